@@ -1,0 +1,67 @@
+/// Depth of every pixel: camera z in metres, row by row; 0 means none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthMap {
+    /// Width, in pixels.
+    pub width: usize,
+    /// Height, in pixels.
+    pub height: usize,
+    /// `width * height` depths in metres, row by row; 0 = none.
+    pub data: Vec<f32>,
+}
+
+impl DepthMap {
+    /// A map without any depth.
+    #[must_use]
+    pub fn empty(width: usize, height: usize) -> Self {
+        Self {
+            width,
+            height,
+            data: vec![0.0; width * height],
+        }
+    }
+
+    /// Depth at column `x`, row `y`, in metres; `None` outside the map or where there is none.
+    #[must_use]
+    pub fn get(&self, x: usize, y: usize) -> Option<f32> {
+        if x >= self.width || y >= self.height {
+            return None;
+        }
+        let depth = self.data[y * self.width + x];
+        (depth > 0.0).then_some(depth)
+    }
+
+    /// Sets the depth at (`x`, `y`) if it is nearer than what is there, or nothing is.
+    ///
+    /// # Panics
+    /// Outside the map.
+    pub fn set_nearest(&mut self, x: usize, y: usize, depth_m: f32) {
+        assert!(x < self.width, "column {x} of {}", self.width);
+        let cell = &mut self.data[y * self.width + x];
+        if *cell == 0.0 || depth_m < *cell {
+            *cell = depth_m;
+        }
+    }
+
+    /// How many pixels have a depth.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.data.iter().filter(|d| **d > 0.0).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_depth_wins_in_any_order() {
+        let mut map = DepthMap::empty(3, 2);
+        for depth in [5.0, 3.0, 4.0] {
+            map.set_nearest(1, 1, depth);
+        }
+        assert_eq!(map.get(1, 1), Some(3.0));
+        assert_eq!(map.get(0, 0), None);
+        assert_eq!(map.get(7, 0), None);
+        assert_eq!(map.count(), 1);
+    }
+}

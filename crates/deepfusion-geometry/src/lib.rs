@@ -1,0 +1,19 @@
+//! Cameras, rigid motions, trajectories and depth maps, in plain `f32` / `f64`.
+//!
+//! # Conventions
+//! - Camera frame: x right, y down, z forward. Vehicle frame: x forward, y left, z up.
+//! - Depth is camera z in metres, never range. Angles in radians, times in seconds, speeds in m/s.
+//! - Transforms are named `a_from_b`: they take a point of frame b to frame a.
+//! - Pixels have integer centres: the centre of the top-left pixel is (0, 0).
+
+mod depth_map;
+mod depth_range;
+mod intrinsics;
+mod se3;
+mod trajectory;
+
+pub use depth_map::DepthMap;
+pub use depth_range::DepthRange;
+pub use intrinsics::Intrinsics;
+pub use se3::Se3;
+pub use trajectory::{StampedPose, Trajectory};

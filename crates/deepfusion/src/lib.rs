@@ -1,0 +1,1 @@
+//! Metric depth from one camera and a speed signal.

@@ -1,0 +1,2 @@
+//! The `deepfusion` command.
+fn main() {}
