@@ -1,1 +1,32 @@
-//! Placeholder.
+//! Depth metrics and the field's evaluation protocol, on plain arrays.
+//!
+//! The way of an image: a [`Prediction`] (depth or disparity, any size) and a ground truth [`Grid`] go into
+//! [`Evaluator::add`]; [`Evaluator::report`] gives the [`Report`], whose JSON is the one scripts rely on and whose
+//! `Display` is the table for people. [`TrivialBaseline`] makes the row that any useful network must beat: the mean
+//! depth of each pixel over the training scans.
+//!
+//! # Conventions
+//! Depth is camera z in metres; ground truth 0 (or NaN, or negative) means none. Disparity is 1/depth in 1/m. Arrays are
+//! H×W, row by row. All arithmetic is in `f64`, whatever the files hold.
+
+mod array_set;
+mod error;
+mod evaluator;
+mod grid;
+mod metrics;
+mod protocol;
+mod report;
+mod resample;
+mod statistics;
+mod table;
+mod trivial;
+
+pub use array_set::{ArraySet, match_names};
+pub use error::{Error, Result};
+pub use evaluator::{Evaluator, ImageScore, Sample};
+pub use grid::{Grid, Prediction};
+pub use metrics::Metrics;
+pub use protocol::{Crop, GroundTruth, Holes, Protocol, Scaling};
+pub use report::{FixedScaled, Points, ProtocolSummary, RangeBin, Report, Scale, TrivialRow};
+pub use statistics::median;
+pub use trivial::TrivialBaseline;

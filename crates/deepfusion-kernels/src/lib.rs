@@ -1,1 +1,27 @@
-//! Placeholder.
+//! The numeric work under the networks, on plain slices, forward and backward: convolution, bilinear
+//! warp, photometric error, batch normalisation, activations.
+//!
+//! Nothing here knows Burn. Images are N×C×H×W, contiguous; work is shared out over rayon's threads,
+//! and every result is independent of how many there are.
+
+mod activation;
+mod adam;
+mod batch_norm;
+mod box_filter;
+mod conv;
+mod photometric;
+mod scratch;
+mod send_ptr;
+mod upsample;
+mod warp;
+
+#[cfg(test)]
+mod noise;
+
+pub use activation::{channel_sums, elu, elu_backward};
+pub use adam::{AdamStep, adam, sum_of_squares};
+pub use batch_norm::{BatchNormSaved, batch_norm, batch_norm_backward, batch_norm_inference};
+pub use conv::{ConvShape, conv2d, conv2d_backward_input, conv2d_backward_weight};
+pub use photometric::{PhotometricShape, photometric_error, photometric_error_backward};
+pub use upsample::{upsample_concat, upsample_concat_backward};
+pub use warp::{WarpShape, warp, warp_backward_coords, warp_backward_image};

@@ -1,1 +1,25 @@
-//! Placeholder.
+//! The depth and pose networks, and the differentiable operations under them.
+//!
+//! A config struct ([`DepthNetConfig`], [`PoseNetConfig`]) says what a network is and is stored beside
+//! its weights; `.init(&device)` builds it; `forward` runs it. Networks on an autodiff device train
+//! (their batch norms follow the batches); [`Module::valid`](burn::module::Module::valid) gives the
+//! network that predicts.
+//!
+//! Tensors are N×C×H×W. Images are RGB in [0, 1]; their normalisation is part of the network.
+
+mod decoder;
+mod depth_net;
+mod error;
+mod init;
+pub mod layers;
+pub mod ops;
+mod pose_net;
+mod resnet;
+pub mod weights;
+
+pub use decoder::{DecoderConfig, DecoderStage, DisparityDecoder, SCALES};
+pub use depth_net::{DepthNet, DepthNetConfig, InputSize};
+pub use error::Error;
+pub use init::{WeightInit, WeightRng};
+pub use pose_net::{PoseDecoder, PoseNet, PoseNetConfig, PoseOutput, RADIANS_PER_UNIT};
+pub use resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth, ResidualBlock};

@@ -1,1 +1,44 @@
-//! Placeholder.
+//! Learning metric depth from a drive: view synthesis, losses, the trainer and its checkpoints.
+//!
+//! The way of a training step: [`Sampler`] → [`SnippetBatch`] → [`Model`] → [`ViewSynthesis`] →
+//! [`LossTerms`] → [`Adam`] → [`TrainEvent`]. The trainer prints nothing: whoever runs it reads its
+//! events.
+
+mod adam;
+mod augment;
+mod batch;
+mod checkpoint;
+mod config;
+mod error;
+mod event;
+pub mod log;
+pub mod losses;
+mod model;
+mod panel;
+mod pose;
+mod predictor;
+mod preset;
+mod resample;
+mod sampler;
+mod source;
+mod trainer;
+mod view_synthesis;
+
+pub use adam::{Adam, StepOutcome};
+pub use augment::Jitter;
+pub use batch::{BatchLoader, SnippetBatch};
+pub use checkpoint::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder};
+pub use config::{Augmentation, DataConfig, LossConfig, Reprojection, ReversedPose, TrainConfig};
+pub use error::Error;
+pub use event::{Control, TrainEvent};
+pub use losses::LossTerms;
+pub use model::{ForwardPass, Model};
+pub use panel::SamplePanel;
+pub use pose::{Motion, rotation_from_axis_angle};
+pub use predictor::{Prediction, Predictor};
+pub use preset::Preset;
+pub use resample::BilinearResize;
+pub use sampler::Sampler;
+pub use source::{Sample, SampleSet};
+pub use trainer::{TrainSummary, Trainer, validation_loss};
+pub use view_synthesis::{Synthesised, ViewSynthesis};

@@ -1,0 +1,63 @@
+use std::path::PathBuf;
+
+/// What can go wrong with a cloud or its file.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file could not be opened, read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Reading or writing a stream failed.
+    #[error("point cloud: {0}")]
+    Stream(#[from] std::io::Error),
+    /// A scan's length is not a whole number of points.
+    #[error(
+        "{}: {bytes} bytes is not a whole number of points (16 bytes each: x, y, z, intensity as f32)",
+        path.display()
+    )]
+    Truncated {
+        /// The scan.
+        path: PathBuf,
+        /// Its length.
+        bytes: u64,
+    },
+    /// A PLY header or body is not what this reader takes.
+    #[error("PLY: {0}")]
+    Ply(String),
+    /// A column, an image or a camera does not fit the points or the depth map.
+    #[error("{what}: {found}, expected {expected}")]
+    Size {
+        /// What has the wrong size.
+        what: &'static str,
+        /// Its size.
+        found: String,
+        /// The size it should have.
+        expected: String,
+    },
+}
+
+/// A result with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// What to do about it, in one line.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::File { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => {
+                Some("the disk is full: free some space and run again".into())
+            }
+            Self::Truncated { .. } => {
+                Some("the scan was cut off while copying or unpacking: fetch it again".into())
+            }
+            Self::Ply(_) => Some(
+                "readable are PLY files in binary_little_endian with float x, y, z in a vertex element".into(),
+            ),
+            _ => None,
+        }
+    }
+}

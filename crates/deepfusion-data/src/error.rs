@@ -1,0 +1,297 @@
+use std::path::{Path, PathBuf};
+
+/// What can go wrong with a recording.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// There is nothing at the path.
+    #[error("{}: no such file or folder", path.display())]
+    NoSuchPath {
+        /// The path given.
+        path: PathBuf,
+    },
+    /// A file could not be opened, read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The path holds something, but no KITTI raw drive.
+    #[error("{}: not a KITTI raw recording: {found}", path.display())]
+    NotKitti {
+        /// The path given.
+        path: PathBuf,
+        /// What is there instead.
+        found: String,
+    },
+    /// A part of the recording that is needed is not there.
+    #[error("{}: missing, it holds {what}", path.display())]
+    Missing {
+        /// Where it should be.
+        path: PathBuf,
+        /// What it would hold.
+        what: &'static str,
+        /// How to get it.
+        remedy: &'static str,
+    },
+    /// No drive has an image of the camera.
+    #[error("{}: no image of camera {camera} (<number>.png or .jpg)", path.display())]
+    NoImages {
+        /// Where they should be.
+        path: PathBuf,
+        /// The camera's number.
+        camera: u8,
+    },
+    /// An image cannot be read.
+    #[error("{}: {problem}", path.display())]
+    Image {
+        /// The image.
+        path: PathBuf,
+        /// Why not.
+        problem: String,
+        /// Whether the file ends early.
+        truncated: bool,
+    },
+    /// An image has another size than its camera's calibration.
+    #[error(
+        "{}: frame {frame} of {drive} is {}x{}, its calibration says {}x{} (S_rect in {})",
+        path.display(), found.0, found.1, expected.0, expected.1, calibration.display()
+    )]
+    FrameSize {
+        /// The image.
+        path: PathBuf,
+        /// Its drive.
+        drive: String,
+        /// Its frame number.
+        frame: u64,
+        /// Its width and height.
+        found: (u32, u32),
+        /// The calibration's.
+        expected: (u32, u32),
+        /// The calibration file.
+        calibration: PathBuf,
+    },
+    /// A calibration file lacks a field or has a bad one.
+    #[error("{}: {field}: {problem}", path.display())]
+    Calibration {
+        /// The file.
+        path: PathBuf,
+        /// The field, such as `P_rect_02`.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A line of a time stamp file cannot be read.
+    #[error("{}:{line}: {problem}", path.display())]
+    TimeStamp {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A frame has no line in the time stamp file.
+    #[error(
+        "{}: has {lines} time stamps (frames 0 to {}), but there is a frame {frame}",
+        path.display(), lines.saturating_sub(1)
+    )]
+    NoTimeStamp {
+        /// The file.
+        path: PathBuf,
+        /// How many time stamps it has.
+        lines: usize,
+        /// The frame without one.
+        frame: u64,
+    },
+    /// An OXTS packet cannot be read.
+    #[error("{}: {field}: {problem}", path.display())]
+    Oxts {
+        /// The packet's file.
+        path: PathBuf,
+        /// The field, such as `vf (value 9 of 30)`.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A split file's line cannot be read.
+    #[error("{}:{line}: {problem}", path.display())]
+    Split {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A split selects no frame of the recording.
+    #[error(
+        "{}: none of its {entries} frames is in {} (it begins with {first})",
+        split.display(), path.display()
+    )]
+    SplitSelectsNothing {
+        /// The split file.
+        split: PathBuf,
+        /// The recording.
+        path: PathBuf,
+        /// How many frames the split names.
+        entries: usize,
+        /// The first of them.
+        first: String,
+    },
+    /// Frame offsets that make no pair.
+    #[error("frame offsets {offsets:?}: expected at least one, none of them 0, none twice")]
+    Offsets {
+        /// The offsets given.
+        offsets: Vec<i32>,
+    },
+    /// A drive of a single frame has no pairs.
+    #[error("{drive}: only frame {frame} is there, and a pair needs two consecutive frames")]
+    OneFrame {
+        /// The drive.
+        drive: String,
+        /// The number of its frame.
+        frame: u64,
+    },
+    /// The car never moves.
+    #[error(
+        "{drive}: the car stands: {pairs} pairs, the fastest at {fastest_mps:.2} m/s, \
+         none reaches {min_speed_mps} m/s"
+    )]
+    Standing {
+        /// The drive.
+        drive: String,
+        /// How many pairs were looked at.
+        pairs: usize,
+        /// Mean speed of the fastest.
+        fastest_mps: f64,
+        /// The speed asked for.
+        min_speed_mps: f64,
+    },
+    /// No pair is left, for the reasons counted.
+    #[error(
+        "{drive}: no pair of frames can be used: of {targets} frames, {no_neighbour} lack a neighbour \
+         at offsets {offsets:?}, {bad_time} have time stamps that do not increase, {no_motion} are not covered by oxts"
+    )]
+    NoPairs {
+        /// The drive.
+        drive: String,
+        /// How many frames were looked at.
+        targets: usize,
+        /// The offsets of the neighbours asked for.
+        offsets: Vec<i32>,
+        /// How many have no such neighbour.
+        no_neighbour: usize,
+        /// How many have time stamps out of order.
+        bad_time: usize,
+        /// How many have no speed measured about their time.
+        no_motion: usize,
+    },
+    /// A velodyne scan cannot be read.
+    #[error(transparent)]
+    Cloud(#[from] deepfusion_cloud::Error),
+    /// An array file cannot be written.
+    #[error("{}: {problem}", path.display())]
+    Array {
+        /// The file.
+        path: PathBuf,
+        /// What went wrong.
+        problem: String,
+    },
+    /// A recording has no scan to make ground truth from.
+    #[error("{}: no velodyne scan belongs to any of the {frames} frames", path.display())]
+    NoScans {
+        /// The recording.
+        path: PathBuf,
+        /// How many frames were looked at.
+        frames: usize,
+    },
+    /// Two things that must have one size differ.
+    #[error("{what} is {}x{}, the image {}x{}", found.0, found.1, image.0, image.1)]
+    Size {
+        /// What differs from the image.
+        what: &'static str,
+        /// Its width and height.
+        found: (u32, u32),
+        /// The image's.
+        image: (u32, u32),
+    },
+}
+
+/// A result with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// The layout a drive must have, for hints.
+const LAYOUT: &str = "expected <date>/<date>_drive_<n>_sync/image_02/data/0000000000.png … with oxts/ beside image_02 \
+                      and calib_cam_to_cam.txt in <date>; give the drive, the date or the folder above";
+
+impl Error {
+    /// An error of the system's at `path`; a missing file is [`Error::NoSuchPath`].
+    #[must_use]
+    pub fn file(path: &Path, source: std::io::Error) -> Self {
+        let path = path.to_owned();
+        match source.kind() {
+            std::io::ErrorKind::NotFound => Self::NoSuchPath { path },
+            _ => Self::File { path, source },
+        }
+    }
+
+    /// What to do about it, in one line.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        use std::io::ErrorKind;
+        let text = match self {
+            Self::NoSuchPath { .. } => "check the spelling, and that the disk is mounted",
+            Self::File { source, .. } => match source.kind() {
+                ErrorKind::StorageFull => "the disk is full: free some space and run again",
+                ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
+                _ => return None,
+            },
+            Self::NotKitti { .. } => LAYOUT,
+            Self::Missing { remedy, .. } => remedy,
+            Self::NoImages { .. } => {
+                "fetch the images, or choose the other camera (2 is left, 3 is right)"
+            }
+            Self::Image {
+                truncated: true, ..
+            } => {
+                "the file was cut off while copying or unpacking: fetch it again, or delete it to leave the frame out"
+            }
+            Self::Image { .. } => "PNG and JPEG are read",
+            Self::FrameSize { .. } => {
+                "use the images and the calibration of one recording; resized images need their own calibration"
+            }
+            Self::Calibration { .. } => "take the calibration files of the drive's own date",
+            Self::TimeStamp { .. } => {
+                "lines look like 2011-09-26 13:04:32.345808896, one for each frame of the drive"
+            }
+            Self::NoTimeStamp { .. } => {
+                "the file lists the whole drive, a frame's number being its line counted from 0: fetch it again"
+            }
+            Self::Oxts { .. } => {
+                "a packet is 30 numbers (oxts/dataformat.txt): repair it, or delete the file to leave the sample out"
+            }
+            Self::Split { .. } => "lines look like: 2011_09_26/2011_09_26_drive_0009_sync 16 l",
+            Self::SplitSelectsNothing { .. } => {
+                "give the folder that holds the dates named in the split, and the camera its sides ask for"
+            }
+            Self::Offsets { .. } => "use [1] for pairs or [-1, 1] for three frames",
+            Self::OneFrame { .. } => "evaluate on it, but train on a longer drive",
+            Self::Standing { .. } => {
+                "a standing camera shows no parallax: leave the drive out, or lower the smallest speed"
+            }
+            Self::NoPairs { .. } => {
+                "train on a drive with consecutive frames and oxts for their times"
+            }
+            Self::Cloud(inner) => return inner.hint(),
+            Self::Array { .. } => "check the free space and the permissions of the folder",
+            Self::NoScans { .. } => {
+                "velodyne_points/data/<frame>.bin is needed: fetch the drive's velodyne_points"
+            }
+            Self::Size { .. } => return None,
+        };
+        Some(text.to_owned())
+    }
+}

@@ -1,0 +1,14 @@
+//! KITTI raw as it lies on disk: `<date>/<date>_drive_<n>_sync/{image_02,image_03,velodyne_points,oxts}`
+//! with the calibration files in `<date>`.
+
+mod calibration;
+pub(crate) mod layout;
+mod oxts;
+mod timestamps;
+mod velodyne;
+
+pub use calibration::Calibration;
+pub use layout::{Drive, find_drives};
+pub use oxts::{OxtsPacket, read_oxts};
+pub use timestamps::TimeStamps;
+pub use velodyne::{GtKind, depth_map};

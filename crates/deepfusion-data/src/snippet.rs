@@ -1,0 +1,154 @@
+//! Training samples: a frame, its neighbours, and how the camera moved between them.
+
+use crate::{Dataset, Error, Result};
+use deepfusion_geometry::Se3;
+use std::collections::{HashMap, HashSet};
+
+/// How the camera moved between a target frame and one of its sources.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EgoMotion {
+    /// Time between the two, in seconds, positive.
+    pub dt_s: f64,
+    /// Length of the camera's translation, in metres.
+    pub distance_m: f64,
+    /// The car's mean speed over that time, in m/s, positive also when reversing.
+    pub speed_mps: f64,
+    /// A point of the target's camera frame in the source's. Driving ahead, its z is negative for the
+    /// frame after the target and positive for the one before.
+    pub source_from_target: Se3,
+}
+
+/// A neighbour of a target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Source {
+    /// Its number less the target's: −1, +1.
+    pub offset: i32,
+    /// Its index in [`Dataset::frames`].
+    pub frame: usize,
+    /// The camera's motion between the two.
+    pub motion: EgoMotion,
+}
+
+/// A training sample: one target and its sources, in the order of the offsets asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Snippet {
+    /// The target's index in [`Dataset::frames`].
+    pub target: usize,
+    /// Its sources.
+    pub sources: Vec<Source>,
+}
+
+impl Dataset {
+    /// The snippets of the selected frames that have every neighbour in `offsets`, in order of their
+    /// numbers: consecutive numbers, real time stamps, ego-motion known, and a mean speed of at least
+    /// `min_speed_mps` in every pair. `[1]` makes the two-frame sample (t, t + 1).
+    ///
+    /// # Errors
+    /// [`Error::Offsets`]; [`Error::Missing`] without time stamps, oxts or the IMU's calibration; and
+    /// where none is left [`Error::OneFrame`], [`Error::Standing`] or [`Error::NoPairs`].
+    pub fn snippets(&self, offsets: &[i32], min_speed_mps: f64) -> Result<Vec<Snippet>> {
+        let distinct: HashSet<_> = offsets.iter().collect();
+        if offsets.is_empty() || offsets.contains(&0) || distinct.len() != offsets.len() {
+            return Err(Error::Offsets {
+                offsets: offsets.to_vec(),
+            });
+        }
+        if let [only] = self.frames() {
+            return Err(Error::OneFrame {
+                drive: self.name().to_owned(),
+                frame: only.number,
+            });
+        }
+        let ego = self.ego()?;
+        let numbers = self.frames().iter().enumerate();
+        let index_of: HashMap<u64, usize> = numbers.map(|(i, f)| (f.number, i)).collect();
+        let (mut no_neighbour, mut bad_time, mut no_motion) = (0, 0, 0);
+        let (mut standing, mut fastest_mps) = (0, 0.0_f64);
+        let mut snippets = Vec::new();
+        'targets: for &target in self.selected() {
+            let number = self.frames()[target].number;
+            let mut sources = Vec::with_capacity(offsets.len());
+            for &offset in offsets {
+                let neighbour = number.checked_add_signed(i64::from(offset));
+                let Some(&frame) = neighbour.and_then(|n| index_of.get(&n)) else {
+                    no_neighbour += 1;
+                    continue 'targets;
+                };
+                match ego.between(self.frames(), target, frame) {
+                    Ok(motion) => sources.push(Source {
+                        offset,
+                        frame,
+                        motion,
+                    }),
+                    Err(NoMotion::Time) => {
+                        bad_time += 1;
+                        continue 'targets;
+                    }
+                    Err(NoMotion::Speed) => {
+                        no_motion += 1;
+                        continue 'targets;
+                    }
+                }
+            }
+            let slowest = sources.iter().map(|s| s.motion.speed_mps);
+            let slowest = slowest.fold(f64::INFINITY, f64::min);
+            if slowest < min_speed_mps {
+                standing += 1;
+                fastest_mps = fastest_mps.max(slowest);
+                continue;
+            }
+            snippets.push(Snippet { target, sources });
+        }
+        if !snippets.is_empty() {
+            return Ok(snippets);
+        }
+        let drive = self.name().to_owned();
+        Err(if standing > 0 {
+            Error::Standing {
+                drive,
+                pairs: standing,
+                fastest_mps,
+                min_speed_mps,
+            }
+        } else {
+            Error::NoPairs {
+                drive,
+                targets: self.selected().len(),
+                offsets: offsets.to_vec(),
+                no_neighbour,
+                bad_time,
+                no_motion,
+            }
+        })
+    }
+}
+
+/// Why the motion between two frames is unknown.
+pub(crate) enum NoMotion {
+    /// Their time stamps do not increase with their numbers.
+    Time,
+    /// No speed was measured about their time.
+    Speed,
+}
+
+/// Splits one drive's snippets, in order, into those to train on and the last `fraction` to validate
+/// on. A training snippet that shares a frame with a validation snippet is left out, so that the
+/// validation frames are unseen. With a single snippet there is nothing to hold out.
+#[must_use]
+pub fn hold_out(mut snippets: Vec<Snippet>, fraction: f64) -> (Vec<Snippet>, Vec<Snippet>) {
+    let held = (snippets.len() as f64 * fraction.clamp(0.0, 1.0)).ceil() as usize;
+    let held = held.min(snippets.len().saturating_sub(1));
+    let validation = snippets.split_off(snippets.len() - held);
+    let frames = |s: &Snippet| -> Vec<usize> {
+        std::iter::once(s.target)
+            .chain(s.sources.iter().map(|source| source.frame))
+            .collect()
+    };
+    let seen: HashSet<usize> = validation.iter().flat_map(frames).collect();
+    let shares = |s: &Snippet| frames(s).iter().any(|f| seen.contains(f));
+    // A drive so short that nothing would be left keeps what it has.
+    if snippets.iter().any(|s| !shares(s)) {
+        snippets.retain(|s| !shares(s));
+    }
+    (snippets, validation)
+}

@@ -1,0 +1,155 @@
+//! The field's split files: lists of frames, one a line.
+
+use crate::dataset::Camera;
+use crate::{Dataset, Error, Result};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// A list of frames, in the file's order.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Split {
+    /// The file it came from.
+    pub path: PathBuf,
+    /// Its lines.
+    pub entries: Vec<SplitEntry>,
+}
+
+/// One line of a split file, `folder index side`.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct SplitEntry {
+    /// `<date>/<drive>`, as written.
+    pub folder: String,
+    /// The frame's number.
+    pub frame: u64,
+    /// `l` is camera 2, `r` is camera 3; without a side, camera 2.
+    pub camera: Camera,
+}
+
+impl Split {
+    /// Reads lines like `2011_09_26/2011_09_26_drive_0009_sync 0000000016 l`; the index may be padded
+    /// with zeros or not, empty lines are skipped.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchPath`] / [`Error::File`], or [`Error::Split`] with the number of a bad line.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+        let mut entries = Vec::new();
+        for (i, line) in String::from_utf8_lossy(&bytes).lines().enumerate() {
+            if line.trim().is_empty() {
+                continue;
+            }
+            entries.push(parse(line).map_err(|problem| Error::Split {
+                path: path.to_owned(),
+                line: i + 1,
+                problem,
+            })?);
+        }
+        if entries.is_empty() {
+            return Err(Error::Split {
+                path: path.to_owned(),
+                line: 1,
+                problem: "the file names no frame".into(),
+            });
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            entries,
+        })
+    }
+
+    /// Where the split's frames are, in the split's order: index into `datasets` and index of the frame
+    /// in it. Frames that are not there are left out; compare the length with [`Self::entries`].
+    #[must_use]
+    pub fn locate(&self, datasets: &[Dataset]) -> Vec<(usize, usize)> {
+        let mut places = HashMap::new();
+        for (d, dataset) in datasets.iter().enumerate() {
+            for (f, frame) in dataset.frames().iter().enumerate() {
+                places.insert(
+                    (dataset.split_name(), frame.number, dataset.camera()),
+                    (d, f),
+                );
+            }
+        }
+        let entries = self.entries.iter();
+        entries
+            .filter_map(|e| places.get(&(e.folder.as_str(), e.frame, e.camera)).copied())
+            .collect()
+    }
+}
+
+impl std::fmt::Display for SplitEntry {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let side = match self.camera {
+            Camera::Left => 'l',
+            Camera::Right => 'r',
+        };
+        write!(f, "{} {} {side}", self.folder, self.frame)
+    }
+}
+
+fn parse(line: &str) -> std::result::Result<SplitEntry, String> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let (folder, index, side) = match words.as_slice() {
+        [folder, index] => (folder, index, "l"),
+        [folder, index, side] => (folder, index, *side),
+        _ => {
+            return Err(format!(
+                "{} words, expected folder, index and side",
+                words.len()
+            ));
+        }
+    };
+    let frame = index
+        .parse()
+        .map_err(|_| format!("index '{index}' is not a frame number"))?;
+    let camera = match side {
+        "l" => Camera::Left,
+        "r" => Camera::Right,
+        _ => return Err(format!("side '{side}', expected l or r")),
+    };
+    Ok(SplitEntry {
+        folder: folder.trim_end_matches('/').to_owned(),
+        frame,
+        camera,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn both_ways_of_writing_an_index_are_one_frame() {
+        let padded = parse("2011_09_26/2011_09_26_drive_0009_sync 0000000016 l").unwrap();
+        let plain = parse("2011_09_26/2011_09_26_drive_0009_sync 16").unwrap();
+        assert_eq!(padded, plain);
+        assert_eq!(parse("a/b 3 r").unwrap().camera, Camera::Right);
+    }
+
+    #[test]
+    fn a_bad_line_is_named_with_its_number() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        for bad in ["a/b", "a/b x l", "a/b 3 m", "a b c d"] {
+            std::fs::write(file.path(), format!("a/b 1 l\n\n{bad}\n")).unwrap();
+            let error = Split::read(file.path()).unwrap_err();
+            assert!(matches!(error, Error::Split { line: 3, .. }), "{error}");
+        }
+        std::fs::write(file.path(), "\n\n").unwrap();
+        assert!(Split::read(file.path()).is_err(), "no frames at all");
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_never_panics(line in ".{0,60}") {
+            let _ = parse(&line);
+        }
+
+        #[test]
+        fn an_entry_is_read_as_it_is_shown(frame in any::<u64>(), right in any::<bool>()) {
+            let camera = if right { Camera::Right } else { Camera::Left };
+            let entry = SplitEntry { folder: "d/e_sync".into(), frame, camera };
+            prop_assert_eq!(parse(&entry.to_string()).unwrap(), entry);
+        }
+    }
+}

@@ -1,0 +1,272 @@
+use std::collections::HashSet;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use ndarray::{ArrayD, Axis};
+use ndarray_npy::{NpzReader, ReadNpyError, ReadNpyExt, ReadNpzError};
+
+use crate::error::first_names;
+use crate::{Error, Grid, Result};
+
+/// A file of H×W arrays, read one at a time: a NumPy `.npz` (arrays with names), or an N×H×W (or H×W) `.npy`, whose
+/// arrays have no name but an order. `float32` and `float64`.
+#[derive(Debug)]
+pub struct ArraySet {
+    path: PathBuf,
+    source: Source,
+}
+
+enum Source {
+    Npz {
+        reader: Box<NpzReader<BufReader<File>>>,
+        names: Vec<String>,
+    },
+    /// N×H×W.
+    Stack(ArrayD<f64>),
+}
+
+impl std::fmt::Debug for Source {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Npz { names, .. } => f.debug_tuple("Npz").field(names).finish(),
+            Self::Stack(array) => f.debug_tuple("Stack").field(&array.shape()).finish(),
+        }
+    }
+}
+
+impl ArraySet {
+    /// Opens a file; what it is is told by its content, not its name.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where it cannot be read, [`Error::ArrayFile`] where it is no such file.
+    pub fn open(path: &Path) -> Result<Self> {
+        let io = |source| Error::Io {
+            path: path.to_owned(),
+            source,
+        };
+        let mut file = BufReader::new(File::open(path).map_err(io)?);
+        let mut magic = Vec::new();
+        file.by_ref().take(6).read_to_end(&mut magic).map_err(io)?;
+        file.seek(SeekFrom::Start(0)).map_err(io)?;
+        let source = if magic.starts_with(b"PK") {
+            let mut reader = NpzReader::new(file).map_err(|e| unreadable_archive(path, &e))?;
+            let names = reader.names().map_err(|e| unreadable_archive(path, &e))?;
+            Source::Npz {
+                reader: Box::new(reader),
+                names,
+            }
+        } else if magic == b"\x93NUMPY" {
+            let array = match ArrayD::<f64>::read_npy(&mut file) {
+                Err(ReadNpyError::WrongDescriptor(_)) => {
+                    file.seek(SeekFrom::Start(0)).map_err(io)?;
+                    ArrayD::<f32>::read_npy(&mut file).map(|a| a.mapv(f64::from))
+                }
+                other => other,
+            };
+            Source::Stack(stack(
+                path,
+                array.map_err(|e| unreadable(path, "the array", e))?,
+            )?)
+        } else {
+            return Err(Error::ArrayFile {
+                path: path.to_owned(),
+                what: "is neither an .npz nor an .npy file".into(),
+                remedy: Some(
+                    "write it with numpy.savez (arrays with names) or numpy.save (N×H×W in split order)",
+                ),
+            });
+        };
+        let set = Self {
+            path: path.to_owned(),
+            source,
+        };
+        if set.is_empty() {
+            return Err(Error::ArrayFile {
+                path: path.to_owned(),
+                what: "has no arrays".into(),
+                remedy: None,
+            });
+        }
+        Ok(set)
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Names in the file's order; `None` for an N×H×W stack.
+    #[must_use]
+    pub fn names(&self) -> Option<&[String]> {
+        match &self.source {
+            Source::Npz { names, .. } => Some(names),
+            Source::Stack(_) => None,
+        }
+    }
+
+    /// How many arrays it has.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match &self.source {
+            Source::Npz { names, .. } => names.len(),
+            Source::Stack(array) => array.len_of(Axis(0)),
+        }
+    }
+
+    /// Whether it has none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Reads the array at `index`, in the file's order. Axes of length 1 beside H×W are dropped.
+    ///
+    /// # Errors
+    /// [`Error::ArrayFile`] naming the array: no such index, not two-dimensional, neither `float32` nor `float64`, damaged.
+    pub fn read(&mut self, index: usize) -> Result<Grid> {
+        let len = self.len();
+        if index >= len {
+            return Err(Error::ArrayFile {
+                path: self.path.clone(),
+                what: format!("has {len} arrays, number {index} was asked for"),
+                remedy: None,
+            });
+        }
+        match &mut self.source {
+            Source::Stack(array) => grid(
+                &self.path,
+                &format!("array {index}"),
+                array.index_axis(Axis(0), index).to_owned(),
+            ),
+            Source::Npz { reader, names } => {
+                let name = names[index].clone();
+                // By index, not by name: an archive may hold a name twice.
+                let array = match reader.by_index::<ndarray::OwnedRepr<f64>, _>(index) {
+                    Err(ReadNpzError::Npy(ReadNpyError::WrongDescriptor(_))) => reader
+                        .by_index::<ndarray::OwnedRepr<f32>, _>(index)
+                        .map(|a| a.mapv(f64::from)),
+                    other => other,
+                };
+                let label = format!("array `{name}`");
+                let array = array.map_err(|e| match e {
+                    ReadNpzError::Npy(e) => unreadable(&self.path, &label, e),
+                    ReadNpzError::Zip(_) => unreadable_archive(&self.path, &e),
+                })?;
+                grid(&self.path, &label, array)
+            }
+        }
+    }
+}
+
+/// Which array of `predictions` belongs to which of `ground_truth`: by name where both have names, else by order.
+/// Triples of (name, index in `predictions`, index in `ground_truth`), in the ground truth's order.
+///
+/// # Errors
+/// [`Error::UnmatchedNames`] where either has an array that the other has not; [`Error::Count`] where arrays in split
+/// order are more or fewer than their counterpart's.
+pub fn match_names(
+    predictions: &ArraySet,
+    ground_truth: &ArraySet,
+) -> Result<Vec<(String, usize, usize)>> {
+    let (Some(predicted), Some(known)) = (predictions.names(), ground_truth.names()) else {
+        let n = ground_truth.len();
+        if predictions.len() != n {
+            return Err(Error::Count {
+                path: predictions.path.clone(),
+                count: predictions.len(),
+                other: ground_truth.path.clone(),
+                expected: n,
+            });
+        }
+        let names = ground_truth.names().or(predictions.names());
+        let name = |i: usize| names.map_or_else(|| format!("array {i}"), |names| names[i].clone());
+        return Ok((0..n).map(|i| (name(i), i, i)).collect());
+    };
+    require(known, &ground_truth.path, predicted, &predictions.path)?;
+    require(predicted, &predictions.path, known, &ground_truth.path)?;
+    let place = |name: &String| predicted.iter().position(|p| p == name);
+    Ok(known
+        .iter()
+        .enumerate()
+        .filter_map(|(i, name)| Some((name.clone(), place(name)?, i)))
+        .collect())
+}
+
+/// Fails where one of `wanted` (the names in `from`) is not among `present` (those in `path`).
+fn require(wanted: &[String], from: &Path, present: &[String], path: &Path) -> Result<()> {
+    let set: HashSet<_> = present.iter().collect();
+    let missing: Vec<_> = wanted.iter().filter(|name| !set.contains(name)).collect();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    Err(Error::UnmatchedNames {
+        path: path.to_owned(),
+        count: missing.len(),
+        of: format!("the {} in {}", wanted.len(), from.display()),
+        names: first_names(missing),
+        instead: present.first().cloned(),
+    })
+}
+
+/// N×H×W of an array that is that, or a single H×W.
+fn stack(path: &Path, array: ArrayD<f64>) -> Result<ArrayD<f64>> {
+    match array.ndim() {
+        2 => Ok(array.insert_axis(Axis(0))),
+        3 | 4 => Ok(array),
+        _ => Err(wrong_shape(path, "the array", array.shape(), "N×H×W")),
+    }
+}
+
+fn grid(path: &Path, label: &str, mut array: ArrayD<f64>) -> Result<Grid> {
+    let shape = array.shape().to_owned();
+    while array.ndim() > 2 {
+        match array.shape().iter().position(|n| *n == 1) {
+            Some(axis) => array = array.index_axis_move(Axis(axis), 0),
+            None => return Err(wrong_shape(path, label, &shape, "H×W")),
+        }
+    }
+    let &[height, width] = array.shape() else {
+        return Err(wrong_shape(path, label, &shape, "H×W"));
+    };
+    // Iterates in logical order, whatever the memory order was (NumPy may write Fortran order).
+    Grid::new(width, height, array.iter().copied().collect())
+        .map_err(|_| wrong_shape(path, label, &shape, "H×W, not empty"))
+}
+
+fn wrong_shape(path: &Path, label: &str, shape: &[usize], expected: &str) -> Error {
+    Error::ArrayFile {
+        path: path.to_owned(),
+        what: format!("{label} has shape {shape:?}, expected {expected}"),
+        remedy: Some("one H×W array an image; different sizes need an .npz"),
+    }
+}
+
+fn unreadable(path: &Path, label: &str, error: ReadNpyError) -> Error {
+    let (what, remedy) = match error {
+        ReadNpyError::WrongDescriptor(found) => (
+            format!("{label} holds values of type {found}, expected float32 or float64"),
+            Some(
+                "convert with .astype(numpy.float32); pickled object arrays: numpy.savez(file, **{name: array, …})",
+            ),
+        ),
+        other => (
+            format!("{label} cannot be read: {other}"),
+            Some("the file may be cut off: write it again"),
+        ),
+    };
+    Error::ArrayFile {
+        path: path.to_owned(),
+        what,
+        remedy,
+    }
+}
+
+fn unreadable_archive(path: &Path, error: &ReadNpzError) -> Error {
+    Error::ArrayFile {
+        path: path.to_owned(),
+        what: format!("cannot be read: {error}"),
+        remedy: Some("the file may be cut off: write it again"),
+    }
+}

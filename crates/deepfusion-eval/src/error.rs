@@ -1,0 +1,153 @@
+use std::path::PathBuf;
+
+/// What can go wrong while arrays are read and compared.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A prediction holds values that cannot be a depth or disparity.
+    #[error(
+        "prediction `{name}` has {count} of {total} values that are no {kind}: the first is {value} at column {x}, row {y} \
+         (expected finite and above 0)"
+    )]
+    InvalidPrediction {
+        /// Name of the array.
+        name: String,
+        /// "depth" or "disparity".
+        kind: &'static str,
+        /// The first such value.
+        value: f64,
+        /// Its column.
+        x: usize,
+        /// Its row.
+        y: usize,
+        /// How many there are.
+        count: usize,
+        /// How many values the array has.
+        total: usize,
+    },
+    /// Width × height and the number of values differ, or one of them is zero.
+    #[error("`{name}` is {width}×{height} but has {len} values")]
+    Shape {
+        /// What the array is.
+        name: String,
+        /// Its width, in pixels.
+        width: usize,
+        /// Its height, in pixels.
+        height: usize,
+        /// How many values were given.
+        len: usize,
+    },
+    /// A protocol that nothing can be measured with.
+    #[error("{field} is {value}: expected {expected}")]
+    Protocol {
+        /// The field of [`crate::Protocol`].
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// No image had a single pixel to compare.
+    #[error("no image has a ground-truth depth inside the mask ({skipped} skipped: {names})")]
+    NothingToEvaluate {
+        /// How many images were skipped.
+        skipped: usize,
+        /// The first few names.
+        names: String,
+    },
+    /// A file that cannot be opened or read.
+    #[error("cannot read {path}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// An array file whose content is not what was expected.
+    #[error("{path}: {what}")]
+    ArrayFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and with which array.
+        what: String,
+        /// What to do about it, if there is something.
+        remedy: Option<&'static str>,
+    },
+    /// Ground truth without prediction, or the other way round.
+    #[error("{path} has no array for {count} of {of}: {names}")]
+    UnmatchedNames {
+        /// The file in which arrays are missing.
+        path: PathBuf,
+        /// How many are missing.
+        count: usize,
+        /// Where the names come from ("the 25 in gt.npz").
+        of: String,
+        /// The first few missing names.
+        names: String,
+        /// A name that the file has instead.
+        instead: Option<String>,
+    },
+    /// A stack of arrays in split order that is longer or shorter than its counterpart.
+    #[error(
+        "{path} has {count} arrays, {other} has {expected}: arrays in split order need the same number"
+    )]
+    Count {
+        /// The prediction file.
+        path: PathBuf,
+        /// How many arrays it has.
+        count: usize,
+        /// The ground-truth file.
+        other: PathBuf,
+        /// How many that has.
+        expected: usize,
+    },
+}
+
+/// A result of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// A one-line remedy, where there is one.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::InvalidPrediction { kind, .. } => Some(format!(
+                "a network's {kind} is positive everywhere; where these values mean \"no prediction\", pass --allow-holes: \
+                 they are left out and counted as hole_rate"
+            )),
+            Self::Shape { .. } => Some("arrays are H×W, row by row".into()),
+            Self::Protocol { field, expected, .. } => Some(format!("set {field} to {expected}")),
+            Self::NothingToEvaluate { .. } => Some(
+                "check that the ground truth is in metres and 0 where there is none, and that --crop and --cap leave pixels"
+                    .into(),
+            ),
+            Self::Io { source, .. } => match source.kind() {
+                std::io::ErrorKind::NotFound => Some("check the spelling, and that the disk is mounted".into()),
+                std::io::ErrorKind::PermissionDenied => Some("check the permissions of the file".into()),
+                _ => None,
+            },
+            Self::ArrayFile { remedy, .. } => remedy.map(str::to_owned),
+            Self::UnmatchedNames { instead, .. } => Some(match instead {
+                Some(name) => format!(
+                    "arrays are matched by name, and this file names its arrays like `{name}`; the same names are needed in both"
+                ),
+                None => "arrays are matched by name; write both files from the same list of frames".into(),
+            }),
+            Self::Count { .. } => Some(
+                "write the predictions from the same split file as the ground truth, or use .npz files with names".into(),
+            ),
+        }
+    }
+}
+
+/// The first few of `names`, for a message.
+pub(crate) fn first_names<'a>(names: impl IntoIterator<Item = &'a String>) -> String {
+    let names: Vec<_> = names.into_iter().collect();
+    let shown: Vec<_> = names.iter().take(5).map(|n| n.as_str()).collect();
+    let more = if names.len() > shown.len() {
+        ", …"
+    } else {
+        ""
+    };
+    format!("{}{more}", shown.join(", "))
+}

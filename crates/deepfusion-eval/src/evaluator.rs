@@ -1,0 +1,347 @@
+use deepfusion_geometry::Intrinsics;
+
+use crate::error::first_names;
+use crate::metrics::{Metrics, Sums};
+use crate::report::{FixedScaled, Points, ProtocolSummary, RangeBin, Report, Scale};
+use crate::resample::{Axis, sample};
+use crate::statistics::{Reservoir, bootstrap_mean_ci95, mean, median, standard_deviation};
+use crate::{Error, Grid, Holes, Prediction, Protocol, Result, Scaling};
+
+/// Borders of the range bins, in metres (SPEC 5).
+const RANGES_M: [u32; 5] = [0, 10, 20, 40, 80];
+
+/// An image to evaluate, with what is only known for some.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample<'a> {
+    /// Its name in messages.
+    pub name: &'a str,
+    /// What the method says, at any size.
+    pub prediction: &'a Prediction,
+    /// Depth in metres, 0 = none. Its size is the one at which is compared.
+    pub ground_truth: &'a Grid,
+    /// Which pixels of the ground truth move, H×W row by row, where labels or FMCW velocities tell.
+    pub moving: Option<&'a [bool]>,
+    /// The camera at the ground truth's size: the point statistics then are distances in space, else along z.
+    pub intrinsics: Option<&'a Intrinsics>,
+}
+
+/// What one image scored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageScore {
+    /// Its name.
+    pub name: String,
+    /// How many pixels were compared.
+    pub pixels: usize,
+    /// Metrics of the prediction as it is.
+    pub unscaled: Metrics,
+    /// Metrics of the prediction times `ratio`.
+    pub median_scaled: Metrics,
+    /// Metrics of the prediction times the fixed factor, where the protocol has one.
+    pub fixed_scaled: Option<Metrics>,
+    /// median(gt) / median(prediction) over the compared pixels, before clamping: 1 for a metric method.
+    pub ratio: f64,
+    /// Unscaled metrics of the pixels that do not move, where known.
+    pub still: Option<Metrics>,
+    /// Unscaled metrics of those that do, where known.
+    pub moving: Option<Metrics>,
+}
+
+/// Compares predictions with ground truth, image by image, and sums up.
+///
+/// ```
+/// use deepfusion_eval::{Evaluator, Grid, Prediction, Protocol};
+/// let truth = Grid::new(2, 1, vec![10.0, 20.0])?;
+/// let depth = Prediction::Depth(Grid::new(2, 1, vec![11.0, 20.0])?);
+/// let mut evaluator = Evaluator::new(Protocol::default())?;
+/// evaluator.add("frame 0", &depth, &truth)?;
+/// assert!((evaluator.report()?.unscaled.abs_rel - 0.05).abs() < 1e-12);
+/// # Ok::<(), deepfusion_eval::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Evaluator {
+    protocol: Protocol,
+    images: Vec<ImageScore>,
+    skipped: Vec<String>,
+    bins: [Sums; RANGES_M.len() - 1],
+    points: Reservoir,
+    /// Pixels with ground truth inside the mask, and those of them without prediction.
+    masked: usize,
+    holes: usize,
+}
+
+impl Evaluator {
+    /// An evaluator that has seen nothing yet.
+    ///
+    /// # Errors
+    /// [`Error::Protocol`] for a protocol that nothing can be measured with.
+    pub fn new(protocol: Protocol) -> Result<Self> {
+        protocol.validate()?;
+        Ok(Self {
+            images: Vec::new(),
+            skipped: Vec::new(),
+            bins: Default::default(),
+            points: Reservoir::new(protocol.points, protocol.seed),
+            masked: 0,
+            holes: 0,
+            protocol,
+        })
+    }
+
+    /// Compares one image; its score, or `None` where the image has no pixel to compare (it is then named in the report).
+    ///
+    /// # Errors
+    /// [`Error::InvalidPrediction`] where the prediction holds values that are no depth and holes are refused.
+    pub fn add(
+        &mut self,
+        name: &str,
+        prediction: &Prediction,
+        ground_truth: &Grid,
+    ) -> Result<Option<&ImageScore>> {
+        self.add_sample(&Sample {
+            name,
+            prediction,
+            ground_truth,
+            moving: None,
+            intrinsics: None,
+        })
+    }
+
+    /// As [`Evaluator::add`], with what is only known for some images.
+    ///
+    /// # Errors
+    /// As [`Evaluator::add`]; [`Error::Shape`] where the moving labels are of another size than the ground truth.
+    pub fn add_sample(&mut self, image: &Sample<'_>) -> Result<Option<&ImageScore>> {
+        let truth = image.ground_truth;
+        if let Some(labels) = image.moving
+            && labels.len() != truth.values().len()
+        {
+            return Err(Error::Shape {
+                name: format!("moving labels of {}", image.name),
+                width: truth.width(),
+                height: truth.height(),
+                len: labels.len(),
+            });
+        }
+        let disparities = self.checked_disparities(image)?;
+        let pixels = self.compared_pixels(image, &disparities);
+        let (Some(middle_gt), Some(middle_pred)) =
+            (median_of(&pixels, |p| p.gt), median_of(&pixels, |p| p.pred))
+        else {
+            self.skipped.push(image.name.to_owned());
+            return Ok(None);
+        };
+        let ratio = middle_gt / middle_pred;
+        let unscaled = self.sums(&pixels, 1.0, |_| true);
+        let (Some(all), Some(median_scaled)) = (
+            unscaled.metrics(),
+            self.sums(&pixels, ratio, |_| true).metrics(),
+        ) else {
+            self.skipped.push(image.name.to_owned());
+            return Ok(None);
+        };
+        let fixed_scaled = match self.protocol.scaling {
+            Scaling::Fixed(factor) => self.sums(&pixels, factor, |_| true).metrics(),
+            Scaling::None | Scaling::Median => None,
+        };
+        let part = |moving: bool| {
+            image.moving.and_then(|labels| {
+                self.sums(&pixels, 1.0, |p| labels[p.index] == moving)
+                    .metrics()
+            })
+        };
+        let score = ImageScore {
+            name: image.name.to_owned(),
+            pixels: pixels.len(),
+            unscaled: all,
+            median_scaled,
+            fixed_scaled,
+            ratio,
+            still: part(false),
+            moving: part(true),
+        };
+        for (bin, edges) in RANGES_M.windows(2).enumerate() {
+            let inside = |p: &Pixel| p.gt >= f64::from(edges[0]) && p.gt < f64::from(edges[1]);
+            let sums = self.sums(&pixels, 1.0, inside);
+            self.bins[bin].add(&sums);
+        }
+        if self.protocol.points > 0 {
+            for pixel in &pixels {
+                let length = image
+                    .intrinsics
+                    .map_or(1.0, |k| ray_length(k, pixel.index, truth.width()));
+                self.points
+                    .push((self.clamp(pixel.pred) - pixel.gt).abs() * length);
+            }
+        }
+        self.images.push(score);
+        Ok(self.images.last())
+    }
+
+    /// Scores of the images so far, in the order in which they came.
+    #[must_use]
+    pub fn images(&self) -> &[ImageScore] {
+        &self.images
+    }
+
+    /// Sums up.
+    ///
+    /// # Errors
+    /// [`Error::NothingToEvaluate`] where no image had a pixel to compare.
+    pub fn report(&self) -> Result<Report> {
+        let nothing = || Error::NothingToEvaluate {
+            skipped: self.skipped.len(),
+            names: first_names(&self.skipped),
+        };
+        let images = &self.images;
+        let average = |part: fn(&ImageScore) -> Option<&Metrics>| {
+            Metrics::mean(images.iter().filter_map(part))
+        };
+        let unscaled = average(|i| Some(&i.unscaled)).ok_or_else(nothing)?;
+        let median_scaled = average(|i| Some(&i.median_scaled)).ok_or_else(nothing)?;
+        let fixed_scaled = match self.protocol.scaling {
+            Scaling::Fixed(factor) => {
+                average(|i| i.fixed_scaled.as_ref()).map(|metrics| FixedScaled { factor, metrics })
+            }
+            Scaling::None | Scaling::Median => None,
+        };
+        Ok(Report {
+            n: images.len(),
+            protocol: ProtocolSummary::from(&self.protocol),
+            unscaled,
+            median_scaled,
+            fixed_scaled,
+            scale: self.scale().ok_or_else(nothing)?,
+            ranges: self.ranges(),
+            still: average(|i| i.still.as_ref()),
+            moving: average(|i| i.moving.as_ref()),
+            hole_rate: (self.protocol.holes == Holes::Skip)
+                .then(|| self.holes as f64 / self.masked.max(1) as f64),
+            points: self.point_statistics(),
+            trivial: None,
+            skipped: self.skipped.clone(),
+        })
+    }
+
+    fn scale(&self) -> Option<Scale> {
+        let ratios: Vec<f64> = self.images.iter().map(|i| i.ratio).collect();
+        // ln(median(pred) / median(gt)): positive where the method sees things too far away.
+        let biases: Vec<f64> = ratios.iter().map(|r| -r.ln()).collect();
+        let middle = median(&ratios)?;
+        Some(Scale {
+            median: middle,
+            std_rel: standard_deviation(&ratios, 0)? / middle,
+            bias: mean(&biases)?,
+            bias_ci95: bootstrap_mean_ci95(&biases, self.protocol.seed),
+        })
+    }
+
+    fn ranges(&self) -> Vec<RangeBin> {
+        RANGES_M
+            .windows(2)
+            .zip(&self.bins)
+            .map(|(edges, sums)| {
+                let metrics = sums.metrics();
+                RangeBin {
+                    from_m: edges[0],
+                    to_m: edges[1],
+                    n: sums.n,
+                    abs_rel: metrics.map(|m| m.abs_rel),
+                    rmse: metrics.map(|m| m.rmse),
+                }
+            })
+            .collect()
+    }
+
+    fn point_statistics(&self) -> Option<Points> {
+        let distances = &self.points.items;
+        let mean_m = mean(distances)?;
+        let std_m = standard_deviation(distances, 1);
+        Some(Points {
+            n: distances.len(),
+            mean_m,
+            std_m,
+            sem_m: std_m.map(|s| s / (distances.len() as f64).sqrt()),
+        })
+    }
+
+    fn clamp(&self, depth_m: f64) -> f64 {
+        depth_m.clamp(self.protocol.min_m, self.protocol.cap_m)
+    }
+
+    fn sums(&self, pixels: &[Pixel], factor: f64, wanted: impl Fn(&Pixel) -> bool) -> Sums {
+        let mut sums = Sums::default();
+        for pixel in pixels.iter().filter(|p| wanted(p)) {
+            sums.push(pixel.gt, self.clamp(pixel.pred * factor));
+        }
+        sums
+    }
+
+    fn checked_disparities(&self, image: &Sample<'_>) -> Result<Vec<Option<f64>>> {
+        let disparities = image.prediction.disparities();
+        let first = disparities.iter().position(Option::is_none);
+        match (first, self.protocol.holes) {
+            (Some(index), Holes::Refuse) => {
+                let grid = image.prediction.grid();
+                Err(Error::InvalidPrediction {
+                    name: image.name.to_owned(),
+                    kind: image.prediction.kind(),
+                    value: grid.values()[index],
+                    x: index % grid.width(),
+                    y: index / grid.width(),
+                    count: disparities.iter().filter(|d| d.is_none()).count(),
+                    total: disparities.len(),
+                })
+            }
+            _ => Ok(disparities),
+        }
+    }
+
+    /// Steps 1 and 2 of SPEC 5: the pixels inside the mask, with the prediction resized as disparity and inverted. Only
+    /// these are resized: ground truth is sparse.
+    fn compared_pixels(&mut self, image: &Sample<'_>, disparities: &[Option<f64>]) -> Vec<Pixel> {
+        let (truth, grid) = (image.ground_truth, image.prediction.grid());
+        let columns = Axis::new(grid.width(), truth.width());
+        let rows = Axis::new(grid.height(), truth.height());
+        let (window_rows, window_columns) =
+            self.protocol.crop.window(truth.width(), truth.height());
+        let mut pixels = Vec::new();
+        for y in window_rows {
+            for x in window_columns.clone() {
+                let index = y * truth.width() + x;
+                let gt = truth.values()[index];
+                if !(gt > self.protocol.min_m && gt < self.protocol.cap_m) {
+                    continue;
+                }
+                self.masked += 1;
+                match sample(disparities, grid.width(), &columns, &rows, x, y) {
+                    Some(disparity) => pixels.push(Pixel {
+                        index,
+                        gt,
+                        pred: 1.0 / disparity,
+                    }),
+                    None => self.holes += 1,
+                }
+            }
+        }
+        pixels
+    }
+}
+
+/// A compared pixel: depths in metres.
+#[derive(Debug, Clone, Copy)]
+struct Pixel {
+    /// Where it is in the ground truth, row by row.
+    index: usize,
+    gt: f64,
+    pred: f64,
+}
+
+fn median_of(pixels: &[Pixel], value: fn(&Pixel) -> f64) -> Option<f64> {
+    median(&pixels.iter().map(value).collect::<Vec<_>>())
+}
+
+/// Length of the viewing ray to z = 1 through a pixel.
+fn ray_length(k: &Intrinsics, index: usize, width: usize) -> f64 {
+    k.back_project((index % width) as f64, (index / width) as f64, 1.0)
+        .norm()
+}

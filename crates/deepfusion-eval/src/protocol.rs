@@ -1,0 +1,176 @@
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Result};
+
+/// The part of the image that is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Crop {
+    /// The whole image.
+    #[default]
+    None,
+    /// Garg et al.'s window, the field's default for KITTI raw.
+    Garg,
+}
+
+impl Crop {
+    /// Rows and columns that are compared in an image of `width` × `height`: half-open ranges of whole pixels, the
+    /// fractions truncated as the field's scripts do.
+    #[must_use]
+    pub fn window(
+        self,
+        width: usize,
+        height: usize,
+    ) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
+        match self {
+            Self::None => (0..height, 0..width),
+            Self::Garg => {
+                let cut = |fraction: f64, size: usize| (fraction * size as f64) as usize;
+                (
+                    cut(0.408_108_11, height)..cut(0.991_891_89, height),
+                    cut(0.035_947_71, width)..cut(0.964_052_29, width),
+                )
+            }
+        }
+    }
+}
+
+/// Which scaling heads the report. Unscaled and median-scaled metrics are always both reported.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Scaling {
+    /// Metres as predicted: the headline of a metric method.
+    #[default]
+    None,
+    /// Each prediction times median(gt) / median(prediction).
+    Median,
+    /// Each prediction times this factor; reported as a row of its own.
+    Fixed(f64),
+}
+
+/// What to do with predicted values that are no depth (NaN, infinite, zero or negative).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Holes {
+    /// An error that names the array: the default, since a network has no holes.
+    #[default]
+    Refuse,
+    /// They mean "no prediction here": left out of the metrics and counted in `hole_rate`.
+    Skip,
+}
+
+/// Which depth the ground truth holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GroundTruth {
+    /// Camera z.
+    #[default]
+    Z,
+    /// The velodyne's forward distance, as in the field's `eigen` files.
+    Velodyne,
+}
+
+/// How predictions are compared with ground truth (SPEC 5).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Protocol {
+    /// The part of the image that is compared.
+    pub crop: Crop,
+    /// Ground truth at or beyond this is left out, predictions are clamped to it. Metres.
+    pub cap_m: f64,
+    /// Ground truth at or below this is left out, predictions are clamped to it. Metres, above 0.
+    pub min_m: f64,
+    /// Which depth the ground truth holds; only recorded.
+    pub gt: GroundTruth,
+    /// Which scaling heads the report.
+    pub scaling: Scaling,
+    /// What to do with predicted values that are no depth.
+    pub holes: Holes,
+    /// How many pixels to draw for the point statistics (the paper's Fig. 11); 0 = none.
+    pub points: usize,
+    /// Seed of the bootstrap and of the drawn points.
+    pub seed: u64,
+}
+
+impl Default for Protocol {
+    /// The whole image, 1e-3 to 80 m, camera z, unscaled.
+    fn default() -> Self {
+        Self {
+            crop: Crop::None,
+            cap_m: 80.0,
+            min_m: 1e-3,
+            gt: GroundTruth::Z,
+            scaling: Scaling::None,
+            holes: Holes::Refuse,
+            points: 0,
+            seed: 0,
+        }
+    }
+}
+
+impl Protocol {
+    /// Checks that something can be measured with it.
+    ///
+    /// # Errors
+    /// [`Error::Protocol`] naming the field.
+    pub fn validate(&self) -> Result<()> {
+        let fail = |field, value: f64, expected| {
+            Err(Error::Protocol {
+                field,
+                value: value.to_string(),
+                expected,
+            })
+        };
+        if !(self.min_m.is_finite() && self.min_m > 0.0) {
+            return fail("the minimum depth", self.min_m, "metres above 0");
+        }
+        if !(self.cap_m.is_finite() && self.cap_m > self.min_m) {
+            return fail("the cap", self.cap_m, "metres above the minimum depth");
+        }
+        if let Scaling::Fixed(factor) = self.scaling
+            && !(factor.is_finite() && factor > 0.0)
+        {
+            return fail("the fixed scale", factor, "a factor above 0");
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_garg_window_of_a_kitti_image_is_the_fields() {
+        // Monodepth2 and its successors print [153, 371) × [44, 1197) for 375×1242.
+        assert_eq!(Crop::Garg.window(1242, 375), (153..371, 44..1197));
+        assert_eq!(Crop::None.window(1242, 375), (0..375, 0..1242));
+    }
+
+    #[test]
+    fn protocols_that_measure_nothing_are_refused() {
+        let ok = Protocol::default();
+        assert!(ok.validate().is_ok());
+        for bad in [
+            Protocol {
+                min_m: 0.0,
+                ..ok.clone()
+            },
+            Protocol {
+                min_m: f64::NAN,
+                ..ok.clone()
+            },
+            Protocol {
+                cap_m: 1e-4,
+                ..ok.clone()
+            },
+            Protocol {
+                cap_m: f64::INFINITY,
+                ..ok.clone()
+            },
+            Protocol {
+                scaling: Scaling::Fixed(-1.0),
+                ..ok.clone()
+            },
+        ] {
+            assert!(bad.validate().is_err(), "{bad:?}");
+        }
+    }
+}

@@ -1,0 +1,138 @@
+use serde::{Deserialize, Serialize};
+
+use crate::{Crop, GroundTruth, Metrics, Protocol};
+
+/// What an evaluation says. Serialises to the JSON that scripts rely on: field names are fixed, parts that do not apply
+/// are absent, and a number that does not exist is `null`, never NaN.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// How many images were compared.
+    pub n: usize,
+    /// How.
+    pub protocol: ProtocolSummary,
+    /// Metrics of the predictions as they are: the headline of a metric method.
+    pub unscaled: Metrics,
+    /// Metrics after each prediction was scaled by median(gt) / median(prediction).
+    pub median_scaled: Metrics,
+    /// Metrics after a fixed factor, where the protocol asks for one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fixed_scaled: Option<FixedScaled>,
+    /// How metric the predictions are.
+    pub scale: Scale,
+    /// Unscaled, by distance; pooled over pixels.
+    pub ranges: Vec<RangeBin>,
+    /// Unscaled metrics of what does not move, where labels tell.
+    #[serde(default, rename = "static", skip_serializing_if = "Option::is_none")]
+    pub still: Option<Metrics>,
+    /// Unscaled metrics of what moves, where labels tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moving: Option<Metrics>,
+    /// Share of the ground truth without prediction, where predictions may have holes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hole_rate: Option<f64>,
+    /// Distances of randomly drawn points from the truth, where asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<Points>,
+    /// The mean depth of each pixel over the training scans, on the same images: what a useful network must beat.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trivial: Option<TrivialRow>,
+    /// Names of images without a pixel to compare, if any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub skipped: Vec<String>,
+}
+
+impl Report {
+    /// Puts the trivial row beside the method's: `trivial` is the report of the baseline's predictions on the same images.
+    #[must_use]
+    pub fn with_trivial(mut self, trivial: &Report) -> Self {
+        self.trivial = Some(TrivialRow {
+            unscaled: trivial.unscaled,
+            median_scaled: trivial.median_scaled,
+        });
+        self
+    }
+}
+
+/// The part of a [`Protocol`] that a reader needs to repeat the comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ProtocolSummary {
+    /// The part of the image that was compared.
+    pub crop: Crop,
+    /// Ground truth from here on was left out, in metres.
+    pub cap_m: f64,
+    /// Ground truth up to here was left out, in metres.
+    pub min_m: f64,
+    /// Which depth the ground truth holds.
+    pub gt: GroundTruth,
+}
+
+impl From<&Protocol> for ProtocolSummary {
+    fn from(protocol: &Protocol) -> Self {
+        Self {
+            crop: protocol.crop,
+            cap_m: protocol.cap_m,
+            min_m: protocol.min_m,
+            gt: protocol.gt,
+        }
+    }
+}
+
+/// Metrics after a fixed factor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FixedScaled {
+    /// The factor.
+    pub factor: f64,
+    /// The seven metrics.
+    #[serde(flatten)]
+    pub metrics: Metrics,
+}
+
+/// How metric the predictions are.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Scale {
+    /// Median over images of median(gt) / median(prediction): 1 for a metric method.
+    pub median: f64,
+    /// Standard deviation of these ratios over their median.
+    pub std_rel: f64,
+    /// Mean over images of ln(median(prediction) / median(gt)): above 0 where the method sees things too far away.
+    pub bias: f64,
+    /// 95 % interval of the bias by bootstrap over images; `None` for a single image.
+    pub bias_ci95: Option<[f64; 2]>,
+}
+
+/// Unscaled metrics of the pixels whose true depth is in [`from_m`, `to_m`).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RangeBin {
+    /// From, in metres.
+    pub from_m: u32,
+    /// Up to, in metres.
+    pub to_m: u32,
+    /// How many pixels.
+    pub n: usize,
+    /// mean |gt − pred| / gt; `None` without pixels.
+    pub abs_rel: Option<f64>,
+    /// √mean (gt − pred)², in metres; `None` without pixels.
+    pub rmse: Option<f64>,
+}
+
+/// Distances in metres between randomly drawn predicted points and their true places (the paper's Fig. 11).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Points {
+    /// How many points.
+    pub n: usize,
+    /// Mean distance.
+    pub mean_m: f64,
+    /// Standard deviation (n − 1); `None` for one point.
+    pub std_m: Option<f64>,
+    /// Standard error of the mean; `None` for one point.
+    pub sem_m: Option<f64>,
+}
+
+/// The trivial baseline's scores on the same images.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TrivialRow {
+    /// As it is.
+    pub unscaled: Metrics,
+    /// After median scaling.
+    pub median_scaled: Metrics,
+}

@@ -1,0 +1,124 @@
+use std::fmt;
+
+use crate::{Crop, GroundTruth, Metrics, Report};
+
+const LABEL: usize = 22;
+
+impl fmt::Display for Report {
+    /// The tables for people: rows side by side, then the scale, then the ranges.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let crop = match self.protocol.crop {
+            Crop::None => "whole image",
+            Crop::Garg => "garg crop",
+        };
+        let gt = match self.protocol.gt {
+            GroundTruth::Z => "camera z",
+            GroundTruth::Velodyne => "velodyne forward distance",
+        };
+        let plural = if self.n == 1 { "" } else { "s" };
+        let (min, cap) = (self.protocol.min_m, self.protocol.cap_m);
+        writeln!(
+            f,
+            "{} image{plural}, {crop}, {min} to {cap} m, ground truth: {gt}",
+            self.n
+        )?;
+        writeln!(f)?;
+        write!(f, "{:LABEL$}", "")?;
+        for name in Metrics::NAMES {
+            write!(f, "{name:>9}")?;
+        }
+        writeln!(f)?;
+        self.rows(f)?;
+        writeln!(f)?;
+        self.scale_lines(f)?;
+        writeln!(f)?;
+        writeln!(
+            f,
+            "{:LABEL$}{:>9}{:>9}{:>9}",
+            "range (unscaled)", "pixels", "abs_rel", "rmse"
+        )?;
+        for bin in &self.ranges {
+            let label = format!("{} to {} m", bin.from_m, bin.to_m);
+            write!(f, "{label:LABEL$}{:>9}", bin.n)?;
+            writeln!(f, "{}{}", number(bin.abs_rel), number(bin.rmse))?;
+        }
+        if !self.skipped.is_empty() {
+            writeln!(f)?;
+            writeln!(
+                f,
+                "skipped, no ground truth inside the mask: {}",
+                self.skipped.join(", ")
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl Report {
+    fn rows(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        row(f, "unscaled", &self.unscaled)?;
+        row(f, "median-scaled", &self.median_scaled)?;
+        if let Some(fixed) = &self.fixed_scaled {
+            row(f, &format!("scaled by {}", fixed.factor), &fixed.metrics)?;
+        }
+        if let Some(metrics) = &self.still {
+            row(f, "static", metrics)?;
+        }
+        if let Some(metrics) = &self.moving {
+            row(f, "moving", metrics)?;
+        }
+        if let Some(trivial) = &self.trivial {
+            row(f, "trivial", &trivial.unscaled)?;
+            row(f, "trivial, median-scaled", &trivial.median_scaled)?;
+        }
+        Ok(())
+    }
+
+    fn scale_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let scale = &self.scale;
+        writeln!(
+            f,
+            "scale   median(gt) / median(prediction) = {:.3}, relative spread {:.3}",
+            scale.median, scale.std_rel
+        )?;
+        let interval = match scale.bias_ci95 {
+            Some([low, high]) => format!("95 % interval {low:+.3} to {high:+.3}"),
+            None => "no interval from one image".to_owned(),
+        };
+        writeln!(
+            f,
+            "bias    ln(median(prediction) / median(gt)) = {:+.3}, {interval}",
+            scale.bias
+        )?;
+        if let Some(rate) = self.hole_rate {
+            writeln!(
+                f,
+                "holes   {:.2} % of the ground truth has no prediction",
+                100.0 * rate
+            )?;
+        }
+        if let Some(points) = &self.points {
+            writeln!(
+                f,
+                "points  {} drawn: mean distance {:.3} m, standard deviation {} m, standard error {} m",
+                points.n,
+                points.mean_m,
+                number(points.std_m).trim_start(),
+                number(points.sem_m).trim_start()
+            )?;
+        }
+        Ok(())
+    }
+}
+
+fn row(f: &mut fmt::Formatter<'_>, label: &str, metrics: &Metrics) -> fmt::Result {
+    write!(f, "{label:LABEL$}")?;
+    for value in metrics.to_array() {
+        write!(f, "{value:>9.3}")?;
+    }
+    writeln!(f)
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or_else(|| format!("{:>9}", "-"), |v| format!("{v:>9.3}"))
+}

@@ -1,0 +1,109 @@
+/// The sizes of a convolution. Images are N×C×H×W, weights O×C×kh×kw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ConvShape {
+    /// Images, N.
+    pub batch: usize,
+    /// Input channels, C.
+    pub in_channels: usize,
+    /// Input height, H.
+    pub in_height: usize,
+    /// Input width, W.
+    pub in_width: usize,
+    /// Output channels, O.
+    pub out_channels: usize,
+    /// Kernel height, kh.
+    pub kernel_height: usize,
+    /// Kernel width, kw.
+    pub kernel_width: usize,
+    /// Step between output pixels, on both axes.
+    pub stride: usize,
+    /// Rows and columns added on each side.
+    pub padding: usize,
+    /// Step between kernel taps, on both axes.
+    pub dilation: usize,
+    /// Padding mirrors the image (without repeating its edge) instead of being zero.
+    pub reflect: bool,
+}
+
+impl ConvShape {
+    /// Output height: ⌊(H + 2p − d(kh − 1) − 1)/s⌋ + 1.
+    #[must_use]
+    pub fn out_height(&self) -> usize {
+        self.out_size(self.in_height, self.kernel_height)
+    }
+
+    /// Output width: ⌊(W + 2p − d(kw − 1) − 1)/s⌋ + 1.
+    #[must_use]
+    pub fn out_width(&self) -> usize {
+        self.out_size(self.in_width, self.kernel_width)
+    }
+
+    fn out_size(&self, size: usize, kernel: usize) -> usize {
+        (size + 2 * self.padding)
+            .checked_sub(self.dilation * (kernel - 1) + 1)
+            .map_or(0, |span| span / self.stride + 1)
+    }
+
+    /// Weights of one output channel: K = C·kh·kw.
+    pub(crate) fn taps(&self) -> usize {
+        self.in_channels * self.kernel_area()
+    }
+
+    pub(crate) fn kernel_area(&self) -> usize {
+        self.kernel_height * self.kernel_width
+    }
+
+    pub(crate) fn out_area(&self) -> usize {
+        self.out_height() * self.out_width()
+    }
+
+    pub(crate) fn in_area(&self) -> usize {
+        self.in_height * self.in_width
+    }
+
+    /// Whether the unfolded input is the input itself.
+    pub(crate) fn is_pointwise(&self) -> bool {
+        self.kernel_area() == 1 && self.stride == 1 && self.padding == 0
+    }
+
+    /// Number of input values.
+    #[must_use]
+    pub fn in_len(&self) -> usize {
+        self.batch * self.in_channels * self.in_area()
+    }
+
+    /// Number of output values.
+    #[must_use]
+    pub fn out_len(&self) -> usize {
+        self.batch * self.out_channels * self.out_area()
+    }
+
+    /// Number of weights.
+    #[must_use]
+    pub fn weight_len(&self) -> usize {
+        self.out_channels * self.taps()
+    }
+
+    /// Multiply-adds of the forward pass; each gradient costs as many.
+    #[must_use]
+    pub fn multiply_adds(&self) -> usize {
+        self.batch * self.out_area() * self.weight_len()
+    }
+
+    /// # Panics
+    /// Where reflection would need more rows or columns than the image has.
+    pub(crate) fn check(&self) {
+        assert!(
+            self.stride > 0 && self.dilation > 0 && self.kernel_area() > 0,
+            "stride, dilation and kernel are at least 1"
+        );
+        assert!(
+            !self.reflect
+                || (self.padding < self.in_height.max(1) && self.padding < self.in_width.max(1)),
+            "reflection padding of {} needs an image larger than {}x{}",
+            self.padding,
+            self.in_height,
+            self.in_width
+        );
+    }
+}

@@ -1,0 +1,150 @@
+//! Checked against the definition, summed in f64, over random shapes.
+
+use super::*;
+use crate::noise::noise32 as noise;
+use proptest::prelude::*;
+
+/// Every product of the convolution: (output index, input index, weight index).
+fn products(s: &ConvShape, mut visit: impl FnMut(usize, usize, usize)) {
+    let reflect = |i: isize, n: usize| -> Option<usize> {
+        let n = n as isize;
+        match i {
+            _ if (0..n).contains(&i) => Some(i as usize),
+            _ if !s.reflect => None,
+            _ if i < 0 => Some((-i) as usize),
+            _ => Some((2 * (n - 1) - i) as usize),
+        }
+    };
+    for n in 0..s.batch {
+        for o in 0..s.out_channels {
+            for y in 0..s.out_height() {
+                for x in 0..s.out_width() {
+                    for c in 0..s.in_channels {
+                        for ky in 0..s.kernel_height {
+                            for kx in 0..s.kernel_width {
+                                let at = |p: usize, k: usize| {
+                                    (p * s.stride + k * s.dilation) as isize - s.padding as isize
+                                };
+                                let iy = reflect(at(y, ky), s.in_height);
+                                let ix = reflect(at(x, kx), s.in_width);
+                                if let (Some(iy), Some(ix)) = (iy, ix) {
+                                    visit(
+                                        ((n * s.out_channels + o) * s.out_height() + y)
+                                            * s.out_width()
+                                            + x,
+                                        ((n * s.in_channels + c) * s.in_height + iy) * s.in_width
+                                            + ix,
+                                        ((o * s.in_channels + c) * s.kernel_height + ky)
+                                            * s.kernel_width
+                                            + kx,
+                                    );
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Rounding grows with the number of summed products: about ε·√n·|term|, with room.
+fn assert_close(ours: &[f32], exact: &[f64], what: &str) {
+    for (i, (a, b)) in ours.iter().zip(exact).enumerate() {
+        assert!(
+            (f64::from(*a) - b).abs() < 2e-5 * (1.0 + b.abs()),
+            "{what}[{i}]: {a} instead of {b}"
+        );
+    }
+}
+
+fn check(s: &ConvShape) {
+    let x = noise(s.in_len(), 1);
+    let w = noise(s.weight_len(), 2);
+    let b = noise(s.out_channels, 3);
+    let g = noise(s.out_len(), 4);
+    let area = s.out_area();
+
+    let mut y_exact: Vec<f64> = (0..s.out_len())
+        .map(|i| f64::from(b[i / area % s.out_channels]))
+        .collect();
+    let mut gx_exact = vec![0.0; s.in_len()];
+    let mut gw_exact = vec![0.0; s.weight_len()];
+    products(s, |o, i, k| {
+        let (xv, wv, gv) = (f64::from(x[i]), f64::from(w[k]), f64::from(g[o]));
+        y_exact[o] += xv * wv;
+        gx_exact[i] += gv * wv;
+        gw_exact[k] += gv * xv;
+    });
+    let mut gb_exact = vec![0.0; s.out_channels];
+    for (i, v) in g.iter().enumerate() {
+        gb_exact[i / area % s.out_channels] += f64::from(*v);
+    }
+
+    // Filled with rubbish: every value must be overwritten.
+    let (mut y, mut gx) = (vec![7.0; s.out_len()], vec![7.0; s.in_len()]);
+    let (mut gw, mut gb) = (vec![7.0; s.weight_len()], vec![7.0; s.out_channels]);
+    conv2d(s, &x, &w, Some(&b), &mut y);
+    conv2d_backward_input(s, &w, &g, &mut gx);
+    conv2d_backward_weight(s, &x, &g, &mut gw);
+    crate::channel_sums(&g, s.batch, area, &mut gb);
+    assert_close(&y, &y_exact, "output");
+    assert_close(&gx, &gx_exact, "input gradient");
+    assert_close(&gw, &gw_exact, "weight gradient");
+    assert_close(&gb, &gb_exact, "bias gradient");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+    #[test]
+    fn equals_the_definition(
+        batch in 1usize..6, in_channels in 1usize..20, out_channels in 1usize..12,
+        in_height in 4usize..14, in_width in 4usize..17,
+        kernel in prop::sample::select(vec![1usize, 2, 3, 5, 7]),
+        stride in 1usize..4, padding in 0usize..4, dilation in 1usize..4, reflect in any::<bool>(),
+    ) {
+        let shape = ConvShape {
+            batch, in_channels, in_height, in_width, out_channels,
+            kernel_height: kernel, kernel_width: kernel, stride, padding, dilation, reflect,
+        };
+        prop_assume!(shape.out_height() > 0 && shape.out_width() > 0);
+        check(&shape);
+    }
+}
+
+/// Large enough for several tiles in an image, and for tiles of several images.
+#[test]
+fn equals_the_definition_across_tiles() {
+    let shape = ConvShape {
+        batch: 2,
+        in_channels: 16,
+        in_height: 64,
+        in_width: 96,
+        out_channels: 4,
+        kernel_height: 3,
+        kernel_width: 3,
+        stride: 1,
+        padding: 1,
+        dilation: 1,
+        reflect: true,
+    };
+    check(&shape);
+    check(&ConvShape {
+        batch: 9,
+        in_channels: 40,
+        in_height: 6,
+        in_width: 9,
+        reflect: false,
+        ..shape
+    });
+    check(&ConvShape {
+        batch: 3,
+        in_channels: 3,
+        kernel_height: 7,
+        kernel_width: 7,
+        stride: 2,
+        padding: 3,
+        reflect: false,
+        ..shape
+    });
+}

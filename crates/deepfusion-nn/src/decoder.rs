@@ -1,0 +1,148 @@
+//! The disparity decoder: five stages from the encoder's coarsest feature to full resolution.
+
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor, activation::sigmoid};
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+use crate::init::WeightRng;
+use crate::layers::{Conv2d, Conv2dConfig};
+use crate::ops::{elu, upsample_concat};
+
+/// How many scales a disparity is predicted at: 1, 1/2, 1/4, 1/8 of the input's size.
+pub const SCALES: usize = 4;
+
+/// What a [`DisparityDecoder`] is built from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DecoderConfig {
+    /// Channels of the five stages, coarse to fine.
+    pub widths: [usize; 5],
+}
+
+impl Default for DecoderConfig {
+    /// 256, 128, 64, 32, 16.
+    fn default() -> Self {
+        Self {
+            widths: [256, 128, 64, 32, 16],
+        }
+    }
+}
+
+impl DecoderConfig {
+    /// # Errors
+    /// [`Error::Config`] for a stage without channels.
+    pub fn validate(&self) -> Result<(), Error> {
+        if self.widths.iter().any(|width| !(1..=4096).contains(width)) {
+            return Err(Error::config(
+                "decoder.widths",
+                "five widths of 1 to 4096",
+                self.widths,
+            ));
+        }
+        Ok(())
+    }
+
+    /// A new decoder for features of `encoder_channels` (fine to coarse). A `head_bias` makes each
+    /// head start with that bias instead of a random one.
+    ///
+    /// # Errors
+    /// As [`Self::validate`].
+    pub fn init(
+        &self,
+        encoder_channels: [usize; 5],
+        head_bias: Option<f32>,
+        rng: &mut WeightRng,
+        device: &Device,
+    ) -> Result<DisparityDecoder, Error> {
+        self.validate()?;
+        let mut channels_in = encoder_channels[4];
+        let stages = (0..5)
+            .map(|index| {
+                let width = self.widths[index];
+                // Stage 0 meets the feature at stride 16, …, stage 3 the one at stride 2, stage 4 none.
+                let skip = if index < 4 {
+                    encoder_channels[3 - index]
+                } else {
+                    0
+                };
+                let stage = DecoderStage {
+                    reduce: Conv2dConfig::new(channels_in, width, 3)
+                        .reflected()
+                        .init(rng, device),
+                    fuse: Conv2dConfig::new(width + skip, width, 3)
+                        .reflected()
+                        .init(rng, device),
+                };
+                channels_in = width;
+                stage
+            })
+            .collect();
+        let heads = (0..SCALES)
+            .map(|scale| {
+                let mut head = Conv2dConfig::new(self.widths[4 - scale], 1, 3)
+                    .reflected()
+                    .init(rng, device);
+                if let Some(bias) = head_bias {
+                    head.bias = Some(Param::from_data([bias], device));
+                }
+                head
+            })
+            .collect();
+        Ok(DisparityDecoder { stages, heads })
+    }
+}
+
+/// One stage: 3×3 + ELU, nearest ×2, the skip feature appended, 3×3 + ELU; all reflection-padded.
+#[derive(Module, Debug)]
+pub struct DecoderStage {
+    /// Before the upsampling.
+    pub reduce: Conv2d,
+    /// After the concatenation.
+    pub fuse: Conv2d,
+}
+
+impl DecoderStage {
+    /// # Shapes
+    /// - `x`: `[batch, in, height, width]`
+    /// - `skip`: `[batch, skip, 2·height, 2·width]`
+    /// - output: `[batch, out, 2·height, 2·width]`
+    pub fn forward(&self, x: Tensor<4>, skip: Option<Tensor<4>>) -> Tensor<4> {
+        let reduced = elu(self.reduce.forward(x));
+        elu(self.fuse.forward(upsample_concat(reduced, skip)))
+    }
+}
+
+/// The decoder and its four disparity heads (SPEC 1.1).
+#[derive(Module, Debug)]
+pub struct DisparityDecoder {
+    /// Coarse to fine.
+    pub stages: Vec<DecoderStage>,
+    /// 3×3 to one channel, by scale: `heads[0]` is the finest.
+    pub heads: Vec<Conv2d>,
+}
+
+impl DisparityDecoder {
+    /// σ = sigmoid(head(stage)), a disparity between the ends of the network's depth range.
+    ///
+    /// # Shapes
+    /// - `features`: the encoder's five, `[batch, channels[k], height / 2ᵏ⁺¹, width / 2ᵏ⁺¹]`
+    /// - output: `[batch, 1, height / 2ˢ, width / 2ˢ]` in (0, 1) for scales s = 0…3, finest first
+    pub fn forward(&self, features: [Tensor<4>; 5]) -> Vec<Tensor<4>> {
+        let [f0, f1, f2, f3, f4] = features;
+        let skips = [Some(f3), Some(f2), Some(f1), Some(f0), None];
+        let mut x = f4;
+        let mut disparities = Vec::with_capacity(SCALES);
+        for (index, (stage, skip)) in self.stages.iter().zip(skips).enumerate() {
+            x = stage.forward(x, skip);
+            if let Some(head) = 4usize
+                .checked_sub(index)
+                .and_then(|scale| self.heads.get(scale))
+            {
+                disparities.push(sigmoid(head.forward(x.clone())));
+            }
+        }
+        disparities.reverse();
+        disparities
+    }
+}

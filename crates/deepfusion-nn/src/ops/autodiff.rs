@@ -1,0 +1,235 @@
+//! How the operations are derived: what each keeps from its forward pass, and which of its parents
+//! receive a gradient.
+
+use super::kernel::{ConvOptions, KernelBackward, KernelOps};
+use burn::backend::autodiff::{
+    Autodiff,
+    checkpoint::{base::Checkpointer, strategy::CheckpointStrategy},
+    grads::Gradients,
+    ops::{Backward, Ops, OpsKind},
+};
+use burn::backend::{AutodiffBackend, Backend, TensorMetadata, tensor::FloatTensor};
+
+/// Runs the forward pass and records the step: `$state` is built only where a gradient is needed.
+macro_rules! record {
+    ($op:expr, $C:ty, $nodes:expr, $output:expr, $state:expr) => {
+        match $op.prepare::<$C>($nodes).compute_bound().stateful() {
+            OpsKind::Tracked(prep) => prep.finish($state, $output),
+            OpsKind::UnTracked(prep) => prep.finish($output),
+        }
+    };
+}
+
+#[derive(Debug)]
+struct Conv2d;
+
+impl<B: KernelBackward> Backward<B, 3> for Conv2d {
+    type State = (FloatTensor<B>, FloatTensor<B>, ConvOptions);
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 3>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let (x, weight, options) = ops.state;
+        let [x_node, weight_node, bias_node] = ops.parents;
+        let grad = grads.consume::<B>(&ops.node);
+        if let Some(node) = bias_node {
+            grads.register::<B>(node.id, B::conv2d_grad_bias(grad.clone()));
+        }
+        if let Some(node) = weight_node {
+            let grad = B::conv2d_grad_weight(x.clone(), weight.clone(), grad.clone(), options);
+            grads.register::<B>(node.id, grad);
+        }
+        if let Some(node) = x_node {
+            grads.register::<B>(node.id, B::conv2d_grad_x(x, weight, grad, options));
+        }
+    }
+}
+
+#[derive(Debug)]
+struct BatchNorm;
+
+impl<B: KernelBackward> Backward<B, 3> for BatchNorm {
+    type State = (
+        FloatTensor<B>,
+        [FloatTensor<B>; 2],
+        [FloatTensor<B>; 2],
+        f64,
+        bool,
+    );
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 3>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let (x, parameters, statistics, epsilon, relu) = ops.state;
+        let grad = grads.consume::<B>(&ops.node);
+        let gradients = B::batch_norm_grad(x, parameters, statistics, grad, epsilon, relu);
+        for (node, grad) in ops.parents.into_iter().zip(gradients) {
+            if let Some(node) = node {
+                grads.register::<B>(node.id, grad);
+            }
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Elu;
+
+impl<B: KernelBackward> Backward<B, 1> for Elu {
+    type State = FloatTensor<B>;
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 1>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let grad = grads.consume::<B>(&ops.node);
+        if let [Some(node)] = ops.parents {
+            grads.register::<B>(node.id, B::elu_grad(ops.state, grad));
+        }
+    }
+}
+
+#[derive(Debug)]
+struct UpsampleConcat;
+
+impl<B: KernelBackward> Backward<B, 2> for UpsampleConcat {
+    type State = usize;
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 2>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let grad = grads.consume::<B>(&ops.node);
+        let gradients = B::upsample_concat_grad(grad, ops.state);
+        for (node, grad) in ops.parents.into_iter().zip(gradients) {
+            if let Some(node) = node {
+                grads.register::<B>(node.id, grad);
+            }
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Warp;
+
+impl<B: KernelBackward> Backward<B, 2> for Warp {
+    type State = (FloatTensor<B>, FloatTensor<B>);
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 2>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let (image, coords) = ops.state;
+        let [image_node, coords_node] = ops.parents;
+        let grad = grads.consume::<B>(&ops.node);
+        if let Some(node) = image_node {
+            let grad = B::warp_grad_image(image.clone(), coords.clone(), grad.clone());
+            grads.register::<B>(node.id, grad);
+        }
+        if let Some(node) = coords_node {
+            grads.register::<B>(node.id, B::warp_grad_coords(image, coords, grad));
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Photometric;
+
+impl<B: KernelBackward> Backward<B, 1> for Photometric {
+    type State = (FloatTensor<B>, FloatTensor<B>, f64);
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 1>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let (a, b, alpha) = ops.state;
+        let grad = grads.consume::<B>(&ops.node);
+        if let [Some(node)] = ops.parents {
+            grads.register::<B>(node.id, B::photometric_grad(a, b, grad, alpha));
+        }
+    }
+}
+
+impl<B, C> KernelOps for Autodiff<B, C>
+where
+    B: Backend + KernelOps + KernelBackward,
+    C: CheckpointStrategy,
+{
+    fn kernel_conv2d(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        has_bias: bool,
+        options: ConvOptions,
+    ) -> FloatTensor<Self> {
+        let ((x, x_node), (weight, weight_node)) = (x.into_parts(), weight.into_parts());
+        let (bias, bias_node) = bias.into_parts();
+        let output = B::kernel_conv2d(x.clone(), weight.clone(), bias, has_bias, options);
+        let nodes = [x_node, weight_node, bias_node];
+        record!(Conv2d, C, nodes, output, (x, weight, options))
+    }
+
+    fn kernel_batch_norm(
+        x: FloatTensor<Self>,
+        gamma: FloatTensor<Self>,
+        beta: FloatTensor<Self>,
+        epsilon: f64,
+        relu: bool,
+    ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>) {
+        let ((x, x_node), (gamma, gamma_node)) = (x.into_parts(), gamma.into_parts());
+        let (beta, beta_node) = beta.into_parts();
+        let (output, mean, variance) =
+            B::kernel_batch_norm(x.clone(), gamma.clone(), beta.clone(), epsilon, relu);
+        let nodes = [x_node, gamma_node, beta_node];
+        let statistics = [mean.clone(), variance.clone()];
+        let state = (x, [gamma, beta], statistics, epsilon, relu);
+        let output = record!(BatchNorm, C, nodes, output, state);
+        (output, Self::from_inner(mean), Self::from_inner(variance))
+    }
+
+    fn kernel_elu(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        let (x, node) = x.into_parts();
+        let output = B::kernel_elu(x);
+        let state = output.clone();
+        record!(Elu, C, [node], output, state)
+    }
+
+    fn kernel_upsample_concat(x: FloatTensor<Self>, skip: FloatTensor<Self>) -> FloatTensor<Self> {
+        let channels = x.shape()[1];
+        let ((x, x_node), (skip, skip_node)) = (x.into_parts(), skip.into_parts());
+        let output = B::kernel_upsample_concat(x, skip);
+        record!(UpsampleConcat, C, [x_node, skip_node], output, channels)
+    }
+
+    fn kernel_warp(image: FloatTensor<Self>, coords: FloatTensor<Self>) -> FloatTensor<Self> {
+        let ((image, image_node), (coords, coords_node)) =
+            (image.into_parts(), coords.into_parts());
+        let output = B::kernel_warp(image.clone(), coords.clone());
+        let nodes = [image_node, coords_node];
+        record!(Warp, C, nodes, output, (image, coords))
+    }
+
+    fn kernel_photometric(
+        a: FloatTensor<Self>,
+        b: FloatTensor<Self>,
+        alpha: f64,
+    ) -> FloatTensor<Self> {
+        let (a, node) = a.into_parts();
+        let b = b.into_primitive();
+        let output = B::kernel_photometric(a.clone(), b.clone(), alpha);
+        record!(Photometric, C, [node], output, (a, b, alpha))
+    }
+}

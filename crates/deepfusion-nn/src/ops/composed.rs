@@ -1,0 +1,156 @@
+//! The operations composed of Burn's own: what the backends without kernels run, and what the
+//! kernels are tested against.
+
+use super::{BatchNormOutput, ConvOptions};
+use burn::tensor::{
+    Int, Tensor,
+    module::avg_pool2d,
+    ops::{AvgPoolOptions, ConvOptions as BurnConvOptions, PadMode},
+};
+
+/// [`super::conv2d`].
+#[must_use]
+pub fn conv2d(
+    x: Tensor<4>,
+    weight: Tensor<4>,
+    bias: Option<Tensor<1>>,
+    options: ConvOptions,
+) -> Tensor<4> {
+    let (x, padding) = if options.reflect && options.padding > 0 {
+        (mirror(x, options.padding), 0)
+    } else {
+        (x, options.padding)
+    };
+    let (s, d) = (options.stride, options.dilation);
+    let options = BurnConvOptions::new([s, s], [padding, padding], [d, d], 1);
+    burn::tensor::module::conv2d(x, weight, bias, options)
+}
+
+fn mirror(x: Tensor<4>, padding: usize) -> Tensor<4> {
+    x.pad((padding, padding, padding, padding), PadMode::Reflect)
+}
+
+/// [`super::batch_norm`].
+#[must_use]
+pub fn batch_norm(
+    x: Tensor<4>,
+    gamma: Tensor<1>,
+    beta: Tensor<1>,
+    epsilon: f64,
+    relu: bool,
+) -> BatchNormOutput {
+    let [batch, channels, height, width] = x.dims();
+    let per_channel = |t: Tensor<1>| t.reshape([1, channels, 1, 1]);
+    let mean_of = |t: Tensor<4>| {
+        t.swap_dims(0, 1)
+            .reshape([channels, batch * height * width])
+            .mean_dim(1)
+            .reshape([channels])
+    };
+    let mean = mean_of(x.clone());
+    let centred = x.sub(per_channel(mean.clone()));
+    let variance = mean_of(centred.clone().powi_scalar(2));
+    let deviation = variance.clone().add_scalar(epsilon).sqrt();
+    let scale = gamma.div(deviation);
+    let output = centred.mul(per_channel(scale)).add(per_channel(beta));
+    BatchNormOutput {
+        output: if relu {
+            burn::tensor::activation::relu(output)
+        } else {
+            output
+        },
+        mean: mean.detach(),
+        variance: variance.detach(),
+    }
+}
+
+/// [`super::elu`], as relu(x) + e^(−relu(−x)) − 1: the exponential's argument is never positive, so
+/// that large activations cannot make an infinity whose gradient is NaN.
+#[must_use]
+pub fn elu(x: Tensor<4>) -> Tensor<4> {
+    let below = burn::tensor::activation::relu(x.clone().neg())
+        .neg()
+        .exp()
+        .sub_scalar(1.0);
+    burn::tensor::activation::relu(x).add(below)
+}
+
+/// [`super::upsample_concat`].
+#[must_use]
+pub fn upsample_concat(x: Tensor<4>, skip: Option<Tensor<4>>) -> Tensor<4> {
+    let [batch, channels, height, width] = x.dims();
+    let large = x
+        .reshape([batch * channels, height, 1, width, 1])
+        .expand([batch * channels, height, 2, width, 2])
+        .reshape([batch, channels, 2 * height, 2 * width]);
+    match skip {
+        Some(skip) => Tensor::cat(vec![large, skip], 1),
+        None => large,
+    }
+}
+
+/// [`super::warp`].
+#[must_use]
+pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
+    let [batch, channels, height, width] = image.dims();
+    let [_, _, out_height, out_width] = coords.dims();
+    let area = out_height * out_width;
+    let flat = image.reshape([batch, channels, height * width]);
+    let axis = |index: usize, size: usize| {
+        let last = (size - 1) as f64;
+        let p = coords
+            .clone()
+            .slice([0..batch, index..index + 1])
+            .reshape([batch, 1, area])
+            .clamp(0.0, last);
+        let low = p.clone().detach().floor().clamp(0.0, (last - 1.0).max(0.0));
+        (low.clone().int(), p.sub(low))
+    };
+    let ((x0, fx), (y0, fy)) = (axis(0, width), axis(1, height));
+    let (right, down) = (i64::from(width > 1), i64::from(height > 1));
+    let read = |dx: i64, dy: i64| {
+        let index: Tensor<3, Int> = y0
+            .clone()
+            .add_scalar(dy)
+            .mul_scalar(width as i64)
+            .add(x0.clone().add_scalar(dx));
+        flat.clone()
+            .gather(2, index.expand([batch, channels, area]))
+    };
+    let mix = |a: Tensor<3>, b: Tensor<3>, f: Tensor<3>| a.clone().add(b.sub(a).mul(f));
+    let top = mix(read(0, 0), read(right, 0), fx.clone());
+    let bottom = mix(read(0, down), read(right, down), fx);
+    mix(top, bottom, fy).reshape([batch, channels, out_height, out_width])
+}
+
+/// [`super::photometric_error`].
+#[must_use]
+pub fn photometric_error(a: Tensor<4>, b: Tensor<4>, alpha: f64) -> Tensor<4> {
+    let b = b.detach();
+    let window = AvgPoolOptions::new([3, 3]).with_stride([1, 1]);
+    let mean = |t: Tensor<4>| avg_pool2d(mirror(t, 1), window.clone());
+    let (mu_a, mu_b) = (mean(a.clone()), mean(b.clone()));
+    let var_a = mean(a.clone().mul(a.clone())).sub(mu_a.clone().mul(mu_a.clone()));
+    let var_b = mean(b.clone().mul(b.clone())).sub(mu_b.clone().mul(mu_b.clone()));
+    let product = mu_a.clone().mul(mu_b.clone());
+    let covariance = mean(a.clone().mul(b.clone())).sub(product.clone());
+    let numerator = product
+        .mul_scalar(2.0)
+        .add_scalar(1e-4)
+        .mul(covariance.mul_scalar(2.0).add_scalar(9e-4));
+    let denominator = mu_a
+        .powi_scalar(2)
+        .add(mu_b.powi_scalar(2))
+        .add_scalar(1e-4)
+        .mul(var_a.add(var_b).add_scalar(9e-4));
+    let dissimilar = numerator
+        .div(denominator)
+        .neg()
+        .add_scalar(1.0)
+        .mul_scalar(0.5)
+        .clamp(0.0, 1.0);
+    dissimilar
+        .mul_scalar(alpha)
+        .add(a.sub(b).abs().mul_scalar(1.0 - alpha))
+        .mean_dim(1)
+}

@@ -1,0 +1,284 @@
+//! The operations on the CPU: Burn's Flex tensors handed to the kernels as slices.
+
+use super::kernel::{ConvOptions, KernelBackward, KernelOps};
+use burn::backend::{Flex, TensorMetadata, ops::FloatTensorOps, tensor::FloatTensor};
+use burn::tensor::TensorData;
+use deepfusion_kernels::{self as kernels, BatchNormSaved, ConvShape, PhotometricShape, WarpShape};
+
+type Float = FloatTensor<Flex>;
+
+/// A tensor's values in order, copied only where it is a view.
+struct Values(Float);
+
+impl Values {
+    fn of(tensor: Float) -> Self {
+        Self(tensor.to_contiguous())
+    }
+
+    fn slice(&self) -> &[f32] {
+        self.0
+            .as_slice::<f32>()
+            .expect("a contiguous tensor of f32: the networks are built in single precision")
+    }
+}
+
+fn dims<const D: usize>(tensor: &Float) -> [usize; D] {
+    tensor.shape().dims()
+}
+
+fn tensor<const D: usize>(values: Vec<f32>, shape: [usize; D]) -> Float {
+    Flex::float_from_data(TensorData::new(values, shape), &Default::default())
+}
+
+fn conv_shape(x: [usize; 4], weight: [usize; 4], options: ConvOptions) -> ConvShape {
+    ConvShape {
+        batch: x[0],
+        in_channels: x[1],
+        in_height: x[2],
+        in_width: x[3],
+        out_channels: weight[0],
+        kernel_height: weight[2],
+        kernel_width: weight[3],
+        stride: options.stride,
+        padding: options.padding,
+        dilation: options.dilation,
+        reflect: options.reflect,
+    }
+}
+
+fn warp_shape(image: &Float, coords: &Float) -> ([usize; 4], WarpShape) {
+    let [batch, channels, in_height, in_width] = dims(image);
+    let [_, _, out_height, out_width] = dims(coords);
+    (
+        [batch, channels, out_height, out_width],
+        WarpShape {
+            channels,
+            in_height,
+            in_width,
+            out_area: out_height * out_width,
+        },
+    )
+}
+
+fn photometric_shape(a: &Float, alpha: f64) -> ([usize; 4], PhotometricShape) {
+    let [batch, channels, height, width] = dims(a);
+    (
+        [batch, channels, height, width],
+        PhotometricShape {
+            channels,
+            height,
+            width,
+            alpha,
+        },
+    )
+}
+
+#[allow(clippy::cast_possible_truncation)]
+fn single(value: f64) -> f32 {
+    value as f32
+}
+
+impl KernelOps for Flex {
+    fn kernel_conv2d(
+        x: Float,
+        weight: Float,
+        bias: Float,
+        has_bias: bool,
+        options: ConvOptions,
+    ) -> Float {
+        let shape = conv_shape(dims(&x), dims(&weight), options);
+        let (x, weight, bias) = (Values::of(x), Values::of(weight), Values::of(bias));
+        let mut out = vec![0.0; shape.out_len()];
+        let bias = has_bias.then(|| bias.slice());
+        kernels::conv2d(&shape, x.slice(), weight.slice(), bias, &mut out);
+        let sizes = [
+            shape.batch,
+            shape.out_channels,
+            shape.out_height(),
+            shape.out_width(),
+        ];
+        tensor(out, sizes)
+    }
+
+    fn kernel_batch_norm(
+        x: Float,
+        gamma: Float,
+        beta: Float,
+        epsilon: f64,
+        relu: bool,
+    ) -> (Float, Float, Float) {
+        let sizes: [usize; 4] = dims(&x);
+        let (x, gamma, beta) = (Values::of(x), Values::of(gamma), Values::of(beta));
+        let mut out = vec![0.0; x.slice().len()];
+        let saved = kernels::batch_norm(
+            x.slice(),
+            gamma.slice(),
+            beta.slice(),
+            sizes[2] * sizes[3],
+            single(epsilon),
+            relu,
+            &mut out,
+        );
+        let channels = [sizes[1]];
+        (
+            tensor(out, sizes),
+            tensor(saved.mean, channels),
+            tensor(saved.variance, channels),
+        )
+    }
+
+    fn kernel_elu(x: Float) -> Float {
+        let sizes: [usize; 4] = dims(&x);
+        let x = Values::of(x);
+        let mut out = vec![0.0; x.slice().len()];
+        kernels::elu(x.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn kernel_upsample_concat(x: Float, skip: Float) -> Float {
+        let [batch, channels, height, width] = dims(&x);
+        let [_, skips, _, _] = dims(&skip);
+        let (x, skip) = (Values::of(x), Values::of(skip));
+        let sizes = [batch, channels + skips, 2 * height, 2 * width];
+        let mut out = vec![0.0; sizes.iter().product()];
+        kernels::upsample_concat(x.slice(), skip.slice(), batch, channels, width, &mut out);
+        tensor(out, sizes)
+    }
+
+    fn kernel_warp(image: Float, coords: Float) -> Float {
+        let (sizes, shape) = warp_shape(&image, &coords);
+        let (image, coords) = (Values::of(image), Values::of(coords));
+        let mut out = vec![0.0; sizes.iter().product()];
+        kernels::warp(&shape, image.slice(), coords.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn kernel_photometric(a: Float, b: Float, alpha: f64) -> Float {
+        let ([batch, _, height, width], shape) = photometric_shape(&a, alpha);
+        let (a, b) = (Values::of(a), Values::of(b));
+        let mut out = vec![0.0; batch * height * width];
+        kernels::photometric_error(&shape, a.slice(), b.slice(), &mut out);
+        tensor(out, [batch, 1, height, width])
+    }
+}
+
+impl KernelBackward for Flex {
+    fn conv2d_grad_x(x: Float, weight: Float, grad: Float, options: ConvOptions) -> Float {
+        let sizes: [usize; 4] = dims(&x);
+        let shape = conv_shape(sizes, dims(&weight), options);
+        let (weight, grad) = (Values::of(weight), Values::of(grad));
+        let mut out = vec![0.0; shape.in_len()];
+        kernels::conv2d_backward_input(&shape, weight.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn conv2d_grad_weight(x: Float, weight: Float, grad: Float, options: ConvOptions) -> Float {
+        let sizes: [usize; 4] = dims(&weight);
+        let shape = conv_shape(dims(&x), sizes, options);
+        let (x, grad) = (Values::of(x), Values::of(grad));
+        let mut out = vec![0.0; shape.weight_len()];
+        kernels::conv2d_backward_weight(&shape, x.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn conv2d_grad_bias(grad: Float) -> Float {
+        let [batch, channels, height, width] = dims(&grad);
+        let grad = Values::of(grad);
+        let mut out = vec![0.0; channels];
+        kernels::channel_sums(grad.slice(), batch, height * width, &mut out);
+        tensor(out, [channels])
+    }
+
+    fn batch_norm_grad(
+        x: Float,
+        [gamma, beta]: [Float; 2],
+        [mean, variance]: [Float; 2],
+        grad: Float,
+        epsilon: f64,
+        relu: bool,
+    ) -> [Float; 3] {
+        let sizes: [usize; 4] = dims(&x);
+        let (x, gamma, beta) = (Values::of(x), Values::of(gamma), Values::of(beta));
+        let (grad, mean, variance) = (Values::of(grad), Values::of(mean), Values::of(variance));
+        let saved = BatchNormSaved {
+            mean: mean.slice().to_vec(),
+            variance: variance.slice().to_vec(),
+        };
+        let mut grad_x = vec![0.0; x.slice().len()];
+        let (grad_gamma, grad_beta) = kernels::batch_norm_backward(
+            x.slice(),
+            gamma.slice(),
+            beta.slice(),
+            &saved,
+            grad.slice(),
+            sizes[2] * sizes[3],
+            single(epsilon),
+            relu,
+            &mut grad_x,
+        );
+        let channels = [sizes[1]];
+        [
+            tensor(grad_x, sizes),
+            tensor(grad_gamma, channels),
+            tensor(grad_beta, channels),
+        ]
+    }
+
+    fn elu_grad(output: Float, grad: Float) -> Float {
+        let sizes: [usize; 4] = dims(&output);
+        let (output, grad) = (Values::of(output), Values::of(grad));
+        let mut out = vec![0.0; grad.slice().len()];
+        kernels::elu_backward(output.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn upsample_concat_grad(grad: Float, channels: usize) -> [Float; 2] {
+        let [batch, all, height, width] = dims(&grad);
+        let x_sizes = [batch, channels, height / 2, width / 2];
+        let skip_sizes = [batch, all - channels, height, width];
+        let grad = Values::of(grad);
+        let mut grad_x = vec![0.0; x_sizes.iter().product()];
+        let mut grad_skip = vec![0.0; skip_sizes.iter().product()];
+        kernels::upsample_concat_backward(
+            grad.slice(),
+            batch,
+            channels,
+            width / 2,
+            &mut grad_x,
+            &mut grad_skip,
+        );
+        [tensor(grad_x, x_sizes), tensor(grad_skip, skip_sizes)]
+    }
+
+    fn warp_grad_image(image: Float, coords: Float, grad: Float) -> Float {
+        let sizes: [usize; 4] = dims(&image);
+        let (_, shape) = warp_shape(&image, &coords);
+        let (coords, grad) = (Values::of(coords), Values::of(grad));
+        let mut out = vec![0.0; sizes.iter().product()];
+        kernels::warp_backward_image(&shape, coords.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn warp_grad_coords(image: Float, coords: Float, grad: Float) -> Float {
+        let sizes: [usize; 4] = dims(&coords);
+        let (_, shape) = warp_shape(&image, &coords);
+        let (image, coords, grad) = (Values::of(image), Values::of(coords), Values::of(grad));
+        let mut out = vec![0.0; sizes.iter().product()];
+        kernels::warp_backward_coords(
+            &shape,
+            image.slice(),
+            coords.slice(),
+            grad.slice(),
+            &mut out,
+        );
+        tensor(out, sizes)
+    }
+
+    fn photometric_grad(a: Float, b: Float, grad: Float, alpha: f64) -> Float {
+        let (sizes, shape) = photometric_shape(&a, alpha);
+        let (a, b, grad) = (Values::of(a), Values::of(b), Values::of(grad));
+        let mut out = vec![0.0; a.slice().len()];
+        kernels::photometric_error_backward(&shape, a.slice(), b.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+}

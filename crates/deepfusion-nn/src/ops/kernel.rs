@@ -1,0 +1,127 @@
+//! The operations as Burn's dispatch sees them.
+
+use burn::backend::{Backend, backend_extension, tensor::FloatTensor};
+
+/// Stride, padding and dilation of a convolution, the same on both axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ConvOptions {
+    /// Step between output pixels.
+    pub stride: usize,
+    /// Rows and columns added on each side.
+    pub padding: usize,
+    /// Step between kernel taps.
+    pub dilation: usize,
+    /// Padding mirrors the image (without repeating its edge) instead of being zero.
+    pub reflect: bool,
+}
+
+impl Default for ConvOptions {
+    /// Stride 1, no padding, no dilation.
+    fn default() -> Self {
+        Self {
+            stride: 1,
+            padding: 0,
+            dilation: 1,
+            reflect: false,
+        }
+    }
+}
+
+/// The forward passes. Shapes are those of the functions in [`super`].
+#[backend_extension(Flex, Autodiff)]
+pub trait KernelOps: Backend {
+    /// See [`super::conv2d`]; `bias` is not read unless `has_bias`.
+    fn kernel_conv2d(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        has_bias: bool,
+        options: ConvOptions,
+    ) -> FloatTensor<Self>;
+
+    /// See [`super::batch_norm`]: output, mean, variance.
+    fn kernel_batch_norm(
+        x: FloatTensor<Self>,
+        gamma: FloatTensor<Self>,
+        beta: FloatTensor<Self>,
+        epsilon: f64,
+        relu: bool,
+    ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>);
+
+    /// See [`super::elu`].
+    fn kernel_elu(x: FloatTensor<Self>) -> FloatTensor<Self>;
+
+    /// See [`super::upsample_concat`].
+    fn kernel_upsample_concat(x: FloatTensor<Self>, skip: FloatTensor<Self>) -> FloatTensor<Self>;
+
+    /// See [`super::warp`].
+    fn kernel_warp(image: FloatTensor<Self>, coords: FloatTensor<Self>) -> FloatTensor<Self>;
+
+    /// See [`super::photometric_error`].
+    fn kernel_photometric(
+        a: FloatTensor<Self>,
+        b: FloatTensor<Self>,
+        alpha: f64,
+    ) -> FloatTensor<Self>;
+}
+
+/// The backward passes, on the backend below autodiff. Each gives the gradient of its inputs; where
+/// an input needs none, its work can be left out.
+pub trait KernelBackward: Backend {
+    /// Gradient of the input of [`KernelOps::kernel_conv2d`].
+    fn conv2d_grad_x(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+        options: ConvOptions,
+    ) -> FloatTensor<Self>;
+
+    /// Gradient of its weights.
+    fn conv2d_grad_weight(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+        options: ConvOptions,
+    ) -> FloatTensor<Self>;
+
+    /// Gradient of its bias.
+    fn conv2d_grad_bias(grad: FloatTensor<Self>) -> FloatTensor<Self>;
+
+    /// Gradients of x, γ and β of [`KernelOps::kernel_batch_norm`].
+    fn batch_norm_grad(
+        x: FloatTensor<Self>,
+        parameters: [FloatTensor<Self>; 2],
+        statistics: [FloatTensor<Self>; 2],
+        grad: FloatTensor<Self>,
+        epsilon: f64,
+        relu: bool,
+    ) -> [FloatTensor<Self>; 3];
+
+    /// Gradient of [`KernelOps::kernel_elu`] from its output.
+    fn elu_grad(output: FloatTensor<Self>, grad: FloatTensor<Self>) -> FloatTensor<Self>;
+
+    /// Gradients of x and skip of [`KernelOps::kernel_upsample_concat`]; `channels` are those of x.
+    fn upsample_concat_grad(grad: FloatTensor<Self>, channels: usize) -> [FloatTensor<Self>; 2];
+
+    /// Gradient of the image of [`KernelOps::kernel_warp`].
+    fn warp_grad_image(
+        image: FloatTensor<Self>,
+        coords: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+    ) -> FloatTensor<Self>;
+
+    /// Gradient of its coordinates.
+    fn warp_grad_coords(
+        image: FloatTensor<Self>,
+        coords: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+    ) -> FloatTensor<Self>;
+
+    /// Gradient of a of [`KernelOps::kernel_photometric`].
+    fn photometric_grad(
+        a: FloatTensor<Self>,
+        b: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+        alpha: f64,
+    ) -> FloatTensor<Self>;
+}

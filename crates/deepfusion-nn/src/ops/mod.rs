@@ -1,0 +1,182 @@
+//! The project's own differentiable operations.
+//!
+//! On the CPU (Burn's Flex backend) they run on the kernels of `deepfusion-kernels`, with backward
+//! passes of their own; on every other backend they are composed of Burn's operations and mean the
+//! same. `kernel` declares them to Burn's dispatch, `flex` runs them, `autodiff` derives them, and
+//! `composed` holds the other backends' form.
+
+mod autodiff;
+mod composed;
+mod flex;
+mod kernel;
+
+use burn::backend::{Dispatch, DispatchDevice};
+use burn::tensor::Tensor;
+use kernel::KernelOps;
+
+pub use composed::{
+    batch_norm as composed_batch_norm, conv2d as composed_conv2d, elu as composed_elu,
+    photometric_error as composed_photometric_error, upsample_concat as composed_upsample_concat,
+    warp as composed_warp,
+};
+pub use kernel::ConvOptions;
+
+/// Whether the tensor lives where the kernels run.
+fn on_cpu<const D: usize>(tensor: &Tensor<D>) -> bool {
+    matches!(
+        tensor.device().inner().as_dispatch(),
+        DispatchDevice::Flex(_)
+    )
+}
+
+/// Convolution, y = w ⋆ x + b.
+///
+/// # Shapes
+/// - `x`: `[N, C, H, W]`
+/// - `weight`: `[O, C, kh, kw]`
+/// - `bias`: `[O]`
+/// - output: `[N, O, H', W']`, H' = ⌊(H + 2·padding − dilation·(kh − 1) − 1) / stride⌋ + 1
+///
+/// # Panics
+/// When the shapes do not fit each other, as Burn's own operations do.
+#[must_use]
+pub fn conv2d(
+    x: Tensor<4>,
+    weight: Tensor<4>,
+    bias: Option<Tensor<1>>,
+    options: ConvOptions,
+) -> Tensor<4> {
+    if !on_cpu(&x) {
+        return composed::conv2d(x, weight, bias, options);
+    }
+    let [_, channels, _, _] = x.dims();
+    let [out, expected, _, _] = weight.dims();
+    assert_eq!(channels, expected, "the input's channels are the weight's");
+    let has_bias = bias.is_some();
+    // The kernel does not read the bias where there is none.
+    let bias = bias.unwrap_or_else(|| Tensor::zeros([out], &x.device().inner()));
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_conv2d(
+        x.into_dispatch(),
+        weight.into_dispatch(),
+        bias.into_dispatch(),
+        has_bias,
+        options,
+    ))
+}
+
+/// What batch normalisation over a batch gives.
+#[derive(Debug, Clone)]
+pub struct BatchNormOutput {
+    /// The normalised values, `[N, C, H, W]`.
+    pub output: Tensor<4>,
+    /// The batch's mean, `[C]`, without gradient.
+    pub mean: Tensor<1>,
+    /// The batch's variance without Bessel's correction, `[C]`, without gradient.
+    pub variance: Tensor<1>,
+}
+
+/// Batch normalisation with the batch's own statistics, y = γ·(x − μ)/√(σ² + ε) + β, followed by a
+/// ReLU with `relu`.
+///
+/// # Shapes
+/// - `x`, output: `[N, C, H, W]`
+/// - `gamma`, `beta`: `[C]`
+#[must_use]
+pub fn batch_norm(
+    x: Tensor<4>,
+    gamma: Tensor<1>,
+    beta: Tensor<1>,
+    epsilon: f64,
+    relu: bool,
+) -> BatchNormOutput {
+    if !on_cpu(&x) {
+        return composed::batch_norm(x, gamma, beta, epsilon, relu);
+    }
+    let (output, mean, variance) = <Dispatch as KernelOps>::kernel_batch_norm(
+        x.into_dispatch(),
+        gamma.into_dispatch(),
+        beta.into_dispatch(),
+        epsilon,
+        relu,
+    );
+    BatchNormOutput {
+        output: Tensor::from_dispatch(output),
+        mean: Tensor::from_dispatch(mean),
+        variance: Tensor::from_dispatch(variance),
+    }
+}
+
+/// ELU, x for x > 0 and eˣ − 1 below.
+#[must_use]
+pub fn elu(x: Tensor<4>) -> Tensor<4> {
+    if !on_cpu(&x) {
+        return composed::elu(x);
+    }
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_elu(x.into_dispatch()))
+}
+
+/// Every pixel repeated twice in both directions, then the skip feature behind it.
+///
+/// # Shapes
+/// - `x`: `[N, C, H, W]`
+/// - `skip`: `[N, S, 2H, 2W]`
+/// - output: `[N, C + S, 2H, 2W]`
+#[must_use]
+pub fn upsample_concat(x: Tensor<4>, skip: Option<Tensor<4>>) -> Tensor<4> {
+    if !on_cpu(&x) {
+        return composed::upsample_concat(x, skip);
+    }
+    let [batch, _, height, width] = x.dims();
+    let skip = skip
+        .unwrap_or_else(|| Tensor::zeros([batch, 0, 2 * height, 2 * width], &x.device().inner()));
+    assert_eq!(
+        [skip.dims()[0], skip.dims()[2], skip.dims()[3]],
+        [batch, 2 * height, 2 * width],
+        "the skip feature is twice the size"
+    );
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_upsample_concat(
+        x.into_dispatch(),
+        skip.into_dispatch(),
+    ))
+}
+
+/// The bilinear warp, out(p) = image⟨coords(p)⟩; outside the image its border counts (SPEC 0).
+///
+/// # Shapes
+/// - `image`: `[N, C, H, W]`
+/// - `coords`: `[N, 2, H', W']`, u and v in pixels, integers at pixel centres
+/// - output: `[N, C, H', W']`
+#[must_use]
+pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
+    if !on_cpu(&coords) {
+        return composed::warp(image, coords);
+    }
+    assert_eq!(
+        coords.dims()[..2],
+        [image.dims()[0], 2],
+        "two coordinates a pixel"
+    );
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_warp(
+        image.into_dispatch(),
+        coords.into_dispatch(),
+    ))
+}
+
+/// The photometric error of SPEC 2, Eq. 6: pe(a, b) = α·clamp((1 − SSIM(a, b))/2, 0, 1) +
+/// (1 − α)·|a − b|, mean over channels. The gradient flows to `a` alone: `b` is what was observed.
+///
+/// # Shapes
+/// - `a`, `b`: `[N, C, H, W]`
+/// - output: `[N, 1, H, W]`
+#[must_use]
+pub fn photometric_error(a: Tensor<4>, b: Tensor<4>, alpha: f64) -> Tensor<4> {
+    assert_eq!(a.dims(), b.dims(), "both images have the same size");
+    if !on_cpu(&a) {
+        return composed::photometric_error(a, b, alpha);
+    }
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_photometric(
+        a.into_dispatch(),
+        b.detach().into_dispatch(),
+        alpha,
+    ))
+}

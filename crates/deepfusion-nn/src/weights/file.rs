@@ -1,0 +1,168 @@
+//! Weights in files: safetensors both ways, PyTorch's `.pth` for reading.
+
+use std::collections::HashMap;
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use burn::store::pytorch_reader::{DType as TorchDType, PytorchReader};
+use burn::tensor::{bf16, f16};
+use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
+
+use super::{WeightTensor, Weights};
+use crate::Error;
+
+/// Reads every float tensor of a `.safetensors`, `.pth` or `.pt` file; the kind is told by content,
+/// not by name. f64, f16 and bf16 become f32; integers (PyTorch's `num_batches_tracked`) and
+/// entries that are no tensors are skipped.
+///
+/// # Errors
+/// [`Error::Io`] for a file that cannot be read, [`Error::Format`] for one that holds no weights.
+pub fn read(path: &Path) -> Result<Weights, Error> {
+    let weights = if is_pytorch(path)? {
+        read_pytorch(path)?
+    } else {
+        read_safetensors(path)?
+    };
+    if weights.tensors.is_empty() {
+        return Err(format_error(path, "it holds no float tensors"));
+    }
+    Ok(weights)
+}
+
+/// PyTorch writes a zip archive ("PK"), before version 1.6 a bare pickle (0x80, protocol). A
+/// safetensors file starts with the length of its JSON header, whose first byte stands at offset 8.
+fn is_pytorch(path: &Path) -> Result<bool, Error> {
+    let mut start = [0_u8; 9];
+    let mut file = fs::File::open(path).map_err(|source| io_error(path, "open", source))?;
+    let mut filled = 0;
+    while filled < start.len() {
+        match file.read(&mut start[filled..]) {
+            Ok(0) => break,
+            Ok(n) => filled += n,
+            Err(source) => return Err(io_error(path, "read", source)),
+        }
+    }
+    if filled == start.len() && start[8] == b'{' {
+        return Ok(false);
+    }
+    if start.starts_with(b"PK") || start[0] == 0x80 {
+        return Ok(true);
+    }
+    let seen = if filled == 0 {
+        "the file is empty".to_owned()
+    } else {
+        format!("it starts with the bytes {:02x?}", &start[..filled])
+    };
+    Err(format_error(path, seen))
+}
+
+fn read_safetensors(path: &Path) -> Result<Weights, Error> {
+    let bytes = fs::read(path).map_err(|source| io_error(path, "read", source))?;
+    let reason = |error: SafeTensorError| format_error(path, error.to_string());
+    let (_, header) = SafeTensors::read_metadata(&bytes).map_err(reason)?;
+    let file = SafeTensors::deserialize(&bytes).map_err(reason)?;
+    let mut weights = Weights::new(path.display().to_string());
+    if let Some(metadata) = header.metadata() {
+        weights.metadata = metadata.clone().into_iter().collect();
+    }
+    for (name, view) in file.iter() {
+        let values = match view.dtype() {
+            Dtype::F32 => floats(view.data(), f32::from_le_bytes),
+            Dtype::F64 => floats(view.data(), |b| f64::from_le_bytes(b) as f32),
+            Dtype::F16 => floats(view.data(), |b| f16::from_le_bytes(b).to_f32()),
+            Dtype::BF16 => floats(view.data(), |b| bf16::from_le_bytes(b).to_f32()),
+            _ => continue,
+        };
+        let shape = view.shape().to_vec();
+        weights
+            .tensors
+            .insert(name.to_owned(), WeightTensor { shape, values });
+    }
+    Ok(weights)
+}
+
+fn read_pytorch(path: &Path) -> Result<Weights, Error> {
+    let reader = PytorchReader::new(path).map_err(|e| format_error(path, e.to_string()))?;
+    let mut weights = Weights::new(path.display().to_string());
+    for (name, tensor) in reader.into_tensors() {
+        let read = || tensor.read().map_err(|e| format_error(path, e.to_string()));
+        // The reader hands out the machine's own byte order.
+        let values = match tensor.dtype() {
+            TorchDType::F32 => floats(&read()?, f32::from_ne_bytes),
+            TorchDType::F64 => floats(&read()?, |b| f64::from_ne_bytes(b) as f32),
+            TorchDType::F16 => floats(&read()?, |b| f16::from_ne_bytes(b).to_f32()),
+            TorchDType::BF16 => floats(&read()?, |b| bf16::from_ne_bytes(b).to_f32()),
+            _ => continue,
+        };
+        let shape = tensor.shape().to_vec();
+        weights.tensors.insert(name, WeightTensor { shape, values });
+    }
+    Ok(weights)
+}
+
+fn floats<const N: usize>(bytes: &[u8], convert: impl Fn([u8; N]) -> f32) -> Vec<f32> {
+    let (chunks, _) = bytes.as_chunks::<N>();
+    chunks.iter().map(|chunk| convert(*chunk)).collect()
+}
+
+/// Writes the tensors as f32 to a safetensors file. The file appears under its name only when it is
+/// complete.
+///
+/// # Errors
+/// [`Error::Io`] naming the file; what was written of it is removed.
+pub fn write_safetensors(path: &Path, weights: &Weights) -> Result<(), Error> {
+    let bytes: Vec<(&String, &WeightTensor, Vec<u8>)> = weights
+        .tensors
+        .iter()
+        .map(|(name, tensor)| {
+            let bytes = tensor.values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            (name, tensor, bytes)
+        })
+        .collect();
+    let mut views = Vec::with_capacity(bytes.len());
+    for (name, tensor, bytes) in &bytes {
+        let view = TensorView::new(Dtype::F32, tensor.shape.clone(), bytes)
+            .map_err(|e| format_error(path, format!("tensor `{name}`: {e}")))?;
+        views.push((name.as_str(), view));
+    }
+    let metadata: HashMap<String, String> = weights.metadata.clone().into_iter().collect();
+    let part = part_name(path);
+    safetensors::serialize_to_file(views, Some(metadata), &part)
+        .map_err(|error| match error {
+            SafeTensorError::IoError(source) => io_error(path, "write", source),
+            other => format_error(path, other.to_string()),
+        })
+        .and_then(|()| {
+            // On the disk before it takes the name: a power cut must not leave half a file there.
+            fs::File::open(&part)
+                .and_then(|file| file.sync_all())
+                .and_then(|()| fs::rename(&part, path))
+                .map_err(|source| io_error(path, "write", source))
+        })
+        .inspect_err(|_| {
+            let _ = fs::remove_file(&part);
+        })
+}
+
+/// A name beside the target, on the same file system, that no other process writes to.
+fn part_name(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.tmp", std::process::id()));
+    path.with_file_name(name)
+}
+
+fn io_error(path: &Path, action: &'static str, source: std::io::Error) -> Error {
+    Error::Io {
+        path: path.to_owned(),
+        action,
+        source,
+    }
+}
+
+fn format_error(path: &Path, reason: impl Into<String>) -> Error {
+    Error::Format {
+        path: path.to_owned(),
+        reason: reason.into(),
+    }
+}

@@ -1,0 +1,165 @@
+//! Weights out of a module and into it.
+
+use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
+use burn::tensor::{Tensor, TensorData};
+
+use super::{WeightTensor, Weights};
+use crate::Error;
+
+/// Every float tensor of the module by its path, the batch norms' running statistics included.
+pub fn collect<M: Module>(module: &M) -> Weights {
+    struct Collect {
+        path: Vec<String>,
+        weights: Weights,
+    }
+    impl ModuleVisitor for Collect {
+        fn enter_module(&mut self, name: &str, _container_type: &str) {
+            self.path.push(name.to_owned());
+        }
+        fn exit_module(&mut self, _name: &str, _container_type: &str) {
+            self.path.pop();
+        }
+        fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+            let tensor = param.val();
+            let shape = tensor.dims().to_vec();
+            let values = tensor.into_data().iter::<f32>().collect();
+            self.weights
+                .tensors
+                .insert(self.path.join("."), WeightTensor { shape, values });
+        }
+    }
+    let mut collect = Collect {
+        path: Vec::new(),
+        weights: Weights::new("the network"),
+    };
+    module.visit(&mut collect);
+    collect.weights
+}
+
+/// The module with the given weights, which must be exactly its own: same names, same shapes, finite.
+///
+/// The running statistics of a module are shared with its clones (Burn keeps them behind a lock), so
+/// clones made before see the new ones too.
+///
+/// # Errors
+/// [`Error::MissingTensor`], [`Error::UnexpectedTensor`], [`Error::TensorShape`] naming the first such
+/// tensor, [`Error::NotFinite`]; the module is unchanged then (and dropped).
+pub fn apply<M: Module>(module: M, weights: &Weights) -> Result<M, Error> {
+    check(&shapes(&module), weights)?;
+    Ok(module.map(&mut Apply {
+        path: Vec::new(),
+        weights,
+    }))
+}
+
+/// Names and shapes of the module's tensors, in the module's order.
+fn shapes<M: Module>(module: &M) -> Vec<(String, Vec<usize>)> {
+    struct Shapes {
+        path: Vec<String>,
+        found: Vec<(String, Vec<usize>)>,
+    }
+    impl ModuleVisitor for Shapes {
+        fn enter_module(&mut self, name: &str, _container_type: &str) {
+            self.path.push(name.to_owned());
+        }
+        fn exit_module(&mut self, _name: &str, _container_type: &str) {
+            self.path.pop();
+        }
+        fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+            self.found
+                .push((self.path.join("."), param.val().dims().to_vec()));
+        }
+    }
+    let mut shapes = Shapes {
+        path: Vec::new(),
+        found: Vec::new(),
+    };
+    module.visit(&mut shapes);
+    shapes.found
+}
+
+fn check(wanted: &[(String, Vec<usize>)], weights: &Weights) -> Result<(), Error> {
+    let origin = || weights.origin.clone();
+
+    let differing: Vec<_> = wanted
+        .iter()
+        .filter_map(|(name, shape)| Some((name, shape, weights.tensors.get(name)?)))
+        .filter(|(_, shape, tensor)| tensor.shape != **shape)
+        .collect();
+    if let Some((name, expected, tensor)) = differing.first() {
+        return Err(Error::TensorShape {
+            origin: origin(),
+            name: (*name).clone(),
+            expected: (*expected).clone(),
+            found: tensor.shape.clone(),
+            others: differing.len() - 1,
+        });
+    }
+
+    let missing: Vec<_> = wanted
+        .iter()
+        .filter(|(name, _)| !weights.tensors.contains_key(name))
+        .collect();
+    if let Some((name, shape)) = missing.first() {
+        return Err(Error::MissingTensor {
+            origin: origin(),
+            name: name.clone(),
+            expected: shape.clone(),
+            others: missing.len() - 1,
+        });
+    }
+
+    let unexpected: Vec<_> = weights
+        .tensors
+        .iter()
+        .filter(|(name, _)| !wanted.iter().any(|(wanted, _)| wanted == *name))
+        .collect();
+    if let Some((name, tensor)) = unexpected.first() {
+        return Err(Error::UnexpectedTensor {
+            origin: origin(),
+            name: (*name).clone(),
+            found: tensor.shape.clone(),
+            others: unexpected.len() - 1,
+        });
+    }
+
+    for (name, tensor) in &weights.tensors {
+        let count = tensor.values.iter().filter(|v| !v.is_finite()).count();
+        if count > 0 {
+            return Err(Error::NotFinite {
+                origin: origin(),
+                name: name.clone(),
+                count,
+            });
+        }
+    }
+    Ok(())
+}
+
+struct Apply<'a> {
+    path: Vec<String>,
+    weights: &'a Weights,
+}
+
+impl ModuleMapper for Apply<'_> {
+    fn enter_module(&mut self, name: &str, _container_type: &str) {
+        self.path.push(name.to_owned());
+    }
+    fn exit_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.pop();
+    }
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let Some(tensor) = self.weights.tensors.get(&self.path.join(".")) else {
+            return param; // `check` has seen every name.
+        };
+        param.map(|old| {
+            let data = TensorData::new(tensor.values.clone(), tensor.shape.clone());
+            let new = Tensor::from_data(data, &old.device());
+            if old.is_require_grad() {
+                new.require_grad()
+            } else {
+                new
+            }
+        })
+    }
+}

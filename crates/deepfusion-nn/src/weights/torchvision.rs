@@ -1,0 +1,73 @@
+//! torchvision's ResNets.
+
+use std::path::Path;
+
+use super::{Weights, apply, read};
+use crate::Error;
+use crate::resnet::{ResNet, ResNetDepth};
+
+/// Reads ImageNet weights, as torchvision publishes them (`resnet18-f37072fd.pth` and its like, or
+/// the same tensors as `.safetensors`), into an encoder. The classifier (`fc`) is left out; for an
+/// encoder of several frames the first convolution is repeated per frame and divided by their number,
+/// so that equal frames give the activations of the single image.
+///
+/// # Errors
+/// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] for weights that are no ResNet.
+pub fn load_torchvision_resnet(encoder: ResNet, path: &Path) -> Result<ResNet, Error> {
+    let weights = read(path)?;
+    detect_resnet(&weights)?;
+    apply_torchvision(encoder, weights)
+}
+
+/// [`load_torchvision_resnet`] on tensors already read, under torchvision's names.
+pub(super) fn apply_torchvision(encoder: ResNet, weights: Weights) -> Result<ResNet, Error> {
+    let mut weights = weights.renamed(|name| (!name.starts_with("fc.")).then(|| name.to_owned()));
+    let channels = encoder.conv1.weight.val().dims()[1];
+    if let Some(conv1) = weights.tensors.get_mut("conv1.weight")
+        && conv1.shape.len() == 4
+        && conv1.shape[1] == 3
+        && channels > 3
+        && channels.is_multiple_of(3)
+    {
+        let frames = channels / 3;
+        let per_filter = conv1.values.len() / conv1.shape[0].max(1);
+        conv1.values = conv1
+            .values
+            .chunks_exact(per_filter.max(1))
+            .flat_map(|filter| std::iter::repeat_n(filter, frames).flatten())
+            .map(|value| value / frames as f32)
+            .collect();
+        conv1.shape[1] = channels;
+    }
+    apply(encoder, &weights)
+}
+
+/// Which ResNet these are the weights of, by torchvision's names.
+///
+/// # Errors
+/// [`Error::UnknownArchitecture`] when the blocks are none of the known ones'.
+pub fn detect_resnet(weights: &Weights) -> Result<ResNetDepth, Error> {
+    let blocks: [usize; 4] = std::array::from_fn(|layer| {
+        (0..)
+            .take_while(|block| {
+                let name = format!("layer{}.{block}.conv1.weight", layer + 1);
+                weights.tensors.contains_key(&name)
+            })
+            .count()
+    });
+    let bottleneck = weights.tensors.contains_key("layer1.0.conv3.weight");
+    ResNetDepth::ALL
+        .into_iter()
+        .find(|depth| depth.blocks() == blocks && depth.is_bottleneck() == bottleneck)
+        .ok_or_else(|| Error::UnknownArchitecture {
+            origin: weights.origin.clone(),
+            reason: if blocks == [0; 4] {
+                let first = weights.tensors.keys().next().map_or("", String::as_str);
+                format!(
+                    "no ResNet: there is no `layer1.0.conv1.weight`; its first tensor is `{first}`"
+                )
+            } else {
+                format!("a ResNet of {blocks:?} blocks, bottleneck: {bottleneck}, is not known")
+            },
+        })
+}

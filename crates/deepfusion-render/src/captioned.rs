@@ -1,0 +1,83 @@
+use image::{Rgb, RgbImage, imageops};
+
+use crate::text::{TextSize, draw_text};
+
+pub(crate) const PAPER: Rgb<u8> = Rgb([24, 24, 27]);
+pub(crate) const INK: Rgb<u8> = Rgb([228, 228, 231]);
+const GAP: u32 = 6;
+
+/// A picture with the words above it.
+#[derive(Debug, Clone)]
+pub struct Tile {
+    /// What it shows.
+    pub caption: String,
+    /// The picture.
+    pub picture: RgbImage,
+}
+
+impl Tile {
+    /// A picture with its caption.
+    #[must_use]
+    pub fn new(caption: impl Into<String>, picture: RgbImage) -> Self {
+        Self {
+            caption: caption.into(),
+            picture,
+        }
+    }
+}
+
+/// Pictures in rows of `columns` (at least 1), each under its caption; columns are as wide as the widest picture, rows as
+/// high as their highest.
+#[must_use]
+pub fn sheet(tiles: &[Tile], columns: usize) -> RgbImage {
+    let columns = columns.clamp(1, tiles.len().max(1));
+    let width = tiles.iter().map(|t| t.picture.width()).max().unwrap_or(0);
+    let size = TextSize::for_width(width);
+    let caption = size.height() + 6;
+    let highest = |row: &[Tile]| row.iter().map(|t| t.picture.height()).max().unwrap_or(0);
+    let height: u32 = tiles
+        .chunks(columns)
+        .map(|row| caption + highest(row) + GAP)
+        .sum();
+    let mut out = RgbImage::from_pixel(columns as u32 * (width + GAP) + GAP, height + GAP, PAPER);
+    let mut y = GAP;
+    for row in tiles.chunks(columns) {
+        for (column, tile) in (0u32..).zip(row) {
+            let x = GAP + column * (width + GAP);
+            draw_text(&mut out, &tile.caption, (x as i32, y as i32), size, INK);
+            imageops::replace(
+                &mut out,
+                &tile.picture,
+                i64::from(x),
+                i64::from(y + caption),
+            );
+        }
+        y += caption + highest(row) + GAP;
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_stand_where_they_belong() {
+        let red = RgbImage::from_pixel(30, 10, Rgb([255, 0, 0]));
+        let blue = RgbImage::from_pixel(30, 10, Rgb([0, 0, 255]));
+        let out = sheet(
+            &[
+                Tile::new("a", red.clone()),
+                Tile::new("b", blue),
+                Tile::new("c", red),
+            ],
+            2,
+        );
+        assert_eq!(out.dimensions(), (6 + 2 * 36, 6 + 2 * 32));
+        assert_eq!(out.get_pixel(8, 25), &Rgb([255, 0, 0]));
+        assert_eq!(out.get_pixel(44, 25), &Rgb([0, 0, 255]));
+        assert_eq!(out.get_pixel(8, 57), &Rgb([255, 0, 0]));
+        assert_eq!(out.get_pixel(44, 57), &PAPER);
+        assert_eq!(sheet(&[], 3).dimensions(), (12, 6));
+    }
+}

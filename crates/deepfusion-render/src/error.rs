@@ -1,0 +1,51 @@
+/// What can go wrong while a picture or a report is made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Two things that belong together are of different sizes.
+    #[error("{what} has {found} values, expected {expected}")]
+    Size {
+        /// What does not fit.
+        what: &'static str,
+        /// How many values it has.
+        found: usize,
+        /// How many it should have.
+        expected: String,
+    },
+    /// A picture cannot be encoded.
+    #[error("a picture of the report cannot be encoded")]
+    Encode(#[from] image::ImageError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Data(#[from] deepfusion_data::Error),
+}
+
+/// A result of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// A one-line remedy, where there is one.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Data(inner) => inner.hint(),
+            Self::Size { .. } | Self::Encode(_) => None,
+        }
+    }
+}
+
+/// Fails where `found` is not width × height.
+pub(crate) fn require_size(
+    what: &'static str,
+    found: usize,
+    (width, height): (u32, u32),
+) -> Result<()> {
+    if found == width as usize * height as usize {
+        return Ok(());
+    }
+    Err(Error::Size {
+        what,
+        found,
+        expected: format!("{width}×{height}"),
+    })
+}

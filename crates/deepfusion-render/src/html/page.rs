@@ -1,0 +1,236 @@
+use std::fmt::Write as _;
+use std::io::{Cursor, Write as _};
+use std::path::Path;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use image::RgbImage;
+use image::codecs::jpeg::JpegEncoder;
+
+use super::{escape, tables};
+use crate::{LineChart, Result};
+
+/// How a picture is stored in a report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PictureFormat {
+    /// Small, for photographs and renderings.
+    #[default]
+    Jpeg,
+    /// Exact, for pictures with text and sharp edges.
+    Png,
+}
+
+/// Builds a report, part by part, in the order in which they will be read.
+///
+/// ```
+/// use deepfusion_render::HtmlReport;
+/// let html = HtmlReport::new("Demo", "Metric depth from one camera")
+///     .facts(&[("Abs Rel", "0.112"), ("scale", "1.01")])
+///     .section("How it was made")
+///     .paragraph("Trained on a simulated street.")
+///     .command("deepfusion demo")
+///     .to_html();
+/// assert!(html.starts_with("<!doctype html>") && html.contains("0.112"));
+/// ```
+#[derive(Debug, Clone)]
+pub struct HtmlReport {
+    title: String,
+    subtitle: String,
+    body: String,
+}
+
+impl HtmlReport {
+    /// An empty report.
+    #[must_use]
+    pub fn new(title: impl Into<String>, subtitle: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            subtitle: subtitle.into(),
+            body: String::new(),
+        }
+    }
+
+    /// The few numbers that matter, in large: name and value.
+    #[must_use]
+    pub fn facts(mut self, facts: &[(&str, &str)]) -> Self {
+        self.body.push_str(r#"<div class="facts">"#);
+        for (name, value) in facts {
+            // Writing to a String cannot fail, here and below.
+            let _ = write!(
+                self.body,
+                r#"<div class="fact"><div class="value">{}</div><div class="name">{}</div></div>"#,
+                escape(value),
+                escape(name)
+            );
+        }
+        self.body.push_str("</div>");
+        self
+    }
+
+    /// Begins a section.
+    #[must_use]
+    pub fn section(mut self, title: &str) -> Self {
+        let _ = write!(self.body, "<h2>{}</h2>", escape(title));
+        self
+    }
+
+    /// A paragraph of plain text.
+    #[must_use]
+    pub fn paragraph(mut self, text: &str) -> Self {
+        let _ = write!(self.body, "<p>{}</p>", escape(text));
+        self
+    }
+
+    /// The tables of an evaluation: rows of metrics with the trivial row, scale, ranges.
+    #[must_use]
+    pub fn evaluation(mut self, report: &deepfusion_eval::Report) -> Self {
+        self.body.push_str(&tables::evaluation(report));
+        self
+    }
+
+    /// Any table: the first column is left-aligned text, the others are numbers.
+    #[must_use]
+    pub fn table(mut self, header: &[&str], rows: &[Vec<String>]) -> Self {
+        self.body.push_str(&tables::table(header, rows));
+        self
+    }
+
+    /// A chart. Charts that follow each other stand side by side where there is room.
+    #[must_use]
+    pub fn chart(mut self, chart: &LineChart) -> Self {
+        let _ = write!(
+            self.body,
+            r#"<figure class="half">{}</figure>"#,
+            chart.to_svg()
+        );
+        self
+    }
+
+    /// A picture with the words below it.
+    ///
+    /// # Errors
+    /// [`crate::Error::Encode`] where it cannot be encoded (it has no pixels).
+    pub fn picture(
+        mut self,
+        caption: &str,
+        picture: &RgbImage,
+        format: PictureFormat,
+    ) -> Result<Self> {
+        let mut bytes = Cursor::new(Vec::new());
+        let kind = match format {
+            PictureFormat::Jpeg => {
+                picture.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, 88))?;
+                "jpeg"
+            }
+            PictureFormat::Png => {
+                picture.write_to(&mut bytes, image::ImageFormat::Png)?;
+                "png"
+            }
+        };
+        let _ = write!(
+            self.body,
+            r#"<figure><img alt="{0}" width="{1}" height="{2}" src="data:image/{kind};base64,{3}"><figcaption>{0}</figcaption></figure>"#,
+            escape(caption),
+            picture.width(),
+            picture.height(),
+            STANDARD.encode(bytes.get_ref())
+        );
+        Ok(self)
+    }
+
+    /// A command to copy.
+    #[must_use]
+    pub fn command(mut self, command: &str) -> Self {
+        let _ = write!(self.body, "<pre><code>{}</code></pre>", escape(command));
+        self
+    }
+
+    /// Settings as they were written to a file, folded away.
+    #[must_use]
+    pub fn settings(mut self, title: &str, text: &str) -> Self {
+        let _ = write!(
+            self.body,
+            "<details><summary>{}</summary><pre><code>{}</code></pre></details>",
+            escape(title),
+            escape(text)
+        );
+        self
+    }
+
+    /// The whole page.
+    #[must_use]
+    pub fn to_html(&self) -> String {
+        format!(
+            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n<main>\n\
+             <header><h1>{title}</h1><p>{subtitle}</p></header>\n{body}\n</main>\n</body>\n</html>\n",
+            title = escape(&self.title),
+            subtitle = escape(&self.subtitle),
+            style = include_str!("style.css"),
+            body = self.body,
+        )
+    }
+
+    /// Writes the page, whole or not at all.
+    ///
+    /// # Errors
+    /// [`crate::Error::Data`] naming the file.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        deepfusion_data::write_atomically(path, |file| {
+            file.write_all(self.to_html().as_bytes())
+                .map_err(|e| deepfusion_data::Error::file(path, e).into())
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_needs_nothing_from_outside() {
+        let picture = RgbImage::new(20, 10);
+        let html = HtmlReport::new("A <b>", "sub & title")
+            .picture("street", &picture, PictureFormat::Jpeg)
+            .unwrap()
+            .picture("depth", &picture, PictureFormat::Png)
+            .unwrap()
+            .chart(&LineChart::new("loss", "step").line("a", vec![(0.0, 1.0), (1.0, 0.5)]))
+            .settings("config.toml", "seed = 1")
+            .to_html();
+        assert!(html.contains("A &lt;b&gt;") && html.contains("sub &amp; title"));
+        assert!(
+            html.contains("data:image/jpeg;base64,/9j/")
+                && html.contains("data:image/png;base64,iVBOR")
+        );
+        for outside in ["http://", "https://", "@import", "<script", "<link"] {
+            assert!(!html.contains(outside), "{outside}");
+        }
+    }
+
+    #[test]
+    fn it_is_written_as_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("report.html");
+        HtmlReport::new("t", "s").write(&path).unwrap();
+        assert!(
+            std::fs::read_to_string(&path)
+                .unwrap()
+                .ends_with("</html>\n")
+        );
+        assert!(
+            HtmlReport::new("t", "s")
+                .write(&folder.path().join("no/such.html"))
+                .is_err()
+        );
+    }
+
+    #[test]
+    fn an_empty_picture_is_an_error_not_a_panic() {
+        for format in [PictureFormat::Jpeg, PictureFormat::Png] {
+            let result = HtmlReport::new("t", "s").picture("none", &RgbImage::new(0, 0), format);
+            assert!(result.is_err());
+        }
+    }
+}

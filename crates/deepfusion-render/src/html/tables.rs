@@ -1,0 +1,159 @@
+use std::fmt::Write as _;
+
+use deepfusion_eval::{Crop, GroundTruth, Metrics, Report};
+
+use super::escape;
+
+/// A table: the first column is text, the others are numbers.
+pub(super) fn table(header: &[&str], rows: &[Vec<String>]) -> String {
+    table_of_class("plain", header, rows)
+}
+
+fn table_of_class(class: &str, header: &[&str], rows: &[Vec<String>]) -> String {
+    let mut out = format!(r#"<div class="scroll"><table class="{class}"><thead><tr>"#);
+    for cell in header {
+        // Writing to a String cannot fail, here and below.
+        let _ = write!(out, "<th>{}</th>", escape(cell));
+    }
+    out.push_str("</tr></thead><tbody>");
+    for row in rows {
+        out.push_str("<tr>");
+        for cell in row {
+            let _ = write!(out, "<td>{}</td>", escape(cell));
+        }
+        out.push_str("</tr>");
+    }
+    out.push_str("</tbody></table></div>");
+    out
+}
+
+/// All that a report says, as tables and sentences.
+pub(super) fn evaluation(report: &Report) -> String {
+    let mut out = table_of_class(
+        "metrics",
+        &[
+            "",
+            "Abs Rel ↓",
+            "Sq Rel ↓",
+            "RMSE ↓",
+            "RMSE log ↓",
+            "δ < 1.25 ↑",
+            "δ < 1.25² ↑",
+            "δ < 1.25³ ↑",
+        ],
+        &metric_rows(report),
+    );
+    let crop = match report.protocol.crop {
+        Crop::None => "the whole image",
+        Crop::Garg => "Garg's crop",
+    };
+    let gt = match report.protocol.gt {
+        GroundTruth::Z => "camera z",
+        GroundTruth::Velodyne => "the velodyne's forward distance",
+    };
+    let _ = write!(
+        out,
+        "<p class=\"note\">Means over {} image{}: {crop}, {} to {} m, ground truth: {gt}.{}</p>",
+        report.n,
+        if report.n == 1 { "" } else { "s" },
+        report.protocol.min_m,
+        report.protocol.cap_m,
+        if report.trivial.is_some() {
+            " The trivial row is the mean depth of each pixel over the training scans, without looking at the image."
+        } else {
+            ""
+        },
+    );
+    out.push_str(&scale_table(report));
+    let rows: Vec<Vec<String>> = report
+        .ranges
+        .iter()
+        .map(|bin| {
+            vec![
+                format!("{} to {} m", bin.from_m, bin.to_m),
+                bin.n.to_string(),
+                number(bin.abs_rel),
+                number(bin.rmse),
+            ]
+        })
+        .collect();
+    out.push_str(&table(
+        &["range (unscaled)", "pixels", "Abs Rel", "RMSE, m"],
+        &rows,
+    ));
+    if !report.skipped.is_empty() {
+        let _ = write!(
+            out,
+            "<p class=\"note\">Without ground truth and therefore skipped: {}.</p>",
+            escape(&report.skipped.join(", "))
+        );
+    }
+    out
+}
+
+fn metric_rows(report: &Report) -> Vec<Vec<String>> {
+    let row = |label: &str, metrics: &Metrics| {
+        let mut row = vec![label.to_owned()];
+        row.extend(metrics.to_array().iter().map(|v| format!("{v:.3}")));
+        row
+    };
+    let mut rows = vec![
+        row("unscaled (metric)", &report.unscaled),
+        row("median-scaled", &report.median_scaled),
+    ];
+    if let Some(fixed) = &report.fixed_scaled {
+        rows.push(row(&format!("scaled by {}", fixed.factor), &fixed.metrics));
+    }
+    if let Some(metrics) = &report.still {
+        rows.push(row("static", metrics));
+    }
+    if let Some(metrics) = &report.moving {
+        rows.push(row("moving", metrics));
+    }
+    if let Some(trivial) = &report.trivial {
+        rows.push(row("trivial", &trivial.unscaled));
+        rows.push(row("trivial, median-scaled", &trivial.median_scaled));
+    }
+    rows
+}
+
+fn scale_table(report: &Report) -> String {
+    let scale = &report.scale;
+    let interval = scale.bias_ci95.map_or_else(
+        || "–".to_owned(),
+        |[low, high]| format!("{low:+.3} to {high:+.3}"),
+    );
+    let mut rows = vec![
+        vec![
+            "scale: median of median(gt) / median(prediction)".into(),
+            format!("{:.3}", scale.median),
+        ],
+        vec![
+            "its relative spread over images".into(),
+            format!("{:.3}", scale.std_rel),
+        ],
+        vec![
+            "bias: mean of ln(median(prediction) / median(gt))".into(),
+            format!("{:+.3}", scale.bias),
+        ],
+        vec!["its 95 % interval".into(), interval],
+    ];
+    if let Some(rate) = report.hole_rate {
+        rows.push(vec![
+            "ground truth without prediction".into(),
+            format!("{:.2} %", 100.0 * rate),
+        ]);
+    }
+    if let Some(points) = &report.points {
+        let text = format!("{:.3} m", points.mean_m);
+        rows.push(vec![
+            format!("mean distance of {} drawn points", points.n),
+            text,
+        ]);
+    }
+    table(&["scale", ""], &rows)
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"))
+}

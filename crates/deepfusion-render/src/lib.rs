@@ -1,0 +1,26 @@
+//! Pictures of depth, errors and clouds, and the HTML report. Plain slices and `image` pictures, no tensors.
+//!
+//! Depth is shown by the logarithm of metres, warm near and cold far, with a legend in metres ([`DepthScale`]);
+//! disparity without a unit in magma, bright near. Text is drawn in a bitmap font ([`draw_text`]).
+
+mod captioned;
+mod chart;
+mod cloud_view;
+mod colour;
+mod depth_picture;
+mod error;
+mod error_picture;
+mod html;
+mod panel;
+mod text;
+
+pub use captioned::{Tile, sheet};
+pub use chart::{LineChart, Series};
+pub use cloud_view::{CloudView, render_cloud};
+pub use colour::{ColourMap, DepthScale};
+pub use depth_picture::{depth_picture, disparity_picture, side_by_side, with_depth_legend};
+pub use error::{Error, Result};
+pub use error_picture::error_picture;
+pub use html::{HtmlReport, PictureFormat};
+pub use panel::{SamplePanel, sample_panel};
+pub use text::{TextSize, draw_text, text_width};

@@ -1,0 +1,201 @@
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// The kind of place that is driven through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Scene {
+    /// A street of houses, shops, gardens and parks, by day.
+    #[default]
+    Urban,
+}
+
+impl std::str::FromStr for Scene {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        match name {
+            "urban" => Ok(Self::Urban),
+            other => Err(Error::Config {
+                field: "scene",
+                value: other.to_owned(),
+                expected: "urban",
+            }),
+        }
+    }
+}
+
+/// A street of half an hour's drive still fits into memory, and its coordinates into f32.
+const LONGEST_DRIVE_S: f64 = 1800.0;
+
+/// What to simulate. Equal configurations give equal drives, byte for byte.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SimConfig {
+    /// Chooses the street, its look, the light and the way it is driven.
+    pub seed: u64,
+    /// Number of frames, at least 1.
+    pub frames: usize,
+    /// Width of the pictures, in pixels.
+    pub width: u32,
+    /// Height of the pictures, in pixels.
+    pub height: u32,
+    /// Number of cars that move.
+    pub moving_cars: usize,
+    /// Frames a second; the real intervals vary by ±1 ms around 1 / `fps`.
+    pub fps: f64,
+    /// The kind of place.
+    pub scene: Scene,
+    /// [`crate::write_kitti`] writes a velodyne scan for every n-th frame; 0 writes none.
+    pub scan_every: usize,
+    /// Angle between two columns of a velodyne scan, in degrees.
+    pub scan_step_deg: f64,
+}
+
+impl Default for SimConfig {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            frames: 100,
+            width: 640,
+            height: 192,
+            moving_cars: 0,
+            fps: 10.0,
+            scene: Scene::Urban,
+            scan_every: 1,
+            scan_step_deg: 0.3,
+        }
+    }
+}
+
+impl SimConfig {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::Config`] names the first field that is out of range.
+    pub fn validate(&self) -> Result<()> {
+        let check = |ok: bool, field, value: String, expected| {
+            if ok {
+                Ok(())
+            } else {
+                Err(Error::Config {
+                    field,
+                    value,
+                    expected,
+                })
+            }
+        };
+        let size = 16..=8192;
+        check(
+            (1..=100_000).contains(&self.frames),
+            "frames",
+            self.frames.to_string(),
+            "1 to 100000",
+        )?;
+        check(
+            size.contains(&self.width),
+            "width",
+            self.width.to_string(),
+            "16 to 8192",
+        )?;
+        check(
+            size.contains(&self.height),
+            "height",
+            self.height.to_string(),
+            "16 to 8192",
+        )?;
+        check(
+            self.moving_cars <= 1000,
+            "moving_cars",
+            self.moving_cars.to_string(),
+            "0 to 1000",
+        )?;
+        check(
+            self.fps >= 2.0 && self.fps <= 100.0,
+            "fps",
+            self.fps.to_string(),
+            "2 to 100",
+        )?;
+        check(
+            self.frames as f64 / self.fps <= LONGEST_DRIVE_S,
+            "frames",
+            format!("{} at {} a second", self.frames, self.fps),
+            "a drive of at most 30 minutes",
+        )?;
+        check(
+            self.scan_step_deg >= 0.05 && self.scan_step_deg <= 5.0,
+            "scan_step_deg",
+            self.scan_step_deg.to_string(),
+            "0.05 to 5",
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bad_field_is_named() {
+        let base = SimConfig::default;
+        let bad = [
+            (
+                SimConfig {
+                    frames: 30_000,
+                    ..base()
+                },
+                "frames",
+            ),
+            (
+                SimConfig {
+                    frames: 0,
+                    ..base()
+                },
+                "frames",
+            ),
+            (SimConfig { width: 0, ..base() }, "width"),
+            (
+                SimConfig {
+                    height: 9000,
+                    ..base()
+                },
+                "height",
+            ),
+            (
+                SimConfig {
+                    moving_cars: 5000,
+                    ..base()
+                },
+                "moving_cars",
+            ),
+            (
+                SimConfig {
+                    fps: f64::NAN,
+                    ..base()
+                },
+                "fps",
+            ),
+            (
+                SimConfig {
+                    scan_step_deg: 0.0,
+                    ..base()
+                },
+                "scan_step_deg",
+            ),
+        ];
+        for (config, name) in bad {
+            let error = config.validate().unwrap_err();
+            assert!(error.to_string().contains(name), "{error}");
+            assert!(error.hint().is_some_and(|hint| hint.contains(name)));
+        }
+        assert!(base().validate().is_ok());
+    }
+
+    #[test]
+    fn an_unknown_scene_says_what_there_is() {
+        let error = "moon".parse::<Scene>().unwrap_err();
+        assert!(error.to_string().contains("moon") && error.to_string().contains("urban"));
+        assert_eq!("urban".parse::<Scene>().ok(), Some(Scene::Urban));
+    }
+}

@@ -1,0 +1,72 @@
+use std::path::PathBuf;
+
+/// What can go wrong while a drive is made or written.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A value of the configuration is out of its range.
+    #[error("simulator setting `{field}` is {value}, expected {expected}")]
+    Config {
+        /// Name of the field of [`crate::SimConfig`].
+        field: &'static str,
+        /// The value given.
+        value: String,
+        /// What would be accepted.
+        expected: &'static str,
+    },
+    /// The output folder holds something already.
+    #[error("{}: the output folder is not empty", path.display())]
+    OutputNotEmpty {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A folder or file cannot be written.
+    #[error("{}: cannot {action}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was being done.
+        action: &'static str,
+        /// Why it failed.
+        source: std::io::Error,
+    },
+    /// A picture cannot be encoded.
+    #[error("{}: cannot encode the picture: {source}", path.display())]
+    Encode {
+        /// The file that was to be written.
+        path: PathBuf,
+        /// Why it failed.
+        source: image::ImageError,
+    },
+}
+
+impl Error {
+    /// A one-line remedy, where there is one.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Config {
+                field, expected, ..
+            } => Some(format!("set `{field}` to {expected}")),
+            Self::OutputNotEmpty { .. } => {
+                Some("choose a new folder, or empty this one first".to_owned())
+            }
+            Self::Io { source, .. } => Some(
+                match source.kind() {
+                    std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
+                        "the disk is full: free some space, or simulate fewer frames or scans"
+                    }
+                    std::io::ErrorKind::PermissionDenied
+                    | std::io::ErrorKind::ReadOnlyFilesystem => {
+                        "choose an output folder that you may write to"
+                    }
+                    _ => "check that the output folder exists, is a folder and can be written to",
+                }
+                .to_owned(),
+            ),
+            Self::Encode { .. } => None,
+        }
+    }
+}
+
+/// A result with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;

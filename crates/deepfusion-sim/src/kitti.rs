@@ -1,0 +1,373 @@
+//! Writes a drive in the layout of KITTI's raw recordings.
+
+use crate::oxts::DATA_FORMAT;
+use crate::rig::CAM2_FROM_CAM0_X;
+use crate::{Error, Result, SimFrame, Simulation};
+use deepfusion_cloud::PointCloud;
+use deepfusion_geometry::{DepthMap, Se3};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use rayon::prelude::*;
+use std::fs;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// The date every simulated drive carries.
+const DATE: &str = "2026_01_01";
+
+/// Frames rendered and encoded together.
+const BATCH: usize = 8;
+
+/// Writes the whole drive below `out`, which must be new or empty, and returns the drive's folder.
+///
+/// Below `out/2026_01_01`: the three calibration files and `2026_01_01_drive_<seed>_sync` with
+/// `image_02` (PNG), `oxts`, `velodyne_points` (every [`crate::SimConfig::scan_every`]-th frame),
+/// `proj_depth/groundtruth/image_02` (dense exact camera z, 16-bit PNG, metres × 256, 0 beyond
+/// 255 m), `moving_02` (255 on things that move), and `poses.txt` (`world_from_cam`, the upper three
+/// rows of the matrix in 12 numbers a line).
+///
+/// `progress` is called with the frames done and their number. Everything is written to a folder
+/// beside its final place and renamed at the end: after an error `out` is as it was.
+///
+/// # Errors
+/// [`Error::OutputNotEmpty`] where `out` holds anything; [`Error::Io`] and [`Error::Encode`], with
+/// the path, where something cannot be written.
+pub fn write_kitti(
+    simulation: &Simulation,
+    out: &Path,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<PathBuf> {
+    let existed = prepare(out)?;
+    let staging = out.join(format!(".{DATE}.partial"));
+    let written = write_all(simulation, &staging, progress).and_then(|drive| {
+        let date = out.join(DATE);
+        fs::rename(&staging, &date).map_err(io(&date, "move the finished drive here"))?;
+        Ok(date.join(drive))
+    });
+    if written.is_err() {
+        // Best effort: the first error is the one to report.
+        let _ = fs::remove_dir_all(&staging);
+        if !existed {
+            let _ = fs::remove_dir(out);
+        }
+    }
+    written
+}
+
+/// Makes the output folder; whether it was there before.
+fn prepare(out: &Path) -> Result<bool> {
+    match fs::read_dir(out) {
+        Ok(mut entries) => match entries.next() {
+            None => Ok(true),
+            Some(_) => Err(Error::OutputNotEmpty {
+                path: out.to_owned(),
+            }),
+        },
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            make_folder(out)?;
+            Ok(false)
+        }
+        Err(error) => Err(io(out, "use this as the output folder")(error)),
+    }
+}
+
+/// Writes below `date`; returns the drive folder's name.
+fn write_all(
+    simulation: &Simulation,
+    date: &Path,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<String> {
+    let name = format!("{DATE}_drive_{:04}_sync", simulation.config().seed);
+    let drive = date.join(&name);
+    let scan_every = simulation.config().scan_every;
+    let images = drive.join("image_02/data");
+    let depths = drive.join("proj_depth/groundtruth/image_02");
+    let moving = drive.join("moving_02");
+    let oxts = drive.join("oxts/data");
+    let scans = drive.join("velodyne_points/data");
+    for folder in [&images, &depths, &moving, &oxts] {
+        make_folder(folder)?;
+    }
+    if scan_every > 0 {
+        make_folder(&scans)?;
+    }
+    write_calibration(simulation, date)?;
+    let frames = simulation.frames();
+    for first in (0..frames).step_by(BATCH) {
+        let last = (first + BATCH).min(frames);
+        (first..last).into_par_iter().try_for_each(|index| {
+            let frame = simulation.frame(index);
+            write_png(&images.join(format!("{index:010}.png")), &frame)?;
+            write_depth(&depths.join(format!("{index:010}.png")), &frame.depth)?;
+            write_mask(&moving.join(format!("{index:010}.png")), &frame)?;
+            let line = simulation.oxts(index).line() + "\n";
+            write_file(&oxts.join(format!("{index:010}.txt")), line.as_bytes())?;
+            if scan_every > 0 && index % scan_every == 0 {
+                let path = scans.join(format!("{index:010}.bin"));
+                write_scan(&path, &simulation.velodyne(index))?;
+            }
+            Ok(())
+        })?;
+        progress(last, frames);
+    }
+    let stamps = |shift: f64| -> String {
+        (0..frames)
+            .map(|i| timestamp(simulation.time_s(i) + shift) + "\n")
+            .collect()
+    };
+    let stamp_files = [
+        ("image_02/timestamps.txt", 0.0),
+        ("oxts/timestamps.txt", 0.0),
+        ("velodyne_points/timestamps.txt", 0.0),
+        ("velodyne_points/timestamps_start.txt", -0.05),
+        ("velodyne_points/timestamps_end.txt", 0.05),
+    ];
+    for (file, shift) in stamp_files {
+        if scan_every > 0 || !file.starts_with("velodyne") {
+            write_file(&drive.join(file), stamps(shift).as_bytes())?;
+        }
+    }
+    write_file(&drive.join("oxts/dataformat.txt"), DATA_FORMAT.as_bytes())?;
+    let poses: String = (0..frames)
+        .map(|i| pose_line(&simulation.world_from_cam(i)))
+        .collect();
+    write_file(&drive.join("poses.txt"), poses.as_bytes())?;
+    Ok(name)
+}
+
+fn io<'a>(path: &'a Path, action: &'static str) -> impl Fn(std::io::Error) -> Error + 'a {
+    move |source| Error::Io {
+        path: path.to_owned(),
+        action,
+        source,
+    }
+}
+
+fn make_folder(path: &Path) -> Result<()> {
+    fs::create_dir_all(path).map_err(io(path, "make this folder"))
+}
+
+/// Writes a file under another name and renames it, so that no half of it is ever seen.
+fn write_with(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<fs::File>) -> Result<()>,
+) -> Result<()> {
+    let temporary = path.with_extension("partial");
+    let failed = io(path, "write this file");
+    let file = fs::File::create(&temporary).map_err(&failed)?;
+    let mut writer = BufWriter::with_capacity(1 << 16, file);
+    fill(&mut writer)
+        .and_then(|()| writer.flush().map_err(&failed))
+        .and_then(|()| fs::rename(&temporary, path).map_err(&failed))
+        .inspect_err(|_| {
+            let _ = fs::remove_file(&temporary);
+        })
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_with(path, |w| {
+        w.write_all(bytes).map_err(io(path, "write this file"))
+    })
+}
+
+fn encode(
+    path: &Path,
+    bytes: &[u8],
+    width: u32,
+    height: u32,
+    colour: ExtendedColorType,
+    filter: FilterType,
+) -> Result<()> {
+    write_with(path, |writer| {
+        PngEncoder::new_with_quality(writer, CompressionType::Fast, filter)
+            .write_image(bytes, width, height, colour)
+            .map_err(|error| match error {
+                image::ImageError::IoError(source) => io(path, "write this file")(source),
+                source => Error::Encode {
+                    path: path.to_owned(),
+                    source,
+                },
+            })
+    })
+}
+
+fn write_png(path: &Path, frame: &SimFrame) -> Result<()> {
+    let (width, height) = frame.rgb.dimensions();
+    encode(
+        path,
+        frame.rgb.as_raw(),
+        width,
+        height,
+        ExtendedColorType::Rgb8,
+        FilterType::Sub,
+    )
+}
+
+/// KITTI's 16-bit depth: metres × 256, 0 where there is none.
+fn write_depth(path: &Path, depth: &DepthMap) -> Result<()> {
+    let bytes: Vec<u8> = depth
+        .data
+        .iter()
+        .flat_map(|d| {
+            let value = (f64::from(*d) * 256.0).round();
+            let value = if value < 65_536.0 { value as u16 } else { 0 };
+            // The encoder takes the machine's own byte order.
+            value.to_ne_bytes()
+        })
+        .collect();
+    let (width, height) = (depth.width as u32, depth.height as u32);
+    encode(
+        path,
+        &bytes,
+        width,
+        height,
+        ExtendedColorType::L16,
+        FilterType::Sub,
+    )
+}
+
+fn write_mask(path: &Path, frame: &SimFrame) -> Result<()> {
+    let bytes: Vec<u8> = frame
+        .moving
+        .iter()
+        .map(|m| if *m { 255 } else { 0 })
+        .collect();
+    let (width, height) = frame.rgb.dimensions();
+    encode(
+        path,
+        &bytes,
+        width,
+        height,
+        ExtendedColorType::L8,
+        FilterType::NoFilter,
+    )
+}
+
+fn write_scan(path: &Path, cloud: &PointCloud) -> Result<()> {
+    write_with(path, |writer| {
+        cloud.write_kitti_bin(writer).map_err(|error| match error {
+            deepfusion_cloud::Error::Stream(source) => io(path, "write this scan")(source),
+            error => io(path, "write this scan")(std::io::Error::other(error)),
+        })
+    })
+}
+
+/// The date's noon plus `seconds`, with nanoseconds, as KITTI writes it.
+fn timestamp(seconds: f64) -> String {
+    let total = 12 * 3600 * 1_000_000_000 + (seconds * 1e9).round() as i64;
+    let (nanos, total) = (total % 1_000_000_000, total / 1_000_000_000);
+    // Noon of the first day; long drives run into the next ones of January.
+    let (second, minute, hour, day) = (
+        total % 60,
+        total / 60 % 60,
+        total / 3600 % 24,
+        total / 86_400,
+    );
+    format!(
+        "2026-01-{:02} {hour:02}:{minute:02}:{second:02}.{nanos:09}",
+        day + 1
+    )
+}
+
+fn numbers(values: impl IntoIterator<Item = f64>) -> String {
+    let words: Vec<String> = values.into_iter().map(scientific).collect();
+    words.join(" ")
+}
+
+/// C's `%.12e`, which KITTI's tools print (with fewer digits).
+fn scientific(value: f64) -> String {
+    let text = format!("{value:.12e}");
+    match text.split_once('e') {
+        Some((mantissa, exponent)) => {
+            let (sign, digits) = match exponent.strip_prefix('-') {
+                Some(digits) => ('-', digits),
+                None => ('+', exponent),
+            };
+            format!("{mantissa}e{sign}{digits:0>2}")
+        }
+        None => text,
+    }
+}
+
+fn rows(pose: &Se3) -> Vec<f64> {
+    let matrix = pose.matrix();
+    (0..12).map(|i| matrix[(i / 4, i % 4)]).collect()
+}
+
+fn pose_line(pose: &Se3) -> String {
+    numbers(rows(pose)) + "\n"
+}
+
+fn write_calibration(simulation: &Simulation, date: &Path) -> Result<()> {
+    let k = simulation.intrinsics();
+    let (w, h) = (f64::from(k.width), f64::from(k.height));
+    let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    let matrix = [k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0];
+    let mut text = String::from("calib_time: 01-Jan-2026 12:00:00\ncorner_dist: 9.950000e-02\n");
+    for (camera, shift) in [("00", 0.0), ("02", CAM2_FROM_CAM0_X)] {
+        let projection = [
+            k.fx,
+            0.0,
+            k.cx,
+            k.fx * shift,
+            0.0,
+            k.fy,
+            k.cy,
+            0.0,
+            0.0,
+            0.0,
+            1.0,
+            0.0,
+        ];
+        let entries: [(&str, Vec<f64>); 8] = [
+            ("S", vec![w, h]),
+            ("K", matrix.to_vec()),
+            ("D", vec![0.0; 5]),
+            ("R", identity.to_vec()),
+            ("T", vec![shift, 0.0, 0.0]),
+            ("S_rect", vec![w, h]),
+            ("R_rect", identity.to_vec()),
+            ("P_rect", projection.to_vec()),
+        ];
+        for (key, values) in entries {
+            text += &format!("{key}_{camera}: {}\n", numbers(values));
+        }
+    }
+    write_file(&date.join("calib_cam_to_cam.txt"), text.as_bytes())?;
+    let rig = simulation.rig();
+    let velo = rigid(&rig.cam0_from_velo)
+        + "delta_f: 0.000000e+00 0.000000e+00\ndelta_c: 0.000000e+00 0.000000e+00\n";
+    write_file(&date.join("calib_velo_to_cam.txt"), velo.as_bytes())?;
+    let imu = rigid(&rig.velo_from_imu);
+    write_file(&date.join("calib_imu_to_velo.txt"), imu.as_bytes())
+}
+
+fn rigid(pose: &Se3) -> String {
+    let rotation = pose.rotation();
+    let entries = (0..9).map(|i| rotation[(i / 3, i % 3)]);
+    let t = pose.translation();
+    format!(
+        "calib_time: 01-Jan-2026 12:00:00\nR: {}\nT: {}\n",
+        numbers(entries),
+        numbers([t.x, t.y, t.z])
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_look_like_kitti_s() {
+        assert_eq!(scientific(721.5377), "7.215377000000e+02");
+        assert_eq!(scientific(-0.00125), "-1.250000000000e-03");
+        assert_eq!(scientific(0.0), "0.000000000000e+00");
+    }
+
+    #[test]
+    fn time_stamps_run_over_minutes_and_days() {
+        assert_eq!(timestamp(0.1), "2026-01-01 12:00:00.100000000");
+        assert_eq!(timestamp(3725.5), "2026-01-01 13:02:05.500000000");
+        assert_eq!(timestamp(12.0 * 3600.0), "2026-01-02 00:00:00.000000000");
+    }
+}

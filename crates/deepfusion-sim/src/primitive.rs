@@ -1,0 +1,364 @@
+//! The solids everything above the ground is made of, and where a ray enters them.
+
+use nalgebra::Vector3;
+
+/// Short name for the renderer's vectors.
+pub type V3 = Vector3<f32>;
+
+/// Faces of a box, as [`Hit::face`] counts them: +x, −x, +y, −y, top, bottom. The other shapes use
+/// [`FACE_TOP`] for their flat top and [`FACE_ROUND`] for the rest.
+pub const FACE_TOP: u8 = 4;
+/// A curved surface.
+pub const FACE_ROUND: u8 = 6;
+
+/// A convex solid bounded by planes n·p ≤ d in its own axes.
+#[derive(Debug, Clone)]
+pub struct Hull {
+    /// Outward unit normals and distances.
+    pub planes: Vec<(V3, f32)>,
+    /// Half extents along x and y and the range of z: a box around it.
+    pub bounds: (f32, f32, f32, f32),
+}
+
+/// A solid in its own axes: x forward or along the street, y left, z up, metres.
+#[derive(Debug, Clone, Copy)]
+pub enum Shape {
+    /// Half extents along x and y; z from 0 to `height`.
+    Box {
+        /// Half the extent along x.
+        half_x: f32,
+        /// Half the extent along y.
+        half_y: f32,
+        /// Extent along z.
+        height: f32,
+    },
+    /// Upright, z from 0 to `height`.
+    Cylinder {
+        /// Radius.
+        radius: f32,
+        /// Extent along z.
+        height: f32,
+    },
+    /// A cylinder along y around the origin.
+    Wheel {
+        /// Radius.
+        radius: f32,
+        /// Half its width.
+        half_width: f32,
+    },
+    /// Around the origin.
+    Ellipsoid {
+        /// Half axes.
+        radii: [f32; 3],
+    },
+    /// Index of a [`Hull`] of the scene.
+    Hull(u32),
+}
+
+/// A placed solid.
+#[derive(Debug, Clone, Copy)]
+pub struct Primitive {
+    /// Origin of its axes in the world.
+    pub position: [f64; 3],
+    /// Heading of its x axis in the world: cosine and sine.
+    pub heading: (f32, f32),
+    /// What it is.
+    pub shape: Shape,
+    /// Index into the scene's materials.
+    pub material: u32,
+    /// Varies its texture.
+    pub seed: u32,
+    /// Belongs to something that moves.
+    pub moving: bool,
+}
+
+/// Where a ray enters a solid.
+#[derive(Debug, Clone, Copy)]
+pub struct Entry {
+    /// In units of the ray's direction.
+    pub t: f32,
+    /// Which face.
+    pub face: u8,
+}
+
+impl Primitive {
+    /// A world direction in the solid's axes.
+    #[inline]
+    pub fn local_of(&self, d: &V3) -> V3 {
+        let (c, s) = self.heading;
+        V3::new(c * d.x + s * d.y, c * d.y - s * d.x, d.z)
+    }
+
+    /// A direction of the solid's axes in the world.
+    #[inline]
+    pub fn world_of(&self, d: &V3) -> V3 {
+        let (c, s) = self.heading;
+        V3::new(c * d.x - s * d.y, s * d.x + c * d.y, d.z)
+    }
+
+    /// A world point in the solid's axes; subtracted in f64, so far from the origin too.
+    pub fn local_point(&self, p: &Vector3<f64>) -> V3 {
+        let d = V3::new(
+            (p.x - self.position[0]) as f32,
+            (p.y - self.position[1]) as f32,
+            (p.z - self.position[2]) as f32,
+        );
+        self.local_of(&d)
+    }
+
+    /// Half extents along x and y and the range of z of a box around it, in its own axes.
+    pub fn bounds(&self, hulls: &[Hull]) -> (f32, f32, f32, f32) {
+        match self.shape {
+            Shape::Box {
+                half_x,
+                half_y,
+                height,
+            } => (half_x, half_y, 0.0, height),
+            Shape::Cylinder { radius, height } => (radius, radius, 0.0, height),
+            Shape::Wheel { radius, half_width } => (radius, half_width, -radius, radius),
+            Shape::Ellipsoid { radii: [x, y, z] } => (x, y, -z, z),
+            Shape::Hull(index) => hulls[index as usize].bounds,
+        }
+    }
+}
+
+/// Where a ray from `o` along `d` (the solid's axes) enters the shape, if at t in (0, `limit`).
+#[inline]
+pub fn enter(shape: &Shape, hulls: &[Hull], o: &V3, d: &V3, limit: f32) -> Option<Entry> {
+    match *shape {
+        Shape::Box {
+            half_x,
+            half_y,
+            height,
+        } => enter_box(half_x, half_y, height, o, d, limit),
+        Shape::Cylinder { radius, height } => enter_cylinder(radius, height, o, d, limit),
+        Shape::Wheel { radius, half_width } => enter_wheel(radius, half_width, o, d, limit),
+        Shape::Ellipsoid { radii } => enter_ellipsoid(radii, o, d, limit),
+        Shape::Hull(index) => enter_hull(&hulls[index as usize], o, d, limit),
+    }
+}
+
+#[inline]
+fn enter_box(hx: f32, hy: f32, height: f32, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
+    // Slabs; a zero component gives infinities of the right sign (a NaN only on the slab's own
+    // plane, which min and max ignore).
+    let (ix, iy, iz) = (1.0 / d.x, 1.0 / d.y, 1.0 / d.z);
+    let (x1, x2) = ((-hx - o.x) * ix, (hx - o.x) * ix);
+    let (y1, y2) = ((-hy - o.y) * iy, (hy - o.y) * iy);
+    let (z1, z2) = (-o.z * iz, (height - o.z) * iz);
+    let (near_x, near_y, near_z) = (x1.min(x2), y1.min(y2), z1.min(z2));
+    let near = near_x.max(near_y).max(near_z);
+    let far = x1.max(x2).min(y1.max(y2)).min(z1.max(z2));
+    if !(near <= far && near > 0.0 && near < limit) {
+        return None;
+    }
+    let face = if near == near_x {
+        u8::from(d.x > 0.0)
+    } else if near == near_y {
+        2 + u8::from(d.y > 0.0)
+    } else {
+        4 + u8::from(d.z > 0.0)
+    };
+    Some(Entry { t: near, face })
+}
+
+#[inline]
+fn enter_cylinder(radius: f32, height: f32, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
+    let a = d.x * d.x + d.y * d.y;
+    let b = o.x * d.x + o.y * d.y;
+    // The distance of the ray to the axis from the cross product: no cancellation far away.
+    let cross = o.x * d.y - o.y * d.x;
+    let root = radius * radius * a - cross * cross;
+    if root <= 0.0 {
+        return None;
+    }
+    let t = (-b - root.sqrt()) / a;
+    let z = o.z + t * d.z;
+    if t > 0.0 && t < limit && z >= 0.0 && z <= height {
+        return Some(Entry {
+            t,
+            face: FACE_ROUND,
+        });
+    }
+    if d.z < 0.0 && o.z > height {
+        let t = (height - o.z) / d.z;
+        let (x, y) = (o.x + t * d.x, o.y + t * d.y);
+        if t > 0.0 && t < limit && x * x + y * y <= radius * radius {
+            return Some(Entry { t, face: FACE_TOP });
+        }
+    }
+    None
+}
+
+#[inline]
+fn enter_wheel(radius: f32, half_width: f32, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
+    let side = if d.y > 0.0 { -half_width } else { half_width };
+    let t = (side - o.y) / d.y;
+    if t > 0.0 && t < limit {
+        let (x, z) = (o.x + t * d.x, o.z + t * d.z);
+        if x * x + z * z <= radius * radius {
+            return Some(Entry {
+                t,
+                face: 2 + u8::from(d.y > 0.0),
+            });
+        }
+    }
+    let a = d.x * d.x + d.z * d.z;
+    let b = o.x * d.x + o.z * d.z;
+    let cross = o.x * d.z - o.z * d.x;
+    let root = radius * radius * a - cross * cross;
+    if root <= 0.0 {
+        return None;
+    }
+    let t = (-b - root.sqrt()) / a;
+    let y = o.y + t * d.y;
+    (t > 0.0 && t < limit && y.abs() <= half_width).then_some(Entry {
+        t,
+        face: FACE_ROUND,
+    })
+}
+
+#[inline]
+fn enter_ellipsoid(radii: [f32; 3], o: &V3, d: &V3, limit: f32) -> Option<Entry> {
+    let inverse = V3::new(1.0 / radii[0], 1.0 / radii[1], 1.0 / radii[2]);
+    let (o, d) = (o.component_mul(&inverse), d.component_mul(&inverse));
+    let a = d.norm_squared();
+    let b = o.dot(&d);
+    let root = a - o.cross(&d).norm_squared();
+    if root <= 0.0 {
+        return None;
+    }
+    let t = (-b - root.sqrt()) / a;
+    (t > 0.0 && t < limit).then_some(Entry {
+        t,
+        face: FACE_ROUND,
+    })
+}
+
+#[inline]
+fn enter_hull(hull: &Hull, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
+    let (mut near, mut far, mut face) = (0.0f32, limit, u8::MAX);
+    for (index, (normal, distance)) in hull.planes.iter().enumerate() {
+        let rate = normal.dot(d);
+        let gap = distance - normal.dot(o);
+        if rate < 0.0 {
+            let t = gap / rate;
+            if t > near {
+                (near, face) = (t, index as u8);
+            }
+        } else if rate > 0.0 {
+            far = far.min(gap / rate);
+        } else if gap < 0.0 {
+            return None;
+        }
+        if near > far {
+            return None;
+        }
+    }
+    (face != u8::MAX && near < limit).then_some(Entry { t: near, face })
+}
+
+/// Outward normal of the surface at a point (the solid's axes).
+#[inline]
+pub fn normal_at(shape: &Shape, hulls: &[Hull], p: &V3, face: u8) -> V3 {
+    match (shape, face) {
+        (Shape::Hull(index), face) => hulls[*index as usize].planes[usize::from(face)].0,
+        (_, 0) => V3::x(),
+        (_, 1) => -V3::x(),
+        (_, 2) => V3::y(),
+        (_, 3) => -V3::y(),
+        (_, 4) => V3::z(),
+        (_, 5) => -V3::z(),
+        (Shape::Cylinder { radius, .. }, _) => V3::new(p.x / radius, p.y / radius, 0.0),
+        (Shape::Wheel { radius, .. }, _) => V3::new(p.x / radius, 0.0, p.z / radius),
+        (Shape::Ellipsoid { radii: [a, b, c] }, _) => {
+            V3::new(p.x / (a * a), p.y / (b * b), p.z / (c * c)).normalize()
+        }
+        (Shape::Box { .. }, _) => V3::z(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn hulls() -> Vec<Hull> {
+        // A unit box with a slanted front, as a hull.
+        let slant = V3::new(1.0, 0.0, 1.0).normalize();
+        vec![Hull {
+            planes: vec![
+                (V3::x(), 1.0),
+                (-V3::x(), 1.0),
+                (V3::y(), 0.7),
+                (-V3::y(), 0.7),
+                (V3::z(), 1.5),
+                (-V3::z(), 0.0),
+                (slant, 1.2),
+            ],
+            bounds: (1.0, 0.7, 0.0, 1.5),
+        }]
+    }
+
+    /// How far outside the shape a point is; negative inside.
+    fn outside(shape: &Shape, hulls: &[Hull], p: &V3) -> f32 {
+        match *shape {
+            Shape::Box {
+                half_x,
+                half_y,
+                height,
+            } => (p.x.abs() - half_x)
+                .max(p.y.abs() - half_y)
+                .max(-p.z)
+                .max(p.z - height),
+            Shape::Cylinder { radius, height } => {
+                (p.x.hypot(p.y) - radius).max(-p.z).max(p.z - height)
+            }
+            Shape::Wheel { radius, half_width } => {
+                (p.x.hypot(p.z) - radius).max(p.y.abs() - half_width)
+            }
+            Shape::Ellipsoid { radii: [a, b, c] } => {
+                V3::new(p.x / a, p.y / b, p.z / c).norm() - 1.0
+            }
+            Shape::Hull(i) => hulls[i as usize]
+                .planes
+                .iter()
+                .map(|(n, d)| n.dot(p) - d)
+                .fold(f32::MIN, f32::max),
+        }
+    }
+
+    proptest! {
+        /// The entry is on the surface, everything before it is outside, and the normal faces the ray;
+        /// without an entry, the whole ray is outside. Rays from below are not cast (nor tested: an
+        /// upright cylinder has no bottom).
+        #[test]
+        fn a_ray_enters_where_the_solid_begins(
+            which in 0usize..5, angle in 0.0..std::f32::consts::TAU, distance in 4.0..30.0f32,
+            up in 0.2..4.0f32, aim_x in -1.2..1.2f32, aim_y in -1.2..1.2f32, aim_z in 0.05..1.6f32,
+        ) {
+            let shape = [
+                Shape::Box { half_x: 1.0, half_y: 0.5, height: 1.3 },
+                Shape::Cylinder { radius: 0.8, height: 1.4 },
+                Shape::Wheel { radius: 0.9, half_width: 0.4 },
+                Shape::Ellipsoid { radii: [1.0, 0.6, 1.4] },
+                Shape::Hull(0),
+            ][which];
+            let hulls = hulls();
+            let o = V3::new(distance * angle.cos(), distance * angle.sin(), up.max(aim_z));
+            let d = V3::new(aim_x, aim_y, aim_z) - o;
+            let entry = enter(&shape, &hulls, &o, &d, f32::INFINITY);
+            let end = entry.map_or(2.0, |e| e.t);
+            for i in 0..400 {
+                let p = o + d * (end * i as f32 / 400.0);
+                prop_assert!(outside(&shape, &hulls, &p) > -2e-4);
+            }
+            if let Some(e) = entry {
+                let p = o + d * e.t;
+                prop_assert!(outside(&shape, &hulls, &p).abs() < 1e-3);
+                prop_assert!(normal_at(&shape, &hulls, &p, e.face).dot(&d) < 1e-3);
+                prop_assert!(enter(&shape, &hulls, &o, &d, e.t * 0.999).is_none());
+            }
+        }
+    }
+}

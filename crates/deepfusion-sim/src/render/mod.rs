@@ -1,0 +1,312 @@
+//! The camera: rays through a frame's solids and the ground, shaded and antialiased.
+
+mod shade;
+mod tiles;
+
+use crate::light::{Foot, GroundLight};
+use crate::primitive::{Primitive, Shape, V3, enter};
+use crate::road::{KERB_HEIGHT, StreetPoint};
+use crate::scene::SceneObject;
+use crate::scene::World;
+use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use image::RgbImage;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+pub use shade::Shader;
+use shade::encode_srgb;
+use tiles::{TILE, Tiles};
+
+/// Solids farther along the street than this are not drawn, metres: ahead and behind.
+const AHEAD: f32 = 420.0;
+const BEHIND: f32 = 70.0;
+
+/// Ground beyond this depth counts as horizon, metres.
+const FARTHEST_GROUND: f32 = 600.0;
+
+/// What a ray meets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Surface {
+    /// Nothing.
+    Sky,
+    /// A solid of the frame: its index and face.
+    Solid(u32, u8),
+    /// The carriageway.
+    Road,
+    /// The upright face of a kerb.
+    Kerb,
+    /// Ground beside the road.
+    Beside,
+}
+
+/// Where a ray ends: `t` in units of its direction.
+#[derive(Debug, Clone, Copy)]
+pub struct Hit {
+    /// In units of the ray's direction; infinite for the sky.
+    pub t: f32,
+    /// What it met.
+    pub surface: Surface,
+}
+
+/// A solid seen from one eye.
+pub struct FrameSolid {
+    /// The solid.
+    pub primitive: Primitive,
+    /// The eye in the solid's axes.
+    pub eye: V3,
+    /// Its nearest possible depth (for the camera) or range (for a scanner), metres.
+    pub nearest: f32,
+}
+
+/// The solids around a place on the street, and those that move.
+pub fn gather(world: &World, moving: &[Primitive], eye: &Vector3<f64>) -> Vec<Primitive> {
+    let s = world.road.locate(eye.x, eye.y).s;
+    let from = world.along.partition_point(|a| *a < s - BEHIND);
+    let to = world.along.partition_point(|a| *a < s + AHEAD);
+    world.primitives[from..to]
+        .iter()
+        .chain(moving)
+        .copied()
+        .collect()
+}
+
+/// An eye in the world: what rays start from.
+pub struct Eye<'a> {
+    /// The world.
+    pub world: &'a World,
+    /// Where it is.
+    pub position: Vector3<f64>,
+    /// What it may see, nearest first.
+    pub solids: Vec<FrameSolid>,
+}
+
+impl Eye<'_> {
+    /// First solid among `candidates` (indices, nearest first) along `d`, or the ground, or the sky.
+    #[inline]
+    pub fn trace(&self, candidates: &[u32], d: &V3) -> Hit {
+        let mut hit = Hit {
+            t: f32::INFINITY,
+            surface: Surface::Sky,
+        };
+        for index in candidates {
+            let solid = &self.solids[*index as usize];
+            if solid.nearest > hit.t {
+                break;
+            }
+            let local = solid.primitive.local_of(d);
+            let shape: &Shape = &solid.primitive.shape;
+            if let Some(entry) = enter(shape, &self.world.hulls, &solid.eye, &local, hit.t) {
+                hit = Hit {
+                    t: entry.t,
+                    surface: Surface::Solid(*index, entry.face),
+                };
+            }
+        }
+        if d.z < -1e-5 {
+            let (t, surface) = self.ground(d, hit.t);
+            if t < hit.t {
+                return Hit { t, surface };
+            }
+        }
+        hit
+    }
+
+    /// Street coordinates of the ray's point at `t`.
+    #[inline]
+    pub fn street_point(&self, d: &V3, t: f32) -> StreetPoint {
+        let x = self.position.x + f64::from(d.x * t);
+        let y = self.position.y + f64::from(d.y * t);
+        self.world.road.locate(x, y)
+    }
+
+    /// The ground is a road at height 0 and everything else at the kerb's height, with upright
+    /// kerbs between them.
+    #[inline]
+    fn ground(&self, d: &V3, limit: f32) -> (f32, Surface) {
+        let road = &self.world.road;
+        let height = self.position.z as f32;
+        let t_upper = (KERB_HEIGHT - height) / d.z;
+        if t_upper >= limit || t_upper <= 0.0 || t_upper > FARTHEST_GROUND {
+            return (f32::INFINITY, Surface::Sky);
+        }
+        let upper = road.kerb_distance(&self.street_point(d, t_upper));
+        if upper >= 0.0 {
+            return (t_upper, Surface::Beside);
+        }
+        let t_lower = -height / d.z;
+        let lower = road.kerb_distance(&self.street_point(d, t_lower));
+        if lower < 0.0 {
+            return (t_lower, Surface::Road);
+        }
+        // The kerb is where the distance changes sign: bisection, then one secant step.
+        let (mut a, mut b) = ((t_upper, upper), (t_lower, lower));
+        for _ in 0..5 {
+            let middle = 0.5 * (a.0 + b.0);
+            let distance = road.kerb_distance(&self.street_point(d, middle));
+            if distance < 0.0 {
+                a = (middle, distance);
+            } else {
+                b = (middle, distance);
+            }
+        }
+        (a.0 + (b.0 - a.0) * a.1 / (a.1 - b.1), Surface::Kerb)
+    }
+}
+
+/// A rendered picture.
+pub struct Picture {
+    /// Colours.
+    pub rgb: RgbImage,
+    /// Camera z in metres, 0 for the sky.
+    pub depth: DepthMap,
+    /// Pixels of things that move.
+    pub moving: Vec<bool>,
+}
+
+/// Renders what a camera sees; `moving` are the solids of the moving `cars`.
+pub fn render(
+    world: &World,
+    light: &GroundLight,
+    moving: &[Primitive],
+    cars: &[SceneObject],
+    world_from_cam: &Se3,
+    k: &Intrinsics,
+) -> Picture {
+    let position = world_from_cam.translation();
+    let solids = gather(world, moving, &position);
+    let (tiles, solids) = Tiles::bin(world, solids, world_from_cam, k);
+    let eye = Eye {
+        world,
+        position,
+        solids,
+    };
+    let camera = Camera::new(world_from_cam, k);
+    let (width, height) = (k.width as usize, k.height as usize);
+    let mut hits = vec![
+        Hit {
+            t: 0.0,
+            surface: Surface::Sky
+        };
+        width * height
+    ];
+    hits.par_chunks_mut(width * TILE)
+        .enumerate()
+        .for_each(|(band, hits)| {
+            for (row, hits) in hits.chunks_mut(width).enumerate() {
+                let v = band * TILE + row;
+                for (u, hit) in hits.iter_mut().enumerate() {
+                    let d = camera.ray(u as f32, v as f32);
+                    *hit = eye.trace(tiles.at(u, v), &d);
+                }
+            }
+        });
+    let feet: Vec<Foot> = cars.iter().map(|car| Foot::of(world, car)).collect();
+    let shader = Shader {
+        eye: &eye,
+        light,
+        pixel: camera.pixel,
+        samples: 3.0,
+        moving: &feet,
+    };
+    // Where four rays share a pixel, each stands for a part of it.
+    let part = Shader {
+        pixel: 0.6 * camera.pixel,
+        samples: 2.0,
+        ..shader
+    };
+    let mut colours = vec![0u8; 3 * width * height];
+    colours
+        .par_chunks_mut(3 * width)
+        .enumerate()
+        .for_each(|(v, row)| {
+            for u in 0..width {
+                let hit = &hits[v * width + u];
+                let colour = if on_edge(&hits, width, height, u, v) {
+                    // Four rays on a rotated grid; the depth stays that of the centre.
+                    let offsets = [
+                        (-0.125, -0.375),
+                        (0.375, -0.125),
+                        (0.125, 0.375),
+                        (-0.375, 0.125),
+                    ];
+                    let sum: V3 = offsets
+                        .iter()
+                        .map(|(du, dv)| {
+                            let d = camera.ray(u as f32 + du, v as f32 + dv);
+                            part.colour(&eye.trace(tiles.at(u, v), &d), &d)
+                        })
+                        .sum();
+                    sum * 0.25
+                } else {
+                    shader.colour(hit, &camera.ray(u as f32, v as f32))
+                };
+                row[3 * u..3 * u + 3].copy_from_slice(&encode_srgb(&colour));
+            }
+        });
+    let depth = hits
+        .iter()
+        .map(|hit| if hit.t.is_finite() { hit.t } else { 0.0 });
+    let is_moving = |hit: &Hit| match hit.surface {
+        Surface::Solid(index, _) => eye.solids[index as usize].primitive.moving,
+        _ => false,
+    };
+    Picture {
+        depth: DepthMap {
+            width,
+            height,
+            data: depth.collect(),
+        },
+        moving: hits.iter().map(is_moving).collect(),
+        // The buffer has 3 · width · height bytes by construction.
+        rgb: RgbImage::from_raw(k.width, k.height, colours)
+            .unwrap_or_else(|| RgbImage::new(k.width, k.height)),
+    }
+}
+
+/// Whether a pixel or one of its four neighbours sees another surface.
+#[inline]
+fn on_edge(hits: &[Hit], width: usize, height: usize, u: usize, v: usize) -> bool {
+    let here = hits[v * width + u];
+    let differs = |other: &Hit| {
+        other.surface != here.surface
+            // A solid can hide itself, as an ellipsoid does not but a hull's edge would.
+            || (here.t.is_finite() && (other.t - here.t).abs() > 0.2 * here.t.min(other.t)
+                && matches!(here.surface, Surface::Solid(..)))
+    };
+    (u > 0 && differs(&hits[v * width + u - 1]))
+        || (u + 1 < width && differs(&hits[v * width + u + 1]))
+        || (v > 0 && differs(&hits[(v - 1) * width + u]))
+        || (v + 1 < height && differs(&hits[(v + 1) * width + u]))
+}
+
+/// The rays of a pinhole camera, in world axes.
+struct Camera {
+    columns: [V3; 3],
+    inverse: [f32; 4],
+    /// Width of a pixel at depth 1.
+    pixel: f32,
+}
+
+impl Camera {
+    fn new(world_from_cam: &Se3, k: &Intrinsics) -> Self {
+        let rotation = world_from_cam.rotation();
+        let column = |i: usize| rotation.column(i).map(|x| x as f32).into_owned();
+        Self {
+            columns: [column(0), column(1), column(2)],
+            inverse: [
+                (1.0 / k.fx) as f32,
+                (-k.cx / k.fx) as f32,
+                (1.0 / k.fy) as f32,
+                (-k.cy / k.fy) as f32,
+            ],
+            pixel: (1.0 / k.fx.min(k.fy)) as f32,
+        }
+    }
+
+    /// The ray of a pixel, with camera z = 1: its parameter is the depth.
+    #[inline]
+    fn ray(&self, u: f32, v: f32) -> V3 {
+        let x = u * self.inverse[0] + self.inverse[1];
+        let y = v * self.inverse[2] + self.inverse[3];
+        self.columns[0] * x + self.columns[1] * y + self.columns[2]
+    }
+}

@@ -1,0 +1,198 @@
+//! The street and everything on it.
+
+mod buildings;
+pub mod cars;
+mod furniture;
+mod greenery;
+mod layout;
+
+use crate::primitive::{Hull, Primitive, Shape, V3};
+use crate::road::Road;
+use crate::texture::ground::Stretch;
+use crate::texture::noise::Noise;
+use crate::texture::sky::Sky;
+use crate::texture::{Material, Rgb};
+use deepfusion_geometry::Se3;
+use nalgebra::Vector3;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+/// What an object is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum ObjectClass {
+    /// A car, parked or moving.
+    Car,
+    /// A lamp post, a sign, a bollard, a box at the roadside.
+    Pole,
+    /// A tree or a bush.
+    Tree,
+    /// A house.
+    Building,
+    /// A hedge, a fence or a garden wall.
+    Fence,
+}
+
+/// Something on the street, with its exact box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SceneObject {
+    /// What it is.
+    pub class: ObjectClass,
+    /// Centre of its box and its axes (x forward, y left, z up) in the world, metres.
+    pub world_from_object: Se3,
+    /// Length, width and height of its box along these axes, metres.
+    pub size: [f64; 3],
+    /// Velocity over ground in the world's axes, m/s.
+    pub velocity: Vector3<f64>,
+}
+
+/// The parts of the world that no camera moves.
+pub struct World {
+    /// The street.
+    pub road: Road,
+    /// Stretches of the street.
+    pub stretches: Vec<Stretch>,
+    /// Index into `stretches` for each sample of the road.
+    pub stretch_of: Vec<u16>,
+    /// Solids, in order of `s`.
+    pub primitives: Vec<Primitive>,
+    /// Metres along the street of each solid, and its reach around that.
+    pub along: Vec<f32>,
+    /// Convex solids that primitives refer to.
+    pub hulls: Vec<Hull>,
+    /// What primitives are made of.
+    pub materials: Vec<Material>,
+    /// Everything that stands still.
+    pub objects: Vec<SceneObject>,
+    /// The models of cars, for the moving ones.
+    pub models: Vec<cars::CarModel>,
+    /// The random table of every texture.
+    pub noise: Noise,
+    /// The sky.
+    pub sky: Sky,
+    /// Towards the sun, unit length, world axes.
+    pub sun: V3,
+    /// Irradiance of the sun and of the sky.
+    pub light: (Rgb, Rgb),
+    /// The drive's seed, folded.
+    pub seed: u32,
+}
+
+impl World {
+    /// Furnishes `road` for the drive of `seed`.
+    pub fn furnish(road: Road, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5EED_57AE_E700_0001);
+        let azimuth: f32 = rng.random_range(0.0..std::f32::consts::TAU);
+        let elevation: f32 = rng.random_range(0.5..1.0);
+        let sun = V3::new(
+            azimuth.cos() * elevation.cos(),
+            azimuth.sin() * elevation.cos(),
+            elevation.sin(),
+        );
+        let clouds = rng.random_range(0.15..0.75);
+        let sun_strength = 2.3 - 1.2 * clouds;
+        let mut world = Self {
+            road,
+            stretches: Vec::new(),
+            stretch_of: Vec::new(),
+            primitives: Vec::new(),
+            along: Vec::new(),
+            hulls: Vec::new(),
+            materials: Vec::new(),
+            objects: Vec::new(),
+            models: Vec::new(),
+            noise: Noise::new(seed),
+            sky: Sky {
+                horizon: Rgb::new(0.72, 0.8, 0.88),
+                zenith: Rgb::new(0.16, 0.34, 0.72),
+                clouds,
+            },
+            sun,
+            light: (
+                Rgb::new(1.0, 0.95, 0.86) * sun_strength,
+                Rgb::new(0.62, 0.68, 0.78) * (0.5 + 0.4 * clouds),
+            ),
+            seed: (seed ^ (seed >> 32)) as u32,
+        };
+        world.models = cars::models(&mut world, &mut rng);
+        layout::furnish(&mut world, &mut rng);
+        world.sort();
+        world
+    }
+
+    /// Sorts the solids along the street, so that a camera finds those around it.
+    fn sort(&mut self) {
+        let mut keyed: Vec<(f32, Primitive)> = self
+            .primitives
+            .iter()
+            .map(|p| (self.road.locate(p.position[0], p.position[1]).s, *p))
+            .collect();
+        keyed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        self.along = keyed.iter().map(|k| k.0).collect();
+        self.primitives = keyed.into_iter().map(|k| k.1).collect();
+    }
+
+    /// Index of a new material.
+    fn material(&mut self, material: Material) -> u32 {
+        self.materials.push(material);
+        (self.materials.len() - 1) as u32
+    }
+
+    /// Index of a new hull.
+    fn hull(&mut self, hull: Hull) -> u32 {
+        self.hulls.push(hull);
+        (self.hulls.len() - 1) as u32
+    }
+
+    /// Places a solid.
+    fn solid(&mut self, shape: Shape, position: [f64; 3], heading: f64, material: u32, seed: u32) {
+        self.primitives.push(Primitive {
+            position,
+            heading: (heading.cos() as f32, heading.sin() as f32),
+            shape,
+            material,
+            seed,
+            moving: false,
+        });
+    }
+
+    /// Lists an object that stands still; `base` is the middle of its underside.
+    fn object(&mut self, class: ObjectClass, base: [f64; 3], heading: f64, size: [f64; 3]) {
+        self.objects.push(SceneObject {
+            class,
+            world_from_object: upright(base, heading, size[2]),
+            size,
+            velocity: Vector3::zeros(),
+        });
+    }
+
+    /// Whether a rectangle (half extents along `heading` and across it) keeps `clear` metres from
+    /// every kerb.
+    fn is_clear(&self, x: f64, y: f64, heading: f64, half: [f64; 2], clear: f32) -> bool {
+        let (sin, cos) = heading.sin_cos();
+        let steps = |half: f64| ((half / 0.8).ceil() as i32).max(1);
+        let (nx, ny) = (steps(half[0]), steps(half[1]));
+        (-nx..=nx).all(|i| {
+            (-ny..=ny)
+                .filter(|j| i.abs() == nx || j.abs() == ny)
+                .all(|j| {
+                    let u = half[0] * f64::from(i) / f64::from(nx);
+                    let v = half[1] * f64::from(j) / f64::from(ny);
+                    let p = self
+                        .road
+                        .locate(x + cos * u - sin * v, y + sin * u + cos * v);
+                    self.road.kerb_distance(&p) >= clear
+                })
+        })
+    }
+}
+
+/// The pose of an upright box from the middle of its underside, its heading and its height.
+pub fn upright(base: [f64; 3], heading: f64, height: f64) -> Se3 {
+    Se3::from_axis_angle(
+        Vector3::new(0.0, 0.0, heading),
+        Vector3::new(base[0], base[1], base[2] + 0.5 * height),
+    )
+}

@@ -1,0 +1,223 @@
+use crate::config::SimConfig;
+use crate::light::GroundLight;
+use crate::motion::Drive;
+use crate::oxts::OxtsReading;
+use crate::rig::{Rig, kitti_like_intrinsics};
+use crate::road::Road;
+use crate::scene::{SceneObject, World};
+use crate::texture::noise::hash;
+use crate::traffic::Traffic;
+use crate::{Result, render, velodyne};
+use deepfusion_cloud::PointCloud;
+use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use image::RgbImage;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// The street begins this far behind the car and ends this far beyond the drive, metres.
+const LEAD_IN: f64 = 60.0;
+const LEAD_OUT: f64 = 430.0;
+
+/// The camera's picture at one time, with what is true about it.
+#[derive(Debug, Clone)]
+pub struct SimFrame {
+    /// H×W 8-bit RGB.
+    pub rgb: RgbImage,
+    /// Exact camera z of each pixel's centre, metres; 0 = sky.
+    pub depth: DepthMap,
+    /// H·W flags, row by row: the pixel's centre sees something that moves.
+    pub moving: Vec<bool>,
+    /// Camera (x right, y down, z forward) to world (z up), metres.
+    pub world_from_cam: Se3,
+    /// Time of the picture, seconds since the drive's begin.
+    pub time_s: f64,
+    /// Speed of the car (of its IMU), m/s.
+    pub speed_mps: f64,
+}
+
+/// A drive through a procedural street. Equal configurations give equal drives, byte for byte.
+///
+/// Frames are numbered from 0 to [`Simulation::frames`] − 1. The methods that take a frame's number
+/// panic beyond that, as slices do.
+pub struct Simulation {
+    config: SimConfig,
+    world: World,
+    light: GroundLight,
+    drive: Drive,
+    traffic: Traffic,
+    rig: Rig,
+    intrinsics: Intrinsics,
+    times: Vec<f64>,
+}
+
+impl Simulation {
+    /// Lays out the street and the drive.
+    ///
+    /// # Errors
+    /// [`crate::Error::Config`] where a setting is out of range.
+    pub fn new(config: &SimConfig) -> Result<Self> {
+        config.validate()?;
+        let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
+        let times = frame_times(&mut rng, config);
+        let duration_s = times[times.len() - 1];
+        let longest = 14.0 * (duration_s + 3.0);
+        let mut road = Road::generate(&mut rng, -LEAD_IN, longest + LEAD_OUT);
+        let drive = Drive::simulate(&mut rng, &road, duration_s);
+        road.truncate(drive.progress(duration_s).0 + LEAD_OUT);
+        let world = World::furnish(road, config.seed);
+        let light = GroundLight::bake(&world);
+        let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x7AFF_1C00);
+        let traffic = Traffic::new(&mut rng, &world, &drive, duration_s, config.moving_cars);
+        Ok(Self {
+            config: config.clone(),
+            world,
+            light,
+            drive,
+            traffic,
+            rig: Rig::kitti_like(),
+            intrinsics: kitti_like_intrinsics(config.width, config.height),
+            times,
+        })
+    }
+
+    /// What this drive was made from.
+    #[must_use]
+    pub fn config(&self) -> &SimConfig {
+        &self.config
+    }
+
+    /// Number of frames.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.times.len()
+    }
+
+    /// The camera, in pixels of the pictures.
+    #[must_use]
+    pub fn intrinsics(&self) -> Intrinsics {
+        self.intrinsics
+    }
+
+    /// Where the sensors are on the car.
+    #[must_use]
+    pub fn rig(&self) -> Rig {
+        self.rig
+    }
+
+    /// Time of a frame, seconds since the first.
+    ///
+    /// # Panics
+    /// Where there is no such frame.
+    #[must_use]
+    pub fn time_s(&self, frame: usize) -> f64 {
+        self.times[frame]
+    }
+
+    /// World (x east, y north, z up, metres) from the camera at a frame.
+    ///
+    /// # Panics
+    /// Where there is no such frame.
+    #[must_use]
+    pub fn world_from_cam(&self, frame: usize) -> Se3 {
+        self.world_from_imu(frame) * self.rig.cam_from_imu().inverse()
+    }
+
+    /// World from the IMU (x forward, y left, z up) at a frame.
+    ///
+    /// # Panics
+    /// Where there is no such frame.
+    #[must_use]
+    pub fn world_from_imu(&self, frame: usize) -> Se3 {
+        self.drive
+            .world_from_imu(&self.world.road, self.times[frame])
+    }
+
+    /// World from the velodyne (x forward, y left, z up) at a frame.
+    ///
+    /// # Panics
+    /// Where there is no such frame.
+    #[must_use]
+    pub fn world_from_velo(&self, frame: usize) -> Se3 {
+        self.world_from_imu(frame) * self.rig.velo_from_imu.inverse()
+    }
+
+    /// What the inertial unit reads at a frame.
+    ///
+    /// # Panics
+    /// Where there is no such frame.
+    #[must_use]
+    pub fn oxts(&self, frame: usize) -> OxtsReading {
+        OxtsReading::at(&self.drive, &self.world.road, self.times[frame])
+    }
+
+    /// The picture of a frame with its exact depth.
+    ///
+    /// # Panics
+    /// Where there is no such frame.
+    #[must_use]
+    pub fn frame(&self, frame: usize) -> SimFrame {
+        let time_s = self.times[frame];
+        let world_from_cam = self.world_from_cam(frame);
+        let solids = self.traffic.solids(&self.world, time_s);
+        let picture = render::render(
+            &self.world,
+            &self.light,
+            &solids,
+            &self.traffic.objects(&self.world, time_s),
+            &world_from_cam,
+            &self.intrinsics,
+        );
+        SimFrame {
+            rgb: picture.rgb,
+            depth: picture.depth,
+            moving: picture.moving,
+            world_from_cam,
+            time_s,
+            speed_mps: self.oxts(frame).forward_speed(),
+        }
+    }
+
+    /// One turn of the velodyne at a frame's instant: points in its axes, metres, with intensity.
+    ///
+    /// # Panics
+    /// Where there is no such frame.
+    #[must_use]
+    pub fn velodyne(&self, frame: usize) -> PointCloud {
+        let solids = self.traffic.solids(&self.world, self.times[frame]);
+        let key = hash(frame as i32, 29, self.world.seed);
+        velodyne::scan(
+            &self.world,
+            &self.light,
+            &solids,
+            &self.world_from_velo(frame),
+            self.config.scan_step_deg,
+            key,
+        )
+    }
+
+    /// Everything on the street at a frame, standing or moving, with exact boxes.
+    ///
+    /// # Panics
+    /// Where there is no such frame.
+    #[must_use]
+    pub fn objects(&self, frame: usize) -> Vec<SceneObject> {
+        let mut objects = self.world.objects.clone();
+        objects.extend(self.traffic.objects(&self.world, self.times[frame]));
+        objects
+    }
+}
+
+/// Frame times: 1 / fps apart, give or take a millisecond.
+fn frame_times(rng: &mut ChaCha8Rng, config: &SimConfig) -> Vec<f64> {
+    let jitter = 0.001f64.min(0.05 / config.fps);
+    (0..config.frames)
+        .map(|i| {
+            let shift = if i == 0 {
+                0.0
+            } else {
+                rng.random_range(-jitter..jitter)
+            };
+            i as f64 / config.fps + shift
+        })
+        .collect()
+}

@@ -1,0 +1,86 @@
+//! What surfaces look like: albedo as a function of the place on the surface, never of the viewer.
+
+pub mod facade;
+pub mod ground;
+pub mod noise;
+pub mod objects;
+pub mod sky;
+
+use crate::primitive::V3;
+use facade::Facade;
+use noise::Noise;
+
+/// A colour, linear red, green, blue.
+pub type Rgb = V3;
+
+/// A piece of a surface that one pixel (or one sample of it) sees.
+#[derive(Debug, Clone, Copy)]
+pub struct Patch {
+    /// Its middle, in the solid's axes, metres.
+    pub point: V3,
+    /// The solid's face.
+    pub face: u8,
+    /// Outward normal, in the solid's axes.
+    pub normal: V3,
+    /// Its size, metres.
+    pub size: f32,
+    /// Its extent along each of the solid's axes, metres.
+    pub extent: V3,
+    /// Varies the texture from solid to solid.
+    pub seed: u32,
+}
+
+/// What a solid is made of.
+#[derive(Debug, Clone)]
+pub enum Material {
+    /// Walls with windows and doors; also the flat top of the house.
+    Facade(Box<Facade>),
+    /// A tiled roof of this colour.
+    Roof(Rgb),
+    /// Leaves of this colour.
+    Foliage(Rgb),
+    /// A trunk of this colour.
+    Bark(Rgb),
+    /// Painted metal with rings and wear.
+    Metal(Rgb),
+    /// Upright planks.
+    Planks(Rgb),
+    /// Masonry of this colour.
+    Masonry(Rgb),
+    /// Car paint; the windows of the cabin are `glass`.
+    Paint(objects::Paint),
+    /// A tyre with a rim.
+    Tyre,
+    /// A sign or a poster: two colours in large shapes.
+    Sign(Rgb, Rgb),
+}
+
+impl Material {
+    /// Albedo of a patch.
+    pub fn albedo(&self, noise: &Noise, patch: &Patch) -> Rgb {
+        match self {
+            Self::Facade(facade) => facade.albedo(noise, patch),
+            Self::Roof(colour) => facade::roof(noise, patch, colour),
+            Self::Foliage(colour) => objects::foliage(noise, patch, colour),
+            Self::Bark(colour) => objects::bark(noise, patch, colour),
+            Self::Metal(colour) => objects::metal(noise, patch, colour),
+            Self::Planks(colour) => objects::planks(noise, patch, colour),
+            Self::Masonry(colour) => objects::masonry(noise, patch, colour),
+            Self::Paint(paint) => paint.albedo(noise, patch),
+            Self::Tyre => objects::tyre(noise, patch),
+            Self::Sign(a, b) => objects::sign(noise, patch, a, b),
+        }
+    }
+}
+
+/// A multiple of `colour` that noise of about ±1 moves by about ±`strength`; never below zero.
+#[inline]
+pub fn vary(colour: &Rgb, noise: f32, strength: f32) -> Rgb {
+    colour * (1.0 + strength * noise).max(0.05)
+}
+
+/// Two colours mixed.
+#[inline]
+pub fn mix(a: &Rgb, b: &Rgb, t: f32) -> Rgb {
+    a + (b - a) * t
+}

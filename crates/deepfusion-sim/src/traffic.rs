@@ -1,0 +1,129 @@
+//! Cars that move: ahead in the same lane and towards the camera in the other one.
+
+use crate::motion::Drive;
+use crate::primitive::Primitive;
+use crate::road::Road;
+use crate::scene::{ObjectClass, SceneObject, World, upright};
+use nalgebra::Vector3;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+/// Where the lanes are, metres left of the centreline.
+const LANE: f64 = 1.65;
+
+/// Distance kept between two cars of one lane, metres.
+const GAP: f64 = 13.0;
+
+/// One moving car: constant speed along its lane.
+struct MovingCar {
+    model: usize,
+    seed: u32,
+    /// Metres along the street at time 0.
+    s: f64,
+    /// Along the street, m/s; negative: towards the start.
+    speed: f64,
+    lateral: f64,
+}
+
+/// All moving cars.
+pub struct Traffic {
+    cars: Vec<MovingCar>,
+}
+
+impl Traffic {
+    /// `count` cars around a drive of `duration_s` seconds. All cars of one lane have one speed, so
+    /// that none runs into another; the ones ahead stay ahead of the camera.
+    pub fn new(
+        rng: &mut ChaCha8Rng,
+        world: &World,
+        drive: &Drive,
+        duration_s: f64,
+        count: usize,
+    ) -> Self {
+        let travelled = drive.progress(duration_s).0;
+        let with = (travelled / duration_s.max(0.1)).clamp(3.0, 14.0);
+        let against = -rng.random_range(6.0..11.0);
+        // The first car ahead starts so far on that the camera never comes nearer than a few metres.
+        let closest = (0..=(duration_s * 10.0) as usize)
+            .map(|i| {
+                let t = i as f64 * 0.1;
+                drive.progress(t).0 - with * t
+            })
+            .fold(0.0, f64::max);
+        let mut ahead = closest + rng.random_range(11.0..18.0);
+        let oncoming = count - count / 3;
+        // Oncoming cars are met evenly over the drive.
+        let spread = ((travelled - against * duration_s) / oncoming.max(1) as f64).clamp(GAP, 60.0);
+        let mut towards = rng.random_range(18.0..40.0);
+        let cars = (0..count)
+            .map(|i| {
+                let (s, speed) = if i % 3 == 2 {
+                    let s = ahead;
+                    ahead += rng.random_range(GAP..2.0 * GAP);
+                    (s, with)
+                } else {
+                    let s = towards;
+                    towards += spread * rng.random_range(1.0..1.5);
+                    (s, against)
+                };
+                MovingCar {
+                    model: rng.random_range(0..world.models.len()),
+                    seed: rng.random(),
+                    s,
+                    speed,
+                    lateral: if speed > 0.0 { -LANE } else { LANE },
+                }
+            })
+            .collect();
+        Self { cars }
+    }
+
+    /// The cars that are on the street at a time.
+    fn present<'a>(
+        &'a self,
+        road: &'a Road,
+        time_s: f64,
+    ) -> impl Iterator<Item = (&'a MovingCar, [f64; 3], f64)> {
+        self.cars.iter().filter_map(move |car| {
+            let s = car.s + car.speed * time_s;
+            if s < road.start + 5.0 || s > road.end() - 5.0 {
+                return None;
+            }
+            let (x, y, heading) = road.world(s, car.lateral);
+            let turn = if car.speed > 0.0 {
+                0.0
+            } else {
+                std::f64::consts::PI
+            };
+            Some((car, [x, y, 0.0], heading + turn))
+        })
+    }
+
+    /// Their solids at a time.
+    pub fn solids(&self, world: &World, time_s: f64) -> Vec<Primitive> {
+        self.present(&world.road, time_s)
+            .flat_map(|(car, base, heading)| {
+                world.models[car.model].solids(base, heading, car.seed, true)
+            })
+            .collect()
+    }
+
+    /// Their boxes and velocities at a time.
+    pub fn objects(&self, world: &World, time_s: f64) -> Vec<SceneObject> {
+        self.present(&world.road, time_s)
+            .map(|(car, base, heading)| {
+                let size = world.models[car.model].size.map(f64::from);
+                // Constant speed along the centreline, so faster on the outside of a bend.
+                let s = car.s + car.speed * time_s;
+                let curvature = world.road.centre(s).3;
+                let speed = car.speed.abs() * (1.0 - curvature * car.lateral);
+                SceneObject {
+                    class: ObjectClass::Car,
+                    world_from_object: upright(base, heading, size[2]),
+                    size,
+                    velocity: Vector3::new(heading.cos(), heading.sin(), 0.0) * speed,
+                }
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,225 @@
+use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
+use burn::tensor::{Gradients, Tensor, TensorData};
+use deepfusion_kernels::{AdamStep, adam, sum_of_squares};
+use deepfusion_nn::weights::{WeightTensor, Weights};
+use std::collections::BTreeMap;
+
+/// A parameter's moments.
+#[derive(Debug, Clone, Default)]
+struct Moments {
+    first: Vec<f32>,
+    second: Vec<f32>,
+}
+
+/// Adam (Kingma and Ba), β₁ = 0.9, β₂ = 0.999, ε = 1e-8, with the gradient clipped by its norm.
+///
+/// The moments are kept by the parameters' names in main memory; the update is one pass over
+/// parameter, gradient and moments.
+#[derive(Debug, Clone, Default)]
+pub struct Adam {
+    moments: BTreeMap<String, Moments>,
+    steps: u32,
+}
+
+/// What a step did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StepOutcome {
+    /// The parameters moved.
+    Done {
+        /// Norm of the gradient before clipping.
+        gradient_norm: f64,
+    },
+    /// The gradient was not finite: nothing moved.
+    Skipped,
+}
+
+/// A step's gradients by parameter name.
+#[derive(Debug, Default)]
+pub(crate) struct NamedGradients(BTreeMap<String, Vec<f32>>);
+
+impl NamedGradients {
+    /// Adds the gradients of the module's parameters, named with `prefix`, times `scale`.
+    pub(crate) fn add<M: Module>(
+        &mut self,
+        prefix: &str,
+        module: &M,
+        gradients: &mut Gradients,
+        scale: f32,
+    ) {
+        module.visit(&mut Collect {
+            path: vec![prefix.to_owned()],
+            gradients,
+            into: &mut self.0,
+            scale,
+        });
+    }
+
+    fn norm(&self) -> f64 {
+        self.0
+            .values()
+            .map(|g| sum_of_squares(g))
+            .sum::<f64>()
+            .sqrt()
+    }
+}
+
+struct Collect<'a> {
+    path: Vec<String>,
+    gradients: &'a mut Gradients,
+    into: &'a mut BTreeMap<String, Vec<f32>>,
+    scale: f32,
+}
+
+impl ModuleVisitor for Collect<'_> {
+    fn enter_module(&mut self, name: &str, _container_type: &str) {
+        self.path.push(name.to_owned());
+    }
+    fn exit_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.pop();
+    }
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        let Some(gradient) = param.val().grad_remove(self.gradients) else {
+            return;
+        };
+        let mut values = to_vec(gradient);
+        if self.scale != 1.0 {
+            values.iter_mut().for_each(|v| *v *= self.scale);
+        }
+        match self.into.entry(self.path.join(".")) {
+            std::collections::btree_map::Entry::Vacant(entry) => {
+                entry.insert(values);
+            }
+            std::collections::btree_map::Entry::Occupied(mut entry) => {
+                for (sum, add) in entry.get_mut().iter_mut().zip(values) {
+                    *sum += add;
+                }
+            }
+        }
+    }
+}
+
+fn to_vec<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    let data = tensor.into_data();
+    data.try_into_vec::<f32>()
+        .expect("the networks are built in single precision")
+}
+
+impl Adam {
+    /// Steps made.
+    #[must_use]
+    pub fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// Prepares a step: the factor that clips the gradient to `clip_norm` (0: no limit), or that
+    /// nothing should move.
+    pub(crate) fn begin(
+        &mut self,
+        gradients: &NamedGradients,
+        learning_rate: f64,
+        clip_norm: f64,
+    ) -> (StepOutcome, Option<AdamStep>) {
+        let norm = gradients.norm();
+        if !norm.is_finite() {
+            return (StepOutcome::Skipped, None);
+        }
+        self.steps += 1;
+        let (beta1, beta2) = (0.9_f64, 0.999_f64);
+        let scale = if clip_norm > 0.0 && norm > clip_norm {
+            clip_norm / norm
+        } else {
+            1.0
+        };
+        let step = AdamStep {
+            learning_rate: learning_rate as f32,
+            beta1: beta1 as f32,
+            beta2: beta2 as f32,
+            epsilon: 1e-8,
+            correction1: (1.0 - beta1.powi(self.steps as i32)) as f32,
+            correction2: (1.0 - beta2.powi(self.steps as i32)) as f32,
+            gradient_scale: scale as f32,
+        };
+        let outcome = StepOutcome::Done {
+            gradient_norm: norm,
+        };
+        (outcome, Some(step))
+    }
+
+    /// Moves the parameters of one module, named with `prefix`.
+    pub(crate) fn apply<M: Module>(
+        &mut self,
+        step: &AdamStep,
+        prefix: &str,
+        module: M,
+        gradients: &NamedGradients,
+    ) -> M {
+        module.map(&mut Update {
+            path: vec![prefix.to_owned()],
+            step,
+            gradients,
+            moments: &mut self.moments,
+        })
+    }
+
+    /// The moments as named tensors, `m.` and `v.` before the parameters' names.
+    #[must_use]
+    pub fn state(&self) -> Weights {
+        let mut weights = Weights::new("the optimiser");
+        for (name, moments) in &self.moments {
+            for (prefix, values) in [("m", &moments.first), ("v", &moments.second)] {
+                let tensor = WeightTensor {
+                    shape: vec![values.len()],
+                    values: values.clone(),
+                };
+                weights.tensors.insert(format!("{prefix}.{name}"), tensor);
+            }
+        }
+        weights
+    }
+
+    /// The optimiser that [`Self::state`] came from, after `steps` steps.
+    #[must_use]
+    pub fn restore(state: Weights, steps: u32) -> Self {
+        let mut moments: BTreeMap<String, Moments> = BTreeMap::new();
+        for (name, tensor) in state.tensors {
+            if let Some(name) = name.strip_prefix("m.") {
+                moments.entry(name.to_owned()).or_default().first = tensor.values;
+            } else if let Some(name) = name.strip_prefix("v.") {
+                moments.entry(name.to_owned()).or_default().second = tensor.values;
+            }
+        }
+        Self { moments, steps }
+    }
+}
+
+struct Update<'a> {
+    path: Vec<String>,
+    step: &'a AdamStep,
+    gradients: &'a NamedGradients,
+    moments: &'a mut BTreeMap<String, Moments>,
+}
+
+impl ModuleMapper for Update<'_> {
+    fn enter_module(&mut self, name: &str, _container_type: &str) {
+        self.path.push(name.to_owned());
+    }
+    fn exit_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.pop();
+    }
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let name = self.path.join(".");
+        let Some(gradient) = self.gradients.0.get(&name) else {
+            return param;
+        };
+        let moments = self.moments.entry(name).or_default();
+        moments.first.resize(gradient.len(), 0.0);
+        moments.second.resize(gradient.len(), 0.0);
+        param.map(|tensor| {
+            let (shape, device) = (tensor.dims(), tensor.device());
+            let mut values = to_vec(tensor.inner());
+            let Moments { first, second } = moments;
+            adam(self.step, &mut values, gradient, first, second);
+            Tensor::from_data(TensorData::new(values, shape), &device).require_grad()
+        })
+    }
+}

@@ -1,0 +1,307 @@
+use crate::{Error, Jitter, SampleSet, Sampler, TrainConfig, sampler::stream};
+use burn::tensor::{Device, Tensor, TensorData};
+use deepfusion_data::{resize_rgb, to_chw};
+use deepfusion_geometry::Se3;
+use rand::Rng;
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::{Arc, Mutex};
+
+/// Bytes of resized images that are kept, so that a small drive is decoded once and not every epoch.
+const CACHE_BYTES: usize = 2 << 30;
+/// Batches made ahead of the trainer.
+const AHEAD: usize = 3;
+
+/// A batch of B samples with F frames each: the target, then its sources.
+#[derive(Debug, Clone)]
+pub struct SnippetBatch {
+    /// Clean images by frame, each B×3×H×W; the losses see these.
+    pub clean: Vec<Tensor<4>>,
+    /// Jittered images by frame; the networks see these.
+    pub network: Vec<Tensor<4>>,
+    /// K, B×3×3, in pixels of these images.
+    pub intrinsics: Tensor<3>,
+    /// K⁻¹, B×3×3.
+    pub inverse_intrinsics: Tensor<3>,
+    /// Length of the camera's translation by source, each B, in metres.
+    pub distance_m: Vec<Tensor<1>>,
+    /// Rotation of `source_from_target` by source, each B×3×3.
+    pub rotation: Vec<Tensor<3>>,
+    /// Offsets of the sources.
+    pub offsets: Vec<i32>,
+    /// Drive and frame of each target.
+    pub names: Vec<String>,
+}
+
+impl SnippetBatch {
+    /// Number of samples, B.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Whether there is no sample.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.names.is_empty()
+    }
+}
+
+/// A batch as plain values, made on the loader's thread.
+struct RawBatch {
+    clean: Vec<Vec<f32>>,
+    network: Vec<Vec<f32>>,
+    intrinsics: Vec<f32>,
+    inverse_intrinsics: Vec<f32>,
+    distance_m: Vec<Vec<f32>>,
+    rotation: Vec<Vec<f32>>,
+    offsets: Vec<i32>,
+    names: Vec<String>,
+}
+
+/// Everything that making a batch needs.
+struct Maker {
+    config: TrainConfig,
+    set: SampleSet,
+    /// Whether samples are mirrored and jittered.
+    augment: bool,
+    cache: Mutex<HashMap<(usize, usize), Arc<Vec<u8>>>>,
+}
+
+/// Makes batches in order, ahead of the trainer, on its own thread.
+pub struct BatchLoader {
+    batches: Receiver<Result<RawBatch, Error>>,
+    size: (usize, usize),
+}
+
+impl std::fmt::Debug for BatchLoader {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("BatchLoader")
+            .field("size", &self.size)
+            .finish()
+    }
+}
+
+impl BatchLoader {
+    /// Batches number `first`, `first + 1`, … of the sampler, mirrored and jittered as the
+    /// configuration says. What a batch holds depends on the seed and its number alone.
+    #[must_use]
+    pub fn training(config: &TrainConfig, set: SampleSet, first: usize) -> Self {
+        let sampler = Sampler::new(set.samples.len(), config.batch, config.seed);
+        Self::start(
+            config,
+            set,
+            true,
+            (first..).map(move |i| (i, sampler.batch(i))),
+        )
+    }
+
+    /// All samples once, in order, clean.
+    #[must_use]
+    pub fn validation(config: &TrainConfig, set: SampleSet) -> Self {
+        let indices: Vec<usize> = (0..set.samples.len()).collect();
+        let batches: Vec<Vec<usize>> = indices.chunks(config.batch).map(<[_]>::to_vec).collect();
+        Self::start(config, set, false, batches.into_iter().enumerate())
+    }
+
+    fn start(
+        config: &TrainConfig,
+        set: SampleSet,
+        augment: bool,
+        batches: impl Iterator<Item = (usize, Vec<usize>)> + Send + 'static,
+    ) -> Self {
+        let (sender, receiver) = sync_channel(AHEAD);
+        let maker = Maker {
+            config: config.clone(),
+            set,
+            augment,
+            cache: Mutex::default(),
+        };
+        // The thread ends when the receiver is dropped: `send` fails then.
+        std::thread::spawn(move || {
+            for (number, samples) in batches {
+                let batch = maker.make(number, &samples);
+                let failed = batch.is_err();
+                if sender.send(batch).is_err() || failed {
+                    return;
+                }
+            }
+        });
+        Self {
+            batches: receiver,
+            size: (config.size.height, config.size.width),
+        }
+    }
+
+    /// The next batch on `device`; `None` after the last.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for an image that cannot be read or has another size than its camera.
+    pub fn next(&self, device: &Device) -> Option<Result<SnippetBatch, Error>> {
+        let raw = match self.batches.recv().ok()? {
+            Ok(raw) => raw,
+            Err(error) => return Some(Err(error)),
+        };
+        let n = raw.names.len();
+        let (height, width) = self.size;
+        let images = |frames: Vec<Vec<f32>>| {
+            let tensor = |v| Tensor::from_data(TensorData::new(v, [n, 3, height, width]), device);
+            frames.into_iter().map(tensor).collect()
+        };
+        let matrices = |v| Tensor::<3>::from_data(TensorData::new(v, [n, 3, 3]), device);
+        let vectors = |v| Tensor::<1>::from_data(TensorData::new(v, [n]), device);
+        Some(Ok(SnippetBatch {
+            clean: images(raw.clean),
+            network: images(raw.network),
+            intrinsics: matrices(raw.intrinsics),
+            inverse_intrinsics: matrices(raw.inverse_intrinsics),
+            distance_m: raw.distance_m.into_iter().map(vectors).collect(),
+            rotation: raw.rotation.into_iter().map(matrices).collect(),
+            offsets: raw.offsets,
+            names: raw.names,
+        }))
+    }
+}
+
+/// One sample's part of a batch.
+struct Item {
+    clean: Vec<Vec<f32>>,
+    network: Vec<Vec<f32>>,
+    intrinsics: [f32; 9],
+    inverse_intrinsics: [f32; 9],
+    motion: Vec<(f32, [f32; 9])>,
+}
+
+impl Maker {
+    fn make(&self, number: usize, samples: &[usize]) -> Result<RawBatch, Error> {
+        let items = samples
+            .par_iter()
+            .enumerate()
+            .map(|(slot, sample)| self.item(*sample, number * samples.len() + slot))
+            .collect::<Result<Vec<Item>, Error>>()?;
+        let frames = 1 + self.config.frames.len();
+        let images = |of: fn(&Item) -> &Vec<Vec<f32>>| {
+            (0..frames)
+                .map(|f| {
+                    items
+                        .iter()
+                        .flat_map(|item| of(item)[f].iter().copied())
+                        .collect()
+                })
+                .collect()
+        };
+        let sources = 0..self.config.frames.len();
+        Ok(RawBatch {
+            clean: images(|item| &item.clean),
+            network: images(|item| &item.network),
+            intrinsics: items.iter().flat_map(|i| i.intrinsics).collect(),
+            inverse_intrinsics: items.iter().flat_map(|i| i.inverse_intrinsics).collect(),
+            distance_m: sources
+                .clone()
+                .map(|s| items.iter().map(|i| i.motion[s].0).collect())
+                .collect(),
+            rotation: sources
+                .map(|s| items.iter().flat_map(|i| i.motion[s].1).collect())
+                .collect(),
+            offsets: self.config.frames.clone(),
+            names: samples.iter().map(|s| self.set.name(*s)).collect(),
+        })
+    }
+
+    fn item(&self, sample: usize, draw: usize) -> Result<Item, Error> {
+        let sample = &self.set.samples[sample];
+        let dataset = &self.set.datasets[sample.dataset];
+        let size = self.config.size;
+        let (width, height) = (size.width as u32, size.height as u32);
+        let mut rng = stream(self.config.seed, 1, draw);
+        let flip = rng.random::<bool>() && self.augment && self.config.augmentation.flip;
+        let jitter = self
+            .augment
+            .then(|| Jitter::draw(&self.config.augmentation, &mut rng))
+            .flatten();
+
+        let sources = &sample.snippet.sources;
+        let frames = std::iter::once(sample.snippet.target).chain(sources.iter().map(|s| s.frame));
+        let mut clean = Vec::new();
+        for frame in frames {
+            clean.push(self.image(sample.dataset, frame, flip)?);
+        }
+        let network = clean
+            .iter()
+            .map(|image| {
+                let mut image = image.clone();
+                if let Some(jitter) = &jitter {
+                    jitter.apply(&mut image);
+                }
+                image
+            })
+            .collect();
+
+        let mut k = dataset
+            .intrinsics(sample.snippet.target)
+            .resized(width, height);
+        if flip {
+            k = k.flipped();
+        }
+        let motion = sources
+            .iter()
+            .map(|source| {
+                let mut motion: Se3 = source.motion.source_from_target;
+                if flip {
+                    motion = motion.mirrored_x();
+                }
+                (
+                    source.motion.distance_m as f32,
+                    row_major(&motion.rotation()),
+                )
+            })
+            .collect();
+        Ok(Item {
+            clean,
+            network,
+            intrinsics: row_major(&k.matrix()),
+            inverse_intrinsics: row_major(&k.inverse_matrix()),
+            motion,
+        })
+    }
+
+    /// The image at network size, 3×H×W in [0, 1].
+    fn image(&self, dataset: usize, frame: usize, flip: bool) -> Result<Vec<f32>, Error> {
+        let size = self.config.size;
+        let cached = self.lock().get(&(dataset, frame)).cloned();
+        let bytes = match cached {
+            Some(bytes) => bytes,
+            None => {
+                let image = self.set.datasets[dataset].load_image(frame)?;
+                let small = resize_rgb(&image, size.width as u32, size.height as u32);
+                let bytes = Arc::new(small.into_raw());
+                let mut cache = self.lock();
+                if (cache.len() + 1) * bytes.len() <= CACHE_BYTES {
+                    cache.insert((dataset, frame), Arc::clone(&bytes));
+                }
+                bytes
+            }
+        };
+        let (w, h) = (size.width as u32, size.height as u32);
+        let image = deepfusion_data::RgbImage::from_raw(w, h, bytes.to_vec()).unwrap_or_default();
+        let mut values = to_chw(&image);
+        if flip {
+            values
+                .chunks_exact_mut(size.width)
+                .for_each(<[f32]>::reverse);
+        }
+        Ok(values)
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, HashMap<(usize, usize), Arc<Vec<u8>>>> {
+        // A thread that panicked while holding the cache left it whole: entries go in at once.
+        self.cache
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+fn row_major(m: &nalgebra::Matrix3<f64>) -> [f32; 9] {
+    std::array::from_fn(|i| m[(i / 3, i % 3)] as f32)
+}

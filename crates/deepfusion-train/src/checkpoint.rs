@@ -1,0 +1,228 @@
+use crate::{Adam, Error, Model, TrainConfig};
+use burn::tensor::Device;
+use deepfusion_nn::weights::{self, Weights};
+use std::path::{Path, PathBuf};
+
+/// The version of the checkpoint's layout; files of another version are refused.
+pub const CHECKPOINT_VERSION: u32 = 1;
+
+/// Which checkpoint of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CheckpointKind {
+    /// Everything needed to go on.
+    Last,
+    /// The networks at the lowest validation loss.
+    Best,
+}
+
+impl CheckpointKind {
+    fn file(self) -> &'static str {
+        match self {
+            Self::Last => "last.safetensors",
+            Self::Best => "best.safetensors",
+        }
+    }
+}
+
+/// Where training stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Checkpoint {
+    /// Steps done, skipped ones included.
+    pub step: usize,
+    /// The lowest validation loss so far.
+    pub best_validation: Option<f64>,
+    /// Steps skipped for a gradient that was not finite.
+    pub skipped: usize,
+}
+
+/// A run's folder: `config.toml`, `last.safetensors`, `best.safetensors`, logs and panels.
+#[derive(Debug, Clone)]
+pub struct RunFolder {
+    path: PathBuf,
+}
+
+impl RunFolder {
+    /// An empty folder for a new run.
+    ///
+    /// # Errors
+    /// [`Error::RunExists`] where a run already is; [`Error::Io`].
+    pub fn create(path: &Path) -> Result<Self, Error> {
+        if path.join("config.toml").exists() {
+            return Err(Error::RunExists {
+                path: path.to_owned(),
+            });
+        }
+        std::fs::create_dir_all(path).map_err(|e| Error::io(path, "write", e))?;
+        Ok(Self {
+            path: path.to_owned(),
+        })
+    }
+
+    /// A folder that holds a run, or a checkpoint file in one; the latter also says which checkpoint.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] when there is no run.
+    pub fn open(path: &Path) -> Result<(Self, Option<CheckpointKind>), Error> {
+        let (folder, kind) = match path.file_name().and_then(|n| n.to_str()) {
+            Some("last.safetensors") => (path.parent(), Some(CheckpointKind::Last)),
+            Some("best.safetensors") => (path.parent(), Some(CheckpointKind::Best)),
+            _ => (Some(path), None),
+        };
+        let folder = folder.unwrap_or(Path::new("."));
+        if !folder.join("config.toml").is_file() {
+            let reason = if folder.exists() {
+                "this is no run: it has no config.toml"
+            } else {
+                "no such run"
+            };
+            return Err(Error::Checkpoint {
+                path: path.to_owned(),
+                reason: reason.into(),
+                remedy: "give the folder that `train`, `demo` or `weights import` wrote".into(),
+            });
+        }
+        let folder = Self {
+            path: folder.to_owned(),
+        };
+        Ok((folder, kind))
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The configuration file.
+    #[must_use]
+    pub fn config_path(&self) -> PathBuf {
+        self.path.join("config.toml")
+    }
+
+    /// A checkpoint's file.
+    #[must_use]
+    pub fn checkpoint_path(&self, kind: CheckpointKind) -> PathBuf {
+        self.path.join(kind.file())
+    }
+
+    /// The checkpoint that the folder as a whole means: the best where there is one, else the last.
+    #[must_use]
+    pub fn preferred(&self) -> CheckpointKind {
+        if self.checkpoint_path(CheckpointKind::Best).exists() {
+            CheckpointKind::Best
+        } else {
+            CheckpointKind::Last
+        }
+    }
+
+    /// Writes the configuration.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write_config(&self, config: &TrainConfig) -> Result<(), Error> {
+        let text = config.to_toml()?;
+        let path = self.config_path();
+        deepfusion_data::write_atomically::<Error>(&path, |file| {
+            std::io::Write::write_all(file, text.as_bytes())
+                .map_err(|e| Error::io(&path, "write", e))
+        })
+    }
+
+    /// Reads the configuration.
+    ///
+    /// # Errors
+    /// As [`TrainConfig::read`].
+    pub fn read_config(&self) -> Result<TrainConfig, Error> {
+        TrainConfig::read(&self.config_path())
+    }
+
+    /// Writes a checkpoint; it replaces the one before only when it is complete.
+    ///
+    /// # Errors
+    /// [`Error::Network`] naming the file.
+    pub fn save(
+        &self,
+        kind: CheckpointKind,
+        model: &Model,
+        adam: Option<&Adam>,
+        state: &Checkpoint,
+    ) -> Result<PathBuf, Error> {
+        let mut all = weights::collect(&model.depth_net).with_prefix("depth.");
+        all = all.merged(weights::collect(&model.pose_net).with_prefix("pose."));
+        if let Some(adam) = adam {
+            all = all.merged(adam.state().with_prefix("adam."));
+            all.metadata
+                .insert("adam_steps".into(), adam.steps().to_string());
+        }
+        let mut note = |key: &str, value: String| all.metadata.insert(key.into(), value);
+        note("format_version", CHECKPOINT_VERSION.to_string());
+        note("program_version", env!("CARGO_PKG_VERSION").into());
+        note("step", state.step.to_string());
+        note("skipped", state.skipped.to_string());
+        if let Some(best) = state.best_validation {
+            // All digits: the comparison must go on exactly.
+            note("best_validation", format!("{:016x}", best.to_bits()));
+        }
+        let path = self.checkpoint_path(kind);
+        weights::write_safetensors(&path, &all)?;
+        Ok(path)
+    }
+
+    /// The networks, the optimiser where it was saved, and where training stood.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] for a file of another version, [`Error::Network`] for one of another
+    /// architecture, naming the first tensor that differs.
+    pub fn load(
+        &self,
+        kind: CheckpointKind,
+        config: &TrainConfig,
+        device: &Device,
+    ) -> Result<(Model, Option<Adam>, Checkpoint), Error> {
+        let path = self.checkpoint_path(kind);
+        let all = weights::read(&path)?;
+        let fail = |reason: String, remedy: &str| Error::Checkpoint {
+            path: path.clone(),
+            reason,
+            remedy: remedy.into(),
+        };
+        let number = |key: &str| {
+            let text = all.metadata.get(key);
+            text.and_then(|t| t.parse::<usize>().ok()).ok_or_else(|| {
+                fail(
+                    format!("no checkpoint of this program: `{key}` is missing from its metadata"),
+                    "`weights import` reads weights of other programs",
+                )
+            })
+        };
+        let version = number("format_version")?;
+        if version != CHECKPOINT_VERSION as usize {
+            return Err(fail(
+                format!("checkpoint format {version}, this program reads {CHECKPOINT_VERSION}"),
+                "use the version of the program that wrote it",
+            ));
+        }
+        let state = Checkpoint {
+            step: number("step")?,
+            skipped: number("skipped")?,
+            best_validation: all
+                .metadata
+                .get("best_validation")
+                .and_then(|t| u64::from_str_radix(t, 16).ok())
+                .map(f64::from_bits),
+        };
+        let named = |prefix: &str| -> Weights { all.under(prefix) };
+        let blank = Model::new(config, device)?;
+        let depth_net = weights::apply(blank.depth_net, &named("depth."))?;
+        let pose_net = weights::apply(blank.pose_net, &named("pose."))?;
+        let adam = match all.metadata.get("adam_steps") {
+            Some(_) => {
+                let steps = u32::try_from(number("adam_steps")?).unwrap_or(u32::MAX);
+                Some(Adam::restore(named("adam."), steps))
+            }
+            None => None,
+        };
+        let model = Model::with_networks(config, depth_net, pose_net, device);
+        Ok((model, adam, state))
+    }
+}

@@ -1,0 +1,258 @@
+use crate::{Error, Preset};
+use deepfusion_geometry::Intrinsics;
+use deepfusion_nn::{DepthNetConfig, InputSize, PoseNetConfig};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// How the views of a target are compared (SPEC 2).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Reprojection {
+    /// Two frames, each warped onto the other: the paper's double-frame coupled reprojection.
+    Bidirectional,
+    /// The smallest error of all sources at each pixel: Monodepth2's.
+    Minimum,
+}
+
+/// Where the motion of the reversed pair comes from in bidirectional reprojection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ReversedPose {
+    /// The network is asked again with the frames swapped.
+    Predicted,
+    /// The forward motion is inverted: half the work of the pose network.
+    Inverted,
+}
+
+/// Weights and switches of the loss terms (SPEC 2). A weight of 0 switches a term off.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LossConfig {
+    /// α of the photometric error: the share of SSIM beside the absolute difference.
+    pub ssim_weight: f64,
+    /// λ_s of the edge-aware smoothness at full resolution; halved at each coarser scale.
+    pub smoothness: f64,
+    /// λ_v of the speed loss.
+    pub speed: f64,
+    /// β_R: weight of the rotation inside the speed loss.
+    pub rotation: f64,
+    /// Steps over which λ_v rises from 0; at most a tenth of the run.
+    pub speed_warmup_steps: usize,
+    /// Whether pixels that the unwarped source explains better contribute that constant instead.
+    pub automask: bool,
+}
+
+impl LossConfig {
+    /// The names that [`Self::without`] takes.
+    pub const TERMS: [&'static str; 3] = ["smoothness", "speed", "automask"];
+
+    /// Switches a term off by its name.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a name that is none of [`Self::TERMS`].
+    pub fn without(&mut self, term: &str) -> Result<(), Error> {
+        match term {
+            "smoothness" => self.smoothness = 0.0,
+            "speed" => self.speed = 0.0,
+            "automask" => self.automask = false,
+            _ => {
+                return Err(Error::Config {
+                    field: "without",
+                    expected: format!("one of {}", Self::TERMS.join(", ")),
+                    found: term.to_owned(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What is done to the images before the networks see them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Augmentation {
+    /// Mirror every other sample left to right, its camera and motion with it.
+    pub flip: bool,
+    /// Probability of a colour jitter; the losses always see the clean images.
+    pub jitter: f64,
+    /// Largest change of brightness, contrast and saturation, as a factor around 1.
+    pub brightness: f32,
+    /// Largest change of hue, in turns.
+    pub hue: f32,
+}
+
+/// Where a run's images come from; a resumed run finds them again by this.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DataConfig {
+    /// Drive folders, date folders or KITTI roots.
+    pub paths: Vec<PathBuf>,
+    /// Recordings to validate on; none: the held-out end of each drive.
+    pub validation: Vec<PathBuf>,
+    /// A split file that selects frames.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub split: Option<PathBuf>,
+    /// Which cameras: `2`, `3` or `both`; empty means 2.
+    pub camera: String,
+}
+
+/// Everything that decides a training run. One struct serves the command line, the `--config` file
+/// and the checkpoint; it is stored beside the run as `config.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainConfig {
+    /// The preset this started from.
+    pub preset: Preset,
+    /// Width and height of the images the networks see.
+    pub size: InputSize,
+    /// Offsets of the sources: `[1]` or `[-1, 1]`.
+    pub frames: Vec<i32>,
+    /// How views are compared.
+    pub reprojection: Reprojection,
+    /// Where the reversed pair's motion comes from.
+    pub reversed_pose: ReversedPose,
+    /// Samples a step.
+    pub batch: usize,
+    /// Batches whose gradients are averaged before a step of the optimiser.
+    pub accumulate: usize,
+    /// Passes over the data; `steps` overrides it.
+    pub epochs: usize,
+    /// Steps of the optimiser, where given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steps: Option<usize>,
+    /// Adam's step size.
+    pub learning_rate: f64,
+    /// Share of the run after which the step size is divided by ten.
+    pub learning_rate_drop: f64,
+    /// Largest norm of the gradient; longer ones are shortened to it. 0: no limit.
+    pub clip_norm: f64,
+    /// Decides everything random.
+    pub seed: u64,
+    /// Pairs slower than this are dropped, in m/s.
+    pub min_speed_mps: f64,
+    /// Share of each drive's end that is held out for validation.
+    pub validation_share: f64,
+    /// Steps between validations, checkpoints and panels; 0: once an epoch.
+    pub validate_every: usize,
+    /// A PoseNet that starts out driving ahead by the data's mean displacement, instead of standing.
+    /// Needs the frames in time order, so it has no effect where the reversed pose is predicted.
+    pub start_moving: bool,
+    /// The camera trained with, at network size; filled in from the data. Several cameras: the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Intrinsics>,
+    /// The recordings.
+    #[serde(default)]
+    pub data: DataConfig,
+    /// The loss.
+    pub loss: LossConfig,
+    /// The augmentation.
+    pub augmentation: Augmentation,
+    /// The depth network.
+    pub depth_net: DepthNetConfig,
+    /// The pose network. `metres_per_unit` 0 means the data's mean displacement per pair.
+    pub pose_net: PoseNetConfig,
+}
+
+impl TrainConfig {
+    /// Reads a TOML file.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::ConfigFile`] naming the line, or what [`Self::validate`] says.
+    pub fn read(path: &std::path::Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+        let config: Self = toml::from_str(&text).map_err(|e| Error::ConfigFile {
+            path: path.to_owned(),
+            reason: e.to_string(),
+        })?;
+        config.validate()?;
+        Ok(config)
+    }
+
+    /// The configuration as TOML.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if a value has no TOML form.
+    pub fn to_toml(&self) -> Result<String, Error> {
+        toml::to_string_pretty(self).map_err(|e| Error::Config {
+            field: "config",
+            expected: "values that TOML can hold".into(),
+            found: e.to_string(),
+        })
+    }
+
+    /// # Errors
+    /// [`Error::Config`] naming the first setting that means nothing.
+    pub fn validate(&self) -> Result<(), Error> {
+        let fail = |field, expected: &str, found: String| {
+            Err(Error::Config {
+                field,
+                expected: expected.into(),
+                found,
+            })
+        };
+        self.size.validate()?;
+        self.depth_net.validate()?;
+        self.pose_net.encoder.validate()?;
+        if self.batch == 0 {
+            return fail("batch", "at least 1", "0".into());
+        }
+        if self.accumulate == 0 {
+            return fail("accumulate", "at least 1", "0".into());
+        }
+        if self.steps.unwrap_or(self.epochs) == 0 {
+            return fail("steps", "at least 1", "0".into());
+        }
+        if !(self.learning_rate > 0.0 && self.learning_rate.is_finite()) {
+            return fail("learning_rate", "above 0", self.learning_rate.to_string());
+        }
+        if !(0.0..=1.0).contains(&self.learning_rate_drop) {
+            let found = self.learning_rate_drop.to_string();
+            return fail("learning_rate_drop", "0 to 1", found);
+        }
+        if !(0.0..=0.5).contains(&self.validation_share) {
+            return fail(
+                "validation_share",
+                "0 to 0.5",
+                self.validation_share.to_string(),
+            );
+        }
+        let weights = [
+            ("loss.smoothness", self.loss.smoothness),
+            ("loss.speed", self.loss.speed),
+            ("loss.rotation", self.loss.rotation),
+            ("clip_norm", self.clip_norm),
+            ("min_speed_mps", self.min_speed_mps),
+            ("pose_net.metres_per_unit", self.pose_net.metres_per_unit),
+        ];
+        for (field, weight) in weights {
+            if !(weight >= 0.0 && weight.is_finite()) {
+                return fail(field, "0 or more", weight.to_string());
+            }
+        }
+        for (field, share) in [
+            ("loss.ssim_weight", self.loss.ssim_weight),
+            ("augmentation.jitter", self.augmentation.jitter),
+            (
+                "augmentation.brightness",
+                f64::from(self.augmentation.brightness),
+            ),
+            ("augmentation.hue", f64::from(self.augmentation.hue) * 2.0),
+        ] {
+            if !(0.0..=1.0).contains(&share) {
+                return fail(field, "0 to 1", share.to_string());
+            }
+        }
+        match (self.reprojection, self.frames.as_slice()) {
+            (_, []) => fail("frames", "at least one offset", "[]".into()),
+            (_, frames) if frames.contains(&0) => {
+                fail("frames", "offsets other than 0", format!("{frames:?}"))
+            }
+            (Reprojection::Bidirectional, frames) if frames != [1] => fail(
+                "frames",
+                "[1] for bidirectional reprojection",
+                format!("{frames:?}"),
+            ),
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,134 @@
+use std::path::PathBuf;
+
+/// What can go wrong while learning.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A setting that means nothing.
+    #[error("setting `{field}`: expected {expected}, found {found}")]
+    Config {
+        /// The setting's name, as in the file.
+        field: &'static str,
+        /// What would do.
+        expected: String,
+        /// What was found.
+        found: String,
+    },
+    /// A configuration file that cannot be read as one.
+    #[error("{path}: not a training configuration: {reason}")]
+    ConfigFile {
+        /// The file.
+        path: PathBuf,
+        /// What the parser says, with the line.
+        reason: String,
+    },
+    /// A file that cannot be read or written.
+    #[error("{path}: cannot {action}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// "read" or "write".
+        action: &'static str,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A checkpoint that does not fit the program or the configuration.
+    #[error("{path}: {reason}")]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// Why it cannot be used.
+        reason: String,
+        /// What to do about it.
+        remedy: String,
+    },
+    /// A folder that already holds a run.
+    #[error("{path}: there is a run here already")]
+    RunExists {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Nothing to learn from.
+    #[error("no training sample in {data}: {reason}")]
+    NoSamples {
+        /// The data that was given.
+        data: String,
+        /// Why nothing is left.
+        reason: String,
+    },
+    /// A loss that is not a number.
+    #[error("step {step}: the loss term `{term}` is {value}; frames {frames}")]
+    NotFinite {
+        /// The step, counted from 1.
+        step: usize,
+        /// The term's name.
+        term: &'static str,
+        /// Its value.
+        value: f64,
+        /// The drives and frame numbers of the batch.
+        frames: String,
+    },
+    /// Gradients that stay non-finite.
+    #[error(
+        "{count} steps in a row had a gradient that is not finite, the last at step {step}; frames {frames}"
+    )]
+    GradientsNotFinite {
+        /// How many.
+        count: usize,
+        /// The last such step.
+        step: usize,
+        /// The drives and frame numbers of its batch.
+        frames: String,
+    },
+    /// The recording.
+    #[error(transparent)]
+    Data(#[from] deepfusion_data::Error),
+    /// The networks or their weights.
+    #[error(transparent)]
+    Network(#[from] deepfusion_nn::Error),
+}
+
+impl Error {
+    /// What to do about it, in a line.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Config { .. } => None,
+            Self::ConfigFile { .. } => Some(
+                "a run's own config.toml is a complete example; start from one and change it".into(),
+            ),
+            Self::Io { source, action, .. } => match source.kind() {
+                std::io::ErrorKind::StorageFull => {
+                    Some("the disk is full; what was there before is untouched".into())
+                }
+                std::io::ErrorKind::PermissionDenied => {
+                    Some(format!("no permission to {action} there"))
+                }
+                _ => None,
+            },
+            Self::Checkpoint { remedy, .. } => Some(remedy.clone()),
+            Self::RunExists { .. } => Some(
+                "continue it with --resume, or choose another folder with --out".into(),
+            ),
+            Self::NoSamples { .. } => Some(
+                "training needs consecutive frames of a moving camera, with time stamps and speeds; \
+                 `deepfusion data inspect` shows what is there"
+                    .into(),
+            ),
+            Self::NotFinite { .. } | Self::GradientsNotFinite { .. } => Some(
+                "the last good checkpoint is kept; look at the frames named above, or lower the \
+                 learning rate, and continue with --resume"
+                    .into(),
+            ),
+            Self::Data(error) => error.hint(),
+            Self::Network(error) => error.hint(),
+        }
+    }
+
+    pub(crate) fn io(path: &std::path::Path, action: &'static str, source: std::io::Error) -> Self {
+        Self::Io {
+            path: path.to_owned(),
+            action,
+            source,
+        }
+    }
+}

@@ -1,0 +1,81 @@
+use crate::{LossTerms, SamplePanel};
+use std::path::PathBuf;
+
+/// What the trainer reports. It never prints; whoever runs it decides what becomes of these.
+#[derive(Debug, Clone)]
+pub enum TrainEvent {
+    /// Training begins, or goes on.
+    Started {
+        /// Steps already done.
+        from_step: usize,
+        /// Steps of the whole run.
+        steps: usize,
+        /// Training samples.
+        samples: usize,
+        /// Held-out samples.
+        validation_samples: usize,
+        /// The data's mean displacement per pair, in metres.
+        mean_displacement_m: f64,
+    },
+    /// A step of the optimiser was made.
+    Step {
+        /// Counted from 1.
+        step: usize,
+        /// Steps of the whole run.
+        steps: usize,
+        /// The batch's loss.
+        losses: LossTerms,
+        /// The step size.
+        learning_rate: f64,
+        /// Images a second that went through the depth network, over the last steps.
+        images_per_second: f64,
+        /// Seconds until the end at the present pace.
+        remaining_s: f64,
+        /// Displacement by the vehicle's speed over displacement by PoseNet, smoothed over the last
+        /// steps: 1 when the scale is metric.
+        scale_ratio: f64,
+        /// Norm of the gradient before clipping.
+        gradient_norm: f64,
+    },
+    /// The held-out samples were looked at.
+    Validated {
+        /// After this step.
+        step: usize,
+        /// Their loss.
+        losses: LossTerms,
+        /// Displacement by speed over displacement by PoseNet.
+        scale_ratio: f64,
+        /// Whether this is the best so far.
+        best: bool,
+    },
+    /// A look at what is learned.
+    Panel {
+        /// After this step.
+        step: usize,
+        /// The images.
+        panel: Box<SamplePanel>,
+    },
+    /// A checkpoint was written.
+    Saved {
+        /// After this step.
+        step: usize,
+        /// The file.
+        path: PathBuf,
+    },
+    /// Something looks wrong but training goes on.
+    Warning {
+        /// After this step.
+        step: usize,
+        /// What, with the figure.
+        message: String,
+    },
+}
+
+/// What the listener wants next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Control {
+    /// Go on.
+    Continue,
+    /// Save and stop.
+    Stop,
+}

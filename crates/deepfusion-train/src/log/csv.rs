@@ -1,0 +1,101 @@
+use crate::{Error, LossTerms};
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+
+/// `log.csv`: a line a record, `split` "train" or "validation".
+#[derive(Debug)]
+pub struct CsvLog {
+    file: File,
+    path: PathBuf,
+}
+
+/// The columns after the loss terms.
+const EXTRA: &str = "learning_rate,scale_ratio,images_per_second";
+
+fn header() -> String {
+    let terms: Vec<_> = LossTerms::default()
+        .named()
+        .iter()
+        .map(|(n, _)| *n)
+        .collect();
+    format!("step,split,{},{EXTRA}", terms.join(","))
+}
+
+impl CsvLog {
+    /// Opens the log; records after `step`, left by a run that was interrupted later, are dropped.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn open(path: &Path, step: usize) -> Result<Self, Error> {
+        let io = |action| move |e| Error::io(path, action, e);
+        let mut kept = vec![header()];
+        if step > 0 && path.exists() {
+            let file = File::open(path).map_err(io("read"))?;
+            for line in BufReader::new(file).lines().skip(1) {
+                let line = line.map_err(io("read"))?;
+                let of = line.split(',').next().and_then(|s| s.parse::<usize>().ok());
+                if of.is_some_and(|of| of <= step) {
+                    kept.push(line);
+                }
+            }
+        }
+        deepfusion_data::write_atomically::<Error>(path, |out| {
+            writeln!(out, "{}", kept.join("\n")).map_err(io("write"))
+        })?;
+        let file = OpenOptions::new().append(true).open(path);
+        Ok(Self {
+            file: file.map_err(io("write"))?,
+            path: path.to_owned(),
+        })
+    }
+
+    /// Appends a record.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write(
+        &mut self,
+        step: usize,
+        split: &str,
+        losses: &LossTerms,
+        learning_rate: f64,
+        scale_ratio: f64,
+        images_per_second: f64,
+    ) -> Result<(), Error> {
+        let terms: Vec<_> = losses
+            .named()
+            .iter()
+            .map(|(_, v)| format!("{v:.9}"))
+            .collect();
+        let line = format!(
+            "{step},{split},{},{learning_rate:e},{scale_ratio:.6},{images_per_second:.3}",
+            terms.join(",")
+        );
+        writeln!(self.file, "{line}").map_err(|e| Error::io(&self.path, "write", e))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_resumed_log_goes_on_where_the_checkpoint_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        let write = |from: usize, steps: std::ops::RangeInclusive<usize>| {
+            let mut log = CsvLog::open(&path, from).unwrap();
+            for step in steps {
+                log.write(step, "train", &LossTerms::default(), 1e-4, 1.0, 2.0)
+                    .unwrap();
+            }
+        };
+        write(0, 1..=7);
+        write(4, 5..=6);
+        let text = std::fs::read_to_string(&path).unwrap();
+        let steps: Vec<_> = text.lines().skip(1).map(|l| &l[..1]).collect();
+        assert_eq!(steps, ["1", "2", "3", "4", "5", "6"]);
+        assert!(text.starts_with("step,split,total,reprojection"), "{text}");
+    }
+}

@@ -1,0 +1,7 @@
+//! A run's records: `log.csv` and TensorBoard events.
+
+mod csv;
+mod tensorboard;
+
+pub use csv::CsvLog;
+pub use tensorboard::TensorBoardLog;

@@ -1,0 +1,133 @@
+use crate::Motion;
+use burn::tensor::Tensor;
+
+/// The speed loss (Eq. 32–39): mean over pairs of |‖t̂‖ − d| + β_R·angle(R̂ᵀ·R), d and R from the
+/// vehicle's sensors. It is what fixes the scale in metres.
+///
+/// # Shapes
+/// - `motion`: N predicted motions
+/// - `distance_m`: `[N]`, length of the camera's true translation
+/// - `rotation`: `[N, 3, 3]`, the true rotation in the same direction; read only where β_R > 0
+/// - output: one value, in metres
+#[must_use]
+pub fn speed(
+    motion: &Motion,
+    distance_m: Tensor<1>,
+    rotation: &Tensor<3>,
+    rotation_weight: f64,
+) -> Tensor<1> {
+    let translation = motion.distance().sub(distance_m).abs().mean();
+    if rotation_weight == 0.0 {
+        return translation;
+    }
+    // ‖R̂ − R‖_F = 2√2·sin(angle/2): for the small angles between two frames the angle is
+    // ‖R̂ − R‖_F/√2 to third order, and the square root is kept away from zero.
+    let [n, _, _] = rotation.dims();
+    let angle = motion
+        .rotation
+        .clone()
+        .sub(rotation.clone())
+        .powi_scalar(2)
+        .reshape([n, 9])
+        .sum_dim(1)
+        .mul_scalar(0.5)
+        .add_scalar(1e-12)
+        .sqrt();
+    translation + angle.mean().mul_scalar(rotation_weight)
+}
+
+/// λ_v at a step (counted from 0): it rises linearly over one epoch or `warmup_steps`, whichever is
+/// longer, but over at most a tenth of the run.
+#[must_use]
+pub fn speed_weight(
+    weight: f64,
+    step: usize,
+    steps: usize,
+    epoch_steps: usize,
+    warmup_steps: usize,
+) -> f64 {
+    let warmup = epoch_steps.max(warmup_steps).min(steps / 10).max(1);
+    weight * ((step + 1) as f64 / warmup as f64).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use burn::tensor::Device;
+
+    #[test]
+    fn the_right_distance_costs_nothing_in_any_direction() {
+        let device = Device::flex();
+        let zeros = Tensor::<2>::zeros([2, 3], &device);
+        let translation = Tensor::<2>::from_data([[0.0, 0.6, 0.8], [3.0, 0.0, -4.0]], &device);
+        let motion = Motion::new(zeros, translation);
+        let rotation = motion.rotation.clone();
+        let loss = |d: [f32; 2]| {
+            let d = Tensor::<1>::from_data(d, &device);
+            speed(&motion, d, &rotation, 0.5).into_scalar::<f32>()
+        };
+        assert!(loss([1.0, 5.0]) < 1e-5);
+        assert!((loss([1.5, 4.0]) - 0.75).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_rotation_term_is_the_angle() {
+        let device = Device::flex();
+        let translation = Tensor::<2>::from_data([[0.0, 0.0, 1.0]], &device);
+        let turned = Tensor::<2>::from_data([[0.0, 0.02, 0.0]], &device);
+        let motion = Motion::new(turned, translation.clone());
+        let straight = Motion::new(Tensor::zeros([1, 3], &device), translation);
+        let one = Tensor::<1>::ones([1], &device);
+        let loss = speed(&motion, one, &straight.rotation, 1.0).into_scalar::<f32>();
+        assert!((loss - 0.02).abs() < 1e-5, "{loss}");
+    }
+
+    /// Away from the kink ‖t̂‖ = d; in f32 a step of 1e-2 on a smooth function leaves 1e-4.
+    #[test]
+    fn gradient_equals_finite_differences() {
+        let device = Device::flex().autodiff();
+        let rotation = Motion::new(
+            Tensor::<2>::from_data([[0.1, 0.0, -0.05]], &device),
+            Tensor::zeros([1, 3], &device),
+        )
+        .rotation;
+        let loss = |p: [f32; 6]| {
+            let v = Tensor::<1>::from_data(p, &device).require_grad();
+            let motion = Motion::new(
+                v.clone().narrow(0, 0, 3).reshape([1, 3]),
+                v.clone().narrow(0, 3, 3).reshape([1, 3]),
+            );
+            let d = Tensor::<1>::from_data([0.7], &device);
+            (v, speed(&motion, d, &rotation, 0.3))
+        };
+        let point = [0.2, -0.1, 0.15, 0.4, -0.2, 1.1];
+        let (v, value) = loss(point);
+        let gradient: Vec<f32> = v
+            .grad(&value.backward())
+            .unwrap()
+            .into_data()
+            .into_vec()
+            .unwrap();
+        for i in 0..6 {
+            let at = |step: f32| {
+                let mut moved = point;
+                moved[i] += step;
+                loss(moved).1.into_scalar::<f32>()
+            };
+            let numeric = (at(1e-2) - at(-1e-2)) / 2e-2;
+            assert!(
+                (numeric - gradient[i]).abs() < 2e-3,
+                "{i}: {numeric} {}",
+                gradient[i]
+            );
+        }
+    }
+
+    #[test]
+    fn the_weight_rises_over_at_most_a_tenth_of_the_run() {
+        assert!((speed_weight(0.2, 0, 10_000, 100, 500) - 0.2 / 500.0).abs() < 1e-12);
+        assert!((speed_weight(0.2, 9_999, 10_000, 100, 500) - 0.2).abs() < 1e-12);
+        assert!((speed_weight(0.2, 49, 1000, 200, 500) - 0.1).abs() < 1e-12);
+        assert!((speed_weight(0.2, 0, 5, 200, 500) - 0.2).abs() < 1e-12);
+    }
+}

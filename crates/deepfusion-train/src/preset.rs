@@ -1,0 +1,144 @@
+use crate::config::{
+    Augmentation, DataConfig, LossConfig, Reprojection, ReversedPose, TrainConfig,
+};
+use deepfusion_nn::{
+    DecoderConfig, DepthNetConfig, InputSize, PoseNetConfig, ResNetConfig, ResNetDepth,
+};
+use serde::{Deserialize, Serialize};
+
+/// Named configurations to start from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// ResNet-18 at half width, 320×96: learns something useful on two cores in minutes.
+    Tiny,
+    /// ResNet-18, 640×192.
+    Light,
+    /// ResNet-50, 640×192, batch 12: the paper's sizes.
+    Resnet50,
+    /// Monodepth2's network and losses (three frames, minimum reprojection) with the speed term.
+    Monodepth2,
+}
+
+impl Preset {
+    /// All presets with the names the command line takes.
+    pub const ALL: [(Self, &'static str); 4] = [
+        (Self::Tiny, "tiny"),
+        (Self::Light, "light"),
+        (Self::Resnet50, "resnet50"),
+        (Self::Monodepth2, "monodepth2"),
+    ];
+
+    /// The configuration.
+    #[must_use]
+    pub fn config(self) -> TrainConfig {
+        let base = |depth: ResNetDepth| TrainConfig {
+            preset: self,
+            size: InputSize {
+                width: 640,
+                height: 192,
+            },
+            frames: vec![1],
+            reprojection: Reprojection::Bidirectional,
+            reversed_pose: ReversedPose::Predicted,
+            batch: 12,
+            accumulate: 1,
+            epochs: 20,
+            steps: None,
+            learning_rate: 1e-4,
+            learning_rate_drop: 0.75,
+            clip_norm: 10.0,
+            seed: 0,
+            min_speed_mps: 0.5,
+            validation_share: 0.1,
+            validate_every: 0,
+            start_moving: false,
+            camera: None,
+            data: DataConfig::default(),
+            loss: LossConfig {
+                ssim_weight: 0.85,
+                smoothness: 1e-3,
+                speed: 0.2,
+                rotation: 0.0,
+                speed_warmup_steps: 500,
+                automask: true,
+            },
+            augmentation: Augmentation {
+                flip: true,
+                jitter: 0.5,
+                brightness: 0.2,
+                hue: 0.1,
+            },
+            depth_net: DepthNetConfig::new(depth),
+            pose_net: PoseNetConfig {
+                // Measured from the data when training starts (SPEC 1.2).
+                metres_per_unit: 0.0,
+                ..PoseNetConfig::new(depth)
+            },
+        };
+        match self {
+            Self::Tiny => {
+                let narrow = |config: ResNetConfig| config.with_base_width(32);
+                let mut config = base(ResNetDepth::ResNet18);
+                config.size = InputSize {
+                    width: 320,
+                    height: 96,
+                };
+                config.batch = 4;
+                config.learning_rate = 3e-4;
+                config.reversed_pose = ReversedPose::Inverted;
+                config.start_moving = true;
+                config.depth_net.encoder = narrow(config.depth_net.encoder);
+                config.depth_net.decoder = DecoderConfig {
+                    widths: [128, 64, 32, 16, 16],
+                };
+                config.pose_net.encoder = narrow(config.pose_net.encoder).with_base_width(16);
+                config
+            }
+            Self::Light => base(ResNetDepth::ResNet18),
+            Self::Resnet50 => base(ResNetDepth::ResNet50),
+            Self::Monodepth2 => {
+                let mut config = base(ResNetDepth::ResNet18);
+                config.frames = vec![-1, 1];
+                config.reprojection = Reprojection::Minimum;
+                config.depth_net = DepthNetConfig {
+                    // A metric pose needs a first depth that keeps pixels in view.
+                    initial_depth_m: Some(10.0),
+                    ..DepthNetConfig::monodepth2(ResNetDepth::ResNet18)
+                };
+                config.pose_net = PoseNetConfig {
+                    metres_per_unit: 0.0,
+                    ..PoseNetConfig::monodepth2(ResNetDepth::ResNet18)
+                };
+                config
+            }
+        }
+    }
+}
+
+impl std::fmt::Display for Preset {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let name = Self::ALL.iter().find(|(preset, _)| preset == self);
+        f.write_str(name.map_or("", |(_, name)| name))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_is_valid_and_survives_its_file() {
+        for (preset, name) in Preset::ALL {
+            let config = preset.config();
+            config.validate().unwrap();
+            assert_eq!(preset.to_string(), name);
+            let text = config.to_toml().unwrap();
+            assert_eq!(
+                toml::from_str::<TrainConfig>(&text).unwrap(),
+                config,
+                "{text}"
+            );
+        }
+    }
+}

@@ -1,0 +1,115 @@
+use crate::{Error, TrainConfig};
+use deepfusion_data::{Dataset, Snippet, hold_out};
+use deepfusion_geometry::Intrinsics;
+use std::sync::Arc;
+
+/// A training sample and the recording it belongs to.
+#[derive(Debug, Clone)]
+pub struct Sample {
+    /// Index in [`SampleSet::datasets`].
+    pub dataset: usize,
+    /// The frames and the motion between them.
+    pub snippet: Snippet,
+}
+
+/// The samples of all recordings.
+#[derive(Debug, Clone)]
+pub struct SampleSet {
+    /// The recordings.
+    pub datasets: Arc<Vec<Dataset>>,
+    /// The samples.
+    pub samples: Vec<Sample>,
+}
+
+impl SampleSet {
+    /// The training samples of `train`, and the validation samples: those of `validation` where it is
+    /// given, else the held-out end of each training drive. Drives without a usable pair are skipped
+    /// and reported in the last result, as long as one is left.
+    ///
+    /// # Errors
+    /// [`Error::NoSamples`] with the reason for the last drive when no drive has a pair.
+    pub fn split(
+        config: &TrainConfig,
+        train: Vec<Dataset>,
+        validation: Option<Vec<Dataset>>,
+    ) -> Result<(Self, Self, Vec<String>), Error> {
+        let mut skipped = Vec::new();
+        let share = if validation.is_some() {
+            0.0
+        } else {
+            config.validation_share
+        };
+        let train = Arc::new(train);
+        let (samples, held_out) = Self::gather(config, &train, share, &mut skipped)?;
+        let validation = match validation {
+            Some(datasets) => {
+                let datasets = Arc::new(datasets);
+                let (samples, _) = Self::gather(config, &datasets, 0.0, &mut skipped)?;
+                Self { datasets, samples }
+            }
+            None => Self {
+                datasets: Arc::clone(&train),
+                samples: held_out,
+            },
+        };
+        let train = Self {
+            datasets: train,
+            samples,
+        };
+        Ok((train, validation, skipped))
+    }
+
+    fn gather(
+        config: &TrainConfig,
+        datasets: &[Dataset],
+        share: f64,
+        skipped: &mut Vec<String>,
+    ) -> Result<(Vec<Sample>, Vec<Sample>), Error> {
+        let (mut train, mut held) = (Vec::new(), Vec::new());
+        let mut last = None;
+        for (dataset, recording) in datasets.iter().enumerate() {
+            match recording.snippets(&config.frames, config.min_speed_mps) {
+                Ok(snippets) => {
+                    let (a, b) = hold_out(snippets, share);
+                    let sample = |snippet| Sample { dataset, snippet };
+                    train.extend(a.into_iter().map(sample));
+                    held.extend(b.into_iter().map(sample));
+                }
+                Err(error) => {
+                    skipped.push(error.to_string());
+                    last = Some(error);
+                }
+            }
+        }
+        match (train.is_empty(), last) {
+            (false, _) => Ok((train, held)),
+            (true, Some(error)) => Err(error.into()),
+            (true, None) => Err(Error::NoSamples {
+                data: "the data given".into(),
+                reason: "it has no drive".into(),
+            }),
+        }
+    }
+
+    /// The mean length of the camera's translation over all pairs, in metres.
+    #[must_use]
+    pub fn mean_displacement_m(&self) -> f64 {
+        let pairs = || self.samples.iter().flat_map(|s| &s.snippet.sources);
+        pairs().map(|s| s.motion.distance_m).sum::<f64>() / pairs().count().max(1) as f64
+    }
+
+    /// The camera of the first sample, at the image's own size.
+    #[must_use]
+    pub fn camera(&self) -> Option<Intrinsics> {
+        let sample = self.samples.first()?;
+        Some(self.datasets[sample.dataset].intrinsics(sample.snippet.target))
+    }
+
+    /// Drive and frame numbers of a sample, for messages.
+    #[must_use]
+    pub fn name(&self, sample: usize) -> String {
+        let Sample { dataset, snippet } = &self.samples[sample];
+        let frame = &self.datasets[*dataset].frames()[snippet.target];
+        format!("{}/{:010}", frame.drive, frame.number)
+    }
+}

@@ -1,0 +1,90 @@
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use deepfusion_data::{CameraChoice, GtKind};
+use deepfusion_eval::GroundTruth;
+
+/// `deepfusion data …`.
+#[derive(Debug, Subcommand)]
+pub enum DataCommand {
+    /// What is in a recording: streams, rates, gaps, intrinsics, speeds, usable pairs.
+    Inspect(InspectArgs),
+    /// Write sparse ground-truth depth from the scans as an .npz file.
+    ExportGt(ExportGtArgs),
+}
+
+/// `deepfusion data inspect`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  deepfusion data inspect kitti/2011_09_26/2011_09_26_drive_0005_sync\n  \
+    deepfusion data inspect kitti/2011_09_26 --overlay --out overlays"
+)]
+pub struct InspectArgs {
+    /// A drive folder, a date folder or a KITTI root.
+    pub path: PathBuf,
+    /// Also draw the LiDAR on the images of all frames that have a scan.
+    #[arg(long)]
+    pub overlay: bool,
+    /// Folder for the pictures of --overlay [default: runs/inspect-<time>].
+    #[arg(long, value_name = "DIR", requires = "overlay")]
+    pub out: Option<PathBuf>,
+    /// Print as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `deepfusion data export-gt`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "One H×W array of f32 metres a frame, 0 = none, named 0000000005, or <drive>/0000000005 where \
+    several drives are given.\n\n\
+    Example:\n  deepfusion data export-gt kitti --split eigen/test_files.txt --out gt.npz"
+)]
+pub struct ExportGtArgs {
+    /// Drive folders, date folders or KITTI roots.
+    #[arg(required = true, value_name = "PATH")]
+    pub paths: Vec<PathBuf>,
+    /// Only the frames of this split file (lines "folder index side").
+    #[arg(long, value_name = "FILE")]
+    pub split: Option<PathBuf>,
+    /// Which depth, at which pixel.
+    #[arg(long, value_enum, default_value_t)]
+    pub gt_depth: GtDepth,
+    /// Which camera.
+    #[arg(long, value_name = "2|3|both", default_value = "2")]
+    pub camera: CameraChoice,
+    /// File to write.
+    #[arg(long, value_name = "FILE.npz")]
+    pub out: PathBuf,
+    /// Replace the file if it is there.
+    #[arg(long)]
+    pub overwrite: bool,
+}
+
+/// Conventions of ground-truth depth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum GtDepth {
+    /// Camera z at pixel round(u), round(v), as KITTI's annotated depth.
+    #[default]
+    Z,
+    /// The velodyne's forward distance at pixel round(u) - 1, round(v) - 1: the field's eigen files.
+    Velodyne,
+}
+
+impl GtDepth {
+    /// The same in the data crate's terms.
+    pub fn kind(self) -> GtKind {
+        match self {
+            Self::Z => GtKind::Z,
+            Self::Velodyne => GtKind::Velodyne,
+        }
+    }
+
+    /// The same in the report's terms.
+    pub fn reported(self) -> GroundTruth {
+        match self {
+            Self::Z => GroundTruth::Z,
+            Self::Velodyne => GroundTruth::Velodyne,
+        }
+    }
+}

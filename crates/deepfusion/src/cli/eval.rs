@@ -1,0 +1,126 @@
+use std::path::PathBuf;
+
+use clap::{ArgGroup, Args, ValueEnum};
+use deepfusion_data::CameraChoice;
+use deepfusion_eval::{Crop, Holes, Protocol, Scaling};
+
+use super::values::{positive, scaling};
+use super::{DeviceChoice, GtDepth};
+
+/// `deepfusion eval`.
+#[derive(Debug, Args)]
+#[command(
+    group(ArgGroup::new("what").required(true).args(["model", "pred"])),
+    after_help = "Metrics are means over images, unscaled and median-scaled, both always. Array files: .npz (matched by \
+    name) or N×H×W .npy (in split order), float32 or float64, any size: predictions are resized as disparity.\n\n\
+    Examples:\n  deepfusion eval --model runs/train-1 --data kitti --split eigen/test_files.txt\n  \
+    deepfusion eval --pred depth.npz --pred-kind depth --gt gt.npz --crop garg --json"
+)]
+pub struct EvalArgs {
+    /// A run folder or a checkpoint in it.
+    #[arg(long, value_name = "RUN", requires = "data")]
+    pub model: Option<PathBuf>,
+    /// Recordings to evaluate on: drive folders, date folders or KITTI roots.
+    #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pred")]
+    pub data: Vec<PathBuf>,
+    /// Only the frames of this split file (lines "folder index side").
+    #[arg(long, value_name = "FILE", conflicts_with = "pred")]
+    pub split: Option<PathBuf>,
+    /// Which camera.
+    #[arg(
+        long,
+        value_name = "2|3|both",
+        default_value = "2",
+        conflicts_with = "pred"
+    )]
+    pub camera: CameraChoice,
+    /// Predicted arrays.
+    #[arg(long, value_name = "FILE", requires = "pred_kind", requires = "gt")]
+    pub pred: Option<PathBuf>,
+    /// What the predicted arrays hold.
+    #[arg(long, value_enum, requires = "pred")]
+    pub pred_kind: Option<PredKind>,
+    /// Ground-truth depth in metres, 0 = none; with --model, instead of the recording's scans.
+    #[arg(long, value_name = "FILE")]
+    pub gt: Option<PathBuf>,
+    /// Which depth the ground truth is (of a --gt file: only recorded in the report).
+    #[arg(long, value_enum, default_value_t)]
+    pub gt_depth: GtDepth,
+    /// Part of the image to compare [default: garg for KITTI raw, else none].
+    #[arg(long, value_enum)]
+    pub crop: Option<CropChoice>,
+    /// Farthest ground truth that counts, in metres; predictions are clamped to it.
+    #[arg(long, value_name = "M", default_value_t = 80.0, value_parser = positive)]
+    pub cap: f64,
+    /// Nearest ground truth that counts, in metres; predictions are clamped to it.
+    #[arg(long, value_name = "M", default_value_t = 1e-3, value_parser = positive)]
+    pub min: f64,
+    /// An extra row with a fixed factor (fixed=F); none and median are always reported.
+    #[arg(long, value_name = "none|median|fixed=F", default_value = "none", value_parser = scaling)]
+    pub scale: Scaling,
+    /// Also draw N points at random and report their distances from the truth.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub points: usize,
+    /// Predicted values that are NaN, infinite or not above 0 mean "none here": leave them out and count them.
+    #[arg(long)]
+    pub allow_holes: bool,
+    /// Training scans (from data export-gt) for the trivial row [default: those the model was trained on, if known].
+    #[arg(long, value_name = "FILE.npz")]
+    pub trivial: Option<PathBuf>,
+    /// Do not correct depth for another focal length than the one trained on.
+    #[arg(long, conflicts_with = "pred")]
+    pub no_focal_correction: bool,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value_t, conflicts_with = "pred")]
+    pub device: DeviceChoice,
+    /// Print as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl EvalArgs {
+    /// The protocol asked for; `default_crop` where none was.
+    pub fn protocol(&self, default_crop: Crop) -> Protocol {
+        Protocol {
+            crop: self.crop.map_or(default_crop, CropChoice::crop),
+            cap_m: self.cap,
+            min_m: self.min,
+            gt: self.gt_depth.reported(),
+            scaling: self.scale,
+            holes: if self.allow_holes {
+                Holes::Skip
+            } else {
+                Holes::Refuse
+            },
+            points: self.points,
+            ..Protocol::default()
+        }
+    }
+}
+
+/// What a predicted array holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PredKind {
+    /// Camera z in metres.
+    Depth,
+    /// 1 / depth.
+    Disparity,
+}
+
+/// Part of the image to compare.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum CropChoice {
+    /// The whole image.
+    None,
+    /// Garg et al.'s window, the field's default for KITTI.
+    Garg,
+}
+
+impl CropChoice {
+    fn crop(self) -> Crop {
+        match self {
+            Self::None => Crop::None,
+            Self::Garg => Crop::Garg,
+        }
+    }
+}

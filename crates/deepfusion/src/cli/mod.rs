@@ -1,0 +1,132 @@
+//! The command line's shape: what can be said, not what it does.
+
+mod data;
+mod eval;
+mod predict;
+mod train;
+mod values;
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+pub use data::{DataCommand, ExportGtArgs, GtDepth, InspectArgs};
+pub use eval::{EvalArgs, PredKind};
+pub use predict::{BenchArgs, PredictArgs, Save, WeightsCommand};
+pub use train::{DeviceChoice, PresetChoice, TrainArgs};
+pub use values::{CameraIntrinsics, Size};
+
+/// Metric depth from one camera and a speed signal.
+#[derive(Debug, Parser)]
+#[command(
+    name = "deepfusion",
+    version,
+    max_term_width = 100,
+    subcommand_required = false
+)]
+pub struct Cli {
+    /// What to do; without it, an overview with examples.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// No progress on stderr, only warnings and errors.
+    #[arg(long, short, global = true, display_order = 900)]
+    pub quiet: bool,
+}
+
+/// Everything the program can do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// With no data at all: simulate a drive, train on it, measure depth on a street never seen.
+    Demo(DemoArgs),
+    /// Write a simulated drive with exact ground truth.
+    Simulate(SimulateArgs),
+    /// Look into recordings.
+    #[command(subcommand)]
+    Data(DataCommand),
+    /// Train on drives, without depth labels.
+    Train(Box<TrainArgs>),
+    /// Measure depth: the field's seven metrics, unscaled and median-scaled.
+    Eval(Box<EvalArgs>),
+    /// Metric depth of images.
+    Predict(Box<PredictArgs>),
+    /// Bring in weights of other programs.
+    #[command(subcommand)]
+    Weights(WeightsCommand),
+    /// Measure speed: milliseconds per stage, frames a second, memory.
+    Bench(BenchArgs),
+}
+
+/// `deepfusion demo`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Takes a few minutes on two cores. Leaves pictures, a point cloud and report.html.\n\n\
+    Example:\n  deepfusion demo --out runs/first"
+)]
+pub struct DemoArgs {
+    /// Folder for everything it makes [default: runs/demo-<time>].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print the final evaluation as JSON on stdout.
+    #[arg(long)]
+    pub json: bool,
+    /// Seed of the street trained on; the street it is measured on has another.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value_t)]
+    pub device: DeviceChoice,
+}
+
+/// `deepfusion simulate`.
+#[derive(Debug, Args)]
+#[command(after_help = "Equal settings give equal drives, byte for byte.\n\n\
+    Examples:\n  deepfusion simulate --out street --frames 200 --seed 7\n  \
+    deepfusion simulate --out traffic --frames 100 --moving-cars 6 --size 1242x375")]
+pub struct SimulateArgs {
+    /// Folder to write, new or empty.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Layout of the drive.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: SimulateFormat,
+    /// Number of frames.
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    pub frames: usize,
+    /// Chooses the street, its look, the light and the way it is driven.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// Kind of place.
+    #[arg(long, value_enum, default_value_t)]
+    pub scene: SceneChoice,
+    /// Number of cars that move.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub moving_cars: usize,
+    /// Size of the pictures.
+    #[arg(long, value_name = "WxH", default_value = "640x192")]
+    pub size: Size,
+    /// Frames a second.
+    #[arg(long, value_name = "HZ", default_value_t = 10.0)]
+    pub fps: f64,
+    /// A velodyne scan for every N-th frame; 0 writes none.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub scan_every: usize,
+    /// Print what was written as JSON on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Layouts the simulator writes.
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+pub enum SimulateFormat {
+    /// KITTI raw: images, oxts, velodyne scans, calibration, and exact depth beside them.
+    #[default]
+    Kitti,
+}
+
+/// Places the simulator knows.
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+pub enum SceneChoice {
+    /// A street with houses, parked cars, trees.
+    #[default]
+    Urban,
+}

@@ -1,0 +1,119 @@
+use std::path::PathBuf;
+
+use clap::{ArgGroup, Args, Subcommand, ValueEnum};
+
+use super::values::positive;
+use super::{CameraIntrinsics, DeviceChoice, PresetChoice, Size};
+
+/// `deepfusion predict`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "A network sees metres through the focal length it was trained at; depth is corrected for the input's. \
+    Without intrinsics the training camera's field of view is assumed, and the sidecar says so.\n\n\
+    Examples:\n  deepfusion predict --model runs/train-1 street.jpg --out depth\n  \
+    deepfusion predict --model runs/train-1 'drive/*.png' --save npy,ply --out depth"
+)]
+pub struct PredictArgs {
+    /// A run folder or a checkpoint in it.
+    #[arg(long, value_name = "RUN")]
+    pub model: PathBuf,
+    /// Images, folders of images, or globs.
+    #[arg(required = true, value_name = "INPUT")]
+    pub inputs: Vec<String>,
+    /// The camera, in pixels of the input images.
+    #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "calib")]
+    pub intrinsics: Option<CameraIntrinsics>,
+    /// A calibration file (KITTI's calib_cam_to_cam.txt).
+    #[arg(long, value_name = "FILE")]
+    pub calib: Option<PathBuf>,
+    /// What to write for every image.
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["depth-png", "color"])]
+    pub save: Vec<Save>,
+    /// Leave out points of the cloud beyond this depth, in metres.
+    #[arg(long, value_name = "M", default_value_t = 80.0, value_parser = positive)]
+    pub max_depth: f64,
+    /// Do not correct depth for another focal length than the one trained on.
+    #[arg(long)]
+    pub no_focal_correction: bool,
+    /// Stretch images of another aspect ratio instead of cropping them about the principal row.
+    #[arg(long)]
+    pub stretch: bool,
+    /// Folder to write.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Replace files that are there.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value_t)]
+    pub device: DeviceChoice,
+    /// Print the sidecars as a JSON array on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What `predict` writes for an image, beside the JSON sidecar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Save {
+    /// 16-bit PNG, metres × 256.
+    DepthPng,
+    /// H×W f32 metres, for NumPy.
+    Npy,
+    /// Depth in colours with a legend in metres.
+    Color,
+    /// The image and its depth in colours.
+    SideBySide,
+    /// Coloured point cloud in the camera's axes.
+    Ply,
+}
+
+/// `deepfusion weights …`.
+#[derive(Debug, Subcommand)]
+pub enum WeightsCommand {
+    /// Make a run of weights of torchvision's ResNet or of Monodepth2 (.pth, .safetensors).
+    #[command(
+        after_help = "Examples:\n  deepfusion weights import encoder.pth depth.pth pose_encoder.pth pose.pth --out runs/monodepth2\n  \
+        deepfusion weights import resnet18-5c106cde.pth --out runs/imagenet18"
+    )]
+    Import {
+        /// The files: one of a ResNet, or Monodepth2's encoder, depth, pose_encoder and pose.
+        #[arg(required = true, value_name = "FILE")]
+        files: Vec<PathBuf>,
+        /// Folder of the run to make.
+        #[arg(long, value_name = "RUN")]
+        out: PathBuf,
+    },
+    /// Which weights can be imported, what they give and under which terms.
+    List {
+        /// Print as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// `deepfusion bench`.
+#[derive(Debug, Args)]
+#[command(
+    group(ArgGroup::new("network").args(["model", "preset"])),
+    after_help = "Example:\n  deepfusion bench --preset light --size 640x192"
+)]
+pub struct BenchArgs {
+    /// A run folder or a checkpoint in it.
+    #[arg(long, value_name = "RUN")]
+    pub model: Option<PathBuf>,
+    /// A preset's network with random weights [default: tiny].
+    #[arg(long, value_enum)]
+    pub preset: Option<PresetChoice>,
+    /// Size of the network's input [default: the network's own].
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// How often each stage is measured.
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub repeats: usize,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value_t)]
+    pub device: DeviceChoice,
+    /// Print as JSON.
+    #[arg(long)]
+    pub json: bool,
+}

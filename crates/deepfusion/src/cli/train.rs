@@ -1,0 +1,95 @@
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use deepfusion_data::CameraChoice;
+
+use super::Size;
+
+/// `deepfusion train`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Learns from images and the car's speed alone. Writes config.toml, log.csv, TensorBoard events, the \
+    checkpoints last and best, and sample panels. A config file sets everything; options override it.\n\n\
+    Examples:\n  deepfusion train --data kitti/2011_09_26/2011_09_26_drive_0005_sync --preset tiny\n  \
+    deepfusion train --data kitti --preset light --epochs 20 --out runs/light\n  \
+    deepfusion train --out runs/light --resume"
+)]
+pub struct TrainArgs {
+    /// Recordings to train on: drive folders, date folders or KITTI roots.
+    #[arg(long, value_name = "PATH", num_args = 1.., required_unless_present = "resume")]
+    pub data: Vec<PathBuf>,
+    /// Settings to start from [default: tiny].
+    #[arg(long, value_enum)]
+    pub preset: Option<PresetChoice>,
+    /// Settings from a file, as written into every run as config.toml.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "preset")]
+    pub config: Option<PathBuf>,
+    /// Folder of the run [default: runs/train-<time>].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Continue the run in --out exactly where it stopped.
+    #[arg(long, requires = "out")]
+    pub resume: bool,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value_t)]
+    pub device: DeviceChoice,
+    /// Passes over the data.
+    #[arg(long, value_name = "N", conflicts_with = "steps")]
+    pub epochs: Option<usize>,
+    /// Optimiser steps, instead of epochs.
+    #[arg(long, value_name = "N")]
+    pub steps: Option<usize>,
+    /// Size of the network's input.
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Samples a step.
+    #[arg(long, value_name = "N")]
+    pub batch: Option<usize>,
+    /// Fixes everything that is random.
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// Which cameras.
+    #[arg(long, value_name = "2|3|both", default_value = "2")]
+    pub camera: CameraChoice,
+    /// Only the frames of this split file (lines "folder index side").
+    #[arg(long, value_name = "FILE")]
+    pub split: Option<PathBuf>,
+    /// Recordings to validate on [default: the last tenth of each drive].
+    #[arg(long, value_name = "PATH", num_args = 1..)]
+    pub val_data: Vec<PathBuf>,
+    /// Weights to start from: a run, a checkpoint, or a file from weights import.
+    #[arg(long, value_name = "WEIGHTS")]
+    pub init: Option<PathBuf>,
+    /// Terms of the loss to leave out.
+    #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = ["smoothness", "speed", "automask"])]
+    pub without: Vec<String>,
+}
+
+/// Settings to start from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PresetChoice {
+    /// ResNet-18 at half width, 320×96: useful on two cores in minutes.
+    Tiny,
+    /// ResNet-18, 640×192.
+    Light,
+    /// ResNet-50, 640×192, batch 12.
+    Resnet50,
+    /// Monodepth2's network and losses, with the speed term.
+    Monodepth2,
+}
+
+/// Where to compute.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum DeviceChoice {
+    /// This machine's processor.
+    #[default]
+    Cpu,
+    /// A GPU through Vulkan.
+    Vulkan,
+    /// A GPU through WebGPU.
+    Wgpu,
+    /// An NVIDIA GPU.
+    Cuda,
+    /// An Apple GPU.
+    Metal,
+}

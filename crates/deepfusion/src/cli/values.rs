@@ -1,0 +1,140 @@
+//! Values that are more than a word or a number.
+
+use std::str::FromStr;
+
+use deepfusion_eval::Scaling;
+
+/// Width and height in pixels, written `640x192`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size {
+    /// Width, in pixels.
+    pub width: u32,
+    /// Height, in pixels.
+    pub height: u32,
+}
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once(['x', 'X', '×']);
+        let number = |s: &str| s.trim().parse::<u32>().ok().filter(|n| *n > 0);
+        match parts.and_then(|(w, h)| number(w).zip(number(h))) {
+            Some((width, height)) => Ok(Self { width, height }),
+            None => Err("expected WIDTHxHEIGHT in pixels, such as 640x192".into()),
+        }
+    }
+}
+
+/// A camera's numbers as given on the command line, in pixels of the input image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraIntrinsics {
+    /// Focal length along x.
+    pub fx: f64,
+    /// Focal length along y.
+    pub fy: f64,
+    /// Principal point, x.
+    pub cx: f64,
+    /// Principal point, y.
+    pub cy: f64,
+}
+
+impl FromStr for CameraIntrinsics {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers: Vec<f64> = text
+            .split(',')
+            .filter_map(|s| s.trim().parse().ok())
+            .collect();
+        match numbers[..] {
+            [fx, fy, cx, cy]
+                if text.split(',').count() == 4
+                    && fx > 0.0
+                    && fy > 0.0
+                    && numbers.iter().all(|n| n.is_finite()) =>
+            {
+                Ok(Self { fx, fy, cx, cy })
+            }
+            _ => Err("expected fx,fy,cx,cy in pixels, such as 721.5,721.5,609.6,172.9".into()),
+        }
+    }
+}
+
+/// `none`, `median` or `fixed=F`.
+pub fn scaling(text: &str) -> Result<Scaling, String> {
+    match text {
+        "none" => Ok(Scaling::None),
+        "median" => Ok(Scaling::Median),
+        _ => text
+            .strip_prefix("fixed=")
+            .and_then(|factor| factor.parse().ok())
+            .filter(|factor: &f64| factor.is_finite() && *factor > 0.0)
+            .map(Scaling::Fixed)
+            .ok_or_else(|| {
+                "expected none, median or fixed=F with F above 0, such as fixed=5.4".into()
+            }),
+    }
+}
+
+/// A number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|n: &f64| n.is_finite() && *n > 0.0)
+        .ok_or_else(|| "expected a number above 0".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes() {
+        assert_eq!(
+            "640x192".parse(),
+            Ok(Size {
+                width: 640,
+                height: 192
+            })
+        );
+        for bad in ["640", "640x", "0x5", "axb", "640x192x3", "-1x5"] {
+            assert!(bad.parse::<Size>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn intrinsics() {
+        assert!(
+            "721.5,721.5,609.6,172.9"
+                .parse::<CameraIntrinsics>()
+                .is_ok()
+        );
+        for bad in [
+            "1,2,3",
+            "1,2,3,4,5",
+            "1,2,x,4,5",
+            "0,1,2,3",
+            "1,2,x,4",
+            "nan,1,2,3",
+        ] {
+            assert!(bad.parse::<CameraIntrinsics>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn scalings() {
+        assert_eq!(scaling("fixed=5.4"), Ok(Scaling::Fixed(5.4)));
+        assert_eq!(scaling("median"), Ok(Scaling::Median));
+        for bad in [
+            "fixed",
+            "fixed=",
+            "fixed=0",
+            "fixed=-1",
+            "fixed=nan",
+            "medium",
+        ] {
+            assert!(scaling(bad).is_err(), "{bad}");
+        }
+    }
+}

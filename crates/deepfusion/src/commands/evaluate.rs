@@ -1,0 +1,159 @@
+//! Evaluation shared by `eval`, `demo` and training reports.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use deepfusion_data::{CameraChoice, Dataset, GtKind, OpenOptions, Split, ground_truth_names};
+use deepfusion_eval::{
+    ArraySet, Evaluator, Grid, Prediction, Protocol, Report, Sample, TrivialBaseline,
+};
+
+/// Opens the recordings at several paths, each drive and camera a data set.
+pub fn open_datasets(
+    paths: &[PathBuf],
+    split: Option<&Path>,
+    camera: CameraChoice,
+) -> Result<Vec<Dataset>> {
+    let options = OpenOptions {
+        camera,
+        split: split.map(Split::read).transpose()?,
+    };
+    let mut datasets = Vec::new();
+    for path in paths {
+        datasets.extend(Dataset::open(path, &options)?);
+    }
+    Ok(datasets)
+}
+
+/// Where the truth comes from.
+pub enum Truth {
+    /// The recordings' scans.
+    Scans(GtKind),
+    /// A file of arrays that are named as `data export-gt` names them.
+    Arrays(Box<ArraySet>),
+}
+
+/// The trivial row's scans: all of the given (training) recordings'.
+pub fn trivial_from_datasets(datasets: &[Dataset], kind: GtKind) -> Result<TrivialBaseline> {
+    let mut baseline = TrivialBaseline::new();
+    for dataset in datasets {
+        for &frame in dataset.selected() {
+            if let Some(depth) = dataset.ground_truth(frame, kind)? {
+                baseline.add_scan(&Grid::from(&depth));
+            }
+        }
+    }
+    Ok(baseline)
+}
+
+/// The trivial row's scans, from an array file.
+pub fn trivial_from_arrays(path: &Path) -> Result<TrivialBaseline> {
+    let mut scans = ArraySet::open(path)?;
+    let mut baseline = TrivialBaseline::new();
+    for index in 0..scans.len() {
+        baseline.add_scan(&scans.read(index)?);
+    }
+    Ok(baseline)
+}
+
+/// Evaluates a method and, beside it, the trivial baseline on the same images.
+pub struct Comparison {
+    method: Evaluator,
+    trivial: Option<(Evaluator, TrivialBaseline)>,
+}
+
+impl Comparison {
+    /// Without any image yet; a baseline without scans gives no trivial row.
+    pub fn new(protocol: &Protocol, baseline: Option<TrivialBaseline>) -> Result<Self> {
+        let baseline = baseline.filter(|b| b.scans() > 0);
+        Ok(Self {
+            method: Evaluator::new(protocol.clone())?,
+            trivial: match baseline {
+                Some(baseline) => Some((Evaluator::new(protocol.clone())?, baseline)),
+                None => None,
+            },
+        })
+    }
+
+    /// Compares one image.
+    pub fn add(&mut self, image: &Sample<'_>) -> Result<()> {
+        self.method.add_sample(image)?;
+        if let Some((evaluator, baseline)) = &mut self.trivial {
+            // A baseline of this one scan alone has nothing else to say than "80 m": that is its score.
+            let depth = baseline.depth_for(Some(image.ground_truth))?;
+            evaluator.add(image.name, &Prediction::Depth(depth), image.ground_truth)?;
+        }
+        Ok(())
+    }
+
+    /// The method's report with the trivial row.
+    pub fn report(&self) -> Result<Report> {
+        let report = self.method.report()?;
+        Ok(match &self.trivial {
+            Some((evaluator, _)) => report.with_trivial(&evaluator.report()?),
+            None => report,
+        })
+    }
+}
+
+/// Evaluates `predict` (data set, frame, its image's prediction) on every selected frame that has ground truth.
+pub fn evaluate_datasets(
+    datasets: &[Dataset],
+    mut truth: Truth,
+    protocol: &Protocol,
+    baseline: Option<TrivialBaseline>,
+    predict: &mut dyn FnMut(&Dataset, usize) -> Result<Prediction>,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Report> {
+    let mut comparison = Comparison::new(protocol, baseline)?;
+    let names = ground_truth_names(datasets);
+    let total = names.iter().map(Vec::len).sum();
+    let places = match &truth {
+        Truth::Scans(_) => HashMap::new(),
+        Truth::Arrays(arrays) => array_places(arrays, &names),
+    };
+    let mut done = 0;
+    for (dataset, names) in datasets.iter().zip(&names) {
+        for (&frame, name) in dataset.selected().iter().zip(names) {
+            let known = match &mut truth {
+                Truth::Scans(kind) => dataset
+                    .ground_truth(frame, *kind)?
+                    .map(|depth| Grid::from(&depth)),
+                Truth::Arrays(arrays) => places
+                    .get(name)
+                    .map(|place| arrays.read(*place))
+                    .transpose()?,
+            };
+            if let Some(ground_truth) = known {
+                let prediction = predict(dataset, frame)?;
+                let k = dataset.intrinsics(frame);
+                let same_size = (k.width as usize, k.height as usize)
+                    == (ground_truth.width(), ground_truth.height());
+                comparison.add(&Sample {
+                    name,
+                    prediction: &prediction,
+                    ground_truth: &ground_truth,
+                    moving: None,
+                    intrinsics: same_size.then_some(&k),
+                })?;
+            }
+            done += 1;
+            progress(done, total);
+        }
+    }
+    comparison.report()
+}
+
+/// Frame names to places in the file: by name, or, for a stack without names, in the frames' order.
+fn array_places(arrays: &ArraySet, frames: &[Vec<String>]) -> HashMap<String, usize> {
+    match arrays.names() {
+        Some(names) => names.iter().cloned().zip(0..).collect(),
+        None => frames
+            .iter()
+            .flatten()
+            .cloned()
+            .zip(0..arrays.len())
+            .collect(),
+    }
+}

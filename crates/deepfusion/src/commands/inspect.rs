@@ -1,0 +1,63 @@
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use deepfusion_data::{
+    Dataset, GtKind, OpenOptions, ground_truth_names, inspect, overlay, save_png,
+};
+
+use crate::cli::InspectArgs;
+use crate::output;
+use crate::progress::{Progress, say};
+
+/// `deepfusion data inspect`.
+pub fn run(args: &InspectArgs) -> Result<()> {
+    let inspection = inspect(&args.path)?;
+    if args.json {
+        output::print_json(&inspection)?;
+    } else {
+        output::print(&inspection.to_string())?;
+    }
+    if args.overlay {
+        let folder = output::run_folder(args.out.as_deref(), "inspect")?;
+        let pictures = write_overlays(&args.path, &folder)?;
+        say(&format!("{pictures} pictures in {}", folder.display()));
+    }
+    Ok(())
+}
+
+/// A picture for every frame with a scan; how many.
+fn write_overlays(path: &Path, folder: &Path) -> Result<usize> {
+    let datasets = Dataset::open(path, &OpenOptions::default())?;
+    let names = ground_truth_names(&datasets);
+    let total = names.iter().map(Vec::len).sum();
+    let (mut done, mut written) = (0, 0);
+    let mut progress = Progress::new("drawing");
+    for (dataset, names) in datasets.iter().zip(&names) {
+        for (&frame, name) in dataset.selected().iter().zip(names) {
+            if let Some(depth) = dataset.ground_truth(frame, GtKind::Z)? {
+                let picture = overlay(&dataset.load_image(frame)?, &depth)?;
+                save_png(&picture, &picture_path(folder, name)?)?;
+                written += 1;
+            }
+            done += 1;
+            progress.set(done, total);
+        }
+    }
+    if written == 0 {
+        return Err(deepfusion_data::Error::NoScans {
+            path: path.to_owned(),
+            frames: total,
+        }
+        .into());
+    }
+    Ok(written)
+}
+
+/// `<folder>/<name>.png`, where the name may hold the drive's folder.
+fn picture_path(folder: &Path, name: &str) -> Result<PathBuf> {
+    let path = folder.join(format!("{name}.png"));
+    if let Some(parent) = path.parent() {
+        std::fs::create_dir_all(parent).map_err(|e| deepfusion_data::Error::file(parent, e))?;
+    }
+    Ok(path)
+}

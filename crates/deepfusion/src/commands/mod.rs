@@ -1,0 +1,38 @@
+//! What each command does, one file a command.
+
+mod bench;
+mod demo;
+mod device;
+mod eval;
+mod evaluate;
+mod export_gt;
+mod inspect;
+mod overview;
+mod predict;
+mod recorder;
+mod simulate;
+mod train;
+mod weights;
+
+use anyhow::Result;
+
+use crate::cli::{Command, DataCommand, WeightsCommand};
+
+/// Runs what was asked for.
+pub fn run(command: Option<Command>) -> Result<()> {
+    let Some(command) = command else {
+        return overview::run();
+    };
+    match command {
+        Command::Demo(args) => demo::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Data(DataCommand::Inspect(args)) => inspect::run(&args),
+        Command::Data(DataCommand::ExportGt(args)) => export_gt::run(&args),
+        Command::Train(args) => train::run(&args),
+        Command::Eval(args) => eval::run(&args),
+        Command::Predict(args) => predict::run(&args),
+        Command::Weights(WeightsCommand::Import { files, out }) => weights::import(&files, &out),
+        Command::Weights(WeightsCommand::List { json }) => weights::list(json),
+        Command::Bench(args) => bench::run(&args),
+    }
+}

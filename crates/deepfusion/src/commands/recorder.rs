@@ -1,0 +1,251 @@
+//! What becomes of a trainer's events: log files, panels, and lines for the person who waits.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use deepfusion_render::sample_panel;
+use deepfusion_train::log::{CsvLog, TensorBoardLog};
+use deepfusion_train::{Control, TrainEvent};
+
+use crate::progress::{Progress, say};
+
+/// How often a line tells of the losses where there is no bar.
+const LINE_EVERY: Duration = Duration::from_secs(20);
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// From now on Ctrl-C asks training to save and stop; a second one ends the program at once.
+pub fn catch_interrupt() {
+    static SET: OnceLock<()> = OnceLock::new();
+    SET.get_or_init(|| {
+        let caught = ctrlc::set_handler(|| {
+            if INTERRUPTED.swap(true, Ordering::SeqCst) {
+                std::process::exit(130);
+            }
+            eprintln!("stopping after this step; the run is saved (Ctrl-C again: at once)");
+        });
+        if let Err(error) = caught {
+            tracing::warn!("Ctrl-C will end the program without saving: {error}");
+        }
+    });
+}
+
+/// Writes the logs of a run and shows its progress.
+pub struct Recorder {
+    csv: CsvLog,
+    events: TensorBoardLog,
+    panels: PathBuf,
+    progress: Progress,
+    last_line: Instant,
+    /// Step and photometric loss, training and validation.
+    pub curves: Curves,
+    /// The first failure to write a log: training goes on, the command ends with it.
+    failure: Option<anyhow::Error>,
+}
+
+/// Points of the report's charts.
+#[derive(Debug, Clone, Default)]
+pub struct Curves {
+    /// Reprojection loss of the batches, averaged over a few steps.
+    pub train: Vec<(f64, f64)>,
+    /// Reprojection loss of the held-out samples.
+    pub validation: Vec<(f64, f64)>,
+    /// Displacement by speed over displacement by PoseNet.
+    pub scale: Vec<(f64, f64)>,
+    sum: (f64, f64),
+}
+
+/// Steps that a point of the training curve averages.
+const STEPS_A_POINT: f64 = 10.0;
+
+impl Recorder {
+    /// For the run in `folder`, going on after `step`.
+    pub fn open(folder: &Path, step: usize) -> Result<Self> {
+        let panels = folder.join("panels");
+        std::fs::create_dir_all(&panels)
+            .with_context(|| format!("{}: cannot be made", panels.display()))?;
+        Ok(Self {
+            csv: CsvLog::open(&folder.join("log.csv"), step)?,
+            events: TensorBoardLog::create(folder)?,
+            panels,
+            progress: Progress::new("training"),
+            last_line: Instant::now(),
+            curves: Curves::default(),
+            failure: None,
+        })
+    }
+
+    /// Handles an event.
+    pub fn handle(&mut self, event: TrainEvent) -> Control {
+        if let Err(error) = self.record(event) {
+            // A full disk: what is saved is safe, more would be lost.
+            self.failure.get_or_insert(error);
+            return Control::Stop;
+        }
+        if INTERRUPTED.load(Ordering::SeqCst) {
+            Control::Stop
+        } else {
+            Control::Continue
+        }
+    }
+
+    /// The curves, or the first failure to write.
+    pub fn finish(self) -> Result<Curves> {
+        match self.failure {
+            Some(error) => Err(error),
+            None => Ok(self.curves),
+        }
+    }
+
+    fn record(&mut self, event: TrainEvent) -> Result<()> {
+        match event {
+            TrainEvent::Started {
+                from_step,
+                steps,
+                samples,
+                validation_samples,
+                mean_displacement_m,
+            } => {
+                let going_on = if from_step > 0 {
+                    format!(", going on after step {from_step}")
+                } else {
+                    String::new()
+                };
+                say(&format!(
+                    "{samples} training samples, {validation_samples} held out, mean displacement \
+                     {mean_displacement_m:.3} m; {steps} steps{going_on}"
+                ));
+            }
+            TrainEvent::Step {
+                step,
+                steps,
+                losses,
+                learning_rate,
+                images_per_second,
+                remaining_s,
+                scale_ratio,
+                gradient_norm,
+            } => {
+                self.csv.write(
+                    step,
+                    "train",
+                    &losses,
+                    learning_rate,
+                    scale_ratio,
+                    images_per_second,
+                )?;
+                let mut scalars: Vec<_> = losses.named().to_vec();
+                scalars.push(("learning_rate", learning_rate));
+                scalars.push(("scale_ratio", scale_ratio));
+                scalars.push(("gradient_norm", gradient_norm));
+                let tagged: Vec<_> = scalars
+                    .iter()
+                    .map(|(n, v)| (format!("train/{n}"), *v))
+                    .collect();
+                let tagged: Vec<_> = tagged.iter().map(|(n, v)| (n.as_str(), *v)).collect();
+                self.events.scalars(step, &tagged)?;
+                self.curves.add(step, losses.reprojection, scale_ratio);
+                let line = format!(
+                    "loss {:.4} (reprojection {:.4}, smoothness {:.4}, speed {:.3} m), scale ratio \
+                     {scale_ratio:.3}, {images_per_second:.1} images/s, {} left",
+                    losses.total,
+                    losses.reprojection,
+                    losses.smoothness,
+                    losses.speed,
+                    clock(remaining_s)
+                );
+                self.progress.note(&line);
+                self.progress.set(step, steps);
+                if !self.progress.is_bar()
+                    && (step <= 1 || step == steps || self.last_line.elapsed() > LINE_EVERY)
+                {
+                    self.last_line = Instant::now();
+                    say(&format!("step {step}/{steps}: {line}"));
+                }
+            }
+            TrainEvent::Validated {
+                step,
+                losses,
+                scale_ratio,
+                best,
+            } => {
+                self.csv
+                    .write(step, "validation", &losses, 0.0, scale_ratio, 0.0)?;
+                let named = losses.named();
+                let tagged: Vec<_> = named
+                    .iter()
+                    .map(|(n, v)| (format!("validation/{n}"), *v))
+                    .collect();
+                let tagged: Vec<_> = tagged.iter().map(|(n, v)| (n.as_str(), *v)).collect();
+                self.events.scalars(step, &tagged)?;
+                self.curves
+                    .validation
+                    .push((step as f64, losses.reprojection));
+                say(&format!(
+                    "step {step}: held-out loss {:.4} (reprojection {:.4}, speed {:.3} m), scale ratio {scale_ratio:.3}{}",
+                    losses.total,
+                    losses.reprojection,
+                    losses.speed,
+                    if best { ", the best so far" } else { "" }
+                ));
+            }
+            TrainEvent::Panel { step, panel } => {
+                let picture = sample_panel(&deepfusion_render::SamplePanel {
+                    width: panel.width as u32,
+                    height: panel.height as u32,
+                    image: &panel.image,
+                    disparity: &panel.disparity,
+                    warped: &panel.warped,
+                    error: &panel.error,
+                    mask: &panel.mask,
+                })?;
+                deepfusion_data::save_png(&picture, &self.panels.join(format!("{step:06}.png")))?;
+            }
+            TrainEvent::Saved { .. } => {}
+            TrainEvent::Warning { step, message } => {
+                tracing::warn!("step {step}: {message}");
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Curves {
+    fn add(&mut self, step: usize, reprojection: f64, scale_ratio: f64) {
+        self.sum.0 += reprojection;
+        self.sum.1 += 1.0;
+        if self.sum.1 >= STEPS_A_POINT {
+            self.train.push((step as f64, self.sum.0 / self.sum.1));
+            self.scale.push((step as f64, scale_ratio));
+            self.sum = (0.0, 0.0);
+        }
+    }
+}
+
+/// Seconds as minutes and seconds, or hours and minutes.
+pub fn clock(seconds: f64) -> String {
+    if !seconds.is_finite() {
+        return "?".into();
+    }
+    let s = seconds.max(0.0).round() as u64;
+    if s >= 3600 {
+        format!("{} h {:02} min", s / 3600, s / 60 % 60)
+    } else {
+        format!("{}:{:02} min", s / 60, s % 60)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_read_well() {
+        assert_eq!(clock(75.4), "1:15 min");
+        assert_eq!(clock(7_320.0), "2 h 02 min");
+        assert_eq!(clock(f64::NAN), "?");
+    }
+}

@@ -1,0 +1,117 @@
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use burn::tensor::Device;
+use deepfusion_nn::weights::{Monodepth2Files, detect_resnet, load_monodepth2, read};
+use deepfusion_nn::{DepthNetConfig, PoseNetConfig, weights::load_torchvision_resnet};
+use deepfusion_train::{Checkpoint, CheckpointKind, Model, Preset, RunFolder, TrainConfig};
+
+use crate::output;
+use crate::progress::say;
+
+/// `deepfusion weights import`.
+pub fn import(files: &[PathBuf], out: &Path) -> Result<()> {
+    let device = Device::flex();
+    let (config, model) = match files {
+        [file] if !file.is_dir() => from_resnet(file, &device)?,
+        [folder] => from_monodepth2(&Monodepth2Files::in_folder(folder), &device)?,
+        files => from_monodepth2(&named(files), &device)?,
+    };
+    let folder = RunFolder::create(&output::run_folder(Some(out), "weights")?)?;
+    folder.write_config(&config)?;
+    let state = Checkpoint {
+        step: 0,
+        best_validation: None,
+        skipped: 0,
+    };
+    let path = folder.save(CheckpointKind::Last, &model, None, &state)?;
+    say("imported; the scale of imported weights is not metric until they are trained with speeds");
+    output::print(&format!("{}\n", path.display()))
+}
+
+/// Monodepth2's files among those given, by their names.
+fn named(files: &[PathBuf]) -> Monodepth2Files {
+    let find = |name: &str| {
+        let is = |p: &&PathBuf| p.file_stem().is_some_and(|stem| stem == name);
+        files.iter().find(is).cloned()
+    };
+    Monodepth2Files {
+        encoder: find("encoder").unwrap_or_else(|| PathBuf::from("encoder.pth")),
+        depth: find("depth").unwrap_or_else(|| PathBuf::from("depth.pth")),
+        pose: find("pose_encoder").zip(find("pose")),
+    }
+}
+
+fn from_monodepth2(files: &Monodepth2Files, device: &Device) -> Result<(TrainConfig, Model)> {
+    let imported = load_monodepth2(files, device)?;
+    let mut config = Preset::Monodepth2.config();
+    config.depth_net = imported.depth_config;
+    if let Some(size) = imported.input_size {
+        config.size = size;
+    }
+    let pose_net = match imported.pose {
+        Some((pose_config, pose_net)) => {
+            config.pose_net = pose_config;
+            pose_net
+        }
+        None => {
+            config.pose_net = PoseNetConfig::monodepth2(config.depth_net.encoder.depth);
+            config.pose_net.init(device)?
+        }
+    };
+    let model = Model::with_networks(&config, imported.depth_net, pose_net, device);
+    Ok((config, model))
+}
+
+fn from_resnet(file: &Path, device: &Device) -> Result<(TrainConfig, Model)> {
+    let depth = detect_resnet(&read(file)?)?;
+    let mut config = Preset::Light.config();
+    config.depth_net = DepthNetConfig::new(depth);
+    config.pose_net = PoseNetConfig::new(depth);
+    let mut depth_net = config.depth_net.init(device)?;
+    let mut pose_net = config.pose_net.init(device)?;
+    depth_net.encoder = load_torchvision_resnet(depth_net.encoder, file)?;
+    pose_net.encoder = load_torchvision_resnet(pose_net.encoder, file)?;
+    let model = Model::with_networks(&config, depth_net, pose_net, device);
+    Ok((config, model))
+}
+
+/// What can be imported: name, files, what it gives, terms.
+const KNOWN: [[&str; 4]; 3] = [
+    [
+        "torchvision ResNet-18, 34, 50, 101",
+        "resnet*.pth or .safetensors",
+        "encoders of both networks, trained on ImageNet",
+        "BSD-3-Clause (torchvision); ImageNet's own terms for the data",
+    ],
+    [
+        "Monodepth2",
+        "encoder.pth, depth.pth, pose_encoder.pth, pose.pth",
+        "the whole networks; depth up to an unknown factor",
+        "non-commercial (Niantic)",
+    ],
+    [
+        "a run of this program",
+        "its folder, last.safetensors or best.safetensors",
+        "with --init: training starts from its networks",
+        "yours",
+    ],
+];
+
+/// `deepfusion weights list`.
+pub fn list(json: bool) -> Result<()> {
+    if json {
+        let rows: Vec<_> = KNOWN
+            .iter()
+            .map(|[name, files, gives, terms]| {
+                serde_json::json!({"name": name, "files": files, "gives": gives, "terms": terms})
+            })
+            .collect();
+        return output::print_json(&rows);
+    }
+    let mut text = String::new();
+    for [name, files, gives, terms] in KNOWN {
+        text += &format!("{name}\n  files  {files}\n  gives  {gives}\n  terms  {terms}\n");
+    }
+    output::print(&text)
+}

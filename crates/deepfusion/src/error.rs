@@ -1,0 +1,97 @@
+//! How failures are told: `error: …`, what caused it, `hint: …`.
+
+use std::process::ExitCode;
+
+use anstyle::{AnsiColor, Style};
+
+/// Failures that only the command line knows.
+#[derive(Debug, thiserror::Error)]
+pub enum CliError {
+    /// Something that would be overwritten.
+    #[error("{}: is there already", path.display())]
+    Exists {
+        /// The file or folder.
+        path: std::path::PathBuf,
+        /// The option that allows it, or what else to do.
+        remedy: &'static str,
+    },
+    /// A device whose backend was not compiled in.
+    #[error("this build has no `{device}` backend")]
+    NoBackend {
+        /// The device's name.
+        device: &'static str,
+    },
+    /// A folder or pattern without images.
+    #[error("{input}: no image (.png, .jpg, .jpeg) there")]
+    NoImages {
+        /// What was given.
+        input: String,
+    },
+    /// Intrinsics that cannot be the image's.
+    #[error("the intrinsics do not fit the image: {why}")]
+    Camera {
+        /// Why.
+        why: String,
+    },
+    /// A cloud without a camera.
+    #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
+    NoCamera,
+}
+
+impl CliError {
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::Exists { remedy, .. } => Some((*remedy).to_owned()),
+            Self::NoBackend { device } => Some(format!(
+                "build it with `cargo build --release --features {device}`, or use --device cpu"
+            )),
+            Self::NoImages { .. } => None,
+            Self::Camera { .. } => {
+                Some("give fx,fy,cx,cy in pixels of the input image, at its own size".into())
+            }
+            Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
+        }
+    }
+}
+
+/// Prints a failure on stderr; the exit code is 1.
+pub fn report(problem: &anyhow::Error) -> ExitCode {
+    const ERROR: Style = AnsiColor::Red.on_default().bold();
+    const HINT: Style = AnsiColor::Cyan.on_default().bold();
+    let mut told = problem.to_string();
+    anstream::eprintln!("{ERROR}error:{ERROR:#} {told}");
+    for cause in problem.chain().skip(1) {
+        let cause = cause.to_string();
+        // Many messages already hold their cause's.
+        if !told.contains(&cause) {
+            anstream::eprintln!("  because: {cause}");
+            told = cause;
+        }
+    }
+    if let Some(hint) = hint_of(problem) {
+        anstream::eprintln!("{HINT}hint:{HINT:#} {hint}");
+    }
+    ExitCode::FAILURE
+}
+
+/// The first remedy that an error of the chain knows.
+fn hint_of(problem: &anyhow::Error) -> Option<String> {
+    problem.chain().find_map(|cause| {
+        macro_rules! hint_from {
+            ($($error:ty),* $(,)?) => {
+                $(if let Some(error) = cause.downcast_ref::<$error>() { return error.hint(); })*
+            };
+        }
+        hint_from!(
+            CliError,
+            deepfusion_cloud::Error,
+            deepfusion_data::Error,
+            deepfusion_eval::Error,
+            deepfusion_train::Error,
+            deepfusion_nn::Error,
+            deepfusion_render::Error,
+            deepfusion_sim::Error,
+        );
+        None
+    })
+}

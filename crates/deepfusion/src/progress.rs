@@ -1,0 +1,94 @@
+//! Progress on stderr: a bar on a terminal, a line now and then elsewhere.
+
+use std::io::IsTerminal;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Elsewhere than on a terminal, lines come no more often than this.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// Turns all progress off (`--quiet`).
+pub fn set_quiet(quiet: bool) {
+    QUIET.store(quiet, Ordering::Relaxed);
+}
+
+/// A line of information on stderr, unless quiet.
+pub fn say(text: &str) {
+    if !QUIET.load(Ordering::Relaxed) {
+        eprintln!("{text}");
+    }
+}
+
+/// Progress of one piece of work.
+pub struct Progress {
+    what: String,
+    bar: Option<ProgressBar>,
+    last_line: Instant,
+    /// Short work needs no line: only what had one gets a last one.
+    told: bool,
+    quiet: bool,
+}
+
+impl Progress {
+    /// Begins; `what` is told beside the numbers.
+    pub fn new(what: &str) -> Self {
+        let quiet = QUIET.load(Ordering::Relaxed);
+        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
+            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+            // The template is a constant: were it wrong, the default style would do.
+            if let Ok(style) =
+                ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len}, {eta} left")
+            {
+                bar.set_style(style.progress_chars("=> "));
+            }
+            bar.set_message(what.to_owned());
+            bar
+        });
+        Self {
+            what: what.to_owned(),
+            bar,
+            last_line: Instant::now(),
+            told: false,
+            quiet,
+        }
+    }
+
+    /// Whether a bar is shown (else lines).
+    pub fn is_bar(&self) -> bool {
+        self.bar.is_some()
+    }
+
+    /// Words beside the bar; nothing where there is none.
+    pub fn note(&self, text: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(text.to_owned());
+        }
+    }
+
+    /// `done` of `total` are done.
+    pub fn set(&mut self, done: usize, total: usize) {
+        if let Some(bar) = &self.bar {
+            bar.set_length(total as u64);
+            bar.set_position(done as u64);
+        } else if !self.quiet
+            && (self.last_line.elapsed() >= LINE_EVERY || (self.told && done == total))
+        {
+            self.last_line = Instant::now();
+            self.told = true;
+            eprintln!("{}: {done}/{total}", self.what);
+        }
+    }
+}
+
+impl Drop for Progress {
+    /// The bar goes away with the work; what was achieved is said by the command.
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! From a simulated drive to numbers, through the program alone.
+
+mod support;
+
+use std::path::Path;
+
+use deepfusion_data::{Dataset, GtKind, OpenOptions};
+use ndarray::{Array2, Array3};
+use ndarray_npy::{NpzReader, NpzWriter, write_npy};
+use serde_json::Value;
+use support::{Run, in_folder};
+
+fn ok(folder: &Path, args: &str) -> Run {
+    let run = in_folder(folder, &args.split_whitespace().collect::<Vec<_>>());
+    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
+    run
+}
+
+fn json(folder: &Path, args: &str) -> Value {
+    serde_json::from_str(&ok(folder, args).stdout).unwrap()
+}
+
+/// Reads an .npz, changes every array, writes it under another name.
+fn derive(folder: &Path, from: &str, to: &str, change: impl Fn(&Array2<f32>) -> Array2<f32>) {
+    let mut reader = NpzReader::new(std::fs::File::open(folder.join(from)).unwrap()).unwrap();
+    let mut writer = NpzWriter::new(std::fs::File::create(folder.join(to)).unwrap());
+    for name in reader.names().unwrap() {
+        let array: Array2<f32> = reader.by_name(&name).unwrap();
+        writer.add_array(name, &change(&array)).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn a_simulated_drive_is_inspected_exported_and_scored() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let made = json(
+        at,
+        "simulate --out sim --frames 4 --seed 3 --size 160x48 --scan-every 2 --json",
+    );
+    let drive = made["drive"].as_str().unwrap().to_owned();
+    assert_eq!(made["frames"], 4);
+
+    let inspection = json(at, "data inspect sim --json");
+    assert_eq!(
+        (&inspection["frames"], &inspection["kind"]),
+        (&4.into(), &"kitti_raw".into())
+    );
+    assert_eq!(inspection["size"], serde_json::json!([160, 48]));
+    assert!(inspection["speed_mps"]["mean"].as_f64().unwrap() > 0.5);
+    ok(
+        at,
+        &format!("data inspect {drive} --overlay --out overlays"),
+    );
+    let pictures = std::fs::read_dir(at.join("overlays")).unwrap().count();
+    assert_eq!(pictures, 2, "frames 0 and 2 have scans");
+    assert_eq!(
+        ok(at, "data inspect sim").stdout.lines().next().unwrap(),
+        "KITTI raw, 4 frames of 160x48"
+    );
+
+    ok(at, "data export-gt sim --out gt.npz");
+    let dataset = Dataset::open(&at.join("sim"), &OpenOptions::default())
+        .unwrap()
+        .remove(0);
+    let depth = dataset.ground_truth(2, GtKind::Z).unwrap().unwrap();
+    let exported: Array2<f32> = NpzReader::new(std::fs::File::open(at.join("gt.npz")).unwrap())
+        .unwrap()
+        .by_name("0000000002")
+        .unwrap();
+    assert_eq!(exported.iter().copied().collect::<Vec<_>>(), depth.data);
+
+    // The truth, filled where it has none, 10 % too far: known numbers.
+    derive(at, "gt.npz", "far.npz", |a| {
+        a.mapv(|d| if d > 0.0 { 1.1 * d } else { 30.0 })
+    });
+    derive(at, "far.npz", "disparity.npz", |a| a.mapv(|d| 1.0 / d));
+    let report = json(
+        at,
+        "eval --pred far.npz --pred-kind depth --gt gt.npz --cap 70 --trivial gt.npz --json",
+    );
+    assert_eq!(report["n"], 2);
+    assert!((report["unscaled"]["abs_rel"].as_f64().unwrap() - 0.1).abs() < 2e-3);
+    assert!((report["scale"]["median"].as_f64().unwrap() - 1.0 / 1.1).abs() < 1e-6);
+    assert!(report["median_scaled"]["abs_rel"].as_f64().unwrap() < 1e-6);
+    assert!(
+        report["trivial"]["unscaled"]["abs_rel"].as_f64().unwrap() > 0.1,
+        "never the image's own scan"
+    );
+    let other = json(
+        at,
+        "eval --pred disparity.npz --pred-kind disparity --gt gt.npz --cap 70 --json",
+    );
+    assert!(
+        (other["unscaled"]["abs_rel"].as_f64().unwrap()
+            - report["unscaled"]["abs_rel"].as_f64().unwrap())
+        .abs()
+            < 1e-6
+    );
+
+    let table = ok(
+        at,
+        "eval --pred far.npz --pred-kind depth --gt gt.npz --trivial gt.npz --scale fixed=0.9 --points 50",
+    );
+    for row in [
+        "unscaled",
+        "median-scaled",
+        "scaled by 0.9",
+        "trivial",
+        "points  50 drawn",
+    ] {
+        assert!(table.stdout.contains(row), "{row}: {}", table.stdout);
+    }
+
+    write_npy(
+        at.join("stack.npy"),
+        &Array3::<f32>::from_elem((2, 10, 20), 12.0),
+    )
+    .unwrap();
+    assert_eq!(
+        json(
+            at,
+            "eval --pred stack.npy --pred-kind depth --gt gt.npz --json"
+        )["n"],
+        2
+    );
+}
+
+#[test]
+fn bad_arrays_end_in_an_error_with_the_array_and_a_hint() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut writer = NpzWriter::new(std::fs::File::create(at.join("gt.npz")).unwrap());
+    writer
+        .add_array("0000000005", &Array2::<f32>::from_elem((4, 6), 10.0))
+        .unwrap();
+    writer.finish().unwrap();
+    derive(at, "gt.npz", "nan.npz", |a| a.mapv(|_| f32::NAN));
+    derive(at, "gt.npz", "none.npz", |a| a.mapv(|_| 0.0));
+    for (args, expected) in [
+        (
+            "eval --pred gt.npz --pred-kind depth --gt gt.npz --cap 1 --min 2",
+            "above the minimum depth",
+        ),
+        (
+            "eval --pred nan.npz --pred-kind depth --gt gt.npz",
+            "`0000000005`",
+        ),
+        (
+            "eval --pred gt.npz --pred-kind depth --gt none.npz",
+            "0000000005",
+        ),
+    ] {
+        let run = in_folder(at, &args.split_whitespace().collect::<Vec<_>>());
+        assert_eq!((run.code, run.stdout.as_str()), (1, ""));
+        assert!(
+            run.stderr.contains(expected) && run.stderr.contains("hint: "),
+            "{}",
+            run.stderr
+        );
+    }
+}

@@ -1,0 +1,158 @@
+//! The texts people meet: help and errors, as they come out of the program.
+
+mod support;
+
+use support::{deepfusion, in_folder};
+
+#[test]
+fn help_texts() {
+    for command in [
+        "",
+        "demo",
+        "simulate",
+        "data",
+        "data inspect",
+        "data export-gt",
+        "train",
+        "eval",
+        "predict",
+        "weights",
+        "weights import",
+        "weights list",
+        "bench",
+    ] {
+        let args: Vec<&str> = command.split_whitespace().chain(["--help"]).collect();
+        let run = deepfusion(&args);
+        assert_eq!((run.code, run.stderr.as_str()), (0, ""), "{command}");
+        let name = format!("help {command}").trim().replace([' ', '-'], "_");
+        insta::assert_snapshot!(name, run.stdout);
+    }
+}
+
+#[test]
+fn alone_it_says_what_it_can_do() {
+    let run = deepfusion(&[]);
+    assert_eq!((run.code, run.stderr.as_str()), (0, ""));
+    insta::assert_snapshot!(run.stdout);
+}
+
+#[test]
+fn wrong_arguments_end_with_2_and_suggest_the_near_one() {
+    for (args, expected) in [
+        (&["traim"][..], "'train'"),
+        (&["simulate", "--out", "x", "--scene", "urbna"], "'urban'"),
+        (
+            &["simulate", "--out", "x", "--size", "640"],
+            "such as 640x192",
+        ),
+        (
+            &[
+                "eval",
+                "--pred",
+                "p.npz",
+                "--pred-kind",
+                "depht",
+                "--gt",
+                "g.npz",
+            ],
+            "'depth'",
+        ),
+        (&["eval", "--pred", "p.npz", "--gt", "g.npz"], "--pred-kind"),
+        (&["eval", "--pred", "p.npz", "--pred-kind", "depth"], "--gt"),
+        (&["eval"], "--model <RUN>|--pred <FILE>"),
+        (
+            &[
+                "eval",
+                "--pred",
+                "p",
+                "--pred-kind",
+                "depth",
+                "--gt",
+                "g",
+                "--scale",
+                "fixed=x",
+            ],
+            "fixed=5.4",
+        ),
+        (
+            &[
+                "eval",
+                "--pred",
+                "p",
+                "--pred-kind",
+                "depth",
+                "--gt",
+                "g",
+                "--cap",
+                "0",
+            ],
+            "above 0",
+        ),
+        (&["train", "--data", "d", "--without", "sped"], "'speed'"),
+        (&["train", "--data", "d", "--preset", "tinny"], "'tiny'"),
+        (&["train"], "--data <PATH>"),
+        (
+            &["data", "export-gt", "d", "--out", "x.npz", "--camera", "4"],
+            "2, 3 or both",
+        ),
+        (
+            &[
+                "predict",
+                "--model",
+                "m",
+                "i.png",
+                "--out",
+                "o",
+                "--intrinsics",
+                "1,2,3",
+            ],
+            "fx,fy,cx,cy",
+        ),
+        (
+            &[
+                "predict", "--model", "m", "i.png", "--out", "o", "--save", "plyy",
+            ],
+            "'ply'",
+        ),
+    ] {
+        let run = deepfusion(args);
+        assert_eq!(run.code, 2, "{args:?}: {}", run.stderr);
+        assert!(run.stderr.contains(expected), "{args:?}: {}", run.stderr);
+        assert_eq!(run.stdout, "", "{args:?}");
+    }
+}
+
+#[test]
+fn failures_say_what_where_and_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("text.npz"), "no archive").unwrap();
+    std::fs::create_dir(folder.path().join("empty")).unwrap();
+    std::fs::write(folder.path().join("taken.npz"), "").unwrap();
+    let mut texts = String::new();
+    for args in [
+        "data inspect nowhere",
+        "data inspect empty",
+        "data inspect text.npz",
+        "data export-gt empty --out taken.npz",
+        "data export-gt nowhere --out gt.npz",
+        "eval --pred nowhere.npz --pred-kind depth --gt text.npz",
+        "eval --pred text.npz --pred-kind depth --gt text.npz",
+        "simulate --out . --frames 1",
+        "simulate --out new --frames 0",
+    ] {
+        let run = in_folder(folder.path(), &args.split_whitespace().collect::<Vec<_>>());
+        assert_eq!((run.code, run.stdout.as_str()), (1, ""), "{args}");
+        assert!(
+            run.stderr.contains("error: ") && run.stderr.contains("hint: "),
+            "{args}: {}",
+            run.stderr
+        );
+        texts += &format!("$ deepfusion {args}\n{}\n", run.stderr);
+    }
+    let left: Vec<_> = std::fs::read_dir(folder.path())
+        .unwrap()
+        .map(|e| e.unwrap().file_name())
+        .collect();
+    assert_eq!(left.len(), 3, "nothing half-written: {left:?}");
+    insta::assert_snapshot!(texts);
+}
