@@ -339,7 +339,12 @@ fn start_moving(mut pose_net: PoseNet) -> PoseNet {
             let device = b.device();
             let mut values: Vec<f32> = b.into_data().iter::<f32>().collect();
             values[..6].copy_from_slice(&[0.0, 0.0, 0.0, 0.0, 0.0, -1.0]);
-            Tensor::<1>::from_data(values.as_slice(), &device).require_grad()
+            let moving = Tensor::<1>::from_data(values.as_slice(), &device);
+            if moving.is_autodiff() {
+                moving.require_grad()
+            } else {
+                moving
+            }
         })
     });
     pose_net

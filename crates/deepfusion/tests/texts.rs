@@ -2,7 +2,13 @@
 
 mod support;
 
-use support::{deepfusion, in_folder};
+use std::path::Path;
+
+use support::{Run, in_folder};
+
+fn deepfusion(args: &[&str]) -> Run {
+    in_folder(Path::new("."), args)
+}
 
 #[test]
 fn help_texts() {

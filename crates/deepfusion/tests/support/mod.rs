@@ -13,11 +13,6 @@ pub struct Run {
     pub stderr: String,
 }
 
-/// Runs `deepfusion` with these arguments.
-pub fn deepfusion(args: &[&str]) -> Run {
-    in_folder(Path::new("."), args)
-}
-
 /// Runs `deepfusion` in a folder.
 pub fn in_folder(folder: &Path, args: &[&str]) -> Run {
     let output = Command::new(env!("CARGO_BIN_EXE_deepfusion"))
