@@ -60,13 +60,16 @@ struct RawBatch {
     names: Vec<String>,
 }
 
+/// Resized images, H×W×3 bytes, by data set and frame.
+type ImageCache = HashMap<(usize, usize), Arc<Vec<u8>>>;
+
 /// Everything that making a batch needs.
 struct Maker {
     config: TrainConfig,
     set: SampleSet,
     /// Whether samples are mirrored and jittered.
     augment: bool,
-    cache: Mutex<HashMap<(usize, usize), Arc<Vec<u8>>>>,
+    cache: Mutex<ImageCache>,
 }
 
 /// Makes batches in order, ahead of the trainer, on its own thread.
@@ -294,7 +297,7 @@ impl Maker {
         Ok(values)
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, HashMap<(usize, usize), Arc<Vec<u8>>>> {
+    fn lock(&self) -> std::sync::MutexGuard<'_, ImageCache> {
         // A thread that panicked while holding the cache left it whole: entries go in at once.
         self.cache
             .lock()

@@ -70,7 +70,7 @@ impl Motion {
     }
 }
 
-/// Rodrigues' formula, R = I + (sin θ/θ)·[v]× + ((1 − cos θ)/θ²)·[v]×², with θ = √(‖v‖² + 1e-12).
+/// Rodrigues' formula, R = I + (sin θ/θ)·V + ((1 − cos θ)/θ²)·V², V the cross matrix of v, θ = √(‖v‖² + 1e-12).
 ///
 /// # Shapes
 /// - `axis_angle`: `[N, 3]`, radians

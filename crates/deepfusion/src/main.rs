@@ -1,5 +1,6 @@
 //! The `deepfusion` command.
 
+mod allocator;
 mod cli;
 mod commands;
 mod error;
@@ -10,12 +11,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-/// Training allocates and frees megabytes in every operation; the system's allocator gives each of
-/// them back to the kernel and asks again.
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
-
 fn main() -> ExitCode {
+    allocator::keep_memory();
     output::init_logging();
     // Wrong arguments end here: clap says which, suggests the near one and exits with 2.
     let cli = cli::Cli::parse();

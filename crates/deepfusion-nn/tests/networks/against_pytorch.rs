@@ -3,7 +3,7 @@
 //! Tolerance: 1e-5 on what the networks put out, and on features relative to their root mean square. The
 //! reference is in double precision, so the difference is float32 rounding through 20 to 55 convolutions.
 //! Measured: disparities 2.3e-6 (ResNet-18; PyTorch's own float32: 3.5e-6) and 4.2e-7 (ResNet-50), poses
-//! 5e-7, features 4.5e-6. The repeating weights of the `.pth` files cancel more, and so round more.
+//! 5e-7. The repeating weights of the `.pth` files cancel more, and so round more.
 
 use crate::common::{images, largest_error, manifest, unpack, values, write_listed};
 use burn::tensor::Device;

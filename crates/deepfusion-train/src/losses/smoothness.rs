@@ -77,7 +77,7 @@ mod tests {
             .grad(&value.backward())
             .unwrap()
             .into_data()
-            .into_vec()
+            .try_into_vec()
             .unwrap();
         for i in 0..9 {
             let at = |step: f32| {

@@ -106,7 +106,7 @@ mod tests {
             .grad(&value.backward())
             .unwrap()
             .into_data()
-            .into_vec()
+            .try_into_vec()
             .unwrap();
         for i in 0..6 {
             let at = |step: f32| {

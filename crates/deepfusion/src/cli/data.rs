@@ -25,7 +25,7 @@ pub struct InspectArgs {
     /// Also draw the LiDAR on the images of all frames that have a scan.
     #[arg(long)]
     pub overlay: bool,
-    /// Folder for the pictures of --overlay [default: runs/inspect-<time>].
+    /// Folder for the pictures of --overlay [default: runs/inspect-TIME].
     #[arg(long, value_name = "DIR", requires = "overlay")]
     pub out: Option<PathBuf>,
     /// Print as JSON.

@@ -63,7 +63,7 @@ pub enum Command {
     Example:\n  deepfusion demo --out runs/first"
 )]
 pub struct DemoArgs {
-    /// Folder for everything it makes [default: runs/demo-<time>].
+    /// Folder for everything it makes [default: runs/demo-TIME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Print the final evaluation as JSON on stdout.

@@ -24,7 +24,7 @@ pub struct TrainArgs {
     /// Settings from a file, as written into every run as config.toml.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "preset")]
     pub config: Option<PathBuf>,
-    /// Folder of the run [default: runs/train-<time>].
+    /// Folder of the run [default: runs/train-TIME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Continue the run in --out exactly where it stopped.

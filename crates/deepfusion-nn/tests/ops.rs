@@ -1,0 +1,209 @@
+//! The CPU kernels as differentiable operations, against the same composed of Burn's operations:
+//! values and gradients.
+
+use burn::tensor::{Device, Distribution, Tensor};
+use deepfusion_nn::ops::{self, ConvOptions};
+
+/// Differences of two ways of summing the same few hundred products in f32.
+const TOLERANCE: f32 = 2e-5;
+
+fn random<const D: usize>(shape: [usize; D], device: &Device) -> Tensor<D> {
+    Tensor::random(shape, Distribution::Uniform(-1.0, 1.0), device)
+}
+
+fn assert_close<const D: usize>(what: &str, a: Tensor<D>, b: Tensor<D>) {
+    assert_eq!(a.dims(), b.dims(), "{what}");
+    let scale = b.clone().abs().max().into_scalar::<f32>().max(1.0);
+    let difference = a.sub(b).abs().max().into_scalar::<f32>();
+    assert!(
+        difference < TOLERANCE * scale,
+        "{what}: {difference} of {scale}"
+    );
+}
+
+/// A weighted sum, so that every output has a gradient of its own.
+fn weigh(output: Tensor<4>) -> Tensor<1> {
+    let shape = output.dims();
+    let count: usize = shape.iter().product();
+    let weights: Vec<f32> = (0..count).map(|i| (i as f32 * 0.7).sin()).collect();
+    let weights = Tensor::<1>::from_data(weights.as_slice(), &output.device());
+    output.mul(weights.reshape(shape)).sum()
+}
+
+fn leaf<const D: usize>(tensor: &Tensor<D>) -> Tensor<D> {
+    tensor.clone().require_grad()
+}
+
+#[test]
+fn convolution() {
+    let device = Device::flex().autodiff();
+    let cases = [
+        (3, 1, 1, true, [2, 5, 7, 9]),
+        (3, 2, 1, false, [3, 4, 8, 11]),
+        (7, 2, 3, false, [1, 3, 12, 10]),
+        (1, 1, 0, false, [2, 6, 5, 5]),
+        (1, 2, 0, false, [2, 6, 6, 7]),
+        (3, 1, 2, true, [1, 2, 6, 8]),
+    ];
+    for (kernel, stride, padding, reflect, size) in cases {
+        for dilation in [1, 2] {
+            if kernel == 1 && dilation == 2 {
+                continue;
+            }
+            let padding = if dilation == 2 {
+                padding.max(2)
+            } else {
+                padding
+            };
+            let options = ConvOptions {
+                stride,
+                padding,
+                dilation,
+                reflect,
+            };
+            let (x, w) = (
+                random(size, &device),
+                random([4, size[1], kernel, kernel], &device),
+            );
+            let bias = random([4], &device);
+            let run = |ours: bool| {
+                let (x, w, b) = (leaf(&x), leaf(&w), leaf(&bias));
+                let f = if ours {
+                    ops::conv2d
+                } else {
+                    ops::composed_conv2d
+                };
+                let y = f(x.clone(), w.clone(), Some(b.clone()), options);
+                let gradients = weigh(y.clone()).backward();
+                let gx = x.grad(&gradients).unwrap();
+                (
+                    y.inner(),
+                    gx,
+                    w.grad(&gradients).unwrap(),
+                    b.grad(&gradients).unwrap(),
+                )
+            };
+            let (a, b) = (run(true), run(false));
+            let name = format!("{kernel}x{kernel} {options:?}");
+            assert_close(&name, a.0, b.0);
+            assert_close(&format!("{name} x"), a.1, b.1);
+            assert_close(&format!("{name} weight"), a.2, b.2);
+            assert_close(&format!("{name} bias"), a.3, b.3);
+        }
+    }
+}
+
+#[test]
+fn batch_normalisation() {
+    let device = Device::flex().autodiff();
+    let x = random([3, 4, 5, 6], &device);
+    let (gamma, beta) = (random([4], &device), random([4], &device));
+    for relu in [false, true] {
+        let run = |ours: bool| {
+            let (x, g, b) = (leaf(&x), leaf(&gamma), leaf(&beta));
+            let f = if ours {
+                ops::batch_norm
+            } else {
+                ops::composed_batch_norm
+            };
+            let out = f(x.clone(), g.clone(), b.clone(), 1e-5, relu);
+            let gradients = weigh(out.output.clone()).backward();
+            let grad = x.grad(&gradients).unwrap();
+            let (gg, gb) = (g.grad(&gradients).unwrap(), b.grad(&gradients).unwrap());
+            (
+                out.output.inner(),
+                grad,
+                gg,
+                gb,
+                out.mean.inner(),
+                out.variance.inner(),
+            )
+        };
+        let (a, b) = (run(true), run(false));
+        assert_close("output", a.0, b.0);
+        assert_close("x", a.1, b.1);
+        assert_close("gamma", a.2, b.2);
+        assert_close("beta", a.3, b.3);
+        assert_close("mean", a.4, b.4);
+        assert_close("variance", a.5, b.5);
+    }
+}
+
+#[test]
+fn pointwise_and_upsampling() {
+    let device = Device::flex().autodiff();
+    let (x, skip) = (
+        random([2, 3, 4, 5], &device),
+        random([2, 2, 8, 10], &device),
+    );
+    let run = |ours: bool, with_skip: bool| {
+        let (x, s) = (leaf(&x), leaf(&skip));
+        let elu = if ours { ops::elu } else { ops::composed_elu };
+        let join = if ours {
+            ops::upsample_concat
+        } else {
+            ops::composed_upsample_concat
+        };
+        let y = join(elu(x.clone()), with_skip.then(|| s.clone()));
+        let gradients = weigh(y.clone()).backward();
+        (y.inner(), x.grad(&gradients).unwrap(), s.grad(&gradients))
+    };
+    for with_skip in [true, false] {
+        let (a, b) = (run(true, with_skip), run(false, with_skip));
+        assert_close("output", a.0, b.0);
+        assert_close("x", a.1, b.1);
+        assert_eq!(a.2.is_some(), with_skip);
+        if let (Some(a), Some(b)) = (a.2, b.2) {
+            assert_close("skip", a, b);
+        }
+    }
+}
+
+#[test]
+fn warp_and_photometric_error() {
+    let device = Device::flex().autodiff();
+    let image = random([2, 3, 6, 8], &device).abs();
+    let target = random([2, 3, 5, 7], &device).abs();
+    // In view and out of it.
+    let coords = random([2, 2, 5, 7], &device)
+        .mul_scalar(5.0)
+        .add_scalar(3.0);
+    let run = |ours: bool| {
+        let (i, c) = (leaf(&image), leaf(&coords));
+        let warp = if ours { ops::warp } else { ops::composed_warp };
+        let error = if ours {
+            ops::photometric_error
+        } else {
+            ops::composed_photometric_error
+        };
+        let y = warp(i.clone(), c.clone());
+        let e = error(y.clone(), target.clone(), 0.85);
+        let gradients = weigh(e.clone()).backward();
+        (
+            y.inner(),
+            e.inner(),
+            i.grad(&gradients).unwrap(),
+            c.grad(&gradients).unwrap(),
+        )
+    };
+    let (a, b) = (run(true), run(false));
+    assert_close("warp", a.0, b.0);
+    assert_close("error", a.1, b.1);
+    assert_close("image", a.2, b.2);
+    assert_close("coords", a.3, b.3);
+}
+
+/// Without autodiff the same operations run plainly.
+#[test]
+fn inference_runs_the_same_kernels() {
+    let plain = Device::flex();
+    let x = random([1, 3, 6, 6], &plain);
+    let w = random([2, 3, 3, 3], &plain);
+    let options = ConvOptions {
+        padding: 1,
+        ..ConvOptions::default()
+    };
+    let a = ops::conv2d(x.clone(), w.clone(), None, options);
+    let b = ops::composed_conv2d(x, w, None, options);
+    assert_close("conv", a, b);
+}

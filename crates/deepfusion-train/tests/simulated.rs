@@ -1,0 +1,225 @@
+//! Against the simulator, which knows the truth.
+
+use burn::tensor::{Device, Tensor, TensorData};
+use deepfusion_data::{Dataset, OpenOptions, to_chw};
+use deepfusion_geometry::Se3;
+use deepfusion_sim::{SimConfig, Simulation, write_kitti};
+use deepfusion_train::{
+    BatchLoader, CheckpointKind, Control, Error, LossTerms, Motion, Preset, RunFolder, SampleSet,
+    TrainConfig, TrainEvent, Trainer, ViewSynthesis,
+};
+use std::path::Path;
+
+fn street(frames: usize) -> Simulation {
+    Simulation::new(&SimConfig {
+        seed: 5,
+        frames,
+        scan_every: 0,
+        ..SimConfig::default()
+    })
+    .unwrap()
+}
+
+fn matrix(m: &nalgebra::Matrix3<f64>, device: &Device) -> Tensor<3> {
+    let values: Vec<f32> = (0..9).map(|i| m[(i / 3, i % 3)] as f32).collect();
+    Tensor::from_data(TensorData::new(values, [1, 3, 3]), device)
+}
+
+fn motion(a_from_b: &Se3, device: &Device) -> Motion {
+    let t = a_from_b.translation();
+    Motion {
+        rotation: matrix(&a_from_b.rotation(), device),
+        translation: Tensor::from_data([[t.x as f32, t.y as f32, t.z as f32]], device),
+    }
+}
+
+fn values(tensor: Tensor<4>) -> Vec<f32> {
+    tensor.into_data().try_into_vec().unwrap()
+}
+
+/// Warping frame 1 with frame 0's true depth and the true motion gives frame 0: every sign and
+/// convention of back-projection, motion, projection and sampling. Pixels count where the point is
+/// visible in both frames: its depth in frame 1 is the depth seen there.
+#[test]
+fn the_true_depth_and_motion_reproduce_the_other_frame() {
+    let device = Device::flex();
+    let simulation = street(12);
+    let (h, w) = (192, 640);
+    let k = simulation.intrinsics();
+    let synthesis = ViewSynthesis::new(h, w, &device);
+    for (a, b) in [(3, 4), (9, 8)] {
+        let (target, source) = (simulation.frame(a), simulation.frame(b));
+        let source_from_target = source.world_from_cam.inverse() * target.world_from_cam;
+        let image = |rgb| Tensor::from_data(TensorData::new(to_chw(rgb), [1, 3, h, w]), &device);
+        // The sky has no depth; far away it does not move with the camera's translation.
+        let depth: Vec<f32> = target
+            .depth
+            .data
+            .iter()
+            .map(|d| if *d > 0.0 { *d } else { 1e6 })
+            .collect();
+        let depth = Tensor::from_data(TensorData::new(depth, [1, 1, h, w]), &device);
+        let out = synthesis.forward(
+            image(&source.rgb),
+            depth,
+            &motion(&source_from_target, &device),
+            &matrix(&k.matrix(), &device),
+            &matrix(&k.inverse_matrix(), &device),
+        );
+        let (warped, valid) = (values(out.image), values(out.valid.float()));
+        let expected = to_chw(&target.rgb);
+        let unwarped = to_chw(&source.rgb);
+        let (mut error, mut still, mut count) = (0.0_f64, 0.0_f64, 0);
+        for y in 0..h {
+            for x in 0..w {
+                let (Some(d), true) = (target.depth.get(x, y), valid[y * w + x] > 0.5) else {
+                    continue;
+                };
+                let point = k.back_project(x as f64, y as f64, f64::from(d));
+                let there = source_from_target.transform(&point);
+                let Some(pixel) = k.project(&there) else {
+                    continue;
+                };
+                let seen = source
+                    .depth
+                    .get(pixel.x.round() as usize, pixel.y.round() as usize);
+                if !seen.is_some_and(|s| (f64::from(s) - there.z).abs() < 0.05 * there.z) {
+                    continue;
+                }
+                for c in 0..3 {
+                    let i = (c * h + y) * w + x;
+                    error += f64::from((warped[i] - expected[i]).abs());
+                    still += f64::from((unwarped[i] - expected[i]).abs());
+                    count += 1;
+                }
+            }
+        }
+        let n = f64::from(count);
+        assert!(n > 0.5 * 3.0 * (h * w) as f64, "{n} values compared");
+        assert!(error / n < 0.02, "mean absolute error {}", error / n);
+        assert!(
+            still / n > 2.0 * error / n,
+            "standing still explains as much: {}",
+            still / n
+        );
+    }
+}
+
+/// A small network on a short drive, in seconds.
+fn small(drive: &Path, steps: usize) -> (TrainConfig, SampleSet, SampleSet) {
+    let mut config = Preset::Tiny.config();
+    (config.size.width, config.size.height) = (96, 64);
+    config.batch = 2;
+    config.steps = Some(steps);
+    config.validate_every = 2;
+    config.depth_net.encoder = config.depth_net.encoder.with_base_width(8);
+    config.depth_net.decoder.widths = [16, 16, 8, 8, 8];
+    config.pose_net.encoder = config.pose_net.encoder.with_base_width(8);
+    let datasets = Dataset::open(drive, &OpenOptions::default()).unwrap();
+    let (train, validation, skipped) = SampleSet::split(&config, datasets, None).unwrap();
+    assert!(skipped.is_empty());
+    (config, train, validation)
+}
+
+fn drive(folder: &Path, frames: usize) -> std::path::PathBuf {
+    write_kitti(&street(frames), folder, &mut |_, _| {}).unwrap()
+}
+
+/// Runs to the end or to `stop`, and gives every step's and validation's losses.
+fn losses(trainer: &mut Trainer, stop: Option<usize>) -> Vec<(usize, LossTerms)> {
+    let mut all = Vec::new();
+    trainer
+        .run(&mut |event| {
+            match event {
+                TrainEvent::Step { step, losses, .. } => {
+                    all.push((step, losses));
+                    if stop == Some(step) {
+                        return Control::Stop;
+                    }
+                }
+                TrainEvent::Validated { step, losses, .. } => all.push((step, losses)),
+                _ => {}
+            }
+            Control::Continue
+        })
+        .unwrap();
+    all
+}
+
+#[test]
+fn a_resumed_run_repeats_the_uninterrupted_one_to_the_last_digit() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(&folder.path().join("street"), 14);
+    let device = Device::flex();
+    let start = |name: &str| {
+        let (config, train, validation) = small(&drive, 7);
+        let folder = RunFolder::create(&folder.path().join(name)).unwrap();
+        Trainer::create(config, folder, (train, validation), &device, Ok).unwrap()
+    };
+    let whole = losses(&mut start("whole"), None);
+    let mut parts = losses(&mut start("parts"), Some(3));
+    let (run, _) = RunFolder::open(&folder.path().join("parts")).unwrap();
+    let config = run.read_config().unwrap();
+    let (_, train, validation) = small(&drive, 7);
+    let mut resumed = Trainer::resume(config, run, (train, validation), &device).unwrap();
+    assert_eq!(resumed.step(), 3);
+    parts.extend(losses(&mut resumed, None));
+    assert_eq!(whole, parts);
+    assert!(
+        whole
+            .iter()
+            .all(|(_, l)| l.total.is_finite() && l.total > 0.0)
+    );
+}
+
+#[test]
+fn a_checkpoint_of_another_network_is_refused_by_its_tensor() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(&folder.path().join("street"), 8);
+    let (config, train, validation) = small(&drive, 1);
+    let run = RunFolder::create(&folder.path().join("run")).unwrap();
+    let device = Device::flex();
+    let mut trainer = Trainer::create(
+        config.clone(),
+        run.clone(),
+        (train, validation),
+        &device,
+        Ok,
+    )
+    .unwrap();
+    losses(&mut trainer, None);
+    let mut wider = trainer.config().clone();
+    wider.depth_net.encoder = wider.depth_net.encoder.with_base_width(16);
+    let error = run.load(CheckpointKind::Last, &wider, &device).unwrap_err();
+    assert!(error.to_string().contains("encoder"), "{error}");
+    assert!(matches!(error, Error::Network(_)));
+    // A run is not overwritten.
+    assert!(matches!(
+        RunFolder::create(run.path()),
+        Err(Error::RunExists { .. })
+    ));
+}
+
+/// Samples that are mirrored have a mirrored camera and motion; what they hold depends on their number
+/// alone.
+#[test]
+fn batches_are_the_same_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(&folder.path().join("street"), 8);
+    let (config, train, _) = small(&drive, 1);
+    let device = Device::flex();
+    let third = |first: usize| {
+        let loader = BatchLoader::training(&config, train.clone(), first);
+        (first..2).for_each(|_| drop(loader.next(&device)));
+        loader.next(&device).unwrap().unwrap()
+    };
+    let (a, b) = (third(0), third(2));
+    assert_eq!(a.names, b.names);
+    assert_eq!(values(a.clean[1].clone()), values(b.clean[1].clone()));
+    assert_eq!(values(a.network[0].clone()), values(b.network[0].clone()));
+    let distances: Vec<f32> = a.distance_m[0].clone().into_data().try_into_vec().unwrap();
+    assert!(
+        distances.iter().all(|d| (0.1..2.0).contains(d)),
+        "{distances:?}"
+    );
+}

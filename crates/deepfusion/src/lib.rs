@@ -1,1 +1,0 @@
-//! Metric depth from one camera and a speed signal.

@@ -1,0 +1,232 @@
+//! Training, evaluation and prediction through the program alone, on good input and bad.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use support::{Run, in_folder};
+
+fn run(folder: &Path, args: &str) -> Run {
+    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
+}
+
+fn ok(folder: &Path, args: &str) -> Run {
+    let run = run(folder, args);
+    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
+    run
+}
+
+/// The run must fail with code 1, name every one of `names`, and give a hint.
+fn fails(folder: &Path, args: &str, names: &[&str]) {
+    let run = run(folder, args);
+    assert_eq!(run.code, 1, "{args}: {}", run.stderr);
+    for name in names {
+        assert!(
+            run.stderr.contains(name),
+            "{args}: no `{name}` in {}",
+            run.stderr
+        );
+    }
+    assert!(run.stderr.contains("hint: "), "{args}: {}", run.stderr);
+    assert!(!run.stderr.contains("panicked"), "{args}: {}", run.stderr);
+}
+
+const SMALL: &str = "--size 96x64 --batch 2";
+
+#[test]
+fn a_drive_is_learned_resumed_evaluated_and_predicted() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 12 --seed 3 --scan-every 4");
+    ok(at, &format!("train --data sim {SMALL} --steps 2 --out run"));
+    for file in [
+        "config.toml",
+        "log.csv",
+        "last.safetensors",
+        "best.safetensors",
+    ] {
+        assert!(at.join("run").join(file).is_file(), "{file}");
+    }
+    assert_eq!(fs::read_dir(at.join("run/panels")).unwrap().count(), 1);
+
+    // A longer run goes on; one that is there is not overwritten.
+    ok(at, "train --out run --resume --steps 3");
+    let log = fs::read_to_string(at.join("run/log.csv")).unwrap();
+    let steps: Vec<_> = log
+        .lines()
+        .filter(|l| l.contains(",train,"))
+        .map(|l| &l[..1])
+        .collect();
+    assert_eq!(steps, ["1", "2", "3"]);
+    fails(
+        at,
+        &format!("train --data sim {SMALL} --steps 1 --out run"),
+        &["run"],
+    );
+
+    let report: Value =
+        serde_json::from_str(&ok(at, "eval --model run --data sim --json").stdout).unwrap();
+    assert_eq!(report["n"], 3);
+    assert_eq!(report["protocol"]["crop"], "garg");
+    let abs_rel = report["unscaled"]["abs_rel"].as_f64().unwrap();
+    assert!(abs_rel > 0.01 && abs_rel < 3.0, "{abs_rel}");
+    assert!(report["scale"]["median"].as_f64().unwrap() > 0.2);
+    assert!(report["trivial"]["unscaled"]["abs_rel"].is_number());
+
+    let image = "sim/2026_01_01/2026_01_01_drive_0003_sync/image_02/data/0000000001.png";
+    let all = "depth-png,npy,color,side-by-side,ply";
+    ok(
+        at,
+        &format!("predict --model run {image} --calib sim/2026_01_01 --save {all} --out depth"),
+    );
+    let sidecar = fs::read_to_string(at.join("depth/0000000001.json")).unwrap();
+    let sidecar: Value = serde_json::from_str(&sidecar).unwrap();
+    assert_eq!(sidecar["files"].as_array().unwrap().len(), 5);
+    assert_eq!(sidecar["scale_trusted"], true);
+    assert!((sidecar["focal_factor"].as_f64().unwrap() - 1.0).abs() < 1e-9);
+    // Twice the focal length: the same picture is twice as far.
+    let k = "--intrinsics 743.6,738.9,313.9,88.3";
+    ok(
+        at,
+        &format!("predict --model run {image} {k} --save npy --out zoomed"),
+    );
+    let zoomed = fs::read_to_string(at.join("zoomed/0000000001.json")).unwrap();
+    let zoomed: Value = serde_json::from_str(&zoomed).unwrap();
+    assert!((zoomed["focal_factor"].as_f64().unwrap() - 2.0).abs() < 1e-3);
+    // Without a camera the assumption is said.
+    let assumed = ok(
+        at,
+        &format!("predict --model run {image} --out assumed --json"),
+    );
+    assert!(assumed.stderr.contains("assumed"), "{}", assumed.stderr);
+    assert!(
+        assumed.stdout.contains("\"scale_trusted\": false"),
+        "{}",
+        assumed.stdout
+    );
+
+    // Nothing is overwritten, and wrong cameras are told.
+    fails(
+        at,
+        &format!("predict --model run {image} --out assumed"),
+        &["0000000001"],
+    );
+    let wrong = "--intrinsics 743.6,738.9,5000,88.3";
+    fails(
+        at,
+        &format!("predict --model run {image} {wrong} --out wrong"),
+        &["cx"],
+    );
+    fails(
+        at,
+        "predict --model run nothing.png --out none",
+        &["nothing.png"],
+    );
+    fails(at, "predict --model nowhere a.png --out none", &["nowhere"]);
+    fs::write(
+        at.join("cut.png"),
+        &fs::read(at.join(image)).unwrap()[..900],
+    )
+    .unwrap();
+    fails(at, "predict --model run cut.png --out none", &["cut.png"]);
+
+    // A checkpoint of another architecture, and one cut off.
+    let config = fs::read_to_string(at.join("run/config.toml")).unwrap();
+    let wider = config.replacen("base_width = 32", "base_width = 24", 1);
+    assert_ne!(config, wider);
+    fs::write(at.join("run/config.toml"), wider).unwrap();
+    fails(at, "eval --model run --data sim", &["encoder"]);
+    fs::write(at.join("run/config.toml"), &config).unwrap();
+    let weights = fs::read(at.join("run/last.safetensors")).unwrap();
+    fs::write(
+        at.join("run/last.safetensors"),
+        &weights[..weights.len() / 2],
+    )
+    .unwrap();
+    fails(
+        at,
+        "train --out run --resume --steps 4",
+        &["last.safetensors"],
+    );
+}
+
+#[test]
+fn what_cannot_be_trained_on_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fails(at, "train --data nowhere", &["nowhere"]);
+    fs::create_dir(at.join("empty")).unwrap();
+    fails(at, "train --data empty", &["empty"]);
+
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    let drive = at.join("sim/2026_01_01/2026_01_01_drive_0003_sync");
+    let packet = drive.join("oxts/data/0000000002.txt");
+    let good = fs::read_to_string(&packet).unwrap();
+    let mut fields: Vec<_> = good.split_whitespace().collect();
+    fields[8] = "nan";
+    fs::write(&packet, fields.join(" ")).unwrap();
+    fails(at, "train --data sim", &["0000000002.txt", "vf"]);
+    fs::write(&packet, &good).unwrap();
+
+    let stamps = drive.join("image_02/timestamps.txt");
+    fs::rename(&stamps, at.join("stamps")).unwrap();
+    fails(at, "train --data sim", &["timestamps.txt"]);
+    fs::rename(at.join("stamps"), &stamps).unwrap();
+
+    // A learning rate that destroys the weights: the loss is named with its frames, and the run can be
+    // looked at.
+    ok(
+        at,
+        &format!("train --data sim {SMALL} --steps 1 --out seed"),
+    );
+    let config = fs::read_to_string(at.join("seed/config.toml")).unwrap();
+    let broken: String = config
+        .lines()
+        .map(|l| {
+            let is_rate = l.starts_with("learning_rate = ");
+            let steps = l.starts_with("steps = ");
+            match (is_rate, steps) {
+                (true, _) => "learning_rate = 1e30\n".to_owned(),
+                (_, true) => "steps = 30\n".to_owned(),
+                _ => format!("{l}\n"),
+            }
+        })
+        .collect();
+    fs::write(at.join("broken.toml"), broken).unwrap();
+    fails(
+        at,
+        "train --data sim --config broken.toml --out broken",
+        &["loss term", "2026_01_01_drive_0003_sync/"],
+    );
+
+    // A car that stands has no parallax to learn from.
+    for entry in fs::read_dir(drive.join("oxts/data")).unwrap() {
+        let path = entry.unwrap().path();
+        let text = fs::read_to_string(&path).unwrap();
+        let mut fields: Vec<_> = text.split_whitespace().collect();
+        for field in 8..11 {
+            fields[field] = "0.0";
+        }
+        fs::write(&path, fields.join(" ")).unwrap();
+    }
+    fails(at, "train --data sim", &["m/s"]);
+}
+
+#[test]
+fn weights_and_bench_tell_what_they_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    assert!(ok(at, "weights list").stdout.contains("Monodepth2"));
+    fails(at, "weights import missing.pth --out run", &["missing.pth"]);
+    let bench = ok(at, "bench --preset tiny --size 96x64 --repeats 1 --json");
+    let bench: Value = serde_json::from_str(&bench.stdout).unwrap();
+    for stage in ["decode", "resize", "network", "depth", "cloud"] {
+        assert!(bench["stages_ms"][stage].as_f64().unwrap() > 0.0, "{stage}");
+    }
+    assert!(bench["fps"].as_f64().unwrap() > 0.0);
+    assert!(bench["parameters"].as_u64().unwrap() > 100_000);
+    #[cfg(target_os = "linux")]
+    assert!(bench["peak_rss_mb"].as_f64().unwrap() > 1.0);
+}
