@@ -122,6 +122,8 @@ pub struct TrainConfig {
     pub steps: Option<usize>,
     /// Adam's step size.
     pub learning_rate: f64,
+    /// Steps over which the step size rises from 0: large first steps can flatten the depth for good.
+    pub learning_rate_warmup_steps: usize,
     /// Share of the run after which the step size is divided by ten.
     pub learning_rate_drop: f64,
     /// Largest norm of the gradient; longer ones are shortened to it. 0: no limit.

@@ -46,6 +46,7 @@ impl Preset {
             epochs: 20,
             steps: None,
             learning_rate: 1e-4,
+            learning_rate_warmup_steps: 0,
             learning_rate_drop: 0.75,
             clip_norm: 10.0,
             seed: 0,
@@ -85,7 +86,8 @@ impl Preset {
                     height: 96,
                 };
                 config.batch = 4;
-                config.learning_rate = 3e-4;
+                config.learning_rate = 1e-3;
+                config.learning_rate_warmup_steps = 100;
                 config.reversed_pose = ReversedPose::Inverted;
                 config.start_moving = true;
                 config.depth_net.encoder = narrow(config.depth_net.encoder);

@@ -298,7 +298,9 @@ impl Trainer {
         } else {
             0.1
         };
-        self.config.learning_rate * factor
+        let warmup = self.config.learning_rate_warmup_steps.max(1) as f64;
+        let rise = ((self.state.step + 1) as f64 / warmup).min(1.0);
+        self.config.learning_rate * rise * factor
     }
 
     /// Panel, validation and checkpoints.

@@ -113,7 +113,7 @@ pub fn conv2d_backward_input(
                     // SAFETY: written once, by this task; sizes are the shape's.
                     unsafe {
                         let to = to.at(start_of(n) + offset);
-                        product(sizes, to, shape.in_area(), false, weights, grad);
+                        product(sizes, to, (shape.in_area(), 1), false, weights, grad);
                     }
                     return;
                 }
@@ -126,7 +126,14 @@ pub fn conv2d_backward_input(
                 with_scratch(taps * columns, |matrix| {
                     // SAFETY: the matrix is this thread's own; sizes are the shape's.
                     unsafe {
-                        product(sizes, matrix.as_mut_ptr(), columns, false, weights, grad);
+                        product(
+                            sizes,
+                            matrix.as_mut_ptr(),
+                            (columns, 1),
+                            false,
+                            weights,
+                            grad,
+                        );
                     }
                     // SAFETY: this task alone has these images and channels.
                     fold_add(shape, tile, channels.len(), matrix, |n| unsafe {
@@ -194,6 +201,9 @@ pub fn conv2d_backward_weight(
 
 /// The weight gradient of `channels` summed over `tiles`, into the columns of `to` (O×K) that belong
 /// to them.
+///
+/// The sum is kept as its transpose, K×O: then the product packs the output gradient and streams the
+/// unfolded input, which is kh·kw times larger, as it lies.
 fn accumulate_weight(
     shape: &ConvShape,
     tiles: &[Tile],
@@ -203,42 +213,55 @@ fn accumulate_weight(
     to: &SharedMut<f32>,
 ) {
     let taps = channels.len() * shape.kernel_area();
-    for (i, &tile) in tiles.iter().enumerate() {
-        let columns = tile.columns(shape);
-        with_grad_tile(shape, tile, grad_out, |grad| {
-            let multiply = |unfolded: Operand| {
-                let transposed = Operand {
-                    row_stride: unfolded.column_stride,
-                    column_stride: unfolded.row_stride,
-                    ..unfolded
+    let outputs = shape.out_channels;
+    with_scratch(taps * outputs, |sum| {
+        sum.fill(0.0);
+        for &tile in tiles {
+            let columns = tile.columns(shape);
+            with_grad_tile(shape, tile, grad_out, |grad| {
+                let mut add = |unfolded: Operand| {
+                    let transposed = Operand {
+                        row_stride: unfolded.column_stride,
+                        column_stride: unfolded.row_stride,
+                        ..unfolded
+                    };
+                    // SAFETY: the sum is this thread's own; sizes are the shape's.
+                    unsafe {
+                        let sizes = (outputs, taps, columns);
+                        product(
+                            sizes,
+                            sum.as_mut_ptr(),
+                            (1, outputs),
+                            true,
+                            grad,
+                            transposed,
+                        );
+                    }
                 };
-                // SAFETY: the taps of these channels are written by this task alone.
-                unsafe {
-                    product(
-                        (shape.out_channels, taps, columns),
-                        to.at(channels.start * shape.kernel_area()),
-                        shape.taps(),
-                        i > 0,
-                        grad,
-                        transposed,
-                    );
+                if shape.is_pointwise() && in_one_image(shape, tile) {
+                    let image = tile.first_row / shape.out_height();
+                    let offset = (tile.first_row % shape.out_height()) * shape.out_width();
+                    let start = (image * shape.in_channels + channels.start) * shape.in_area();
+                    add(Operand {
+                        pointer: x[start + offset..].as_ptr(),
+                        row_stride: shape.in_area(),
+                        column_stride: 1,
+                    });
+                    return;
                 }
-            };
-            if shape.is_pointwise() && in_one_image(shape, tile) {
-                let image = tile.first_row / shape.out_height();
-                let offset = (tile.first_row % shape.out_height()) * shape.out_width();
-                let start = (image * shape.in_channels + channels.start) * shape.in_area();
-                multiply(Operand {
-                    pointer: x[start + offset..].as_ptr(),
-                    row_stride: shape.in_area(),
-                    column_stride: 1,
+                with_scratch(taps * columns, |matrix| {
+                    unfold(shape, tile, channels.clone(), x, matrix);
+                    add(rows_of(matrix, columns));
                 });
-                return;
-            }
-            with_scratch(taps * columns, |matrix| {
-                unfold(shape, tile, channels.clone(), x, matrix);
-                multiply(rows_of(matrix, columns));
             });
-        });
-    }
+        }
+        for output in 0..outputs {
+            let start = output * shape.taps() + channels.start * shape.kernel_area();
+            // SAFETY: the taps of these channels are written by this task alone.
+            let row = unsafe { to.slice(start, taps) };
+            for (tap, value) in row.iter_mut().enumerate() {
+                *value = sum[tap * outputs + output];
+            }
+        }
+    });
 }

@@ -14,14 +14,15 @@ pub(super) struct Operand {
     pub(super) column_stride: usize,
 }
 
-/// `to (m×n) = a (m×k) · b (k×n)`, or `+=` with `accumulate`, on this thread.
+/// `to (m×n) = a (m×k) · b (k×n)`, or `+=` with `accumulate`, on this thread. `to` is given by the
+/// distances between its rows and between its columns.
 ///
 /// # Safety
 /// All operands must be in bounds, and `to` must not be written by anyone else.
 pub(super) unsafe fn product(
     (m, n, k): (usize, usize, usize),
     to: *mut f32,
-    to_row_stride: usize,
+    (to_row_stride, to_column_stride): (usize, usize),
     accumulate: bool,
     a: Operand,
     b: Operand,
@@ -34,7 +35,7 @@ pub(super) unsafe fn product(
             n,
             k,
             to,
-            1,
+            stride(to_column_stride),
             stride(to_row_stride),
             accumulate,
             a.pointer,
@@ -104,7 +105,7 @@ fn forward_tile(
             product(
                 (channels, columns, taps),
                 to,
-                to_row_stride,
+                (to_row_stride, 1),
                 false,
                 weights,
                 b,

@@ -2,7 +2,7 @@ use super::ConvShape;
 
 /// Bytes of unfolded input that a tile may take: it should stay in the cache between being written
 /// and being multiplied.
-const TILE_BYTES: usize = 2 << 20;
+const TILE_BYTES: usize = 1 << 20;
 
 /// Columns below which a matrix product no longer pays for reading the weights.
 const MIN_COLUMNS: usize = 192;
