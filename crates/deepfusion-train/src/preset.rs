@@ -97,7 +97,12 @@ impl Preset {
                 config.pose_net.encoder = narrow(config.pose_net.encoder).with_base_width(16);
                 config
             }
-            Self::Light => base(ResNetDepth::ResNet18),
+            Self::Light => {
+                let mut config = base(ResNetDepth::ResNet18);
+                config.reversed_pose = ReversedPose::Inverted;
+                config.start_moving = true;
+                config
+            }
             Self::Resnet50 => base(ResNetDepth::ResNet50),
             Self::Monodepth2 => {
                 let mut config = base(ResNetDepth::ResNet18);
