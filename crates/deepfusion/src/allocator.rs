@@ -6,7 +6,7 @@
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 /// Keeps freed memory instead of returning it to the system after 10 ms: the next step needs it again,
-/// and the kernel clears every page that it hands out (measured: a quarter of a training step).
+/// and the kernel clears every page that it hands out (a tenth of a training step's profile).
 pub fn keep_memory() {
     /// `mi_option_purge_delay` of mimalloc.h, the same number in its versions 2 and 3.
     const PURGE_DELAY: libmimalloc_sys::mi_option_t = 15;

@@ -69,7 +69,7 @@ pub struct DemoArgs {
     /// Print the final evaluation as JSON on stdout.
     #[arg(long)]
     pub json: bool,
-    /// Seed of the street trained on; the street it is measured on has another.
+    /// Seed of the first street trained on; the street it is measured on has another.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
     /// Where to compute.

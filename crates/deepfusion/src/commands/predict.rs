@@ -253,37 +253,30 @@ fn find_images(inputs: &[String]) -> Result<Vec<PathBuf>> {
         if path.is_dir() {
             let entries =
                 std::fs::read_dir(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
-            let mut images: Vec<_> = entries
-                .filter_map(|entry| Some(entry.ok()?.path()))
-                .filter(|p| is_image(p))
-                .collect();
-            if images.is_empty() {
-                return Err(CliError::NoImages {
-                    input: input.clone(),
-                }
-                .into());
-            }
-            images.sort();
-            found.extend(images);
+            let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+            found.extend(images_among(paths, input)?);
         } else if path.exists() || !input.contains(['*', '?', '[']) {
             // A file that is not there is told by whoever opens it.
             found.push(path);
         } else {
-            let mut images: Vec<_> = glob::glob(input)?
-                .filter_map(Result::ok)
-                .filter(|p| is_image(p))
-                .collect();
-            if images.is_empty() {
-                return Err(CliError::NoImages {
-                    input: input.clone(),
-                }
-                .into());
-            }
-            images.sort();
-            found.extend(images);
+            found.extend(images_among(
+                glob::glob(input)?.filter_map(Result::ok),
+                input,
+            )?);
         }
     }
     Ok(found)
+}
+
+/// The images among the paths, in order; that there is none is an error that names the input.
+fn images_among(paths: impl Iterator<Item = PathBuf>, input: &str) -> Result<Vec<PathBuf>> {
+    let mut images: Vec<_> = paths.filter(|p| is_image(p)).collect();
+    if images.is_empty() {
+        let input = input.to_owned();
+        return Err(CliError::NoImages { input }.into());
+    }
+    images.sort();
+    Ok(images)
 }
 
 fn is_image(path: &Path) -> bool {
