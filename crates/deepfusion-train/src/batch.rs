@@ -10,6 +10,8 @@ use std::sync::{Arc, Mutex};
 
 /// Bytes of resized images that are kept, so that a small drive is decoded once and not every epoch.
 const CACHE_BYTES: usize = 2 << 30;
+/// Threads that decode and resize.
+const MAX_THREADS: usize = 4;
 /// Batches made ahead of the trainer.
 const AHEAD: usize = 3;
 
@@ -121,10 +123,19 @@ impl BatchLoader {
             augment,
             cache: Mutex::default(),
         };
+        // Threads of its own: the trainer may wait for a batch on one of the shared pool's.
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.min(MAX_THREADS))
+            .build();
         // The thread ends when the receiver is dropped: `send` fails then.
         std::thread::spawn(move || {
             for (number, samples) in batches {
-                let batch = maker.make(number, &samples);
+                let batch = match &pool {
+                    Ok(pool) => pool.install(|| maker.make(number, &samples)),
+                    // No more threads to be had: this one does it alone.
+                    Err(_) => maker.make(number, &samples),
+                };
                 let failed = batch.is_err();
                 if sender.send(batch).is_err() || failed {
                     return;

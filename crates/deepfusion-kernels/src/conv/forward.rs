@@ -1,57 +1,26 @@
 use super::{
     ConvShape,
-    tile::{Tile, tiles},
-    unfold::unfold,
+    lattice::{Lattice, Tile, tiles},
+    product::{TapProduct, padded},
 };
 use crate::{scratch::with_scratch, send_ptr::SharedMut};
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// A row-major matrix operand: pointer, row stride, column stride.
-#[derive(Clone, Copy)]
-pub(super) struct Operand {
-    pub(super) pointer: *const f32,
-    pub(super) row_stride: usize,
-    pub(super) column_stride: usize,
-}
+/// Tasks below which the output channels of a tile are shared out too, so that no core waits.
+const TASKS: usize = 4;
 
-/// `to (m×n) = a (m×k) · b (k×n)`, or `+=` with `accumulate`, on this thread. `to` is given by the
-/// distances between its rows and between its columns.
-///
-/// # Safety
-/// All operands must be in bounds, and `to` must not be written by anyone else.
-pub(super) unsafe fn product(
-    (m, n, k): (usize, usize, usize),
-    to: *mut f32,
-    (to_row_stride, to_column_stride): (usize, usize),
-    accumulate: bool,
-    a: Operand,
-    b: Operand,
-) {
-    let stride = |s: usize| isize::try_from(s).unwrap_or(isize::MAX);
-    // SAFETY: the caller's promise.
-    unsafe {
-        gemm::gemm(
-            m,
-            n,
-            k,
-            to,
-            stride(to_column_stride),
-            stride(to_row_stride),
-            accumulate,
-            a.pointer,
-            stride(a.column_stride),
-            stride(a.row_stride),
-            b.pointer,
-            stride(b.column_stride),
-            stride(b.row_stride),
-            1.0,
-            1.0,
-            false,
-            false,
-            false,
-            gemm::Parallelism::None,
-        );
+/// Every tile with every group of `channels`; several groups only where the tiles are few.
+pub(super) fn tasks(tiles: &[Tile], channels: usize) -> Vec<(Tile, Range<usize>)> {
+    let groups = TASKS.div_ceil(tiles.len().max(1));
+    let most = channels.div_ceil(groups).next_multiple_of(8);
+    let mut tasks = Vec::new();
+    for tile in tiles {
+        for first in (0..channels).step_by(most) {
+            tasks.push((*tile, first..(first + most).min(channels)));
+        }
     }
+    tasks
 }
 
 /// Y = W ⋆ X + b.
@@ -73,102 +42,69 @@ pub fn conv2d(shape: &ConvShape, x: &[f32], weight: &[f32], bias: Option<&[f32]>
     if out.is_empty() {
         return;
     }
+    let row_floats = shape.in_channels * shape.stride * (shape.in_width + 2 * shape.padding)
+        + shape.out_channels * (shape.out_width() + 2);
+    let tiles = tiles(shape.batch, 0, shape.out_height(), row_floats);
     let out = SharedMut::new(out);
-    tiles(shape, shape.taps(), 0, shape.batch)
+    tasks(&tiles, shape.out_channels)
         .into_par_iter()
-        .for_each(|tile| forward_tile(shape, tile, x, weight, bias, &out));
+        .for_each(|(tile, channels)| forward_tile(shape, tile, channels, x, weight, bias, &out));
 }
 
 fn forward_tile(
     shape: &ConvShape,
     tile: Tile,
+    channels: Range<usize>,
     x: &[f32],
     weight: &[f32],
     bias: Option<&[f32]>,
     out: &SharedMut<f32>,
 ) {
-    let (taps, area, width) = (shape.taps(), shape.out_area(), shape.out_width());
-    let (columns, channels) = (tile.columns(shape), shape.out_channels);
-    let single = tile.rows <= shape.out_height();
-    let image = tile.first_row / shape.out_height();
-    let offset = (tile.first_row % shape.out_height()) * width;
-    let weights = Operand {
-        pointer: weight.as_ptr(),
-        row_stride: taps,
-        column_stride: 1,
-    };
-
-    let multiply = |b: Operand, to: *mut f32, to_row_stride: usize| {
-        // SAFETY: `to` is this tile's columns, which no other tile has; the operands' sizes are those
-        // of the shape, checked against the slices' lengths above.
-        unsafe {
-            product(
-                (channels, columns, taps),
-                to,
-                (to_row_stride, 1),
-                false,
-                weights,
-                b,
-            );
+    let lattice = Lattice::new(shape.window(), tile);
+    let (columns, taps) = (padded(lattice.columns()), shape.taps());
+    let offsets = shape.tap_offsets(&lattice, 0..shape.in_channels);
+    let source_len = shape.in_channels * lattice.plane_len;
+    with_scratch(source_len + channels.len() * columns, |buffer| {
+        let (source, result) = buffer.split_at_mut(source_len);
+        gather(&lattice, x, shape.in_channels, 0..shape.in_channels, source);
+        TapProduct {
+            weights: &weight[channels.start * taps..channels.end * taps],
+            weight_stride: taps,
+            offsets: &offsets,
+            source,
+            columns,
+            out: result,
+            rows: channels.len(),
         }
-    };
-    let add_bias = |row: &mut [f32], channel: usize| {
-        if let Some(bias) = bias {
-            row.iter_mut().for_each(|v| *v += bias[channel]);
-        }
-    };
-
-    if single {
-        // SAFETY: rows of this tile only; the start is within the output.
-        let to = unsafe { out.at(image * channels * area + offset) };
-        if shape.is_pointwise() {
-            let from = &x[image * shape.in_channels * area..][..shape.in_channels * area];
-            multiply(
-                Operand {
-                    pointer: from[offset..].as_ptr(),
-                    row_stride: area,
-                    column_stride: 1,
-                },
-                to,
-                area,
-            );
-        } else {
-            with_scratch(taps * columns, |matrix| {
-                unfold(shape, tile, 0..shape.in_channels, x, matrix);
-                multiply(rows_of(matrix, columns), to, area);
-            });
-        }
-        if bias.is_some() {
-            for channel in 0..channels {
-                let start = (image * channels + channel) * area + offset;
-                // SAFETY: this tile's columns of one channel.
-                add_bias(unsafe { out.slice(start, columns) }, channel);
-            }
-        }
-        return;
-    }
-    with_scratch((taps + channels) * columns, |buffer| {
-        let (matrix, result) = buffer.split_at_mut(taps * columns);
-        unfold(shape, tile, 0..shape.in_channels, x, matrix);
-        multiply(rows_of(matrix, columns), result.as_mut_ptr(), columns);
-        for piece in tile.pieces(shape) {
-            for channel in 0..channels {
-                let start = (piece.image * channels + channel) * area + piece.y * width;
-                let len = piece.rows * width;
-                // SAFETY: this tile's rows of one image and channel.
-                let to = unsafe { out.slice(start, len) };
-                to.copy_from_slice(&result[channel * columns + piece.column..][..len]);
-                add_bias(to, channel);
+        .run();
+        let (area, width) = (shape.out_area(), shape.out_width());
+        for (channel, result) in channels.clone().zip(result.chunks_exact(columns)) {
+            let bias = bias.map_or(0.0, |b| b[channel]);
+            for image in 0..tile.images {
+                let plane = ((tile.first_image + image) * shape.out_channels + channel) * area;
+                for row in 0..tile.rows {
+                    // SAFETY: a row of this task's tile and channels.
+                    let to = unsafe { out.slice(plane + (tile.first_row + row) * width, width) };
+                    let from = &result[lattice.column(image, row)..][..width];
+                    for (to, from) in to.iter_mut().zip(from) {
+                        *to = from + bias;
+                    }
+                }
             }
         }
     });
 }
 
-/// A row-major matrix with `columns` columns.
-pub(super) fn rows_of(matrix: &[f32], columns: usize) -> Operand {
-    Operand {
-        pointer: matrix.as_ptr(),
-        row_stride: columns,
-        column_stride: 1,
+/// Gathers `wanted` of the `channels` channels of `x` into consecutive planes.
+pub(super) fn gather(
+    lattice: &Lattice,
+    x: &[f32],
+    channels: usize,
+    wanted: Range<usize>,
+    planes: &mut [f32],
+) {
+    let area = lattice.image_area();
+    for (channel, plane) in wanted.zip(planes.chunks_exact_mut(lattice.plane_len)) {
+        lattice.gather(|n| &x[(n * channels + channel) * area..][..area], plane);
     }
 }

@@ -1,24 +1,27 @@
-//! Two-dimensional convolution as tiles of im2col and matrix products.
+//! Two-dimensional convolution and its gradients, without unfolding (im2col).
 //!
-//! With K = C_in·kh·kw, the weights are an O×K matrix W and the unfolded input a K×P matrix X of the
-//! P = N·H_out·W_out output pixels. Then
-//! - forward: Y = W·X + b,
-//! - weight gradient: ∂W = ∂Y·Xᵀ,
-//! - input gradient: ∂X = Wᵀ·∂Y, folded back.
+//! A tile of the input is copied once, padded, into planes in which every tap of the kernel is a shift
+//! ([`lattice`]); one register-blocked loop then reads it through a table of offsets ([`product`]):
+//! - forward: Y\[o, q\] = b\[o\] + Σ_k W\[o, k\]·X\[q + offset k\],
+//! - input gradient: the same over ∂Y with transposed weights; with stride s, one such product for each of
+//!   the s×s residues of the input's rows and columns,
+//! - weight gradient: ∂W\[o, k\] = Σ_q ∂Y\[o, q\]·X\[q + offset k\].
 //!
-//! X is never whole: a tile of output rows is unfolded, used and forgotten while it is in the cache.
-//! Where an image has few pixels (deep layers), a tile spans several images, so that the weights are
-//! read once for all of them.
+//! Tiles are sized for the second cache; where an image has few pixels (deep layers), a tile holds several
+//! images, so that the weights are read once for all of them.
 
-mod backward;
 mod forward;
+mod input_gradient;
+mod lattice;
+mod product;
 mod shape;
-mod tile;
-mod unfold;
+mod transpose;
+mod weight_gradient;
 
-pub use backward::{conv2d_backward_input, conv2d_backward_weight};
 pub use forward::conv2d;
+pub use input_gradient::conv2d_backward_input;
 pub use shape::ConvShape;
+pub use weight_gradient::conv2d_backward_weight;
 
 #[cfg(test)]
 mod tests;

@@ -1,3 +1,6 @@
+use super::lattice::{Lattice, Window};
+use std::ops::Range;
+
 /// The sizes of a convolution. Images are N×C×H×W, weights O×C×kh×kw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConvShape {
@@ -61,9 +64,39 @@ impl ConvShape {
         self.in_height * self.in_width
     }
 
-    /// Whether the unfolded input is the input itself.
-    pub(crate) fn is_pointwise(&self) -> bool {
-        self.kernel_area() == 1 && self.stride == 1 && self.padding == 0
+    /// Distance between the first and the last tap, down and right.
+    pub(super) fn reach(&self) -> (usize, usize) {
+        (
+            (self.kernel_height - 1) * self.dilation,
+            (self.kernel_width - 1) * self.dilation,
+        )
+    }
+
+    /// The taps of one channel, each as its distance (down, right) from the first.
+    pub(super) fn kernel_taps(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let (height, width, step) = (self.kernel_height, self.kernel_width, self.dilation);
+        (0..height).flat_map(move |y| (0..width).map(move |x| (y * step, x * step)))
+    }
+
+    /// How the kernel looks at the input.
+    pub(super) fn window(&self) -> Window {
+        Window {
+            height: self.in_height,
+            width: self.in_width,
+            padding: (self.padding, self.padding),
+            reflect: self.reflect,
+            stride: self.stride,
+            reach: self.reach(),
+            out_width: self.out_width(),
+        }
+    }
+
+    /// Where the taps of channels `channels` read, with these channels' planes one after the other.
+    pub(super) fn tap_offsets(&self, lattice: &Lattice, channels: Range<usize>) -> Vec<usize> {
+        let of_channel: Vec<usize> = self.kernel_taps().map(|t| lattice.offset(t)).collect();
+        channels
+            .flat_map(|c| of_channel.iter().map(move |o| c * lattice.plane_len + o))
+            .collect()
     }
 
     /// Number of input values.

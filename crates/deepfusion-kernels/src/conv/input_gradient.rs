@@ -1,0 +1,234 @@
+use super::{
+    ConvShape,
+    forward::{gather, tasks},
+    lattice::{Lattice, Tile, Window, inside, tiles},
+    product::{TapProduct, padded},
+};
+use crate::{scratch::with_scratch, send_ptr::SharedMut};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// The padded input rows and columns of one residue by the stride: a convolution of ∂Y at stride 1 with
+/// those taps alone that reach them.
+struct Phase {
+    down: usize,
+    right: usize,
+    /// Taps (index in the kernel, distance from the first tap).
+    taps: Vec<(usize, (usize, usize))>,
+    /// Transposed weights, C × (O·taps).
+    weights: Vec<f32>,
+}
+
+/// ∂L/∂X: every input pixel gathers from the outputs it went into.
+///
+/// # Shapes
+/// `weight` O×C×kh×kw, `grad_out` N×O×H_out×W_out, `grad_x` N×C×H×W, overwritten.
+///
+/// # Panics
+/// When a length does not fit `shape`.
+pub fn conv2d_backward_input(
+    shape: &ConvShape,
+    weight: &[f32],
+    grad_out: &[f32],
+    grad_x: &mut [f32],
+) {
+    shape.check();
+    assert_eq!(weight.len(), shape.weight_len(), "weight length");
+    assert_eq!(grad_out.len(), shape.out_len(), "output gradient length");
+    assert_eq!(grad_x.len(), shape.in_len(), "input gradient length");
+    if grad_x.is_empty() {
+        return;
+    }
+    // Elsewhere every value is written exactly once.
+    if shape.stride > 1 || shape.reflect || grad_out.is_empty() {
+        grad_x.par_chunks_mut(1 << 16).for_each(|c| c.fill(0.0));
+    }
+    if grad_out.is_empty() {
+        return;
+    }
+    let (s, p) = (shape.stride, shape.padding);
+    let phases: Vec<Phase> = (0..s * s)
+        .map(|i| phase(shape, weight, i / s, i % s))
+        .filter(|phase| !phase.taps.is_empty())
+        .collect();
+    let window = gradient_window(shape);
+    // Rows of a phase; without reflection those that lie wholly in the padding are left out.
+    let rows = if shape.reflect {
+        0..shape.out_height() + window.padding.0
+    } else {
+        p / s..(p + shape.in_height)
+            .div_ceil(s)
+            .min(shape.out_height() + window.padding.0)
+    };
+    let row_floats = shape.out_channels * (window.width + 2 * window.padding.1)
+        + shape.in_channels * (window.out_width + 2);
+    let tiles = tiles(shape.batch, rows.start, rows.len(), row_floats);
+    let to = SharedMut::new(grad_x);
+    if shape.reflect {
+        // Mirrored rows may fall into the neighbouring tile: the tiles of an image take turns.
+        tiles
+            .chunk_by(|a, b| a.first_image == b.first_image)
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .for_each(|of_image| {
+                for tile in of_image {
+                    let channels = 0..shape.in_channels;
+                    gradient_tile(shape, window, *tile, channels, &phases, grad_out, &to);
+                }
+            });
+    } else {
+        tasks(&tiles, shape.in_channels)
+            .into_par_iter()
+            .for_each(|(tile, channels)| {
+                gradient_tile(shape, window, tile, channels, &phases, grad_out, &to);
+            });
+    }
+}
+
+/// How a phase of the padded input looks at ∂Y.
+fn gradient_window(shape: &ConvShape) -> Window {
+    let (down, right) = shape.reach();
+    let reach = (down / shape.stride, right / shape.stride);
+    Window {
+        height: shape.out_height(),
+        width: shape.out_width(),
+        padding: reach,
+        reflect: false,
+        stride: 1,
+        reach,
+        out_width: shape.out_width() + reach.1,
+    }
+}
+
+fn phase(shape: &ConvShape, weight: &[f32], down: usize, right: usize) -> Phase {
+    let s = shape.stride;
+    let taps: Vec<_> = shape
+        .kernel_taps()
+        .enumerate()
+        .filter(|(_, (y, x))| y % s == down && x % s == right)
+        .collect();
+    let (area, channels) = (shape.kernel_area(), shape.in_channels);
+    let row = shape.out_channels * taps.len();
+    let mut weights = vec![0.0; channels * row];
+    let whole = taps.len() == area;
+    weights
+        .par_chunks_mut((8 * row).max(1))
+        .enumerate()
+        .for_each(|(group, to)| {
+            for output in 0..shape.out_channels {
+                let from = &weight[(output * channels + group * 8) * area..];
+                for (to, from) in to.chunks_exact_mut(row).zip(from.chunks_exact(area)) {
+                    let to = &mut to[output * taps.len()..][..taps.len()];
+                    if whole {
+                        to.copy_from_slice(from);
+                    } else {
+                        for (to, (tap, _)) in to.iter_mut().zip(&taps) {
+                            *to = from[*tap];
+                        }
+                    }
+                }
+            }
+        });
+    Phase {
+        down,
+        right,
+        taps,
+        weights,
+    }
+}
+
+fn gradient_tile(
+    shape: &ConvShape,
+    window: Window,
+    tile: Tile,
+    channels: Range<usize>,
+    phases: &[Phase],
+    grad_out: &[f32],
+    to: &SharedMut<f32>,
+) {
+    let lattice = Lattice::new(window, tile);
+    let columns = padded(lattice.columns());
+    let source_len = shape.out_channels * lattice.plane_len;
+    with_scratch(source_len + channels.len() * columns, |buffer| {
+        let (source, result) = buffer.split_at_mut(source_len);
+        let outputs = 0..shape.out_channels;
+        gather(&lattice, grad_out, shape.out_channels, outputs, source);
+        for phase in phases {
+            let offsets: Vec<usize> = (0..shape.out_channels)
+                .flat_map(|o| {
+                    phase.taps.iter().map(move |(_, (y, x))| {
+                        let (y, x) = (y / shape.stride, x / shape.stride);
+                        let shift = (window.reach.0 - y, window.reach.1 - x);
+                        o * lattice.plane_len + lattice.offset(shift)
+                    })
+                })
+                .collect();
+            let row = offsets.len();
+            TapProduct {
+                weights: &phase.weights[channels.start * row..channels.end * row],
+                weight_stride: row,
+                offsets: &offsets,
+                source,
+                columns,
+                out: &mut *result,
+                rows: channels.len(),
+            }
+            .run();
+            for (channel, result) in channels.clone().zip(result.chunks_exact(columns)) {
+                scatter(shape, &lattice, tile, phase, channel, result, to);
+            }
+        }
+    });
+}
+
+/// Writes one channel of a phase to the pixels it belongs to; mirrored margins are added to theirs.
+fn scatter(
+    shape: &ConvShape,
+    lattice: &Lattice,
+    tile: Tile,
+    phase: &Phase,
+    channel: usize,
+    result: &[f32],
+    to: &SharedMut<f32>,
+) {
+    let (s, p) = (shape.stride, shape.padding);
+    let (height, width) = (shape.in_height, shape.in_width);
+    let count = shape.out_width() + shape.reach().1 / s;
+    // Columns whose pixel lies inside: 0 <= s·x + right − p < width.
+    let first = p.saturating_sub(phase.right).div_ceil(s).min(count);
+    let last = (width + p)
+        .saturating_sub(phase.right)
+        .div_ceil(s)
+        .clamp(first, count);
+    for image in 0..tile.images {
+        let plane = ((tile.first_image + image) * shape.in_channels + channel) * height * width;
+        for row in 0..tile.rows {
+            let y = (tile.first_row + row) * s + phase.down;
+            let Some(y) = inside(y, p, height, shape.reflect) else {
+                continue;
+            };
+            // SAFETY: rows of this task's images and channels; tasks with the same image have other rows,
+            // or, with reflection, run one after the other.
+            let to = unsafe { to.slice(plane + y * width, width) };
+            let from = &result[lattice.column(image, row)..][..count];
+            let start = first * s + phase.right;
+            let body = &from[first..last];
+            if shape.reflect {
+                for x in (0..first).chain(last..count) {
+                    if let Some(at) = inside(x * s + phase.right, p, width, true) {
+                        to[at] += from[x];
+                    }
+                }
+            }
+            if body.is_empty() {
+                continue;
+            }
+            let to = to[start - p..].iter_mut().step_by(s).zip(body);
+            if shape.reflect {
+                to.for_each(|(to, from)| *to += *from);
+            } else {
+                to.for_each(|(to, from)| *to = *from);
+            }
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! Padded pieces of images in which every tap of a kernel is a shift.
+
+use super::product::LANES;
+
+/// Floats a tile's padded input and its output may take: they should stay in the second cache.
+const TILE_FLOATS: usize = 1 << 17;
+
+/// Rows of one image, or all rows of several.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Tile {
+    pub(super) first_image: usize,
+    pub(super) images: usize,
+    pub(super) first_row: usize,
+    pub(super) rows: usize,
+}
+
+/// Cuts `images` images of `rows` rows, `first_row` on, into tiles of about [`TILE_FLOATS`], where a row
+/// takes `row_floats`.
+pub(super) fn tiles(
+    images: usize,
+    first_row: usize,
+    rows: usize,
+    row_floats: usize,
+) -> Vec<Tile> {
+    let wanted = (TILE_FLOATS / row_floats.max(1)).max(1);
+    let whole = wanted / rows.max(1);
+    let mut tiles = Vec::new();
+    if whole >= 2 {
+        // Equal tiles: a last one of a single image would waste most of a product.
+        let groups = images.div_ceil(whole);
+        for g in 0..groups {
+            let first_image = g * images / groups;
+            tiles.push(Tile {
+                first_image,
+                images: (g + 1) * images / groups - first_image,
+                first_row,
+                rows,
+            });
+        }
+        return tiles;
+    }
+    let parts = rows.div_ceil(wanted);
+    for first_image in 0..images {
+        for part in 0..parts {
+            let start = part * rows / parts;
+            tiles.push(Tile {
+                first_image,
+                images: 1,
+                first_row: first_row + start,
+                rows: (part + 1) * rows / parts - start,
+            });
+        }
+    }
+    tiles
+}
+
+/// How a kernel looks at an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Window {
+    pub(super) height: usize,
+    pub(super) width: usize,
+    /// Rows above and below, columns left and right.
+    pub(super) padding: (usize, usize),
+    /// The padding mirrors the image instead of being zero.
+    pub(super) reflect: bool,
+    pub(super) stride: usize,
+    /// Distance between the first and the last tap, down and right.
+    pub(super) reach: (usize, usize),
+    /// Pixels of an output row.
+    pub(super) out_width: usize,
+}
+
+/// A tile's padded input: tap (down, right) of the output pixel in column q reads
+/// `q + offset(down, right)` of its channel's plane.
+///
+/// With stride s a plane is s×s phases, each every s-th row and column, which the taps read at stride 1.
+/// Zero padding is shared: a row's right margin is the next one's left, an image's foot the next one's head.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lattice {
+    window: Window,
+    tile: Tile,
+    /// Distance between the rows of a phase.
+    pub(super) pitch: usize,
+    /// Distance between the images of a phase, in rows.
+    image_rows: usize,
+    phase_len: usize,
+    /// Length of a channel's plane.
+    pub(super) plane_len: usize,
+}
+
+impl Lattice {
+    pub(super) fn new(window: Window, tile: Tile) -> Self {
+        let (down, right) = (window.reach.0 / window.stride, window.reach.1 / window.stride);
+        let shared = !window.reflect && window.stride == 1;
+        let pitch = if shared {
+            (window.width + window.padding.1).max(window.out_width)
+        } else {
+            window.out_width + right
+        };
+        let image_rows = if shared && tile.images > 1 {
+            (window.height + window.padding.0).max(tile.rows)
+        } else {
+            tile.rows + down
+        };
+        // The last pixels' taps reach past the last row; the last vector a little further.
+        let slack = (down + 1) * pitch + right + LANES;
+        let phase_len = tile.images * image_rows * pitch + slack;
+        Self {
+            window,
+            tile,
+            pitch,
+            image_rows,
+            phase_len,
+            plane_len: window.stride * window.stride * phase_len,
+        }
+    }
+
+    /// Pixels of an image's channel.
+    pub(super) fn image_area(&self) -> usize {
+        self.window.height * self.window.width
+    }
+
+    /// Columns of a product over the whole tile, margins between its rows included.
+    pub(super) fn columns(&self) -> usize {
+        self.column(self.tile.images - 1, self.tile.rows - 1) + self.window.out_width
+    }
+
+    /// Column of the first pixel of a row of the tile's n-th image.
+    pub(super) fn column(&self, image: usize, row: usize) -> usize {
+        (image * self.image_rows + row) * self.pitch
+    }
+
+    /// Columns of all output pixels, in order.
+    pub(super) fn pixels(&self) -> Vec<usize> {
+        let mut pixels = Vec::new();
+        for image in 0..self.tile.images {
+            for row in 0..self.tile.rows {
+                let first = self.column(image, row);
+                pixels.extend(first..first + self.window.out_width);
+            }
+        }
+        pixels
+    }
+
+    /// Where a tap that lies `down` and `right` of the first one reads, in a channel's plane.
+    pub(super) fn offset(&self, (down, right): (usize, usize)) -> usize {
+        let s = self.window.stride;
+        ((down % s) * s + right % s) * self.phase_len + (down / s) * self.pitch + right / s
+    }
+
+    /// Copies a channel of the tile's images, `image(n)` that of the n-th image of the batch, into its
+    /// padded plane.
+    pub(super) fn gather<'a>(&self, image: impl Fn(usize) -> &'a [f32], plane: &mut [f32]) {
+        let s = self.window.stride;
+        for (index, phase) in plane.chunks_exact_mut(self.phase_len).enumerate() {
+            let shift = (index / s, index % s);
+            for n in 0..self.tile.images {
+                let from = image(self.tile.first_image + n);
+                let start = self.column(n, 0);
+                let rows = &mut phase[start..][..self.image_rows * self.pitch];
+                for (row, to) in rows.chunks_exact_mut(self.pitch).enumerate() {
+                    self.gather_row(from, row, shift, to);
+                }
+            }
+            phase[self.column(self.tile.images, 0)..].fill(0.0);
+        }
+    }
+
+    fn gather_row(&self, image: &[f32], row: usize, (down, right): (usize, usize), to: &mut [f32]) {
+        let Window {
+            height,
+            width,
+            padding,
+            reflect,
+            stride,
+            ..
+        } = self.window;
+        let y = (self.tile.first_row + row) * stride + down;
+        let Some(y) = inside(y, padding.0, height, reflect) else {
+            to.fill(0.0);
+            return;
+        };
+        let from = &image[y * width..][..width];
+        // Columns whose source lies inside: 0 <= stride·x + right − padding < width.
+        let first = padding.1.saturating_sub(right).div_ceil(stride).min(to.len());
+        let last = (width + padding.1)
+            .saturating_sub(right)
+            .div_ceil(stride)
+            .clamp(first, to.len());
+        for x in (0..first).chain(last..to.len()) {
+            let source = inside(x * stride + right, padding.1, width, reflect);
+            to[x] = source.map_or(0.0, |x| from[x]);
+        }
+        if first == last {
+            return;
+        }
+        let from = &from[first * stride + right - padding.1..];
+        let to = &mut to[first..last];
+        if stride == 1 {
+            to.copy_from_slice(&from[..to.len()]);
+        } else {
+            for (value, from) in to.iter_mut().zip(from.iter().step_by(stride)) {
+                *value = *from;
+            }
+        }
+    }
+}
+
+/// The index that position `i` of an axis of `n` values with `padding` before it reads; `None` is zero.
+pub(super) fn inside(i: usize, padding: usize, n: usize, reflect: bool) -> Option<usize> {
+    if i >= padding && i - padding < n {
+        return Some(i - padding);
+    }
+    if !reflect {
+        return None;
+    }
+    if i < padding {
+        return (padding - i < n).then(|| padding - i);
+    }
+    // Past the mirrored margin there is only slack, which no pixel reads.
+    (2 * (n - 1)).checked_sub(i - padding)
+}
