@@ -3,7 +3,10 @@
 //! x̂ = (x − μ_c)/√(σ²_c + ε), y = γ_c·x̂ + β_c; μ and σ² over images and pixels (σ² without Bessel's
 //! correction).
 
-use crate::{activation::sum, send_ptr::SharedMut};
+use crate::{
+    lanes::{sum, sum_product},
+    send_ptr::SharedMut,
+};
 use rayon::prelude::*;
 
 /// What the backward pass needs of the forward pass, and what the running statistics are made of.
@@ -32,19 +35,6 @@ fn sum_squares(values: &[f32], shift: f32) -> f32 {
         }
     }
     lanes.iter().sum::<f32>() + rest.iter().map(|v| (v - shift) * (v - shift)).sum::<f32>()
-}
-
-/// Sums of a·b and of a in lanes.
-fn sum_product(a: &[f32], b: &[f32]) -> f32 {
-    let mut lanes = [0.0f32; 16];
-    let (ca, ra) = a.as_chunks::<16>();
-    let (cb, rb) = b.as_chunks::<16>();
-    for (a, b) in ca.iter().zip(cb) {
-        for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
-            *lane += *a * *b;
-        }
-    }
-    lanes.iter().sum::<f32>() + ra.iter().zip(rb).map(|(a, b)| a * b).sum::<f32>()
 }
 
 /// Normalises with the batch's own statistics.

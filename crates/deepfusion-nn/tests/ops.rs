@@ -193,6 +193,53 @@ fn warp_and_photometric_error() {
     assert_close("coords", a.3, b.3);
 }
 
+#[test]
+fn projection_and_smoothness() {
+    let device = Device::flex().autodiff();
+    let depth = random([2, 1, 5, 7], &device).abs().add_scalar(0.05);
+    let turn = Tensor::<3>::from_data(
+        [
+            [[1.0, 0.02, 0.5], [-0.01, 0.98, 0.3], [0.002, -0.001, 1.0]],
+            [[0.9, -0.03, 0.1], [0.02, 1.1, -0.4], [-0.01, 0.03, 1.0]],
+        ],
+        &device,
+    );
+    // The second image has points behind the camera.
+    let shift = Tensor::<2>::from_data([[3.0, -1.0, -0.5], [-2.0, 1.5, -2.0]], &device);
+    let image = random([2, 3, 5, 7], &device);
+    let run = |ours: bool| {
+        let (d, h, s) = (leaf(&depth), leaf(&turn), leaf(&shift));
+        let (coords, smooth) = if ours {
+            (
+                ops::project(d.clone(), h.clone(), s.clone()),
+                ops::smoothness(d.clone(), image.clone()),
+            )
+        } else {
+            (
+                ops::composed_project(d.clone(), h.clone(), s.clone()),
+                ops::composed_smoothness(d.clone(), image.clone()),
+            )
+        };
+        let gradients = (weigh(coords.clone()) + smooth.clone()).backward();
+        let view = ops::in_view(coords.clone(), [5, 7]).float().inner();
+        (
+            coords.inner(),
+            smooth.inner(),
+            view,
+            d.grad(&gradients).unwrap(),
+            h.grad(&gradients).unwrap(),
+            s.grad(&gradients).unwrap(),
+        )
+    };
+    let (a, b) = (run(true), run(false));
+    assert_close("coords", a.0, b.0);
+    assert_close("smoothness", a.1, b.1);
+    assert_close("in view", a.2, b.2);
+    assert_close("inverse depth", a.3, b.3);
+    assert_close("homography", a.4, b.4);
+    assert_close("shift", a.5, b.5);
+}
+
 /// Without autodiff the same operations run plainly.
 #[test]
 fn inference_runs_the_same_kernels() {

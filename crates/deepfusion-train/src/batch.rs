@@ -1,4 +1,4 @@
-use crate::{Error, Jitter, SampleSet, Sampler, TrainConfig, sampler::stream};
+use crate::{Error, Jitter, Motion, SampleSet, Sampler, TrainConfig, sampler::stream};
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_data::{resize_rgb, to_chw};
 use deepfusion_geometry::Se3;
@@ -28,8 +28,8 @@ pub struct SnippetBatch {
     pub inverse_intrinsics: Tensor<3>,
     /// Length of the camera's translation by source, each B, in metres.
     pub distance_m: Vec<Tensor<1>>,
-    /// Rotation of `source_from_target` by source, each B×3×3.
-    pub rotation: Vec<Tensor<3>>,
+    /// `source_from_target` of the camera by the vehicle's sensors, by source, B each.
+    pub measured: Vec<Motion>,
     /// Offsets of the sources.
     pub offsets: Vec<i32>,
     /// Drive and frame of each target.
@@ -58,6 +58,7 @@ struct RawBatch {
     inverse_intrinsics: Vec<f32>,
     distance_m: Vec<Vec<f32>>,
     rotation: Vec<Vec<f32>>,
+    translation: Vec<Vec<f32>>,
     offsets: Vec<i32>,
     names: Vec<String>,
 }
@@ -171,7 +172,15 @@ impl BatchLoader {
             intrinsics: matrices(raw.intrinsics),
             inverse_intrinsics: matrices(raw.inverse_intrinsics),
             distance_m: raw.distance_m.into_iter().map(vectors).collect(),
-            rotation: raw.rotation.into_iter().map(matrices).collect(),
+            measured: raw
+                .rotation
+                .into_iter()
+                .zip(raw.translation)
+                .map(|(r, t)| Motion {
+                    rotation: matrices(r),
+                    translation: Tensor::from_data(TensorData::new(t, [n, 3]), device),
+                })
+                .collect(),
             offsets: raw.offsets,
             names: raw.names,
         }))
@@ -184,7 +193,8 @@ struct Item {
     network: Vec<Vec<f32>>,
     intrinsics: [f32; 9],
     inverse_intrinsics: [f32; 9],
-    motion: Vec<(f32, [f32; 9])>,
+    /// Distance, rotation and translation by source.
+    motion: Vec<(f32, [f32; 9], [f32; 3])>,
 }
 
 impl Maker {
@@ -216,7 +226,11 @@ impl Maker {
                 .map(|s| items.iter().map(|i| i.motion[s].0).collect())
                 .collect(),
             rotation: sources
+                .clone()
                 .map(|s| items.iter().flat_map(|i| i.motion[s].1).collect())
+                .collect(),
+            translation: sources
+                .map(|s| items.iter().flat_map(|i| i.motion[s].2).collect())
                 .collect(),
             offsets: self.config.frames.clone(),
             names: samples.iter().map(|s| self.set.name(*s)).collect(),
@@ -268,6 +282,7 @@ impl Maker {
                 (
                     source.motion.distance_m as f32,
                     row_major(&motion.rotation()),
+                    motion.translation().map(|v| v as f32).into(),
                 )
             })
             .collect();

@@ -139,6 +139,11 @@ pub struct TrainConfig {
     /// A PoseNet that starts out driving ahead by the data's mean displacement, instead of standing.
     /// Needs the frames in time order, so it has no effect where the reversed pose is predicted.
     pub start_moving: bool,
+    /// Share of the run, from its start, in which the views are synthesised with the motion that the
+    /// vehicle measured (speed and yaw rate, SPEC 3.4). PoseNet learns that motion meanwhile, and depth
+    /// does not have to wait for it. 0: PoseNet's motion from the first step on, as in the paper.
+    #[serde(default)]
+    pub measured_motion_share: f64,
     /// The camera trained with, at network size; filled in from the data. Several cameras: the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Intrinsics>,
@@ -210,6 +215,10 @@ impl TrainConfig {
         if !(0.0..=1.0).contains(&self.learning_rate_drop) {
             let found = self.learning_rate_drop.to_string();
             return fail("learning_rate_drop", "0 to 1", found);
+        }
+        if !(0.0..=1.0).contains(&self.measured_motion_share) {
+            let found = self.measured_motion_share.to_string();
+            return fail("measured_motion_share", "0 to 1", found);
         }
         if !(0.0..=0.5).contains(&self.validation_share) {
             return fail(

@@ -1,6 +1,6 @@
 //! Learning metric depth from a drive: view synthesis, losses, the trainer and its checkpoints.
 //!
-//! The way of a training step: [`Sampler`] → [`SnippetBatch`] → [`Model`] → [`ViewSynthesis`] →
+//! The way of a training step: [`Sampler`] → [`SnippetBatch`] → [`Model`] → [`synthesise`] →
 //! [`LossTerms`] → [`Adam`] → [`TrainEvent`]. The trainer prints nothing: whoever runs it reads its
 //! events.
 
@@ -41,4 +41,4 @@ pub use resample::BilinearResize;
 pub use sampler::Sampler;
 pub use source::{Sample, SampleSet};
 pub use trainer::{TrainSummary, Trainer, validation_loss};
-pub use view_synthesis::{Synthesised, ViewSynthesis};
+pub use view_synthesis::{Synthesised, synthesise};

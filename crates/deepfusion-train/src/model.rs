@@ -1,6 +1,6 @@
 use crate::config::{Reprojection, ReversedPose};
 use crate::losses::{self, LossTerms, ReprojectionOutput, View};
-use crate::{BilinearResize, Error, Motion, SnippetBatch, TrainConfig, ViewSynthesis};
+use crate::{BilinearResize, Error, Motion, SnippetBatch, TrainConfig, synthesise};
 use burn::module::Module;
 use burn::tensor::module::avg_pool2d;
 use burn::tensor::ops::AvgPoolOptions;
@@ -16,7 +16,6 @@ pub struct Model {
     /// Motion between two.
     pub pose_net: PoseNet,
     config: TrainConfig,
-    synthesis: ViewSynthesis,
     /// From scale s to full resolution.
     enlarge: Vec<BilinearResize>,
 }
@@ -26,8 +25,10 @@ pub struct Model {
 pub struct ForwardPass {
     /// Sigmoid disparities of the targets by scale, T×1×H/2ˢ×W/2ˢ.
     pub disparities: Vec<Tensor<4>>,
-    /// `source_from_target` by view, T each.
+    /// `source_from_target` by PoseNet, by view, T each.
     pub motions: Vec<Motion>,
+    /// The same by the vehicle's sensors.
+    pub measured: Vec<Motion>,
     /// Clean images of the targets, T×3×H×W.
     pub targets: Tensor<4>,
     /// Clean images of the sources by view, T×3×H×W.
@@ -36,6 +37,35 @@ pub struct ForwardPass {
     pub intrinsics: Tensor<3>,
     /// K⁻¹ of the targets, T×3×3.
     pub inverse_intrinsics: Tensor<3>,
+}
+
+/// Whose motion the views of a batch are synthesised with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ViewMotion {
+    /// PoseNet's.
+    Predicted,
+    /// The vehicle's sensors'.
+    Measured,
+}
+
+impl ViewMotion {
+    /// That of a step, counted from 0.
+    pub(crate) fn at(config: &TrainConfig, step: usize, steps: usize) -> Self {
+        if step as f64 >= config.measured_motion_share * steps as f64 {
+            Self::Predicted
+        } else {
+            Self::Measured
+        }
+    }
+
+    /// That of a run's last step.
+    pub(crate) fn at_end(config: &TrainConfig) -> Self {
+        if config.measured_motion_share < 1.0 {
+            Self::Predicted
+        } else {
+            Self::Measured
+        }
+    }
 }
 
 /// The loss of a batch: the sum to differentiate, its terms, and what the finest scale saw.
@@ -98,7 +128,6 @@ impl Model {
             depth_net,
             pose_net,
             config: config.clone(),
-            synthesis: ViewSynthesis::new(height, width, device),
             enlarge,
         }
     }
@@ -150,6 +179,10 @@ impl Model {
         ForwardPass {
             disparities: self.depth_net.forward(pair(first, second, 0)),
             motions: vec![motion],
+            measured: vec![Motion::cat(vec![
+                batch.measured[0].clone(),
+                batch.measured[0].inverse(),
+            ])],
             targets: pair(&batch.clean[0], &batch.clean[1], 0),
             sources: vec![pair(&batch.clean[1], &batch.clean[0], 0)],
             intrinsics: twice(&batch.intrinsics),
@@ -187,6 +220,7 @@ impl Model {
         ForwardPass {
             disparities: self.depth_net.forward(target.clone()),
             motions: motions.collect(),
+            measured: batch.measured.clone(),
             targets: batch.clean[0].clone(),
             sources: batch.clean[1..].to_vec(),
             intrinsics: batch.intrinsics.clone(),
@@ -199,12 +233,14 @@ impl Model {
         Motion::new(pose.axis_angle, pose.translation)
     }
 
-    /// The loss of a forward pass, with λ_v as given: L = Σ_s ¼(L_rp + λ_s·L_smooth) + λ_v·L_speed.
+    /// The loss of a forward pass, with λ_v as given: L = Σ_s ¼(L_rp + λ_s·L_smooth) + λ_v·L_speed. The
+    /// views are synthesised with `motion`.
     pub(crate) fn loss(
         &self,
         pass: &ForwardPass,
         batch: &SnippetBatch,
         speed_weight: f64,
+        motion: ViewMotion,
     ) -> BatchLoss {
         let settings = &self.config.loss;
         let range = self.range();
@@ -221,20 +257,24 @@ impl Model {
                 )
             })
             .collect();
+        let motions = match motion {
+            ViewMotion::Predicted => &pass.motions,
+            ViewMotion::Measured => &pass.measured,
+        };
+        let pyramid = pyramid(pass.targets.clone());
         let (mut reprojection, mut smooth) = (Vec::new(), Vec::new());
         let mut finest = None;
         for (scale, disparity) in pass.disparities.iter().enumerate() {
-            let depth_m = self.enlarge[scale]
+            let inverse_depth = self.enlarge[scale]
                 .apply(disparity.clone())
                 .mul_scalar(high - low)
-                .add_scalar(low)
-                .recip();
+                .add_scalar(low);
             let mut first_warp = None;
-            let views = pass.sources.iter().zip(&pass.motions).zip(&unwarped).map(
+            let views = pass.sources.iter().zip(motions).zip(&unwarped).map(
                 |((source, motion), unwarped_error)| {
-                    let synthesised = self.synthesis.forward(
+                    let synthesised = synthesise(
                         source.clone(),
-                        depth_m.clone(),
+                        inverse_depth.clone(),
                         motion,
                         &pass.intrinsics,
                         &pass.inverse_intrinsics,
@@ -255,7 +295,7 @@ impl Model {
             );
             reprojection.push(output.loss.clone());
             if settings.smoothness > 0.0 {
-                let image = shrink(pass.targets.clone(), 1 << scale);
+                let image = pyramid[scale].clone();
                 let weight = 1.0 / f64::from(1_u32 << scale);
                 smooth.push(losses::smoothness(disparity.clone(), image).mul_scalar(weight));
             }
@@ -283,7 +323,12 @@ impl Model {
             total = total + smooth.mul_scalar(settings.smoothness);
         }
         if settings.speed > 0.0 {
-            let speed = self.speed_loss(pass, batch);
+            let speed = match motion {
+                ViewMotion::Predicted => self.speed_loss(pass, batch),
+                ViewMotion::Measured => mean_of(pass.motions.iter().zip(&pass.measured), |pair| {
+                    losses::motion(pair.0, pair.1)
+                }),
+            };
             terms.speed = number(&speed);
             total = total + speed.mul_scalar(speed_weight);
         }
@@ -298,22 +343,31 @@ impl Model {
 
     fn speed_loss(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Tensor<1> {
         let weight = self.config.loss.rotation;
-        let views = pass.motions.len() as f64;
-        let losses = pass.motions.iter().enumerate().map(|(view, motion)| {
-            let (mut distance, mut rotation) =
-                (batch.distance_m[view].clone(), batch.rotation[view].clone());
-            if self.config.reprojection == Reprojection::Bidirectional {
-                // The second half of the targets looks back: Rᵀ.
-                distance = Tensor::cat(vec![distance.clone(), distance], 0);
-                rotation = Tensor::cat(vec![rotation.clone(), rotation.swap_dims(1, 2)], 0);
-            }
-            losses::speed(motion, distance, &rotation, weight)
-        });
-        losses
-            .reduce(|a, b| a + b)
-            .expect("a target has at least one source: the configuration is validated")
-            .mul_scalar(1.0 / views)
+        let bidirectional = self.config.reprojection == Reprojection::Bidirectional;
+        let views = pass.motions.iter().zip(&pass.measured);
+        mean_of(
+            views.zip(&batch.distance_m),
+            |((motion, measured), distance)| {
+                // With two directions the second half of the targets looks back, as far.
+                let distance = if bidirectional {
+                    Tensor::cat(vec![distance.clone(), distance.clone()], 0)
+                } else {
+                    distance.clone()
+                };
+                losses::speed(motion, distance, &measured.rotation, weight)
+            },
+        )
     }
+}
+
+/// The mean of a loss over views.
+fn mean_of<T>(views: impl ExactSizeIterator<Item = T>, loss: impl Fn(T) -> Tensor<1>) -> Tensor<1> {
+    let count = views.len() as f64;
+    views
+        .map(loss)
+        .reduce(|a, b| a + b)
+        .expect("a target has at least one source: the configuration is validated")
+        .mul_scalar(1.0 / count)
 }
 
 /// The share of true pixels.
@@ -321,13 +375,14 @@ fn share(mask: &Tensor<4, burn::tensor::Bool>) -> f64 {
     f64::from(mask.clone().float().mean().into_scalar::<f32>())
 }
 
-/// The image at 1/`factor` of its size, by the mean of blocks.
-fn shrink(image: Tensor<4>, factor: usize) -> Tensor<4> {
-    if factor == 1 {
-        return image;
+/// The image at every scale, each by the mean of 2×2 blocks of the one before.
+fn pyramid(image: Tensor<4>) -> Vec<Tensor<4>> {
+    let mut images = vec![image];
+    for scale in 1..SCALES {
+        let options = AvgPoolOptions::new([2, 2]).with_stride([2, 2]);
+        images.push(avg_pool2d(images[scale - 1].clone(), options));
     }
-    let options = AvgPoolOptions::new([factor, factor]).with_stride([factor, factor]);
-    avg_pool2d(image, options)
+    images
 }
 
 /// The pose network with a bias that means one unit of translation ahead: a point of frame 0 has a

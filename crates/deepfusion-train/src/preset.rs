@@ -54,6 +54,7 @@ impl Preset {
             validation_share: 0.1,
             validate_every: 0,
             start_moving: false,
+            measured_motion_share: 0.0,
             camera: None,
             data: DataConfig::default(),
             loss: LossConfig {

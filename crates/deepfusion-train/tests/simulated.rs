@@ -6,7 +6,7 @@ use deepfusion_geometry::Se3;
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{
     BatchLoader, CheckpointKind, Control, Error, LossTerms, Motion, Preset, RunFolder, SampleSet,
-    TrainConfig, TrainEvent, Trainer, ViewSynthesis,
+    TrainConfig, TrainEvent, Trainer, synthesise,
 };
 use std::path::Path;
 
@@ -46,20 +46,19 @@ fn the_true_depth_and_motion_reproduce_the_other_frame() {
     let simulation = street(12);
     let (h, w) = (192, 640);
     let k = simulation.intrinsics();
-    let synthesis = ViewSynthesis::new(h, w, &device);
     for (a, b) in [(3, 4), (9, 8)] {
         let (target, source) = (simulation.frame(a), simulation.frame(b));
         let source_from_target = source.world_from_cam.inverse() * target.world_from_cam;
         let image = |rgb| Tensor::from_data(TensorData::new(to_chw(rgb), [1, 3, h, w]), &device);
         // The sky has no depth; far away it does not move with the camera's translation.
-        let depth: Vec<f32> = target
+        let inverse: Vec<f32> = target
             .depth
             .data
             .iter()
-            .map(|d| if *d > 0.0 { *d } else { 1e6 })
+            .map(|d| if *d > 0.0 { 1.0 / *d } else { 1e-6 })
             .collect();
-        let depth = Tensor::from_data(TensorData::new(depth, [1, 1, h, w]), &device);
-        let out = synthesis.forward(
+        let depth = Tensor::from_data(TensorData::new(inverse, [1, 1, h, w]), &device);
+        let out = synthesise(
             image(&source.rgb),
             depth,
             &motion(&source_from_target, &device),

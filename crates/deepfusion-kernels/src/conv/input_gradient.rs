@@ -56,9 +56,10 @@ pub fn conv2d_backward_input(
     let rows = if shape.reflect {
         0..shape.out_height() + window.padding.0
     } else {
-        p / s..(p + shape.in_height)
-            .div_ceil(s)
-            .min(shape.out_height() + window.padding.0)
+        p / s
+            ..(p + shape.in_height)
+                .div_ceil(s)
+                .min(shape.out_height() + window.padding.0)
     };
     let row_floats = shape.out_channels * (window.width + 2 * window.padding.1)
         + shape.in_channels * (window.out_width + 2);

@@ -16,12 +16,7 @@ pub(super) struct Tile {
 
 /// Cuts `images` images of `rows` rows, `first_row` on, into tiles of about [`TILE_FLOATS`], where a row
 /// takes `row_floats`.
-pub(super) fn tiles(
-    images: usize,
-    first_row: usize,
-    rows: usize,
-    row_floats: usize,
-) -> Vec<Tile> {
+pub(super) fn tiles(images: usize, first_row: usize, rows: usize, row_floats: usize) -> Vec<Tile> {
     let wanted = (TILE_FLOATS / row_floats.max(1)).max(1);
     let whole = wanted / rows.max(1);
     let mut tiles = Vec::new();
@@ -90,7 +85,10 @@ pub(super) struct Lattice {
 
 impl Lattice {
     pub(super) fn new(window: Window, tile: Tile) -> Self {
-        let (down, right) = (window.reach.0 / window.stride, window.reach.1 / window.stride);
+        let (down, right) = (
+            window.reach.0 / window.stride,
+            window.reach.1 / window.stride,
+        );
         let shared = !window.reflect && window.stride == 1;
         let pitch = if shared {
             (window.width + window.padding.1).max(window.out_width)
@@ -182,7 +180,11 @@ impl Lattice {
         };
         let from = &image[y * width..][..width];
         // Columns whose source lies inside: 0 <= stride·x + right − padding < width.
-        let first = padding.1.saturating_sub(right).div_ceil(stride).min(to.len());
+        let first = padding
+            .1
+            .saturating_sub(right)
+            .div_ceil(stride)
+            .min(to.len());
         let last = (width + padding.1)
             .saturating_sub(right)
             .div_ceil(stride)

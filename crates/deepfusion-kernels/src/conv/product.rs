@@ -207,7 +207,8 @@ impl WithSimd for TapProduct<'_> {
         } = self;
         let most = most_rows::<S>();
         for first in (0..offsets.len().max(1)).step_by(TAPS_AT_ONCE) {
-            let taps = &offsets[first.min(offsets.len())..(first + TAPS_AT_ONCE).min(offsets.len())];
+            let taps =
+                &offsets[first.min(offsets.len())..(first + TAPS_AT_ONCE).min(offsets.len())];
             let mut m = 0;
             while m < rows {
                 let height = rows_at_once(rows - m, most);

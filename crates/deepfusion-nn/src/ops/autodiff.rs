@@ -144,6 +144,49 @@ impl<B: KernelBackward> Backward<B, 2> for Warp {
 }
 
 #[derive(Debug)]
+struct Project;
+
+impl<B: KernelBackward> Backward<B, 3> for Project {
+    type State = [FloatTensor<B>; 3];
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 3>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let [inverse_depth, homography, shift] = ops.state;
+        let grad = grads.consume::<B>(&ops.node);
+        let gradients = B::project_grad(inverse_depth, homography, shift, grad);
+        for (node, grad) in ops.parents.into_iter().zip(gradients) {
+            if let Some(node) = node {
+                grads.register::<B>(node.id, grad);
+            }
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Smoothness;
+
+impl<B: KernelBackward> Backward<B, 1> for Smoothness {
+    type State = (FloatTensor<B>, FloatTensor<B>);
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 1>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let (disparity, image) = ops.state;
+        let grad = grads.consume::<B>(&ops.node);
+        if let [Some(node)] = ops.parents {
+            grads.register::<B>(node.id, B::smoothness_grad(disparity, image, grad));
+        }
+    }
+}
+
+#[derive(Debug)]
 struct Photometric;
 
 impl<B: KernelBackward> Backward<B, 1> for Photometric {
@@ -220,6 +263,34 @@ where
         let output = B::kernel_warp(image.clone(), coords.clone());
         let nodes = [image_node, coords_node];
         record!(Warp, C, nodes, output, (image, coords))
+    }
+
+    fn kernel_project(
+        inverse_depth: FloatTensor<Self>,
+        homography: FloatTensor<Self>,
+        shift: FloatTensor<Self>,
+    ) -> FloatTensor<Self> {
+        let (inverse_depth, depth_node) = inverse_depth.into_parts();
+        let (homography, homography_node) = homography.into_parts();
+        let (shift, shift_node) = shift.into_parts();
+        let output = B::kernel_project(inverse_depth.clone(), homography.clone(), shift.clone());
+        let nodes = [depth_node, homography_node, shift_node];
+        let state = [inverse_depth, homography, shift];
+        record!(Project, C, nodes, output, state)
+    }
+
+    fn kernel_in_view(coords: FloatTensor<Self>, height: usize, width: usize) -> FloatTensor<Self> {
+        Self::from_inner(B::kernel_in_view(coords.into_primitive(), height, width))
+    }
+
+    fn kernel_smoothness(
+        disparity: FloatTensor<Self>,
+        image: FloatTensor<Self>,
+    ) -> FloatTensor<Self> {
+        let (disparity, node) = disparity.into_parts();
+        let image = image.into_primitive();
+        let output = B::kernel_smoothness(disparity.clone(), image.clone());
+        record!(Smoothness, C, [node], output, (disparity, image))
     }
 
     fn kernel_photometric(

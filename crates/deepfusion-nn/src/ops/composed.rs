@@ -3,7 +3,7 @@
 
 use super::{BatchNormOutput, ConvOptions};
 use burn::tensor::{
-    Int, Tensor,
+    Bool, Int, Tensor,
     module::avg_pool2d,
     ops::{AvgPoolOptions, ConvOptions as BurnConvOptions, PadMode},
 };
@@ -153,4 +153,75 @@ pub fn photometric_error(a: Tensor<4>, b: Tensor<4>, alpha: f64) -> Tensor<4> {
         .mul_scalar(alpha)
         .add(a.sub(b).abs().mul_scalar(1.0 - alpha))
         .mean_dim(1)
+}
+
+/// [`super::project`].
+#[must_use]
+pub fn project(inverse_depth: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>) -> Tensor<4> {
+    /// Points nearer than this to the camera's plane, in metres, have no pixel.
+    const MIN_DEPTH_M: f64 = 1e-3;
+    /// The coordinate of pixels that have none.
+    const NOWHERE: f64 = -1e6;
+    let [n, _, height, width] = inverse_depth.dims();
+    let device = inverse_depth.device().inner();
+    let along = |size: usize| {
+        let steps: Tensor<1> = Tensor::<1, Int>::arange(0..size as i64, &device).float();
+        steps
+    };
+    let x = along(width).reshape([1, 1, 1, width]);
+    let y = along(height).reshape([1, 1, height, 1]);
+    let entry = |row: usize, column: usize| {
+        let one = homography
+            .clone()
+            .slice([0..n, row..row + 1, column..column + 1]);
+        one.reshape([n, 1, 1, 1])
+    };
+    let axis = |row: usize| {
+        let s = shift
+            .clone()
+            .slice([0..n, row..row + 1])
+            .reshape([n, 1, 1, 1]);
+        x.clone() * entry(row, 0)
+            + y.clone() * entry(row, 1)
+            + entry(row, 2)
+            + inverse_depth.clone() * s
+    };
+    let w = axis(2);
+    let behind = w
+        .clone()
+        .lower_equal(inverse_depth.clone().mul_scalar(MIN_DEPTH_M));
+    let w = w.mask_fill(behind.clone(), 1.0);
+    let coords = [0, 1].map(|row| axis(row).div(w.clone()).mask_fill(behind.clone(), NOWHERE));
+    Tensor::cat(coords.to_vec(), 1)
+}
+
+/// [`super::in_view`].
+#[must_use]
+pub fn in_view(coords: Tensor<4>, size: [usize; 2]) -> Tensor<4, Bool> {
+    let inside = |axis: usize, size: usize| {
+        let p = coords.clone().narrow(1, axis, 1);
+        p.clone()
+            .greater_equal_elem(0.0)
+            .bool_and(p.lower_equal_elem((size - 1) as f64))
+    };
+    inside(0, size[1]).bool_and(inside(1, size[0]))
+}
+
+/// [`super::smoothness`].
+#[must_use]
+pub fn smoothness(disparity: Tensor<4>, image: Tensor<4>) -> Tensor<1> {
+    let mean = disparity.clone().mean_dim(2).mean_dim(3).add_scalar(1e-7);
+    let normalised = disparity.div(mean);
+    let along = |axis: usize| {
+        let difference = |t: Tensor<4>| {
+            let size = t.dims()[axis];
+            t.clone()
+                .narrow(axis, 1, size - 1)
+                .sub(t.narrow(axis, 0, size - 1))
+                .abs()
+        };
+        let edge = difference(image.clone()).mean_dim(1).neg().exp();
+        difference(normalised.clone()).mul(edge).mean()
+    };
+    along(3) + along(2)
 }

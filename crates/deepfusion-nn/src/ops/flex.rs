@@ -3,7 +3,9 @@
 use super::kernel::{ConvOptions, KernelBackward, KernelOps};
 use burn::backend::{Flex, TensorMetadata, ops::FloatTensorOps, tensor::FloatTensor};
 use burn::tensor::TensorData;
-use deepfusion_kernels::{self as kernels, BatchNormSaved, ConvShape, PhotometricShape, WarpShape};
+use deepfusion_kernels::{
+    self as kernels, BatchNormSaved, ConvShape, PhotometricShape, SmoothnessShape, WarpShape,
+};
 
 type Float = FloatTensor<Flex>;
 
@@ -84,6 +86,16 @@ fn photometric_shape(a: &Float, alpha: f64) -> ([usize; 4], PhotometricShape) {
     )
 }
 
+fn smoothness_shape(image: &Float) -> SmoothnessShape {
+    let [batch, channels, height, width] = dims(image);
+    SmoothnessShape {
+        batch,
+        channels,
+        height,
+        width,
+    }
+}
+
 #[allow(clippy::cast_possible_truncation)]
 fn single(value: f64) -> f32 {
     value as f32
@@ -162,6 +174,37 @@ impl KernelOps for Flex {
         let mut out = unwritten(sizes.iter().product());
         kernels::warp(&shape, image.slice(), coords.slice(), &mut out);
         tensor(out, sizes)
+    }
+
+    fn kernel_project(inverse_depth: Float, homography: Float, shift: Float) -> Float {
+        let [batch, _, height, width] = dims(&inverse_depth);
+        let (depth, homography) = (Values::of(inverse_depth), Values::of(homography));
+        let shift = Values::of(shift);
+        let mut out = unwritten(2 * batch * height * width);
+        kernels::project(
+            (height, width),
+            depth.slice(),
+            homography.slice(),
+            shift.slice(),
+            &mut out,
+        );
+        tensor(out, [batch, 2, height, width])
+    }
+
+    fn kernel_in_view(coords: Float, height: usize, width: usize) -> Float {
+        let [batch, _, out_height, out_width] = dims(&coords);
+        let coords = Values::of(coords);
+        let area = out_height * out_width;
+        let mut out = unwritten(batch * area);
+        kernels::in_view((height, width), coords.slice(), area, &mut out);
+        tensor(out, [batch, 1, out_height, out_width])
+    }
+
+    fn kernel_smoothness(disparity: Float, image: Float) -> Float {
+        let shape = smoothness_shape(&image);
+        let (disparity, image) = (Values::of(disparity), Values::of(image));
+        let loss = kernels::smoothness(&shape, disparity.slice(), image.slice());
+        tensor(vec![loss], [1])
     }
 
     fn kernel_photometric(a: Float, b: Float, alpha: f64) -> Float {
@@ -282,6 +325,41 @@ impl KernelBackward for Flex {
             grad.slice(),
             &mut out,
         );
+        tensor(out, sizes)
+    }
+
+    fn project_grad(
+        inverse_depth: Float,
+        homography: Float,
+        shift: Float,
+        grad: Float,
+    ) -> [Float; 3] {
+        let sizes: [usize; 4] = dims(&inverse_depth);
+        let (depth, homography) = (Values::of(inverse_depth), Values::of(homography));
+        let (shift, grad) = (Values::of(shift), Values::of(grad));
+        let mut grad_depth = unwritten(sizes.iter().product());
+        let gradients = kernels::project_backward(
+            (sizes[2], sizes[3]),
+            depth.slice(),
+            homography.slice(),
+            shift.slice(),
+            grad.slice(),
+            &mut grad_depth,
+        );
+        [
+            tensor(grad_depth, sizes),
+            tensor(gradients.homography, [sizes[0], 3, 3]),
+            tensor(gradients.shift, [sizes[0], 3]),
+        ]
+    }
+
+    fn smoothness_grad(disparity: Float, image: Float, grad: Float) -> Float {
+        let sizes: [usize; 4] = dims(&disparity);
+        let shape = smoothness_shape(&image);
+        let (disparity, image) = (Values::of(disparity), Values::of(image));
+        let grad = Values::of(grad).slice()[0];
+        let mut out = unwritten(sizes.iter().product());
+        kernels::smoothness_backward(&shape, disparity.slice(), image.slice(), grad, &mut out);
         tensor(out, sizes)
     }
 

@@ -57,6 +57,22 @@ pub trait KernelOps: Backend {
     /// See [`super::warp`].
     fn kernel_warp(image: FloatTensor<Self>, coords: FloatTensor<Self>) -> FloatTensor<Self>;
 
+    /// See [`super::project`].
+    fn kernel_project(
+        inverse_depth: FloatTensor<Self>,
+        homography: FloatTensor<Self>,
+        shift: FloatTensor<Self>,
+    ) -> FloatTensor<Self>;
+
+    /// See [`super::in_view`]: 1 or 0, N×1×H×W, without gradient.
+    fn kernel_in_view(coords: FloatTensor<Self>, height: usize, width: usize) -> FloatTensor<Self>;
+
+    /// See [`super::smoothness`].
+    fn kernel_smoothness(
+        disparity: FloatTensor<Self>,
+        image: FloatTensor<Self>,
+    ) -> FloatTensor<Self>;
+
     /// See [`super::photometric_error`].
     fn kernel_photometric(
         a: FloatTensor<Self>,
@@ -114,6 +130,21 @@ pub trait KernelBackward: Backend {
     fn warp_grad_coords(
         image: FloatTensor<Self>,
         coords: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+    ) -> FloatTensor<Self>;
+
+    /// Gradients of inverse depth, homography and shift of [`KernelOps::kernel_project`].
+    fn project_grad(
+        inverse_depth: FloatTensor<Self>,
+        homography: FloatTensor<Self>,
+        shift: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+    ) -> [FloatTensor<Self>; 3];
+
+    /// Gradient of the disparity of [`KernelOps::kernel_smoothness`].
+    fn smoothness_grad(
+        disparity: FloatTensor<Self>,
+        image: FloatTensor<Self>,
         grad: FloatTensor<Self>,
     ) -> FloatTensor<Self>;
 

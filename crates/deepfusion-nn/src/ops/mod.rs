@@ -11,12 +11,13 @@ mod flex;
 mod kernel;
 
 use burn::backend::{Dispatch, DispatchDevice};
-use burn::tensor::Tensor;
+use burn::tensor::{Bool, Tensor};
 use kernel::KernelOps;
 
 pub use composed::{
     batch_norm as composed_batch_norm, conv2d as composed_conv2d, elu as composed_elu,
-    photometric_error as composed_photometric_error, upsample_concat as composed_upsample_concat,
+    photometric_error as composed_photometric_error, project as composed_project,
+    smoothness as composed_smoothness, upsample_concat as composed_upsample_concat,
     warp as composed_warp,
 };
 pub use kernel::ConvOptions;
@@ -159,6 +160,60 @@ pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
     Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_warp(
         image.into_dispatch(),
         coords.into_dispatch(),
+    ))
+}
+
+/// Where the pixels of a view lie in another (SPEC 2, Eq. 3–5): p' ~ H·p̃ + d·s, d the inverse depth.
+/// Points behind the other camera are sent far outside of its image.
+///
+/// # Shapes
+/// - `inverse_depth`: `[N, 1, H, W]`, 1/m
+/// - `homography`: `[N, 3, 3]`, K·R·K⁻¹
+/// - `shift`: `[N, 3]`, K·t
+/// - output: `[N, 2, H, W]`, u and v in pixels
+#[must_use]
+pub fn project(inverse_depth: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>) -> Tensor<4> {
+    if !on_cpu(&inverse_depth) {
+        return composed::project(inverse_depth, homography, shift);
+    }
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_project(
+        inverse_depth.into_dispatch(),
+        homography.into_dispatch(),
+        shift.into_dispatch(),
+    ))
+}
+
+/// Where coordinates lie inside an image of `[height, width]`, its border included. No gradient.
+///
+/// # Shapes
+/// - `coords`: `[N, 2, H, W]`
+/// - output: `[N, 1, H, W]`
+#[must_use]
+pub fn in_view(coords: Tensor<4>, [height, width]: [usize; 2]) -> Tensor<4, Bool> {
+    let coords = coords.detach();
+    if !on_cpu(&coords) {
+        return composed::in_view(coords, [height, width]);
+    }
+    let inside = <Dispatch as KernelOps>::kernel_in_view(coords.into_dispatch(), height, width);
+    Tensor::<4>::from_dispatch(inside).greater_elem(0.5)
+}
+
+/// Edge-aware smoothness (SPEC 2, Eq. 8): mean(|∂ₓd*|·e^(−|∂ₓI|)) + mean(|∂ᵧd*|·e^(−|∂ᵧI|)), d* = disparity
+/// over its mean in the image, |∂I| averaged over channels.
+///
+/// # Shapes
+/// - `disparity`: `[N, 1, H, W]`
+/// - `image`: `[N, C, H, W]`, without gradient
+/// - output: one value
+#[must_use]
+pub fn smoothness(disparity: Tensor<4>, image: Tensor<4>) -> Tensor<1> {
+    let image = image.detach();
+    if !on_cpu(&disparity) {
+        return composed::smoothness(disparity, image);
+    }
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_smoothness(
+        disparity.into_dispatch(),
+        image.into_dispatch(),
     ))
 }
 

@@ -6,7 +6,7 @@ mod speed;
 
 pub use reprojection::{ReprojectionOutput, View, reprojection};
 pub use smoothness::smoothness;
-pub use speed::{speed, speed_weight};
+pub use speed::{motion, speed, speed_weight};
 
 /// The loss of a batch, term by term, as numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -17,7 +17,8 @@ pub struct LossTerms {
     pub reprojection: f64,
     /// Edge-aware smoothness, mean over scales, weighted by 1/2ˢ but not by λ_s.
     pub smoothness: f64,
-    /// L_speed in metres per pair, unweighted.
+    /// L_speed in metres per pair, unweighted; the distance of PoseNet's motion from the measured one
+    /// while that synthesises the views.
     pub speed: f64,
     /// Share of pixels that the warp finds in view, at full resolution.
     pub valid_share: f64,

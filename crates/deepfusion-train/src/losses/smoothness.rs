@@ -1,35 +1,11 @@
-use burn::tensor::Tensor;
+//! Edge-aware smoothness (Eq. 8); the operation is one of the networks' own.
 
-/// Edge-aware smoothness (Eq. 8): mean(|∂ₓd*|·e^(−|∂ₓI|)) + mean(|∂ᵧd*|·e^(−|∂ᵧI|)), d* = disparity
-/// over its mean, |∂I| averaged over channels.
-///
-/// # Shapes
-/// - `disparity`: `[N, 1, H, W]`
-/// - `image`: `[N, C, H, W]`, without gradient
-/// - output: one value
-#[must_use]
-pub fn smoothness(disparity: Tensor<4>, image: Tensor<4>) -> Tensor<1> {
-    let mean = disparity.clone().mean_dim(2).mean_dim(3).add_scalar(1e-7);
-    let normalised = disparity.div(mean);
-    let image = image.detach();
-    let along = |axis: usize| {
-        let difference = |t: Tensor<4>| {
-            let size = t.dims()[axis];
-            t.clone()
-                .narrow(axis, 1, size - 1)
-                .sub(t.narrow(axis, 0, size - 1))
-                .abs()
-        };
-        let edge = difference(image.clone()).mean_dim(1).neg().exp();
-        difference(normalised.clone()).mul(edge).mean()
-    };
-    along(3) + along(2)
-}
+pub use deepfusion_nn::ops::smoothness;
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use burn::tensor::{Device, Distribution};
+    use burn::tensor::{Device, Distribution, Tensor};
 
     #[test]
     fn a_flat_disparity_is_smooth_and_the_scale_does_not_matter() {

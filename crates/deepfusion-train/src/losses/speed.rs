@@ -36,6 +36,30 @@ pub fn speed(
     translation + angle.mean().mul_scalar(rotation_weight)
 }
 
+/// Metres that a radian counts for in [`motion`]: what a rotation moves a point ten metres away.
+const METRES_PER_RADIAN: f64 = 10.0;
+
+/// How far predicted motions are from measured ones: mean over pairs of ‖t̂ − t‖ + 10 m·angle(R̂ᵀ·R). What
+/// PoseNet learns from while the views are synthesised with the measured motion.
+///
+/// # Shapes
+/// - `predicted`, `measured`: N motions in the same direction
+/// - output: one value, in metres
+#[must_use]
+pub fn motion(predicted: &Motion, measured: &Motion) -> Tensor<1> {
+    let [n, _] = measured.translation.dims();
+    // Its length is then the distance between the two translations.
+    let apart = Motion {
+        rotation: predicted.rotation.clone(),
+        translation: predicted
+            .translation
+            .clone()
+            .sub(measured.translation.clone()),
+    };
+    let nothing = Tensor::zeros([n], &measured.translation.device());
+    speed(&apart, nothing, &measured.rotation, METRES_PER_RADIAN)
+}
+
 /// λ_v at a step (counted from 0): it rises linearly over one epoch or `warmup_steps`, whichever is
 /// longer, but over at most a tenth of the run.
 #[must_use]
@@ -68,6 +92,23 @@ mod tests {
         };
         assert!(loss([1.0, 5.0]) < 1e-5);
         assert!((loss([1.5, 4.0]) - 0.75).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_motion_costs_its_distance_and_ten_metres_a_radian() {
+        let device = Device::flex();
+        let of = |v: [f32; 3], t: [f32; 3]| {
+            Motion::new(
+                Tensor::<2>::from_data([v], &device),
+                Tensor::<2>::from_data([t], &device),
+            )
+        };
+        let measured = of([0.0, 0.01, 0.0], [0.0, 0.0, -1.0]);
+        let predicted = of([0.0, 0.03, 0.0], [0.3, 0.0, -1.4]);
+        let loss = motion(&predicted, &measured).into_scalar::<f32>();
+        assert!((loss - 0.7).abs() < 1e-4, "{loss}");
+        // The norm's ε is 1e-4 m.
+        assert!(motion(&measured, &measured).into_scalar::<f32>() < 2e-4);
     }
 
     #[test]
