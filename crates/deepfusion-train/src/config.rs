@@ -24,12 +24,41 @@ pub enum ReversedPose {
     Inverted,
 }
 
+/// Whose motion the views are synthesised with. The first error that depth has to wait for is PoseNet's:
+/// what the vehicle knows already need not be learned first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ViewMotion {
+    /// PoseNet's, whose length the speed loss pulls towards the vehicle's: the paper's way.
+    #[default]
+    PoseNet,
+    /// PoseNet's rotation and direction, with the length that the vehicle's speed gives.
+    Distance,
+    /// The vehicle's own, from speed and yaw rate (SPEC 3.4). PoseNet learns that motion beside it.
+    Vehicle,
+}
+
+/// The size at which the views of a coarser scale are compared with their targets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CompareAt {
+    /// Full size, to which its disparity is enlarged: fewer holes and copied textures (SPEC 2).
+    #[default]
+    Full,
+    /// The scale's own: a pixel there sees 2ˢ times as far, so that near things, which move far, are found
+    /// from a wrong first depth; and it costs a third.
+    Own,
+}
+
 /// Weights and switches of the loss terms (SPEC 2). A weight of 0 switches a term off.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LossConfig {
     /// α of the photometric error: the share of SSIM beside the absolute difference.
     pub ssim_weight: f64,
+    /// The size at which the views of a coarser scale are compared.
+    #[serde(default)]
+    pub compare_at: CompareAt,
     /// λ_s of the edge-aware smoothness at full resolution; halved at each coarser scale.
     pub smoothness: f64,
     /// λ_v of the speed loss.
@@ -139,11 +168,9 @@ pub struct TrainConfig {
     /// A PoseNet that starts out driving ahead by the data's mean displacement, instead of standing.
     /// Needs the frames in time order, so it has no effect where the reversed pose is predicted.
     pub start_moving: bool,
-    /// Share of the run, from its start, in which the views are synthesised with the motion that the
-    /// vehicle measured (speed and yaw rate, SPEC 3.4). PoseNet learns that motion meanwhile, and depth
-    /// does not have to wait for it. 0: PoseNet's motion from the first step on, as in the paper.
+    /// Whose motion the views are synthesised with.
     #[serde(default)]
-    pub measured_motion_share: f64,
+    pub view_motion: ViewMotion,
     /// The camera trained with, at network size; filled in from the data. Several cameras: the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Intrinsics>,
@@ -187,6 +214,19 @@ impl TrainConfig {
         })
     }
 
+    /// Switches a term of the loss off by its name. Without the speed term nothing measured fixes the
+    /// scale: the views then follow PoseNet alone.
+    ///
+    /// # Errors
+    /// As [`LossConfig::without`].
+    pub fn without(&mut self, term: &str) -> Result<(), Error> {
+        self.loss.without(term)?;
+        if self.loss.speed == 0.0 {
+            self.view_motion = ViewMotion::PoseNet;
+        }
+        Ok(())
+    }
+
     /// # Errors
     /// [`Error::Config`] naming the first setting that means nothing.
     pub fn validate(&self) -> Result<(), Error> {
@@ -215,10 +255,6 @@ impl TrainConfig {
         if !(0.0..=1.0).contains(&self.learning_rate_drop) {
             let found = self.learning_rate_drop.to_string();
             return fail("learning_rate_drop", "0 to 1", found);
-        }
-        if !(0.0..=1.0).contains(&self.measured_motion_share) {
-            let found = self.measured_motion_share.to_string();
-            return fail("measured_motion_share", "0 to 1", found);
         }
         if !(0.0..=0.5).contains(&self.validation_share) {
             return fail(

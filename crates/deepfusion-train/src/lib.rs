@@ -11,6 +11,7 @@ mod checkpoint;
 mod config;
 mod error;
 mod event;
+mod level;
 pub mod log;
 pub mod losses;
 mod model;
@@ -28,7 +29,10 @@ pub use adam::{Adam, StepOutcome};
 pub use augment::Jitter;
 pub use batch::{BatchLoader, SnippetBatch};
 pub use checkpoint::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder};
-pub use config::{Augmentation, DataConfig, LossConfig, Reprojection, ReversedPose, TrainConfig};
+pub use config::{
+    Augmentation, CompareAt, DataConfig, LossConfig, Reprojection, ReversedPose, TrainConfig,
+    ViewMotion,
+};
 pub use error::Error;
 pub use event::{Control, TrainEvent};
 pub use losses::LossTerms;

@@ -1,12 +1,11 @@
-use crate::config::{Reprojection, ReversedPose};
+use crate::config::{CompareAt, Reprojection, ReversedPose, ViewMotion};
+use crate::level::{Level, pyramid};
 use crate::losses::{self, LossTerms, ReprojectionOutput, View};
 use crate::{BilinearResize, Error, Motion, SnippetBatch, TrainConfig, synthesise};
 use burn::module::Module;
-use burn::tensor::module::avg_pool2d;
-use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Device, Tensor};
 use deepfusion_geometry::DepthRange;
-use deepfusion_nn::{DepthNet, PoseNet, SCALES, ops};
+use deepfusion_nn::{DepthNet, PoseNet, SCALES};
 
 /// The networks of a run, and what their training step needs.
 #[derive(Debug, Clone)]
@@ -37,35 +36,6 @@ pub struct ForwardPass {
     pub intrinsics: Tensor<3>,
     /// K⁻¹ of the targets, T×3×3.
     pub inverse_intrinsics: Tensor<3>,
-}
-
-/// Whose motion the views of a batch are synthesised with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum ViewMotion {
-    /// PoseNet's.
-    Predicted,
-    /// The vehicle's sensors'.
-    Measured,
-}
-
-impl ViewMotion {
-    /// That of a step, counted from 0.
-    pub(crate) fn at(config: &TrainConfig, step: usize, steps: usize) -> Self {
-        if step as f64 >= config.measured_motion_share * steps as f64 {
-            Self::Predicted
-        } else {
-            Self::Measured
-        }
-    }
-
-    /// That of a run's last step.
-    pub(crate) fn at_end(config: &TrainConfig) -> Self {
-        if config.measured_motion_share < 1.0 {
-            Self::Predicted
-        } else {
-            Self::Measured
-        }
-    }
 }
 
 /// The loss of a batch: the sum to differentiate, its terms, and what the finest scale saw.
@@ -233,51 +203,39 @@ impl Model {
         Motion::new(pose.axis_angle, pose.translation)
     }
 
-    /// The loss of a forward pass, with λ_v as given: L = Σ_s ¼(L_rp + λ_s·L_smooth) + λ_v·L_speed. The
-    /// views are synthesised with `motion`.
+    /// The loss of a forward pass, with λ_v as given: L = Σ_s ¼(L_rp + λ_s·L_smooth) + λ_v·L_speed.
     pub(crate) fn loss(
         &self,
         pass: &ForwardPass,
         batch: &SnippetBatch,
         speed_weight: f64,
-        motion: ViewMotion,
     ) -> BatchLoss {
         let settings = &self.config.loss;
         let range = self.range();
         let (low, high) = (1.0 / range.max_m, 1.0 / range.min_m);
-        // What standing still would explain, the same for all scales.
-        let unwarped: Vec<_> = pass
-            .sources
-            .iter()
-            .map(|source| {
-                ops::photometric_error(
-                    source.clone().detach(),
-                    pass.targets.clone(),
-                    settings.ssim_weight,
-                )
-            })
-            .collect();
-        let motions = match motion {
-            ViewMotion::Predicted => &pass.motions,
-            ViewMotion::Measured => &pass.measured,
-        };
+        let full = Level::at(pass, 0, settings.ssim_weight);
+        let motions = self.view_motions(pass, batch);
         let pyramid = pyramid(pass.targets.clone());
         let (mut reprojection, mut smooth) = (Vec::new(), Vec::new());
         let mut finest = None;
         for (scale, disparity) in pass.disparities.iter().enumerate() {
-            let inverse_depth = self.enlarge[scale]
-                .apply(disparity.clone())
-                .mul_scalar(high - low)
-                .add_scalar(low);
+            let (level, disparity_there) = match settings.compare_at {
+                CompareAt::Full => (full.clone(), self.enlarge[scale].apply(disparity.clone())),
+                CompareAt::Own => (
+                    Level::at(pass, scale, settings.ssim_weight),
+                    disparity.clone(),
+                ),
+            };
+            let inverse_depth = disparity_there.mul_scalar(high - low).add_scalar(low);
             let mut first_warp = None;
-            let views = pass.sources.iter().zip(motions).zip(&unwarped).map(
+            let views = level.sources.iter().zip(&motions).zip(&level.unwarped).map(
                 |((source, motion), unwarped_error)| {
                     let synthesised = synthesise(
                         source.clone(),
                         inverse_depth.clone(),
                         motion,
-                        &pass.intrinsics,
-                        &pass.inverse_intrinsics,
+                        &level.intrinsics,
+                        &level.inverse_intrinsics,
                     );
                     first_warp.get_or_insert_with(|| synthesised.image.clone().detach());
                     View {
@@ -288,7 +246,7 @@ impl Model {
             );
             let views = views.collect();
             let output = losses::reprojection(
-                &pass.targets,
+                &level.targets,
                 views,
                 settings.ssim_weight,
                 settings.automask,
@@ -323,9 +281,9 @@ impl Model {
             total = total + smooth.mul_scalar(settings.smoothness);
         }
         if settings.speed > 0.0 {
-            let speed = match motion {
-                ViewMotion::Predicted => self.speed_loss(pass, batch),
-                ViewMotion::Measured => mean_of(pass.motions.iter().zip(&pass.measured), |pair| {
+            let speed = match self.config.view_motion {
+                ViewMotion::PoseNet | ViewMotion::Distance => self.speed_loss(pass, batch),
+                ViewMotion::Vehicle => mean_of(pass.motions.iter().zip(&pass.measured), |pair| {
                     losses::motion(pair.0, pair.1)
                 }),
             };
@@ -343,20 +301,34 @@ impl Model {
 
     fn speed_loss(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Tensor<1> {
         let weight = self.config.loss.rotation;
-        let bidirectional = self.config.reprojection == Reprojection::Bidirectional;
         let views = pass.motions.iter().zip(&pass.measured);
-        mean_of(
-            views.zip(&batch.distance_m),
-            |((motion, measured), distance)| {
-                // With two directions the second half of the targets looks back, as far.
-                let distance = if bidirectional {
-                    Tensor::cat(vec![distance.clone(), distance.clone()], 0)
-                } else {
-                    distance.clone()
-                };
-                losses::speed(motion, distance, &measured.rotation, weight)
-            },
-        )
+        mean_of(views.enumerate(), |(view, (motion, measured))| {
+            let distance = self.distance_m(batch, view);
+            losses::speed(motion, distance, &measured.rotation, weight)
+        })
+    }
+
+    /// The measured distance of a view's targets, T.
+    fn distance_m(&self, batch: &SnippetBatch, view: usize) -> Tensor<1> {
+        let distance = batch.distance_m[view].clone();
+        match self.config.reprojection {
+            // The second half of the targets looks back, as far.
+            Reprojection::Bidirectional => Tensor::cat(vec![distance.clone(), distance], 0),
+            Reprojection::Minimum => distance,
+        }
+    }
+
+    /// The motions that the views are synthesised with.
+    fn view_motions(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Vec<Motion> {
+        match self.config.view_motion {
+            ViewMotion::PoseNet => pass.motions.clone(),
+            ViewMotion::Vehicle => pass.measured.clone(),
+            ViewMotion::Distance => {
+                let views = pass.motions.iter().enumerate();
+                let scaled = views.map(|(view, m)| m.with_distance(self.distance_m(batch, view)));
+                scaled.collect()
+            }
+        }
     }
 }
 
@@ -373,16 +345,6 @@ fn mean_of<T>(views: impl ExactSizeIterator<Item = T>, loss: impl Fn(T) -> Tenso
 /// The share of true pixels.
 fn share(mask: &Tensor<4, burn::tensor::Bool>) -> f64 {
     f64::from(mask.clone().float().mean().into_scalar::<f32>())
-}
-
-/// The image at every scale, each by the mean of 2×2 blocks of the one before.
-fn pyramid(image: Tensor<4>) -> Vec<Tensor<4>> {
-    let mut images = vec![image];
-    for scale in 1..SCALES {
-        let options = AvgPoolOptions::new([2, 2]).with_stride([2, 2]);
-        images.push(avg_pool2d(images[scale - 1].clone(), options));
-    }
-    images
 }
 
 /// The pose network with a bias that means one unit of translation ahead: a point of frame 0 has a

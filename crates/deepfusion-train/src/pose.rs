@@ -56,6 +56,17 @@ impl Motion {
         }
     }
 
+    /// The same rotations and directions with translations of these lengths (N, in metres).
+    #[must_use]
+    pub fn with_distance(&self, distance_m: Tensor<1>) -> Self {
+        let [n, _] = self.translation.dims();
+        let factor = distance_m.div(self.distance()).reshape([n, 1]);
+        Self {
+            rotation: self.rotation.clone(),
+            translation: self.translation.clone().mul(factor),
+        }
+    }
+
     /// ‖t‖ as √(‖t‖² + 1e-8), N: its gradient at 0 is finite (SPEC 2).
     #[must_use]
     pub fn distance(&self) -> Tensor<1> {
@@ -142,6 +153,18 @@ mod tests {
                     assert!((f64::from(rotation[9 + 3 * i + j]) - identity).abs() < 1e-6);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_distance_keeps_the_direction() {
+        let device = Device::flex();
+        let t = Tensor::<2>::from_data([[3.0, 0.0, -4.0], [0.0, 0.5, 0.0]], &device);
+        let motion = Motion::new(Tensor::zeros([2, 3], &device), t);
+        let distance = Tensor::<1>::from_data([1.0, 2.0], &device);
+        let scaled = values(motion.with_distance(distance).translation);
+        for (ours, expected) in scaled.iter().zip([0.6, 0.0, -0.8, 0.0, 2.0, 0.0]) {
+            assert!((ours - expected).abs() < 1e-6, "{scaled:?}");
         }
     }
 

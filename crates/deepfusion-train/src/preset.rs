@@ -1,5 +1,6 @@
 use crate::config::{
-    Augmentation, DataConfig, LossConfig, Reprojection, ReversedPose, TrainConfig,
+    Augmentation, CompareAt, DataConfig, LossConfig, Reprojection, ReversedPose, TrainConfig,
+    ViewMotion,
 };
 use deepfusion_nn::{
     DecoderConfig, DepthNetConfig, InputSize, PoseNetConfig, ResNetConfig, ResNetDepth,
@@ -54,11 +55,12 @@ impl Preset {
             validation_share: 0.1,
             validate_every: 0,
             start_moving: false,
-            measured_motion_share: 0.0,
+            view_motion: ViewMotion::PoseNet,
             camera: None,
             data: DataConfig::default(),
             loss: LossConfig {
                 ssim_weight: 0.85,
+                compare_at: CompareAt::Full,
                 smoothness: 1e-3,
                 speed: 0.2,
                 rotation: 0.0,
@@ -91,6 +93,7 @@ impl Preset {
                 config.learning_rate_warmup_steps = 100;
                 config.reversed_pose = ReversedPose::Inverted;
                 config.start_moving = true;
+                config.view_motion = ViewMotion::Distance;
                 config.depth_net.encoder = narrow(config.depth_net.encoder);
                 config.depth_net.decoder = DecoderConfig {
                     widths: [128, 64, 32, 16, 16],
@@ -102,6 +105,7 @@ impl Preset {
                 let mut config = base(ResNetDepth::ResNet18);
                 config.reversed_pose = ReversedPose::Inverted;
                 config.start_moving = true;
+                config.view_motion = ViewMotion::Distance;
                 config
             }
             Self::Resnet50 => base(ResNetDepth::ResNet50),

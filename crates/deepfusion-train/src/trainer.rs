@@ -1,6 +1,6 @@
 use crate::adam::NamedGradients;
 use crate::losses::speed_weight;
-use crate::model::{BatchLoss, ViewMotion, displacement_ratio};
+use crate::model::{BatchLoss, displacement_ratio};
 use crate::{
     Adam, BatchLoader, Checkpoint, CheckpointKind, Control, Error, ForwardPass, LossTerms, Model,
     RunFolder, SamplePanel, SampleSet, Sampler, SnippetBatch, StepOutcome, TrainConfig, TrainEvent,
@@ -199,14 +199,13 @@ impl Trainer {
                 self.epoch_steps(),
                 self.config.loss.speed_warmup_steps,
             );
-            let motion = ViewMotion::at(&self.config, self.state.step, steps);
             let mut images = 0;
             let mut last: Option<(ForwardPass, BatchLoss)> = None;
             for _ in 0..accumulate {
                 let batch = next_batch(&loader, &self.device)?;
                 images += batch.len() * 2;
                 let pass = self.model.forward(&batch);
-                let loss = self.model.loss(&pass, &batch, weight, motion);
+                let loss = self.model.loss(&pass, &batch, weight);
                 losses = loss.terms;
                 if let Some((term, value)) = losses.not_finite() {
                     return Err(Error::NotFinite {
@@ -368,8 +367,7 @@ fn next_batch(loader: &BatchLoader, device: &Device) -> Result<SnippetBatch, Err
     })
 }
 
-/// The mean loss over the held-out samples, with λ_v at its full weight and the motion that the run ends
-/// with, and the ratio of measured to predicted displacement.
+/// The mean loss over the held-out samples, with λ_v at its full weight, and the ratio of measured to predicted displacement.
 ///
 /// # Errors
 /// [`Error::Data`] for an image that cannot be read.
@@ -380,15 +378,13 @@ pub fn validation_loss(
     device: &Device,
 ) -> Result<(LossTerms, f64), Error> {
     let (model, device) = (model.valid(device), device.clone().inner());
-    // As the run ends: one measure for all of it.
-    let motion = ViewMotion::at_end(config);
     let loader = BatchLoader::validation(config, samples.clone());
     let mut sum = LossTerms::default();
     let (mut count, mut ratio) = (0.0, 0.0);
     while let Some(batch) = loader.next(&device) {
         let batch = batch?;
         let pass = model.forward(&batch);
-        let terms = model.loss(&pass, &batch, config.loss.speed, motion).terms;
+        let terms = model.loss(&pass, &batch, config.loss.speed).terms;
         let n = batch.len() as f64;
         count += n;
         ratio += n * displacement_ratio(&pass, &batch);

@@ -10,13 +10,13 @@ use std::ops::Range;
 
 /// The padded input rows and columns of one residue by the stride: a convolution of ∂Y at stride 1 with
 /// those taps alone that reach them.
-struct Phase {
+struct Phase<'a> {
     down: usize,
     right: usize,
     /// Taps (index in the kernel, distance from the first tap).
     taps: Vec<(usize, (usize, usize))>,
     /// Transposed weights, C × (O·taps).
-    weights: Vec<f32>,
+    weights: &'a [f32],
 }
 
 /// ∂L/∂X: every input pixel gathers from the outputs it went into.
@@ -46,11 +46,15 @@ pub fn conv2d_backward_input(
     if grad_out.is_empty() {
         return;
     }
+    // Each weight belongs to one phase.
+    with_scratch(shape.weight_len(), |transposed| {
+        let phases = phases(shape, weight, transposed);
+        backward_input(shape, &phases, grad_out, grad_x);
+    });
+}
+
+fn backward_input(shape: &ConvShape, phases: &[Phase], grad_out: &[f32], grad_x: &mut [f32]) {
     let (s, p) = (shape.stride, shape.padding);
-    let phases: Vec<Phase> = (0..s * s)
-        .map(|i| phase(shape, weight, i / s, i % s))
-        .filter(|phase| !phase.taps.is_empty())
-        .collect();
     let window = gradient_window(shape);
     // Rows of a phase; without reflection those that lie wholly in the padding are left out.
     let rows = if shape.reflect {
@@ -74,14 +78,14 @@ pub fn conv2d_backward_input(
             .for_each(|of_image| {
                 for tile in of_image {
                     let channels = 0..shape.in_channels;
-                    gradient_tile(shape, window, *tile, channels, &phases, grad_out, &to);
+                    gradient_tile(shape, window, *tile, channels, phases, grad_out, &to);
                 }
             });
     } else {
         tasks(&tiles, shape.in_channels)
             .into_par_iter()
             .for_each(|(tile, channels)| {
-                gradient_tile(shape, window, tile, channels, &phases, grad_out, &to);
+                gradient_tile(shape, window, tile, channels, phases, grad_out, &to);
             });
     }
 }
@@ -101,41 +105,63 @@ fn gradient_window(shape: &ConvShape) -> Window {
     }
 }
 
-fn phase(shape: &ConvShape, weight: &[f32], down: usize, right: usize) -> Phase {
+/// All phases that have taps; their weights are written to `transposed`, one after the other.
+fn phases<'a>(shape: &ConvShape, weight: &[f32], transposed: &'a mut [f32]) -> Vec<Phase<'a>> {
     let s = shape.stride;
-    let taps: Vec<_> = shape
-        .kernel_taps()
-        .enumerate()
-        .filter(|(_, (y, x))| y % s == down && x % s == right)
-        .collect();
-    let (area, channels) = (shape.kernel_area(), shape.in_channels);
-    let row = shape.out_channels * taps.len();
-    let mut weights = vec![0.0; channels * row];
-    let whole = taps.len() == area;
-    weights
-        .par_chunks_mut((8 * row).max(1))
+    let mut rest = transposed;
+    let mut phases = Vec::new();
+    for (down, right) in (0..s * s).map(|i| (i / s, i % s)) {
+        let taps: Vec<_> = shape
+            .kernel_taps()
+            .enumerate()
+            .filter(|(_, (y, x))| y % s == down && x % s == right)
+            .collect();
+        if taps.is_empty() {
+            continue;
+        }
+        let len = shape.in_channels * shape.out_channels * taps.len();
+        let (weights, after) = rest.split_at_mut(len);
+        rest = after;
+        transpose_weights(shape, weight, &taps, weights);
+        phases.push(Phase {
+            down,
+            right,
+            taps,
+            weights,
+        });
+    }
+    phases
+}
+
+/// From O × (C·kernel) to C × (O·taps).
+fn transpose_weights(
+    shape: &ConvShape,
+    weight: &[f32],
+    taps: &[(usize, (usize, usize))],
+    to: &mut [f32],
+) {
+    /// Channels of a task: their taps lie side by side.
+    const GROUP: usize = 8;
+    let (area, channels, count) = (shape.kernel_area(), shape.in_channels, taps.len());
+    let row = shape.out_channels * count;
+    to.par_chunks_mut(GROUP * row)
         .enumerate()
         .for_each(|(group, to)| {
             for output in 0..shape.out_channels {
-                let from = &weight[(output * channels + group * 8) * area..];
+                let from = &weight[(output * channels + group * GROUP) * area..];
                 for (to, from) in to.chunks_exact_mut(row).zip(from.chunks_exact(area)) {
-                    let to = &mut to[output * taps.len()..][..taps.len()];
-                    if whole {
-                        to.copy_from_slice(from);
+                    let to = &mut to[output * count..][..count];
+                    if let (Some(to), Some(from)) = (to.as_mut_array::<9>(), from.as_array::<9>()) {
+                        // The usual 3×3: a copy of known length needs no call.
+                        *to = *from;
                     } else {
-                        for (to, (tap, _)) in to.iter_mut().zip(&taps) {
+                        for (to, (tap, _)) in to.iter_mut().zip(taps) {
                             *to = from[*tap];
                         }
                     }
                 }
             }
         });
-    Phase {
-        down,
-        right,
-        taps,
-        weights,
-    }
 }
 
 fn gradient_tile(

@@ -2,7 +2,7 @@ use super::{
     ConvShape,
     forward::gather,
     lattice::{Lattice, Tile, tiles},
-    product::{PixelProduct, padded},
+    product::{LANES, PixelProduct, padded},
     transpose::transpose,
 };
 use crate::{scratch::with_scratch, send_ptr::SharedMut};
@@ -53,23 +53,44 @@ pub fn conv2d_backward_weight(
         + padded(shape.out_channels) * shape.out_width();
     let tiles = tiles(shape.batch, 0, shape.out_height(), row_floats);
     let to = SharedMut::new(grad_weight);
+    let all = 0..shape.in_channels;
     if shape.weight_len() > FEW_WEIGHTS && shape.in_channels >= TASKS {
+        // Every group of channels needs the transposed gradient of all tiles: it is made once.
+        let mut grads = vec![0.0; shape.batch * shape.out_area() * padded(shape.out_channels)];
+        let mut rest = grads.as_mut_slice();
+        let mut parts = Vec::new();
+        for tile in &tiles {
+            let (part, after) = rest.split_at_mut(grad_len(shape, tile));
+            parts.push((tile, part));
+            rest = after;
+        }
+        parts
+            .par_iter_mut()
+            .for_each(|(tile, part)| transposed_grad(shape, tile, grad_out, part));
+        let parts: Vec<(Tile, &[f32])> = parts.into_iter().map(|(t, p)| (*t, &*p)).collect();
         split(shape.in_channels, TASKS)
             .into_par_iter()
             .for_each(|channels| {
                 let mut sum = vec![0.0; sum_len(shape, &channels)];
-                add_tiles(shape, &tiles, channels.clone(), x, grad_out, &mut sum);
+                let mut adder = Adder::default();
+                for (tile, grad) in &parts {
+                    adder.add(shape, *tile, channels.clone(), x, grad, &mut sum);
+                }
                 write(shape, channels, &sum, &to);
             });
         return;
     }
-    let channels = 0..shape.in_channels;
     let mut parts: Vec<Vec<f32>> = split(tiles.len(), TASKS)
         .into_par_iter()
         .map(|range| {
-            let mut sum = vec![0.0; sum_len(shape, &channels)];
-            let tiles = &tiles[range];
-            add_tiles(shape, tiles, channels.clone(), x, grad_out, &mut sum);
+            let mut sum = vec![0.0; sum_len(shape, &all)];
+            let mut adder = Adder::default();
+            for tile in &tiles[range] {
+                with_scratch(grad_len(shape, tile), |grad| {
+                    transposed_grad(shape, tile, grad_out, grad);
+                    adder.add(shape, *tile, all.clone(), x, grad, &mut sum);
+                });
+            }
             sum
         })
         .collect();
@@ -79,7 +100,24 @@ pub fn conv2d_backward_weight(
             *sum += *add;
         }
     }
-    write(shape, channels, &total, &to);
+    write(shape, all, &total, &to);
+}
+
+/// Length of a tile's transposed gradient: pixels × padded outputs.
+fn grad_len(shape: &ConvShape, tile: &Tile) -> usize {
+    tile.images * tile.rows * shape.out_width() * padded(shape.out_channels)
+}
+
+/// The output gradient of a tile as pixels × outputs.
+fn transposed_grad(shape: &ConvShape, tile: &Tile, grad_out: &[f32], to: &mut [f32]) {
+    let outputs = padded(shape.out_channels);
+    let (area, width) = (shape.out_area(), shape.out_width());
+    let count = tile.rows * width;
+    for (n, to) in to.chunks_exact_mut(count * outputs).enumerate() {
+        let first = (tile.first_image + n) * shape.out_channels * area;
+        let from = &grad_out[first + tile.first_row * width..];
+        transpose(from, area, shape.out_channels, count, to, outputs);
+    }
 }
 
 /// Length of the transposed sum of some channels' taps: taps × padded outputs.
@@ -87,61 +125,73 @@ fn sum_len(shape: &ConvShape, channels: &Range<usize>) -> usize {
     channels.len() * shape.kernel_area() * padded(shape.out_channels)
 }
 
-/// Adds the weight gradient of `channels` over `tiles` to its transpose, taps × outputs.
-fn add_tiles(
-    shape: &ConvShape,
-    tiles: &[Tile],
-    channels: Range<usize>,
-    x: &[f32],
-    grad_out: &[f32],
-    sum: &mut [f32],
-) {
-    let outputs = padded(shape.out_channels);
-    let (area, width) = (shape.out_area(), shape.out_width());
-    let mut layout: Option<(Tile, Vec<usize>, Vec<usize>)> = None;
-    for tile in tiles {
-        let lattice = Lattice::new(shape.window(), *tile);
-        let same = |t: &Tile| (t.images, t.rows) == (tile.images, tile.rows);
-        if !layout.as_ref().is_some_and(|(t, ..)| same(t)) {
-            let offsets = shape.tap_offsets(&lattice, 0..channels.len());
-            layout = Some((*tile, offsets, lattice.pixels()));
-        }
-        let Some((_, offsets, pixels)) = &layout else {
-            continue;
+/// Sums weight gradients over tiles; remembers the offsets, which tiles of one size share.
+#[derive(Default)]
+struct Adder {
+    layout: Option<Layout>,
+}
+
+struct Layout {
+    images: usize,
+    rows: usize,
+    taps: Vec<usize>,
+    pixels: Vec<usize>,
+}
+
+impl Adder {
+    /// Adds the weight gradient of `channels` over a tile to its transpose, taps × outputs.
+    fn add(
+        &mut self,
+        shape: &ConvShape,
+        tile: Tile,
+        channels: Range<usize>,
+        x: &[f32],
+        grad: &[f32],
+        sum: &mut [f32],
+    ) {
+        let lattice = Lattice::new(shape.window(), tile);
+        let same = |l: &Layout| (l.images, l.rows) == (tile.images, tile.rows);
+        let layout = match self.layout.take().filter(same) {
+            Some(layout) => layout,
+            None => Layout {
+                images: tile.images,
+                rows: tile.rows,
+                taps: shape.tap_offsets(&lattice, 0..channels.len()),
+                pixels: lattice.pixels(),
+            },
         };
-        let source_len = channels.len() * lattice.plane_len;
-        with_scratch(source_len + pixels.len() * outputs, |buffer| {
-            let (source, grad) = buffer.split_at_mut(source_len);
-            gather(&lattice, x, shape.in_channels, channels.clone(), source);
-            let count = tile.rows * width;
-            for (n, grad) in grad.chunks_exact_mut(count * outputs).enumerate() {
-                let first = (tile.first_image + n) * shape.out_channels * area;
-                let from = &grad_out[first + tile.first_row * width..];
-                transpose(from, area, shape.out_channels, count, grad, outputs);
-            }
+        with_scratch(channels.len() * lattice.plane_len, |source| {
+            gather(&lattice, x, shape.in_channels, channels, source);
             PixelProduct {
-                offsets,
+                offsets: &layout.taps,
                 source,
-                pixels,
+                pixels: &layout.pixels,
                 grad,
-                columns: outputs,
-                out: &mut *sum,
+                columns: padded(shape.out_channels),
+                out: sum,
             }
             .run();
         });
+        self.layout = Some(layout);
     }
 }
 
 /// Writes the transposed sum of `channels` to their weights.
 fn write(shape: &ConvShape, channels: Range<usize>, sum: &[f32], to: &SharedMut<f32>) {
     let taps = channels.len() * shape.kernel_area();
+    let start = channels.start * shape.kernel_area();
     let stride = padded(shape.out_channels);
-    for output in 0..shape.out_channels {
-        let start = output * shape.taps() + channels.start * shape.kernel_area();
-        // SAFETY: the taps of these channels are written by this task alone.
-        let row = unsafe { to.slice(start, taps) };
-        for (value, sums) in row.iter_mut().zip(sum.chunks_exact(stride)) {
-            *value = sums[output];
+    for first in (0..shape.out_channels).step_by(LANES) {
+        let count = LANES.min(shape.out_channels - first);
+        // A vector of the sum goes to as many rows: all of them stay in the cache.
+        let mut rows: Vec<&mut [f32]> = (first..first + count)
+            // SAFETY: the taps of these channels are written by this task alone, each row once.
+            .map(|output| unsafe { to.slice(output * shape.taps() + start, taps) })
+            .collect();
+        for (tap, sums) in sum.chunks_exact(stride).enumerate() {
+            for (row, value) in rows.iter_mut().zip(&sums[first..]) {
+                row[tap] = *value;
+            }
         }
     }
 }

@@ -13,7 +13,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 pub use data::{DataCommand, ExportGtArgs, GtDepth, InspectArgs};
 pub use eval::{EvalArgs, PredKind};
 pub use predict::{BenchArgs, PredictArgs, Save, WeightsCommand};
-pub use train::{DeviceChoice, PresetChoice, TrainArgs};
+pub use train::{DeviceChoice, PresetChoice, TrainArgs, ViewMotionChoice};
 pub use values::{CameraIntrinsics, Size};
 
 /// Metric depth from one camera and a speed signal.

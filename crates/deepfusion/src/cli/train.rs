@@ -60,6 +60,9 @@ pub struct TrainArgs {
     /// Weights to start from: a run, a checkpoint, or a file from weights import.
     #[arg(long, value_name = "WEIGHTS")]
     pub init: Option<PathBuf>,
+    /// Whose motion the views are synthesised with [default: the preset's].
+    #[arg(long, value_enum, value_name = "MOTION")]
+    pub view_motion: Option<ViewMotionChoice>,
     /// Terms of the loss to leave out.
     #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = ["smoothness", "speed", "automask"])]
     pub without: Vec<String>,
@@ -76,6 +79,17 @@ pub enum PresetChoice {
     Resnet50,
     /// Monodepth2's network and losses, with the speed term.
     Monodepth2,
+}
+
+/// Whose motion the views are synthesised with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ViewMotionChoice {
+    /// PoseNet's; the speed loss pulls its length to the vehicle's.
+    Posenet,
+    /// PoseNet's direction and rotation, the vehicle's distance.
+    Distance,
+    /// The vehicle's, from speed and yaw rate.
+    Vehicle,
 }
 
 /// Where to compute.

@@ -18,7 +18,7 @@ use deepfusion_render::{
     render_cloud, side_by_side, with_depth_legend,
 };
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
-use deepfusion_train::{Predictor, Preset, RunFolder, TrainConfig, Trainer};
+use deepfusion_train::{CompareAt, Predictor, Preset, RunFolder, TrainConfig, Trainer, ViewMotion};
 
 use super::eval::predict;
 use super::evaluate::{Truth, evaluate_datasets, open_datasets, trivial_from_datasets};
@@ -28,15 +28,14 @@ use crate::cli::DemoArgs;
 use crate::output;
 use crate::progress::{Progress, say};
 
-/// Streets that are trained on, and frames of each: a network that knows one street by heart cannot
-/// tell depth on the next.
-const STREETS: u64 = 6;
+/// Streets that are trained on, each filmed at its own rate: one street alone is learned by heart. At few
+/// frames a second far things move enough to be measured; at many, cars parked beside the lane move
+/// little enough to be found.
+const FRAMES_PER_SECOND: [f64; 6] = [5.0, 8.0, 12.0, 18.0, 26.0, 36.0];
+/// Frames of each.
 const STREET_FRAMES: usize = 260;
 /// Their pictures: larger than what the network sees, small enough to draw quickly.
 const STREET_SIZE: (u32, u32) = (320, 96);
-/// Frames a second: at KITTI's ten, cars parked beside the lane move further in the image than a network
-/// can learn to follow in minutes.
-const FRAMES_PER_SECOND: f64 = 18.0;
 /// Every n-th of their frames has a scan, for the trivial row alone.
 const STREET_SCAN_EVERY: usize = 20;
 /// Frames of the street that is measured on, and how many of them have a scan.
@@ -56,17 +55,19 @@ pub fn run(args: &DemoArgs) -> Result<()> {
     let out = output::run_folder(args.out.as_deref(), "demo")?;
 
     say("1/4 simulating streets to learn on, and another to be measured on");
-    let street = |i: u64| SimConfig {
-        seed: args.seed.wrapping_add(i),
+    let street = |(i, fps): (usize, f64)| SimConfig {
+        seed: args.seed.wrapping_add(i as u64),
         frames: STREET_FRAMES,
         width: STREET_SIZE.0,
         height: STREET_SIZE.1,
         scan_every: STREET_SCAN_EVERY,
-        fps: FRAMES_PER_SECOND,
+        fps,
         ..SimConfig::default()
     };
-    let train_drives = (0..STREETS)
-        .map(|i| simulate(&out.join(format!("train-{i}")), &street(i)))
+    let train_drives = FRAMES_PER_SECOND
+        .into_iter()
+        .enumerate()
+        .map(|(i, fps)| simulate(&out.join(format!("train-{i}")), &street((i, fps))))
         .collect::<Result<Vec<_>>>()?;
     let test = SimConfig {
         seed: args.seed.wrapping_add(TEST_SEED),
@@ -76,10 +77,12 @@ pub fn run(args: &DemoArgs) -> Result<()> {
     };
     let test_drive = simulate(&out.join("test"), &test)?;
 
-    say("2/4 learning depth from the images and the car's speed alone");
-    let preset = Preset::Tiny.config();
+    say("2/4 learning depth from the images and the car's motion (speed, yaw rate)");
+    let mut preset = Preset::Tiny.config();
+    preset.loss.compare_at = CompareAt::Own;
     let (width, height) = SIZE;
     let config = TrainConfig {
+        view_motion: ViewMotion::Vehicle,
         size: InputSize { width, height },
         steps: Some(STEPS),
         seed: args.seed,

@@ -3,12 +3,14 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use deepfusion_data::{Camera, CameraChoice, Dataset, speed_unit_warning};
 use deepfusion_nn::weights::load_torchvision_resnet;
-use deepfusion_train::{Error, Model, Preset, RunFolder, SampleSet, TrainConfig, Trainer};
+use deepfusion_train::{
+    Error, Model, Preset, RunFolder, SampleSet, TrainConfig, Trainer, ViewMotion,
+};
 
 use super::device;
 use super::evaluate::open_datasets;
 use super::recorder::{Recorder, catch_interrupt, clock};
-use crate::cli::{PresetChoice, TrainArgs};
+use crate::cli::{PresetChoice, TrainArgs, ViewMotionChoice};
 use crate::output;
 use crate::progress::say;
 
@@ -92,8 +94,15 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     }
     config.batch = args.batch.unwrap_or(config.batch);
     config.seed = args.seed.unwrap_or(config.seed);
+    if let Some(choice) = args.view_motion {
+        config.view_motion = match choice {
+            ViewMotionChoice::Posenet => ViewMotion::PoseNet,
+            ViewMotionChoice::Distance => ViewMotion::Distance,
+            ViewMotionChoice::Vehicle => ViewMotion::Vehicle,
+        };
+    }
     for term in &args.without {
-        config.loss.without(term)?;
+        config.without(term)?;
     }
     config.data.paths.clone_from(&args.data);
     config.data.validation.clone_from(&args.val_data);
