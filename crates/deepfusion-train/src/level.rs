@@ -82,7 +82,14 @@ mod tests {
     #[test]
     fn the_matrix_resizes_the_camera() {
         let device = Device::flex();
-        let k = Intrinsics::new(700.0, 710.0, 319.0, 90.0, 640, 192);
+        let k = Intrinsics {
+            fx: 700.0,
+            fy: 710.0,
+            cx: 319.0,
+            cy: 90.0,
+            width: 640,
+            height: 192,
+        };
         let expected = k.resized(160, 48).matrix();
         let rows: [[f32; 3]; 3] =
             std::array::from_fn(|i| std::array::from_fn(|j| k.matrix()[(i, j)] as f32));

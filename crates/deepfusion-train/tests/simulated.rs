@@ -5,8 +5,9 @@ use deepfusion_data::{Dataset, OpenOptions, to_chw};
 use deepfusion_geometry::Se3;
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{
-    BatchLoader, CheckpointKind, Control, Error, LossTerms, Motion, Preset, RunFolder, SampleSet,
-    TrainConfig, TrainEvent, Trainer, synthesise,
+    BatchLoader, CheckpointKind, CompareAt, Control, Error, LossTerms, Model, Motion, Preset,
+    RunFolder, SampleSet, TrainConfig, TrainEvent, Trainer, ViewMotion, synthesise,
+    validation_loss,
 };
 use std::path::Path;
 
@@ -221,4 +222,46 @@ fn batches_are_the_same_again() {
         distances.iter().all(|d| (0.1..2.0).contains(d)),
         "{distances:?}"
     );
+}
+
+/// What the views follow: PoseNet in everything, in everything but the distance, or in nothing.
+#[test]
+fn the_views_follow_the_motion_that_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let (config, samples, _) = small(&drive(folder.path(), 8), 1);
+    let device = Device::flex().autodiff();
+    let reprojection = |view_motion, compare_at, metres_per_unit, seed| {
+        let mut config = config.clone();
+        config.view_motion = view_motion;
+        config.loss.compare_at = compare_at;
+        config.pose_net.metres_per_unit = metres_per_unit;
+        let mut model = Model::new(&config, &device).unwrap();
+        model.pose_net = config.pose_net.init_with_seed(seed, &device).unwrap();
+        let (losses, _) = validation_loss(&model, &config, &samples, &device).unwrap();
+        losses.reprojection
+    };
+    for compare_at in [CompareAt::Full, CompareAt::Own] {
+        let of = |motion, metres, seed| reprojection(motion, compare_at, metres, seed);
+        let far = |a: f64, b: f64| (a - b).abs() > 1e-4;
+        let same = |a: f64, b: f64| (a - b).abs() < 1e-6;
+        let posenet = of(ViewMotion::PoseNet, 20.0, 1);
+        assert!(
+            far(posenet, of(ViewMotion::PoseNet, 400.0, 1)),
+            "its length counts"
+        );
+        let distance = of(ViewMotion::Distance, 20.0, 1);
+        assert!(
+            same(distance, of(ViewMotion::Distance, 400.0, 1)),
+            "not its length"
+        );
+        assert!(
+            far(distance, of(ViewMotion::Distance, 20.0, 2)),
+            "but its direction"
+        );
+        let vehicle = of(ViewMotion::Vehicle, 20.0, 1);
+        assert!(
+            same(vehicle, of(ViewMotion::Vehicle, 400.0, 2)),
+            "nothing of it"
+        );
+    }
 }
