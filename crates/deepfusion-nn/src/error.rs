@@ -87,6 +87,10 @@ pub enum Error {
         others: usize,
     },
 
+    /// A network that cannot be written as a graph; its config and weights were accepted before.
+    #[error(transparent)]
+    Graph(#[from] deepfusion_infer::Error),
+
     /// A NaN or an infinity among the weights.
     #[error("{origin}: tensor `{name}` holds {count} values that are not finite")]
     NotFinite {
@@ -113,7 +117,7 @@ impl Error {
     #[must_use]
     pub fn hint(&self) -> Option<String> {
         let hint = match self {
-            Self::Config { .. } => return None,
+            Self::Config { .. } | Self::Graph(_) => return None,
             Self::InputSize { width, height } => {
                 let nearest = |n: usize| (n.max(64) + 16) / 32 * 32;
                 return Some(format!(

@@ -10,6 +10,7 @@
 mod decoder;
 mod depth_net;
 mod error;
+mod graph;
 mod init;
 pub mod layers;
 pub mod ops;
@@ -20,6 +21,7 @@ pub mod weights;
 pub use decoder::{DecoderConfig, DecoderStage, DisparityDecoder, SCALES};
 pub use depth_net::{DepthNet, DepthNetConfig, InputSize};
 pub use error::Error;
+pub use graph::depth_graph;
 pub use init::{WeightInit, WeightRng};
 pub use pose_net::{PoseDecoder, PoseNet, PoseNetConfig, PoseOutput, RADIANS_PER_UNIT};
 pub use resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth, ResidualBlock};

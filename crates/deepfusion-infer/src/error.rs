@@ -1,0 +1,31 @@
+/// What can go wrong before a network runs; running it cannot fail.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// A graph that means no network.
+    #[error("network graph, node {node} ({name}): {reason}")]
+    Graph {
+        /// Which node, counted from 0.
+        node: usize,
+        /// The node's name.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// An image size that the graph cannot work on.
+    #[error(
+        "network input of {width}x{height} pixels: width and height must be multiples of {step}, at least {least}"
+    )]
+    Size {
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+        /// What both must be multiples of.
+        step: usize,
+        /// The smallest side.
+        least: usize,
+    },
+    /// A precision that this processor has no instructions for.
+    #[error("bf16 needs a processor with AMX or AVX512-BF16; this one has neither")]
+    NoBf16,
+}
