@@ -233,6 +233,17 @@ impl Graph {
         &self.nodes
     }
 
+    /// The operations alone; a weight can be dropped once it is used.
+    pub(crate) fn into_nodes(self) -> Vec<Node> {
+        self.nodes
+    }
+
+    /// Whether any operation reads the value.
+    pub(crate) fn is_read(&self, value: ValueId) -> bool {
+        let reads = |node: &Node| node.op.inputs().any(|v| v == value);
+        self.nodes.iter().any(reads)
+    }
+
     /// The outputs.
     #[must_use]
     pub fn outputs(&self) -> &[ValueId] {

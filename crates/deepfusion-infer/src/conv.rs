@@ -1,0 +1,110 @@
+//! What every form of the convolution shares: its geometry on views, and how work is cut into tasks.
+
+use crate::view::View;
+use crate::{Activation, Conv};
+
+/// A convolution's place in the arena.
+#[derive(Debug, Clone)]
+pub(crate) struct Geometry {
+    pub(crate) input: View,
+    pub(crate) out: View,
+    pub(crate) residual: Option<View>,
+    pub(crate) kernel: usize,
+    pub(crate) stride: usize,
+    pub(crate) activation: Activation,
+}
+
+/// Inputs of one output pixel that lie one after the other in memory.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Runs {
+    /// Where each run starts, from the output pixel's own input pixel less half a kernel.
+    pub(crate) offsets: Vec<usize>,
+    /// Elements of a run.
+    pub(crate) len: usize,
+    /// For each run and element, which input channel and tap (ky·kernel + kx) it is; none where it only
+    /// fills up.
+    pub(crate) sources: Vec<Option<(usize, usize)>>,
+}
+
+impl Runs {
+    /// The runs of a convolution over a view whose first channels are the logical ones named by
+    /// `channel_of` (physical → logical); runs are at most `most` long and multiples of `multiple`.
+    pub(crate) fn new(
+        view: &View,
+        kernel: usize,
+        channel_of: &[Option<usize>],
+        most: usize,
+        multiple: usize,
+    ) -> Self {
+        let channels = channel_of.len();
+        // Where nothing stands between two pixels' channels, a row of the kernel is one run.
+        let joined = if channels == view.pitch { kernel } else { 1 };
+        let whole = channels * joined;
+        let parts = whole.div_ceil(most);
+        let len = whole.div_ceil(parts).next_multiple_of(multiple);
+        let mut runs = Self {
+            offsets: Vec::new(),
+            len,
+            sources: Vec::new(),
+        };
+        for ky in 0..kernel {
+            for kx in (0..kernel).step_by(joined) {
+                for part in 0..whole.div_ceil(len) {
+                    runs.offsets
+                        .push(ky * view.row + kx * view.pitch + part * len);
+                    for k in part * len..(part + 1) * len {
+                        let tap = ky * kernel + kx + k / channels;
+                        let channel = if k < whole {
+                            channel_of[k % channels]
+                        } else {
+                            None
+                        };
+                        runs.sources.push(channel.map(|c| (c, tap)));
+                    }
+                }
+            }
+        }
+        runs
+    }
+}
+
+/// One weight of a convolution, 0 where there is none.
+pub(crate) fn weight(conv: &Conv, out: usize, source: Option<(usize, usize)>) -> f32 {
+    match source {
+        Some((channel, tap)) if out < conv.channels_out => {
+            let taps = conv.kernel * conv.kernel;
+            conv.weight[(out * conv.channels_in + channel) * taps + tap]
+        }
+        _ => 0.0,
+    }
+}
+
+/// The bias, filled up with zeros.
+pub(crate) fn padded_bias(conv: &Conv, channels: usize) -> Vec<f32> {
+    let mut bias = conv.bias.clone();
+    bias.resize(channels, 0.0);
+    bias
+}
+
+/// Cuts `pixels` × `groups` into tasks: pieces of about `most` pixels, and of fewer groups where there would
+/// be too few tasks for the threads.
+pub(crate) fn tasks(
+    pixels: usize,
+    most: usize,
+    multiple: usize,
+    groups: usize,
+) -> Vec<(std::ops::Range<usize>, std::ops::Range<usize>)> {
+    let threads = rayon::current_num_threads();
+    let pieces = pixels.div_ceil(most);
+    let piece = pixels.div_ceil(pieces).next_multiple_of(multiple);
+    let pieces = pixels.div_ceil(piece);
+    let parts = (2 * threads).div_ceil(pieces).min(groups);
+    let mut tasks = Vec::with_capacity(pieces * parts);
+    for part in 0..parts {
+        let group = part * groups / parts..(part + 1) * groups / parts;
+        for start in (0..pixels).step_by(piece) {
+            tasks.push((start..(start + piece).min(pixels), group.clone()));
+        }
+    }
+    tasks
+}

@@ -1,0 +1,145 @@
+//! A convolution in f32, pixel by pixel, without unfolding.
+
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+use crate::conv::{Geometry, Runs, padded_bias, tasks, weight};
+use crate::tile::{GROUP, LANES, Pixel, Shift, Start, Sum, tiles};
+use crate::view::Shared;
+use crate::{Activation, Conv};
+
+/// Inputs summed before the sums go back to memory: their weights stay in the first cache.
+const INPUTS_AT_ONCE: usize = 160;
+/// Output pixels of a task: their inputs and outputs stay in the second cache.
+const PIXELS_AT_ONCE: usize = 480;
+
+/// A convolution ready to run.
+#[derive(Debug)]
+pub(crate) struct Direct {
+    geometry: Geometry,
+    runs: Runs,
+    /// For each group of [`GROUP`] output channels: a row of them for every input of every run.
+    panels: Vec<f32>,
+    bias: Vec<f32>,
+}
+
+impl Direct {
+    pub(crate) fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
+        let runs = Runs::new(
+            &geometry.input,
+            geometry.kernel,
+            channel_of,
+            INPUTS_AT_ONCE,
+            1,
+        );
+        let columns = conv.channels_out.next_multiple_of(LANES);
+        let mut panels = Vec::with_capacity(runs.sources.len() * columns);
+        for first in (0..columns).step_by(GROUP) {
+            let width = GROUP.min(columns - first);
+            for source in &runs.sources {
+                panels.extend((first..first + width).map(|o| weight(conv, o, *source)));
+            }
+        }
+        Self {
+            bias: padded_bias(conv, columns),
+            geometry,
+            runs,
+            panels,
+        }
+    }
+
+    /// # Safety
+    /// `arena` must hold every view of the geometry, its border included, and nobody else may use the
+    /// output meanwhile.
+    pub(crate) unsafe fn run(&self, arena: Shared<f32>) {
+        let groups = self.bias.len().div_ceil(GROUP);
+        tasks(self.geometry.out.pixels(), PIXELS_AT_ONCE, 6, groups)
+            .into_par_iter()
+            .for_each(|(pixels, groups)| {
+                Arch::new().dispatch(Task {
+                    conv: self,
+                    arena,
+                    pixels,
+                    groups,
+                });
+            });
+    }
+}
+
+struct Task<'a> {
+    conv: &'a Direct,
+    arena: Shared<f32>,
+    pixels: std::ops::Range<usize>,
+    groups: std::ops::Range<usize>,
+}
+
+impl WithSimd for Task<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self {
+            conv,
+            arena,
+            pixels,
+            groups,
+        } = self;
+        let g = &conv.geometry;
+        let half = g.kernel / 2;
+        let corner = g.input.offset - half * (g.input.row + g.input.pitch);
+        let at_once = (INPUTS_AT_ONCE / conv.runs.len).max(1);
+        let columns = conv.bias.len();
+        let mut places = Vec::with_capacity(pixels.len());
+        let mut p = pixels.start;
+        while p < pixels.end {
+            // The rest of the task in this row.
+            let (x, y) = (p % g.out.width, p / g.out.width);
+            let count = (g.out.width - x).min(pixels.end - p);
+            let input = corner + y * g.stride * g.input.row;
+            // SAFETY: the pixels lie in the views (the promise of `run`).
+            places.extend((x..x + count).map(|x| unsafe {
+                Pixel {
+                    input: arena.at(input + x * g.stride * g.input.pitch),
+                    out: arena.at(g.out.at(x, y)),
+                    residual: match &g.residual {
+                        Some(view) => arena.at(view.at(x, y)),
+                        None => std::ptr::null(),
+                    },
+                }
+            }));
+            p += count;
+        }
+        for group in groups {
+            let first = group * GROUP;
+            let width = GROUP.min(columns - first);
+            let shift = Shift {
+                input: 0,
+                out: first,
+            };
+            let panel = &conv.panels[first * conv.runs.sources.len()..];
+            let last = conv.runs.offsets.len().div_ceil(at_once) - 1;
+            for (i, runs) in conv.runs.offsets.chunks(at_once).enumerate() {
+                let sum = Sum {
+                    runs,
+                    len: conv.runs.len,
+                    panel: panel[i * at_once * conv.runs.len * width..].as_ptr(),
+                    stride: width,
+                    start: match (i, &g.residual) {
+                        (0, None) => Start::Bias(conv.bias[first..].as_ptr()),
+                        (0, Some(_)) => Start::BiasAndResidual(conv.bias[first..].as_ptr()),
+                        _ => Start::Out,
+                    },
+                    relu: i == last && g.activation == Activation::Relu,
+                };
+                // SAFETY: the views lie in the arena, the panel has a row for every input.
+                unsafe { tiles(simd, &sum, width, &places, shift) };
+            }
+            if !matches!(g.activation, Activation::Identity | Activation::Relu) {
+                for place in &places {
+                    // SAFETY: written just now, by this task alone.
+                    unsafe { g.activation.apply(simd, place.out.add(first), width) };
+                }
+            }
+        }
+    }
+}

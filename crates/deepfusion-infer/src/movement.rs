@@ -1,0 +1,153 @@
+//! The operations that only move values: the image's entry, borders, maximum pooling, enlarging.
+
+use rayon::prelude::*;
+
+use crate::element::Element;
+use crate::view::{Shared, View};
+
+/// (b / 255 − mean) / std of every byte, for each colour.
+#[derive(Debug, Clone)]
+pub(crate) struct ByteTable(Box<[[f32; 256]; 3]>);
+
+impl ByteTable {
+    pub(crate) fn new(mean: [f32; 3], std: [f32; 3]) -> Self {
+        let value = |c: usize, b: usize| (b as f32 / 255.0 - mean[c]) / std[c];
+        Self(Box::new(std::array::from_fn(|c| {
+            std::array::from_fn(|b| value(c, b))
+        })))
+    }
+
+    /// Writes the normalised image.
+    ///
+    /// # Safety
+    /// `to` must lie in the arena and nobody else use it.
+    pub(crate) unsafe fn run<E: Element>(&self, rgb: &[u8], arena: Shared<E>, to: &View) {
+        let rows = rgb.par_chunks_exact(3 * to.width);
+        rows.enumerate().for_each(|(y, row)| {
+            // SAFETY: the row lies in the view.
+            let out = unsafe { row_of(arena, to, y) };
+            let (pixels, _) = row.as_chunks::<3>();
+            for (out, pixel) in out.chunks_exact_mut(to.pitch).zip(pixels) {
+                for c in 0..3 {
+                    out[c] = E::of(self.0[c][usize::from(pixel[c])]);
+                }
+            }
+        });
+    }
+}
+
+/// All elements of an image's row, without the border.
+unsafe fn row_of<'a, E: Element>(arena: Shared<E>, view: &View, y: usize) -> &'a mut [E] {
+    // SAFETY: the caller's promise.
+    unsafe { std::slice::from_raw_parts_mut(arena.at(view.at(0, y)), view.width * view.pitch) }
+}
+
+/// A pixel's channels.
+unsafe fn pixel_of<'a, E: Element>(arena: Shared<E>, view: &View, at: usize) -> &'a mut [E] {
+    // SAFETY: the caller's promise.
+    unsafe { std::slice::from_raw_parts_mut(arena.at(at), view.channels) }
+}
+
+/// Calls `each` with the place of every border pixel up to `reach` and its place among the image's own by
+/// mirroring.
+fn for_border(view: &View, reach: usize, mut each: impl FnMut(usize, usize)) {
+    let (w, h, r) = (view.width as isize, view.height as isize, reach as isize);
+    let mirror = |i: isize, n: isize| {
+        let i = i.abs();
+        if i < n { i } else { 2 * (n - 1) - i }
+    };
+    let at = |x: isize, y: isize| {
+        let from_start = |i: isize| (i + view.border as isize) as usize;
+        view.start() + from_start(y) * view.row + from_start(x) * view.pitch
+    };
+    for y in -r..h + r {
+        let inside = (0..h).contains(&y);
+        for x in (-r..w + r).filter(|x| !inside || !(0..w).contains(x)) {
+            each(at(x, y), at(mirror(x, w), mirror(y, h)));
+        }
+    }
+}
+
+/// # Safety
+/// The view must lie in the arena and nobody else use it.
+pub(crate) unsafe fn zero_border<E: Element>(arena: Shared<E>, view: &View, reach: usize) {
+    for_border(view, reach, |at, _| {
+        // SAFETY: a pixel of the view's border.
+        unsafe { pixel_of(arena, view, at) }.fill(E::default());
+    });
+}
+
+/// # Safety
+/// As [`zero_border`].
+pub(crate) unsafe fn reflect_border<E: Element>(arena: Shared<E>, view: &View, reach: usize) {
+    for_border(view, reach, |at, from| {
+        // SAFETY: a pixel of the view's border, and one within.
+        unsafe { pixel_of(arena, view, at).copy_from_slice(pixel_of(arena, view, from)) };
+    });
+}
+
+/// The maximum over 3×3 pixels at stride 2; pixels beyond the edge do not count.
+///
+/// # Safety
+/// The views must lie in the arena, apart from each other, and nobody else use `to`.
+pub(crate) unsafe fn max_pool<E: Element>(arena: Shared<E>, from: &View, to: &View) {
+    (0..to.height).into_par_iter().for_each(|y| {
+        for x in 0..to.width {
+            // SAFETY: pixels of the views.
+            let out = unsafe { pixel_of(arena, to, to.at(x, y)) };
+            let within = |i: usize, n: usize| (2 * i).saturating_sub(1)..(2 * i + 2).min(n);
+            let mut first = true;
+            for i in within(y, from.height) {
+                for j in within(x, from.width) {
+                    // SAFETY: as above.
+                    let pixel = unsafe { pixel_of(arena, from, from.at(j, i)) };
+                    if first {
+                        out.copy_from_slice(pixel);
+                        first = false;
+                        continue;
+                    }
+                    for (out, v) in out.iter_mut().zip(pixel) {
+                        *out = if *v > *out { *v } else { *out };
+                    }
+                }
+            }
+        }
+    });
+}
+
+/// Every pixel becomes 2×2.
+///
+/// # Safety
+/// As [`max_pool`].
+pub(crate) unsafe fn upsample<E: Element>(arena: Shared<E>, from: &View, to: &View) {
+    (0..from.height).into_par_iter().for_each(|y| {
+        for x in 0..from.width {
+            // SAFETY: pixels of the views.
+            unsafe {
+                let pixel = pixel_of(arena, from, from.at(x, y));
+                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    pixel_of(arena, from, to.at(2 * x + dx, 2 * y + dy)).copy_from_slice(pixel);
+                }
+            }
+        }
+    });
+}
+
+/// Copies the channels of `from` to the first of `to`.
+///
+/// # Safety
+/// As [`max_pool`].
+pub(crate) unsafe fn copy<E: Element>(arena: Shared<E>, from: &View, to: &View) {
+    (0..from.height).into_par_iter().for_each(|y| {
+        for x in 0..from.width {
+            // SAFETY: pixels of the views.
+            unsafe {
+                pixel_of(arena, from, to.at(x, y)).copy_from_slice(pixel_of(
+                    arena,
+                    from,
+                    from.at(x, y),
+                ));
+            }
+        }
+    });
+}

@@ -1,0 +1,332 @@
+//! From a graph to steps over one block of memory: where every value lies, and what happens in which order.
+
+use crate::conv::Geometry;
+use crate::tile::LANES;
+use crate::view::View;
+use crate::{Border, Conv, Graph, Op, ValueId};
+
+/// What a step does; the engine gives each convolution its form.
+#[derive(Debug)]
+pub(crate) enum Step<C> {
+    /// Writes the normalised image.
+    Image(View),
+    /// Fills a view's border.
+    Border {
+        view: View,
+        reach: usize,
+        kind: Border,
+    },
+    Conv(C),
+    MaxPool(View, View),
+    Upsample(View, View),
+    Copy(View, View),
+}
+
+/// A graph laid out for one image size.
+#[derive(Debug)]
+pub(crate) struct Plan<C> {
+    /// With their names.
+    pub(crate) steps: Vec<(String, Step<C>)>,
+    /// Elements of the block of memory.
+    pub(crate) arena: usize,
+    /// Where the outputs lie, and for each of their channels its place in a pixel.
+    pub(crate) outputs: Vec<(View, Vec<usize>)>,
+}
+
+/// Elements after the last buffer that kernels may read (and multiply by zero).
+const SLACK: usize = 1024;
+
+/// A buffer holds one value, or a concatenation with the values that are its parts.
+#[derive(Debug, Clone, Default)]
+struct Buffer {
+    /// Physical channels.
+    channels: usize,
+    halvings: u32,
+    border: usize,
+    /// First and last step that uses it.
+    live: Option<(usize, usize)>,
+    offset: usize,
+}
+
+/// A value's place: some channels of a buffer.
+#[derive(Debug, Clone)]
+struct Home {
+    buffer: usize,
+    first: usize,
+    /// For each physical channel the logical one; none for those that fill up.
+    channel_of: Vec<Option<usize>>,
+}
+
+impl<C> Plan<C> {
+    /// Lays the graph out for images of this size (which the graph must accept); `init` gives each
+    /// convolution its form and may drop its weights.
+    pub(crate) fn new(
+        graph: Graph,
+        width: usize,
+        height: usize,
+        mut init: impl FnMut(Conv, Geometry, &[Option<usize>]) -> C,
+    ) -> Self {
+        let mut layout = Layout::new(&graph);
+        let outline = layout.outline(&graph);
+        let arena = layout.place(width, height) + SLACK;
+        let view = |value: ValueId| layout.view(value, width, height);
+        let outputs = graph.outputs().iter();
+        let outputs = outputs.map(|v| (view(*v), layout.places(*v))).collect();
+        let name = |value: ValueId| match value.0.checked_sub(1) {
+            Some(node) => graph.nodes()[node].name.clone(),
+            None => "image".to_owned(),
+        };
+        let names: Vec<_> = outline.iter().map(|step| name(step.value())).collect();
+        let mut nodes: Vec<_> = graph.into_nodes().into_iter().map(|n| Some(n.op)).collect();
+        let mut step_of = |step: Outline| match step {
+            Outline::Image => Step::Image(view(ValueId::IMAGE)),
+            Outline::Border(value, reach, kind) => Step::Border {
+                view: view(value),
+                reach,
+                kind,
+            },
+            Outline::MaxPool(from, to) => Step::MaxPool(view(from), view(to)),
+            Outline::Upsample(from, to) => Step::Upsample(view(from), view(to)),
+            Outline::Copy(from, to, behind) => {
+                let mut to = view(to);
+                to.offset += layout.homes[behind.0].channel_of.len();
+                Step::Copy(view(from), to)
+            }
+            Outline::Conv(node) => {
+                let Some(Op::Conv(conv)) = nodes[node].take() else {
+                    unreachable!("the outline names each convolution once")
+                };
+                let geometry = Geometry {
+                    input: view(conv.input),
+                    out: view(ValueId(node + 1)),
+                    residual: conv.residual.map(view),
+                    kernel: conv.kernel,
+                    stride: conv.stride,
+                    activation: conv.activation,
+                };
+                let channels = &layout.homes[conv.input.0].channel_of;
+                Step::Conv(init(*conv, geometry, channels))
+            }
+        };
+        let steps = outline.into_iter().map(&mut step_of);
+        let steps = names.into_iter().zip(steps).collect();
+        Self {
+            steps,
+            arena,
+            outputs,
+        }
+    }
+}
+
+/// A step before places are known.
+enum Outline {
+    Image,
+    Border(ValueId, usize, Border),
+    Conv(usize),
+    MaxPool(ValueId, ValueId),
+    Upsample(ValueId, ValueId),
+    /// A value into the concatenation, behind the value enlarged into it.
+    Copy(ValueId, ValueId, ValueId),
+}
+
+impl Outline {
+    /// What the step writes, or whose border it fills.
+    fn value(&self) -> ValueId {
+        match self {
+            Self::Image => ValueId::IMAGE,
+            Self::Border(value, ..) => *value,
+            Self::Conv(node) => ValueId(node + 1),
+            Self::MaxPool(_, to) | Self::Upsample(_, to) | Self::Copy(_, to, _) => *to,
+        }
+    }
+}
+
+struct Layout {
+    buffers: Vec<Buffer>,
+    homes: Vec<Home>,
+}
+
+impl Layout {
+    /// A home for every value: what is appended in a concatenation is written there from the start.
+    fn new(graph: &Graph) -> Self {
+        let count = graph.nodes().len() + 1;
+        let mut homes: Vec<Option<Home>> = vec![None; count];
+        let mut buffers = Vec::new();
+        // Channels of a value on its own.
+        let own = |value: usize| -> Vec<Option<usize>> {
+            let channels = graph.shape(ValueId(value)).channels;
+            // The image, and a single channel that nothing is summed over, are not filled up.
+            let physical = if value == 0 || (channels == 1 && !graph.is_read(ValueId(value))) {
+                channels
+            } else {
+                channels.next_multiple_of(LANES)
+            };
+            let logical = |c: usize| (c < channels).then_some(c);
+            (0..physical).map(logical).collect()
+        };
+        // The last ones first: a concatenation's parts come before it.
+        for value in (0..count).rev() {
+            let concat = match value.checked_sub(1).map(|i| &graph.nodes()[i].op) {
+                Some(Op::UpsampleConcat { input, skip }) => Some((*input, *skip)),
+                _ => None,
+            };
+            let channel_of = match concat {
+                Some((input, Some(skip))) => {
+                    let shift = graph.shape(input).channels;
+                    let behind = own(skip.0).into_iter().map(|c| c.map(|c| c + shift));
+                    own(input.0).into_iter().chain(behind).collect()
+                }
+                Some((input, None)) => own(input.0),
+                None => own(value),
+            };
+            let home = homes[value].get_or_insert_with(|| {
+                buffers.push(Buffer {
+                    channels: channel_of.len(),
+                    halvings: graph.shape(ValueId(value)).halvings,
+                    ..Buffer::default()
+                });
+                Home {
+                    buffer: buffers.len() - 1,
+                    first: 0,
+                    channel_of,
+                }
+            });
+            let buffer = home.buffer;
+            if let Some((input, Some(skip))) = concat
+                && home.first == 0
+                && homes[skip.0].is_none()
+                && !is_concat(graph, skip)
+            {
+                homes[skip.0] = Some(Home {
+                    buffer,
+                    first: own(input.0).len(),
+                    channel_of: own(skip.0),
+                });
+            }
+        }
+        let homes = homes.into_iter().flatten().collect();
+        Self { buffers, homes }
+    }
+
+    /// The steps in order; notes how far each buffer's border reaches and when it is used.
+    fn outline(&mut self, graph: &Graph) -> Vec<Outline> {
+        let mut steps = vec![Outline::Image];
+        self.used(ValueId::IMAGE, 0);
+        // What stands in each value's border.
+        let mut borders: Vec<Option<(usize, Border)>> = vec![None; self.homes.len()];
+        for (index, node) in graph.nodes().iter().enumerate() {
+            let value = ValueId(index + 1);
+            match &node.op {
+                Op::Conv(conv) => {
+                    let reach = conv.kernel / 2;
+                    let wanted = (reach, conv.border);
+                    if reach > 0 && borders[conv.input.0] != Some(wanted) {
+                        // The parts of a concatenation share its border.
+                        for other in 0..borders.len() {
+                            if self.homes[other].buffer == self.homes[conv.input.0].buffer {
+                                borders[other] = None;
+                            }
+                        }
+                        borders[conv.input.0] = Some(wanted);
+                        steps.push(Outline::Border(conv.input, reach, conv.border));
+                    }
+                    let buffer = &mut self.buffers[self.homes[conv.input.0].buffer];
+                    buffer.border = buffer.border.max(reach);
+                    steps.push(Outline::Conv(index));
+                }
+                Op::MaxPool { input } => steps.push(Outline::MaxPool(*input, value)),
+                Op::UpsampleConcat { input, skip } => {
+                    steps.push(Outline::Upsample(*input, value));
+                    if let Some(skip) = skip
+                        && self.homes[skip.0].buffer != self.homes[value.0].buffer
+                    {
+                        steps.push(Outline::Copy(*skip, value, *input));
+                        self.used(*skip, steps.len() - 1);
+                    }
+                }
+            }
+            for input in node.op.inputs().chain([value]) {
+                self.used(input, steps.len() - 1);
+            }
+        }
+        for output in graph.outputs() {
+            self.used(*output, steps.len());
+        }
+        steps
+    }
+
+    fn used(&mut self, value: ValueId, step: usize) {
+        let live = &mut self.buffers[self.homes[value.0].buffer].live;
+        let (first, last) = live.unwrap_or((step, step));
+        *live = Some((first.min(step), last.max(step)));
+    }
+
+    /// Gives every buffer an offset; buffers that are never alive together may share memory. Returns the
+    /// size of the whole.
+    fn place(&mut self, width: usize, height: usize) -> usize {
+        let mut order: Vec<usize> = (0..self.buffers.len()).collect();
+        let size = |b: &Buffer| {
+            let side = |n: usize| (n >> b.halvings) + 2 * b.border;
+            (side(width) * side(height) * b.channels).next_multiple_of(64)
+        };
+        // Large ones first: the small ones fill the gaps.
+        order.sort_by_key(|i| std::cmp::Reverse(size(&self.buffers[*i])));
+        let mut placed: Vec<usize> = Vec::new();
+        let mut end = 0;
+        for index in order {
+            let Some(live) = self.buffers[index].live else {
+                continue;
+            };
+            let wanted = size(&self.buffers[index]);
+            let together = |other: &&usize| {
+                let (first, last) = self.buffers[**other].live.unwrap_or((1, 0));
+                first <= live.1 && live.0 <= last
+            };
+            let mut taken: Vec<(usize, usize)> = placed
+                .iter()
+                .filter(together)
+                .map(|i| (self.buffers[*i].offset, size(&self.buffers[*i])))
+                .collect();
+            taken.sort_unstable();
+            let mut offset = 0;
+            for (start, length) in taken {
+                if offset + wanted <= start {
+                    break;
+                }
+                offset = offset.max(start + length);
+            }
+            self.buffers[index].offset = offset;
+            end = end.max(offset + wanted);
+            placed.push(index);
+        }
+        end
+    }
+
+    /// Where each logical channel of a value lies in a pixel.
+    fn places(&self, value: ValueId) -> Vec<usize> {
+        let channels = self.homes[value.0].channel_of.iter().enumerate();
+        channels.filter_map(|(i, c)| c.map(|_| i)).collect()
+    }
+
+    fn view(&self, value: ValueId, width: usize, height: usize) -> View {
+        let home = &self.homes[value.0];
+        let buffer = &self.buffers[home.buffer];
+        let (width, height) = (width >> buffer.halvings, height >> buffer.halvings);
+        let pitch = buffer.channels;
+        let row = (width + 2 * buffer.border) * pitch;
+        View {
+            offset: buffer.offset + buffer.border * (row + pitch) + home.first,
+            row,
+            pitch,
+            width,
+            height,
+            channels: home.channel_of.len(),
+            border: buffer.border,
+        }
+    }
+}
+
+fn is_concat(graph: &Graph, value: ValueId) -> bool {
+    let node = value.0.checked_sub(1).map(|i| &graph.nodes()[i].op);
+    matches!(node, Some(Op::UpsampleConcat { .. }))
+}

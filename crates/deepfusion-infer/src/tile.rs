@@ -1,0 +1,201 @@
+//! The inner loop in f32: a few pixels by a few vectors of output channels, kept in registers.
+
+use pulp::Simd;
+
+/// Channels come in multiples of this, the lanes of the widest vectors.
+pub(crate) const LANES: usize = 16;
+/// Output channels whose weights lie together, one row of them for every input.
+pub(crate) const GROUP: usize = 64;
+
+/// What a tile of outputs is summed from: `out[r][o] = Σ_run Σ_k input[r][run + k] · panel[k'][o]`.
+#[derive(Clone, Copy)]
+pub(crate) struct Sum<'a> {
+    /// Where each run of inputs starts, seen from a pixel.
+    pub(crate) runs: &'a [usize],
+    /// Inputs in a run, one after the other in memory.
+    pub(crate) len: usize,
+    /// A row of `stride` weights for each input of each run.
+    pub(crate) panel: *const f32,
+    /// Weights in a row of the panel.
+    pub(crate) stride: usize,
+    /// What the sum starts at.
+    pub(crate) start: Start,
+    /// Whether negative sums become 0 in the end.
+    pub(crate) relu: bool,
+}
+
+/// What a sum starts at.
+#[derive(Clone, Copy)]
+pub(crate) enum Start {
+    Zero,
+    /// What is in `out`.
+    Out,
+    /// A value for each output channel.
+    Bias(*const f32),
+    /// The same, and each pixel's residual.
+    BiasAndResidual(*const f32),
+}
+
+impl Start {
+    fn moved(self, column: usize) -> Self {
+        match self {
+            Self::Bias(bias) => Self::Bias(bias.wrapping_add(column)),
+            Self::BiasAndResidual(bias) => Self::BiasAndResidual(bias.wrapping_add(column)),
+            other => other,
+        }
+    }
+}
+
+/// Where one pixel is read and written.
+#[derive(Clone, Copy)]
+pub(crate) struct Pixel {
+    pub(crate) input: *const f32,
+    pub(crate) out: *mut f32,
+    /// Read where a sum starts at it.
+    pub(crate) residual: *const f32,
+}
+
+/// # Safety
+/// Everything the sum names must be readable, everything of `out` writable.
+#[inline(always)]
+unsafe fn tile<S: Simd, const R: usize, const V: usize>(
+    simd: S,
+    sum: &Sum,
+    pixels: &[Pixel],
+    shift: Shift,
+) {
+    // Short loops without branches within: the compiler unrolls them all and keeps `sums` in registers.
+    let zero = simd.splat_f32s(0.0);
+    let mut sums = [[zero; V]; R];
+    let mut inputs = [std::ptr::null::<f32>(); R];
+    for (input, pixel) in inputs.iter_mut().zip(pixels) {
+        *input = pixel.input.wrapping_add(shift.input);
+    }
+    // SAFETY: the caller's promise.
+    unsafe {
+        let load = |from: *const f32, v: usize| from.cast::<S::f32s>().add(v).read_unaligned();
+        match sum.start {
+            Start::Zero => {}
+            Start::Out => {
+                for r in 0..R {
+                    for v in 0..V {
+                        sums[r][v] = load(pixels.get_unchecked(r).out.add(shift.out), v);
+                    }
+                }
+            }
+            Start::Bias(bias) => {
+                for r in 0..R {
+                    for v in 0..V {
+                        sums[r][v] = load(bias, v);
+                    }
+                }
+            }
+            Start::BiasAndResidual(bias) => {
+                for r in 0..R {
+                    for v in 0..V {
+                        let residual = load(pixels.get_unchecked(r).residual.add(shift.out), v);
+                        sums[r][v] = simd.add_f32s(residual, load(bias, v));
+                    }
+                }
+            }
+        }
+        let mut panel = sum.panel;
+        for &run in sum.runs {
+            for k in run..run + sum.len {
+                let mut weights = [zero; V];
+                for v in 0..V {
+                    weights[v] = load(panel, v);
+                }
+                panel = panel.add(sum.stride);
+                for r in 0..R {
+                    let x = simd.splat_f32s(*inputs[r].add(k));
+                    for v in 0..V {
+                        sums[r][v] = simd.mul_add_f32s(x, weights[v], sums[r][v]);
+                    }
+                }
+            }
+        }
+        let least = simd.splat_f32s(if sum.relu { 0.0 } else { f32::NEG_INFINITY });
+        for r in 0..R {
+            let out = pixels.get_unchecked(r).out.add(shift.out).cast::<S::f32s>();
+            for v in 0..V {
+                out.add(v).write_unaligned(simd.max_f32s(sums[r][v], least));
+            }
+        }
+    }
+}
+
+/// Vectors of a tile, where registers allow.
+fn most_vectors<S: Simd>() -> usize {
+    if S::REGISTER_COUNT >= 32 { 4 } else { 2 }
+}
+
+/// Pixels of a tile of that many vectors: sums, weights and one input fill the registers.
+fn most_pixels<S: Simd>(vectors: usize) -> usize {
+    if S::REGISTER_COUNT >= 32 && vectors < 4 {
+        8
+    } else {
+        6
+    }
+}
+
+macro_rules! with_size {
+    ($rows:expr, $vectors:expr, |$R:ident, $V:ident| $call:expr) => {
+        with_size!(@rows $rows, $vectors, $R, $V, $call; 8 7 6 5 4 3 2 1)
+    };
+    (@rows $rows:expr, $vectors:expr, $R:ident, $V:ident, $call:expr; $($r:literal)*) => {
+        match ($rows, $vectors) {
+            $(
+                ($r, 4) if $r <= 6 => { const $R: usize = if $r <= 6 { $r } else { 6 }; const $V: usize = 4; $call }
+                ($r, 3) => { const $R: usize = $r; const $V: usize = 3; $call }
+                ($r, 2) => { const $R: usize = $r; const $V: usize = 2; $call }
+                ($r, 1) => { const $R: usize = $r; const $V: usize = 1; $call }
+            )*
+            _ => unreachable!("tiles have 1 to 8 pixels by 1 to 4 vectors"),
+        }
+    };
+}
+
+/// What is added to every pixel's pointers.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Shift {
+    pub(crate) input: usize,
+    /// Of `out` and `residual`.
+    pub(crate) out: usize,
+}
+
+/// The sum for all pixels and `columns` output channels (a multiple of [`LANES`], at most the panel's
+/// stride).
+///
+/// # Safety
+/// Everything the sum names must be readable, everything of the pixels' `out` writable, for `columns`
+/// values each.
+#[inline(always)]
+pub(crate) unsafe fn tiles<S: Simd>(
+    simd: S,
+    sum: &Sum,
+    columns: usize,
+    pixels: &[Pixel],
+    shift: Shift,
+) {
+    let mut column = 0;
+    while column < columns {
+        let vectors = ((columns - column) / S::F32_LANES).min(most_vectors::<S>());
+        let part = Sum {
+            panel: sum.panel.wrapping_add(column),
+            start: sum.start.moved(column),
+            ..*sum
+        };
+        let shift = Shift {
+            out: shift.out + column,
+            ..shift
+        };
+        for pixels in pixels.chunks(most_pixels::<S>(vectors)) {
+            // SAFETY: the caller's promise.
+            with_size!(pixels.len(), vectors, |R, V| unsafe {
+                tile::<S, R, V>(simd, &part, pixels, shift);
+            });
+        }
+        column += vectors * S::F32_LANES;
+    }
+}

@@ -1,0 +1,344 @@
+//! 3×3 convolutions at stride 1 by Winograd's F(4×4, 3×3): 36 products for 16 pixels instead of 144.
+//!
+//! y = Aᵀ [ (G g Gᵀ) ⊙ (Bᵀ d B) ] A for a tile of 6×6 inputs d, kernel g and 4×4 outputs y (Lavin and Gray,
+//! "Fast Algorithms for Convolutional Neural Networks", 2016). The sums over channels of ⊙ are 36
+//! matrix products.
+
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+use crate::Conv;
+use crate::conv::{Geometry, padded_bias, weight};
+use crate::tile::{GROUP, LANES, Pixel, Shift, Start, Sum, tiles};
+use crate::view::{Shared, View};
+
+/// Outputs of a tile along one side.
+const OUT: usize = 4;
+/// Inputs of a tile along one side.
+const IN: usize = 6;
+/// Products of a tile.
+const AREA: usize = IN * IN;
+/// Channels transformed at once, at most.
+const CHANNELS_AT_ONCE: usize = 128;
+/// Values of transformed inputs and products that a task holds: they stay in the second cache.
+const VALUES_AT_ONCE: usize = 280_000;
+
+/// G: a kernel's three taps at the points 0, 1, −1, 2, −2, ∞.
+const G: [[f64; 3]; IN] = [
+    [0.25, 0.0, 0.0],
+    [-1.0 / 6.0, -1.0 / 6.0, -1.0 / 6.0],
+    [-1.0 / 6.0, 1.0 / 6.0, -1.0 / 6.0],
+    [1.0 / 24.0, 1.0 / 12.0, 1.0 / 6.0],
+    [1.0 / 24.0, -1.0 / 12.0, 1.0 / 6.0],
+    [0.0, 0.0, 1.0],
+];
+
+/// A convolution ready to run.
+#[derive(Debug)]
+pub(crate) struct Winograd {
+    geometry: Geometry,
+    /// Physical input channels, cut into parts of at most [`CHANNELS_AT_ONCE`].
+    parts: Vec<std::ops::Range<usize>>,
+    /// For each part, each of the 36 products and each group of [`GROUP`] output channels: a row of them
+    /// for every input channel.
+    panels: Vec<f32>,
+    bias: Vec<f32>,
+    /// Tiles of a task.
+    tiles: usize,
+}
+
+impl Winograd {
+    /// Whether this form pays for a convolution: 3×3 at stride 1, on enough pixels to share the
+    /// transformed weights, which are four times as many.
+    pub(crate) fn fits(conv: &Conv, geometry: &Geometry) -> bool {
+        conv.kernel == 3 && conv.stride == 1 && geometry.out.pixels() >= 400
+    }
+
+    pub(crate) fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
+        let channels = channel_of.len();
+        let count = channels.div_ceil(CHANNELS_AT_ONCE);
+        let size = channels.div_ceil(count).next_multiple_of(LANES);
+        let parts: Vec<_> = (0..channels)
+            .step_by(size)
+            .map(|c| c..(c + size).min(channels))
+            .collect();
+        let columns = conv.channels_out.next_multiple_of(LANES);
+        let mut panels = vec![0.0; AREA * channels * columns];
+        let width_of = |first: usize| GROUP.min(columns - first);
+        for part in &parts {
+            for (row, c) in part.clone().enumerate() {
+                let Some(channel) = channel_of[c] else {
+                    continue;
+                };
+                for out in 0..conv.channels_out {
+                    let kernel = std::array::from_fn(|tap| {
+                        f64::from(weight(conv, out, Some((channel, tap))))
+                    });
+                    let first = out / GROUP * GROUP;
+                    for (product, value) in transformed_kernel(&kernel).into_iter().enumerate() {
+                        let panel = AREA * part.start * columns
+                            + product * part.len() * columns
+                            + first * part.len();
+                        panels[panel + row * width_of(first) + out - first] = value as f32;
+                    }
+                }
+            }
+        }
+        let tiles = VALUES_AT_ONCE / (AREA * (size + columns));
+        Self {
+            bias: padded_bias(conv, columns),
+            tiles: (tiles / 6 * 6).max(6),
+            geometry,
+            parts,
+            panels,
+        }
+    }
+
+    /// # Safety
+    /// As [`crate::direct::Direct::run`].
+    pub(crate) unsafe fn run(&self, arena: Shared<f32>) {
+        let out = &self.geometry.out;
+        let all = out.width.div_ceil(OUT) * out.height.div_ceil(OUT);
+        // Whole rounds for all threads, where there are few tasks.
+        let rounds = all
+            .div_ceil(self.tiles)
+            .next_multiple_of(rayon::current_num_threads());
+        let tiles = all.div_ceil(rounds);
+        (0..all.div_ceil(tiles)).into_par_iter().for_each_init(
+            Scratch::default,
+            |scratch, task| {
+                Arch::new().dispatch(Task {
+                    conv: self,
+                    arena,
+                    tiles: task * tiles..((task + 1) * tiles).min(all),
+                    scratch,
+                });
+            },
+        );
+    }
+}
+
+/// G g Gᵀ.
+fn transformed_kernel(g: &[f64; 9]) -> [f64; AREA] {
+    let mut out = [0.0; AREA];
+    for i in 0..IN {
+        for j in 0..IN {
+            for y in 0..3 {
+                for x in 0..3 {
+                    out[i * IN + j] += G[i][y] * g[y * 3 + x] * G[j][x];
+                }
+            }
+        }
+    }
+    out
+}
+
+/// What a task needs: for each tile the transformed inputs, 36 × channels, and the products.
+#[derive(Default)]
+struct Scratch {
+    inputs: Vec<f32>,
+    products: Vec<f32>,
+}
+
+struct Task<'a> {
+    conv: &'a Winograd,
+    arena: Shared<f32>,
+    tiles: std::ops::Range<usize>,
+    scratch: &'a mut Scratch,
+}
+
+impl WithSimd for Task<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self {
+            conv,
+            arena,
+            tiles: range,
+            scratch,
+        } = self;
+        let (count, columns) = (range.len(), conv.bias.len());
+        let widest = conv.parts[0].len();
+        scratch.inputs.resize(AREA * count * widest, 0.0);
+        scratch.products.resize(AREA * count * columns, 0.0);
+        let mut rows = Vec::with_capacity(count);
+        for (i, part) in conv.parts.iter().enumerate() {
+            let size = part.len();
+            let input = View {
+                offset: conv.geometry.input.offset + part.start,
+                channels: size,
+                ..conv.geometry.input
+            };
+            for (t, tile) in range.clone().enumerate() {
+                let to = scratch.inputs[t * AREA * size..].as_mut_ptr();
+                // SAFETY: the input lies in the arena; the scratch holds `count` tiles.
+                unsafe { transform_input(simd, arena, &input, conv.place(tile), to) };
+            }
+            rows.clear();
+            rows.extend((0..count).map(|t| Pixel {
+                input: scratch.inputs[t * AREA * size..].as_ptr(),
+                out: scratch.products[t * AREA * columns..].as_mut_ptr(),
+                residual: std::ptr::null(),
+            }));
+            for product in 0..AREA {
+                for first in (0..columns).step_by(GROUP) {
+                    let width = GROUP.min(columns - first);
+                    let panel = (AREA * part.start + product * size) * columns + first * size;
+                    let shift = Shift {
+                        input: product * size,
+                        out: product * columns + first,
+                    };
+                    let sum = Sum {
+                        runs: &[0],
+                        len: size,
+                        panel: conv.panels[panel..].as_ptr(),
+                        stride: width,
+                        start: if i == 0 { Start::Zero } else { Start::Out },
+                        relu: false,
+                    };
+                    // SAFETY: inputs, products and panel have these extents.
+                    unsafe { tiles(simd, &sum, width, &rows, shift) };
+                }
+            }
+        }
+        for (t, tile) in range.enumerate() {
+            let from = scratch.products[t * AREA * columns..].as_ptr();
+            // SAFETY: the output lies in the arena, each tile of it belongs to one task.
+            unsafe { conv.transform_output(simd, arena, from, conv.place(tile)) };
+        }
+    }
+}
+
+/// Bᵀ d along one axis.
+#[inline(always)]
+fn input_axis<S: Simd>(simd: S, d: [S::f32s; IN]) -> [S::f32s; IN] {
+    let by = |factor: f32| simd.splat_f32s(factor);
+    let (two, four, five) = (by(2.0), by(4.0), by(5.0));
+    let madd = |a, b, c| simd.mul_add_f32s(a, b, c);
+    let sub = |a, b| simd.sub_f32s(a, b);
+    // d4 − 4 d2 and d3 − 4 d1, d4 − d2 and 2 (d3 − d1).
+    let even = sub(d[4], simd.mul_f32s(four, d[2]));
+    let odd = sub(d[3], simd.mul_f32s(four, d[1]));
+    let far_even = sub(d[4], d[2]);
+    let far_odd = simd.mul_f32s(two, sub(d[3], d[1]));
+    [
+        sub(madd(four, d[0], d[4]), simd.mul_f32s(five, d[2])),
+        simd.add_f32s(even, odd),
+        sub(even, odd),
+        simd.add_f32s(far_even, far_odd),
+        sub(far_even, far_odd),
+        sub(madd(four, d[1], d[5]), simd.mul_f32s(five, d[3])),
+    ]
+}
+
+/// Aᵀ m along one axis.
+#[inline(always)]
+fn output_axis<S: Simd>(simd: S, m: [S::f32s; IN]) -> [S::f32s; OUT] {
+    let by = |factor: f32| simd.splat_f32s(factor);
+    let (near, near_odd) = (simd.add_f32s(m[1], m[2]), simd.sub_f32s(m[1], m[2]));
+    let (far, far_odd) = (simd.add_f32s(m[3], m[4]), simd.sub_f32s(m[3], m[4]));
+    let madd = |a, b, c| simd.mul_add_f32s(a, b, c);
+    [
+        simd.add_f32s(simd.add_f32s(m[0], near), far),
+        madd(by(2.0), far_odd, near_odd),
+        madd(by(4.0), far, near),
+        simd.add_f32s(madd(by(8.0), far_odd, near_odd), m[5]),
+    ]
+}
+
+/// Bᵀ d B for all channels of a tile whose outputs start at (x, y); product (i, j) of channel c goes to
+/// `to[(i·6 + j)·channels + c]`.
+#[inline(always)]
+unsafe fn transform_input<S: Simd>(
+    simd: S,
+    arena: Shared<f32>,
+    view: &View,
+    (x, y): (usize, usize),
+    to: *mut f32,
+) {
+    // What lies beyond the border only reaches outputs beyond the image.
+    let column = |i: usize| (x + i).min(view.width + 1) * view.pitch;
+    let row = |i: usize| (y + i).min(view.height + 1) * view.row;
+    let corner = view.offset - view.row - view.pitch;
+    let columns: [usize; IN] = std::array::from_fn(column);
+    for c in (0..view.channels).step_by(S::F32_LANES) {
+        let zero = simd.splat_f32s(0.0);
+        let mut half = [[zero; IN]; IN];
+        // SAFETY: the caller's promise.
+        unsafe {
+            for j in 0..IN {
+                let d = std::array::from_fn(|i| {
+                    let at = arena.at(corner + row(i) + columns[j] + c);
+                    at.cast::<S::f32s>().read_unaligned()
+                });
+                let d = input_axis(simd, d);
+                for i in 0..IN {
+                    half[i][j] = d[i];
+                }
+            }
+            for i in 0..IN {
+                let d = input_axis(simd, half[i]);
+                for j in 0..IN {
+                    to.add((i * IN + j) * view.channels + c)
+                        .cast::<S::f32s>()
+                        .write_unaligned(d[j]);
+                }
+            }
+        }
+    }
+}
+
+impl Winograd {
+    /// First output pixel of a tile.
+    fn place(&self, tile: usize) -> (usize, usize) {
+        let across = self.geometry.out.width.div_ceil(OUT);
+        (tile % across * OUT, tile / across * OUT)
+    }
+
+    /// Aᵀ m A with bias, residual and activation, for the pixels of the tile that are in the image.
+    #[inline(always)]
+    unsafe fn transform_output<S: Simd>(
+        &self,
+        simd: S,
+        arena: Shared<f32>,
+        from: *const f32,
+        (x, y): (usize, usize),
+    ) {
+        let g = &self.geometry;
+        let columns = self.bias.len();
+        let across = OUT.min(g.out.width - x);
+        let down = OUT.min(g.out.height - y);
+        let zero = simd.splat_f32s(0.0);
+        for c in (0..columns).step_by(S::F32_LANES) {
+            let mut half = [[zero; IN]; OUT];
+            // SAFETY: the caller's promise.
+            unsafe {
+                let bias = self.bias.as_ptr().add(c).cast::<S::f32s>().read_unaligned();
+                for j in 0..IN {
+                    let m = std::array::from_fn(|i| {
+                        let at = from.add((i * IN + j) * columns + c);
+                        at.cast::<S::f32s>().read_unaligned()
+                    });
+                    let m = output_axis(simd, m);
+                    for i in 0..OUT {
+                        half[i][j] = m[i];
+                    }
+                }
+                for i in 0..down {
+                    let values = output_axis(simd, half[i]);
+                    for j in 0..across {
+                        let mut value = simd.add_f32s(values[j], bias);
+                        if let Some(residual) = &g.residual {
+                            let r = arena.at(residual.at(x + j, y + i) + c);
+                            value = simd.add_f32s(value, r.cast::<S::f32s>().read_unaligned());
+                        }
+                        let out = arena.at(g.out.at(x + j, y + i) + c);
+                        let value = g.activation.of(simd, value);
+                        out.cast::<S::f32s>().write_unaligned(value);
+                    }
+                }
+            }
+        }
+    }
+}

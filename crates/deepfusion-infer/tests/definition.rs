@@ -1,0 +1,261 @@
+//! The engine against the operations' definitions in f64, on small random networks.
+
+use deepfusion_infer::{Activation, Border, Conv, Engine, Graph, Op, ValueId};
+use proptest::prelude::*;
+
+/// Channels × height × width.
+#[derive(Clone)]
+struct Image {
+    channels: usize,
+    height: usize,
+    width: usize,
+    data: Vec<f64>,
+}
+
+impl Image {
+    fn from_fn(
+        channels: usize,
+        height: usize,
+        width: usize,
+        f: impl Fn(usize, usize, usize) -> f64,
+    ) -> Self {
+        let mut data = Vec::with_capacity(channels * height * width);
+        for c in 0..channels {
+            for y in 0..height {
+                data.extend((0..width).map(|x| f(c, y, x)));
+            }
+        }
+        Self {
+            channels,
+            height,
+            width,
+            data,
+        }
+    }
+
+    fn at(&self, c: usize, y: usize, x: usize) -> f64 {
+        self.data[(c * self.height + y) * self.width + x]
+    }
+}
+
+fn conv(conv: &Conv, values: &[Image]) -> Image {
+    let input = &values[conv.input.0];
+    let half = conv.kernel as isize / 2;
+    // Where a tap looks, none for zeros.
+    let place = |i: isize, n: usize| {
+        let n = n as isize;
+        match conv.border {
+            _ if (0..n).contains(&i) => Some(i as usize),
+            Border::Zero => None,
+            Border::Reflect if i < 0 => Some((-i) as usize),
+            Border::Reflect => Some((2 * (n - 1) - i) as usize),
+        }
+    };
+    let (h, w) = (input.height / conv.stride, input.width / conv.stride);
+    Image::from_fn(conv.channels_out, h, w, |o, y, x| {
+        let mut sum = f64::from(conv.bias[o]);
+        for c in 0..conv.channels_in {
+            for ky in 0..conv.kernel {
+                for kx in 0..conv.kernel {
+                    let look =
+                        |i: usize, k: usize, n| place((i * conv.stride + k) as isize - half, n);
+                    let places = (look(y, ky, input.height), look(x, kx, input.width));
+                    if let (Some(i), Some(j)) = places {
+                        let tap =
+                            ((o * conv.channels_in + c) * conv.kernel + ky) * conv.kernel + kx;
+                        sum += f64::from(conv.weight[tap]) * input.at(c, i, j);
+                    }
+                }
+            }
+        }
+        sum += conv.residual.map_or(0.0, |r| values[r.0].at(o, y, x));
+        match conv.activation {
+            Activation::Identity => sum,
+            Activation::Relu => sum.max(0.0),
+            Activation::Elu if sum < 0.0 => sum.exp_m1(),
+            Activation::Elu => sum,
+            Activation::Sigmoid => 1.0 / (1.0 + (-sum).exp()),
+        }
+    })
+}
+
+/// All values of the graph.
+fn run(graph: &Graph, rgb: &[u8], height: usize, width: usize) -> Vec<Image> {
+    let mut values = vec![Image::from_fn(3, height, width, |c, y, x| {
+        let byte = f64::from(rgb[(y * width + x) * 3 + c]);
+        (byte / 255.0 - f64::from(graph.mean()[c])) / f64::from(graph.std()[c])
+    })];
+    for node in graph.nodes() {
+        let value = match &node.op {
+            Op::Conv(op) => conv(op, &values),
+            Op::MaxPool { input } => {
+                let v = &values[input.0];
+                Image::from_fn(v.channels, v.height / 2, v.width / 2, |c, y, x| {
+                    let around = |i: usize, n: usize| (2 * i).saturating_sub(1)..(2 * i + 2).min(n);
+                    around(y, v.height)
+                        .flat_map(|i| around(x, v.width).map(move |j| (i, j)))
+                        .map(|(i, j)| v.at(c, i, j))
+                        .fold(f64::NEG_INFINITY, f64::max)
+                })
+            }
+            Op::UpsampleConcat { input, skip } => {
+                let v = &values[input.0];
+                let skip = skip.map(|s| &values[s.0]);
+                let channels = v.channels + skip.map_or(0, |s| s.channels);
+                Image::from_fn(channels, v.height * 2, v.width * 2, |c, y, x| match skip {
+                    Some(skip) if c >= v.channels => skip.at(c - v.channels, y, x),
+                    _ => v.at(c, y / 2, x / 2),
+                })
+            }
+        };
+        values.push(value);
+    }
+    values
+}
+
+/// Numbers without a pattern in [−1, 1).
+fn noise(seed: u64) -> impl FnMut() -> f32 {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 40) as f32 / (1_u64 << 23) as f32 - 1.0
+    }
+}
+
+struct Builder<F> {
+    graph: Graph,
+    noise: F,
+}
+
+impl<F: FnMut() -> f32> Builder<F> {
+    fn conv(&mut self, input: ValueId, channels: usize, change: impl Fn(&mut Conv)) -> ValueId {
+        let mut conv = Conv {
+            input,
+            weight: Vec::new(),
+            bias: Vec::new(),
+            channels_in: self.graph.shape(input).channels,
+            channels_out: channels,
+            kernel: 3,
+            stride: 1,
+            border: Border::Zero,
+            residual: None,
+            activation: Activation::Relu,
+        };
+        change(&mut conv);
+        let taps = conv.channels_in * conv.kernel * conv.kernel;
+        let scale = (3.0 / taps as f32).sqrt();
+        conv.weight = (0..channels * taps)
+            .map(|_| (self.noise)() * scale)
+            .collect();
+        conv.bias = (0..channels).map(|_| (self.noise)() * 0.3).collect();
+        self.graph.push("conv", Op::Conv(Box::new(conv))).unwrap()
+    }
+}
+
+/// The depth network's shapes in small: stem, pooling, blocks with and without a shortcut convolution, an
+/// enlarging decoder with skips, a head.
+fn network(seed: u64, widths: [usize; 4], bottleneck: bool, stem: usize) -> Graph {
+    let mut b = Builder {
+        graph: Graph::new([0.485, 0.456, 0.406], [0.229, 0.224, 0.225]),
+        noise: noise(seed),
+    };
+    let f0 = b.conv(ValueId::IMAGE, widths[0], |c| {
+        (c.kernel, c.stride) = (stem, 2)
+    });
+    let pooled = b.graph.push("pool", Op::MaxPool { input: f0 }).unwrap();
+    let x = b.conv(pooled, widths[1], |c| c.kernel = 1);
+    let x = b.conv(x, widths[0], |c| c.residual = Some(pooled));
+    let shortcut = b.conv(x, widths[2], |c| {
+        (c.kernel, c.stride, c.activation) = (1, 2, Activation::Identity);
+    });
+    let y = b.conv(x, widths[2], |c| {
+        (c.kernel, c.stride) = (if bottleneck { 1 } else { 3 }, 2);
+    });
+    let deep = b.conv(y, widths[2], |c| c.residual = Some(shortcut));
+    let reflected = |c: &mut Conv| (c.border, c.activation) = (Border::Reflect, Activation::Elu);
+    let mut up = deep;
+    for (width, skip) in [
+        (widths[3], Some(x)),
+        (widths[1], Some(f0)),
+        (widths[0], None),
+    ] {
+        up = b.conv(up, width, reflected);
+        up = b
+            .graph
+            .push("up", Op::UpsampleConcat { input: up, skip })
+            .unwrap();
+        up = b.conv(up, width, reflected);
+    }
+    let head = b.conv(up, 1, |c| {
+        reflected(c);
+        c.activation = Activation::Sigmoid;
+    });
+    b.graph.add_output(head);
+    b.graph
+}
+
+fn deviation(engine: &[f32], exact: &Image) -> f64 {
+    let off = engine.iter().zip(&exact.data);
+    off.map(|(a, b)| (f64::from(*a) - b).abs())
+        .fold(0.0, f64::max)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn the_engine_computes_what_the_operations_mean(
+        seed in any::<u64>(),
+        widths in [1_usize..40, 1_usize..70, 1_usize..150, 1_usize..40],
+        bottleneck in any::<bool>(),
+        stem in prop::sample::select(vec![3_usize, 7]),
+        (across, down) in (2_usize..9, 2_usize..9),
+    ) {
+        let (width, height) = (8 * across, 8 * down);
+        let graph = network(seed, widths, bottleneck, stem);
+        let mut next = noise(seed ^ 1);
+        let rgb: Vec<u8> = (0..3 * width * height).map(|_| (next() * 127.0 + 128.0) as u8).collect();
+        let values = run(&graph, &rgb, height, width);
+        let exact = &values[graph.outputs()[0].0];
+        let mut engine = Engine::new(graph, width, height).unwrap();
+        // Twice: nothing of an image may remain for the next.
+        for _ in 0..2 {
+            engine.run(&rgb);
+            let off = deviation(&engine.output(0), exact);
+            // A sigmoid's output; f32 through 13 layers, the Winograd form's 1e-5 included.
+            prop_assert!(off < 3e-5, "off by {off}");
+        }
+    }
+}
+
+#[test]
+fn large_images_take_the_winograd_form_and_agree_too() {
+    let graph = network(7, [16, 64, 96, 32], true, 7);
+    let (width, height) = (208, 72);
+    let mut next = noise(3);
+    let rgb: Vec<u8> = (0..3 * width * height)
+        .map(|_| (next() * 127.0 + 128.0) as u8)
+        .collect();
+    let values = run(&graph, &rgb, height, width);
+    let exact = &values[graph.outputs()[0].0];
+    let mut engine = Engine::new(graph, width, height).unwrap();
+    let forms: Vec<String> = engine
+        .profile(&rgb)
+        .into_iter()
+        .map(|(name, _)| name)
+        .collect();
+    assert!(forms.iter().any(|f| f.ends_with("winograd")), "{forms:?}");
+    assert!(forms.iter().any(|f| f.ends_with("direct")), "{forms:?}");
+    let off = deviation(&engine.output(0), exact);
+    assert!(off < 3e-5, "off by {off}");
+}
+
+#[test]
+fn sizes_that_do_not_halve_are_refused() {
+    let graph = network(7, [8, 8, 8, 8], true, 7);
+    let error = Engine::new(graph, 100, 64).unwrap_err();
+    assert!(error.to_string().contains("100x64"), "{error}");
+    assert!(error.to_string().contains("multiples of 8"), "{error}");
+}
