@@ -66,6 +66,31 @@ impl Runs {
         }
         runs
     }
+
+    /// Runs of `len` channels each, all taps of the same channels together: neighbouring taps see the same
+    /// pixels, which then still lie in the first cache.
+    pub(crate) fn by_channels(
+        view: &View,
+        kernel: usize,
+        channel_of: &[Option<usize>],
+        len: usize,
+    ) -> Self {
+        let mut runs = Self {
+            offsets: Vec::new(),
+            len,
+            sources: Vec::new(),
+        };
+        for first in (0..channel_of.len()).step_by(len) {
+            for tap in 0..kernel * kernel {
+                let (ky, kx) = (tap / kernel, tap % kernel);
+                runs.offsets.push(ky * view.row + kx * view.pitch + first);
+                let channel = |c: usize| channel_of.get(c).copied().flatten();
+                let sources = (first..first + len).map(|c| channel(c).map(|c| (c, tap)));
+                runs.sources.extend(sources);
+            }
+        }
+        runs
+    }
 }
 
 /// One weight of a convolution, 0 where there is none.

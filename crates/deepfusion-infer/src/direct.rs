@@ -3,6 +3,7 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use crate::aligned::Aligned;
 use crate::conv::{Geometry, Runs, padded_bias, tasks, weight};
 use crate::tile::{GROUP, LANES, Pixel, Shift, Start, Sum, tiles};
 use crate::view::Shared;
@@ -19,7 +20,7 @@ pub(crate) struct Direct {
     geometry: Geometry,
     runs: Runs,
     /// For each group of [`GROUP`] output channels: a row of them for every input of every run.
-    panels: Vec<f32>,
+    panels: Aligned<f32>,
     bias: Vec<f32>,
 }
 
@@ -44,7 +45,7 @@ impl Direct {
             bias: padded_bias(conv, columns),
             geometry,
             runs,
-            panels,
+            panels: Aligned::from_slice(&panels),
         }
     }
 

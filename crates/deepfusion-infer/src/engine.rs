@@ -3,72 +3,63 @@
 
 use std::time::{Duration, Instant};
 
-use crate::conv::Geometry;
-use crate::direct::Direct;
-use crate::head::Head;
+use crate::aligned::Aligned;
+use crate::element::{Bf16, Element};
+use crate::forms::{Bf16Conv, ConvForm, F32Conv};
 use crate::movement::{self, ByteTable};
 use crate::plan::{Plan, Step};
 use crate::view::Shared;
-use crate::winograd::Winograd;
-use crate::{Border, Conv, Error, Graph};
+use crate::{Border, Error, Graph};
+
+/// In which numbers the network computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// 32-bit floats throughout.
+    F32,
+    /// Weights and the values between operations in bf16 (8 bits of mantissa), sums in f32.
+    Bf16,
+}
 
 /// A network that runs.
 #[derive(Debug)]
 pub struct Engine {
-    plan: Plan<F32Conv>,
-    arena: Vec<f32>,
-    bytes: ByteTable,
+    runner: Runner,
     size: (usize, usize),
 }
 
-/// The forms of a convolution in f32.
 #[derive(Debug)]
-enum F32Conv {
-    Direct(Direct),
-    Winograd(Winograd),
-    Head(Head),
-}
-
-impl F32Conv {
-    fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
-        if conv.channels_out == 1 && geometry.out.pitch == 1 {
-            Self::Head(Head::new(conv, geometry, channel_of))
-        } else if Winograd::fits(conv, &geometry) {
-            Self::Winograd(Winograd::new(conv, geometry, channel_of))
-        } else {
-            Self::Direct(Direct::new(conv, geometry, channel_of))
-        }
-    }
-
-    unsafe fn run(&self, arena: Shared<f32>) {
-        // SAFETY: the caller's promise.
-        unsafe {
-            match self {
-                Self::Direct(conv) => conv.run(arena),
-                Self::Winograd(conv) => conv.run(arena),
-                Self::Head(conv) => conv.run(arena),
-            }
-        }
-    }
+enum Runner {
+    F32(Typed<f32, F32Conv>),
+    Bf16(Typed<Bf16, Bf16Conv>),
 }
 
 impl Engine {
     /// Packs the graph for images of this size.
     ///
     /// # Errors
-    /// [`Error::Size`] where the graph cannot work on such images.
-    pub fn new(graph: Graph, width: usize, height: usize) -> Result<Self, Error> {
+    /// [`Error::Size`] where the graph cannot work on such images, [`Error::NoBf16`].
+    pub fn new(
+        graph: Graph,
+        width: usize,
+        height: usize,
+        precision: Precision,
+    ) -> Result<Self, Error> {
         graph.check_size(width, height)?;
-        let bytes = ByteTable::new(graph.mean(), graph.std());
-        let plan = Plan::new(graph, width, height, |conv, geometry, channel_of| {
-            F32Conv::new(&conv, geometry, channel_of)
-        });
+        let runner = match precision {
+            Precision::F32 => Runner::F32(Typed::new(graph, width, height)),
+            Precision::Bf16 if !Self::has_bf16() => return Err(Error::NoBf16),
+            Precision::Bf16 => Runner::Bf16(Typed::new(graph, width, height)),
+        };
         Ok(Self {
-            arena: vec![0.0; plan.arena],
-            plan,
-            bytes,
+            runner,
             size: (width, height),
         })
+    }
+
+    /// Whether this processor can compute in bf16.
+    #[must_use]
+    pub fn has_bf16() -> bool {
+        Bf16Conv::available()
     }
 
     /// Width and height of the images, in pixels.
@@ -102,13 +93,55 @@ impl Engine {
         times
     }
 
-    fn run_steps(&mut self, rgb: &[u8], mut after: impl FnMut(&str, &str)) {
+    fn run_steps(&mut self, rgb: &[u8], after: impl FnMut(&str, &str) + Send) {
         let (width, height) = self.size;
         assert_eq!(
             rgb.len(),
             3 * width * height,
             "an image of {width}x{height}"
         );
+        // On one of rayon's threads: from outside, every single step would be handed over to them.
+        rayon::scope(|_| match &mut self.runner {
+            Runner::F32(runner) => runner.run(rgb, after),
+            Runner::Bf16(runner) => runner.run(rgb, after),
+        });
+    }
+
+    /// The values of an output after the last run: channel by channel, row by row.
+    ///
+    /// # Panics
+    /// When the graph has no such output.
+    #[must_use]
+    pub fn output(&self, index: usize) -> Vec<f32> {
+        match &self.runner {
+            Runner::F32(runner) => runner.output(index),
+            Runner::Bf16(runner) => runner.output(index),
+        }
+    }
+}
+
+/// An engine whose values are stored as `E`.
+#[derive(Debug)]
+pub(crate) struct Typed<E, C> {
+    plan: Plan<C>,
+    arena: Aligned<E>,
+    bytes: ByteTable,
+}
+
+impl<E: Element, C: ConvForm<E>> Typed<E, C> {
+    pub(crate) fn new(graph: Graph, width: usize, height: usize) -> Self {
+        let bytes = ByteTable::new(graph.mean(), graph.std());
+        let plan = Plan::new::<E>(graph, width, height, |conv, geometry, channel_of| {
+            C::new(&conv, geometry, channel_of)
+        });
+        Self {
+            arena: Aligned::zeros(plan.arena),
+            plan,
+            bytes,
+        }
+    }
+
+    pub(crate) fn run(&mut self, rgb: &[u8], mut after: impl FnMut(&str, &str)) {
         let arena = Shared(self.arena.as_mut_ptr());
         for (name, step) in &self.plan.steps {
             // SAFETY: the plan's views lie in the arena; steps run one after the other, and the output of
@@ -126,36 +159,34 @@ impl Engine {
                     Step::Copy(from, to) => movement::copy(arena, from, to),
                 }
             }
-            after(name, kind(step));
+            let kind = match step {
+                Step::Image(_) => "image",
+                Step::Border { .. } => "border",
+                Step::Conv(conv) => conv.name(),
+                Step::MaxPool(..) => "maximum",
+                Step::Upsample(..) => "upsample",
+                Step::Copy(..) => "copy",
+            };
+            after(name, kind);
         }
     }
 
-    /// The values of an output after the last run: channel by channel, row by row.
-    ///
-    /// # Panics
-    /// When the graph has no such output.
-    #[must_use]
-    pub fn output(&self, index: usize) -> Vec<f32> {
+    pub(crate) fn output(&self, index: usize) -> Vec<f32> {
         let (view, places) = &self.plan.outputs[index];
         let mut out = Vec::with_capacity(places.len() * view.pixels());
+        let value = |at: usize| {
+            if view.result {
+                // SAFETY: the layout gave the value the room of an f32, at a multiple of its size.
+                unsafe { *self.arena.as_ptr().add(at).cast::<f32>() }
+            } else {
+                self.arena[at].value()
+            }
+        };
         for c in places {
             for y in 0..view.height {
-                out.extend((0..view.width).map(|x| self.arena[view.at(x, y) + c]));
+                out.extend((0..view.width).map(|x| value(view.at(x, y) + c)));
             }
         }
         out
-    }
-}
-
-fn kind(step: &Step<F32Conv>) -> &'static str {
-    match step {
-        Step::Image(_) => "image",
-        Step::Border { .. } => "border",
-        Step::Conv(F32Conv::Direct(_)) => "direct",
-        Step::Conv(F32Conv::Winograd(_)) => "winograd",
-        Step::Conv(F32Conv::Head(_)) => "head",
-        Step::MaxPool(..) => "maximum",
-        Step::Upsample(..) => "upsample",
-        Step::Copy(..) => "copy",
     }
 }

@@ -1,19 +1,25 @@
 //! A trained network as a graph, and the engine that runs it fast. Nothing here knows Burn.
 
 mod activate;
+mod aligned;
+#[cfg(target_arch = "x86_64")]
+mod bf16;
 mod conv;
 mod direct;
 mod element;
 mod engine;
 mod error;
+mod forms;
 mod graph;
 mod head;
 mod movement;
 mod plan;
+#[cfg(test)]
+mod tests;
 mod tile;
 mod view;
 mod winograd;
 
-pub use engine::Engine;
+pub use engine::{Engine, Precision};
 pub use error::Error;
 pub use graph::{Activation, Border, Conv, Graph, Node, Op, ValueId, ValueShape};

@@ -33,9 +33,6 @@ pub(crate) struct Plan<C> {
     pub(crate) outputs: Vec<(View, Vec<usize>)>,
 }
 
-/// Elements after the last buffer that kernels may read (and multiply by zero).
-const SLACK: usize = 1024;
-
 /// A buffer holds one value, or a concatenation with the values that are its parts.
 #[derive(Debug, Clone, Default)]
 struct Buffer {
@@ -55,20 +52,21 @@ struct Home {
     first: usize,
     /// For each physical channel the logical one; none for those that fill up.
     channel_of: Vec<Option<usize>>,
+    result: bool,
 }
 
 impl<C> Plan<C> {
     /// Lays the graph out for images of this size (which the graph must accept); `init` gives each
     /// convolution its form and may drop its weights.
-    pub(crate) fn new(
+    pub(crate) fn new<E>(
         graph: Graph,
         width: usize,
         height: usize,
         mut init: impl FnMut(Conv, Geometry, &[Option<usize>]) -> C,
     ) -> Self {
-        let mut layout = Layout::new(&graph);
+        let mut layout = Layout::new(&graph, size_of::<f32>() / size_of::<E>());
         let outline = layout.outline(&graph);
-        let arena = layout.place(width, height) + SLACK;
+        let arena = layout.place(width, height);
         let view = |value: ValueId| layout.view(value, width, height);
         let outputs = graph.outputs().iter();
         let outputs = outputs.map(|v| (view(*v), layout.places(*v))).collect();
@@ -148,18 +146,19 @@ struct Layout {
 
 impl Layout {
     /// A home for every value: what is appended in a concatenation is written there from the start.
-    fn new(graph: &Graph) -> Self {
+    /// A result takes `slots` elements.
+    fn new(graph: &Graph, slots: usize) -> Self {
         let count = graph.nodes().len() + 1;
         let mut homes: Vec<Option<Home>> = vec![None; count];
         let mut buffers = Vec::new();
         // Channels of a value on its own.
         let own = |value: usize| -> Vec<Option<usize>> {
             let channels = graph.shape(ValueId(value)).channels;
-            // The image, and a single channel that nothing is summed over, are not filled up.
-            let physical = if value == 0 || (channels == 1 && !graph.is_read(ValueId(value))) {
-                channels
-            } else {
-                channels.next_multiple_of(LANES)
+            // The image is not filled up.
+            let physical = match value {
+                0 => channels,
+                _ if is_result(graph, ValueId(value)) => slots,
+                _ => channels.next_multiple_of(LANES),
             };
             let logical = |c: usize| (c < channels).then_some(c);
             (0..physical).map(logical).collect()
@@ -189,6 +188,7 @@ impl Layout {
                     buffer: buffers.len() - 1,
                     first: 0,
                     channel_of,
+                    result: is_result(graph, ValueId(value)),
                 }
             });
             let buffer = home.buffer;
@@ -201,6 +201,7 @@ impl Layout {
                     buffer,
                     first: own(input.0).len(),
                     channel_of: own(skip.0),
+                    result: false,
                 });
             }
         }
@@ -261,19 +262,27 @@ impl Layout {
         *live = Some((first.min(step), last.max(step)));
     }
 
-    /// Gives every buffer an offset; buffers that are never alive together may share memory. Returns the
-    /// size of the whole.
+    /// Gives every buffer an offset; buffers that are never alive together may share memory. Results lie
+    /// behind them all: a kernel that reads on past a buffer's end, times zero, must not meet the halves of
+    /// an f32, which may be no number. Returns the size of the whole.
     fn place(&mut self, width: usize, height: usize) -> usize {
         let mut order: Vec<usize> = (0..self.buffers.len()).collect();
         let size = |b: &Buffer| {
             let side = |n: usize| (n >> b.halvings) + 2 * b.border;
             (side(width) * side(height) * b.channels).next_multiple_of(64)
         };
+        let results: Vec<bool> = (0..self.buffers.len())
+            .map(|b| {
+                self.homes
+                    .iter()
+                    .any(|home| home.buffer == b && home.result)
+            })
+            .collect();
         // Large ones first: the small ones fill the gaps.
         order.sort_by_key(|i| std::cmp::Reverse(size(&self.buffers[*i])));
         let mut placed: Vec<usize> = Vec::new();
         let mut end = 0;
-        for index in order {
+        for index in order.iter().copied().filter(|i| !results[*i]) {
             let Some(live) = self.buffers[index].live else {
                 continue;
             };
@@ -299,7 +308,19 @@ impl Layout {
             end = end.max(offset + wanted);
             placed.push(index);
         }
+        end += self.slack();
+        for index in order.into_iter().filter(|i| results[*i]) {
+            self.buffers[index].offset = end;
+            end += size(&self.buffers[index]);
+        }
         end
+    }
+
+    /// Elements after the last buffer that kernels may read, and multiply by zero or drop: whole vectors,
+    /// and pixels that fill up a tile.
+    fn slack(&self) -> usize {
+        let widest = self.buffers.iter().map(|b| b.channels).max().unwrap_or(0);
+        (40 * widest + 1024).next_multiple_of(64)
     }
 
     /// Where each logical channel of a value lies in a pixel.
@@ -322,8 +343,16 @@ impl Layout {
             height,
             channels: home.channel_of.len(),
             border: buffer.border,
+            result: home.result,
         }
     }
+}
+
+/// A single channel that a convolution without a residual gives and nothing reads.
+fn is_result(graph: &Graph, value: ValueId) -> bool {
+    let node = value.0.checked_sub(1).map(|i| &graph.nodes()[i].op);
+    let plain = matches!(node, Some(Op::Conv(conv)) if conv.residual.is_none());
+    plain && graph.shape(value).channels == 1 && !graph.is_read(value)
 }
 
 fn is_concat(graph: &Graph, value: ValueId) -> bool {

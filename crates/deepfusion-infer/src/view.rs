@@ -18,6 +18,8 @@ pub(crate) struct View {
     pub(crate) channels: usize,
     /// Pixels around the image on every side.
     pub(crate) border: usize,
+    /// Whether it is one channel stored as f32 whatever the elements are: a result that nothing reads.
+    pub(crate) result: bool,
 }
 
 impl View {

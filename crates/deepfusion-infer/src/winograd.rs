@@ -8,6 +8,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::Conv;
+use crate::aligned::Aligned;
 use crate::conv::{Geometry, padded_bias, weight};
 use crate::tile::{GROUP, LANES, Pixel, Shift, Start, Sum, tiles};
 use crate::view::{Shared, View};
@@ -41,7 +42,7 @@ pub(crate) struct Winograd {
     parts: Vec<std::ops::Range<usize>>,
     /// For each part, each of the 36 products and each group of [`GROUP`] output channels: a row of them
     /// for every input channel.
-    panels: Vec<f32>,
+    panels: Aligned<f32>,
     bias: Vec<f32>,
     /// Tiles of a task.
     tiles: usize,
@@ -63,7 +64,7 @@ impl Winograd {
             .map(|c| c..(c + size).min(channels))
             .collect();
         let columns = conv.channels_out.next_multiple_of(LANES);
-        let mut panels = vec![0.0; AREA * channels * columns];
+        let mut panels = Aligned::zeros(AREA * channels * columns);
         let width_of = |first: usize| GROUP.min(columns - first);
         for part in &parts {
             for (row, c) in part.clone().enumerate() {
@@ -105,7 +106,7 @@ impl Winograd {
             .next_multiple_of(rayon::current_num_threads());
         let tiles = all.div_ceil(rounds);
         (0..all.div_ceil(tiles)).into_par_iter().for_each_init(
-            Scratch::default,
+            || self.scratch(tiles),
             |scratch, task| {
                 Arch::new().dispatch(Task {
                     conv: self,
@@ -134,10 +135,9 @@ fn transformed_kernel(g: &[f64; 9]) -> [f64; AREA] {
 }
 
 /// What a task needs: for each tile the transformed inputs, 36 × channels, and the products.
-#[derive(Default)]
 struct Scratch {
-    inputs: Vec<f32>,
-    products: Vec<f32>,
+    inputs: Aligned<f32>,
+    products: Aligned<f32>,
 }
 
 struct Task<'a> {
@@ -159,9 +159,6 @@ impl WithSimd for Task<'_> {
             scratch,
         } = self;
         let (count, columns) = (range.len(), conv.bias.len());
-        let widest = conv.parts[0].len();
-        scratch.inputs.resize(AREA * count * widest, 0.0);
-        scratch.products.resize(AREA * count * columns, 0.0);
         let mut rows = Vec::with_capacity(count);
         for (i, part) in conv.parts.iter().enumerate() {
             let size = part.len();
@@ -290,6 +287,15 @@ unsafe fn transform_input<S: Simd>(
 }
 
 impl Winograd {
+    /// For that many tiles.
+    fn scratch(&self, tiles: usize) -> Scratch {
+        let widest = self.parts.iter().map(|part| part.len()).max().unwrap_or(0);
+        Scratch {
+            inputs: Aligned::zeros(AREA * tiles * widest),
+            products: Aligned::zeros(AREA * tiles * self.bias.len()),
+        }
+    }
+
     /// First output pixel of a tile.
     fn place(&self, tile: usize) -> (usize, usize) {
         let across = self.geometry.out.width.div_ceil(OUT);

@@ -1,7 +1,11 @@
 //! The engine against the operations' definitions in f64, on small random networks.
 
-use deepfusion_infer::{Activation, Border, Conv, Engine, Graph, Op, ValueId};
 use proptest::prelude::*;
+
+use crate::element::Element;
+use crate::engine::Typed;
+use crate::forms::ConvForm;
+use crate::{Activation, Border, Conv, Engine, Graph, Op, Precision, ValueId};
 
 /// Channels × height × width.
 #[derive(Clone)]
@@ -202,6 +206,20 @@ fn deviation(engine: &[f32], exact: &Image) -> f64 {
         .fold(0.0, f64::max)
 }
 
+/// An image of noise.
+fn noise_image(seed: u64, width: usize, height: usize) -> Vec<u8> {
+    let mut next = noise(seed);
+    let bytes = (0..3 * width * height).map(|_| (next() * 127.0 + 128.0) as u8);
+    bytes.collect()
+}
+
+/// The first output of an engine whose convolutions all take one form.
+fn output_of<E: Element, C: ConvForm<E>>(graph: Graph, rgb: &[u8], width: usize) -> Vec<f32> {
+    let mut engine = Typed::<E, C>::new(graph, width, rgb.len() / 3 / width);
+    engine.run(rgb, |_, _| {});
+    engine.output(0)
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
@@ -215,17 +233,29 @@ proptest! {
     ) {
         let (width, height) = (8 * across, 8 * down);
         let graph = network(seed, widths, bottleneck, stem);
-        let mut next = noise(seed ^ 1);
-        let rgb: Vec<u8> = (0..3 * width * height).map(|_| (next() * 127.0 + 128.0) as u8).collect();
+        let rgb = noise_image(seed ^ 1, width, height);
         let values = run(&graph, &rgb, height, width);
         let exact = &values[graph.outputs()[0].0];
-        let mut engine = Engine::new(graph, width, height).unwrap();
+        let mut engine = Engine::new(graph.clone(), width, height, Precision::F32).unwrap();
         // Twice: nothing of an image may remain for the next.
         for _ in 0..2 {
             engine.run(&rgb);
             let off = deviation(&engine.output(0), exact);
             // A sigmoid's output; f32 through 13 layers, the Winograd form's 1e-5 included.
             prop_assert!(off < 3e-5, "off by {off}");
+        }
+        #[cfg(target_arch = "x86_64")]
+        {
+            use crate::element::Bf16;
+            // Each of 13 layers rounds to 8 bits.
+            if crate::bf16::has_amx() {
+                let off = deviation(&output_of::<Bf16, crate::bf16::Amx>(graph.clone(), &rgb, width), exact);
+                prop_assert!(off < 0.06, "amx off by {off}");
+            }
+            if crate::bf16::has_dot() {
+                let off = deviation(&output_of::<Bf16, crate::bf16::Dot>(graph, &rgb, width), exact);
+                prop_assert!(off < 0.06, "dot off by {off}");
+            }
         }
     }
 }
@@ -234,28 +264,66 @@ proptest! {
 fn large_images_take_the_winograd_form_and_agree_too() {
     let graph = network(7, [16, 64, 96, 32], true, 7);
     let (width, height) = (208, 72);
-    let mut next = noise(3);
-    let rgb: Vec<u8> = (0..3 * width * height)
-        .map(|_| (next() * 127.0 + 128.0) as u8)
-        .collect();
+    let rgb = noise_image(3, width, height);
     let values = run(&graph, &rgb, height, width);
     let exact = &values[graph.outputs()[0].0];
-    let mut engine = Engine::new(graph, width, height).unwrap();
+    let mut engine = Engine::new(graph, width, height, Precision::F32).unwrap();
     let forms: Vec<String> = engine
         .profile(&rgb)
         .into_iter()
         .map(|(name, _)| name)
         .collect();
-    assert!(forms.iter().any(|f| f.ends_with("winograd")), "{forms:?}");
-    assert!(forms.iter().any(|f| f.ends_with("direct")), "{forms:?}");
+    for form in ["winograd", "direct", "head"] {
+        assert!(forms.iter().any(|f| f.ends_with(form)), "{forms:?}");
+    }
     let off = deviation(&engine.output(0), exact);
     assert!(off < 3e-5, "off by {off}");
+}
+
+/// The matrix unit and the dot products sum the same products in another order.
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn both_bf16_forms_round_alike() {
+    use crate::element::Bf16;
+    if !crate::bf16::has_amx() {
+        return;
+    }
+    let graph = network(11, [64, 128, 96, 32], true, 7);
+    let (width, height) = (128, 72);
+    let rgb = noise_image(5, width, height);
+    let amx = output_of::<Bf16, crate::bf16::Amx>(graph.clone(), &rgb, width);
+    let dot = output_of::<Bf16, crate::bf16::Dot>(graph, &rgb, width);
+    let off = amx.iter().zip(&dot).map(|(a, b)| (a - b).abs());
+    let (sum, most) = off.fold((0.0, 0.0_f32), |(sum, most), d| (sum + d, most.max(d)));
+    let mean = sum / amx.len() as f32;
+    assert!(mean < 1e-3 && most < 2e-2, "mean {mean}, most {most}");
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let (width, height) = (128, 72);
+    let rgb = noise_image(5, width, height);
+    for precision in [Precision::F32, Precision::Bf16] {
+        if precision == Precision::Bf16 && !Engine::has_bf16() {
+            continue;
+        }
+        let [one, three] = [1, 3].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            pool.unwrap().install(|| {
+                let graph = network(11, [64, 128, 96, 32], true, 7);
+                let mut engine = Engine::new(graph, width, height, precision).unwrap();
+                engine.run(&rgb);
+                engine.output(0)
+            })
+        });
+        assert_eq!(one, three, "{precision:?}");
+    }
 }
 
 #[test]
 fn sizes_that_do_not_halve_are_refused() {
     let graph = network(7, [8, 8, 8, 8], true, 7);
-    let error = Engine::new(graph, 100, 64).unwrap_err();
+    let error = Engine::new(graph, 100, 64, Precision::F32).unwrap_err();
     assert!(error.to_string().contains("100x64"), "{error}");
     assert!(error.to_string().contains("multiples of 8"), "{error}");
 }

@@ -1,0 +1,388 @@
+//! Convolutions in bf16 on AMX, the matrix unit of Xeon processors since Sapphire Rapids.
+//!
+//! A tile register holds 16 rows of 64 bytes. Sixteen pixels whose inputs lie at equal distances are the rows of
+//! one operand just as they lie in memory; the weights are packed as the other. The instructions have no
+//! stable intrinsics, so they are written as assembly.
+
+use std::arch::asm;
+use std::sync::OnceLock;
+
+use rayon::prelude::*;
+
+use super::{Finish, Place};
+use crate::Conv;
+use crate::aligned::Aligned;
+use crate::conv::{Geometry, Runs, padded_bias, tasks, weight};
+use crate::element::{Bf16, Element};
+use crate::forms::ConvForm;
+use crate::tile::LANES;
+use crate::view::Shared;
+
+/// Rows of a tile: pixels.
+const PIXELS: usize = 16;
+/// Inputs in a row of a tile.
+const INPUTS: usize = 32;
+/// Output channels whose sums are kept at once: two tiles of 16.
+const GROUP: usize = 32;
+/// Elements of a tile.
+const TILE: usize = PIXELS * INPUTS;
+/// Inputs summed before the sums go back to memory: the weights of a group stay in the first cache.
+const INPUTS_AT_ONCE: usize = 512;
+/// Strips of a task: their inputs and outputs stay in the second cache.
+const STRIPS_AT_ONCE: usize = 32;
+
+/// Whether the processor has the unit and the system lets this process use it.
+pub(super) fn available() -> bool {
+    static AVAILABLE: OnceLock<bool> = OnceLock::new();
+    *AVAILABLE.get_or_init(|| has_tiles() && may_use_tiles())
+}
+
+fn has_tiles() -> bool {
+    use std::arch::x86_64::{__cpuid, __cpuid_count};
+    const BF16: u32 = 1 << 22;
+    const TILES: u32 = 1 << 24;
+    __cpuid(0).eax >= 7 && __cpuid_count(7, 0).edx & (BF16 | TILES) == BF16 | TILES
+}
+
+/// Linux grants the tile registers' state to a process that asks for it; its threads share the grant.
+#[cfg(target_os = "linux")]
+fn may_use_tiles() -> bool {
+    const ARCH_PRCTL: i64 = 158;
+    const ARCH_REQ_XCOMP_PERM: i64 = 0x1023;
+    const XFEATURE_XTILEDATA: i64 = 18;
+    let result: i64;
+    // SAFETY: a system call that reads no memory of ours.
+    unsafe {
+        asm!(
+            "syscall",
+            inlateout("rax") ARCH_PRCTL => result,
+            in("rdi") ARCH_REQ_XCOMP_PERM,
+            in("rsi") XFEATURE_XTILEDATA,
+            out("rcx") _,
+            out("r11") _,
+        );
+    }
+    result == 0
+}
+
+/// Not tried on other systems.
+#[cfg(not(target_os = "linux"))]
+fn may_use_tiles() -> bool {
+    false
+}
+
+/// A convolution ready to run.
+#[derive(Debug)]
+pub(crate) struct Amx {
+    geometry: Geometry,
+    runs: Runs,
+    /// For each group of [`GROUP`] output channels and 32 inputs: one or two tiles of 16 pairs of inputs × 16
+    /// outputs.
+    panels: Aligned<Bf16>,
+    bias: Vec<f32>,
+    strips: Vec<Strip>,
+}
+
+/// Sixteen pixels at equal distances in the input, not all of them of the image.
+#[derive(Debug)]
+struct Strip {
+    /// Where the first pixel's first tap lies.
+    input: usize,
+    /// None where it is no pixel of the output.
+    places: [Option<Place>; PIXELS],
+}
+
+impl ConvForm<Bf16> for Amx {
+    fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
+        let (view, kernel) = (&geometry.input, geometry.kernel);
+        // Of few channels, several taps fill one row of a tile.
+        let runs = if channel_of.len() < INPUTS {
+            Runs::new(view, kernel, channel_of, usize::MAX, INPUTS)
+        } else {
+            Runs::by_channels(view, kernel, channel_of, INPUTS)
+        };
+        let columns = conv.channels_out.next_multiple_of(LANES);
+        let mut panels = Vec::with_capacity(runs.sources.len() * columns);
+        for first in (0..columns).step_by(GROUP) {
+            for inputs in runs.sources.chunks(INPUTS) {
+                for tile in (first..(first + GROUP).min(columns)).step_by(LANES) {
+                    for pair in inputs.chunks(2) {
+                        for o in tile..tile + LANES {
+                            panels.extend(pair.iter().map(|s| Bf16::of(weight(conv, o, *s))));
+                        }
+                    }
+                }
+            }
+        }
+        Self {
+            bias: padded_bias(conv, columns),
+            strips: strips(&geometry),
+            geometry,
+            runs,
+            panels: Aligned::from_slice(&panels),
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "amx"
+    }
+
+    /// # Safety
+    /// As the trait says; the processor must have the matrix unit.
+    unsafe fn run(&self, arena: Shared<Bf16>) {
+        let groups = self.bias.len().div_ceil(GROUP);
+        tasks(self.strips.len(), STRIPS_AT_ONCE, 2, groups)
+            .into_par_iter()
+            .for_each_init(Vec::new, |scratch, (strips, groups)| {
+                // SAFETY: the processor has the registers (the caller's promise).
+                unsafe { configure() };
+                for group in groups {
+                    // SAFETY: the views lie in the arena.
+                    unsafe { self.group(arena, group, &self.strips[strips.clone()], scratch) };
+                }
+                // SAFETY: configured above.
+                unsafe { asm!("tilerelease", options(nostack)) };
+            });
+    }
+}
+
+impl Amx {
+    /// All of a task's strips, for one group of output channels.
+    unsafe fn group(
+        &self,
+        arena: Shared<Bf16>,
+        group: usize,
+        strips: &[Strip],
+        scratch: &mut Vec<Sums>,
+    ) {
+        let first = group * GROUP;
+        let width = GROUP.min(self.bias.len() - first);
+        let panel = &self.panels[first * self.runs.sources.len()..];
+        let at_once = (INPUTS_AT_ONCE / self.runs.len).max(1);
+        let last = self.runs.offsets.len().div_ceil(at_once) - 1;
+        let stride = self.geometry.stride * self.geometry.input.pitch * size_of::<Bf16>();
+        scratch.resize_with(strips.len().div_ceil(2), || {
+            Sums([[0.0; LANES * PIXELS]; 4])
+        });
+        for (i, runs) in self.runs.offsets.chunks(at_once).enumerate() {
+            for (pair, sums) in strips.chunks(2).zip(scratch.iter_mut()) {
+                let product = Product {
+                    // An odd strip is computed twice and written once.
+                    inputs: [&pair[0], pair.last().unwrap_or(&pair[0])]
+                        // SAFETY: the views lie in the arena.
+                        .map(|strip| unsafe { arena.at(strip.input).cast_const() }),
+                    stride,
+                    runs,
+                    len: self.runs.len,
+                    panel: panel[i * at_once * self.runs.len * width..].as_ptr(),
+                    add: i > 0,
+                };
+                // SAFETY: the runs lie in the arena, the panel has a tile for each of their parts.
+                unsafe {
+                    if width == GROUP {
+                        product.two_by_two(sums);
+                    } else {
+                        product.two_by_one(sums);
+                    }
+                }
+                if i == last {
+                    // SAFETY: the processor has the instructions; the output is this task's alone.
+                    unsafe { self.finish(arena, pair, sums, first, width) };
+                }
+            }
+        }
+    }
+
+    /// # Safety
+    /// The output must be this thread's alone.
+    #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
+    unsafe fn finish(
+        &self,
+        arena: Shared<Bf16>,
+        strips: &[Strip],
+        sums: &Sums,
+        first: usize,
+        width: usize,
+    ) {
+        let finish = Finish::new(&self.geometry, &self.bias, arena);
+        for (i, strip) in strips.iter().enumerate() {
+            let tiles = &sums.0[2 * i..];
+            if self.geometry.out.result {
+                // SAFETY: the caller's promise.
+                unsafe { finish.results(&strip.places, |p| tiles[0][p * LANES]) };
+                continue;
+            }
+            for (c, tile) in (first..first + width).step_by(LANES).zip(tiles) {
+                for (place, sums) in strip.places.iter().zip(tile.as_chunks::<LANES>().0) {
+                    if let Some(place) = *place {
+                        // SAFETY: as above.
+                        unsafe { finish.channels(place, c, sums.as_ptr()) };
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The strips of all output pixels.
+fn strips(g: &Geometry) -> Vec<Strip> {
+    let half = g.kernel / 2;
+    let corner = g.input.offset - half * (g.input.row + g.input.pitch);
+    let place =
+        |x: usize, y: usize| (x < g.out.width && y < g.out.height).then(|| Place::new(g, x, y));
+    if g.stride == 1 {
+        // From a row's last pixel to the next row's first it is as far as over the border between them, so
+        // strips run on over it.
+        let across = g.input.row / g.input.pitch;
+        let last = (g.out.height - 1) * across + g.out.width;
+        let strip = |start: usize| Strip {
+            input: corner + start * g.input.pitch,
+            places: std::array::from_fn(|i| place((start + i) % across, (start + i) / across)),
+        };
+        return (0..last).step_by(PIXELS).map(strip).collect();
+    }
+    let mut strips = Vec::new();
+    for y in 0..g.out.height {
+        for x in (0..g.out.width).step_by(PIXELS) {
+            strips.push(Strip {
+                input: corner + g.stride * (y * g.input.row + x * g.input.pitch),
+                places: std::array::from_fn(|i| place(x + i, y)),
+            });
+        }
+    }
+    strips
+}
+
+/// The sums of two strips by two tiles of channels: tile `2·strip + channels`, pixels × channels.
+#[repr(align(64))]
+struct Sums([[f32; LANES * PIXELS]; 4]);
+
+/// Eight tiles of 16 rows of 64 bytes.
+unsafe fn configure() {
+    #[repr(align(64))]
+    struct Palette([u8; 64]);
+    let mut palette = Palette([0; 64]);
+    palette.0[0] = 1;
+    for tile in 0..8 {
+        palette.0[16 + 2 * tile] = 64;
+        palette.0[48 + tile] = 16;
+    }
+    // SAFETY: 64 bytes that describe a valid palette.
+    unsafe { asm!("ldtilecfg [{}]", in(reg) &raw const palette.0, options(nostack)) };
+}
+
+/// Two strips' inputs times one group's weights.
+struct Product<'a> {
+    inputs: [*const Bf16; 2],
+    /// Bytes from a pixel of a strip to the next.
+    stride: usize,
+    runs: &'a [usize],
+    len: usize,
+    panel: *const Bf16,
+    /// Whether the sums go on from what they are.
+    add: bool,
+}
+
+impl Product<'_> {
+    /// Two tiles of channels.
+    ///
+    /// # Safety
+    /// The runs of sixteen pixels must be readable, the panel as long as the runs, the tiles configured.
+    #[inline(always)]
+    unsafe fn two_by_two(&self, sums: &mut Sums) {
+        let sums = sums.0.as_mut_ptr();
+        let mut panel = self.panel;
+        // SAFETY: the caller's promise. Nothing else in this program uses the tile registers.
+        unsafe {
+            if self.add {
+                asm!(
+                    "tileloadd tmm0, [{c} + {s}]",
+                    "tileloadd tmm1, [{c} + {s} + 1024]",
+                    "tileloadd tmm2, [{c} + {s} + 2048]",
+                    "tileloadd tmm3, [{c} + {s} + 3072]",
+                    c = in(reg) sums, s = in(reg) 64_usize, options(nostack, readonly),
+                );
+            } else {
+                asm!(
+                    "tilezero tmm0",
+                    "tilezero tmm1",
+                    "tilezero tmm2",
+                    "tilezero tmm3"
+                );
+            }
+            for &run in self.runs {
+                for k in (run..run + self.len).step_by(INPUTS) {
+                    asm!(
+                        "tileloadd tmm6, [{b0} + {sb}]",
+                        "tileloadd tmm4, [{a0} + {sa}]",
+                        "tileloadd tmm5, [{a1} + {sa}]",
+                        "tileloadd tmm7, [{b0} + {sb} + 1024]",
+                        "tdpbf16ps tmm0, tmm4, tmm6",
+                        "tdpbf16ps tmm2, tmm5, tmm6",
+                        "tdpbf16ps tmm1, tmm4, tmm7",
+                        "tdpbf16ps tmm3, tmm5, tmm7",
+                        a0 = in(reg) self.inputs[0].add(k),
+                        a1 = in(reg) self.inputs[1].add(k),
+                        sa = in(reg) self.stride,
+                        b0 = in(reg) panel,
+                        sb = in(reg) 64_usize,
+                        options(nostack, readonly),
+                    );
+                    panel = panel.add(2 * TILE);
+                }
+            }
+            asm!(
+                "tilestored [{c} + {s}], tmm0",
+                "tilestored [{c} + {s} + 1024], tmm1",
+                "tilestored [{c} + {s} + 2048], tmm2",
+                "tilestored [{c} + {s} + 3072], tmm3",
+                c = in(reg) sums, s = in(reg) 64_usize, options(nostack),
+            );
+        }
+    }
+
+    /// One tile of channels.
+    ///
+    /// # Safety
+    /// As [`Self::two_by_two`].
+    #[inline(always)]
+    unsafe fn two_by_one(&self, sums: &mut Sums) {
+        let sums = sums.0.as_mut_ptr();
+        let mut panel = self.panel;
+        // SAFETY: as there.
+        unsafe {
+            if self.add {
+                asm!(
+                    "tileloadd tmm0, [{c} + {s}]",
+                    "tileloadd tmm2, [{c} + {s} + 2048]",
+                    c = in(reg) sums, s = in(reg) 64_usize, options(nostack, readonly),
+                );
+            } else {
+                asm!("tilezero tmm0", "tilezero tmm2");
+            }
+            for &run in self.runs {
+                for k in (run..run + self.len).step_by(INPUTS) {
+                    asm!(
+                        "tileloadd tmm6, [{b0} + {sb}]",
+                        "tileloadd tmm4, [{a0} + {sa}]",
+                        "tileloadd tmm5, [{a1} + {sa}]",
+                        "tdpbf16ps tmm0, tmm4, tmm6",
+                        "tdpbf16ps tmm2, tmm5, tmm6",
+                        a0 = in(reg) self.inputs[0].add(k),
+                        a1 = in(reg) self.inputs[1].add(k),
+                        sa = in(reg) self.stride,
+                        b0 = in(reg) panel,
+                        sb = in(reg) 64_usize,
+                        options(nostack, readonly),
+                    );
+                    panel = panel.add(TILE);
+                }
+            }
+            asm!(
+                "tilestored [{c} + {s}], tmm0",
+                "tilestored [{c} + {s} + 2048], tmm2",
+                c = in(reg) sums, s = in(reg) 64_usize, options(nostack),
+            );
+        }
+    }
+}

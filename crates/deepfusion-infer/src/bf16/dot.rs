@@ -1,0 +1,222 @@
+//! Convolutions in bf16 with AVX-512's dot products: each lane adds the products of a pair of inputs.
+
+use std::arch::x86_64::{
+    _mm512_dpbf16_ps, _mm512_loadu_ps, _mm512_loadu_si512, _mm512_set1_epi32, _mm512_setzero_ps,
+    _mm512_storeu_ps,
+};
+use std::mem::transmute;
+
+use rayon::prelude::*;
+
+use super::{Finish, Place};
+use crate::Conv;
+use crate::aligned::Aligned;
+use crate::conv::{Geometry, Runs, padded_bias, tasks, weight};
+use crate::element::{Bf16, Element};
+use crate::forms::ConvForm;
+use crate::tile::{GROUP, LANES};
+use crate::view::Shared;
+
+/// Inputs summed before the sums go back to memory: their weights stay in the first cache.
+const INPUTS_AT_ONCE: usize = 320;
+/// Output pixels of a task.
+const PIXELS_AT_ONCE: usize = 480;
+/// Pixels whose sums are kept in registers, at four vectors each.
+const ROWS: usize = 6;
+
+/// A convolution ready to run.
+#[derive(Debug)]
+pub(crate) struct Dot {
+    geometry: Geometry,
+    runs: Runs,
+    /// For each group of [`GROUP`] output channels and pair of inputs: the pair's weights, channel by channel.
+    panels: Aligned<Bf16>,
+    bias: Vec<f32>,
+}
+
+impl ConvForm<Bf16> for Dot {
+    fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
+        let (view, kernel) = (&geometry.input, geometry.kernel);
+        let runs = Runs::new(view, kernel, channel_of, INPUTS_AT_ONCE, 2);
+        let columns = conv.channels_out.next_multiple_of(LANES);
+        let mut panels = Vec::with_capacity(runs.sources.len() * columns);
+        for first in (0..columns).step_by(GROUP) {
+            for pair in runs.sources.chunks(2) {
+                for o in first..(first + GROUP).min(columns) {
+                    panels.extend(pair.iter().map(|s| Bf16::of(weight(conv, o, *s))));
+                }
+            }
+        }
+        Self {
+            bias: padded_bias(conv, columns),
+            geometry,
+            runs,
+            panels: Aligned::from_slice(&panels),
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        "dot"
+    }
+
+    /// # Safety
+    /// As the trait says; the processor must have the instructions.
+    unsafe fn run(&self, arena: Shared<Bf16>) {
+        let groups = self.bias.len().div_ceil(GROUP);
+        tasks(self.geometry.out.pixels(), PIXELS_AT_ONCE, ROWS, groups)
+            .into_par_iter()
+            .for_each_init(
+                || Aligned::zeros(PIXELS_AT_ONCE.next_multiple_of(ROWS) * GROUP),
+                |sums, (pixels, groups)| {
+                    let inputs = self.inputs(arena, pixels.clone());
+                    for group in groups {
+                        // SAFETY: the caller's promise.
+                        unsafe {
+                            self.sum(group, &inputs, sums);
+                            self.finish(arena, group, pixels.clone(), sums);
+                        }
+                    }
+                },
+            );
+    }
+}
+
+impl Dot {
+    /// Where each pixel's first tap lies.
+    fn inputs(&self, arena: Shared<Bf16>, pixels: std::ops::Range<usize>) -> Vec<*const Bf16> {
+        let g = &self.geometry;
+        let half = g.kernel / 2;
+        let corner = g.input.offset - half * (g.input.row + g.input.pitch);
+        let place = |p: usize| {
+            let (x, y) = (p % g.out.width, p / g.out.width);
+            // SAFETY: the views lie in the arena.
+            unsafe { arena.at(corner + g.stride * (y * g.input.row + x * g.input.pitch)) }
+        };
+        pixels.map(|p| place(p).cast_const()).collect()
+    }
+
+    fn width(&self, group: usize) -> usize {
+        GROUP.min(self.bias.len() - group * GROUP)
+    }
+
+    /// The sums of all pixels, [`GROUP`] values each.
+    #[target_feature(enable = "avx512f,avx512bf16")]
+    unsafe fn sum(&self, group: usize, inputs: &[*const Bf16], sums: &mut Aligned<f32>) {
+        let width = self.width(group);
+        let panel = &self.panels[group * GROUP * self.runs.sources.len()..];
+        let at_once = (INPUTS_AT_ONCE / self.runs.len).max(1);
+        for (i, runs) in self.runs.offsets.chunks(at_once).enumerate() {
+            for (inputs, sums) in inputs.chunks(ROWS).zip(sums.chunks_mut(ROWS * GROUP)) {
+                let mut rows = [inputs[0]; ROWS];
+                // Too few pixels are filled up with the first; nobody reads those sums.
+                rows[..inputs.len()].copy_from_slice(inputs);
+                for column in (0..width).step_by(2 * LANES) {
+                    let tile = Tile {
+                        rows,
+                        runs,
+                        len: self.runs.len,
+                        panel: panel[i * at_once * self.runs.len * width + 2 * column..].as_ptr(),
+                        stride: 2 * width,
+                        add: i > 0,
+                        sums: sums[column..].as_mut_ptr(),
+                    };
+                    // SAFETY: runs, panel and sums have these extents.
+                    unsafe {
+                        if width - column >= 2 * LANES {
+                            tile.run::<2>();
+                        } else {
+                            tile.run::<1>();
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
+    unsafe fn finish(
+        &self,
+        arena: Shared<Bf16>,
+        group: usize,
+        pixels: std::ops::Range<usize>,
+        sums: &[f32],
+    ) {
+        let g = &self.geometry;
+        let finish = Finish::new(g, &self.bias, arena);
+        let places = pixels.map(|p| Place::new(g, p % g.out.width, p / g.out.width));
+        if g.out.result {
+            let places: Vec<_> = places.map(Some).collect();
+            for (i, places) in places.chunks(LANES).enumerate() {
+                // SAFETY: the caller's promise.
+                unsafe { finish.results(places, |p| sums[(i * LANES + p) * GROUP]) };
+            }
+            return;
+        }
+        for (place, sums) in places.zip(sums.chunks(GROUP)) {
+            for c in (0..self.width(group)).step_by(LANES) {
+                // SAFETY: as above.
+                unsafe { finish.channels(place, group * GROUP + c, sums[c..].as_ptr()) };
+            }
+        }
+    }
+}
+
+/// [`ROWS`] pixels by a few vectors of output channels.
+struct Tile<'a> {
+    rows: [*const Bf16; ROWS],
+    runs: &'a [usize],
+    len: usize,
+    panel: *const Bf16,
+    /// Elements of a row of the panel.
+    stride: usize,
+    /// Whether the sums go on from what they are.
+    add: bool,
+    /// [`GROUP`] values from a pixel to the next.
+    sums: *mut f32,
+}
+
+impl Tile<'_> {
+    /// # Safety
+    /// The runs must be readable, the panel as long as they are, the sums writable.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512bf16")]
+    unsafe fn run<const V: usize>(self) {
+        let mut sums = [[_mm512_setzero_ps(); V]; ROWS];
+        // SAFETY: the caller's promise.
+        unsafe {
+            if self.add {
+                for r in 0..ROWS {
+                    for v in 0..V {
+                        sums[r][v] = _mm512_loadu_ps(self.sums.add(r * GROUP + v * LANES));
+                    }
+                }
+            }
+            let mut panel = self.panel;
+            for &run in self.runs {
+                for k in (run..run + self.len).step_by(2) {
+                    let mut weights = [_mm512_set1_epi32(0); V];
+                    for v in 0..V {
+                        weights[v] = _mm512_loadu_si512(panel.add(2 * v * LANES).cast());
+                    }
+                    panel = panel.add(self.stride);
+                    for r in 0..ROWS {
+                        let pair = self.rows[r].add(k).cast::<i32>().read_unaligned();
+                        let pair = _mm512_set1_epi32(pair);
+                        for v in 0..V {
+                            sums[r][v] = _mm512_dpbf16_ps(
+                                sums[r][v],
+                                transmute(pair),
+                                transmute(weights[v]),
+                            );
+                        }
+                    }
+                }
+            }
+            for r in 0..ROWS {
+                for v in 0..V {
+                    _mm512_storeu_ps(self.sums.add(r * GROUP + v * LANES), sums[r][v]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Convolutions in bf16, on the matrix unit (AMX) or with AVX-512's dot products of pairs.
+
+mod amx;
+mod dot;
+
+use std::arch::x86_64::{
+    __m256i, __m512, _mm256_loadu_si256, _mm256_storeu_si256, _mm512_add_ps, _mm512_castsi512_ps,
+    _mm512_cvtepu16_epi32, _mm512_cvtneps_pbh, _mm512_loadu_ps, _mm512_slli_epi32,
+};
+use std::mem::transmute;
+
+use pulp::x86::V4;
+
+use crate::Activation;
+use crate::conv::Geometry;
+use crate::element::Bf16;
+use crate::tile::LANES;
+use crate::view::Shared;
+
+pub(crate) use amx::Amx;
+pub(crate) use dot::Dot;
+
+/// Whether the processor multiplies pairs of bf16 (AVX512-BF16).
+pub(crate) fn has_dot() -> bool {
+    V4::try_new().is_some() && is_x86_feature_detected!("avx512bf16")
+}
+
+/// Whether the processor has the matrix unit and the system lets this process use it.
+pub(crate) fn has_amx() -> bool {
+    has_dot() && amx::available()
+}
+
+/// Where an output pixel is written, and its residual read.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    out: usize,
+    residual: usize,
+}
+
+impl Place {
+    fn new(g: &Geometry, x: usize, y: usize) -> Self {
+        Self {
+            out: g.out.at(x, y),
+            residual: g.residual.as_ref().map_or(0, |view| view.at(x, y)),
+        }
+    }
+}
+
+/// The end of a pixel's sums: bias, residual and activation, rounded to bf16.
+struct Finish<'a> {
+    simd: V4,
+    geometry: &'a Geometry,
+    bias: &'a [f32],
+    arena: Shared<Bf16>,
+}
+
+impl<'a> Finish<'a> {
+    /// # Panics
+    /// Without AVX-512; [`has_dot`] must hold.
+    fn new(geometry: &'a Geometry, bias: &'a [f32], arena: Shared<Bf16>) -> Self {
+        let simd = V4::try_new();
+        Self {
+            simd: simd.expect("AVX512-BF16 comes with AVX-512; the engine asked for it"),
+            geometry,
+            bias,
+            arena,
+        }
+    }
+
+    /// Sixteen channels from `c` on.
+    ///
+    /// # Safety
+    /// The place's pixel must lie in the arena and be this thread's alone; `sums` holds 16 values;
+    /// [`has_dot`] must hold.
+    #[inline]
+    #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
+    unsafe fn channels(&self, place: Place, c: usize, sums: *const f32) {
+        // SAFETY: the caller's promise; the bias has a value for each channel.
+        unsafe {
+            let bias = _mm512_loadu_ps(self.bias.as_ptr().add(c));
+            let mut sum = _mm512_add_ps(_mm512_loadu_ps(sums), bias);
+            if self.geometry.residual.is_some() {
+                let bits = _mm256_loadu_si256(self.arena.at(place.residual + c).cast());
+                let bits = _mm512_slli_epi32::<16>(_mm512_cvtepu16_epi32(bits));
+                sum = _mm512_add_ps(sum, _mm512_castsi512_ps(bits));
+            }
+            let value = self.geometry.activation.of(self.simd, transmute(sum));
+            let rounded: __m256i = transmute(_mm512_cvtneps_pbh(transmute::<_, __m512>(value)));
+            _mm256_storeu_si256(self.arena.at(place.out + c).cast(), rounded);
+        }
+    }
+
+    /// The single channel of up to sixteen pixels, kept in f32.
+    ///
+    /// # Safety
+    /// As [`Self::channels`].
+    unsafe fn results(&self, places: &[Option<Place>], sums: impl Fn(usize) -> f32) {
+        let mut values = [0.0_f32; LANES];
+        for (p, value) in values.iter_mut().enumerate().take(places.len()) {
+            *value = sums(p) + self.bias[0];
+        }
+        let activation: Activation = self.geometry.activation;
+        // SAFETY: sixteen values; the output lies in the arena, with room for an f32 a pixel.
+        unsafe {
+            activation.apply(self.simd, values.as_mut_ptr(), LANES);
+            for (place, value) in places.iter().zip(values) {
+                if let Some(place) = place {
+                    self.arena.at(place.out).cast::<f32>().write(value);
+                }
+            }
+        }
+    }
+}
