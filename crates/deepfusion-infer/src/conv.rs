@@ -1,5 +1,9 @@
 //! What every form of the convolution shares: its geometry on views, and how work is cut into tasks.
 
+use std::ops::Range;
+
+use rayon::prelude::*;
+
 use crate::view::View;
 use crate::{Activation, Conv};
 
@@ -111,25 +115,40 @@ pub(crate) fn padded_bias(conv: &Conv, channels: usize) -> Vec<f32> {
     bias
 }
 
-/// Cuts `pixels` × `groups` into tasks: pieces of about `most` pixels, and of fewer groups where there would
+/// `pixels` × `groups` cut into tasks: pieces of about `most` pixels, and of fewer groups where there would
 /// be too few tasks for the threads.
-pub(crate) fn tasks(
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tasks {
     pixels: usize,
-    most: usize,
-    multiple: usize,
+    piece: usize,
+    pieces: usize,
     groups: usize,
-) -> Vec<(std::ops::Range<usize>, std::ops::Range<usize>)> {
-    let threads = rayon::current_num_threads();
-    let pieces = pixels.div_ceil(most);
-    let piece = pixels.div_ceil(pieces).next_multiple_of(multiple);
-    let pieces = pixels.div_ceil(piece);
-    let parts = (2 * threads).div_ceil(pieces).min(groups);
-    let mut tasks = Vec::with_capacity(pieces * parts);
-    for part in 0..parts {
-        let group = part * groups / parts..(part + 1) * groups / parts;
-        for start in (0..pixels).step_by(piece) {
-            tasks.push((start..(start + piece).min(pixels), group.clone()));
+    parts: usize,
+}
+
+impl Tasks {
+    /// Pieces are multiples of `multiple` pixels, the last one excepted.
+    pub(crate) fn new(pixels: usize, most: usize, multiple: usize, groups: usize) -> Self {
+        let even = pixels.div_ceil(pixels.div_ceil(most));
+        let piece = even.next_multiple_of(multiple);
+        let pieces = pixels.div_ceil(piece);
+        let wanted = 2 * rayon::current_num_threads();
+        Self {
+            pixels,
+            piece,
+            pieces,
+            groups,
+            parts: wanted.div_ceil(pieces).min(groups),
         }
     }
-    tasks
+
+    /// Runs every task, each with its pixels and its groups.
+    pub(crate) fn run(self, task: impl Fn(Range<usize>, Range<usize>) + Sync) {
+        (0..self.pieces * self.parts).into_par_iter().for_each(|i| {
+            let (part, start) = (i / self.pieces, i % self.pieces * self.piece);
+            let group = |part: usize| part * self.groups / self.parts;
+            let pixels = start..(start + self.piece).min(self.pixels);
+            task(pixels, group(part)..group(part + 1));
+        });
+    }
 }

@@ -1,10 +1,10 @@
 //! A convolution in f32, pixel by pixel, without unfolding.
 
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 
 use crate::aligned::Aligned;
-use crate::conv::{Geometry, Runs, padded_bias, tasks, weight};
+use crate::conv::{Geometry, Runs, Tasks, padded_bias, weight};
+use crate::scratch::with_scratch;
 use crate::tile::{GROUP, LANES, Pixel, Shift, Start, Sum, tiles};
 use crate::view::Shared;
 use crate::{Activation, Conv};
@@ -54,16 +54,17 @@ impl Direct {
     /// output meanwhile.
     pub(crate) unsafe fn run(&self, arena: Shared<f32>) {
         let groups = self.bias.len().div_ceil(GROUP);
-        tasks(self.geometry.out.pixels(), PIXELS_AT_ONCE, 6, groups)
-            .into_par_iter()
-            .for_each(|(pixels, groups)| {
+        Tasks::new(self.geometry.out.pixels(), PIXELS_AT_ONCE, 6, groups).run(|pixels, groups| {
+            with_scratch(|scratch| {
                 Arch::new().dispatch(Task {
                     conv: self,
                     arena,
                     pixels,
                     groups,
+                    places: &mut scratch.pixels,
                 });
             });
+        });
     }
 }
 
@@ -72,6 +73,7 @@ struct Task<'a> {
     arena: Shared<f32>,
     pixels: std::ops::Range<usize>,
     groups: std::ops::Range<usize>,
+    places: &'a mut Vec<Pixel>,
 }
 
 impl WithSimd for Task<'_> {
@@ -84,13 +86,14 @@ impl WithSimd for Task<'_> {
             arena,
             pixels,
             groups,
+            places,
         } = self;
         let g = &conv.geometry;
         let half = g.kernel / 2;
         let corner = g.input.offset - half * (g.input.row + g.input.pitch);
         let at_once = (INPUTS_AT_ONCE / conv.runs.len).max(1);
         let columns = conv.bias.len();
-        let mut places = Vec::with_capacity(pixels.len());
+        places.clear();
         let mut p = pixels.start;
         while p < pixels.end {
             // The rest of the task in this row.
@@ -133,10 +136,10 @@ impl WithSimd for Task<'_> {
                     relu: i == last && g.activation == Activation::Relu,
                 };
                 // SAFETY: the views lie in the arena, the panel has a row for every input.
-                unsafe { tiles(simd, &sum, width, &places, shift) };
+                unsafe { tiles(simd, &sum, width, places, shift) };
             }
             if !matches!(g.activation, Activation::Identity | Activation::Relu) {
-                for place in &places {
+                for place in places.iter() {
                     // SAFETY: written just now, by this task alone.
                     unsafe { g.activation.apply(simd, place.out.add(first), width) };
                 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use crate::aligned::Aligned;
 use crate::element::{Bf16, Element};
 use crate::forms::{Bf16Conv, ConvForm, F32Conv};
-use crate::movement::{self, ByteTable};
+use crate::movement::{self, Normalisation};
 use crate::plan::{Plan, Step};
 use crate::view::Shared;
 use crate::{Border, Error, Graph};
@@ -71,39 +71,39 @@ impl Engine {
     /// Runs the network on an image; afterwards [`Self::output`] gives the results.
     ///
     /// # Shapes
-    /// - `rgb`: height × width × 3, row by row, red, green, blue
+    /// - `image`: 3 × height × width, RGB in [0, 1]
     ///
     /// # Panics
     /// When the image has another size.
-    pub fn run(&mut self, rgb: &[u8]) {
-        self.run_steps(rgb, |_, _| {});
+    pub fn run(&mut self, image: &[f32]) {
+        self.run_steps(image, |_, _| {});
     }
 
     /// The same; gives each step's name (its node's, and what it does) and time.
     ///
     /// # Panics
     /// As [`Self::run`].
-    pub fn profile(&mut self, rgb: &[u8]) -> Vec<(String, Duration)> {
+    pub fn profile(&mut self, image: &[f32]) -> Vec<(String, Duration)> {
         let mut times = Vec::new();
         let mut start = Instant::now();
-        self.run_steps(rgb, |name, kind| {
+        self.run_steps(image, |name, kind| {
             times.push((format!("{name} {kind}"), start.elapsed()));
             start = Instant::now();
         });
         times
     }
 
-    fn run_steps(&mut self, rgb: &[u8], after: impl FnMut(&str, &str) + Send) {
+    fn run_steps(&mut self, image: &[f32], after: impl FnMut(&str, &str) + Send) {
         let (width, height) = self.size;
         assert_eq!(
-            rgb.len(),
+            image.len(),
             3 * width * height,
             "an image of {width}x{height}"
         );
         // On one of rayon's threads: from outside, every single step would be handed over to them.
         rayon::scope(|_| match &mut self.runner {
-            Runner::F32(runner) => runner.run(rgb, after),
-            Runner::Bf16(runner) => runner.run(rgb, after),
+            Runner::F32(runner) => runner.run(image, after),
+            Runner::Bf16(runner) => runner.run(image, after),
         });
     }
 
@@ -125,30 +125,33 @@ impl Engine {
 pub(crate) struct Typed<E, C> {
     plan: Plan<C>,
     arena: Aligned<E>,
-    bytes: ByteTable,
+    normalisation: Normalisation,
 }
 
 impl<E: Element, C: ConvForm<E>> Typed<E, C> {
     pub(crate) fn new(graph: Graph, width: usize, height: usize) -> Self {
-        let bytes = ByteTable::new(graph.mean(), graph.std());
+        let normalisation = Normalisation {
+            mean: graph.mean(),
+            std: graph.std(),
+        };
         let plan = Plan::new::<E>(graph, width, height, |conv, geometry, channel_of| {
             C::new(&conv, geometry, channel_of)
         });
         Self {
             arena: Aligned::zeros(plan.arena),
             plan,
-            bytes,
+            normalisation,
         }
     }
 
-    pub(crate) fn run(&mut self, rgb: &[u8], mut after: impl FnMut(&str, &str)) {
+    pub(crate) fn run(&mut self, image: &[f32], mut after: impl FnMut(&str, &str)) {
         let arena = Shared(self.arena.as_mut_ptr());
         for (name, step) in &self.plan.steps {
             // SAFETY: the plan's views lie in the arena; steps run one after the other, and the output of
             // each lies apart from what it reads.
             unsafe {
                 match step {
-                    Step::Image(to) => self.bytes.run(rgb, arena, to),
+                    Step::Image(to) => self.normalisation.run(image, arena, to),
                     Step::Border { view, reach, kind } => match kind {
                         Border::Zero => movement::zero_border(arena, view, *reach),
                         Border::Reflect => movement::reflect_border(arena, view, *reach),

@@ -14,6 +14,7 @@ mod graph;
 mod head;
 mod movement;
 mod plan;
+mod scratch;
 #[cfg(test)]
 mod tests;
 mod tile;

@@ -5,31 +5,27 @@ use rayon::prelude::*;
 use crate::element::Element;
 use crate::view::{Shared, View};
 
-/// (b / 255 − mean) / std of every byte, for each colour.
-#[derive(Debug, Clone)]
-pub(crate) struct ByteTable(Box<[[f32; 256]; 3]>);
+/// How an image is normalised: (x − mean) / std for red, green and blue.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Normalisation {
+    pub(crate) mean: [f32; 3],
+    pub(crate) std: [f32; 3],
+}
 
-impl ByteTable {
-    pub(crate) fn new(mean: [f32; 3], std: [f32; 3]) -> Self {
-        let value = |c: usize, b: usize| (b as f32 / 255.0 - mean[c]) / std[c];
-        Self(Box::new(std::array::from_fn(|c| {
-            std::array::from_fn(|b| value(c, b))
-        })))
-    }
-
-    /// Writes the normalised image.
+impl Normalisation {
+    /// Writes the normalised image, its channels together.
     ///
     /// # Safety
     /// `to` must lie in the arena and nobody else use it.
-    pub(crate) unsafe fn run<E: Element>(&self, rgb: &[u8], arena: Shared<E>, to: &View) {
-        let rows = rgb.par_chunks_exact(3 * to.width);
-        rows.enumerate().for_each(|(y, row)| {
+    pub(crate) unsafe fn run<E: Element>(self, image: &[f32], arena: Shared<E>, to: &View) {
+        let planes: [&[f32]; 3] = std::array::from_fn(|c| &image[c * to.pixels()..][..to.pixels()]);
+        (0..to.height).into_par_iter().for_each(|y| {
+            let rows = planes.map(|plane| &plane[y * to.width..][..to.width]);
             // SAFETY: the row lies in the view.
             let out = unsafe { row_of(arena, to, y) };
-            let (pixels, _) = row.as_chunks::<3>();
-            for (out, pixel) in out.chunks_exact_mut(to.pitch).zip(pixels) {
+            for (x, out) in out.chunks_exact_mut(to.pitch).enumerate() {
                 for c in 0..3 {
-                    out[c] = E::of(self.0[c][usize::from(pixel[c])]);
+                    out[c] = E::of((rows[c][x] - self.mean[c]) / self.std[c]);
                 }
             }
         });

@@ -84,10 +84,10 @@ fn conv(conv: &Conv, values: &[Image]) -> Image {
 }
 
 /// All values of the graph.
-fn run(graph: &Graph, rgb: &[u8], height: usize, width: usize) -> Vec<Image> {
+fn run(graph: &Graph, image: &[f32], height: usize, width: usize) -> Vec<Image> {
     let mut values = vec![Image::from_fn(3, height, width, |c, y, x| {
-        let byte = f64::from(rgb[(y * width + x) * 3 + c]);
-        (byte / 255.0 - f64::from(graph.mean()[c])) / f64::from(graph.std()[c])
+        let value = f64::from(image[(c * height + y) * width + x]);
+        (value - f64::from(graph.mean()[c])) / f64::from(graph.std()[c])
     })];
     for node in graph.nodes() {
         let value = match &node.op {
@@ -206,17 +206,17 @@ fn deviation(engine: &[f32], exact: &Image) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// An image of noise.
-fn noise_image(seed: u64, width: usize, height: usize) -> Vec<u8> {
+/// An image of noise in [0, 1).
+fn noise_image(seed: u64, width: usize, height: usize) -> Vec<f32> {
     let mut next = noise(seed);
-    let bytes = (0..3 * width * height).map(|_| (next() * 127.0 + 128.0) as u8);
-    bytes.collect()
+    let values = (0..3 * width * height).map(|_| (next() + 1.0) / 2.0);
+    values.collect()
 }
 
 /// The first output of an engine whose convolutions all take one form.
-fn output_of<E: Element, C: ConvForm<E>>(graph: Graph, rgb: &[u8], width: usize) -> Vec<f32> {
-    let mut engine = Typed::<E, C>::new(graph, width, rgb.len() / 3 / width);
-    engine.run(rgb, |_, _| {});
+fn output_of<E: Element, C: ConvForm<E>>(graph: Graph, image: &[f32], width: usize) -> Vec<f32> {
+    let mut engine = Typed::<E, C>::new(graph, width, image.len() / 3 / width);
+    engine.run(image, |_, _| {});
     engine.output(0)
 }
 
@@ -233,13 +233,13 @@ proptest! {
     ) {
         let (width, height) = (8 * across, 8 * down);
         let graph = network(seed, widths, bottleneck, stem);
-        let rgb = noise_image(seed ^ 1, width, height);
-        let values = run(&graph, &rgb, height, width);
+        let image = noise_image(seed ^ 1, width, height);
+        let values = run(&graph, &image, height, width);
         let exact = &values[graph.outputs()[0].0];
         let mut engine = Engine::new(graph.clone(), width, height, Precision::F32).unwrap();
         // Twice: nothing of an image may remain for the next.
         for _ in 0..2 {
-            engine.run(&rgb);
+            engine.run(&image);
             let off = deviation(&engine.output(0), exact);
             // A sigmoid's output; f32 through 13 layers, the Winograd form's 1e-5 included.
             prop_assert!(off < 3e-5, "off by {off}");
@@ -249,11 +249,11 @@ proptest! {
             use crate::element::Bf16;
             // Each of 13 layers rounds to 8 bits.
             if crate::bf16::has_amx() {
-                let off = deviation(&output_of::<Bf16, crate::bf16::Amx>(graph.clone(), &rgb, width), exact);
+                let off = deviation(&output_of::<Bf16, crate::bf16::Amx>(graph.clone(), &image, width), exact);
                 prop_assert!(off < 0.06, "amx off by {off}");
             }
             if crate::bf16::has_dot() {
-                let off = deviation(&output_of::<Bf16, crate::bf16::Dot>(graph, &rgb, width), exact);
+                let off = deviation(&output_of::<Bf16, crate::bf16::Dot>(graph, &image, width), exact);
                 prop_assert!(off < 0.06, "dot off by {off}");
             }
         }
@@ -264,12 +264,12 @@ proptest! {
 fn large_images_take_the_winograd_form_and_agree_too() {
     let graph = network(7, [16, 64, 96, 32], true, 7);
     let (width, height) = (208, 72);
-    let rgb = noise_image(3, width, height);
-    let values = run(&graph, &rgb, height, width);
+    let image = noise_image(3, width, height);
+    let values = run(&graph, &image, height, width);
     let exact = &values[graph.outputs()[0].0];
     let mut engine = Engine::new(graph, width, height, Precision::F32).unwrap();
     let forms: Vec<String> = engine
-        .profile(&rgb)
+        .profile(&image)
         .into_iter()
         .map(|(name, _)| name)
         .collect();
@@ -290,9 +290,9 @@ fn both_bf16_forms_round_alike() {
     }
     let graph = network(11, [64, 128, 96, 32], true, 7);
     let (width, height) = (128, 72);
-    let rgb = noise_image(5, width, height);
-    let amx = output_of::<Bf16, crate::bf16::Amx>(graph.clone(), &rgb, width);
-    let dot = output_of::<Bf16, crate::bf16::Dot>(graph, &rgb, width);
+    let image = noise_image(5, width, height);
+    let amx = output_of::<Bf16, crate::bf16::Amx>(graph.clone(), &image, width);
+    let dot = output_of::<Bf16, crate::bf16::Dot>(graph, &image, width);
     let off = amx.iter().zip(&dot).map(|(a, b)| (a - b).abs());
     let (sum, most) = off.fold((0.0, 0.0_f32), |(sum, most), d| (sum + d, most.max(d)));
     let mean = sum / amx.len() as f32;
@@ -302,7 +302,7 @@ fn both_bf16_forms_round_alike() {
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let (width, height) = (128, 72);
-    let rgb = noise_image(5, width, height);
+    let image = noise_image(5, width, height);
     for precision in [Precision::F32, Precision::Bf16] {
         if precision == Precision::Bf16 && !Engine::has_bf16() {
             continue;
@@ -312,7 +312,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
             pool.unwrap().install(|| {
                 let graph = network(11, [64, 128, 96, 32], true, 7);
                 let mut engine = Engine::new(graph, width, height, precision).unwrap();
-                engine.run(&rgb);
+                engine.run(&image);
                 engine.output(0)
             })
         });

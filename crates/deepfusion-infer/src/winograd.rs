@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use crate::Conv;
 use crate::aligned::Aligned;
 use crate::conv::{Geometry, padded_bias, weight};
+use crate::scratch::with_scratch;
 use crate::tile::{GROUP, LANES, Pixel, Shift, Start, Sum, tiles};
 use crate::view::{Shared, View};
 
@@ -105,17 +106,24 @@ impl Winograd {
             .div_ceil(self.tiles)
             .next_multiple_of(rayon::current_num_threads());
         let tiles = all.div_ceil(rounds);
-        (0..all.div_ceil(tiles)).into_par_iter().for_each_init(
-            || self.scratch(tiles),
-            |scratch, task| {
+        (0..all.div_ceil(tiles)).into_par_iter().for_each(|task| {
+            let tiles = task * tiles..((task + 1) * tiles).min(all);
+            with_scratch(|scratch| {
                 Arch::new().dispatch(Task {
                     conv: self,
                     arena,
-                    tiles: task * tiles..((task + 1) * tiles).min(all),
-                    scratch,
+                    inputs: scratch.first.take(AREA * tiles.len() * self.widest()),
+                    products: scratch.second.take(AREA * tiles.len() * self.bias.len()),
+                    rows: &mut scratch.pixels,
+                    tiles,
                 });
-            },
-        );
+            });
+        });
+    }
+
+    /// Channels of the widest part.
+    fn widest(&self) -> usize {
+        self.parts.iter().map(|part| part.len()).max().unwrap_or(0)
     }
 }
 
@@ -134,17 +142,15 @@ fn transformed_kernel(g: &[f64; 9]) -> [f64; AREA] {
     out
 }
 
-/// What a task needs: for each tile the transformed inputs, 36 × channels, and the products.
-struct Scratch {
-    inputs: Aligned<f32>,
-    products: Aligned<f32>,
-}
-
 struct Task<'a> {
     conv: &'a Winograd,
     arena: Shared<f32>,
     tiles: std::ops::Range<usize>,
-    scratch: &'a mut Scratch,
+    /// Of each tile, 36 × channels.
+    inputs: &'a mut [f32],
+    /// Of each tile, 36 × output channels.
+    products: &'a mut [f32],
+    rows: &'a mut Vec<Pixel>,
 }
 
 impl WithSimd for Task<'_> {
@@ -156,10 +162,11 @@ impl WithSimd for Task<'_> {
             conv,
             arena,
             tiles: range,
-            scratch,
+            inputs,
+            products,
+            rows,
         } = self;
         let (count, columns) = (range.len(), conv.bias.len());
-        let mut rows = Vec::with_capacity(count);
         for (i, part) in conv.parts.iter().enumerate() {
             let size = part.len();
             let input = View {
@@ -168,14 +175,14 @@ impl WithSimd for Task<'_> {
                 ..conv.geometry.input
             };
             for (t, tile) in range.clone().enumerate() {
-                let to = scratch.inputs[t * AREA * size..].as_mut_ptr();
+                let to = inputs[t * AREA * size..].as_mut_ptr();
                 // SAFETY: the input lies in the arena; the scratch holds `count` tiles.
                 unsafe { transform_input(simd, arena, &input, conv.place(tile), to) };
             }
             rows.clear();
             rows.extend((0..count).map(|t| Pixel {
-                input: scratch.inputs[t * AREA * size..].as_ptr(),
-                out: scratch.products[t * AREA * columns..].as_mut_ptr(),
+                input: inputs[t * AREA * size..].as_ptr(),
+                out: products[t * AREA * columns..].as_mut_ptr(),
                 residual: std::ptr::null(),
             }));
             for product in 0..AREA {
@@ -195,12 +202,12 @@ impl WithSimd for Task<'_> {
                         relu: false,
                     };
                     // SAFETY: inputs, products and panel have these extents.
-                    unsafe { tiles(simd, &sum, width, &rows, shift) };
+                    unsafe { tiles(simd, &sum, width, rows, shift) };
                 }
             }
         }
         for (t, tile) in range.enumerate() {
-            let from = scratch.products[t * AREA * columns..].as_ptr();
+            let from = products[t * AREA * columns..].as_ptr();
             // SAFETY: the output lies in the arena, each tile of it belongs to one task.
             unsafe { conv.transform_output(simd, arena, from, conv.place(tile)) };
         }
@@ -287,15 +294,6 @@ unsafe fn transform_input<S: Simd>(
 }
 
 impl Winograd {
-    /// For that many tiles.
-    fn scratch(&self, tiles: usize) -> Scratch {
-        let widest = self.parts.iter().map(|part| part.len()).max().unwrap_or(0);
-        Scratch {
-            inputs: Aligned::zeros(AREA * tiles * widest),
-            products: Aligned::zeros(AREA * tiles * self.bias.len()),
-        }
-    }
-
     /// First output pixel of a tile.
     fn place(&self, tile: usize) -> (usize, usize) {
         let across = self.geometry.out.width.div_ceil(OUT);

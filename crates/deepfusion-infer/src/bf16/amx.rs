@@ -7,14 +7,13 @@
 use std::arch::asm;
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
 use super::{Finish, Place};
 use crate::Conv;
 use crate::aligned::Aligned;
-use crate::conv::{Geometry, Runs, padded_bias, tasks, weight};
+use crate::conv::{Geometry, Runs, Tasks, padded_bias, weight};
 use crate::element::{Bf16, Element};
 use crate::forms::ConvForm;
+use crate::scratch::with_scratch;
 use crate::tile::LANES;
 use crate::view::Shared;
 
@@ -26,6 +25,10 @@ const INPUTS: usize = 32;
 const GROUP: usize = 32;
 /// Elements of a tile.
 const TILE: usize = PIXELS * INPUTS;
+/// Sums of a tile: pixels × channels.
+const TILE_SUMS: usize = PIXELS * LANES;
+/// Sums of two strips by two tiles of channels; tile `2·strip + channels`.
+const SUMS: usize = 4 * TILE_SUMS;
 /// Inputs summed before the sums go back to memory: the weights of a group stay in the first cache.
 const INPUTS_AT_ONCE: usize = 512;
 /// Strips of a task: their inputs and outputs stay in the second cache.
@@ -131,18 +134,20 @@ impl ConvForm<Bf16> for Amx {
     /// As the trait says; the processor must have the matrix unit.
     unsafe fn run(&self, arena: Shared<Bf16>) {
         let groups = self.bias.len().div_ceil(GROUP);
-        tasks(self.strips.len(), STRIPS_AT_ONCE, 2, groups)
-            .into_par_iter()
-            .for_each_init(Vec::new, |scratch, (strips, groups)| {
-                // SAFETY: the processor has the registers (the caller's promise).
-                unsafe { configure() };
-                for group in groups {
-                    // SAFETY: the views lie in the arena.
-                    unsafe { self.group(arena, group, &self.strips[strips.clone()], scratch) };
+        Tasks::new(self.strips.len(), STRIPS_AT_ONCE, 2, groups).run(|strips, groups| {
+            let strips = &self.strips[strips];
+            with_scratch(|scratch| {
+                let sums = scratch.first.take(strips.len().div_ceil(2) * SUMS);
+                // SAFETY: the processor has the registers, the views lie in the arena (the caller's promise).
+                unsafe {
+                    configure();
+                    for group in groups {
+                        self.group(arena, group, strips, sums);
+                    }
+                    asm!("tilerelease", options(nostack));
                 }
-                // SAFETY: configured above.
-                unsafe { asm!("tilerelease", options(nostack)) };
             });
+        });
     }
 }
 
@@ -153,7 +158,7 @@ impl Amx {
         arena: Shared<Bf16>,
         group: usize,
         strips: &[Strip],
-        scratch: &mut Vec<Sums>,
+        scratch: &mut [f32],
     ) {
         let first = group * GROUP;
         let width = GROUP.min(self.bias.len() - first);
@@ -161,11 +166,8 @@ impl Amx {
         let at_once = (INPUTS_AT_ONCE / self.runs.len).max(1);
         let last = self.runs.offsets.len().div_ceil(at_once) - 1;
         let stride = self.geometry.stride * self.geometry.input.pitch * size_of::<Bf16>();
-        scratch.resize_with(strips.len().div_ceil(2), || {
-            Sums([[0.0; LANES * PIXELS]; 4])
-        });
         for (i, runs) in self.runs.offsets.chunks(at_once).enumerate() {
-            for (pair, sums) in strips.chunks(2).zip(scratch.iter_mut()) {
+            for (pair, sums) in strips.chunks(2).zip(scratch.chunks_exact_mut(SUMS)) {
                 let product = Product {
                     // An odd strip is computed twice and written once.
                     inputs: [&pair[0], pair.last().unwrap_or(&pair[0])]
@@ -200,19 +202,22 @@ impl Amx {
         &self,
         arena: Shared<Bf16>,
         strips: &[Strip],
-        sums: &Sums,
+        sums: &[f32],
         first: usize,
         width: usize,
     ) {
         let finish = Finish::new(&self.geometry, &self.bias, arena);
         for (i, strip) in strips.iter().enumerate() {
-            let tiles = &sums.0[2 * i..];
+            let tiles = &sums[2 * i * TILE_SUMS..];
             if self.geometry.out.result {
                 // SAFETY: the caller's promise.
-                unsafe { finish.results(&strip.places, |p| tiles[0][p * LANES]) };
+                unsafe { finish.results(&strip.places, |p| tiles[p * LANES]) };
                 continue;
             }
-            for (c, tile) in (first..first + width).step_by(LANES).zip(tiles) {
+            for (c, tile) in (first..first + width)
+                .step_by(LANES)
+                .zip(tiles.chunks_exact(TILE_SUMS))
+            {
                 for (place, sums) in strip.places.iter().zip(tile.as_chunks::<LANES>().0) {
                     if let Some(place) = *place {
                         // SAFETY: as above.
@@ -228,8 +233,10 @@ impl Amx {
 fn strips(g: &Geometry) -> Vec<Strip> {
     let half = g.kernel / 2;
     let corner = g.input.offset - half * (g.input.row + g.input.pitch);
-    let place =
-        |x: usize, y: usize| (x < g.out.width && y < g.out.height).then(|| Place::new(g, x, y));
+    let place = |x: usize, y: usize| {
+        let inside = x < g.out.width && y < g.out.height;
+        inside.then(|| Place::new(g, x, y))
+    };
     if g.stride == 1 {
         // From a row's last pixel to the next row's first it is as far as over the border between them, so
         // strips run on over it.
@@ -241,21 +248,14 @@ fn strips(g: &Geometry) -> Vec<Strip> {
         };
         return (0..last).step_by(PIXELS).map(strip).collect();
     }
-    let mut strips = Vec::new();
-    for y in 0..g.out.height {
-        for x in (0..g.out.width).step_by(PIXELS) {
-            strips.push(Strip {
-                input: corner + g.stride * (y * g.input.row + x * g.input.pitch),
-                places: std::array::from_fn(|i| place(x + i, y)),
-            });
-        }
-    }
-    strips
+    let rows =
+        (0..g.out.height).flat_map(|y| (0..g.out.width).step_by(PIXELS).map(move |x| (x, y)));
+    rows.map(|(x, y)| Strip {
+        input: corner + g.stride * (y * g.input.row + x * g.input.pitch),
+        places: std::array::from_fn(|i| place(x + i, y)),
+    })
+    .collect()
 }
-
-/// The sums of two strips by two tiles of channels: tile `2·strip + channels`, pixels × channels.
-#[repr(align(64))]
-struct Sums([[f32; LANES * PIXELS]; 4]);
 
 /// Eight tiles of 16 rows of 64 bytes.
 unsafe fn configure() {
@@ -289,8 +289,8 @@ impl Product<'_> {
     /// # Safety
     /// The runs of sixteen pixels must be readable, the panel as long as the runs, the tiles configured.
     #[inline(always)]
-    unsafe fn two_by_two(&self, sums: &mut Sums) {
-        let sums = sums.0.as_mut_ptr();
+    unsafe fn two_by_two(&self, sums: &mut [f32]) {
+        let sums = sums.as_mut_ptr();
         let mut panel = self.panel;
         // SAFETY: the caller's promise. Nothing else in this program uses the tile registers.
         unsafe {
@@ -346,8 +346,8 @@ impl Product<'_> {
     /// # Safety
     /// As [`Self::two_by_two`].
     #[inline(always)]
-    unsafe fn two_by_one(&self, sums: &mut Sums) {
-        let sums = sums.0.as_mut_ptr();
+    unsafe fn two_by_one(&self, sums: &mut [f32]) {
+        let sums = sums.as_mut_ptr();
         let mut panel = self.panel;
         // SAFETY: as there.
         unsafe {

@@ -6,14 +6,13 @@ use std::arch::x86_64::{
 };
 use std::mem::transmute;
 
-use rayon::prelude::*;
-
 use super::{Finish, Place};
 use crate::Conv;
 use crate::aligned::Aligned;
-use crate::conv::{Geometry, Runs, padded_bias, tasks, weight};
+use crate::conv::{Geometry, Runs, Tasks, padded_bias, weight};
 use crate::element::{Bf16, Element};
 use crate::forms::ConvForm;
+use crate::scratch::with_scratch;
 use crate::tile::{GROUP, LANES};
 use crate::view::Shared;
 
@@ -63,36 +62,33 @@ impl ConvForm<Bf16> for Dot {
     /// As the trait says; the processor must have the instructions.
     unsafe fn run(&self, arena: Shared<Bf16>) {
         let groups = self.bias.len().div_ceil(GROUP);
-        tasks(self.geometry.out.pixels(), PIXELS_AT_ONCE, ROWS, groups)
-            .into_par_iter()
-            .for_each_init(
-                || Aligned::zeros(PIXELS_AT_ONCE.next_multiple_of(ROWS) * GROUP),
-                |sums, (pixels, groups)| {
-                    let inputs = self.inputs(arena, pixels.clone());
+        Tasks::new(self.geometry.out.pixels(), PIXELS_AT_ONCE, ROWS, groups).run(
+            |pixels, groups| {
+                with_scratch(|scratch| {
+                    let sums = scratch
+                        .first
+                        .take(pixels.len().next_multiple_of(ROWS) * GROUP);
                     for group in groups {
                         // SAFETY: the caller's promise.
                         unsafe {
-                            self.sum(group, &inputs, sums);
+                            self.sum(arena, group, pixels.clone(), sums);
                             self.finish(arena, group, pixels.clone(), sums);
                         }
                     }
-                },
-            );
+                });
+            },
+        );
     }
 }
 
 impl Dot {
-    /// Where each pixel's first tap lies.
-    fn inputs(&self, arena: Shared<Bf16>, pixels: std::ops::Range<usize>) -> Vec<*const Bf16> {
+    /// Where a pixel's first tap lies.
+    fn input(&self, pixel: usize) -> usize {
         let g = &self.geometry;
         let half = g.kernel / 2;
         let corner = g.input.offset - half * (g.input.row + g.input.pitch);
-        let place = |p: usize| {
-            let (x, y) = (p % g.out.width, p / g.out.width);
-            // SAFETY: the views lie in the arena.
-            unsafe { arena.at(corner + g.stride * (y * g.input.row + x * g.input.pitch)) }
-        };
-        pixels.map(|p| place(p).cast_const()).collect()
+        let (x, y) = (pixel % g.out.width, pixel / g.out.width);
+        corner + g.stride * (y * g.input.row + x * g.input.pitch)
     }
 
     fn width(&self, group: usize) -> usize {
@@ -101,15 +97,25 @@ impl Dot {
 
     /// The sums of all pixels, [`GROUP`] values each.
     #[target_feature(enable = "avx512f,avx512bf16")]
-    unsafe fn sum(&self, group: usize, inputs: &[*const Bf16], sums: &mut Aligned<f32>) {
+    unsafe fn sum(
+        &self,
+        arena: Shared<Bf16>,
+        group: usize,
+        pixels: std::ops::Range<usize>,
+        sums: &mut [f32],
+    ) {
         let width = self.width(group);
         let panel = &self.panels[group * GROUP * self.runs.sources.len()..];
         let at_once = (INPUTS_AT_ONCE / self.runs.len).max(1);
         for (i, runs) in self.runs.offsets.chunks(at_once).enumerate() {
-            for (inputs, sums) in inputs.chunks(ROWS).zip(sums.chunks_mut(ROWS * GROUP)) {
-                let mut rows = [inputs[0]; ROWS];
-                // Too few pixels are filled up with the first; nobody reads those sums.
-                rows[..inputs.len()].copy_from_slice(inputs);
+            let starts = pixels.clone().step_by(ROWS);
+            for (start, sums) in starts.zip(sums.chunks_mut(ROWS * GROUP)) {
+                // Too few pixels are filled up with the last; nobody reads those sums.
+                let rows: [*const Bf16; ROWS] = std::array::from_fn(|r| {
+                    let pixel = (start + r).min(pixels.end - 1);
+                    // SAFETY: the views lie in the arena.
+                    unsafe { arena.at(self.input(pixel)).cast_const() }
+                });
                 for column in (0..width).step_by(2 * LANES) {
                     let tile = Tile {
                         rows,
