@@ -1,5 +1,5 @@
 use crate::config::{CompareAt, Reprojection, ReversedPose, ViewMotion};
-use crate::level::{Level, pyramid};
+use crate::level::{levels, pyramid};
 use crate::losses::{self, LossTerms, ReprojectionOutput, View};
 use crate::{BilinearResize, Error, Motion, SnippetBatch, TrainConfig, synthesise};
 use burn::module::Module;
@@ -213,18 +213,15 @@ impl Model {
         let settings = &self.config.loss;
         let range = self.range();
         let (low, high) = (1.0 / range.max_m, 1.0 / range.min_m);
-        let full = Level::at(pass, 0, settings.ssim_weight);
         let motions = self.view_motions(pass, batch);
-        let pyramid = pyramid(pass.targets.clone());
+        let targets = pyramid(pass.targets.clone());
+        let levels = levels(pass, &targets, settings.compare_at, settings.ssim_weight);
         let (mut reprojection, mut smooth) = (Vec::new(), Vec::new());
         let mut finest = None;
-        for (scale, disparity) in pass.disparities.iter().enumerate() {
-            let (level, disparity_there) = match settings.compare_at {
-                CompareAt::Full => (full.clone(), self.enlarge[scale].apply(disparity.clone())),
-                CompareAt::Own => (
-                    Level::at(pass, scale, settings.ssim_weight),
-                    disparity.clone(),
-                ),
+        for (scale, (disparity, level)) in pass.disparities.iter().zip(&levels).enumerate() {
+            let disparity_there = match settings.compare_at {
+                CompareAt::Full => self.enlarge[scale].apply(disparity.clone()),
+                CompareAt::Own => disparity.clone(),
             };
             let inverse_depth = disparity_there.mul_scalar(high - low).add_scalar(low);
             let mut first_warp = None;
@@ -253,7 +250,7 @@ impl Model {
             );
             reprojection.push(output.loss.clone());
             if settings.smoothness > 0.0 {
-                let image = pyramid[scale].clone();
+                let image = targets[scale].clone();
                 let weight = 1.0 / f64::from(1_u32 << scale);
                 smooth.push(losses::smoothness(disparity.clone(), image).mul_scalar(weight));
             }
