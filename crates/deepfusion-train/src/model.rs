@@ -39,11 +39,16 @@ pub struct ForwardPass {
 }
 
 /// The loss of a batch: the sum to differentiate, its terms, and what the finest scale saw.
-pub(crate) struct BatchLoss {
-    pub(crate) total: Tensor<1>,
-    pub(crate) terms: LossTerms,
-    pub(crate) finest: ReprojectionOutput,
-    pub(crate) warped: Tensor<4>,
+#[derive(Debug, Clone)]
+pub struct BatchLoss {
+    /// What is minimised, one value.
+    pub total: Tensor<1>,
+    /// Its terms.
+    pub terms: LossTerms,
+    /// The reprojection at the finest scale.
+    pub finest: ReprojectionOutput,
+    /// The first view's source seen from the targets' place at that scale, T×3×H×W.
+    pub warped: Tensor<4>,
 }
 
 /// Share of the predicted displacement that the loss saw: for the scale ratio.
@@ -204,12 +209,8 @@ impl Model {
     }
 
     /// The loss of a forward pass, with λ_v as given: L = Σ_s ¼(L_rp + λ_s·L_smooth) + λ_v·L_speed.
-    pub(crate) fn loss(
-        &self,
-        pass: &ForwardPass,
-        batch: &SnippetBatch,
-        speed_weight: f64,
-    ) -> BatchLoss {
+    #[must_use]
+    pub fn loss(&self, pass: &ForwardPass, batch: &SnippetBatch, speed_weight: f64) -> BatchLoss {
         let settings = &self.config.loss;
         let range = self.range();
         let (low, high) = (1.0 / range.max_m, 1.0 / range.min_m);

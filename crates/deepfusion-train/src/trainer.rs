@@ -1,9 +1,9 @@
-use crate::adam::NamedGradients;
 use crate::losses::speed_weight;
-use crate::model::{BatchLoss, displacement_ratio};
+use crate::model::displacement_ratio;
 use crate::{
-    Adam, BatchLoader, Checkpoint, CheckpointKind, Control, Error, ForwardPass, LossTerms, Model,
-    RunFolder, SamplePanel, SampleSet, Sampler, SnippetBatch, StepOutcome, TrainConfig, TrainEvent,
+    Adam, BatchLoader, BatchLoss, Checkpoint, CheckpointKind, Control, Error, ForwardPass,
+    LossTerms, Model, NamedGradients, RunFolder, SamplePanel, SampleSet, Sampler, SnippetBatch,
+    StepOutcome, TrainConfig, TrainEvent,
 };
 use burn::tensor::Device;
 use std::path::Path;
