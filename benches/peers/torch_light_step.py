@@ -1,4 +1,4 @@
-"""The peer of `cargo bench -p deepfusion-train -- light`: a whole training step of the preset `light` in PyTorch, eager.
+"""The peer of `cargo bench -p deepfusion-train -- light`: a training step of the preset `light` in PyTorch, eager.
 
 pip install torch torchvision
 python benches/peers/torch_light_step.py [--threads 2] [--size 320x96] [--batch 4]

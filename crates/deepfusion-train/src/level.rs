@@ -85,13 +85,12 @@ fn resizing(factor: f64, device: &Device) -> Tensor<3> {
 
 /// The image at every scale of the decoder, each the means of the last one's 2×2 blocks.
 pub(crate) fn pyramid(image: Tensor<4>) -> Vec<Tensor<4>> {
-    let half = |image: &Tensor<4>| {
+    let mut images = vec![image];
+    for scale in 1..SCALES {
         let options = AvgPoolOptions::new([2, 2]).with_stride([2, 2]);
-        Some(avg_pool2d(image.clone(), options))
-    };
-    std::iter::successors(Some(image), half)
-        .take(SCALES)
-        .collect()
+        images.push(avg_pool2d(images[scale - 1].clone(), options));
+    }
+    images
 }
 
 #[cfg(test)]
