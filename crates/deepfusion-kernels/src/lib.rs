@@ -26,7 +26,7 @@ pub use adam::{AdamStep, adam, sum_of_squares};
 pub use batch_norm::{BatchNormSaved, batch_norm, batch_norm_backward, batch_norm_inference};
 pub use conv::{ConvShape, conv2d, conv2d_backward_input, conv2d_backward_weight};
 pub use photometric::{PhotometricShape, photometric_error, photometric_error_backward};
-pub use project::{ProjectGradients, in_view, project, project_backward};
+pub use project::{MIN_DEPTH_M, NOWHERE, ProjectGradients, in_view, project, project_backward};
 pub use smoothness::{SmoothnessShape, smoothness, smoothness_backward};
 pub use upsample::{upsample_concat, upsample_concat_backward};
 pub use warp::{WarpShape, warp, warp_backward_coords, warp_backward_image};

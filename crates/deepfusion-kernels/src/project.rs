@@ -11,9 +11,9 @@ use num_traits::Float;
 use rayon::prelude::*;
 
 /// Points nearer than this to the camera's plane, in metres, have no pixel.
-const MIN_DEPTH_M: f64 = 1e-3;
+pub const MIN_DEPTH_M: f64 = 1e-3;
 /// The coordinate of pixels that have none: outside of every image.
-const NOWHERE: f64 = -1e6;
+pub const NOWHERE: f64 = -1e6;
 /// Rows handled by one task.
 const ROWS: usize = 16;
 
@@ -273,6 +273,27 @@ mod tests {
         assert!(seen > 100 && behind > 5, "{seen} {behind}");
     }
 
+    /// `gradient` is that of `loss` at `point`, by central differences.
+    fn check_gradient(
+        what: &str,
+        point: &[f64],
+        gradient: &[f64],
+        step: f64,
+        loss: &dyn Fn(&[f64]) -> f64,
+    ) {
+        assert_eq!(point.len(), gradient.len(), "{what}");
+        for (i, ours) in gradient.iter().enumerate() {
+            let at = |step: f64| {
+                let mut moved = point.to_vec();
+                moved[i] += step;
+                loss(&moved)
+            };
+            let numeric = (at(step) - at(-step)) / (2.0 * step);
+            let close = (numeric - ours).abs() < 1e-5 * (1.0 + ours.abs());
+            assert!(close, "{what}[{i}]: {ours} instead of {numeric}");
+        }
+    }
+
     /// Central differences in f64; points whose w is small are left out, where the function is steep.
     #[test]
     fn gradients_equal_finite_differences() {
@@ -287,42 +308,13 @@ mod tests {
         };
         let mut grad_depth = vec![f64::NAN; 2 * AREA];
         let grads = project_backward(SIZE, &depths, &h, &s, &weights, &mut grad_depth);
-        let check = |numeric: f64, ours: f64, what: &str| {
-            let close = (numeric - ours).abs() < 1e-5 * (1.0 + ours.abs());
-            assert!(close, "{what}: {ours} instead of {numeric}");
-        };
-        for i in 0..2 * AREA {
-            let at = |step: f64| {
-                let mut moved = depths.clone();
-                moved[i] += step;
-                loss(&moved, &h, &s)
-            };
-            check(
-                (at(1e-6) - at(-1e-6)) / 2e-6,
-                grad_depth[i],
-                "inverse depth",
-            );
-        }
-        for i in 0..18 {
-            let at = |step: f64| {
-                let mut moved = h.clone();
-                moved[i] += step;
-                loss(&depths, &moved, &s)
-            };
-            check(
-                (at(1e-7) - at(-1e-7)) / 2e-7,
-                grads.homography[i],
-                "homography",
-            );
-        }
-        for i in 0..6 {
-            let at = |step: f64| {
-                let mut moved = s.clone();
-                moved[i] += step;
-                loss(&depths, &h, &moved)
-            };
-            check((at(1e-6) - at(-1e-6)) / 2e-6, grads.shift[i], "shift");
-        }
+        check_gradient("inverse depth", &depths, &grad_depth, 1e-6, &|d| {
+            loss(d, &h, &s)
+        });
+        check_gradient("homography", &h, &grads.homography, 1e-7, &|h| {
+            loss(&depths, h, &s)
+        });
+        check_gradient("shift", &s, &grads.shift, 1e-6, &|s| loss(&depths, &h, s));
     }
 
     #[test]

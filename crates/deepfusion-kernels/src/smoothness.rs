@@ -218,8 +218,8 @@ mod tests {
         assert!((ours - exact).abs() < 1e-5 * exact, "{ours} {exact}");
     }
 
-    /// Central differences in f32 with step 1e-3, away from the kinks: good to about 1e-3 of a
-    /// gradient of order 0.1.
+    /// Central differences with step 1e-3, away from the kinks. The factor 30 makes gradients of up to 4 and a
+    /// loss of 24, of which f32 knows 1e-6: over twice the step that is 1e-3, and 2.4e-3 was measured.
     #[test]
     fn gradient_equals_finite_differences() {
         let (disparity, image) = inputs();
@@ -233,7 +233,7 @@ mod tests {
             };
             let numeric = (at(1e-3) - at(-1e-3)) / 2e-3;
             assert!(
-                (numeric - gradient[i]).abs() < 2e-2,
+                (numeric - gradient[i]).abs() < 5e-3,
                 "{i}: {numeric} {}",
                 gradient[i]
             );

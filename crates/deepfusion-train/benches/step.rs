@@ -1,38 +1,139 @@
-//! The training step and inference on random images: `cargo bench -p deepfusion-train`. The peer is
-//! `benches/peers/torch_step.py`.
+//! Training steps and inference on random images: `cargo bench -p deepfusion-train`. The peers are
+//! `benches/peers/torch_step.py` and, for the whole step, `benches/peers/torch_light_step.py`.
 
 use burn::tensor::{Device, Distribution, Tensor};
-use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
-use deepfusion_nn::{DepthNetConfig, ResNetDepth};
+use criterion::{BatchSize, Criterion, criterion_group};
+use deepfusion_nn::{DepthNet, DepthNetConfig, ResNetDepth};
+use deepfusion_train::{Adam, Model, Motion, NamedGradients, Preset, SnippetBatch};
 
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+/// Of Adam's steps.
+const LEARNING_RATE: f64 = 1e-4;
+/// Longer gradients are shortened to this.
+const CLIP_NORM: f64 = 10.0;
 
 fn images(batch: usize, height: usize, width: usize, device: &Device) -> Tensor<4> {
     let shape = [batch, 3, height, width];
     Tensor::random(shape, Distribution::Uniform(0.0, 1.0), device)
 }
 
+fn depth_net(depth: ResNetDepth, device: &Device) -> DepthNet {
+    let net = DepthNetConfig::new(depth).init(device);
+    net.expect("the preset is valid")
+}
+
+/// The sum of the four disparities' means.
+fn loss_of(net: &DepthNet, x: Tensor<4>) -> Tensor<1> {
+    let means = net.forward(x).into_iter().map(Tensor::mean);
+    means.reduce(|a, b| a + b).expect("four scales")
+}
+
 /// Forward and backward of the ResNet-18 depth network at 320×96, batch 4 (no optimiser).
-fn depth_net_step(criterion: &mut Criterion) {
+fn depth_net_gradients(criterion: &mut Criterion) {
     let device = Device::flex().autodiff();
-    let net = DepthNetConfig::new(ResNetDepth::ResNet18)
-        .init(&device)
-        .expect("the preset is valid");
+    let net = depth_net(ResNetDepth::ResNet18, &device);
     criterion.bench_function(
         "depth net forward + backward, ResNet-18, 320x96, batch 4",
         |b| {
             b.iter_batched(
                 || images(4, 96, 320, &device),
-                |x| {
-                    let outputs = net.forward(x).into_iter().map(Tensor::mean);
-                    let loss = outputs.reduce(|a, b| a + b).expect("four scales");
-                    loss.backward()
-                },
+                |x| loss_of(&net, x).backward(),
                 BatchSize::LargeInput,
             );
         },
     );
+}
+
+/// The same with clipped Adam, and that of the ResNet-50 at 640×192, batch 2.
+fn depth_net_step(criterion: &mut Criterion) {
+    let device = Device::flex().autodiff();
+    for (name, depth, (batch, height, width)) in [
+        (
+            "depth net forward + backward + Adam, ResNet-18, 320x96, batch 4",
+            ResNetDepth::ResNet18,
+            (4, 96, 320),
+        ),
+        (
+            "depth net forward + backward + Adam, ResNet-50, 640x192, batch 2",
+            ResNetDepth::ResNet50,
+            (2, 192, 640),
+        ),
+    ] {
+        let mut net = depth_net(depth, &device);
+        let mut adam = Adam::default();
+        let x = images(batch, height, width, &device);
+        criterion.bench_function(name, |b| {
+            b.iter(|| {
+                let mut raw = loss_of(&net, x.clone()).backward();
+                let mut gradients = NamedGradients::default();
+                gradients.add("depth", &net, &mut raw, 1.0);
+                let (_, step) = adam.begin(&gradients, LEARNING_RATE, CLIP_NORM);
+                let step = step.expect("the gradient is finite");
+                net = adam.apply(&step, "depth", net.clone(), &gradients);
+            });
+        });
+    }
+}
+
+/// A batch of random images whose cameras drive 0.8 m ahead, with KITTI's focal length.
+fn snippets(batch: usize, height: usize, width: usize, device: &Device) -> SnippetBatch {
+    let (w, h) = (width as f32, height as f32);
+    let (fx, fy, cx, cy) = (0.58 * w, 1.92 * h, 0.5 * w, 0.5 * h);
+    let k = [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]];
+    let inverse = [[1.0 / fx, 0.0, -cx / fx], [0.0, 1.0 / fy, -cy / fy], k[2]];
+    let matrices = |m: [[f32; 3]; 3]| {
+        let one = Tensor::<3>::from_data([m], device);
+        one.expand([batch, 3, 3])
+    };
+    let ahead = Tensor::<2>::from_data([[0.0, 0.0, -0.8]], device);
+    let frames = [0, 1].map(|_| images(batch, height, width, device));
+    SnippetBatch {
+        clean: frames.to_vec(),
+        network: frames.to_vec(),
+        intrinsics: matrices(k),
+        inverse_intrinsics: matrices(inverse),
+        distance_m: vec![Tensor::full([batch], 0.8, device)],
+        measured: vec![Motion::new(
+            Tensor::zeros([batch, 3], device),
+            ahead.expand([batch, 3]),
+        )],
+        offsets: vec![1],
+        names: vec![String::new(); batch],
+    }
+}
+
+/// A whole training step of the preset `light` at 320×96, batch 4: depth of both frames, motion, views, all
+/// losses, backward, clipped Adam; the batch is there already.
+fn light_step(criterion: &mut Criterion) {
+    let device = Device::flex().autodiff();
+    let mut config = Preset::Light.config();
+    config.pose_net.metres_per_unit = 0.8;
+    (config.size.width, config.size.height) = (320, 96);
+    let mut model = Model::new(&config, &device).expect("the preset is valid");
+    let mut adam = Adam::default();
+    let batch = snippets(4, 96, 320, &device);
+    criterion.bench_function("training step, preset light, 320x96, batch 4", |b| {
+        b.iter(|| {
+            let pass = model.forward(&batch);
+            let loss = model.loss(&pass, &batch, config.loss.speed);
+            let mut raw = loss.total.backward();
+            let mut gradients = NamedGradients::default();
+            gradients.add("depth", &model.depth_net, &mut raw, 1.0);
+            gradients.add("pose", &model.pose_net, &mut raw, 1.0);
+            let (_, step) = adam.begin(&gradients, LEARNING_RATE, CLIP_NORM);
+            let step = step.expect("the gradient is finite");
+            let Model {
+                depth_net,
+                pose_net,
+                ..
+            } = model.clone();
+            model.depth_net = adam.apply(&step, "depth", depth_net, &gradients);
+            model.pose_net = adam.apply(&step, "pose", pose_net, &gradients);
+            loss.terms.total
+        });
+    });
 }
 
 /// Inference of a ResNet's depth network at 640×192.
@@ -42,9 +143,7 @@ fn inference(criterion: &mut Criterion) {
         ("inference, ResNet-18, 640x192", ResNetDepth::ResNet18),
         ("inference, ResNet-50, 640x192", ResNetDepth::ResNet50),
     ] {
-        let net = DepthNetConfig::new(depth)
-            .init(&device)
-            .expect("the preset is valid");
+        let net = depth_net(depth, &device);
         let x = images(1, 192, 640, &device);
         criterion.bench_function(name, |b| {
             b.iter(|| net.forward(x.clone()).swap_remove(0).into_data());
@@ -55,13 +154,19 @@ fn inference(criterion: &mut Criterion) {
 // The macro makes a public function that cannot be documented.
 #[allow(missing_docs)]
 mod group {
-    use super::{Criterion, criterion_group, depth_net_step, inference};
+    use super::{
+        Criterion, criterion_group, depth_net_gradients, depth_net_step, inference, light_step,
+    };
 
     criterion_group! {
         name = step;
         config = Criterion::default().sample_size(10);
-        targets = depth_net_step, inference
+        targets = depth_net_gradients, depth_net_step, light_step, inference
     }
 }
-use group::step;
-criterion_main!(step);
+
+/// On one of rayon's threads, as the program runs.
+fn main() {
+    rayon::scope(|_| group::step());
+    Criterion::default().configure_from_args().final_summary();
+}

@@ -35,11 +35,11 @@ pub enum StepOutcome {
 
 /// A step's gradients by parameter name.
 #[derive(Debug, Default)]
-pub(crate) struct NamedGradients(BTreeMap<String, Vec<f32>>);
+pub struct NamedGradients(BTreeMap<String, Vec<f32>>);
 
 impl NamedGradients {
     /// Adds the gradients of the module's parameters, named with `prefix`, times `scale`.
-    pub(crate) fn add<M: Module>(
+    pub fn add<M: Module>(
         &mut self,
         prefix: &str,
         module: &M,
@@ -113,7 +113,8 @@ impl Adam {
 
     /// Prepares a step: the factor that clips the gradient to `clip_norm` (0: no limit), or that
     /// nothing should move.
-    pub(crate) fn begin(
+    #[must_use]
+    pub fn begin(
         &mut self,
         gradients: &NamedGradients,
         learning_rate: f64,
@@ -146,7 +147,8 @@ impl Adam {
     }
 
     /// Moves the parameters of one module, named with `prefix`.
-    pub(crate) fn apply<M: Module>(
+    #[must_use]
+    pub fn apply<M: Module>(
         &mut self,
         step: &AdamStep,
         prefix: &str,

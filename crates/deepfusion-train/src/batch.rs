@@ -124,25 +124,21 @@ impl BatchLoader {
             augment,
             cache: Mutex::default(),
         };
-        // Threads of its own: the trainer may wait for a batch on one of the shared pool's.
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.min(MAX_THREADS))
-            .build();
-        // The thread ends when the receiver is dropped: `send` fails then.
-        std::thread::spawn(move || {
+        let complaints = sender.clone();
+        let make = move |pool: rayon::ThreadPool| {
             for (number, samples) in batches {
-                let batch = match &pool {
-                    Ok(pool) => pool.install(|| maker.make(number, &samples)),
-                    // No more threads to be had: this one does it alone.
-                    Err(_) => maker.make(number, &samples),
-                };
+                let batch = pool.install(|| maker.make(number, &samples));
                 let failed = batch.is_err();
+                // The thread ends when the receiver is dropped: `send` fails then.
                 if sender.send(batch).is_err() || failed {
                     return;
                 }
             }
-        });
+        };
+        if let Err(error) = start_thread(make) {
+            // The channel is empty and holds more than one; its receiver is still here.
+            complaints.send(Err(error)).ok();
+        }
         Self {
             batches: receiver,
             size: (config.size.height, config.size.width),
@@ -152,7 +148,8 @@ impl BatchLoader {
     /// The next batch on `device`; `None` after the last.
     ///
     /// # Errors
-    /// [`Error::Data`] for an image that cannot be read or has another size than its camera.
+    /// [`Error::Data`] for an image that cannot be read or has another size than its camera;
+    /// [`Error::Threads`] where the loader could not start.
     pub fn next(&self, device: &Device) -> Option<Result<SnippetBatch, Error>> {
         let raw = match self.batches.recv().ok()? {
             Ok(raw) => raw,
@@ -185,6 +182,22 @@ impl BatchLoader {
             names: raw.names,
         }))
     }
+}
+
+/// Runs `make` on a thread with a pool of its own. The shared pool will not do: the trainer waits for a
+/// batch on one of its threads, which could be the only one.
+fn start_thread(make: impl FnOnce(rayon::ThreadPool) + Send + 'static) -> Result<(), Error> {
+    let failed = |reason: String| Error::Threads { reason };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.min(MAX_THREADS))
+        .build()
+        .map_err(|e| failed(e.to_string()))?;
+    std::thread::Builder::new()
+        .name("batches".into())
+        .spawn(move || make(pool))
+        .map_err(|e| failed(e.to_string()))?;
+    Ok(())
 }
 
 /// One sample's part of a batch.

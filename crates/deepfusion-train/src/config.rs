@@ -63,7 +63,8 @@ pub struct LossConfig {
     pub smoothness: f64,
     /// λ_v of the speed loss.
     pub speed: f64,
-    /// β_R: weight of the rotation inside the speed loss.
+    /// β_R: weight of the rotation inside the speed loss. Not read where the views are synthesised with
+    /// the vehicle's motion: PoseNet then learns the whole of it, at a weight of its own.
     pub rotation: f64,
     /// Steps over which λ_v rises from 0; at most a tenth of the run.
     pub speed_warmup_steps: usize,
@@ -289,6 +290,12 @@ impl TrainConfig {
                 return fail(field, "0 to 1", share.to_string());
             }
         }
+        // Without the speed term a run learns from images alone; and PoseNet would have no loss at all where
+        // the vehicle's motion synthesises the views.
+        if self.loss.speed == 0.0 && self.view_motion != ViewMotion::PoseNet {
+            let found = format!("{:?}", self.view_motion).to_lowercase();
+            return fail("view_motion", "posenet where loss.speed is 0", found);
+        }
         match (self.reprojection, self.frames.as_slice()) {
             (_, []) => fail("frames", "at least one offset", "[]".into()),
             (_, frames) if frames.contains(&0) => {
@@ -300,6 +307,31 @@ impl TrainConfig {
                 format!("{frames:?}"),
             ),
             _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Without the speed term the views follow PoseNet: `without` sees to it, and whoever says otherwise
+    /// afterwards is told.
+    #[test]
+    fn without_speed_the_views_follow_posenet() {
+        let mut config = Preset::Tiny.config();
+        assert_ne!(config.view_motion, ViewMotion::PoseNet);
+        config.without("speed").unwrap();
+        config.validate().unwrap();
+        for motion in [ViewMotion::Distance, ViewMotion::Vehicle] {
+            config.view_motion = motion;
+            let error = config.validate().unwrap_err();
+            let Error::Config { field, found, .. } = &error else {
+                panic!("{error}");
+            };
+            assert_eq!(*field, "view_motion");
+            assert_eq!(*found, format!("{motion:?}").to_lowercase());
+            assert!(error.to_string().contains("posenet where loss.speed is 0"));
         }
     }
 }

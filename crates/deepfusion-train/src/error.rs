@@ -79,6 +79,12 @@ pub enum Error {
         /// The drives and frame numbers of its batch.
         frames: String,
     },
+    /// The loader's threads could not be started.
+    #[error("no threads to load images with: {reason}")]
+    Threads {
+        /// What the system says.
+        reason: String,
+    },
     /// The recording.
     #[error(transparent)]
     Data(#[from] deepfusion_data::Error),
@@ -117,6 +123,10 @@ impl Error {
             Self::NotFinite { .. } | Self::GradientsNotFinite { .. } => Some(
                 "the last good checkpoint is kept; look at the frames named above, or lower the \
                  learning rate, and continue with --resume"
+                    .into(),
+            ),
+            Self::Threads { .. } => Some(
+                "the system allows this user too few threads or too little memory; see `ulimit -u`"
                     .into(),
             ),
             Self::Data(error) => error.hint(),

@@ -27,7 +27,7 @@ pub enum TrainEvent {
         losses: LossTerms,
         /// The step size.
         learning_rate: f64,
-        /// Images a second that went through the depth network, over the last steps.
+        /// Images a second, targets and sources, over the last steps.
         images_per_second: f64,
         /// Seconds until the end at the present pace.
         remaining_s: f64,

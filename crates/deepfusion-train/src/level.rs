@@ -1,4 +1,5 @@
 use crate::ForwardPass;
+use crate::config::CompareAt;
 use burn::tensor::module::avg_pool2d;
 use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Device, Tensor};
@@ -20,32 +21,58 @@ pub(crate) struct Level {
 }
 
 impl Level {
-    /// Scale s of a batch: its images at 1/2ˢ of their size.
-    pub(crate) fn at(pass: &ForwardPass, scale: usize, ssim_weight: f64) -> Self {
-        let image = |t: &Tensor<4>| half(t.clone().detach(), scale);
-        let targets = image(&pass.targets);
-        let sources: Vec<_> = pass.sources.iter().map(image).collect();
+    fn new(
+        targets: Tensor<4>,
+        sources: Vec<Tensor<4>>,
+        (intrinsics, inverse_intrinsics): (Tensor<3>, Tensor<3>),
+        ssim_weight: f64,
+    ) -> Self {
         let unwarped = sources.iter().map(|source| {
             ops::photometric_error(source.clone(), targets.clone(), ssim_weight).detach()
         });
-        let unwarped = unwarped.collect();
-        let device = pass.intrinsics.device();
-        // f' = s·f and c' = s·(c + ½) − ½ (SPEC 0), as matrices.
-        let factor = 1.0 / f64::from(1_u32 << scale);
-        let shrink = resizing(factor, &device);
-        let grow = resizing(1.0 / factor, &device);
-        let [count, _, _] = pass.intrinsics.dims();
         Self {
+            unwarped: unwarped.collect(),
             targets,
             sources,
-            intrinsics: shrink.expand([count, 3, 3]).matmul(pass.intrinsics.clone()),
-            inverse_intrinsics: pass
-                .inverse_intrinsics
-                .clone()
-                .matmul(grow.expand([count, 3, 3])),
-            unwarped,
+            intrinsics,
+            inverse_intrinsics,
         }
     }
+}
+
+/// The level of every scale of the decoder; `targets` are the batch's at these scales.
+pub(crate) fn levels(
+    pass: &ForwardPass,
+    targets: &[Tensor<4>],
+    compare_at: CompareAt,
+    ssim_weight: f64,
+) -> Vec<Level> {
+    if compare_at == CompareAt::Full {
+        let cameras = (pass.intrinsics.clone(), pass.inverse_intrinsics.clone());
+        let sources = pass.sources.clone();
+        let full = Level::new(targets[0].clone(), sources, cameras, ssim_weight);
+        return vec![full; SCALES];
+    }
+    let sources: Vec<_> = pass.sources.iter().cloned().map(pyramid).collect();
+    let scales = targets.iter().enumerate().map(|(scale, targets)| {
+        let sources = sources.iter().map(|source| source[scale].clone());
+        let cameras = cameras(pass, scale);
+        Level::new(targets.clone(), sources.collect(), cameras, ssim_weight)
+    });
+    scales.collect()
+}
+
+/// K and K⁻¹ of images at 1/2ˢ of their size: f' = s·f and c' = s·(c + ½) − ½ (SPEC 0), as matrices.
+fn cameras(pass: &ForwardPass, scale: usize) -> (Tensor<3>, Tensor<3>) {
+    let [count, _, _] = pass.intrinsics.dims();
+    let device = pass.intrinsics.device();
+    let factor = 1.0 / f64::from(1_u32 << scale);
+    let shrink = resizing(factor, &device).expand([count, 3, 3]);
+    let grow = resizing(1.0 / factor, &device).expand([count, 3, 3]);
+    (
+        shrink.matmul(pass.intrinsics.clone()),
+        pass.inverse_intrinsics.clone().matmul(grow),
+    )
 }
 
 /// Takes pixels of an image to those of the image resized by `factor`, 1×3×3.
@@ -56,19 +83,12 @@ fn resizing(factor: f64, device: &Device) -> Tensor<3> {
     Tensor::from_data([matrix], device)
 }
 
-/// The image halved `times` times by the mean of 2×2 blocks.
-pub(crate) fn half(image: Tensor<4>, times: usize) -> Tensor<4> {
-    (0..times).fold(image, |image, _| {
-        let options = AvgPoolOptions::new([2, 2]).with_stride([2, 2]);
-        avg_pool2d(image, options)
-    })
-}
-
-/// The image at every scale of the decoder.
+/// The image at every scale of the decoder, each the means of the last one's 2×2 blocks.
 pub(crate) fn pyramid(image: Tensor<4>) -> Vec<Tensor<4>> {
     let mut images = vec![image];
     for scale in 1..SCALES {
-        images.push(half(images[scale - 1].clone(), 1));
+        let options = AvgPoolOptions::new([2, 2]).with_stride([2, 2]);
+        images.push(avg_pool2d(images[scale - 1].clone(), options));
     }
     images
 }

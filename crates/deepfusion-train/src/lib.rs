@@ -25,7 +25,7 @@ mod source;
 mod trainer;
 mod view_synthesis;
 
-pub use adam::{Adam, StepOutcome};
+pub use adam::{Adam, NamedGradients, StepOutcome};
 pub use augment::Jitter;
 pub use batch::{BatchLoader, SnippetBatch};
 pub use checkpoint::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder};
@@ -36,7 +36,7 @@ pub use config::{
 pub use error::Error;
 pub use event::{Control, TrainEvent};
 pub use losses::LossTerms;
-pub use model::{ForwardPass, Model};
+pub use model::{BatchLoss, ForwardPass, Model};
 pub use panel::SamplePanel;
 pub use pose::{Motion, rotation_from_axis_angle};
 pub use predictor::{Prediction, Predictor};

@@ -1,5 +1,5 @@
 use crate::config::{CompareAt, Reprojection, ReversedPose, ViewMotion};
-use crate::level::{Level, pyramid};
+use crate::level::{levels, pyramid};
 use crate::losses::{self, LossTerms, ReprojectionOutput, View};
 use crate::{BilinearResize, Error, Motion, SnippetBatch, TrainConfig, synthesise};
 use burn::module::Module;
@@ -39,11 +39,16 @@ pub struct ForwardPass {
 }
 
 /// The loss of a batch: the sum to differentiate, its terms, and what the finest scale saw.
-pub(crate) struct BatchLoss {
-    pub(crate) total: Tensor<1>,
-    pub(crate) terms: LossTerms,
-    pub(crate) finest: ReprojectionOutput,
-    pub(crate) warped: Tensor<4>,
+#[derive(Debug, Clone)]
+pub struct BatchLoss {
+    /// What is minimised, one value.
+    pub total: Tensor<1>,
+    /// Its terms.
+    pub terms: LossTerms,
+    /// The reprojection at the finest scale.
+    pub finest: ReprojectionOutput,
+    /// The first view's source seen from the targets' place at that scale, T×3×H×W.
+    pub warped: Tensor<4>,
 }
 
 /// Share of the predicted displacement that the loss saw: for the scale ratio.
@@ -204,27 +209,20 @@ impl Model {
     }
 
     /// The loss of a forward pass, with λ_v as given: L = Σ_s ¼(L_rp + λ_s·L_smooth) + λ_v·L_speed.
-    pub(crate) fn loss(
-        &self,
-        pass: &ForwardPass,
-        batch: &SnippetBatch,
-        speed_weight: f64,
-    ) -> BatchLoss {
+    #[must_use]
+    pub fn loss(&self, pass: &ForwardPass, batch: &SnippetBatch, speed_weight: f64) -> BatchLoss {
         let settings = &self.config.loss;
         let range = self.range();
         let (low, high) = (1.0 / range.max_m, 1.0 / range.min_m);
-        let full = Level::at(pass, 0, settings.ssim_weight);
         let motions = self.view_motions(pass, batch);
-        let pyramid = pyramid(pass.targets.clone());
+        let targets = pyramid(pass.targets.clone());
+        let levels = levels(pass, &targets, settings.compare_at, settings.ssim_weight);
         let (mut reprojection, mut smooth) = (Vec::new(), Vec::new());
         let mut finest = None;
-        for (scale, disparity) in pass.disparities.iter().enumerate() {
-            let (level, disparity_there) = match settings.compare_at {
-                CompareAt::Full => (full.clone(), self.enlarge[scale].apply(disparity.clone())),
-                CompareAt::Own => (
-                    Level::at(pass, scale, settings.ssim_weight),
-                    disparity.clone(),
-                ),
+        for (scale, (disparity, level)) in pass.disparities.iter().zip(&levels).enumerate() {
+            let disparity_there = match settings.compare_at {
+                CompareAt::Full => self.enlarge[scale].apply(disparity.clone()),
+                CompareAt::Own => disparity.clone(),
             };
             let inverse_depth = disparity_there.mul_scalar(high - low).add_scalar(low);
             let mut first_warp = None;
@@ -253,7 +251,7 @@ impl Model {
             );
             reprojection.push(output.loss.clone());
             if settings.smoothness > 0.0 {
-                let image = pyramid[scale].clone();
+                let image = targets[scale].clone();
                 let weight = 1.0 / f64::from(1_u32 << scale);
                 smooth.push(losses::smoothness(disparity.clone(), image).mul_scalar(weight));
             }

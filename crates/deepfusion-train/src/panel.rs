@@ -1,5 +1,4 @@
-use crate::ForwardPass;
-use crate::model::BatchLoss;
+use crate::{BatchLoss, ForwardPass};
 use burn::tensor::Tensor;
 
 /// What the networks make of one training image. All planes are row by row, of `width` × `height`.

@@ -1,9 +1,9 @@
-use crate::adam::NamedGradients;
 use crate::losses::speed_weight;
-use crate::model::{BatchLoss, displacement_ratio};
+use crate::model::displacement_ratio;
 use crate::{
-    Adam, BatchLoader, Checkpoint, CheckpointKind, Control, Error, ForwardPass, LossTerms, Model,
-    RunFolder, SamplePanel, SampleSet, Sampler, SnippetBatch, StepOutcome, TrainConfig, TrainEvent,
+    Adam, BatchLoader, BatchLoss, Checkpoint, CheckpointKind, Control, Error, ForwardPass,
+    LossTerms, Model, NamedGradients, RunFolder, SamplePanel, SampleSet, Sampler, SnippetBatch,
+    StepOutcome, TrainConfig, TrainEvent,
 };
 use burn::tensor::Device;
 use std::path::Path;
@@ -203,7 +203,7 @@ impl Trainer {
             let mut last: Option<(ForwardPass, BatchLoss)> = None;
             for _ in 0..accumulate {
                 let batch = next_batch(&loader, &self.device)?;
-                images += batch.len() * 2;
+                images += batch.len() * (1 + batch.offsets.len());
                 let pass = self.model.forward(&batch);
                 let loss = self.model.loss(&pass, &batch, weight);
                 losses = loss.terms;
@@ -367,7 +367,8 @@ fn next_batch(loader: &BatchLoader, device: &Device) -> Result<SnippetBatch, Err
     })
 }
 
-/// The mean loss over the held-out samples, with λ_v at its full weight, and the ratio of measured to predicted displacement.
+/// The mean loss over the held-out samples, with λ_v at its full weight, and the ratio of measured to
+/// predicted displacement.
 ///
 /// # Errors
 /// [`Error::Data`] for an image that cannot be read.

@@ -24,7 +24,7 @@ fn main() -> ExitCode {
 }
 
 /// Runs `work` on one of rayon's threads: its parallel operations then start at once, where the main
-/// thread would hand each of them over and sleep. A training step has some thousand of them.
+/// thread would hand each of them over and sleep. A training step has a great many of them.
 fn in_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     /// As large as the main thread's: the graph of a backward pass is deep.
     const STACK_BYTES: usize = 8 << 20;

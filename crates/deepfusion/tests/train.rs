@@ -159,6 +159,16 @@ fn what_cannot_be_trained_on_is_told() {
     fails(at, "train --data nowhere", &["nowhere"]);
     fs::create_dir(at.join("empty")).unwrap();
     fails(at, "train --data empty", &["empty"]);
+    // What the command line itself contradicts is not silently put right.
+    let contradiction = run(
+        at,
+        "train --data empty --without speed --view-motion vehicle",
+    );
+    assert_eq!(contradiction.code, 1, "{}", contradiction.stderr);
+    for part in ["`view_motion`", "posenet where loss.speed is 0", "vehicle"] {
+        let told = contradiction.stderr.contains(part);
+        assert!(told, "{part}: {}", contradiction.stderr);
+    }
 
     ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
     let drive = at.join("sim/2026_01_01/2026_01_01_drive_0003_sync");

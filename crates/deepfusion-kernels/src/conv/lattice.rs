@@ -75,7 +75,7 @@ pub(super) struct Lattice {
     window: Window,
     tile: Tile,
     /// Distance between the rows of a phase.
-    pub(super) pitch: usize,
+    pitch: usize,
     /// Distance between the images of a phase, in rows.
     image_rows: usize,
     phase_len: usize,

@@ -145,7 +145,7 @@ fn most_rows<S: Simd>() -> usize {
     if S::REGISTER_COUNT >= 32 { 8 } else { 4 }
 }
 
-/// Cuts `total` rows into blocks of `most`, 4, 2 and 1.
+/// Rows of the next block where `left` are left: blocks of `most`, then of 4, 2 and 1.
 fn rows_at_once(left: usize, most: usize) -> usize {
     match left {
         _ if left >= most => most,
@@ -155,7 +155,7 @@ fn rows_at_once(left: usize, most: usize) -> usize {
     }
 }
 
-/// Cuts vectors into blocks of 3, ending with 2 + 2 rather than 3 + 1.
+/// Vectors of the next block where `left` are left: blocks of 3, ending with 2 + 2 rather than 3 + 1.
 fn vectors_at_once(left: usize) -> usize {
     match left {
         4 => 2,
@@ -288,6 +288,74 @@ impl WithSimd for PixelProduct<'_> {
                 }
                 o += vectors * S::F32_LANES;
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::noise32 as noise;
+
+    /// Rows, columns, taps and pixels that make blocks of every size, and several rounds of sums.
+    const ROWS: usize = 15;
+    const COLUMNS: usize = 7 * LANES;
+    const TAPS: usize = TAPS_AT_ONCE + 11;
+    const PIXELS: usize = PIXELS_AT_ONCE + 9;
+
+    /// Both products by `run`, one after the other.
+    fn products(run: &dyn Fn(TapProduct, PixelProduct)) -> Vec<f32> {
+        let source = noise(2 * TAPS + COLUMNS + 3 * PIXELS, 1);
+        let weights = noise(ROWS * (TAPS + 3), 2);
+        let grad = noise(PIXELS * COLUMNS, 3);
+        let offsets: Vec<usize> = (0..TAPS).map(|k| (k * 7) % (2 * TAPS)).collect();
+        let pixels: Vec<usize> = (0..PIXELS).map(|i| 3 * i).collect();
+        let (mut out, mut sums) = (vec![7.0; ROWS * COLUMNS], noise(ROWS * COLUMNS, 4));
+        let by_taps = TapProduct {
+            weights: &weights,
+            weight_stride: TAPS + 3,
+            offsets: &offsets,
+            source: &source,
+            columns: COLUMNS,
+            out: &mut out,
+            rows: ROWS,
+        };
+        let by_pixels = PixelProduct {
+            offsets: &offsets[..ROWS],
+            source: &source,
+            pixels: &pixels,
+            grad: &grad,
+            columns: COLUMNS,
+            out: &mut sums,
+        };
+        run(by_taps, by_pixels);
+        out.extend(sums);
+        out
+    }
+
+    fn on<S: Simd>(simd: S) -> Vec<f32> {
+        products(&|by_taps, by_pixels| {
+            simd.vectorize(by_taps);
+            simd.vectorize(by_pixels);
+        })
+    }
+
+    /// The width of the vectors decides how many sums are made at once, not in which order: every
+    /// instruction set with fused multiply-add gives the same bits.
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let dispatched = products(&|by_taps, by_pixels| {
+            by_taps.run();
+            by_pixels.run();
+        });
+        assert!(dispatched.iter().all(|v| v.is_finite()));
+        assert!(on(pulp::Scalar::new()) == dispatched, "scalar");
+        #[cfg(target_arch = "x86_64")]
+        {
+            let v3 = pulp::x86::V3::try_new().map(on);
+            assert!(v3.is_none_or(|v3| v3 == dispatched), "AVX2");
+            let v4 = pulp::x86::V4::try_new().map(on);
+            assert!(v4.is_none_or(|v4| v4 == dispatched), "AVX-512");
         }
     }
 }

@@ -58,11 +58,27 @@ fn assert_close(ours: &[f32], exact: &[f64], what: &str) {
     }
 }
 
+/// Image, weights, bias and the output's gradient.
+fn inputs(s: &ConvShape) -> [Vec<f32>; 4] {
+    let lengths = [s.in_len(), s.weight_len(), s.out_channels, s.out_len()];
+    std::array::from_fn(|i| noise(lengths[i], i as u64 + 1))
+}
+
+/// The output, and the gradients of image, weights and bias.
+fn all_passes(s: &ConvShape) -> [Vec<f32>; 4] {
+    let [x, w, b, g] = inputs(s);
+    // Filled with rubbish: every value must be overwritten.
+    let (mut y, mut gx) = (vec![7.0; s.out_len()], vec![7.0; s.in_len()]);
+    let (mut gw, mut gb) = (vec![7.0; s.weight_len()], vec![7.0; s.out_channels]);
+    conv2d(s, &x, &w, Some(&b), &mut y);
+    conv2d_backward_input(s, &w, &g, &mut gx);
+    conv2d_backward_weight(s, &x, &g, &mut gw);
+    crate::channel_sums(&g, s.batch, s.out_area(), &mut gb);
+    [y, gx, gw, gb]
+}
+
 fn check(s: &ConvShape) {
-    let x = noise(s.in_len(), 1);
-    let w = noise(s.weight_len(), 2);
-    let b = noise(s.out_channels, 3);
-    let g = noise(s.out_len(), 4);
+    let [x, w, b, g] = inputs(s);
     let area = s.out_area();
 
     let mut y_exact: Vec<f64> = (0..s.out_len())
@@ -81,13 +97,7 @@ fn check(s: &ConvShape) {
         gb_exact[i / area % s.out_channels] += f64::from(*v);
     }
 
-    // Filled with rubbish: every value must be overwritten.
-    let (mut y, mut gx) = (vec![7.0; s.out_len()], vec![7.0; s.in_len()]);
-    let (mut gw, mut gb) = (vec![7.0; s.weight_len()], vec![7.0; s.out_channels]);
-    conv2d(s, &x, &w, Some(&b), &mut y);
-    conv2d_backward_input(s, &w, &g, &mut gx);
-    conv2d_backward_weight(s, &x, &g, &mut gw);
-    crate::channel_sums(&g, s.batch, area, &mut gb);
+    let [y, gx, gw, gb] = all_passes(s);
     assert_close(&y, &y_exact, "output");
     assert_close(&gx, &gx_exact, "input gradient");
     assert_close(&gw, &gw_exact, "weight gradient");
@@ -147,4 +157,49 @@ fn equals_the_definition_across_tiles() {
         reflect: false,
         ..shape
     });
+}
+
+/// Sums are cut by the shape alone, never by the number of threads: one thread and three give the same
+/// bits, whether tasks share tiles, channels or weights.
+#[test]
+fn threads_do_not_change_a_bit() {
+    let shape = ConvShape {
+        batch: 3,
+        in_channels: 24,
+        in_height: 33,
+        in_width: 70,
+        out_channels: 17,
+        kernel_height: 3,
+        kernel_width: 3,
+        stride: 1,
+        padding: 1,
+        dilation: 1,
+        reflect: false,
+    };
+    // Above the limit where the weight gradient is shared out by channels.
+    let many_weights = ConvShape {
+        in_channels: 96,
+        in_height: 6,
+        in_width: 9,
+        out_channels: 96,
+        ..shape
+    };
+    let cases = [
+        shape,
+        many_weights,
+        ConvShape {
+            reflect: true,
+            ..shape
+        },
+        ConvShape { stride: 2, ..shape },
+    ];
+    for shape in cases {
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().unwrap().install(|| all_passes(&shape))
+        };
+        let alone = on(1);
+        assert!(alone.iter().flatten().all(|v| v.is_finite()));
+        assert!(alone == on(3), "{shape:?}");
+    }
 }

@@ -56,28 +56,30 @@ pub fn conv2d_backward_weight(
     let all = 0..shape.in_channels;
     if shape.weight_len() > FEW_WEIGHTS && shape.in_channels >= TASKS {
         // Every group of channels needs the transposed gradient of all tiles: it is made once.
-        let mut grads = vec![0.0; shape.batch * shape.out_area() * padded(shape.out_channels)];
-        let mut rest = grads.as_mut_slice();
-        let mut parts = Vec::new();
-        for tile in &tiles {
-            let (part, after) = rest.split_at_mut(grad_len(shape, tile));
-            parts.push((tile, part));
-            rest = after;
-        }
-        parts
-            .par_iter_mut()
-            .for_each(|(tile, part)| transposed_grad(shape, tile, grad_out, part));
-        let parts: Vec<(Tile, &[f32])> = parts.into_iter().map(|(t, p)| (*t, &*p)).collect();
-        split(shape.in_channels, TASKS)
-            .into_par_iter()
-            .for_each(|channels| {
-                let mut sum = vec![0.0; sum_len(shape, &channels)];
-                let mut adder = Adder::default();
-                for (tile, grad) in &parts {
-                    adder.add(shape, *tile, channels.clone(), x, grad, &mut sum);
-                }
-                write(shape, channels, &sum, &to);
-            });
+        let len = shape.batch * shape.out_area() * padded(shape.out_channels);
+        with_scratch(len, |grads| {
+            let mut rest = grads;
+            let mut parts = Vec::new();
+            for tile in &tiles {
+                let (part, after) = rest.split_at_mut(grad_len(shape, tile));
+                parts.push((tile, part));
+                rest = after;
+            }
+            parts
+                .par_iter_mut()
+                .for_each(|(tile, part)| transposed_grad(shape, tile, grad_out, part));
+            let parts: Vec<(Tile, &[f32])> = parts.into_iter().map(|(t, p)| (*t, &*p)).collect();
+            split(shape.in_channels, TASKS)
+                .into_par_iter()
+                .for_each(|channels| {
+                    let mut sum = vec![0.0; sum_len(shape, &channels)];
+                    let mut adder = Adder::default();
+                    for (tile, grad) in &parts {
+                        adder.add(shape, *tile, channels.clone(), x, grad, &mut sum);
+                    }
+                    write(shape, channels, &sum, &to);
+                });
+        });
         return;
     }
     let mut parts: Vec<Vec<f32>> = split(tiles.len(), TASKS)

@@ -7,6 +7,7 @@ use burn::tensor::{
     module::avg_pool2d,
     ops::{AvgPoolOptions, ConvOptions as BurnConvOptions, PadMode},
 };
+use deepfusion_kernels::{MIN_DEPTH_M, NOWHERE};
 
 /// [`super::conv2d`].
 #[must_use]
@@ -158,10 +159,6 @@ pub fn photometric_error(a: Tensor<4>, b: Tensor<4>, alpha: f64) -> Tensor<4> {
 /// [`super::project`].
 #[must_use]
 pub fn project(inverse_depth: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>) -> Tensor<4> {
-    /// Points nearer than this to the camera's plane, in metres, have no pixel.
-    const MIN_DEPTH_M: f64 = 1e-3;
-    /// The coordinate of pixels that have none.
-    const NOWHERE: f64 = -1e6;
     let [n, _, height, width] = inverse_depth.dims();
     let device = inverse_depth.device().inner();
     let along = |size: usize| {

@@ -127,21 +127,28 @@ pub fn expected() -> Weights {
     weights::read(&reference("expected.safetensors")).unwrap()
 }
 
-/// The largest |actual − expected| over max(1, rms of the expected values), the actual values taken at
-/// every `step`-th place as in the reference.
-pub fn largest_error(expected: &Weights, name: &str, actual: &[f32], step: usize) -> f32 {
+/// The largest |actual − expected|, and the root mean square of the expected values; the actual values are
+/// taken at every `step`-th place as in the reference.
+pub fn largest_difference(
+    expected: &Weights,
+    name: &str,
+    actual: &[f32],
+    step: usize,
+) -> (f32, f32) {
     let values = &expected.tensors[name].values;
     assert_eq!(actual.len().div_ceil(step), values.len(), "{name}");
     let rms = (values.iter().map(|v| v * v).sum::<f32>() / values.len() as f32).sqrt();
-    actual
-        .iter()
-        .step_by(step)
-        .zip(values)
-        .map(|(a, e)| {
-            assert!(a.is_finite(), "{name}: {a} for {e}");
-            (a - e).abs() / rms.max(1.0)
-        })
-        .fold(0.0, f32::max)
+    let differences = actual.iter().step_by(step).zip(values).map(|(a, e)| {
+        assert!(a.is_finite(), "{name}: {a} for {e}");
+        (a - e).abs()
+    });
+    (differences.fold(0.0, f32::max), rms)
+}
+
+/// The largest |actual − expected| over max(1, rms of the expected values), as [`largest_difference`].
+pub fn largest_error(expected: &Weights, name: &str, actual: &[f32], step: usize) -> f32 {
+    let (difference, rms) = largest_difference(expected, name, actual, step);
+    difference / rms.max(1.0)
 }
 
 pub fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {

@@ -1,7 +1,8 @@
-//! The networks beside PyTorch's, and their weights in files. One binary: linking Burn takes far longer
+//! The networks and their operations beside PyTorch's, and weights in files. One binary: linking Burn takes far longer
 //! than running all of it.
 
 mod against_pytorch;
 mod common;
+mod operations;
 mod training_step;
 mod weight_files;

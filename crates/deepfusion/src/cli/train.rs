@@ -8,7 +8,7 @@ use super::Size;
 /// `deepfusion train`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Learns from images and the car's speed alone. Writes config.toml, log.csv, TensorBoard events, the \
+    after_help = "Learns from images and the car's speed alone (and its yaw rate, with --view-motion vehicle). Writes config.toml, log.csv, TensorBoard events, the \
     checkpoints last and best, and sample panels. A config file sets everything; options override it.\n\n\
     Examples:\n  deepfusion train --data kitti/2011_09_26/2011_09_26_drive_0005_sync --preset tiny\n  \
     deepfusion train --data kitti --preset light --epochs 20 --out runs/light\n  \

@@ -94,15 +94,16 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     }
     config.batch = args.batch.unwrap_or(config.batch);
     config.seed = args.seed.unwrap_or(config.seed);
+    for term in &args.without {
+        config.without(term)?;
+    }
+    // Said last: a motion that contradicts a term left out is an error, and not silently another one.
     if let Some(choice) = args.view_motion {
         config.view_motion = match choice {
             ViewMotionChoice::Posenet => ViewMotion::PoseNet,
             ViewMotionChoice::Distance => ViewMotion::Distance,
             ViewMotionChoice::Vehicle => ViewMotion::Vehicle,
         };
-    }
-    for term in &args.without {
-        config.without(term)?;
     }
     config.data.paths.clone_from(&args.data);
     config.data.validation.clone_from(&args.val_data);
