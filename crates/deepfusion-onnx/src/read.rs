@@ -49,11 +49,10 @@ fn part(part: &'static str, reason: impl Into<String>) -> Error {
 fn number(proto: &ModelProto, key: &'static str) -> Result<f64, Error> {
     let entry = proto.metadata_props.iter().find(|entry| entry.key == key);
     let text = entry.ok_or_else(|| part("metadata", format!("`{key}` is missing")))?;
-    let value = text.value.parse().map_err(|_| {
+    text.value.parse().map_err(|_| {
         let reason = format!("`{key}` is `{}`, expected a number", text.value);
         part("metadata", reason)
-    });
-    value
+    })
 }
 
 fn focal_length(proto: &ModelProto) -> Result<Option<FocalLength>, Error> {
@@ -260,7 +259,7 @@ impl<'a> Reader<'a> {
     fn after(&mut self, before: &NodeProto, ops: &[&str]) -> Option<&'a NodeProto> {
         self.nodes.next_if(|node| {
             ops.contains(&node.op_type.as_str())
-                && node.input.first().is_some()
+                && !node.input.is_empty()
                 && node.input.first() == before.output.first()
         })
     }

@@ -168,7 +168,7 @@ impl Writer {
 
     /// A constant that many nodes share.
     fn shared(&mut self, tensor: TensorProto) -> Result<String, Error> {
-        if self.initializers.iter().any(|i| *i == tensor) {
+        if self.initializers.contains(&tensor) {
             return Ok(tensor.name);
         }
         let name = tensor.name.clone();

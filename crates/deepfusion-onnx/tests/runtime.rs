@@ -114,6 +114,13 @@ fn the_far_end_of_the_range_is_exact() {
     }
 }
 
+/// Images are prepared on one thread and run on another.
+#[test]
+fn engines_move_between_threads() {
+    fn is_send<T: Send>() {}
+    is_send::<OrtEngine>();
+}
+
 #[test]
 fn wrong_sizes_and_models_are_told() {
     if !library_is_here() {

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_nn::{DepthNet, InputSize, depth_graph, weights};
-use deepfusion_onnx::check::{Deviation, PICTURES, deviation, pictures};
+use deepfusion_onnx::check::{PICTURES, deviation, pictures};
 use deepfusion_onnx::runtime::{OrtEngine, find};
 use deepfusion_onnx::{DepthMaps, DepthModel, FocalLength, OPSET, read, reference, write};
 use deepfusion_train::Predictor;
@@ -114,30 +114,13 @@ fn check(
         .iter()
         .map(|picture| burn_maps(model, net, picture, device))
         .collect();
-    let mut checks = Vec::new();
-    let mut compare = |engine: String, found: &[DepthMaps]| -> Result<()> {
-        let Deviation { depth, disparity } = deviation(found, &expected);
-        if !deviation(found, &expected).is_small() {
-            return Err(CliError::Deviates {
-                path: args.out.clone(),
-                engine,
-                deviation: depth.max(disparity),
-            }
-            .into());
-        }
-        checks.push(Check {
-            engine,
-            depth_deviation: depth,
-            disparity_deviation: disparity,
-        });
-        Ok(())
-    };
     let again = read(&bytes)?;
     let found: Result<Vec<_>, _> = pictures
         .iter()
         .map(|picture| reference::depth(&again, picture))
         .collect();
-    compare("this program (the file read back)".into(), &found?)?;
+    let name = "this program (the file read back)".to_owned();
+    let mut checks = vec![compare(&args.out, name, &found?, &expected)?];
     if let Some(mut engine) = runtime(args, &bytes)? {
         let found: Result<Vec<_>, _> = pictures.iter().map(|p| engine.maps(p)).collect();
         let library = engine.library();
@@ -146,9 +129,31 @@ fn check(
             library.version,
             library.path.display()
         );
-        compare(name, &found?)?;
+        checks.push(compare(&args.out, name, &found?, &expected)?);
     }
     Ok(checks)
+}
+
+/// What an engine made of the file, beside what the network sees.
+fn compare(
+    out: &Path,
+    engine: String,
+    found: &[DepthMaps],
+    expected: &[DepthMaps],
+) -> Result<Check, CliError> {
+    let apart = deviation(found, expected);
+    if !apart.is_small() {
+        return Err(CliError::Deviates {
+            path: out.to_owned(),
+            engine,
+            deviation: apart.worst(),
+        });
+    }
+    Ok(Check {
+        engine,
+        depth_deviation: apart.depth,
+        disparity_deviation: apart.disparity,
+    })
 }
 
 /// The file in ONNX Runtime; none where no library was named and none is found.
@@ -205,4 +210,35 @@ fn tell(args: &ExportArgs, model: &DepthModel, bytes: usize, checks: Vec<Check>)
         ));
     }
     output::print(&format!("{}\n", report.file))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_answer_is_an_error_that_names_the_deviation() {
+        let maps = |depth: f32| {
+            [DepthMaps {
+                depth: vec![10.0, depth],
+                disparity: vec![0.1, 1.0 / depth],
+            }]
+        };
+        let told = |depth| {
+            compare(
+                Path::new("depth.onnx"),
+                "an engine".into(),
+                &maps(depth),
+                &maps(5.0),
+            )
+        };
+        assert!(told(5.000_1).is_ok());
+        let error = told(6.0).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "depth.onnx: an engine is 1.7e-1 away from the network (max |difference| / max |value|), more than 1e-4; \
+             not kept"
+        );
+        assert!(told(f32::NAN).is_err());
+    }
 }
