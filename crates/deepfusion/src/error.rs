@@ -33,6 +33,20 @@ pub enum CliError {
         /// Why.
         why: String,
     },
+    /// An exported file that is not the network.
+    #[error(
+        "{}: {engine} is {deviation:.1e} away from the network (max |difference| / max |value|), more than {:.0e}; not kept",
+        path.display(),
+        deepfusion_onnx::check::TOLERANCE
+    )]
+    Deviates {
+        /// The file that would have been written.
+        path: std::path::PathBuf,
+        /// What ran it.
+        engine: String,
+        /// How far it is from the network.
+        deviation: f64,
+    },
     /// A cloud without a camera.
     #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
     NoCamera,
@@ -48,6 +62,9 @@ impl CliError {
             Self::NoImages { .. } => None,
             Self::Camera { .. } => {
                 Some("give fx,fy,cx,cy in pixels of the input image, at its own size".into())
+            }
+            Self::Deviates { .. } => {
+                Some("this is a fault of the program or of the library that ran the file; please report it".into())
             }
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
         }
@@ -89,6 +106,7 @@ fn hint_of(problem: &anyhow::Error) -> Option<String> {
             deepfusion_eval::Error,
             deepfusion_train::Error,
             deepfusion_nn::Error,
+            deepfusion_onnx::Error,
             deepfusion_render::Error,
             deepfusion_sim::Error,
         );

@@ -22,6 +22,7 @@ fn help_texts() {
         "train",
         "eval",
         "predict",
+        "export",
         "weights",
         "weights import",
         "weights list",

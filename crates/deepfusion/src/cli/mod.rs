@@ -2,6 +2,7 @@
 
 mod data;
 mod eval;
+mod export;
 mod predict;
 mod train;
 mod values;
@@ -12,6 +13,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use data::{DataCommand, ExportGtArgs, GtDepth, InspectArgs};
 pub use eval::{EvalArgs, PredKind};
+pub use export::ExportArgs;
 pub use predict::{BenchArgs, PredictArgs, Save, WeightsCommand};
 pub use train::{DeviceChoice, PresetChoice, TrainArgs, ViewMotionChoice};
 pub use values::{CameraIntrinsics, Size};
@@ -49,6 +51,8 @@ pub enum Command {
     Eval(Box<EvalArgs>),
     /// Metric depth of images.
     Predict(Box<PredictArgs>),
+    /// A trained network as an ONNX file, checked before it is kept.
+    Export(ExportArgs),
     /// Bring in weights of other programs.
     #[command(subcommand)]
     Weights(WeightsCommand),

@@ -5,6 +5,7 @@ mod demo;
 mod device;
 mod eval;
 mod evaluate;
+mod export;
 mod export_gt;
 mod inspect;
 mod overview;
@@ -31,6 +32,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Train(args) => train::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Predict(args) => predict::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Weights(WeightsCommand::Import { files, out }) => weights::import(&files, &out),
         Command::Weights(WeightsCommand::List { json }) => weights::list(json),
         Command::Bench(args) => bench::run(&args),

@@ -1,0 +1,97 @@
+use std::path::PathBuf;
+
+/// What can go wrong when a model is written, read or run.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Bytes that are no ONNX file.
+    #[error("not an ONNX file: {0}")]
+    Decode(#[from] prost::DecodeError),
+    /// An operation that cannot be written, or that is not one this program writes.
+    #[error("ONNX node `{name}` ({op}): {reason}")]
+    Node {
+        /// The node's name.
+        name: String,
+        /// Its operator.
+        op: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A part of the model other than a node.
+    #[error("ONNX model, {part}: {reason}")]
+    Model {
+        /// Which part.
+        part: &'static str,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A network that does not fit together, or an image size that it cannot work on.
+    #[error(transparent)]
+    Network(#[from] deepfusion_infer::Error),
+    /// A file too large for the format.
+    #[error("the model has {bytes} bytes; an ONNX file can hold {most}")]
+    TooLarge {
+        /// Size of the file that would be needed.
+        bytes: usize,
+        /// The most that fits.
+        most: usize,
+    },
+    /// No ONNX Runtime on this machine.
+    #[error("no ONNX Runtime library found: looked at {}", list(searched))]
+    NoLibrary {
+        /// Where it was looked for.
+        searched: Vec<PathBuf>,
+    },
+    /// A file that is no ONNX Runtime library, or not one that can be used.
+    #[error("{}: no ONNX Runtime that can be used: {reason}", path.display())]
+    Library {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// What ONNX Runtime itself refuses.
+    #[error("ONNX Runtime cannot {action}: {reason}")]
+    Runtime {
+        /// What was tried.
+        action: &'static str,
+        /// What it says.
+        reason: String,
+    },
+    /// An image or a buffer of another size than the model's.
+    #[error("{what} of {found} values, expected {expected}")]
+    Length {
+        /// Which one.
+        what: &'static str,
+        /// Values expected.
+        expected: usize,
+        /// Values given.
+        found: usize,
+    },
+}
+
+impl Error {
+    /// A one-line remedy, where there is one.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        let hint = match self {
+            Self::Decode(_) => "is it complete? A partial copy ends early",
+            Self::Node { .. } | Self::Model { .. } => {
+                "only files written by `deepfusion export` of this version are read"
+            }
+            Self::TooLarge { .. } => "choose a network with fewer weights",
+            Self::NoLibrary { .. } => {
+                "`pip install onnxruntime` is enough, or set ORT_DYLIB_PATH to libonnxruntime.so of 1.17 or later"
+            }
+            Self::Library { .. } => {
+                "give libonnxruntime.so (onnxruntime.dll, libonnxruntime.dylib) of ONNX Runtime 1.17 or later, built for this processor"
+            }
+            Self::Network(_) | Self::Runtime { .. } | Self::Length { .. } => return None,
+        };
+        Some(hint.to_owned())
+    }
+}
+
+fn list(paths: &[PathBuf]) -> String {
+    let names: Vec<_> = paths.iter().map(|p| p.display().to_string()).collect();
+    names.join(", ")
+}

@@ -1,0 +1,97 @@
+use deepfusion_geometry::DepthRange;
+use deepfusion_infer::{Border, Graph, Op, ValueId};
+
+use crate::Error;
+
+/// The focal lengths of a camera, in pixels of the images that a network was trained on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FocalLength {
+    /// Along x.
+    pub fx: f64,
+    /// Along y.
+    pub fy: f64,
+}
+
+/// A depth network for images of one size: from an RGB picture to metres.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthModel {
+    /// The network; its one output is the sigmoid disparity σ at the image's size.
+    pub graph: Graph,
+    /// What σ means: 1/depth = 1/D_max + (1/D_min − 1/D_max)·σ.
+    pub range: DepthRange,
+    /// Width of the images, in pixels.
+    pub width: usize,
+    /// Height of the images, in pixels.
+    pub height: usize,
+    /// The camera trained with. Depth of another camera's images is to be multiplied by
+    /// f_y(that camera at this model's size) / f_y(trained with).
+    pub trained_with: Option<FocalLength>,
+}
+
+/// What a [`DepthModel`] sees: two maps of H×W values, row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthMaps {
+    /// Camera z, in metres.
+    pub depth: Vec<f32>,
+    /// Metric disparity, 1 / depth, in 1/m.
+    pub disparity: Vec<f32>,
+}
+
+impl DepthModel {
+    /// That the model can work on its images, and that there is one map of depth in it.
+    ///
+    /// # Errors
+    /// [`Error::Network`] for a size the network cannot halve, [`Error::Node`] for a border that is wider
+    /// than the image it mirrors, [`Error::Model`] for a range that is none or other outputs.
+    pub fn validate(&self) -> Result<(), Error> {
+        self.graph.check_size(self.width, self.height)?;
+        let fail = |part: &'static str, reason: String| Err(Error::Model { part, reason });
+        let DepthRange { min_m, max_m } = self.range;
+        if !(min_m > 0.0 && max_m > min_m && max_m.is_finite()) {
+            let reason =
+                format!("{min_m} m to {max_m} m, expected 0 < nearest < farthest, both finite");
+            return fail("depth range", reason);
+        }
+        match self.graph.outputs() {
+            [output] => {
+                let shape = self.graph.shape(*output);
+                if (shape.channels, shape.halvings) != (1, 0) {
+                    let reason = format!(
+                        "{} channels at 1/{} of the image's size, expected one at its size",
+                        shape.channels,
+                        1_u64 << shape.halvings
+                    );
+                    return fail("outputs", reason);
+                }
+            }
+            others => return fail("outputs", format!("{}, expected one", others.len())),
+        }
+        for node in self.graph.nodes() {
+            if let Op::Conv(conv) = &node.op
+                && conv.border == Border::Reflect
+            {
+                let [width, height] = self.size_of(conv.input);
+                if conv.kernel / 2 >= width.min(height) {
+                    return Err(Error::Node {
+                        name: node.name.clone(),
+                        op: "Pad".into(),
+                        reason: format!("mirrors {} pixels of {width}x{height}", conv.kernel / 2),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Width and height of a value of the graph, in its own pixels.
+    pub(crate) fn size_of(&self, value: ValueId) -> [usize; 2] {
+        let halvings = self.graph.shape(value).halvings;
+        [self.width >> halvings, self.height >> halvings]
+    }
+
+    /// 1/D_max and 1/D_min − 1/D_max as the files hold them: disparity = first + second · σ.
+    pub(crate) fn disparity_terms(&self) -> [f32; 2] {
+        let far = self.range.disparity(0.0);
+        [far as f32, (self.range.disparity(1.0) - far) as f32]
+    }
+}

@@ -1,0 +1,298 @@
+//! ONNX → [`DepthModel`], for files that [`write`](crate::write()) wrote.
+
+use std::collections::HashMap;
+use std::iter::Peekable;
+use std::slice::Iter;
+
+use deepfusion_geometry::DepthRange;
+use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
+use prost::Message;
+
+use crate::proto::{GraphProto, ModelProto, NodeProto, TensorProto};
+use crate::write::encode;
+use crate::{DepthModel, Error, FocalLength};
+
+/// The model in an ONNX file that [`write`](crate::write()) wrote.
+///
+/// Nothing is guessed: what was understood is written again, and must be the network that was read.
+///
+/// # Errors
+/// [`Error::Decode`] for bytes that are no such file, [`Error::Node`] naming the first node and
+/// [`Error::Model`] naming the part that are not as this program writes them.
+pub fn read(bytes: &[u8]) -> Result<DepthModel, Error> {
+    let proto = ModelProto::decode(bytes)?;
+    let graph = proto
+        .graph
+        .as_ref()
+        .ok_or_else(|| part("graph", "missing"))?;
+    let model = DepthModel {
+        graph: Reader::new(graph).network()?,
+        range: DepthRange {
+            min_m: number(&proto, "depth_min_m")?,
+            max_m: number(&proto, "depth_max_m")?,
+        },
+        width: side(graph, 2)?,
+        height: side(graph, 1)?,
+        trained_with: focal_length(&proto)?,
+    };
+    compare(&proto, graph, &encode(&model)?)?;
+    Ok(model)
+}
+
+fn part(part: &'static str, reason: impl Into<String>) -> Error {
+    Error::Model {
+        part,
+        reason: reason.into(),
+    }
+}
+
+fn number(proto: &ModelProto, key: &'static str) -> Result<f64, Error> {
+    let entry = proto.metadata_props.iter().find(|entry| entry.key == key);
+    let text = entry.ok_or_else(|| part("metadata", format!("`{key}` is missing")))?;
+    text.value.parse().map_err(|_| {
+        let reason = format!("`{key}` is `{}`, expected a number", text.value);
+        part("metadata", reason)
+    })
+}
+
+fn focal_length(proto: &ModelProto) -> Result<Option<FocalLength>, Error> {
+    let keys = ["training_fx_px", "training_fy_px"];
+    if !proto
+        .metadata_props
+        .iter()
+        .any(|entry| keys.contains(&entry.key.as_str()))
+    {
+        return Ok(None);
+    }
+    let [fx, fy] = keys;
+    Ok(Some(FocalLength {
+        fx: number(proto, fx)?,
+        fy: number(proto, fy)?,
+    }))
+}
+
+/// A side of the input image.
+fn side(graph: &GraphProto, axis: usize) -> Result<usize, Error> {
+    let dims = graph.input.first().and_then(|input| input.dims());
+    let side = dims.as_ref().and_then(|dims| dims.get(axis));
+    side.and_then(|side| usize::try_from(*side).ok())
+        .ok_or_else(|| part("input", "no 1×H×W×3 picture of a fixed size"))
+}
+
+/// That the file is what would be written for what was read; versions of the program and words may differ.
+fn compare(found: &ModelProto, graph: &GraphProto, expected: &ModelProto) -> Result<(), Error> {
+    if found.ir_version != expected.ir_version || found.opset_import != expected.opset_import {
+        let reason = format!(
+            "file layout {} with operators {:?}, expected {} with {:?}",
+            found.ir_version, found.opset_import, expected.ir_version, expected.opset_import
+        );
+        return Err(part("version", reason));
+    }
+    let Some(wanted) = &expected.graph else {
+        return Err(part("graph", "missing"));
+    };
+    for (i, node) in graph.node.iter().enumerate() {
+        if wanted.node.get(i) != Some(node) {
+            return Err(node_error(node, "not as this program writes it"));
+        }
+    }
+    for (i, tensor) in graph.initializer.iter().enumerate() {
+        if wanted.initializer.get(i) != Some(tensor) {
+            let reason = format!("`{}` is not as this program writes it", tensor.name);
+            return Err(part("constants", reason));
+        }
+    }
+    let types = |values: &[crate::proto::ValueInfoProto]| -> Vec<_> {
+        let typed = values.iter().map(|v| (v.name.clone(), v.r#type.clone()));
+        typed.collect()
+    };
+    if types(&graph.input) != types(&wanted.input) {
+        return Err(part("input", "no 1×H×W×3 picture of bytes named `image`"));
+    }
+    if types(&graph.output) != types(&wanted.output) {
+        return Err(part("outputs", "not `depth` and `disparity` of 1×1×H×W"));
+    }
+    // The rest of what was expected, where the file ends earlier.
+    let counts = |g: &GraphProto| [g.node.len(), g.initializer.len()];
+    if counts(graph) != counts(wanted) {
+        let reason = format!("{:?}, expected {:?}", counts(graph), counts(wanted));
+        return Err(part("count of nodes and constants", reason));
+    }
+    Ok(())
+}
+
+fn node_error(node: &NodeProto, reason: impl Into<String>) -> Error {
+    Error::Node {
+        name: node.name.clone(),
+        op: node.op_type.clone(),
+        reason: reason.into(),
+    }
+}
+
+struct Reader<'a> {
+    nodes: Peekable<Iter<'a, NodeProto>>,
+    constants: HashMap<&'a str, &'a TensorProto>,
+    /// The value of the graph that an array is.
+    values: HashMap<&'a str, ValueId>,
+}
+
+impl<'a> Reader<'a> {
+    fn new(graph: &'a GraphProto) -> Self {
+        let named = |tensor: &'a TensorProto| (tensor.name.as_str(), tensor);
+        Self {
+            nodes: graph.node.iter().peekable(),
+            constants: graph.initializer.iter().map(named).collect(),
+            values: HashMap::new(),
+        }
+    }
+
+    fn network(mut self) -> Result<Graph, Error> {
+        for op in ["Transpose", "Cast", "Div"] {
+            self.expect(op)?;
+        }
+        let mean = self.expect("Sub")?;
+        let mean = self.colours(mean)?;
+        let std_node = self.expect("Div")?;
+        let std = self.colours(std_node)?;
+        self.values
+            .insert(output(std_node)?.as_str(), ValueId::IMAGE);
+        let mut graph = Graph::new(mean, std);
+        loop {
+            let node = self.next()?;
+            let (name, op, last) = match node.op_type.as_str() {
+                "Mul" => {
+                    graph.add_output(self.input(node, 0)?);
+                    return Ok(graph);
+                }
+                "Conv" | "Pad" => self.conv(node)?,
+                "MaxPool" => {
+                    let input = self.input(node, 0)?;
+                    (&node.name, Op::MaxPool { input }, node)
+                }
+                "Resize" => self.upsample(node)?,
+                _ => return Err(node_error(node, "not an operation that is expected here")),
+            };
+            let value = graph.push(name, op)?;
+            self.values.insert(output(last)?.as_str(), value);
+        }
+    }
+
+    /// `[Pad →] Conv [→ Add] [→ activation]`: name, operation, last node.
+    fn conv(&mut self, first: &'a NodeProto) -> Result<(&'a String, Op, &'a NodeProto), Error> {
+        let input = self.input(first, 0)?;
+        let (border, node) = if first.op_type == "Pad" {
+            let node = self.after(first, &["Conv"]);
+            let node = node.ok_or_else(|| node_error(first, "no Conv after it"))?;
+            (Border::Reflect, node)
+        } else {
+            (Border::Zero, first)
+        };
+        let weight = self.constant(node, 1)?;
+        let [channels_out, channels_in, kernel, _] = weight.dims[..] else {
+            return Err(node_error(node, "weights that have not four dimensions"));
+        };
+        let size = |n: i64| usize::try_from(n).unwrap_or(0);
+        let strides = node.attribute.iter().find(|a| a.name == "strides");
+        let stride = strides.and_then(|a| a.ints.first().copied()).unwrap_or(1);
+        let mut last = node;
+        let residual = match self.after(last, &["Add"]) {
+            Some(add) => {
+                last = add;
+                Some(self.input(add, 1)?)
+            }
+            None => None,
+        };
+        let mut activation = Activation::Identity;
+        if let Some(node) = self.after(last, &["Relu", "Elu", "Neg"]) {
+            last = node;
+            activation = match node.op_type.as_str() {
+                "Relu" => Activation::Relu,
+                "Elu" => Activation::Elu,
+                _ => {
+                    for op in ["Exp", "Add", "Reciprocal"] {
+                        last = self.expect(op)?;
+                    }
+                    Activation::Sigmoid
+                }
+            };
+        }
+        let conv = Conv {
+            input,
+            weight: floats(node, weight)?,
+            bias: floats(node, self.constant(node, 2)?)?,
+            channels_in: size(channels_in),
+            channels_out: size(channels_out),
+            kernel: size(kernel),
+            stride: size(stride),
+            border,
+            residual,
+            activation,
+        };
+        Ok((&node.name, Op::Conv(Box::new(conv)), last))
+    }
+
+    /// `Resize [→ Concat]`: name, operation, last node.
+    fn upsample(&mut self, node: &'a NodeProto) -> Result<(&'a String, Op, &'a NodeProto), Error> {
+        let input = self.input(node, 0)?;
+        let (skip, last) = match self.after(node, &["Concat"]) {
+            Some(concat) => (Some(self.input(concat, 1)?), concat),
+            None => (None, node),
+        };
+        Ok((&last.name, Op::UpsampleConcat { input, skip }, last))
+    }
+
+    fn next(&mut self) -> Result<&'a NodeProto, Error> {
+        self.nodes
+            .next()
+            .ok_or_else(|| part("nodes", "they end before the depth"))
+    }
+
+    fn expect(&mut self, op: &str) -> Result<&'a NodeProto, Error> {
+        let node = self.next()?;
+        if node.op_type == op {
+            return Ok(node);
+        }
+        Err(node_error(node, format!("expected {op} here")))
+    }
+
+    /// The next node, where it is one of `ops` and goes on with what `before` gives.
+    fn after(&mut self, before: &NodeProto, ops: &[&str]) -> Option<&'a NodeProto> {
+        self.nodes.next_if(|node| {
+            ops.contains(&node.op_type.as_str())
+                && !node.input.is_empty()
+                && node.input.first() == before.output.first()
+        })
+    }
+
+    fn input(&self, node: &NodeProto, index: usize) -> Result<ValueId, Error> {
+        let name = node.input.get(index).map_or("", String::as_str);
+        let value = self.values.get(name).copied();
+        value.ok_or_else(|| node_error(node, format!("its input `{name}` is unknown")))
+    }
+
+    fn constant(&self, node: &NodeProto, index: usize) -> Result<&'a TensorProto, Error> {
+        let name = node.input.get(index).map_or("", String::as_str);
+        let tensor = self.constants.get(name).copied();
+        tensor.ok_or_else(|| node_error(node, format!("its constant `{name}` is missing")))
+    }
+
+    /// A number for red, green and blue.
+    fn colours(&self, node: &NodeProto) -> Result<[f32; 3], Error> {
+        let values = floats(node, self.constant(node, 1)?)?;
+        values
+            .try_into()
+            .map_err(|_| node_error(node, "expected three numbers"))
+    }
+}
+
+fn floats(node: &NodeProto, tensor: &TensorProto) -> Result<Vec<f32>, Error> {
+    tensor.as_floats().ok_or_else(|| {
+        let reason = format!("`{}` does not hold the f32 values it says", tensor.name);
+        node_error(node, reason)
+    })
+}
+
+fn output(node: &NodeProto) -> Result<&String, Error> {
+    let first = node.output.first();
+    first.ok_or_else(|| node_error(node, "it gives nothing"))
+}

@@ -1,0 +1,176 @@
+//! Runs a graph the plain way, one operation after another: what faster engines are compared with.
+
+use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
+use deepfusion_kernels::{ConvShape, conv2d};
+
+use crate::{DepthMaps, DepthModel, Error};
+
+/// Depth and disparity of a picture.
+///
+/// # Shapes
+/// - `rgb`: H×W×3 bytes of the model's size
+/// - output: H×W, row by row
+///
+/// # Errors
+/// [`Error::Length`] for a picture of another size, and as [`DepthModel::validate`].
+pub fn depth(model: &DepthModel, rgb: &[u8]) -> Result<DepthMaps, Error> {
+    model.validate()?;
+    let sigmoid = run(&model.graph, rgb, model.width, model.height)?.swap_remove(0);
+    let [far, span] = model.disparity_terms();
+    let disparity: Vec<f32> = sigmoid.iter().map(|s| s * span + far).collect();
+    Ok(DepthMaps {
+        depth: disparity.iter().map(|d| d.recip()).collect(),
+        disparity,
+    })
+}
+
+/// The outputs of a graph for a picture.
+///
+/// # Shapes
+/// - `rgb`: `height` × `width` × 3 bytes
+/// - each output: C×H×W, row by row
+///
+/// # Errors
+/// [`Error::Length`] for a picture of another size, [`Error::Network`] for a size that the graph cannot work
+/// on.
+pub fn run(graph: &Graph, rgb: &[u8], width: usize, height: usize) -> Result<Vec<Vec<f32>>, Error> {
+    graph.check_size(width, height)?;
+    if rgb.len() != 3 * width * height {
+        return Err(Error::Length {
+            what: "a picture",
+            expected: 3 * width * height,
+            found: rgb.len(),
+        });
+    }
+    let plan = Plan {
+        graph,
+        width,
+        height,
+    };
+    // The last node that reads a value; what nobody reads any more is dropped.
+    let mut last_use = vec![0; graph.nodes().len() + 1];
+    for (i, node) in graph.nodes().iter().enumerate() {
+        node.op.inputs().for_each(|value| last_use[value.0] = i);
+    }
+    for output in graph.outputs() {
+        last_use[output.0] = usize::MAX;
+    }
+    let mut values = vec![normalised(graph, rgb)];
+    for (i, node) in graph.nodes().iter().enumerate() {
+        values.push(plan.value(&node.op, &values));
+        for read in node.op.inputs().filter(|read| last_use[read.0] == i) {
+            values[read.0] = Vec::new();
+        }
+    }
+    let outputs = graph.outputs().iter();
+    Ok(outputs.map(|output| values[output.0].clone()).collect())
+}
+
+/// (x/255 − mean) / std, in planes.
+fn normalised(graph: &Graph, rgb: &[u8]) -> Vec<f32> {
+    let (pixels, _) = rgb.as_chunks::<3>();
+    let mut planes = Vec::with_capacity(rgb.len());
+    for channel in 0..3 {
+        let (mean, std) = (graph.mean()[channel], graph.std()[channel]);
+        let value = |pixel: &[u8; 3]| (f32::from(pixel[channel]) / 255.0 - mean) / std;
+        planes.extend(pixels.iter().map(value));
+    }
+    planes
+}
+
+struct Plan<'a> {
+    graph: &'a Graph,
+    width: usize,
+    height: usize,
+}
+
+impl Plan<'_> {
+    /// Channels, height and width of a value.
+    fn shape(&self, value: ValueId) -> [usize; 3] {
+        let shape = self.graph.shape(value);
+        let [h, w] = [self.height, self.width].map(|side| side >> shape.halvings);
+        [shape.channels, h, w]
+    }
+
+    fn value(&self, op: &Op, values: &[Vec<f32>]) -> Vec<f32> {
+        match op {
+            Op::Conv(conv) => self.conv(conv, values),
+            Op::MaxPool { input } => max_pool(&values[input.0], self.shape(*input)),
+            Op::UpsampleConcat { input, skip } => {
+                let mut large = doubled(&values[input.0], self.shape(*input)[2]);
+                if let Some(skip) = skip {
+                    large.extend_from_slice(&values[skip.0]);
+                }
+                large
+            }
+        }
+    }
+
+    fn conv(&self, conv: &Conv, values: &[Vec<f32>]) -> Vec<f32> {
+        let [_, in_height, in_width] = self.shape(conv.input);
+        let shape = ConvShape {
+            batch: 1,
+            in_channels: conv.channels_in,
+            in_height,
+            in_width,
+            out_channels: conv.channels_out,
+            kernel_height: conv.kernel,
+            kernel_width: conv.kernel,
+            stride: conv.stride,
+            padding: conv.kernel / 2,
+            dilation: 1,
+            reflect: conv.border == Border::Reflect,
+        };
+        let mut y = vec![0.0; shape.out_len()];
+        conv2d(
+            &shape,
+            &values[conv.input.0],
+            &conv.weight,
+            Some(&conv.bias),
+            &mut y,
+        );
+        if let Some(residual) = conv.residual {
+            y.iter_mut()
+                .zip(&values[residual.0])
+                .for_each(|(y, r)| *y += r);
+        }
+        let activate = |x: f32| match conv.activation {
+            Activation::Identity => x,
+            Activation::Relu => x.max(0.0),
+            Activation::Elu if x > 0.0 => x,
+            Activation::Elu => x.exp_m1(),
+            Activation::Sigmoid => (1.0 + (-x).exp()).recip(),
+        };
+        y.iter_mut().for_each(|y| *y = activate(*y));
+        y
+    }
+}
+
+/// The maximum over 3×3 pixels around every other pixel; pixels beyond the edge do not count.
+fn max_pool(x: &[f32], [_, height, width]: [usize; 3]) -> Vec<f32> {
+    let mut y = Vec::with_capacity(x.len() / 4);
+    for plane in x.chunks_exact(height * width) {
+        for row in 0..height / 2 {
+            let rows = (2 * row).saturating_sub(1)..(2 * row + 2).min(height);
+            for column in 0..width / 2 {
+                let columns = (2 * column).saturating_sub(1)..(2 * column + 2).min(width);
+                let values = rows
+                    .clone()
+                    .flat_map(|r| &plane[r * width..][columns.clone()]);
+                y.push(values.copied().fold(f32::NEG_INFINITY, f32::max));
+            }
+        }
+    }
+    y
+}
+
+/// Every pixel becomes 2×2.
+fn doubled(x: &[f32], width: usize) -> Vec<f32> {
+    let mut y = Vec::with_capacity(4 * x.len());
+    for row in x.chunks_exact(width) {
+        let start = y.len();
+        y.extend(row.iter().flat_map(|value| [*value; 2]));
+        y.extend_from_within(start..);
+    }
+    y
+}

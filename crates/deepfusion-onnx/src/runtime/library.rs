@@ -1,0 +1,114 @@
+//! Which ONNX Runtime library, and whether it can be used.
+
+use std::ffi::CStr;
+use std::path::{Path, PathBuf};
+
+use libloading::Symbol;
+use ort::sys::OrtApiBase;
+
+use super::places;
+use crate::Error;
+
+/// An ONNX Runtime library that can be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Library {
+    /// The file.
+    pub path: PathBuf,
+    /// Its version, such as `1.31.1`.
+    pub version: String,
+}
+
+/// The ONNX Runtime library: the file given, else the one that `ORT_DYLIB_PATH` names, else the first that
+/// can be used next to the program, in the system's folders, or in a Python installation on `PATH`
+/// (`pip install onnxruntime`). No Python is started.
+///
+/// # Errors
+/// [`Error::Library`] for a file that was named and cannot be used, or where none of those found can be;
+/// [`Error::NoLibrary`] where there is none.
+pub fn find(asked: Option<&Path>) -> Result<Library, Error> {
+    let named = asked.map(Path::to_owned).or_else(|| {
+        let variable = std::env::var_os("ORT_DYLIB_PATH")?;
+        (!variable.is_empty()).then(|| variable.into())
+    });
+    if let Some(path) = named {
+        return open(&path);
+    }
+    let searched = places::folders();
+    let mut first_failure = None;
+    for file in searched
+        .iter()
+        .flat_map(|folder| places::libraries_in(folder))
+    {
+        match open(&file) {
+            Ok(library) => return Ok(library),
+            Err(error) => first_failure = first_failure.or(Some(error)),
+        }
+    }
+    Err(first_failure.unwrap_or(Error::NoLibrary { searched }))
+}
+
+/// Opens a library and asks for its version.
+fn open(path: &Path) -> Result<Library, Error> {
+    let fail = |reason: String| Error::Library {
+        path: path.to_owned(),
+        reason,
+    };
+    // A name without a folder would be searched for by the system; a path never is.
+    let file = std::path::absolute(path).map_err(|e| fail(e.to_string()))?;
+    if !file.is_file() {
+        return Err(fail("there is no such file".into()));
+    }
+    // SAFETY: opening a library runs its initialisers; the file is one that the user named or that bears
+    // ONNX Runtime's name in a folder of installed programs.
+    let library = unsafe { libloading::Library::new(&file) };
+    let library = library.map_err(|e| fail(e.to_string()))?;
+    // SAFETY: the symbol is ONNX Runtime's one entry point, whose type has never changed.
+    let entry: Result<Symbol<unsafe extern "C" fn() -> *const OrtApiBase>, _> =
+        unsafe { library.get(b"OrtGetApiBase") };
+    let entry = entry.map_err(|_| fail("it has no entry point `OrtGetApiBase`".into()))?;
+    // SAFETY: it takes nothing and gives a pointer to a constant, or null.
+    let base = unsafe { entry().as_ref() };
+    let base = base.ok_or_else(|| fail("its entry point gives nothing".into()))?;
+    // SAFETY: as ONNX Runtime documents it, a text that lives as long as the library.
+    let version = unsafe { CStr::from_ptr((base.GetVersionString)()) };
+    let version = version.to_string_lossy().into_owned();
+    // SAFETY: any number may be asked for; null is the answer for one that it does not know.
+    let known = !unsafe { (base.GetApi)(ort::MINOR_VERSION) }.is_null();
+    if !known || !is_new_enough(&version) {
+        let oldest = ort::MINOR_VERSION;
+        return Err(fail(format!(
+            "it is version {version}, expected 1.{oldest} or later"
+        )));
+    }
+    // It stays open: it is wanted now, and threads of a library must not outlive its code.
+    std::mem::forget(library);
+    Ok(Library {
+        path: file,
+        version,
+    })
+}
+
+/// As the binding compares them, by the second number of `1.x.y`.
+fn is_new_enough(version: &str) -> bool {
+    let minor = version.split('.').nth(1).and_then(|n| n.parse().ok());
+    minor.is_some_and(|minor: u32| minor >= ort::MINOR_VERSION)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions() {
+        for (version, expected) in [
+            ("1.31.1", true),
+            ("1.17.0", true),
+            ("1.16.3", false),
+            ("1", false),
+            ("one.two", false),
+            ("", false),
+        ] {
+            assert_eq!(is_new_enough(version), expected, "{version}");
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! What is written is what is read, and nothing else is read.
+
+mod support;
+
+use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
+use deepfusion_onnx::check::{deviation, pictures, relative};
+use deepfusion_onnx::{DepthMaps, DepthModel, Error, read, reference, write};
+use proptest::prelude::*;
+use support::model;
+
+proptest! {
+    #[test]
+    fn a_model_survives_its_file(seed: u64) {
+        let model = model(seed);
+        let again = read(&write(&model).unwrap()).unwrap();
+        prop_assert_eq!(again, model);
+    }
+
+    #[test]
+    fn damaged_files_are_refused_or_mean_the_same(seed: u64, at: prop::sample::Index, bit in 0..8) {
+        let model = model(seed);
+        let mut bytes = write(&model).unwrap();
+        let at = at.index(bytes.len());
+        bytes[at] ^= 1_u8 << bit;
+        if let Ok(again) = read(&bytes) {
+            // A bit of a weight, of the range, of a word for people: still a model of the same layers.
+            prop_assert_eq!(again.graph.nodes().len(), model.graph.nodes().len());
+            prop_assert!(again.validate().is_ok());
+        }
+        prop_assert!(read(&bytes[..at]).is_err());
+    }
+}
+
+#[test]
+fn files_that_are_none_are_told() {
+    assert!(matches!(read(b"no onnx"), Err(Error::Decode(_))));
+    assert!(matches!(read(b""), Err(Error::Model { part: "graph", .. })));
+}
+
+/// A network of one convolution.
+fn single(change: impl FnOnce(&mut Conv)) -> DepthModel {
+    let mut graph = Graph::new([0.45; 3], [0.225; 3]);
+    let mut conv = Conv {
+        input: ValueId::IMAGE,
+        weight: (0..27).map(|i| i as f32 / 100.0).collect(),
+        bias: vec![-1.0],
+        channels_in: 3,
+        channels_out: 1,
+        kernel: 3,
+        stride: 1,
+        border: Border::Reflect,
+        residual: None,
+        activation: Activation::Sigmoid,
+    };
+    change(&mut conv);
+    let output = graph.push("only", Op::Conv(Box::new(conv))).unwrap();
+    graph.add_output(output);
+    DepthModel {
+        graph,
+        width: 6,
+        height: 4,
+        ..model(0)
+    }
+}
+
+/// Replaces a word of the file by one of the same length.
+fn with(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
+    assert_eq!(from.len(), to.len());
+    let at = bytes
+        .windows(from.len())
+        .position(|w| w == from.as_bytes())
+        .unwrap();
+    let mut changed = bytes.to_vec();
+    changed[at..at + to.len()].copy_from_slice(to.as_bytes());
+    changed
+}
+
+#[test]
+fn other_networks_are_refused_by_the_node() {
+    let bytes = write(&single(|_| ())).unwrap();
+    let node = |from: &str, to: &str| match read(&with(&bytes, from, to)) {
+        Err(Error::Node { name, op, .. }) => format!("{name} {op}"),
+        other => panic!("{from} → {to}: {other:?}"),
+    };
+    // Each of these is a valid file of another meaning.
+    assert_eq!(
+        node("only.exp\"\u{3}Exp", "only.exp\"\u{3}Log"),
+        "only.exp Log"
+    );
+    assert_eq!(node("reflect", "constan"), "only.pad Pad");
+    assert_eq!(node("perm", "prem"), "image.planes Transpose");
+    assert_eq!(node("Reciprocal", "Reciprocol"), "only.sigmoid Reciprocol");
+    assert_eq!(node("Conv", "Comv"), "only.pad Pad");
+    let range = read(&with(&bytes, "depth_min_m", "depth_mim_m"));
+    let Err(Error::Model { part, reason }) = range else {
+        panic!("{range:?}");
+    };
+    assert_eq!(
+        (part, reason.as_str()),
+        ("metadata", "`depth_min_m` is missing")
+    );
+}
+
+#[test]
+fn models_that_cannot_be_written_are_told() {
+    let part = |model: &DepthModel| match write(model) {
+        Err(Error::Model { part, .. }) => part.to_owned(),
+        Err(Error::Node { name, .. }) => name,
+        Err(Error::Network(error)) => error.to_string(),
+        other => panic!("{other:?}"),
+    };
+    let mut model = single(|_| ());
+    model.range.min_m = f64::NAN;
+    assert_eq!(part(&model), "depth range");
+    let model = single(|conv| (conv.stride, conv.border) = (2, Border::Zero));
+    assert_eq!(part(&model), "outputs", "half the image's size");
+    // Seven rows mirrored at the edge of an image of six.
+    let wide = |conv: &mut Conv| (conv.kernel, conv.weight) = (13, vec![0.0; 3 * 13 * 13]);
+    assert_eq!(part(&single(wide)), "only");
+    let mut model = single(|_| ());
+    model.width = 1;
+    assert!(part(&model).contains("1x4"));
+    // Two nodes of one name, and a name that the file needs itself.
+    for name in ["only", "depth", "image", ""] {
+        let mut model = single(|_| ());
+        let input = ValueId(1);
+        let op = Op::Conv(Box::new(Conv {
+            input,
+            weight: vec![1.0],
+            bias: vec![0.0],
+            channels_in: 1,
+            channels_out: 1,
+            kernel: 1,
+            stride: 1,
+            border: Border::Zero,
+            residual: None,
+            activation: Activation::Identity,
+        }));
+        model.graph.push(name, op).unwrap();
+        assert_eq!(part(&model), name);
+    }
+}
+
+#[test]
+fn the_reference_computes_what_the_formula_says() {
+    // Weights 1 on the centre of red alone: y = σ((red/255 − 0.45) / 0.225 − 1).
+    let centre = |conv: &mut Conv| {
+        conv.weight = vec![0.0; 27];
+        conv.weight[4] = 1.0;
+    };
+    let model = single(centre);
+    let rgb: Vec<u8> = (0..72).map(|i| (i * 3) as u8).collect();
+    let maps = reference::depth(&model, &rgb).unwrap();
+    for (i, pixel) in rgb.chunks(3).enumerate() {
+        let x = (f64::from(pixel[0]) / 255.0 - 0.45) / 0.225 - 1.0;
+        let depth = model.range.depth_m(1.0 / (1.0 + (-x).exp()));
+        assert!((f64::from(maps.depth[i]) / depth - 1.0).abs() < 1e-5, "{i}");
+        assert!(
+            (maps.depth[i] * maps.disparity[i] - 1.0).abs() < 1e-6,
+            "{i}"
+        );
+    }
+    // The first row and column mirror the second, not themselves.
+    let above = |conv: &mut Conv| {
+        conv.weight = vec![0.0; 27];
+        conv.weight[0] = 1.0;
+    };
+    let shifted = reference::depth(&single(above), &rgb).unwrap();
+    assert_eq!(shifted.depth[0], maps.depth[7]);
+    assert_eq!(shifted.depth[7], maps.depth[0]);
+    assert!(matches!(
+        reference::depth(&model, &rgb[1..]),
+        Err(Error::Length {
+            expected: 72,
+            found: 71,
+            ..
+        })
+    ));
+}
+
+#[test]
+fn pooling_and_enlarging() {
+    let mut graph = Graph::new([0.0; 3], [1.0; 3]);
+    let pooled = graph
+        .push(
+            "pool",
+            Op::MaxPool {
+                input: ValueId::IMAGE,
+            },
+        )
+        .unwrap();
+    let large = graph
+        .push(
+            "up",
+            Op::UpsampleConcat {
+                input: pooled,
+                skip: Some(ValueId::IMAGE),
+            },
+        )
+        .unwrap();
+    graph.add_output(pooled);
+    graph.add_output(large);
+    // One channel that matters: 0, 51, 102 … row by row; the others are constant.
+    let rgb: Vec<u8> = (0..16).flat_map(|i| [i * 17, 255, 0]).collect();
+    let outputs = reference::run(&graph, &rgb, 4, 4).unwrap();
+    let unit = |values: &[u8]| {
+        values
+            .iter()
+            .map(|v| f32::from(*v * 17) / 255.0)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(outputs[0][..4], unit(&[5, 7, 13, 15]));
+    assert_eq!(outputs[0][4..], [1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(outputs[1].len(), 6 * 16);
+    assert_eq!(outputs[1][..8], unit(&[5, 5, 7, 7, 5, 5, 7, 7]));
+    assert_eq!(outputs[1][48..52], unit(&[0, 1, 2, 3]));
+}
+
+#[test]
+fn deviations() {
+    assert_eq!(relative(&[1.0, 2.0], &[1.0, 4.0]), 0.5);
+    assert_eq!(relative(&[0.0], &[0.0]), 0.0);
+    assert_eq!(relative(&[1.0], &[0.0]), f64::INFINITY);
+    assert_eq!(relative(&[f32::NAN], &[0.0]), f64::INFINITY);
+    assert_eq!(relative(&[1.0], &[1.0, 1.0]), f64::INFINITY);
+    let maps = |depth| DepthMaps {
+        depth: vec![depth],
+        disparity: vec![1.0],
+    };
+    let d = deviation(&[maps(1.0), maps(9.0)], &[maps(1.0), maps(10.0)]);
+    assert!((d.worst() - 0.1).abs() < 1e-12 && d.disparity == 0.0 && !d.is_small());
+}
+
+#[test]
+fn the_pictures_differ_and_fill_the_size() {
+    let all = pictures(40, 24);
+    for (i, picture) in all.iter().enumerate() {
+        assert_eq!(picture.len(), 40 * 24 * 3);
+        assert!(all[..i].iter().all(|other| other != picture));
+    }
+}

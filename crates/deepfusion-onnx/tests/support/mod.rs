@@ -1,0 +1,119 @@
+//! Small random networks.
+#![allow(dead_code)] // Not every test uses all of it.
+
+use deepfusion_geometry::DepthRange;
+use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
+use deepfusion_onnx::{DepthModel, FocalLength};
+
+/// A sequence without a pattern, from a seed.
+pub struct Random(pub u64);
+
+impl Random {
+    /// 0 to `below` − 1.
+    pub fn below(&mut self, below: usize) -> usize {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 33) as usize) % below
+    }
+
+    /// −1 to 1.
+    pub fn signed(&mut self) -> f32 {
+        self.below(20_001) as f32 / 10_000.0 - 1.0
+    }
+
+    fn pick<T: Copy>(&mut self, of: &[T]) -> T {
+        of[self.below(of.len())]
+    }
+}
+
+/// A convolution with random weights, small enough that sums stay near 1.
+pub fn conv(random: &mut Random, graph: &Graph, input: ValueId, channels_out: usize) -> Conv {
+    let channels_in = graph.shape(input).channels;
+    let kernel = random.pick(&[1, 3, 3, 5]);
+    let taps = channels_in * kernel * kernel;
+    let scale = 2.0 / (taps as f32).sqrt();
+    Conv {
+        input,
+        weight: (0..channels_out * taps)
+            .map(|_| scale * random.signed())
+            .collect(),
+        bias: (0..channels_out).map(|_| random.signed()).collect(),
+        channels_in,
+        channels_out,
+        kernel,
+        stride: 1,
+        border: random.pick(&[Border::Zero, Border::Reflect]),
+        residual: None,
+        activation: random.pick(&[
+            Activation::Identity,
+            Activation::Relu,
+            Activation::Elu,
+            Activation::Sigmoid,
+        ]),
+    }
+}
+
+/// A network of every operation, in an order and with connections that the seed decides.
+pub fn model(seed: u64) -> DepthModel {
+    let mut random = Random(seed);
+    let r = &mut random;
+    let mean = [0; 3].map(|_| 0.5 + 0.2 * r.signed());
+    let std = [0; 3].map(|_| 0.3 + 0.1 * r.signed());
+    let mut graph = Graph::new(mean, std);
+    let mut values = vec![ValueId::IMAGE];
+    for i in 0..4 + r.below(8) {
+        let input = r.pick(&values);
+        let shape = graph.shape(input);
+        let channels_out = 1 + r.below(5);
+        let name = format!("stage.{i}");
+        let op = match r.below(4) {
+            0 if shape.halvings < 2 => Op::MaxPool { input },
+            1 if shape.halvings > 0 => {
+                let fitting = |v: &&ValueId| graph.shape(**v).halvings + 1 == shape.halvings;
+                let skips: Vec<_> = values.iter().filter(fitting).copied().collect();
+                let skip = (!skips.is_empty() && r.below(3) > 0).then(|| r.pick(&skips));
+                Op::UpsampleConcat { input, skip }
+            }
+            _ => {
+                let mut conv = conv(r, &graph, input, channels_out);
+                if shape.halvings < 2 && r.below(3) == 0 {
+                    conv.stride = 2;
+                }
+                let halvings = shape.halvings + u32::from(conv.stride == 2);
+                let fitting = |v: &&ValueId| {
+                    let other = graph.shape(**v);
+                    (other.channels, other.halvings) == (channels_out, halvings)
+                };
+                conv.residual = values.iter().rev().find(fitting).copied();
+                Op::Conv(Box::new(conv))
+            }
+        };
+        values.push(graph.push(name, op).unwrap());
+    }
+    let mut last = values[values.len() - 1];
+    for i in 0..graph.shape(last).halvings {
+        let op = Op::UpsampleConcat {
+            input: last,
+            skip: None,
+        };
+        last = graph.push(format!("up.{i}"), op).unwrap();
+    }
+    let mut head = conv(r, &graph, last, 1);
+    head.activation = Activation::Sigmoid;
+    let output = graph.push("head", Op::Conv(Box::new(head))).unwrap();
+    graph.add_output(output);
+    let (width, height) = (16 + 4 * r.below(4), 12 + 4 * r.below(3));
+    let max_m = 50.0 + r.below(1000) as f64 / 7.0;
+    DepthModel {
+        graph,
+        range: DepthRange { min_m: 0.1, max_m },
+        width,
+        height,
+        trained_with: (r.below(2) == 0).then(|| FocalLength {
+            fx: 100.0 / 3.0,
+            fy: r.below(1000) as f64 / 7.0,
+        }),
+    }
+}
