@@ -5,18 +5,18 @@ use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
 use crate::Error;
 use crate::depth_net::DepthNetConfig;
 use crate::layers::BatchNorm2d;
-use crate::weights::{WeightTensor, Weights};
+use crate::weights::Weights;
 
 /// The graph of a [`crate::DepthNet`] with these weights: from an RGB image to the sigmoid disparity at full
 /// size.
 ///
-/// The weights carry the network's own names (`encoder.layer1.0.conv1.weight`); others beside them are
-/// left alone.
+/// The weights carry the network's own names (`encoder.layer1.0.conv1.weight`) and become the graph's; others
+/// beside them are dropped.
 ///
 /// # Errors
 /// [`Error::Config`] for a network that cannot be built, [`Error::MissingTensor`] or
 /// [`Error::TensorShape`] where the weights are another network's.
-pub fn depth_graph(config: &DepthNetConfig, weights: &Weights) -> Result<Graph, Error> {
+pub fn depth_graph(config: &DepthNetConfig, weights: Weights) -> Result<Graph, Error> {
     config.validate()?;
     let normalisation = config.encoder.normalisation;
     let mut builder = Builder {
@@ -29,9 +29,10 @@ pub fn depth_graph(config: &DepthNetConfig, weights: &Weights) -> Result<Graph, 
     Ok(builder.graph)
 }
 
-struct Builder<'a> {
+struct Builder {
     graph: Graph,
-    weights: &'a Weights,
+    /// What was not taken yet.
+    weights: Weights,
 }
 
 /// What a convolution is beside its weights.
@@ -49,7 +50,7 @@ struct Layer<'a> {
     activation: &'a Activation,
 }
 
-impl Builder<'_> {
+impl Builder {
     fn encoder(&mut self, config: &DepthNetConfig) -> Result<[ValueId; 5], Error> {
         let encoder = &config.encoder;
         let width = encoder.base_width;
@@ -182,15 +183,9 @@ impl Builder<'_> {
     fn conv(&mut self, layer: &Layer) -> Result<ValueId, Error> {
         let [channels_in, channels_out] = layer.channels;
         let shape = [channels_out, channels_in, layer.kernel, layer.kernel];
-        let mut weight = self
-            .tensor(&format!("{}.weight", layer.name), &shape)?
-            .values
-            .clone();
+        let mut weight = self.take(&format!("{}.weight", layer.name), &shape)?;
         let bias = match &layer.norm {
-            None => self
-                .tensor(&format!("{}.bias", layer.name), &[channels_out])?
-                .values
-                .clone(),
+            None => self.take(&format!("{}.bias", layer.name), &[channels_out])?,
             Some(norm) => self.fold(norm, &mut weight, channels_out)?,
         };
         let conv = Conv {
@@ -210,10 +205,10 @@ impl Builder<'_> {
 
     /// γ (w ⋆ x − μ) / √(σ² + ε) + β = (s·w) ⋆ x + (β − s·μ), s = γ / √(σ² + ε). Scales the weights by s and
     /// gives the bias.
-    fn fold(&self, norm: &str, weight: &mut [f32], channels: usize) -> Result<Vec<f32>, Error> {
-        let of = |part: &str| self.tensor(&format!("{norm}.{part}"), &[channels]);
-        let (gamma, beta) = (&of("weight")?.values, &of("bias")?.values);
-        let (mean, variance) = (&of("running_mean")?.values, &of("running_var")?.values);
+    fn fold(&mut self, norm: &str, weight: &mut [f32], channels: usize) -> Result<Vec<f32>, Error> {
+        let mut of = |part: &str| self.take(&format!("{norm}.{part}"), &[channels]);
+        let (gamma, beta) = (of("weight")?, of("bias")?);
+        let (mean, variance) = (of("running_mean")?, of("running_var")?);
         let taps = weight.len() / channels;
         let mut bias = Vec::with_capacity(channels);
         for (c, row) in weight.chunks_exact_mut(taps).enumerate() {
@@ -227,25 +222,25 @@ impl Builder<'_> {
         Ok(bias)
     }
 
-    fn tensor(&self, name: &str, shape: &[usize]) -> Result<&WeightTensor, Error> {
-        let origin = || self.weights.origin.clone();
-        let tensor = self.weights.tensors.get(name);
+    /// Moves a tensor's values out of the weights: a large network lies in memory once.
+    fn take(&mut self, name: &str, shape: &[usize]) -> Result<Vec<f32>, Error> {
+        let tensor = self.weights.tensors.remove(name);
         let tensor = tensor.ok_or_else(|| Error::MissingTensor {
-            origin: origin(),
+            origin: self.weights.origin.clone(),
             name: name.into(),
             expected: shape.to_vec(),
             others: 0,
         })?;
         if tensor.shape != shape {
             return Err(Error::TensorShape {
-                origin: origin(),
+                origin: self.weights.origin.clone(),
                 name: name.into(),
                 expected: shape.to_vec(),
-                found: tensor.shape.clone(),
+                found: tensor.shape,
                 others: 0,
             });
         }
-        Ok(tensor)
+        Ok(tensor.values)
     }
 
     fn push(&mut self, name: String, op: Op) -> Result<ValueId, Error> {

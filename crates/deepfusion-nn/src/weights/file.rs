@@ -2,12 +2,12 @@
 
 use std::collections::HashMap;
 use std::fs;
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use burn::store::pytorch_reader::{DType as TorchDType, PytorchReader};
 use burn::tensor::{bf16, f16};
-use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
+use safetensors::tensor::{Dtype, Metadata, SafeTensorError, TensorView};
 
 use super::{WeightTensor, Weights};
 use crate::Error;
@@ -19,10 +19,19 @@ use crate::Error;
 /// # Errors
 /// [`Error::Io`] for a file that cannot be read, [`Error::Format`] for one that holds no weights.
 pub fn read(path: &Path) -> Result<Weights, Error> {
+    read_under(path, "")
+}
+
+/// The same for the tensors alone whose names start with `prefix`, without it. The others of a safetensors
+/// file are not even read: a checkpoint holds the optimiser's state beside the networks.
+///
+/// # Errors
+/// As [`read`]; a file without such tensors is one that holds no weights.
+pub fn read_under(path: &Path, prefix: &str) -> Result<Weights, Error> {
     let weights = if is_pytorch(path)? {
-        read_pytorch(path)?
+        read_pytorch(path)?.under(prefix)
     } else {
-        read_safetensors(path)?
+        read_safetensors(path, prefix)?
     };
     if weights.tensors.is_empty() {
         return Err(format_error(path, "it holds no float tensors"));
@@ -57,27 +66,49 @@ fn is_pytorch(path: &Path) -> Result<bool, Error> {
     Err(format_error(path, seen))
 }
 
-fn read_safetensors(path: &Path) -> Result<Weights, Error> {
-    let bytes = fs::read(path).map_err(|source| io_error(path, "read", source))?;
-    let reason = |error: SafeTensorError| format_error(path, error.to_string());
-    let (_, header) = SafeTensors::read_metadata(&bytes).map_err(reason)?;
-    let file = SafeTensors::deserialize(&bytes).map_err(reason)?;
+fn read_safetensors(path: &Path, prefix: &str) -> Result<Weights, Error> {
+    let failed = |source| io_error(path, "read", source);
+    let cut_off = || format_error(path, "the file ends within its header or its tensors");
+    let mut file = fs::File::open(path).map_err(|source| io_error(path, "open", source))?;
+    let length = file.metadata().map_err(failed)?.len();
+    let mut start = [0_u8; 8];
+    file.read_exact(&mut start).map_err(failed)?;
+    let data = u64::from_le_bytes(start).saturating_add(8);
+    if data > length {
+        return Err(cut_off());
+    }
+    let mut header = vec![0; (data - 8) as usize];
+    file.read_exact(&mut header).map_err(failed)?;
+    let header: Metadata =
+        serde_json::from_slice(&header).map_err(|e| format_error(path, e.to_string()))?;
+    if header.data_len() as u64 != length - data {
+        return Err(cut_off());
+    }
     let mut weights = Weights::new(path.display().to_string());
     if let Some(metadata) = header.metadata() {
         weights.metadata = metadata.clone().into_iter().collect();
     }
-    for (name, view) in file.iter() {
-        let values = match view.dtype() {
-            Dtype::F32 => floats(view.data(), f32::from_le_bytes),
-            Dtype::F64 => floats(view.data(), |b| f64::from_le_bytes(b) as f32),
-            Dtype::F16 => floats(view.data(), |b| f16::from_le_bytes(b).to_f32()),
-            Dtype::BF16 => floats(view.data(), |b| bf16::from_le_bytes(b).to_f32()),
+    let mut bytes = Vec::new();
+    for name in header.offset_keys() {
+        let (Some(short), Some(info)) = (name.strip_prefix(prefix), header.info(&name)) else {
+            continue;
+        };
+        let (begin, end) = info.data_offsets;
+        file.seek(SeekFrom::Start(data + begin as u64))
+            .map_err(failed)?;
+        bytes.resize(end - begin, 0);
+        file.read_exact(&mut bytes).map_err(failed)?;
+        let values = match info.dtype {
+            Dtype::F32 => floats(&bytes, f32::from_le_bytes),
+            Dtype::F64 => floats(&bytes, |b| f64::from_le_bytes(b) as f32),
+            Dtype::F16 => floats(&bytes, |b| f16::from_le_bytes(b).to_f32()),
+            Dtype::BF16 => floats(&bytes, |b| bf16::from_le_bytes(b).to_f32()),
             _ => continue,
         };
-        let shape = view.shape().to_vec();
+        let shape = info.shape.clone();
         weights
             .tensors
-            .insert(name.to_owned(), WeightTensor { shape, values });
+            .insert(short.to_owned(), WeightTensor { shape, values });
     }
     Ok(weights)
 }

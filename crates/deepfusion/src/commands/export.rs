@@ -70,7 +70,7 @@ fn model_of(predictor: &Predictor, args: &ExportArgs) -> Result<DepthModel> {
     let camera = predictor.training_camera();
     let camera = camera.map(|k| k.resized(config.size.width as u32, config.size.height as u32));
     Ok(DepthModel {
-        graph: depth_graph(&config.depth_net, &weights::collect(predictor.depth_net()))?,
+        graph: depth_graph(&config.depth_net, weights::collect(predictor.depth_net()))?,
         range: config.depth_net.range,
         width: size.width,
         height: size.height,
