@@ -68,11 +68,15 @@ pub(crate) fn has_end(bytes: &[u8]) -> bool {
         i += usize::from(high) << 8 | usize::from(low);
         if code == SOS {
             // Coded data up to the next marker: in it 0xFF is followed by 0 or a restart marker.
-            while let (Some(&byte), Some(&next)) = (bytes.get(i), bytes.get(i + 1)) {
-                if byte == 0xFF && next != 0 && !(0xD0..=0xD7).contains(&next) {
-                    break;
+            loop {
+                let Some(at) = memchr::memchr(0xFF, bytes.get(i..).unwrap_or_default()) else {
+                    return false;
+                };
+                i += at;
+                match bytes.get(i + 1) {
+                    Some(0 | 0xD0..=0xD7) => i += 2,
+                    _ => break,
                 }
-                i += 1;
             }
         }
     }

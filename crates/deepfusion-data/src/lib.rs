@@ -14,6 +14,7 @@ mod jpeg;
 pub mod kitti;
 mod overlay;
 mod picture;
+mod resize;
 mod snippet;
 mod speed_check;
 mod split;
@@ -28,7 +29,8 @@ pub use image::RgbImage;
 pub use inspect::{DriveInspection, Inspection, IntrinsicsSummary, SpeedRange, Stream, inspect};
 pub use kitti::GtKind;
 pub use overlay::overlay;
-pub use picture::{image_size, load_rgb, resize_rgb, save_png, to_chw};
+pub use picture::{decode_rgb, image_size, load_rgb, save_png};
+pub use resize::{resize_rgb, to_chw, to_network_input};
 pub use snippet::{EgoMotion, Snippet, Source, hold_out};
 pub use speed_check::{
     GreyImage, GroundPair, SpeedWarning, implied_camera_height, speed_unit_warning,

@@ -1,8 +1,6 @@
-//! Images from files, resized and as numbers.
+//! Images from files and to them.
 
 use crate::{Error, Result, jpeg, write_atomically};
-use fast_image_resize::images::{Image, ImageRef};
-use fast_image_resize::{FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer};
 use image::{DynamicImage, ImageError, ImageReader, RgbImage};
 use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;
@@ -17,13 +15,25 @@ pub fn load_rgb(path: &Path) -> Result<RgbImage> {
     Ok(decode(path)?.into_rgb8())
 }
 
+/// [`load_rgb`] of a file's bytes that were read already; `path` is for errors alone.
+///
+/// # Errors
+/// As [`load_rgb`].
+pub fn decode_rgb(bytes: &[u8], path: &Path) -> Result<RgbImage> {
+    Ok(decode_bytes(bytes, path)?.into_rgb8())
+}
+
 /// A PNG or JPEG in the pixel type it has.
 pub(crate) fn decode(path: &Path) -> Result<DynamicImage> {
     let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
-    if jpeg::is_jpeg(&bytes) && !jpeg::has_end(&bytes) {
+    decode_bytes(&bytes, path)
+}
+
+fn decode_bytes(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
+    if jpeg::is_jpeg(bytes) && !jpeg::has_end(bytes) {
         return Err(truncated(path));
     }
-    reader(Cursor::new(bytes.as_slice()), path)?
+    reader(Cursor::new(bytes), path)?
         .decode()
         .map_err(|e| broken(path, &e))
 }
@@ -95,57 +105,6 @@ fn truncated(path: &Path) -> Error {
         problem: "the image is truncated: the file ends within it".into(),
         truncated: true,
     }
-}
-
-/// Resizes with a Lanczos filter of three lobes, antialiased when shrinking, half-pixel centres: what
-/// PIL's `LANCZOS` does, to one grey level. `width` or `height` 0 gives an empty image.
-#[must_use]
-pub fn resize_rgb(image: &RgbImage, width: u32, height: u32) -> RgbImage {
-    if image.dimensions() == (width, height) {
-        return image.clone();
-    }
-    if width == 0 || height == 0 || image.width() == 0 || image.height() == 0 {
-        return RgbImage::new(width, height);
-    }
-    // Columns first, then rows, as PIL does. Overshoot at edges is cut off after each pass, so that the
-    // other order differs by tens of levels beside high contrasts.
-    let narrowed = pass(image, width, image.height());
-    pass(&narrowed, width, height)
-}
-
-/// Resizes to a size that differs along one axis.
-fn pass(image: &RgbImage, width: u32, height: u32) -> RgbImage {
-    if image.dimensions() == (width, height) {
-        return image.clone();
-    }
-    let mut resized = RgbImage::new(width, height);
-    let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Lanczos3));
-    let bytes = image.as_raw().as_slice();
-    let source = ImageRef::new(image.width(), image.height(), bytes, PixelType::U8x3)
-        .expect("an RgbImage holds width x height x 3 bytes");
-    let mut target = Image::from_slice_u8(width, height, &mut resized, PixelType::U8x3)
-        .expect("an RgbImage holds width x height x 3 bytes");
-    Resizer::new()
-        .resize(&source, &mut target, &options)
-        .expect("both images are 8-bit RGB and not empty, the only reasons to refuse");
-    resized
-}
-
-/// The image as 3×H×W floats in [0, 1], channel by channel.
-#[must_use]
-pub fn to_chw(image: &RgbImage) -> Vec<f32> {
-    let bytes = image.as_raw();
-    let mut chw = Vec::with_capacity(bytes.len());
-    for channel in 0..3 {
-        chw.extend(
-            bytes
-                .iter()
-                .skip(channel)
-                .step_by(3)
-                .map(|b| f32::from(*b) / 255.0),
-        );
-    }
-    chw
 }
 
 /// Writes the image as a PNG, atomically.

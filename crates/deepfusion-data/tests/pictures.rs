@@ -1,6 +1,6 @@
 //! Images: resized as PIL does, truncated ones refused.
 
-use deepfusion_data::{Error, image_size, load_rgb, resize_rgb, to_chw};
+use deepfusion_data::{Error, image_size, load_rgb, resize_rgb, to_chw, to_network_input};
 use image::{Rgb, RgbImage};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
@@ -136,5 +136,26 @@ proptest! {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), bytes).unwrap();
         let _ = (load_rgb(file.path()), image_size(file.path()));
+    }
+}
+
+/// What is cut off must not bleed in through the filter's margin.
+#[test]
+fn a_part_becomes_the_same_numbers_as_that_part_alone() {
+    let source = load_rgb(&reference("resize_source.png")).unwrap();
+    for [x, y, w, h] in [
+        [0, 0, 96, 64],
+        [10, 7, 60, 40],
+        [0, 30, 96, 34],
+        [95, 63, 1, 1],
+    ] {
+        let alone = RgbImage::from_fn(w, h, |i, j| *source.get_pixel(x + i, y + j));
+        for (width, height) in [(41, 13), (w, h), (w, 9), (120, h)] {
+            assert_eq!(
+                to_network_input(&source, [x, y, w, h], width, height),
+                to_chw(&resize_rgb(&alone, width, height)),
+                "{x},{y} {w}x{h} to {width}x{height}"
+            );
+        }
     }
 }
