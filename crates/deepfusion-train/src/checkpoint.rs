@@ -1,5 +1,6 @@
 use crate::{Adam, Error, Model, TrainConfig};
 use burn::tensor::Device;
+use deepfusion_nn::DepthNet;
 use deepfusion_nn::weights::{self, Weights};
 use std::path::{Path, PathBuf};
 
@@ -181,43 +182,15 @@ impl RunFolder {
     ) -> Result<(Model, Option<Adam>, Checkpoint), Error> {
         let path = self.checkpoint_path(kind);
         let all = weights::read(&path)?;
-        let fail = |reason: String, remedy: &str| Error::Checkpoint {
-            path: path.clone(),
-            reason,
-            remedy: remedy.into(),
-        };
-        let number = |key: &str| {
-            let text = all.metadata.get(key);
-            text.and_then(|t| t.parse::<usize>().ok()).ok_or_else(|| {
-                fail(
-                    format!("no checkpoint of this program: `{key}` is missing from its metadata"),
-                    "`weights import` reads weights of other programs",
-                )
-            })
-        };
-        let version = number("format_version")?;
-        if version != CHECKPOINT_VERSION as usize {
-            return Err(fail(
-                format!("checkpoint format {version}, this program reads {CHECKPOINT_VERSION}"),
-                "use the version of the program that wrote it",
-            ));
-        }
-        let state = Checkpoint {
-            step: number("step")?,
-            skipped: number("skipped")?,
-            best_validation: all
-                .metadata
-                .get("best_validation")
-                .and_then(|t| u64::from_str_radix(t, 16).ok())
-                .map(f64::from_bits),
-        };
+        let state = Checkpoint::of(&path, &all)?;
         let named = |prefix: &str| -> Weights { all.under(prefix) };
         let blank = Model::new(config, device)?;
         let depth_net = weights::apply(blank.depth_net, &named("depth."))?;
         let pose_net = weights::apply(blank.pose_net, &named("pose."))?;
         let adam = match all.metadata.get("adam_steps") {
             Some(_) => {
-                let steps = u32::try_from(number("adam_steps")?).unwrap_or(u32::MAX);
+                let steps = number(&path, &all, "adam_steps")?;
+                let steps = u32::try_from(steps).unwrap_or(u32::MAX);
                 Some(Adam::restore(named("adam."), steps))
             }
             None => None,
@@ -225,4 +198,65 @@ impl RunFolder {
         let model = Model::with_networks(config, depth_net, pose_net, device);
         Ok((model, adam, state))
     }
+
+    /// The depth network's weights alone, and where training stood: nothing else of the file is read.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] for a file of another version, [`Error::Network`] for one without a network.
+    pub fn load_depth_weights(&self, kind: CheckpointKind) -> Result<(Weights, Checkpoint), Error> {
+        let path = self.checkpoint_path(kind);
+        let weights = weights::read_under(&path, "depth.")?;
+        let state = Checkpoint::of(&path, &weights)?;
+        Ok((weights, state))
+    }
+}
+
+/// The configuration and the depth network of a run's folder or a checkpoint in it; the folder means `best` where
+/// there is one.
+///
+/// # Errors
+/// As [`RunFolder::open`] and [`RunFolder::load_depth_weights`]; [`Error::Network`] for weights of another
+/// architecture.
+pub fn load_depth_net(path: &Path, device: &Device) -> Result<(TrainConfig, DepthNet), Error> {
+    let (folder, kind) = RunFolder::open(path)?;
+    let config = folder.read_config()?;
+    let (weights, _) = folder.load_depth_weights(kind.unwrap_or_else(|| folder.preferred()))?;
+    let net = weights::apply(config.depth_net.init(device)?, &weights)?;
+    Ok((config, net))
+}
+
+impl Checkpoint {
+    /// What a file's metadata say.
+    fn of(path: &Path, file: &Weights) -> Result<Self, Error> {
+        let version = number(path, file, "format_version")?;
+        if version != CHECKPOINT_VERSION as usize {
+            return Err(Error::Checkpoint {
+                path: path.to_owned(),
+                reason: format!(
+                    "checkpoint format {version}, this program reads {CHECKPOINT_VERSION}"
+                ),
+                remedy: "use the version of the program that wrote it".into(),
+            });
+        }
+        Ok(Self {
+            step: number(path, file, "step")?,
+            skipped: number(path, file, "skipped")?,
+            best_validation: file
+                .metadata
+                .get("best_validation")
+                .and_then(|t| u64::from_str_radix(t, 16).ok())
+                .map(f64::from_bits),
+        })
+    }
+}
+
+/// A number among a file's metadata.
+fn number(path: &Path, file: &Weights, key: &str) -> Result<usize, Error> {
+    let text = file.metadata.get(key);
+    text.and_then(|t| t.parse().ok())
+        .ok_or_else(|| Error::Checkpoint {
+            path: path.to_owned(),
+            reason: format!("no checkpoint of this program: `{key}` is missing from its metadata"),
+            remedy: "`weights import` reads weights of other programs".into(),
+        })
 }

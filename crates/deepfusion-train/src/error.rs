@@ -85,6 +85,14 @@ pub enum Error {
         /// What the system says.
         reason: String,
     },
+    /// Something that runs networks and cannot run this one.
+    #[error("engine `{engine}`: {reason}")]
+    Engine {
+        /// Its name.
+        engine: &'static str,
+        /// What it says.
+        reason: String,
+    },
     /// The recording.
     #[error(transparent)]
     Data(#[from] deepfusion_data::Error),
@@ -94,6 +102,14 @@ pub enum Error {
 }
 
 impl Error {
+    /// What an engine said.
+    pub fn engine(engine: &'static str, reason: &dyn std::fmt::Display) -> Self {
+        Self::Engine {
+            engine,
+            reason: reason.to_string(),
+        }
+    }
+
     /// What to do about it, in a line.
     #[must_use]
     pub fn hint(&self) -> Option<String> {
@@ -125,6 +141,7 @@ impl Error {
                  learning rate, and continue with --resume"
                     .into(),
             ),
+            Self::Engine { .. } => Some("`--engine burn` runs every network on every device".into()),
             Self::Threads { .. } => Some(
                 "the system allows this user too few threads or too little memory; see `ulimit -u`"
                     .into(),

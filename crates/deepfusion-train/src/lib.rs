@@ -18,8 +18,10 @@ mod model;
 mod panel;
 mod pose;
 mod predictor;
+mod prepare;
 mod preset;
 mod resample;
+mod runner;
 mod sampler;
 mod source;
 mod trainer;
@@ -28,7 +30,7 @@ mod view_synthesis;
 pub use adam::{Adam, NamedGradients, StepOutcome};
 pub use augment::Jitter;
 pub use batch::{BatchLoader, SnippetBatch};
-pub use checkpoint::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder};
+pub use checkpoint::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder, load_depth_net};
 pub use config::{
     Augmentation, CompareAt, DataConfig, LossConfig, Reprojection, ReversedPose, TrainConfig,
     ViewMotion,
@@ -40,8 +42,10 @@ pub use model::{BatchLoss, ForwardPass, Model};
 pub use panel::SamplePanel;
 pub use pose::{Motion, rotation_from_axis_angle};
 pub use predictor::{Prediction, Predictor};
+pub use prepare::{PreparedImage, Preparer};
 pub use preset::Preset;
 pub use resample::BilinearResize;
+pub use runner::{BurnRunner, DepthRunner, FusedRunner};
 pub use sampler::Sampler;
 pub use source::{Sample, SampleSet};
 pub use trainer::{TrainSummary, Trainer, validation_loss};

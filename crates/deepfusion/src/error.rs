@@ -47,6 +47,12 @@ pub enum CliError {
         /// How far it is from the network.
         deviation: f64,
     },
+    /// An engine for processors on another device.
+    #[error("only `--engine burn` computes on other devices than the processor")]
+    OnlyOnCpu,
+    /// A precision that an engine does not have.
+    #[error("`--precision bf16` is the fused engine's")]
+    OnlyFused,
     /// A cloud without a camera.
     #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
     NoCamera,
@@ -66,6 +72,8 @@ impl CliError {
             Self::Deviates { .. } => {
                 Some("this is a fault of the program or of the library that ran the file; please report it".into())
             }
+            Self::OnlyOnCpu => Some("leave out --engine, or give --device cpu".into()),
+            Self::OnlyFused => Some("give --engine fused --device cpu, or leave out --precision".into()),
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
         }
     }

@@ -3,6 +3,7 @@
 mod allocator;
 mod cli;
 mod commands;
+mod engine;
 mod error;
 mod output;
 mod progress;

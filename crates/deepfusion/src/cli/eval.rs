@@ -5,7 +5,7 @@ use deepfusion_data::CameraChoice;
 use deepfusion_eval::{Crop, Holes, Protocol, Scaling};
 
 use super::values::{positive, scaling};
-use super::{DeviceChoice, GtDepth};
+use super::{EngineArgs, GtDepth};
 
 /// `deepfusion eval`.
 #[derive(Debug, Args)]
@@ -70,9 +70,9 @@ pub struct EvalArgs {
     /// Do not correct depth for another focal length than the one trained on.
     #[arg(long, conflicts_with = "pred")]
     pub no_focal_correction: bool,
-    /// Where to compute.
-    #[arg(long, value_enum, default_value_t, conflicts_with = "pred")]
-    pub device: DeviceChoice,
+    /// What runs the network.
+    #[command(flatten)]
+    pub engine: EngineArgs,
     /// Print as JSON.
     #[arg(long)]
     pub json: bool,

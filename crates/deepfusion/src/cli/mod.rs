@@ -1,6 +1,7 @@
 //! The command line's shape: what can be said, not what it does.
 
 mod data;
+mod engine;
 mod eval;
 mod export;
 mod predict;
@@ -12,6 +13,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use data::{DataCommand, ExportGtArgs, GtDepth, InspectArgs};
+pub use engine::{EngineArgs, EngineChoice, PrecisionChoice};
 pub use eval::{EvalArgs, PredKind};
 pub use export::ExportArgs;
 pub use predict::{BenchArgs, PredictArgs, Save, WeightsCommand};

@@ -7,7 +7,7 @@ use deepfusion_data::{RgbImage, resize_rgb, to_chw};
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_nn::DepthNet;
 use deepfusion_render::{DepthScale, depth_picture};
-use deepfusion_train::{Predictor, TrainConfig};
+use deepfusion_train::TrainConfig;
 use image::codecs::jpeg::JpegEncoder;
 use serde::Serialize;
 
@@ -48,13 +48,9 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     let device = device::open(args.device)?;
     let (name, config, net) = match &args.model {
         Some(path) => {
-            let predictor = Predictor::load(path, &device)?;
+            let (config, net) = deepfusion_train::load_depth_net(path, &device)?;
             let name = path.display().to_string();
-            (
-                name,
-                predictor.config().clone(),
-                predictor.depth_net().clone(),
-            )
+            (name, config, net)
         }
         None => {
             let preset = preset(args.preset.unwrap_or(PresetChoice::Tiny));

@@ -26,7 +26,8 @@ use super::eval::predict;
 use super::evaluate::{Truth, evaluate_datasets, open_datasets, trivial_from_datasets};
 use super::recorder::{Curves, clock};
 use super::{device, train};
-use crate::cli::DemoArgs;
+use crate::cli::{DemoArgs, EngineArgs};
+use crate::engine;
 use crate::output;
 use crate::progress::{Progress, say};
 
@@ -97,7 +98,8 @@ pub fn run(args: &DemoArgs) -> Result<()> {
     let (config, curves) = learn(config, &train_drives, &model, &device)?;
 
     say("3/4 measuring on the street never seen");
-    let predictor = Predictor::load(&model.join("last.safetensors"), &device)?;
+    let checkpoint = model.join("last.safetensors");
+    let predictor = engine::load(&checkpoint, &EngineArgs::on(args.device))?;
     let train_sets = open_datasets(&train_drives, None, CameraChoice::default())?;
     let test_sets = Dataset::open(&test_drive, &OpenOptions::default())?;
     let report = measure(&predictor, &train_sets, &test_sets)?;
@@ -222,7 +224,8 @@ fn write_report(
     {
         let image = dataset.load_image(frame)?;
         let k = dataset.intrinsics(frame);
-        let depth = predictor.predict(&image, Some(&k), true, true).depth();
+        let depth = predictor.predict(&image, Some(&k), true, true)?;
+        let depth = depth.depth();
         let truth = exact_depth(dataset, frame)?;
         let side = side_by_side(&image, &depth, &scale)?;
         let name = |what: &str| {

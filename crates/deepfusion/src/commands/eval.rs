@@ -8,11 +8,11 @@ use deepfusion_eval::{
 use deepfusion_geometry::Intrinsics;
 use deepfusion_train::Predictor;
 
-use super::device;
 use super::evaluate::{
     Comparison, Truth, evaluate_datasets, open_datasets, trivial_from_arrays, trivial_from_datasets,
 };
 use crate::cli::{EvalArgs, PredKind};
+use crate::engine;
 use crate::output;
 use crate::progress::Progress;
 
@@ -35,7 +35,7 @@ pub fn run(args: &EvalArgs) -> Result<()> {
 /// all of its ground truth counts.
 fn from_model(args: &EvalArgs) -> Result<Report> {
     let model = args.model.as_deref().unwrap_or(Path::new("."));
-    let predictor = Predictor::load(model, &device::open(args.device)?)?;
+    let predictor = engine::load(model, &args.engine)?;
     let datasets = open_datasets(&args.data, args.split.as_deref(), args.camera)?;
     let kind = args.gt_depth.kind();
     let truth = match &args.gt {
@@ -72,7 +72,7 @@ pub fn predict(
     camera: &Intrinsics,
     focal_correction: bool,
 ) -> Result<Prediction> {
-    let prediction = predictor.predict(image, Some(camera), focal_correction, false);
+    let prediction = predictor.predict(image, Some(camera), focal_correction, false)?;
     let grid = Grid::from_f32(prediction.width, prediction.height, &prediction.disparity)?;
     Ok(Prediction::Disparity(grid))
 }

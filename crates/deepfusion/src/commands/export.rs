@@ -8,7 +8,7 @@ use deepfusion_nn::{DepthNet, InputSize, depth_graph, weights};
 use deepfusion_onnx::check::{PICTURES, deviation, pictures};
 use deepfusion_onnx::runtime::{OrtEngine, find};
 use deepfusion_onnx::{DepthMaps, DepthModel, FocalLength, OPSET, read, reference, write};
-use deepfusion_train::Predictor;
+use deepfusion_train::{TrainConfig, load_depth_net};
 use serde::Serialize;
 
 use crate::cli::ExportArgs;
@@ -48,11 +48,11 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         .into());
     }
     let device = Device::flex();
-    let predictor = Predictor::load(&args.model, &device)?;
-    let model = model_of(&predictor, args)?;
+    let (config, net) = load_depth_net(&args.model, &device)?;
+    let model = model_of(&config, &net, args)?;
     let bytes = write(&model)?;
     let partial = partial_file(out, &bytes)?;
-    let checks = check(args, &model, predictor.depth_net(), partial.path(), &device)?;
+    let checks = check(args, &model, &net, partial.path(), &device)?;
     partial
         .persist(out)
         .map_err(|e| deepfusion_data::Error::file(out, e.error))?;
@@ -60,17 +60,17 @@ pub fn run(args: &ExportArgs) -> Result<()> {
 }
 
 /// The network of a run, for pictures of the size asked for.
-fn model_of(predictor: &Predictor, args: &ExportArgs) -> Result<DepthModel> {
-    let config = predictor.config();
+fn model_of(config: &TrainConfig, net: &DepthNet, args: &ExportArgs) -> Result<DepthModel> {
     let size = match args.size {
         Some(size) => InputSize::new(size.width as usize, size.height as usize)?,
         None => config.size,
     };
     // Of the pictures trained on, whatever the size now: a network sees metres through those.
-    let camera = predictor.training_camera();
-    let camera = camera.map(|k| k.resized(config.size.width as u32, config.size.height as u32));
+    let camera = config
+        .camera
+        .map(|k| k.resized(config.size.width as u32, config.size.height as u32));
     Ok(DepthModel {
-        graph: depth_graph(&config.depth_net, weights::collect(predictor.depth_net()))?,
+        graph: depth_graph(&config.depth_net, weights::collect(net))?,
         range: config.depth_net.range,
         width: size.width,
         height: size.height,

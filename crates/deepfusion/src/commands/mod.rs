@@ -2,7 +2,7 @@
 
 mod bench;
 mod demo;
-mod device;
+pub mod device;
 mod eval;
 mod evaluate;
 mod export;

@@ -10,7 +10,6 @@ use deepfusion_render::{DepthScale, depth_picture, side_by_side, with_depth_lege
 use deepfusion_train::{Prediction, Predictor};
 use serde::Serialize;
 
-use super::device;
 use crate::cli::{PredictArgs, Save};
 use crate::error::CliError;
 use crate::output;
@@ -41,7 +40,7 @@ struct Sidecar {
 /// `deepfusion predict`.
 pub fn run(args: &PredictArgs) -> Result<()> {
     let inputs = find_images(&args.inputs)?;
-    let predictor = Predictor::load(&args.model, &device::open(args.device)?)?;
+    let predictor = crate::engine::load(&args.model, &crate::cli::EngineArgs::on(args.device))?;
     std::fs::create_dir_all(&args.out).map_err(|e| deepfusion_data::Error::file(&args.out, e))?;
     let names = output_names(&inputs);
     let mut sidecars = Vec::new();
@@ -87,7 +86,7 @@ fn predict_one(
         camera.as_ref(),
         !args.no_focal_correction,
         !args.stretch,
-    );
+    )?;
     let depth = prediction.depth();
     let scale = DepthScale::default();
     let mut files = Vec::new();

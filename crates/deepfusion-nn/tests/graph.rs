@@ -1,0 +1,101 @@
+//! A network as a graph, batch normalisation folded, gives what the network itself gives.
+
+use burn::tensor::{Device, Tensor, TensorData};
+use deepfusion_infer::{Engine, Precision};
+use deepfusion_nn::weights::{self, Weights};
+use deepfusion_nn::{DepthNetConfig, Error, ResNetDepth, depth_graph};
+
+/// Weights as after some training: batch norms with statistics and factors of their own.
+fn trained(config: &DepthNetConfig) -> Weights {
+    let net = config.init_with_seed(5, &Device::flex()).unwrap();
+    let mut weights = weights::collect(&net);
+    for (name, tensor) in &mut weights.tensors {
+        let spread = |i: usize| ((i * 37 + name.len() * 11) % 17) as f32 / 17.0;
+        for (i, value) in tensor.values.iter_mut().enumerate() {
+            if name.ends_with("running_mean") {
+                *value = spread(i) - 0.5;
+            } else if name.ends_with("running_var") {
+                *value = 0.5 + spread(i);
+            } else if name.contains(".bn") {
+                *value += 0.4 * (spread(i) - 0.5);
+            }
+        }
+    }
+    weights
+}
+
+fn image(width: usize, height: usize) -> Vec<f32> {
+    let value = |i: usize| ((i * 7919 + i / width * 31) % 256) as f32 / 255.0;
+    (0..3 * width * height).map(value).collect()
+}
+
+fn check(config: &DepthNetConfig, width: usize, height: usize) {
+    let (weights, image) = (trained(config), image(width, height));
+    let device = Device::flex();
+    let net = weights::apply(config.init(&device).unwrap(), &weights).unwrap();
+    let input = TensorData::new(image.clone(), [1, 3, height, width]);
+    let expected = net
+        .forward(Tensor::from_data(input, &device))
+        .swap_remove(0);
+    let expected: Vec<f32> = expected.into_data().iter::<f32>().collect();
+    let off = |precision| {
+        let graph = depth_graph(config, weights.clone()).unwrap();
+        let mut engine = Engine::new(graph, width, height, precision).unwrap();
+        engine.run(&image);
+        let output = engine.output(0);
+        assert_eq!(output.len(), expected.len());
+        let off = output.iter().zip(&expected).map(|(a, b)| (a - b).abs());
+        off.fold(0.0, f32::max)
+    };
+    let span = expected
+        .iter()
+        .fold((1.0, 0.0), |(low, high): (f32, f32), v| {
+            (low.min(*v), high.max(*v))
+        });
+    assert!(
+        span.1 - span.0 > 0.05,
+        "a flat answer would prove nothing: {span:?}"
+    );
+    let f32_off = off(Precision::F32);
+    assert!(f32_off < 1e-4, "f32 off by {f32_off}");
+    if Engine::has_bf16() {
+        // Rounding to eight bits in each of some sixty layers.
+        let bf16_off = off(Precision::Bf16);
+        assert!(bf16_off < 0.1, "bf16 off by {bf16_off}");
+    }
+}
+
+#[test]
+fn a_basic_block_network() {
+    check(&DepthNetConfig::new(ResNetDepth::ResNet18), 192, 96);
+}
+
+#[test]
+fn a_bottleneck_network() {
+    check(&DepthNetConfig::monodepth2(ResNetDepth::ResNet50), 128, 96);
+}
+
+#[test]
+fn a_narrow_network_whose_channels_fill_no_vector() {
+    let mut config = DepthNetConfig::new(ResNetDepth::ResNet18);
+    config.encoder.base_width = 12;
+    config.decoder.widths = [40, 24, 20, 10, 6];
+    check(&config, 96, 64);
+}
+
+#[test]
+fn weights_of_another_network_are_refused_by_name() {
+    let config = DepthNetConfig::new(ResNetDepth::ResNet18);
+    let mut weights = trained(&config);
+    weights.tensors.remove("encoder.layer2.0.bn1.running_var");
+    match depth_graph(&config, weights) {
+        Err(Error::MissingTensor { name, .. }) => {
+            assert_eq!(name, "encoder.layer2.0.bn1.running_var");
+        }
+        other => panic!("{other:?}"),
+    }
+    let mut wide = config.clone();
+    wide.encoder.base_width = 96;
+    let shape = depth_graph(&wide, trained(&config));
+    assert!(matches!(shape, Err(Error::TensorShape { .. })), "{shape:?}");
+}

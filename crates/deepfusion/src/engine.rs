@@ -1,0 +1,98 @@
+//! What runs a trained network: the choice made on the command line.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use anyhow::Result;
+use deepfusion_infer::Precision;
+use deepfusion_nn::depth_graph;
+use deepfusion_nn::weights::Weights;
+use deepfusion_onnx::runtime::OrtEngine;
+use deepfusion_onnx::{DepthModel, write};
+use deepfusion_train::{BurnRunner, DepthRunner, Error, FusedRunner, Predictor, TrainConfig};
+
+use crate::cli::{DeviceChoice, EngineArgs, EngineChoice, PrecisionChoice};
+use crate::commands::device;
+use crate::error::CliError;
+
+/// Loads a run with the engine asked for.
+pub fn load(model: &std::path::Path, args: &EngineArgs) -> Result<Predictor> {
+    Predictor::load(model, |config, weights| runner(args, config, weights))
+}
+
+/// The engine asked for, with a network of this configuration and these weights.
+pub fn runner(
+    args: &EngineArgs,
+    config: &TrainConfig,
+    weights: Weights,
+) -> Result<Arc<dyn DepthRunner>> {
+    let on_cpu = args.device == DeviceChoice::Cpu;
+    let engine = match args.engine {
+        EngineChoice::Auto if on_cpu => EngineChoice::Fused,
+        EngineChoice::Auto => EngineChoice::Burn,
+        chosen => chosen,
+    };
+    if engine != EngineChoice::Burn && !on_cpu {
+        return Err(CliError::OnlyOnCpu.into());
+    }
+    if engine != EngineChoice::Fused && args.precision != PrecisionChoice::F32 {
+        return Err(CliError::OnlyFused.into());
+    }
+    Ok(match engine {
+        EngineChoice::Burn | EngineChoice::Auto => Arc::new(BurnRunner::new(
+            config,
+            &weights,
+            &device::open(args.device)?,
+        )?),
+        EngineChoice::Fused => {
+            let precision = match args.precision {
+                PrecisionChoice::F32 => Precision::F32,
+                PrecisionChoice::Bf16 => Precision::Bf16,
+            };
+            Arc::new(FusedRunner::new(config, weights, precision)?)
+        }
+        EngineChoice::Ort => Arc::new(OrtRunner::new(args, config, weights)?),
+    })
+}
+
+/// The network as an ONNX model in the user's ONNX Runtime.
+#[derive(Debug)]
+struct OrtRunner {
+    engine: Mutex<OrtEngine>,
+    pixels: usize,
+}
+
+impl OrtRunner {
+    fn new(args: &EngineArgs, config: &TrainConfig, weights: Weights) -> Result<Self> {
+        let bytes = write(&DepthModel {
+            graph: depth_graph(&config.depth_net, weights)?,
+            range: config.depth_net.range,
+            width: config.size.width,
+            height: config.size.height,
+            trained_with: None,
+        })?;
+        let threads = rayon::current_num_threads();
+        let engine = OrtEngine::load(args.ort_lib.as_deref(), &bytes, threads)?;
+        Ok(Self {
+            engine: Mutex::new(engine),
+            pixels: config.size.width * config.size.height,
+        })
+    }
+}
+
+impl DepthRunner for OrtRunner {
+    fn name(&self) -> &'static str {
+        "ort"
+    }
+
+    fn disparity(&self, image: &[f32]) -> Result<Vec<f32>, Error> {
+        // The model takes bytes, and an image's values are bytes / 255.
+        let byte = |i: usize| (image[i % 3 * self.pixels + i / 3] * 255.0).round() as u8;
+        let rgb: Vec<u8> = (0..3 * self.pixels).map(byte).collect();
+        let mut disparity = vec![0.0; self.pixels];
+        let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
+        match engine.run(&rgb, &mut disparity) {
+            Ok(()) => Ok(disparity),
+            Err(error) => Err(Error::engine("ort", &error)),
+        }
+    }
+}
