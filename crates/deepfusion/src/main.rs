@@ -4,7 +4,9 @@ mod allocator;
 mod cli;
 mod commands;
 mod error;
+mod interrupt;
 mod output;
+mod pipeline;
 mod progress;
 
 use std::process::ExitCode;
