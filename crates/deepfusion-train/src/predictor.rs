@@ -90,6 +90,12 @@ impl Predictor {
         &*self.runner
     }
 
+    /// The same, for keeps.
+    #[must_use]
+    pub fn into_runner(self) -> Arc<dyn DepthRunner> {
+        self.runner
+    }
+
     /// The run's configuration.
     #[must_use]
     pub fn config(&self) -> &TrainConfig {

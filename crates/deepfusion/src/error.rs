@@ -1,8 +1,11 @@
 //! How failures are told: `error: …`, what caused it, `hint: …`.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anstyle::{AnsiColor, Style};
+
+use crate::cli::Shard;
 
 /// Failures that only the command line knows.
 #[derive(Debug, thiserror::Error)]
@@ -11,7 +14,7 @@ pub enum CliError {
     #[error("{}: is there already", path.display())]
     Exists {
         /// The file or folder.
-        path: std::path::PathBuf,
+        path: PathBuf,
         /// The option that allows it, or what else to do.
         remedy: &'static str,
     },
@@ -53,6 +56,50 @@ pub enum CliError {
     /// A precision that an engine does not have.
     #[error("`--precision bf16` is the fused engine's")]
     OnlyFused,
+    /// An output that another run made, or this one of another image.
+    #[error("{}: is there already, {why}", path.display())]
+    Stale {
+        /// The sidecar.
+        path: PathBuf,
+        /// In what it differs.
+        why: String,
+    },
+    /// A shard of a job beside shards of another.
+    #[error("{}: the shards of this folder were begun with {why}", path.display())]
+    OtherJob {
+        /// The other shard's manifest.
+        path: PathBuf,
+        /// In what it differs.
+        why: String,
+    },
+    /// A shard that another process works on.
+    #[error("{}: another run is at work on shard {shard} there", folder.display())]
+    Busy {
+        /// The output folder.
+        folder: PathBuf,
+        /// The shard.
+        shard: Shard,
+    },
+    /// Images that could not be predicted, while others could.
+    #[error("{}", some_failed(failures, *total, *interrupted))]
+    SomeFailed {
+        /// What each of them failed for.
+        failures: Vec<String>,
+        /// How many images there were in all.
+        total: usize,
+        /// Whether the run was stopped before the others were done.
+        interrupted: bool,
+        /// The first remedy that one of the failures knows.
+        hint: Option<String>,
+    },
+    /// A run that was stopped.
+    #[error("stopped: {done} of {total} images are done")]
+    Interrupted {
+        /// Images done.
+        done: usize,
+        /// Images in all.
+        total: usize,
+    },
     /// A cloud without a camera.
     #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
     NoCamera,
@@ -74,9 +121,56 @@ impl CliError {
             }
             Self::OnlyOnCpu => Some("leave out --engine, or give --device cpu".into()),
             Self::OnlyFused => Some("give --engine fused --device cpu, or leave out --precision".into()),
+            Self::Stale { .. } => Some(
+                "--overwrite replaces what was made differently; or choose another folder".into(),
+            ),
+            Self::OtherJob { .. } => Some(
+                "start every shard with the same inputs and options; --overwrite begins anew, or choose \
+                 another folder"
+                    .into(),
+            ),
+            Self::Busy { .. } => {
+                Some("wait for it, or share the work with --shard I/N, a different I each".into())
+            }
+            Self::SomeFailed { hint, .. } => Some(match hint {
+                Some(hint) => format!("{hint}; then run the same again: only what is missing is done"),
+                None => "mend them and run the same again: only what is missing is done".into(),
+            }),
+            Self::Interrupted { .. } => {
+                Some("run the same again: only what is missing is done".into())
+            }
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
         }
     }
+}
+
+/// The failures of a run, a line each, as many as a person reads; the manifest has them all.
+fn some_failed(failures: &[String], total: usize, interrupted: bool) -> String {
+    const TOLD: usize = 20;
+    let mut text = format!("{} of {total} images failed", failures.len());
+    if interrupted {
+        text += " before the run was stopped";
+    }
+    for failure in failures.iter().take(TOLD) {
+        text += &format!("\n  {failure}");
+    }
+    if failures.len() > TOLD {
+        let more = failures.len() - TOLD;
+        text += &format!("\n  and {more} more, in the manifest");
+    }
+    text
+}
+
+/// A failure and its causes in one line.
+pub fn told(problem: &anyhow::Error) -> String {
+    let mut text = problem.to_string();
+    for cause in problem.chain().skip(1).map(ToString::to_string) {
+        // Many messages already hold their cause's.
+        if !text.contains(&cause) {
+            text += &format!(": {cause}");
+        }
+    }
+    text
 }
 
 /// Prints a failure on stderr; the exit code is 1.
@@ -100,7 +194,7 @@ pub fn report(problem: &anyhow::Error) -> ExitCode {
 }
 
 /// The first remedy that an error of the chain knows.
-fn hint_of(problem: &anyhow::Error) -> Option<String> {
+pub fn hint_of(problem: &anyhow::Error) -> Option<String> {
     problem.chain().find_map(|cause| {
         macro_rules! hint_from {
             ($($error:ty),* $(,)?) => {

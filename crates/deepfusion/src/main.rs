@@ -5,7 +5,9 @@ mod cli;
 mod commands;
 mod engine;
 mod error;
+mod interrupt;
 mod output;
+mod pipeline;
 mod progress;
 
 use std::process::ExitCode;

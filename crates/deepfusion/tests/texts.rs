@@ -121,6 +121,18 @@ fn wrong_arguments_end_with_2_and_suggest_the_near_one() {
             ],
             "'ply'",
         ),
+        (
+            &[
+                "predict", "--model", "m", "i.png", "--out", "o", "--shard", "0/4",
+            ],
+            "the first of 4 is 1/4",
+        ),
+        (
+            &[
+                "predict", "--model", "m", "i.png", "--out", "o", "--shard", "5/4",
+            ],
+            "no part 5 of 4",
+        ),
     ] {
         let run = deepfusion(args);
         assert_eq!(run.code, 2, "{args:?}: {}", run.stderr);

@@ -110,7 +110,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     // Nothing is overwritten, and wrong cameras are told.
     fails(
         at,
-        &format!("predict --model run {image} --out assumed"),
+        &format!("predict --model run {image} --out assumed --save npy"),
         &["0000000001"],
     );
     let wrong = "--intrinsics 743.6,738.9,5000,88.3";
@@ -232,10 +232,14 @@ fn weights_and_bench_tell_what_they_do() {
     fails(at, "weights import missing.pth --out run", &["missing.pth"]);
     let bench = ok(at, "bench --preset tiny --size 96x64 --repeats 1 --json");
     let bench: Value = serde_json::from_str(&bench.stdout).unwrap();
-    for stage in ["decode", "resize", "network", "depth", "cloud"] {
+    for stage in ["decode", "resize", "network", "depth", "cloud", "colour"] {
         assert!(bench["stages_ms"][stage].as_f64().unwrap() > 0.0, "{stage}");
     }
     assert!(bench["fps"].as_f64().unwrap() > 0.0);
+    assert!(
+        bench["latency_ms"].as_f64().unwrap() > bench["stages_ms"]["network"].as_f64().unwrap()
+    );
+    assert!(bench["peak_device_mb"].is_null());
     assert!(bench["parameters"].as_u64().unwrap() > 100_000);
     #[cfg(target_os = "linux")]
     assert!(bench["peak_rss_mb"].as_f64().unwrap() > 1.0);

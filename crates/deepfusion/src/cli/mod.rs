@@ -18,7 +18,7 @@ pub use eval::{EvalArgs, PredKind};
 pub use export::ExportArgs;
 pub use predict::{BenchArgs, PredictArgs, Save, WeightsCommand};
 pub use train::{DeviceChoice, PresetChoice, TrainArgs, ViewMotionChoice};
-pub use values::{CameraIntrinsics, Size};
+pub use values::{CameraIntrinsics, Shard, Size};
 
 /// Metric depth from one camera and a speed signal.
 #[derive(Debug, Parser)]

@@ -3,15 +3,18 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args, Subcommand, ValueEnum};
 
 use super::values::positive;
-use super::{CameraIntrinsics, DeviceChoice, PresetChoice, Size};
+use super::{CameraIntrinsics, EngineArgs, PresetChoice, Shard, Size};
 
 /// `deepfusion predict`.
 #[derive(Debug, Args)]
 #[command(
     after_help = "A network sees metres through the focal length it was trained at; depth is corrected for the input's. \
     Without intrinsics the training camera's field of view is assumed, and the sidecar says so.\n\n\
+    A run that was stopped goes on where it was: outputs that are complete are kept. An image that cannot be read is \
+    named at the end; the others are done.\n\n\
     Examples:\n  deepfusion predict --model runs/train-1 street.jpg --out depth\n  \
-    deepfusion predict --model runs/train-1 'drive/*.png' --save npy,ply --out depth"
+    deepfusion predict --model runs/train-1 'drive/*.png' --save npy,ply --out depth\n  \
+    deepfusion predict --model runs/train-1 drive --out depth --shard 1/2   # and 2/2 elsewhere"
 )]
 pub struct PredictArgs {
     /// A run folder or a checkpoint in it.
@@ -41,12 +44,21 @@ pub struct PredictArgs {
     /// Folder to write.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Replace files that are there.
+    /// Do one part of the work: the I-th of N (counted from 1) of the images in the order of their paths. Started
+    /// with the same inputs and options, N such runs, at once and on any machines, do every image once.
+    #[arg(
+        long,
+        value_name = "I/N",
+        default_value = "1/1",
+        hide_default_value = true
+    )]
+    pub shard: Shard,
+    /// Replace files that were made with other options or of an image that has changed.
     #[arg(long)]
     pub overwrite: bool,
-    /// Where to compute.
-    #[arg(long, value_enum, default_value_t)]
-    pub device: DeviceChoice,
+    /// What runs the network.
+    #[command(flatten)]
+    pub engine: EngineArgs,
     /// Print the sidecars as a JSON array on stdout.
     #[arg(long)]
     pub json: bool,
@@ -110,9 +122,9 @@ pub struct BenchArgs {
     /// How often each stage is measured.
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub repeats: usize,
-    /// Where to compute.
-    #[arg(long, value_enum, default_value_t)]
-    pub device: DeviceChoice,
+    /// What runs the network.
+    #[command(flatten)]
+    pub engine: EngineArgs,
     /// Print as JSON.
     #[arg(long)]
     pub json: bool,

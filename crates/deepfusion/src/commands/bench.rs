@@ -1,22 +1,29 @@
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use anyhow::Result;
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::Device;
 use deepfusion_cloud::PointCloud;
-use deepfusion_data::{RgbImage, resize_rgb, to_chw};
+use deepfusion_data::{RgbImage, decode_rgb, resize_rgb, to_network_input};
 use deepfusion_geometry::{DepthMap, Intrinsics};
-use deepfusion_nn::DepthNet;
+use deepfusion_nn::weights::collect;
 use deepfusion_render::{DepthScale, depth_picture};
-use deepfusion_train::TrainConfig;
+use deepfusion_sim::{SimConfig, Simulation};
+use deepfusion_train::{DepthRunner, Predictor, TrainConfig};
 use image::codecs::jpeg::JpegEncoder;
 use serde::Serialize;
 
 use super::{device, train::preset};
 use crate::cli::{BenchArgs, PresetChoice};
-use crate::output;
+use crate::pipeline::{self, Threads};
+use crate::{engine, output};
 
-/// The picture that is decoded and resized: a KITTI frame's size.
+/// The picture that is decoded and resized, a simulated street: a KITTI frame's size.
 const PICTURE: (u32, u32) = (1242, 375);
+
+/// Frames a second are measured over this many images for every repeat of a stage.
+const IMAGES_PER_REPEAT: usize = 3;
 
 #[derive(Debug, Serialize)]
 struct Report {
@@ -27,7 +34,9 @@ struct Report {
     parameters: usize,
     /// Median of each stage.
     stages_ms: Stages,
-    /// Of decode to cloud, one after another.
+    /// From decode to colour, one after another.
+    latency_ms: f64,
+    /// Of all stages, overlapped as `predict` overlaps them.
     fps: f64,
     peak_rss_mb: Option<f64>,
     peak_device_mb: Option<f64>,
@@ -45,34 +54,18 @@ struct Stages {
 
 /// `deepfusion bench`.
 pub fn run(args: &BenchArgs) -> Result<()> {
-    let device = device::open(args.device)?;
-    let (name, config, net) = match &args.model {
-        Some(path) => {
-            let (config, net) = deepfusion_train::load_depth_net(path, &device)?;
-            let name = path.display().to_string();
-            (name, config, net)
-        }
-        None => {
-            let preset = preset(args.preset.unwrap_or(PresetChoice::Tiny));
-            let mut config = preset.config();
-            if let Some(size) = args.size {
-                config.size.width = size.width as usize;
-                config.size.height = size.height as usize;
-            }
-            config.validate()?;
-            let net = config.depth_net.init(&device)?;
-            (preset.to_string(), config, net)
-        }
-    };
-    let stages = measure(&config, &net, &device, args.repeats.max(1))?;
-    let total = stages.decode + stages.resize + stages.network + stages.depth + stages.cloud;
+    let (name, parameters, config, runner) = network(args)?;
+    let repeats = args.repeats.max(1);
+    let bench = Bench::new(&config, &*runner)?;
+    let stages = bench.stages(repeats)?;
     let report = Report {
-        engine: "burn",
-        device: device::name(args.device),
+        engine: runner.name(),
+        device: device::name(args.engine.device),
         network: name,
         size: [config.size.width, config.size.height],
-        parameters: deepfusion_nn::weights::collect(&net).value_count(),
-        fps: 1e3 / total,
+        parameters,
+        latency_ms: stages.sum(),
+        fps: bench.overlapped_fps(repeats)?,
         peak_rss_mb: peak_rss_mb(),
         peak_device_mb: None,
         stages_ms: stages,
@@ -93,14 +86,15 @@ pub fn run(args: &BenchArgs) -> Result<()> {
          depth   {:8.2}   disparity to metres\n\
          cloud   {:8.2}   coloured points\n\
          colour  {:8.2}   depth as a picture\n\
-         {:.1} frames a second from decode to cloud, peak memory {memory}\n",
+         all     {:8.2}   one after another: what an image waits\n\
+         {:.1} frames a second, the stages of {} images overlapped; peak memory {memory}\n",
         report.network,
         report.size[0],
         report.size[1],
         report.parameters as f64 / 1e6,
         report.engine,
         report.device,
-        args.repeats,
+        repeats,
         s.decode,
         PICTURE.0,
         PICTURE.1,
@@ -109,71 +103,160 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         s.depth,
         s.cloud,
         s.colour,
+        report.latency_ms,
         report.fps,
+        repeats * IMAGES_PER_REPEAT,
     ))
 }
 
-fn measure(
-    config: &TrainConfig,
-    net: &DepthNet,
-    device: &Device,
-    repeats: usize,
-) -> Result<Stages> {
-    let (w, h) = (config.size.width, config.size.height);
-    let picture = RgbImage::from_fn(PICTURE.0, PICTURE.1, |x, y| {
-        image::Rgb([(x * 7 + y * 3) as u8, (x ^ y) as u8, (y * 5) as u8])
-    });
-    let mut jpeg = Vec::new();
-    JpegEncoder::new_with_quality(&mut jpeg, 92).encode_image(&picture)?;
-    let decode = median(repeats, || {
-        image::load_from_memory(&jpeg).map(|i| i.to_rgb8())
-    })?;
-    let resize = median(repeats, || {
-        Ok::<_, anyhow::Error>(to_chw(&resize_rgb(&picture, w as u32, h as u32)))
-    })?;
-    let small = resize_rgb(&picture, w as u32, h as u32);
-    let input = to_chw(&small);
-    let range = config.depth_net.range;
-    let mut sigmoid = Vec::new();
-    let network = median(repeats, || {
-        let x = Tensor::from_data(TensorData::new(input.clone(), [1, 3, h, w]), device);
-        let finest = net.forward(x).swap_remove(0);
-        sigmoid = finest.into_data().iter::<f32>().collect();
-        Ok::<_, anyhow::Error>(())
-    })?;
-    let mut depth = DepthMap::empty(w, h);
-    let to_metres = median(repeats, || {
-        for (to, s) in depth.data.iter_mut().zip(&sigmoid) {
-            *to = range.depth_m(f64::from(*s)) as f32;
+/// The network asked for: its name, its number of parameters, its configuration and what runs it.
+fn network(args: &BenchArgs) -> Result<(String, usize, TrainConfig, Arc<dyn DepthRunner>)> {
+    if let Some(path) = &args.model {
+        let mut parameters = 0;
+        let predictor = Predictor::load(path, |config, weights| {
+            parameters = weights.value_count();
+            engine::runner(&args.engine, config, weights)
+        })?;
+        let config = predictor.config().clone();
+        return Ok((
+            path.display().to_string(),
+            parameters,
+            config,
+            predictor.into_runner(),
+        ));
+    }
+    let preset = preset(args.preset.unwrap_or(PresetChoice::Tiny));
+    let mut config = preset.config();
+    if let Some(size) = args.size {
+        config.size.width = size.width as usize;
+        config.size.height = size.height as usize;
+    }
+    config.validate()?;
+    let weights = collect(&config.depth_net.init(&Device::flex())?);
+    let parameters = weights.value_count();
+    let runner = engine::runner(&args.engine, &config, weights)?;
+    Ok((preset.to_string(), parameters, config, runner))
+}
+
+impl Stages {
+    fn sum(&self) -> f64 {
+        self.decode + self.resize + self.network + self.depth + self.cloud + self.colour
+    }
+}
+
+/// What the stages work on.
+struct Bench<'a> {
+    runner: &'a dyn DepthRunner,
+    jpeg: Vec<u8>,
+    k: Intrinsics,
+}
+
+impl<'a> Bench<'a> {
+    fn new(config: &TrainConfig, runner: &'a dyn DepthRunner) -> Result<Self> {
+        let street = Simulation::new(&SimConfig {
+            frames: 1,
+            width: PICTURE.0,
+            height: PICTURE.1,
+            ..SimConfig::default()
+        })?;
+        let mut jpeg = Vec::new();
+        JpegEncoder::new_with_quality(&mut jpeg, 92).encode_image(&street.frame(0).rgb)?;
+        let (width, height) = (config.size.width as u32, config.size.height as u32);
+        Ok(Self {
+            runner,
+            jpeg,
+            k: street.intrinsics().resized(width, height),
+        })
+    }
+
+    fn decode(&self) -> Result<RgbImage> {
+        Ok(decode_rgb(&self.jpeg, Path::new("the bench's picture"))?)
+    }
+
+    fn resize(&self, picture: &RgbImage) -> Vec<f32> {
+        let whole = [0, 0, picture.width(), picture.height()];
+        to_network_input(picture, whole, self.k.width, self.k.height)
+    }
+
+    /// Disparity, on the host.
+    fn network(&self, input: &[f32]) -> Result<Vec<f32>> {
+        Ok(self.runner.disparity(input)?)
+    }
+
+    fn depth(&self, disparity: &[f32]) -> DepthMap {
+        DepthMap {
+            width: self.k.width as usize,
+            height: self.k.height as usize,
+            data: disparity.iter().map(|d| d.recip()).collect(),
         }
-        Ok::<_, anyhow::Error>(())
-    })?;
-    let k = Intrinsics {
-        fx: 0.58 * w as f64,
-        fy: 1.92 * h as f64,
-        cx: w as f64 / 2.0,
-        cy: h as f64 / 2.0,
-        width: w as u32,
-        height: h as u32,
-    };
-    let cloud = median(repeats, || {
-        PointCloud::from_depth(&depth, &k, Some(small.as_raw()), 80.0)
-    })?;
-    let colour = median(repeats, || {
-        Ok::<_, anyhow::Error>(depth_picture(&depth, &DepthScale::default()))
-    })?;
-    Ok(Stages {
-        decode,
-        resize,
-        network,
-        depth: to_metres,
-        cloud,
-        colour,
-    })
+    }
+
+    fn cloud(&self, depth: &DepthMap, small: &RgbImage) -> Result<PointCloud> {
+        Ok(PointCloud::from_depth(depth, &self.k, Some(small), 80.0)?)
+    }
+
+    /// Each stage alone.
+    fn stages(&self, repeats: usize) -> Result<Stages> {
+        let picture = self.decode()?;
+        let small = resize_rgb(&picture, self.k.width, self.k.height);
+        let input = self.resize(&picture);
+        let disparity = self.network(&input)?;
+        let depth = self.depth(&disparity);
+        Ok(Stages {
+            decode: median(repeats, || self.decode())?,
+            resize: median(repeats, || Ok(self.resize(&picture)))?,
+            network: median(repeats, || self.network(&input))?,
+            depth: median(repeats, || Ok(self.depth(&disparity)))?,
+            cloud: median(repeats, || self.cloud(&depth, &small))?,
+            colour: median(repeats, || {
+                Ok(depth_picture(&depth, &DepthScale::default()))
+            })?,
+        })
+    }
+
+    /// Images a second through all stages at once, from the JPEG to cloud and coloured depth in memory.
+    fn overlapped_fps(&self, repeats: usize) -> Result<f64> {
+        let small = resize_rgb(&self.decode()?, self.k.width, self.k.height);
+        let failure = Mutex::new(None);
+        let keep = |error| {
+            failure
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .get_or_insert(error);
+        };
+        let before = |_| match self.decode() {
+            Ok(picture) => Some(self.resize(&picture)),
+            Err(error) => {
+                keep(error);
+                None
+            }
+        };
+        let after = |_, disparity: Result<Vec<f32>>| {
+            let depth = match disparity {
+                Ok(disparity) => self.depth(&disparity),
+                Err(error) => return keep(error),
+            };
+            match self.cloud(&depth, &small) {
+                Ok(cloud) => drop(std::hint::black_box(cloud)),
+                Err(error) => keep(error),
+            }
+            std::hint::black_box(depth_picture(&depth, &DepthScale::default()));
+        };
+        let images = repeats * IMAGES_PER_REPEAT;
+        let threads = Threads::for_this_machine();
+        let start = Instant::now();
+        let network = |input: Vec<f32>| self.network(&input);
+        pipeline::run(images, threads, &|| false, &before, network, &after);
+        let seconds = start.elapsed().as_secs_f64();
+        match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            Some(error) => Err(error),
+            None => Ok(images as f64 / seconds),
+        }
+    }
 }
 
 /// Median time of `work` in milliseconds, after one run that is not counted.
-fn median<T, E>(repeats: usize, mut work: impl FnMut() -> Result<T, E>) -> Result<f64, E> {
+fn median<T>(repeats: usize, mut work: impl FnMut() -> Result<T>) -> Result<f64> {
     work()?;
     let mut times = Vec::with_capacity(repeats);
     for _ in 0..repeats {

@@ -1,8 +1,6 @@
 //! What becomes of a trainer's events: log files, panels, and lines for the person who waits.
 
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
@@ -10,28 +8,11 @@ use deepfusion_render::sample_panel;
 use deepfusion_train::log::{CsvLog, TensorBoardLog};
 use deepfusion_train::{Control, TrainEvent};
 
+use crate::interrupt;
 use crate::progress::{Progress, say};
 
 /// How often a line tells of the losses where there is no bar.
 const LINE_EVERY: Duration = Duration::from_secs(20);
-
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
-/// From now on Ctrl-C asks training to save and stop; a second one ends the program at once.
-pub fn catch_interrupt() {
-    static SET: OnceLock<()> = OnceLock::new();
-    SET.get_or_init(|| {
-        let caught = ctrlc::set_handler(|| {
-            if INTERRUPTED.swap(true, Ordering::SeqCst) {
-                std::process::exit(130);
-            }
-            eprintln!("stopping after this step; the run is saved (Ctrl-C again: at once)");
-        });
-        if let Err(error) = caught {
-            tracing::warn!("Ctrl-C will end the program without saving: {error}");
-        }
-    });
-}
 
 /// Writes the logs of a run and shows its progress.
 pub struct Recorder {
@@ -85,7 +66,7 @@ impl Recorder {
             self.failure.get_or_insert(error);
             return Control::Stop;
         }
-        if INTERRUPTED.load(Ordering::SeqCst) {
+        if interrupt::asked() {
             Control::Stop
         } else {
             Control::Continue

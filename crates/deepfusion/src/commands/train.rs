@@ -9,10 +9,10 @@ use deepfusion_train::{
 
 use super::device;
 use super::evaluate::open_datasets;
-use super::recorder::{Recorder, catch_interrupt, clock};
+use super::recorder::{Recorder, clock};
 use crate::cli::{PresetChoice, TrainArgs, ViewMotionChoice};
-use crate::output;
 use crate::progress::say;
+use crate::{interrupt, output};
 
 /// `deepfusion train`.
 pub fn run(args: &TrainArgs) -> Result<()> {
@@ -57,7 +57,7 @@ pub fn run(args: &TrainArgs) -> Result<()> {
 
 /// Runs a trainer with its logs, and gives the curves for a report.
 pub fn train(trainer: &mut Trainer) -> Result<super::recorder::Curves> {
-    catch_interrupt();
+    interrupt::catch("stopping after this step; the run is saved");
     let mut recorder = Recorder::open(trainer.folder(), trainer.step())?;
     let summary = trainer.run(&mut |event| recorder.handle(event))?;
     let curves = recorder.finish()?;

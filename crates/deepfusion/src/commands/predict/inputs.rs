@@ -1,0 +1,141 @@
+//! The images that the arguments mean, each with the name of its outputs.
+
+use std::collections::HashSet;
+use std::path::{Component, Path, PathBuf};
+
+use anyhow::Result;
+
+use crate::error::CliError;
+
+/// The endings of images.
+const IMAGES: [&str; 3] = ["png", "jpg", "jpeg"];
+
+/// An image, and what its outputs are called.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Input {
+    /// The image.
+    pub path: PathBuf,
+    /// What the names of its outputs begin with.
+    pub name: String,
+}
+
+/// The images that files, folders and patterns mean: in the order of their paths, each once. Neither order nor
+/// names depend on the order of the arguments, so that shards started apart agree on both.
+pub fn find(arguments: &[String]) -> Result<Vec<Input>> {
+    let mut found = Vec::new();
+    for argument in arguments {
+        let path = PathBuf::from(argument);
+        if path.is_dir() {
+            let entries =
+                std::fs::read_dir(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+            let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+            found.extend(images_among(paths, argument)?);
+        } else if path.exists() || !argument.contains(['*', '?', '[']) {
+            // A file that is not there is told by whoever opens it.
+            found.push(path);
+        } else {
+            let paths = glob::glob(argument)?.filter_map(Result::ok);
+            found.extend(images_among(paths, argument)?);
+        }
+    }
+    Ok(named(found))
+}
+
+/// The images among the paths; that there is none is an error that names the argument.
+fn images_among(paths: impl Iterator<Item = PathBuf>, argument: &str) -> Result<Vec<PathBuf>> {
+    let images: Vec<_> = paths.filter(|p| is_image(p)).collect();
+    if images.is_empty() {
+        let input = argument.to_owned();
+        return Err(CliError::NoImages { input }.into());
+    }
+    Ok(images)
+}
+
+fn is_image(path: &Path) -> bool {
+    path.extension()
+        .and_then(|e| e.to_str())
+        .is_some_and(|e| IMAGES.contains(&e.to_ascii_lowercase().as_str()))
+}
+
+/// Sorts the paths, drops those given twice, and names each after its file, numbered where two files share a name.
+fn named(paths: Vec<PathBuf>) -> Vec<Input> {
+    let mut paths: Vec<PathBuf> = paths.iter().map(|p| without_dots(p)).collect();
+    paths.sort();
+    let mut seen = HashSet::new();
+    paths.retain(|p| seen.insert(std::path::absolute(p).unwrap_or_else(|_| p.clone())));
+    let mut used = HashSet::new();
+    let name = |path: &PathBuf| {
+        let stem = path
+            .file_stem()
+            .map_or("image".into(), |s| s.to_string_lossy().into_owned());
+        let mut name = stem.clone();
+        let mut number = 1;
+        // In small letters: to some file systems `A` and `a` are the same.
+        while !used.insert(name.to_lowercase()) {
+            number += 1;
+            name = format!("{stem}-{number}");
+        }
+        name
+    };
+    let names: Vec<String> = paths.iter().map(name).collect();
+    let both = paths.into_iter().zip(names);
+    both.map(|(path, name)| Input { path, name }).collect()
+}
+
+/// `./a/./b` is `a/b`.
+fn without_dots(path: &Path) -> PathBuf {
+    path.components()
+        .filter(|c| *c != Component::CurDir)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn names(paths: &[&str]) -> Vec<String> {
+        let inputs = named(paths.iter().map(PathBuf::from).collect());
+        inputs.into_iter().map(|i| i.name).collect()
+    }
+
+    #[test]
+    fn inputs_of_the_same_name_do_not_overwrite_each_other() {
+        assert_eq!(names(&["a/0.png", "b/0.png", "b/1.jpg"]), ["0", "0-2", "1"]);
+        // Not even where the number makes the name of another.
+        assert_eq!(
+            names(&["a/0.png", "b/0.png", "c/0-2.png", "d/A.png", "e/a.png"]),
+            ["0", "0-2", "0-2-2", "A", "a-2"]
+        );
+    }
+
+    #[test]
+    fn an_image_given_twice_is_one() {
+        let absolute = std::path::absolute("a/0.png").unwrap();
+        let twice = ["./a/0.png", "a/0.png", absolute.to_str().unwrap()];
+        assert_eq!(names(&twice), ["0"]);
+    }
+
+    #[test]
+    fn a_pattern_without_images_is_an_error() {
+        let error = find(&["/nowhere/*.png".into()]).unwrap_err();
+        assert!(error.to_string().contains("/nowhere/*.png"), "{error}");
+    }
+
+    proptest! {
+        #[test]
+        fn names_are_unique_and_independent_of_the_order(
+            mut paths in proptest::collection::vec("[ab]/[aA0](-[23])?\\.(png|jpg)", 1..30),
+            turn in 0usize..30,
+        ) {
+            let inputs = |p: &[String]| named(p.iter().map(PathBuf::from).collect());
+            let first = inputs(&paths);
+            let unique: HashSet<_> = first.iter().map(|i| i.name.to_lowercase()).collect();
+            prop_assert_eq!(unique.len(), first.len());
+            let places = paths.len();
+            paths.rotate_left(turn % places);
+            paths.reverse();
+            prop_assert_eq!(inputs(&paths), first);
+        }
+    }
+}

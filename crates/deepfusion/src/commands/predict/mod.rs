@@ -1,0 +1,205 @@
+//! `deepfusion predict`: images to metric depth, in bulk.
+
+mod camera;
+mod inputs;
+mod ledger;
+mod manifest;
+mod outputs;
+mod resume;
+mod sidecar;
+
+use anyhow::{Context, Result};
+use deepfusion_data::{RgbImage, load_rgb};
+use deepfusion_geometry::Intrinsics;
+use deepfusion_train::{Prediction, Predictor, PreparedImage, Preparer};
+
+use self::camera::CameraSource;
+use self::inputs::Input;
+use self::ledger::Ledger;
+use self::manifest::{Lock, Manifest};
+use self::sidecar::{FileMark, MadeWith, Sidecar};
+use crate::cli::{PredictArgs, Save};
+use crate::engine;
+use crate::error::CliError;
+use crate::pipeline::{self, Threads};
+use crate::progress::say;
+use crate::{interrupt, output};
+
+/// What is the same for all images of a run.
+struct Job<'a> {
+    args: &'a PredictArgs,
+    camera: CameraSource,
+    preparer: Preparer,
+    made_with: MadeWith,
+    step: usize,
+    /// Whether the run learned metres.
+    metric: bool,
+}
+
+/// An image on its way through the network.
+struct Loaded {
+    mark: FileMark,
+    image: RgbImage,
+    camera: Option<Intrinsics>,
+}
+
+/// `deepfusion predict`.
+pub fn run(args: &PredictArgs) -> Result<()> {
+    let all = inputs::find(&args.inputs)?;
+    let mine: Vec<&Input> = args.shard.part_of(&all).collect();
+    let predictor = engine::load(&args.model, &args.engine)?;
+    let camera = CameraSource::new(args, predictor.training_camera())?;
+    if args.save.contains(&Save::Ply) && matches!(camera, CameraSource::Unknown) {
+        return Err(CliError::NoCamera.into());
+    }
+    let job = Job {
+        args,
+        camera,
+        preparer: predictor.preparer(),
+        made_with: MadeWith::new(args, &predictor, &camera)?,
+        step: predictor.step,
+        metric: predictor.training_camera().is_some() && predictor.config().loss.speed > 0.0,
+    };
+    std::fs::create_dir_all(&args.out).map_err(|e| deepfusion_data::Error::file(&args.out, e))?;
+    interrupt::catch("stopping after the images at work; the same command goes on from there");
+    let _lock = Lock::take(&args.out, args.shard)?;
+    let (ledger, todo) = begin(&job, &all, &mine)?;
+    predict(&job, &predictor, &mine, &todo, &ledger);
+    let summary = ledger.finish()?;
+    if job.camera.word() == "assumed" {
+        tracing::warn!(
+            "no intrinsics given: the training camera's field of view is assumed, so the metres are \
+             only as right as that is (scale_trusted: false; give --intrinsics or --calib)"
+        );
+    }
+    let there = mine.len() - todo.len();
+    say(&format!(
+        "{} images written to {}{}",
+        summary.done - there,
+        args.out.display(),
+        if there > 0 {
+            format!(", {there} were there already")
+        } else {
+            String::new()
+        }
+    ));
+    if args.json {
+        output::print_json(&summary.sidecars)?;
+    }
+    summary.outcome
+}
+
+/// Looks at what is there and writes the manifest; gives the images that are left to do, by their place in `mine`.
+fn begin<'a>(job: &Job<'a>, all: &[Input], mine: &[&Input]) -> Result<(Ledger<'a>, Vec<usize>)> {
+    let args = job.args;
+    let mut manifest = Manifest::new(args.shard, all, mine, job.made_with.clone());
+    let before = Manifest::all(&args.out)?;
+    if !args.overwrite {
+        manifest.check_against(&before, &args.out)?;
+    }
+    resume::remove_partial_files(args, mine)?;
+    let begun = manifest.begun(&before);
+    let mut todo = Vec::new();
+    let mut sidecars = vec![None; if args.json { mine.len() } else { 0 }];
+    for (i, input) in mine.iter().enumerate() {
+        let known = begun.contains(&(input.path.as_path(), input.name.as_str()));
+        match resume::finished(args, input, &job.made_with, known)? {
+            None => todo.push(i),
+            Some(sidecar) => {
+                manifest.images[i].state = manifest::State::Done;
+                if let Some(place) = sidecars.get_mut(i) {
+                    *place = Some(sidecar);
+                }
+            }
+        }
+    }
+    manifest.write(&args.out)?;
+    // Again, now that ours can be seen: of two shards of different jobs started at once, one notices.
+    let path = manifest.path(&args.out);
+    let others = Manifest::all(&args.out)?;
+    if !args.overwrite
+        && let Err(error) = manifest.check_against(&others, &args.out)
+    {
+        std::fs::remove_file(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+        return Err(error.into());
+    }
+    Ok((Ledger::new(&args.out, manifest, sidecars), todo))
+}
+
+fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], ledger: &Ledger) {
+    let load = |i: usize| {
+        let loaded = job.load(mine[todo[i]]);
+        loaded.map_err(|e| ledger.failed(todo[i], e)).ok()
+    };
+    let infer = |(loaded, prepared): (Loaded, PreparedImage)| (loaded, predictor.infer(&prepared));
+    let write = |i: usize, (loaded, prediction): (Loaded, Result<Prediction, _>)| {
+        let sidecar = prediction
+            .map_err(anyhow::Error::from)
+            .and_then(|prediction| job.write(mine[todo[i]], &loaded, &prediction));
+        match sidecar {
+            Ok(sidecar) => ledger.done(todo[i], sidecar),
+            Err(error) => ledger.stop(error),
+        }
+    };
+    let stop = || interrupt::asked() || ledger.stopped();
+    let threads = Threads::for_this_machine();
+    pipeline::run(todo.len(), threads, &stop, &load, infer, &write);
+}
+
+impl Job<'_> {
+    /// Reads an image and makes it the network's input.
+    fn load(&self, input: &Input) -> Result<(Loaded, PreparedImage)> {
+        // Before it is read: a change in between is then noticed by the next run.
+        let mark = FileMark::of(&input.path)?;
+        let image = load_rgb(&input.path)?;
+        let camera = self.camera.of(image.width(), image.height());
+        let camera = camera.with_context(|| input.path.display().to_string())?;
+        let (correct, crop) = (!self.args.no_focal_correction, !self.args.stretch);
+        let prepared = self
+            .preparer
+            .prepare(&image, camera.as_ref(), correct, crop);
+        let loaded = Loaded {
+            mark,
+            image,
+            camera,
+        };
+        Ok((loaded, prepared))
+    }
+
+    /// Writes an image's outputs, then its sidecar.
+    fn write(&self, input: &Input, loaded: &Loaded, prediction: &Prediction) -> Result<Sidecar> {
+        let (args, image) = (self.args, &loaded.image);
+        let depth = prediction.depth();
+        let (mut files, mut file_bytes) = (Vec::new(), Vec::new());
+        for save in &args.save {
+            let file = outputs::file_name(&input.name, *save);
+            let path = args.out.join(&file);
+            outputs::write(args, *save, image, loaded.camera.as_ref(), &depth, &path)?;
+            file_bytes.push(FileMark::of(&path)?.bytes);
+            files.push(file);
+        }
+        let seen = depth.data.iter().copied().filter(|d| *d > 0.0);
+        let ends = |[low, high]: [f32; 2], d: f32| [low.min(d), high.max(d)];
+        let sidecar = Sidecar {
+            image: input.path.clone(),
+            image_file: loaded.mark,
+            size: [image.width(), image.height()],
+            unit: "metres along the camera's axis (z)".into(),
+            model: args.model.clone(),
+            checkpoint_step: self.step,
+            intrinsics: loaded.camera.map(|k| [k.fx, k.fy, k.cx, k.cy]),
+            intrinsics_from: self.camera.word().into(),
+            scale_trusted: self.metric && self.camera.word() == "given",
+            focal_factor: prediction.focal_factor,
+            window: prediction.window,
+            depth_m: seen
+                .map(|d| [d, d])
+                .reduce(|ends_so_far, [d, _]| ends(ends_so_far, d)),
+            files,
+            file_bytes,
+            made_with: self.made_with.clone(),
+        };
+        sidecar.write(&args.out, &input.name)?;
+        Ok(sidecar)
+    }
+}

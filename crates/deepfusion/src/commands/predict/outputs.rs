@@ -1,0 +1,83 @@
+//! The files of one prediction.
+
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::Result;
+use deepfusion_cloud::PointCloud;
+use deepfusion_data::{RgbImage, save_png, write_atomically, write_depth_png};
+use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_render::{DepthScale, depth_picture, side_by_side, with_depth_legend};
+
+use crate::cli::{PredictArgs, Save};
+use crate::error::CliError;
+
+/// The name of an output.
+pub fn file_name(name: &str, save: Save) -> String {
+    let ending = match save {
+        Save::DepthPng => "_depth.png",
+        Save::Npy => "_depth.npy",
+        Save::Color => "_color.png",
+        Save::SideBySide => "_side.png",
+        Save::Ply => ".ply",
+    };
+    format!("{name}{ending}")
+}
+
+/// Writes one output, atomically.
+pub fn write(
+    args: &PredictArgs,
+    save: Save,
+    image: &RgbImage,
+    camera: Option<&Intrinsics>,
+    depth: &DepthMap,
+    path: &Path,
+) -> Result<()> {
+    let scale = DepthScale::default();
+    match save {
+        Save::DepthPng => write_depth_png(depth, path)?,
+        Save::Npy => write_npy(depth, path)?,
+        Save::Color => {
+            let picture = with_depth_legend(&depth_picture(depth, &scale), &scale);
+            save_png(&picture, path)?;
+        }
+        Save::SideBySide => save_png(&side_by_side(image, depth, &scale)?, path)?,
+        Save::Ply => {
+            let k = camera.ok_or(CliError::NoCamera)?;
+            let rgb = Some(image.as_raw().as_slice());
+            let cloud = PointCloud::from_depth(depth, k, rgb, args.max_depth as f32)?;
+            write_atomically::<CloudError>(path, |out| Ok(cloud.write_ply(out)?))
+                .map_err(CloudError::into_inner)?;
+        }
+    }
+    Ok(())
+}
+
+fn write_npy(depth: &DepthMap, path: &Path) -> Result<()> {
+    let view = ndarray::ArrayView2::from_shape((depth.height, depth.width), &depth.data)?;
+    let mut bytes = Vec::new();
+    ndarray_npy::WriteNpyExt::write_npy(&view, &mut bytes)?;
+    write_atomically::<deepfusion_data::Error>(path, |out| {
+        out.write_all(&bytes)
+            .map_err(|e| deepfusion_data::Error::file(path, e))
+    })?;
+    Ok(())
+}
+
+/// Either crate's error, out of a file being written.
+#[derive(Debug, thiserror::Error)]
+enum CloudError {
+    #[error(transparent)]
+    File(#[from] deepfusion_data::Error),
+    #[error(transparent)]
+    Cloud(#[from] deepfusion_cloud::Error),
+}
+
+impl CloudError {
+    fn into_inner(self) -> anyhow::Error {
+        match self {
+            Self::File(error) => error.into(),
+            Self::Cloud(error) => error.into(),
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! What of a job is there already, and whether it may stay.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use anyhow::Result;
+
+use super::inputs::Input;
+use super::outputs::file_name;
+use super::sidecar::{FileMark, MadeWith, Sidecar};
+use crate::cli::PredictArgs;
+use crate::error::CliError;
+
+/// The sidecar of an image that is done; `None` where there is work to do.
+///
+/// Files that this job did not make, or made of an image that has changed since, are an error, or with `--overwrite` work
+/// to do. `begun` says that a run of this job had the image in its manifest: files without a sidecar are then what it left
+/// when it was killed.
+pub fn finished(
+    args: &PredictArgs,
+    input: &Input,
+    made_with: &MadeWith,
+    begun: bool,
+) -> Result<Option<Sidecar>> {
+    let path = Sidecar::path(&args.out, &input.name);
+    let text = match std::fs::read(&path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+            if !(begun || args.overwrite) {
+                refuse_files(args, input)?;
+            }
+            return Ok(None);
+        }
+        Err(e) => return Err(deepfusion_data::Error::file(&path, e).into()),
+    };
+    let why = match serde_json::from_slice::<Sidecar>(&text) {
+        Err(_) => "and does not say how it was made".to_owned(),
+        Ok(sidecar) if sidecar.image != input.path => {
+            format!("made from {}", sidecar.image.display())
+        }
+        Ok(sidecar) => match made_with.difference(&sidecar.made_with) {
+            Some(what) => format!("made with {what}"),
+            None if FileMark::of(&input.path).is_ok_and(|mark| mark != sidecar.image_file) => {
+                format!("and {} has changed since", input.path.display())
+            }
+            None if sidecar.is_complete(&args.out) => return Ok(Some(sidecar)),
+            // Ours, but a file of it is gone or cut off.
+            None => return Ok(None),
+        },
+    };
+    if args.overwrite {
+        return Ok(None);
+    }
+    Err(CliError::Stale { path, why }.into())
+}
+
+/// Without a sidecar, nothing of the image's names may be there.
+fn refuse_files(args: &PredictArgs, input: &Input) -> Result<(), CliError> {
+    for save in &args.save {
+        let path = args.out.join(file_name(&input.name, *save));
+        if path.exists() {
+            return Err(CliError::Exists {
+                path,
+                remedy: "allow it with --overwrite, or choose another folder",
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Removes the half-written files that a killed run of this shard left (`.NAME.PID-N.partial`).
+pub fn remove_partial_files(args: &PredictArgs, mine: &[&Input]) -> Result<()> {
+    let files_of = |input: &&Input| {
+        let sidecar = format!("{}.json", input.name);
+        let outputs = args.save.iter().map(|save| file_name(&input.name, *save));
+        outputs.chain([sidecar]).collect::<Vec<_>>()
+    };
+    let files: HashSet<String> = mine.iter().flat_map(files_of).collect();
+    let failed = |e| deepfusion_data::Error::file(&args.out, e);
+    for entry in std::fs::read_dir(&args.out).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if partial_of(&path).is_some_and(|file| files.contains(file)) {
+            std::fs::remove_file(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+        }
+    }
+    Ok(())
+}
+
+/// The file that a half-written one would have become.
+fn partial_of(path: &Path) -> Option<&str> {
+    let name = path.file_name()?.to_str()?;
+    let inner = name.strip_prefix('.')?.strip_suffix(".partial")?;
+    let (file, process) = inner.rsplit_once('.')?;
+    process.contains('-').then_some(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_written_files_are_known_by_their_names() {
+        let of = |name: &'static str| partial_of(Path::new(name));
+        assert_eq!(of("out/.a_depth.png.17-3.partial"), Some("a_depth.png"));
+        assert_eq!(of("out/a_depth.png"), None);
+        assert_eq!(of("out/.a.partial"), None);
+    }
+}

@@ -1,0 +1,203 @@
+//! What stands beside every prediction. It is written last, so that it also says that the rest is there.
+
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+use anyhow::Result;
+use clap::ValueEnum;
+use deepfusion_data::write_atomically;
+use deepfusion_train::{Predictor, RunFolder};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::camera::CameraSource;
+use crate::cli::{PredictArgs, Save};
+
+/// A prediction's description.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Sidecar {
+    /// The input.
+    pub image: PathBuf,
+    /// The input's file, to notice that it changed.
+    pub image_file: FileMark,
+    /// The input's width and height.
+    pub size: [u32; 2],
+    /// What the depths are.
+    pub unit: String,
+    /// The run or checkpoint given.
+    pub model: PathBuf,
+    /// Steps the checkpoint was trained for.
+    pub checkpoint_step: usize,
+    /// fx, fy, cx, cy in pixels of the input.
+    pub intrinsics: Option<[f64; 4]>,
+    /// `given`, `assumed` or `unknown`.
+    pub intrinsics_from: String,
+    /// Whether the metres can be trusted: the run learned them, and the camera is known.
+    pub scale_trusted: bool,
+    /// What depth was multiplied by for another focal length than the one trained with.
+    pub focal_factor: f64,
+    /// x, y, width and height of the part that was looked at; depth is 0 outside.
+    pub window: [u32; 4],
+    /// Smallest and largest depth, in metres; none where no pixel has one.
+    pub depth_m: Option<[f32; 2]>,
+    /// The outputs, in the sidecar's folder.
+    pub files: Vec<String>,
+    /// The outputs' sizes in bytes, to notice a file that was cut off.
+    pub file_bytes: Vec<u64>,
+    /// What else the outputs depend on.
+    pub made_with: MadeWith,
+}
+
+/// A file's size and time of change, as `make` and `rsync` compare them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FileMark {
+    /// Size in bytes.
+    pub bytes: u64,
+    /// Time of the last change, nanoseconds since 1970, where the system knows it.
+    pub modified_ns: Option<u64>,
+}
+
+impl FileMark {
+    /// The file's mark now.
+    pub fn of(path: &Path) -> Result<Self, deepfusion_data::Error> {
+        let meta = std::fs::metadata(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
+        let since = meta.modified().ok().map(|t| t.duration_since(UNIX_EPOCH));
+        let nanoseconds = since.and_then(Result::ok).map(|d| d.as_nanos() as u64);
+        Ok(Self {
+            bytes: meta.len(),
+            modified_ns: nanoseconds,
+        })
+    }
+}
+
+/// Program, weights and options: outputs of the same image with equal ones are equal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MadeWith {
+    /// The program's version.
+    pub version: String,
+    /// SHA-256 of the run's configuration and checkpoint.
+    pub weights: String,
+    /// What ran the network: `--engine`, `--precision`.
+    pub engine: String,
+    /// `--save`.
+    pub save: Vec<String>,
+    /// `--max-depth`.
+    pub max_depth_m: f64,
+    /// `--intrinsics`, or those of `--calib`.
+    pub intrinsics: Option<[f64; 4]>,
+    /// Off: `--no-focal-correction`.
+    pub focal_correction: bool,
+    /// `--stretch`.
+    pub stretch: bool,
+}
+
+impl MadeWith {
+    /// For these arguments and this checkpoint.
+    pub fn new(args: &PredictArgs, predictor: &Predictor, camera: &CameraSource) -> Result<Self> {
+        let (folder, _) = RunFolder::open(&args.model)?;
+        let mut hash = Sha256::new();
+        for path in [
+            folder.config_path(),
+            folder.checkpoint_path(predictor.checkpoint),
+        ] {
+            // In pieces: a checkpoint may be larger than what predicting takes.
+            let mut file =
+                std::fs::File::open(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+            std::io::copy(&mut file, &mut hash)
+                .map_err(|e| deepfusion_data::Error::file(&path, e))?;
+        }
+        Ok(Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            weights: format!("{:x}", hash.finalize()),
+            engine: predictor.runner().name().into(),
+            save: args.save.iter().map(|s| word(*s)).collect(),
+            max_depth_m: args.max_depth,
+            intrinsics: match camera {
+                CameraSource::Given(k) => Some([k.fx, k.fy, k.cx, k.cy]),
+                CameraSource::File(k) => Some([k.fx, k.fy, k.cx, k.cy]),
+                CameraSource::Trained(_) | CameraSource::Unknown => None,
+            },
+            focal_correction: !args.no_focal_correction,
+            stretch: args.stretch,
+        })
+    }
+
+    fn same_camera(&self, other: &Self) -> bool {
+        match (self.intrinsics, other.intrinsics) {
+            (Some(a), Some(b)) => a.iter().zip(b).all(|(a, b)| equal(*a, b)),
+            (a, b) => a.is_none() && b.is_none(),
+        }
+    }
+
+    /// The first thing that differs, in the command line's words.
+    pub fn difference(&self, other: &Self) -> Option<&'static str> {
+        [
+            (self.version != other.version, "another program version"),
+            (self.weights != other.weights, "other weights (--model)"),
+            (
+                self.engine != other.engine,
+                "another engine (--engine, --precision)",
+            ),
+            (self.save != other.save, "another --save"),
+            (
+                !equal(self.max_depth_m, other.max_depth_m),
+                "another --max-depth",
+            ),
+            (
+                !self.same_camera(other),
+                "another camera (--intrinsics, --calib)",
+            ),
+            (
+                self.focal_correction != other.focal_correction,
+                "another --no-focal-correction",
+            ),
+            (self.stretch != other.stretch, "another --stretch"),
+        ]
+        .into_iter()
+        .find_map(|(differs, what)| differs.then_some(what))
+    }
+}
+
+/// Whether two numbers are the same but for the last digits, which JSON may lose.
+fn equal(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-12 * a.abs()
+}
+
+fn word(save: Save) -> String {
+    save.to_possible_value()
+        .map_or_else(String::new, |v| v.get_name().to_owned())
+}
+
+impl Sidecar {
+    /// Where the sidecar of a name lies.
+    pub fn path(folder: &Path, name: &str) -> PathBuf {
+        folder.join(format!("{name}.json"))
+    }
+
+    /// Writes it into the folder, atomically.
+    pub fn write(&self, folder: &Path, name: &str) -> Result<()> {
+        write_json(self, &Self::path(folder, name))
+    }
+
+    /// Whether every output is there, whole.
+    pub fn is_complete(&self, folder: &Path) -> bool {
+        self.files.len() == self.file_bytes.len()
+            && self
+                .files
+                .iter()
+                .zip(&self.file_bytes)
+                .all(|(file, bytes)| {
+                    std::fs::metadata(folder.join(file)).is_ok_and(|m| m.len() == *bytes)
+                })
+    }
+}
+
+/// Writes a value as indented JSON, atomically.
+pub fn write_json<T: Serialize>(value: &T, path: &Path) -> Result<()> {
+    let mut text = serde_json::to_vec_pretty(value)?;
+    text.push(b'\n');
+    write_atomically::<deepfusion_data::Error>(path, |out| {
+        std::io::Write::write_all(out, &text).map_err(|e| deepfusion_data::Error::file(path, e))
+    })?;
+    Ok(())
+}

@@ -1,0 +1,302 @@
+//! Prediction in bulk: shards, runs that were stopped, images that cannot be read.
+
+mod support;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+use support::{Run, in_folder};
+
+const DRIVE: &str = "sim/2026_01_01/2026_01_01_drive_0003_sync/image_02/data";
+const SAVE: &str = "--calib sim/2026_01_01 --save depth-png,npy,ply";
+
+fn run(folder: &Path, args: &str) -> Run {
+    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
+}
+
+fn ok(folder: &Path, args: &str) -> Run {
+    let run = run(folder, args);
+    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
+    run
+}
+
+fn fails(folder: &Path, args: &str, names: &[&str]) {
+    let run = run(folder, args);
+    assert_eq!(
+        (run.code, run.stdout.as_str()),
+        (1, ""),
+        "{args}: {}",
+        run.stderr
+    );
+    for name in names.iter().chain(&["hint: "]) {
+        assert!(run.stderr.contains(name), "{name}: {}", run.stderr);
+    }
+}
+
+fn start(folder: &Path, args: &str) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_deepfusion"))
+        .current_dir(folder)
+        .args(args.split_whitespace())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+/// A drive of 30 small pictures and a network that has hardly learned.
+fn prepare(folder: &Path) {
+    ok(
+        folder,
+        "simulate --out sim --frames 30 --seed 3 --scan-every 0 --size 96x64",
+    );
+    ok(
+        folder,
+        "train --data sim --size 96x64 --batch 2 --steps 1 --out run",
+    );
+}
+
+/// The folder's outputs and sidecars by name; manifests, which say how the work was shared, left out.
+fn outputs(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap())
+        .map(|e| (e.file_name().into_string().unwrap(), e.path()))
+        .filter(|(name, _)| !name.ends_with(".manifest.json"))
+        .map(|(name, path)| (name, fs::read(path).unwrap()))
+        .collect()
+}
+
+fn assert_same(a: &BTreeMap<String, Vec<u8>>, b: &BTreeMap<String, Vec<u8>>) {
+    assert!(a.keys().eq(b.keys()), "{:?} {:?}", a.keys(), b.keys());
+    for (name, bytes) in a {
+        assert!(*bytes == b[name], "{name} differs");
+    }
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn shards_started_at_once_make_what_one_run_makes() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    prepare(at);
+    // Two folders with the same names: what outputs are called depends on all inputs.
+    fs::create_dir(at.join("more")).unwrap();
+    for i in 0..4 {
+        let name = format!("000000000{i}.png");
+        fs::copy(at.join(DRIVE).join(&name), at.join("more").join(&name)).unwrap();
+    }
+    let predict = format!("predict --model run {SAVE}");
+    ok(at, &format!("{predict} {DRIVE} more --out whole"));
+    let whole = outputs(&at.join("whole"));
+    assert_eq!(whole.len(), 34 * 4, "{:?}", whole.keys());
+    let shards: Vec<_> = (1..=3)
+        .map(|i| {
+            // The order of the inputs does not matter.
+            let inputs = [format!("{DRIVE} more"), format!("more {DRIVE}")];
+            let args = format!("{predict} {} --out parts --shard {i}/3", inputs[i % 2]);
+            start(at, &args)
+        })
+        .collect();
+    for mut shard in shards {
+        assert!(shard.wait().unwrap().success());
+    }
+    assert_same(&outputs(&at.join("parts")), &whole);
+    let mut told = 0;
+    for i in 1..=3 {
+        let path = at.join(format!("parts/predict-{i}-of-3.manifest.json"));
+        let manifest = json(&path);
+        let images = manifest["images"].as_array().unwrap();
+        assert!(images.iter().all(|image| image["state"] == "done"));
+        told += images.len();
+    }
+    assert_eq!(told, 34);
+    // A shard of other inputs would leave images out.
+    fails(
+        at,
+        &format!("{predict} {DRIVE} --out parts --shard 2/3"),
+        &["of-3.manifest.json", "34 other inputs, not these 30"],
+    );
+    // Finishing with another number of shards finds everything done.
+    let again = ok(at, &format!("{predict} {DRIVE} more --out parts"));
+    assert!(
+        again.stderr.contains("0 images written"),
+        "{}",
+        again.stderr
+    );
+}
+
+#[test]
+fn a_run_that_was_killed_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    prepare(at);
+    let predict = format!("predict --model run {DRIVE} {SAVE}");
+    ok(at, &format!("{predict} --out whole"));
+    let whole = outputs(&at.join("whole"));
+
+    // Killed in the middle, wherever that is.
+    let mut child = start(at, &format!("{predict} --out killed"));
+    let done = |folder: &Path| {
+        let files = fs::read_dir(folder).into_iter().flatten();
+        files
+            .filter(|e| {
+                e.as_ref()
+                    .is_ok_and(|e| e.path().extension() == Some("json".as_ref()))
+            })
+            .count()
+    };
+    // The manifest and two sidecars.
+    while done(&at.join("killed")) < 3 && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    ok(at, &format!("{predict} --out killed"));
+    assert_same(&outputs(&at.join("killed")), &whole);
+
+    // What a kill can leave: outputs without a sidecar, a file being written, a file cut off by the system.
+    let out = at.join("killed");
+    fs::remove_file(out.join("0000000004.json")).unwrap();
+    fs::write(out.join(".0000000004_depth.npy.71-3.partial"), "half").unwrap();
+    fs::write(out.join("0000000007.ply"), "half").unwrap();
+    fs::remove_file(out.join("0000000009_depth.png")).unwrap();
+    let again = ok(at, &format!("{predict} --out killed"));
+    assert!(
+        again.stderr.contains("3 images written"),
+        "{}",
+        again.stderr
+    );
+    assert_same(&outputs(&out), &whole);
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupt_finishes_what_was_begun() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    prepare(at);
+    let predict = format!("predict --model run {DRIVE} {SAVE} --out out");
+    let mut child = start(at, &predict);
+    // The manifest is there before the first image, and after the handler.
+    let manifest = at.join("out/predict-1-of-1.manifest.json");
+    while !manifest.exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let pid = child.id().to_string();
+    let sent = Command::new("kill").args(["-INT", &pid]).status().unwrap();
+    assert!(sent.success());
+    let code = child.wait().unwrap().code();
+    let done = |state| {
+        let manifest = json(&manifest);
+        let images = manifest["images"].as_array().unwrap();
+        images
+            .iter()
+            .filter(|image| image["state"] == state)
+            .count()
+    };
+    // It may have been done already.
+    assert_eq!(code, Some(if done("done") == 30 { 0 } else { 1 }));
+    let names = outputs(&at.join("out"));
+    assert_eq!(names.len(), done("done") * 4, "{:?}", names.keys());
+    ok(at, &predict);
+    assert_eq!(done("done"), 30);
+    assert_eq!(outputs(&at.join("out")).len(), 30 * 4);
+}
+
+#[test]
+fn a_broken_image_is_named_and_the_others_are_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    prepare(at);
+    let broken = at.join(DRIVE).join("0000000011.png");
+    let whole = fs::read(&broken).unwrap();
+    fs::write(&broken, &whole[..whole.len() / 2]).unwrap();
+    let predict = format!("predict --model run {DRIVE} {SAVE} --out out");
+    fails(
+        at,
+        &predict,
+        &[
+            "1 of 30 images failed",
+            "0000000011.png: the image is truncated",
+        ],
+    );
+    assert_eq!(outputs(&at.join("out")).len(), 29 * 4);
+    let manifest = json(&at.join("out/predict-1-of-1.manifest.json"));
+    assert_eq!(manifest["images"][11]["state"], "failed");
+    assert!(
+        manifest["images"][11]["error"]
+            .as_str()
+            .unwrap()
+            .contains("truncated")
+    );
+    fs::write(&broken, &whole).unwrap();
+    let mended = ok(at, &predict);
+    assert!(
+        mended.stderr.contains("1 images written") && mended.stderr.contains("29 were there"),
+        "{}",
+        mended.stderr
+    );
+}
+
+#[test]
+fn what_is_there_is_kept_only_where_nothing_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    prepare(at);
+    let predict = |more: &str| format!("predict --model run {DRIVE} --out out {more}");
+    ok(at, &predict("--save npy"));
+    fails(at, &predict("--save ply"), &["0000000000.json", "--save"]);
+    fails(
+        at,
+        &predict("--save npy --intrinsics 60,120,47,31"),
+        &["another camera"],
+    );
+    fails(at, &predict("--save npy --stretch"), &["--stretch"]);
+    ok(at, "train --out run --resume --steps 2");
+    fails(at, &predict("--save npy"), &["other weights"]);
+    let again = ok(at, &predict("--save npy --overwrite"));
+    assert!(
+        again.stderr.contains("30 images written"),
+        "{}",
+        again.stderr
+    );
+
+    // Another image at the same path.
+    let image = at.join(DRIVE).join("0000000002.png");
+    fs::copy(at.join(DRIVE).join("0000000003.png"), &image).unwrap();
+    fails(
+        at,
+        &predict("--save npy"),
+        &["0000000002.png has changed since"],
+    );
+    let again = ok(at, &predict("--save npy --overwrite"));
+    assert!(
+        again.stderr.contains("1 images written"),
+        "{}",
+        again.stderr
+    );
+    assert_eq!(
+        fs::read(at.join("out/0000000002_depth.npy")).unwrap(),
+        fs::read(at.join("out/0000000003_depth.npy")).unwrap()
+    );
+
+    // Files of somebody else.
+    fs::create_dir(at.join("other")).unwrap();
+    fs::write(at.join("other/0000000005_depth.npy"), "mine").unwrap();
+    fails(
+        at,
+        &format!("predict --model run {DRIVE} --out other --save npy"),
+        &["0000000005_depth.npy"],
+    );
+    assert_eq!(
+        fs::read(at.join("other/0000000005_depth.npy")).unwrap(),
+        b"mine"
+    );
+}
