@@ -20,5 +20,6 @@ pub use model::{DepthMaps, DepthModel, FocalLength};
 pub use read::read;
 pub use write::write;
 
-/// The operator set of the files: what ONNX Runtime 1.17 and later and OpenVINO read.
+/// The operator set of the files; it has everything that is needed and is older than any library that
+/// [`runtime`] opens.
 pub const OPSET: i64 = 17;
