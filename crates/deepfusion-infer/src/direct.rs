@@ -34,18 +34,21 @@ impl Direct {
             1,
         );
         let columns = conv.channels_out.next_multiple_of(LANES);
-        let mut panels = Vec::with_capacity(runs.sources.len() * columns);
+        let mut panels = Aligned::zeros(runs.sources.len() * columns);
+        let mut rest = panels.iter_mut();
         for first in (0..columns).step_by(GROUP) {
             let width = GROUP.min(columns - first);
             for source in &runs.sources {
-                panels.extend((first..first + width).map(|o| weight(conv, o, *source)));
+                for (o, to) in (first..first + width).zip(&mut rest) {
+                    *to = weight(conv, o, *source);
+                }
             }
         }
         Self {
             bias: padded_bias(conv, columns),
             geometry,
             runs,
-            panels: Aligned::from_slice(&panels),
+            panels,
         }
     }
 

@@ -53,7 +53,7 @@ impl Winograd {
     /// Whether this form pays for a convolution: 3×3 at stride 1, on enough pixels to share the
     /// transformed weights, which are four times as many.
     pub(crate) fn fits(conv: &Conv, geometry: &Geometry) -> bool {
-        conv.kernel == 3 && conv.stride == 1 && geometry.out.pixels() >= 400
+        conv.kernel == 3 && conv.stride == 1 && geometry.out.pixels() >= 1024
     }
 
     pub(crate) fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {

@@ -5,11 +5,28 @@
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// Keeps freed memory instead of returning it to the system after 10 ms: the next step needs it again,
-/// and the kernel clears every page that it hands out (a tenth of a training step's profile).
+/// `mi_option_purge_delay` of mimalloc.h, the same number in its versions 2 and 3: after how many milliseconds freed
+/// memory goes back to the system.
+const PURGE_DELAY: libmimalloc_sys::mi_option_t = 15;
+
+fn set_purge_delay(milliseconds: std::ffi::c_long) {
+    // SAFETY: setting a documented option to a documented value has no precondition.
+    unsafe { libmimalloc_sys::mi_option_set(PURGE_DELAY, milliseconds) };
+}
+
+/// Keeps freed memory: for Burn, whose every operation needs it again; the kernel clears every page that it hands
+/// out (a tenth of a training step's profile).
 pub fn keep_memory() {
-    /// `mi_option_purge_delay` of mimalloc.h, the same number in its versions 2 and 3.
-    const PURGE_DELAY: libmimalloc_sys::mi_option_t = 15;
-    // SAFETY: setting a documented option to a documented value (−1: never) has no precondition.
-    unsafe { libmimalloc_sys::mi_option_set(PURGE_DELAY, -1) };
+    set_purge_delay(-1);
+}
+
+/// Gives freed memory back at once while `work` runs: packing a network frees its weights one by one, and the peak
+/// would hold them all twice.
+pub fn without_hoarding<T>(work: impl FnOnce() -> T) -> T {
+    // SAFETY: reading a documented option has no precondition.
+    let usual = unsafe { libmimalloc_sys::mi_option_get(PURGE_DELAY) };
+    set_purge_delay(0);
+    let result = work();
+    set_purge_delay(usual);
+    result
 }

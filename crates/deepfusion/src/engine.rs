@@ -10,6 +10,7 @@ use deepfusion_onnx::runtime::OrtEngine;
 use deepfusion_onnx::{DepthModel, write};
 use deepfusion_train::{BurnRunner, DepthRunner, Error, FusedRunner, Predictor, TrainConfig};
 
+use crate::allocator;
 use crate::cli::{DeviceChoice, EngineArgs, EngineChoice, PrecisionChoice};
 use crate::commands::device;
 use crate::error::CliError;
@@ -38,17 +39,21 @@ pub fn runner(
         return Err(CliError::OnlyFused.into());
     }
     Ok(match engine {
-        EngineChoice::Burn | EngineChoice::Auto => Arc::new(BurnRunner::new(
-            config,
-            &weights,
-            &device::open(args.device)?,
-        )?),
+        EngineChoice::Burn | EngineChoice::Auto => {
+            allocator::keep_memory();
+            Arc::new(BurnRunner::new(
+                config,
+                &weights,
+                &device::open(args.device)?,
+            )?)
+        }
         EngineChoice::Fused => {
             let precision = match args.precision {
                 PrecisionChoice::F32 => Precision::F32,
                 PrecisionChoice::Bf16 => Precision::Bf16,
             };
-            Arc::new(FusedRunner::new(config, weights, precision)?)
+            let packed = || FusedRunner::new(config, weights, precision);
+            Arc::new(allocator::without_hoarding(packed)?)
         }
         EngineChoice::Ort => Arc::new(OrtRunner::new(args, config, weights)?),
     })

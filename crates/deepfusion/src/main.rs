@@ -15,7 +15,6 @@ use std::process::ExitCode;
 use clap::Parser;
 
 fn main() -> ExitCode {
-    allocator::keep_memory();
     output::init_logging();
     // Wrong arguments end here: clap says which, suggests the near one and exits with 2.
     let cli = cli::Cli::parse();

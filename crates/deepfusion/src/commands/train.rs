@@ -10,6 +10,7 @@ use deepfusion_train::{
 use super::device;
 use super::evaluate::open_datasets;
 use super::recorder::{Recorder, clock};
+use crate::allocator;
 use crate::cli::{PresetChoice, TrainArgs, ViewMotionChoice};
 use crate::progress::say;
 use crate::{interrupt, output};
@@ -57,6 +58,7 @@ pub fn run(args: &TrainArgs) -> Result<()> {
 
 /// Runs a trainer with its logs, and gives the curves for a report.
 pub fn train(trainer: &mut Trainer) -> Result<super::recorder::Curves> {
+    allocator::keep_memory();
     interrupt::catch("stopping after this step; the run is saved");
     let mut recorder = Recorder::open(trainer.folder(), trainer.step())?;
     let summary = trainer.run(&mut |event| recorder.handle(event))?;
