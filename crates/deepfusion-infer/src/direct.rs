@@ -1,9 +1,10 @@
 //! A convolution in f32, pixel by pixel, without unfolding.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 use crate::aligned::Aligned;
 use crate::conv::{Geometry, Runs, Tasks, padded_bias, weight};
+use crate::dispatch::dispatch;
 use crate::scratch::with_scratch;
 use crate::tile::{GROUP, LANES, Pixel, Shift, Start, Sum, tiles};
 use crate::view::Shared;
@@ -59,7 +60,7 @@ impl Direct {
         let groups = self.bias.len().div_ceil(GROUP);
         Tasks::new(self.geometry.out.pixels(), PIXELS_AT_ONCE, 6, groups).run(|pixels, groups| {
             with_scratch(|scratch| {
-                Arch::new().dispatch(Task {
+                dispatch(Task {
                     conv: self,
                     arena,
                     pixels,

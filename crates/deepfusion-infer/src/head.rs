@@ -1,10 +1,11 @@
 //! A convolution to very few channels: lanes along the inputs.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::Conv;
 use crate::conv::{Geometry, Runs, weight};
+use crate::dispatch::dispatch;
 use crate::tile::LANES;
 use crate::view::Shared;
 
@@ -43,7 +44,7 @@ impl Head {
     /// As [`crate::direct::Direct::run`].
     pub(crate) unsafe fn run(&self, arena: Shared<f32>) {
         (0..self.geometry.out.height).into_par_iter().for_each(|y| {
-            Arch::new().dispatch(Row {
+            dispatch(Row {
                 head: self,
                 arena,
                 y,

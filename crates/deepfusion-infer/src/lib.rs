@@ -6,6 +6,7 @@ mod aligned;
 mod bf16;
 mod conv;
 mod direct;
+mod dispatch;
 mod element;
 mod engine;
 mod error;

@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 
+use crate::dispatch::tests::{Level, with_level};
 use crate::element::Element;
 use crate::engine::Typed;
 use crate::forms::ConvForm;
@@ -244,6 +245,15 @@ proptest! {
             // A sigmoid's output; f32 through 13 layers, the Winograd form's 1e-5 included.
             prop_assert!(off < 3e-5, "off by {off}");
         }
+        for level in [Level::Scalar, #[cfg(target_arch = "x86_64")] Level::Avx2] {
+            let narrow = with_level(level, || {
+                let mut engine = Engine::new(graph.clone(), width, height, Precision::F32).unwrap();
+                engine.run(&image);
+                engine.output(0)
+            });
+            let off = deviation(&narrow, exact);
+            prop_assert!(off < 3e-5, "{level:?} off by {off}");
+        }
         #[cfg(target_arch = "x86_64")]
         {
             use crate::element::Bf16;
@@ -278,6 +288,12 @@ fn large_images_take_the_winograd_form_and_agree_too() {
     }
     let off = deviation(&engine.output(0), exact);
     assert!(off < 3e-5, "off by {off}");
+    #[cfg(target_arch = "x86_64")]
+    {
+        with_level(Level::Avx2, || engine.run(&image));
+        let off = deviation(&engine.output(0), exact);
+        assert!(off < 3e-5, "AVX2 off by {off}");
+    }
 }
 
 /// The matrix unit and the dot products sum the same products in another order.

@@ -4,12 +4,13 @@
 //! "Fast Algorithms for Convolutional Neural Networks", 2016). The sums over channels of ⊙ are 36
 //! matrix products.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::Conv;
 use crate::aligned::Aligned;
 use crate::conv::{Geometry, padded_bias, weight};
+use crate::dispatch::dispatch;
 use crate::scratch::with_scratch;
 use crate::tile::{GROUP, LANES, Pixel, Shift, Start, Sum, tiles};
 use crate::view::{Shared, View};
@@ -109,7 +110,7 @@ impl Winograd {
         (0..all.div_ceil(tiles)).into_par_iter().for_each(|task| {
             let tiles = task * tiles..((task + 1) * tiles).min(all);
             with_scratch(|scratch| {
-                Arch::new().dispatch(Task {
+                dispatch(Task {
                     conv: self,
                     arena,
                     inputs: scratch.first.take(AREA * tiles.len() * self.widest()),

@@ -29,4 +29,4 @@ pub use photometric::{PhotometricShape, photometric_error, photometric_error_bac
 pub use project::{MIN_DEPTH_M, NOWHERE, ProjectGradients, in_view, project, project_backward};
 pub use smoothness::{SmoothnessShape, smoothness, smoothness_backward};
 pub use upsample::{upsample_concat, upsample_concat_backward};
-pub use warp::{WarpShape, warp, warp_backward_coords, warp_backward_image};
+pub use warp::{WarpFloat, WarpShape, warp, warp_backward_coords, warp_backward_image};

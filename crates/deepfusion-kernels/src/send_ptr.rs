@@ -31,14 +31,4 @@ impl<T> SharedMut<T> {
         // SAFETY: in bounds by the assertion, not aliased by the caller's promise.
         unsafe { std::slice::from_raw_parts_mut(self.pointer.add(start), len) }
     }
-
-    /// A pointer to element `start`, for strided writes.
-    ///
-    /// # Safety
-    /// As [`Self::slice`], for every element that is written.
-    pub(crate) unsafe fn at(&self, start: usize) -> *mut T {
-        assert!(start <= self.len, "offset outside the buffer");
-        // SAFETY: in bounds by the assertion.
-        unsafe { self.pointer.add(start) }
-    }
 }

@@ -4,6 +4,7 @@
 //! coordinate was moved to the border, the output does not depend on it and its gradient is zero.
 
 use num_traits::Float;
+use pulp::Arch;
 use rayon::prelude::*;
 
 /// The sizes of a warp.
@@ -19,17 +20,43 @@ pub struct WarpShape {
     pub out_area: usize,
 }
 
-/// The four neighbours of a coordinate, and how far it lies between them.
-#[derive(Clone, Copy)]
-struct Sample<T> {
-    top_left: usize,
-    right: usize,
-    down: usize,
-    x: T,
-    y: T,
-    /// Whether moving the coordinate along x (y) moves the sample.
-    free_x: bool,
-    free_y: bool,
+/// Pixels whose coordinates are worked out together: fixed loops, which the compiler turns into vector code.
+const LANES: usize = 16;
+
+/// What coordinates and pixels are made of.
+pub trait WarpFloat: Float + Send + Sync {
+    /// The whole part.
+    ///
+    /// # Safety
+    /// The number must be finite and within what an `i32` holds. (The checked conversion is not turned into vector
+    /// code.)
+    unsafe fn whole(self) -> i32;
+}
+
+impl WarpFloat for f32 {
+    #[inline(always)]
+    unsafe fn whole(self) -> i32 {
+        // SAFETY: the caller's promise.
+        unsafe { self.to_int_unchecked() }
+    }
+}
+
+impl WarpFloat for f64 {
+    #[inline(always)]
+    unsafe fn whole(self) -> i32 {
+        // SAFETY: the caller's promise.
+        unsafe { self.to_int_unchecked() }
+    }
+}
+
+/// For each of some coordinates the upper left of its four neighbours, and how far it lies between them.
+struct Samples<T> {
+    top_left: [usize; LANES],
+    x: [T; LANES],
+    y: [T; LANES],
+    /// 1 where moving the coordinate along x (y) moves the sample, else 0.
+    free_x: [T; LANES],
+    free_y: [T; LANES],
 }
 
 impl WarpShape {
@@ -37,22 +64,23 @@ impl WarpShape {
         self.in_height * self.in_width
     }
 
-    #[inline]
-    fn sample<T: Float>(&self, u: T, v: T) -> Sample<T> {
-        let axis = |p: T, size: usize| {
-            let last = T::from(size - 1).unwrap_or_else(T::zero);
-            // A NaN coordinate reads pixel 0: `max` returns the number.
-            let inside = p.max(T::zero()).min(last);
-            let low = inside.floor().min((last - T::one()).max(T::zero()));
-            let free = p >= T::zero() && p <= last;
-            (low.to_usize().unwrap_or(0), inside - low, free)
-        };
-        let (x0, x, free_x) = axis(u, self.in_width);
-        let (y0, y, free_y) = axis(v, self.in_height);
-        Sample {
-            top_left: y0 * self.in_width + x0,
-            right: usize::from(self.in_width > 1),
-            down: if self.in_height > 1 { self.in_width } else { 0 },
+    /// From a neighbour to the one to its right, and to the one below.
+    fn steps(&self) -> (usize, usize) {
+        let down = if self.in_height > 1 { self.in_width } else { 0 };
+        (usize::from(self.in_width > 1), down)
+    }
+
+    /// At most [`LANES`] coordinates; the rest are filled up with zeros.
+    #[inline(always)]
+    fn samples<T: WarpFloat>(&self, us: &[T], vs: &[T]) -> Samples<T> {
+        let (x0, x, free_x) = axis(&padded(us), self.in_width);
+        let (y0, y, free_y) = axis(&padded(vs), self.in_height);
+        let mut top_left = [0; LANES];
+        for l in 0..LANES {
+            top_left[l] = (y0[l] * self.in_width as i32 + x0[l]) as usize;
+        }
+        Samples {
+            top_left,
             x,
             y,
             free_x,
@@ -65,6 +93,7 @@ impl WarpShape {
             self.in_area() > 0 && self.out_area > 0,
             "images have pixels"
         );
+        assert!(i32::try_from(self.in_area()).is_ok(), "pixels of a plane");
         assert_eq!(image % (self.channels * self.in_area()), 0, "whole images");
         let batch = image / (self.channels * self.in_area());
         assert_eq!(coords, batch * 2 * self.out_area, "two coordinates a pixel");
@@ -72,8 +101,77 @@ impl WarpShape {
     }
 }
 
+/// Along one axis: the lower neighbour, how far the coordinate lies from it, and whether it may move.
+#[inline(always)]
+fn axis<T: WarpFloat>(p: &[T; LANES], size: usize) -> ([i32; LANES], [T; LANES], [T; LANES]) {
+    let last = T::from(size - 1).unwrap_or_else(T::zero);
+    let most = (last - T::one()).max(T::zero());
+    let mut low = [T::zero(); LANES];
+    let (mut index, mut part, mut free) = ([0; LANES], low, low);
+    // One short loop for each step: longer ones are not turned into vector code.
+    for l in 0..LANES {
+        // A NaN coordinate reads pixel 0: `max` returns the number.
+        part[l] = p[l].max(T::zero()).min(last);
+    }
+    for l in 0..LANES {
+        low[l] = part[l].floor().min(most);
+    }
+    for l in 0..LANES {
+        part[l] = part[l] - low[l];
+    }
+    for l in 0..LANES {
+        // SAFETY: between 0 and the last pixel.
+        index[l] = unsafe { low[l].whole() };
+    }
+    for l in 0..LANES {
+        let moves = p[l] >= T::zero() && p[l] <= last;
+        free[l] = if moves { T::one() } else { T::zero() };
+    }
+    (index, part, free)
+}
+
 /// Pixels handled by one task.
 const CHUNK: usize = 4096;
+
+/// The four neighbours of each sample in a plane, row by row: upper left and right, lower left and right.
+///
+/// # Safety
+/// The plane must have as many pixels as the shape says.
+#[inline(always)]
+unsafe fn neighbours<T: WarpFloat>(
+    shape: &WarpShape,
+    plane: &[T],
+    samples: &Samples<T>,
+) -> [[T; LANES]; 4] {
+    let (right, down) = shape.steps();
+    let mut corners = [[T::zero(); LANES]; 4];
+    for (corner, step) in corners.iter_mut().zip([0, right, down, down + right]) {
+        for l in 0..LANES {
+            // SAFETY: `samples` keeps the upper left one in the image, and one from its last row and column
+            // where there are more than one.
+            corner[l] = unsafe { *plane.get_unchecked(samples.top_left[l] + step) };
+        }
+    }
+    corners
+}
+
+/// At most [`LANES`] numbers, filled up with zeros. Whole ones are copied without a loop of unknown length.
+#[inline(always)]
+fn padded<T: WarpFloat>(from: &[T]) -> [T; LANES] {
+    match from.first_chunk::<LANES>() {
+        Some(whole) => *whole,
+        None => std::array::from_fn(|l| from.get(l).copied().unwrap_or_else(T::zero)),
+    }
+}
+
+/// Writes as many of the numbers as there is room for.
+#[inline(always)]
+fn write<T: WarpFloat>(values: &[T; LANES], to: &mut [T]) {
+    match to.first_chunk_mut::<LANES>() {
+        Some(whole) => *whole = *values,
+        None => to.copy_from_slice(&values[..to.len()]),
+    }
+}
 
 /// out(p) = image⟨coords(p)⟩, bilinear.
 ///
@@ -82,32 +180,41 @@ const CHUNK: usize = 4096;
 ///
 /// # Panics
 /// When a length does not fit.
-pub fn warp<T: Float + Send + Sync>(shape: &WarpShape, image: &[T], coords: &[T], out: &mut [T]) {
+pub fn warp<T: WarpFloat>(shape: &WarpShape, image: &[T], coords: &[T], out: &mut [T]) {
     shape.check(image.len(), coords.len(), out.len());
     let (area, channels) = (shape.out_area, shape.channels);
     let to = crate::send_ptr::SharedMut::new(out);
-    for_chunks(shape, coords, |n, range, us, vs| {
-        let image = &image[n * channels * shape.in_area()..];
-        for (i, (u, v)) in us.iter().zip(vs).enumerate() {
-            let s = shape.sample(*u, *v);
-            for c in 0..channels {
-                let plane = &image[c * shape.in_area() + s.top_left..];
-                let (a, b) = (plane[0], plane[s.right]);
-                let (c0, d) = (plane[s.down], plane[s.down + s.right]);
-                let (top, bottom) = (a + (b - a) * s.x, c0 + (d - c0) * s.x);
-                let at = (n * channels + c) * area + range.start + i;
-                // SAFETY: pixel ranges of different tasks do not overlap.
-                unsafe { *to.at(at) = top + (bottom - top) * s.y };
+    for_lanes(
+        shape,
+        coords,
+        #[inline(always)]
+        |n, start, count, samples| {
+            for c in n * channels..(n + 1) * channels {
+                let plane = &image[c * shape.in_area()..][..shape.in_area()];
+                // SAFETY: the plane is whole; pixel ranges of different tasks do not overlap.
+                let ([a, b, c0, d], row) = unsafe {
+                    (
+                        neighbours(shape, plane, samples),
+                        to.slice(c * area + start, count),
+                    )
+                };
+                let mut values = [T::zero(); LANES];
+                for l in 0..LANES {
+                    let (x, y) = (samples.x[l], samples.y[l]);
+                    let (top, bottom) = (a[l] + (b[l] - a[l]) * x, c0[l] + (d[l] - c0[l]) * x);
+                    values[l] = top + (bottom - top) * y;
+                }
+                write(&values, row);
             }
-        }
-    });
+        },
+    );
 }
 
-/// Runs `work(image index, pixel range, u of the range, v of the range)` over all pixels.
-fn for_chunks<T: Float + Send + Sync>(
+/// Runs `work(image index, first pixel, pixels, their samples)` over all pixels, at most [`LANES`] at once.
+fn for_lanes<T: WarpFloat>(
     shape: &WarpShape,
     coords: &[T],
-    work: impl Fn(usize, std::ops::Range<usize>, &[T], &[T]) + Sync,
+    work: impl Fn(usize, usize, usize, &Samples<T>) + Sync,
 ) {
     let area = shape.out_area;
     let chunks = area.div_ceil(CHUNK);
@@ -115,10 +222,37 @@ fn for_chunks<T: Float + Send + Sync>(
     (0..batch * chunks).into_par_iter().for_each(|task| {
         let (n, start) = (task / chunks, task % chunks * CHUNK);
         let range = start..(start + CHUNK).min(area);
-        let us = &coords[2 * n * area..][range.clone()];
-        let vs = &coords[(2 * n + 1) * area..][range.clone()];
-        work(n, range, us, vs);
+        each_lanes(
+            shape,
+            coords,
+            n,
+            range,
+            #[inline(always)]
+            |n, start, count, samples| work(n, start, count, samples),
+        );
     });
+}
+
+/// The same for a range of pixels of image `n`, in the widest instructions there are.
+fn each_lanes<T: WarpFloat>(
+    shape: &WarpShape,
+    coords: &[T],
+    n: usize,
+    range: std::ops::Range<usize>,
+    mut work: impl FnMut(usize, usize, usize, &Samples<T>),
+) {
+    let area = shape.out_area;
+    let us = &coords[2 * n * area..][range.clone()];
+    let vs = &coords[(2 * n + 1) * area..][range.clone()];
+    Arch::new().dispatch(
+        #[inline(always)]
+        || {
+            let lanes = us.chunks(LANES).zip(vs.chunks(LANES));
+            for (start, (us, vs)) in range.step_by(LANES).zip(lanes) {
+                work(n, start, us.len(), &shape.samples(us, vs));
+            }
+        },
+    );
 }
 
 /// Gradient of [`warp`] with respect to the coordinates.
@@ -128,7 +262,7 @@ fn for_chunks<T: Float + Send + Sync>(
 ///
 /// # Panics
 /// When a length does not fit.
-pub fn warp_backward_coords<T: Float + Send + Sync>(
+pub fn warp_backward_coords<T: WarpFloat>(
     shape: &WarpShape,
     image: &[T],
     coords: &[T],
@@ -143,29 +277,38 @@ pub fn warp_backward_coords<T: Float + Send + Sync>(
     );
     let (area, channels) = (shape.out_area, shape.channels);
     let to = crate::send_ptr::SharedMut::new(grad_coords);
-    for_chunks(shape, coords, |n, range, us, vs| {
-        let image = &image[n * channels * shape.in_area()..];
-        for (i, (u, v)) in us.iter().zip(vs).enumerate() {
-            let s = shape.sample(*u, *v);
-            let (mut gu, mut gv) = (T::zero(), T::zero());
-            for c in 0..channels {
-                let g = grad_out[(n * channels + c) * area + range.start + i];
-                let plane = &image[c * shape.in_area() + s.top_left..];
-                let (a, b) = (plane[0], plane[s.right]);
-                let (c0, d) = (plane[s.down], plane[s.down + s.right]);
-                let (top, bottom) = (b - a, d - c0);
-                gu = gu + g * (top + (bottom - top) * s.y);
-                let (left, right) = (c0 - a, d - b);
-                gv = gv + g * (left + (right - left) * s.x);
+    for_lanes(
+        shape,
+        coords,
+        #[inline(always)]
+        |n, start, count, samples| {
+            let (mut gu, mut gv) = ([T::zero(); LANES], [T::zero(); LANES]);
+            for c in n * channels..(n + 1) * channels {
+                let grads = padded(&grad_out[c * area + start..][..count]);
+                let plane = &image[c * shape.in_area()..][..shape.in_area()];
+                // SAFETY: the plane is whole.
+                let [a, b, c0, d] = unsafe { neighbours(shape, plane, samples) };
+                for l in 0..LANES {
+                    let (x, y, g) = (samples.x[l], samples.y[l], grads[l]);
+                    let (top, bottom) = (b[l] - a[l], d[l] - c0[l]);
+                    gu[l] = gu[l] + g * (top + (bottom - top) * y);
+                    let (left, right) = (c0[l] - a[l], d[l] - b[l]);
+                    gv[l] = gv[l] + g * (left + (right - left) * x);
+                }
             }
-            let keep = |free: bool, g: T| if free { g } else { T::zero() };
+            for l in 0..LANES {
+                // Not multiplied: a gradient that is no number must not spread to where nothing moves.
+                let keep = |free: T, g: T| if free > T::zero() { g } else { T::zero() };
+                gu[l] = keep(samples.free_x[l], gu[l]);
+                gv[l] = keep(samples.free_y[l], gv[l]);
+            }
             // SAFETY: pixel ranges of different tasks do not overlap.
             unsafe {
-                *to.at(2 * n * area + range.start + i) = keep(s.free_x, gu);
-                *to.at((2 * n + 1) * area + range.start + i) = keep(s.free_y, gv);
+                write(&gu, to.slice(2 * n * area + start, count));
+                write(&gv, to.slice((2 * n + 1) * area + start, count));
             }
-        }
-    });
+        },
+    );
 }
 
 /// Gradient of [`warp`] with respect to the image.
@@ -175,35 +318,96 @@ pub fn warp_backward_coords<T: Float + Send + Sync>(
 ///
 /// # Panics
 /// When a length does not fit.
-pub fn warp_backward_image<T: Float + Send + Sync>(
+pub fn warp_backward_image<T: WarpFloat>(
     shape: &WarpShape,
     coords: &[T],
     grad_out: &[T],
     grad_image: &mut [T],
 ) {
     shape.check(grad_image.len(), coords.len(), grad_out.len());
-    let (area, channels) = (shape.out_area, shape.channels);
-    // Pixels may scatter anywhere: a task owns whole planes.
+    let (area, channels, in_area) = (shape.out_area, shape.channels, shape.in_area());
+    let batch = coords.len() / (2 * area);
+    // Pixels may scatter anywhere, so that a task owns whole planes: all of an image, whose samples it then works
+    // out once, or where there are few images each plane by itself.
+    let together = if batch >= 2 * rayon::current_num_threads() {
+        channels
+    } else {
+        1
+    };
+    let (right, down) = shape.steps();
     grad_image
-        .par_chunks_mut(shape.in_area())
+        .par_chunks_mut(together * in_area)
         .enumerate()
-        .for_each(|(plane_index, plane)| {
-            plane.fill(T::zero());
-            let n = plane_index / channels;
-            let us = &coords[2 * n * area..][..area];
-            let vs = &coords[(2 * n + 1) * area..][..area];
-            let grads = &grad_out[plane_index * area..][..area];
-            for ((u, v), g) in us.iter().zip(vs).zip(grads) {
-                let s = shape.sample(*u, *v);
-                let (left, right) = (T::one() - s.x, s.x);
-                let (top, bottom) = (*g * (T::one() - s.y), *g * s.y);
-                let mut add = |at: usize, value: T| plane[at] = plane[at] + value;
-                add(s.top_left, top * left);
-                add(s.top_left + s.right, top * right);
-                add(s.top_left + s.down, bottom * left);
-                add(s.top_left + s.down + s.right, bottom * right);
-            }
+        .for_each(|(task, planes)| {
+            planes.fill(T::zero());
+            let first = task * together;
+            each_lanes(
+                shape,
+                coords,
+                first / channels,
+                0..area,
+                #[inline(always)]
+                |_, start, count, samples| {
+                    for (c, plane) in planes.chunks_exact_mut(in_area).enumerate() {
+                        let grads = &grad_out[(first + c) * area + start..][..count];
+                        let mut parts = [[T::zero(); 4]; LANES];
+                        for l in 0..count {
+                            let (x, y, g) = (samples.x[l], samples.y[l], grads[l]);
+                            let (top, bottom) = (g * (T::one() - y), g * y);
+                            let left = T::one() - x;
+                            parts[l] = [top * left, top * x, bottom * left, bottom * x];
+                        }
+                        // SAFETY: `samples` keeps all four neighbours in the image.
+                        unsafe {
+                            scatter(plane, &samples.top_left[..count], &parts, (right, down))
+                        };
+                    }
+                },
+            );
         });
+}
+
+/// Adds to each sample's four neighbours their parts (upper left and right, lower left and right).
+///
+/// Neighbouring samples mostly lie one pixel apart and share two of the four: those sums are kept until the next
+/// sample has added to them, instead of being read back from memory just after they were written.
+///
+/// # Safety
+/// All neighbours must lie in the plane.
+#[inline(always)]
+unsafe fn scatter<T: WarpFloat>(
+    plane: &mut [T],
+    top_left: &[usize],
+    parts: &[[T; 4]; LANES],
+    (right, down): (usize, usize),
+) {
+    let mut add = |at: usize, value: T| {
+        // SAFETY: the caller's promise.
+        let pixel = unsafe { plane.get_unchecked_mut(at) };
+        *pixel = *pixel + value;
+    };
+    let mut at = top_left[0];
+    let mut sums = [T::zero(); 4];
+    for (next, part) in top_left.iter().zip(parts) {
+        if *next != at {
+            add(at, sums[0]);
+            add(at + down, sums[2]);
+            if *next == at + right {
+                sums = [sums[1], T::zero(), sums[3], T::zero()];
+            } else {
+                add(at + right, sums[1]);
+                add(at + down + right, sums[3]);
+                sums = [T::zero(); 4];
+            }
+            at = *next;
+        }
+        for (sum, part) in sums.iter_mut().zip(part) {
+            *sum = *sum + *part;
+        }
+    }
+    for (step, sum) in [0, right, down, down + right].into_iter().zip(sums) {
+        add(at + step, sum);
+    }
 }
 
 #[cfg(test)]

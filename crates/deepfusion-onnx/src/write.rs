@@ -101,13 +101,14 @@ fn metadata(model: &DepthModel, version: &str) -> Vec<StringStringEntryProto> {
         ("program", "deepfusion".to_owned()),
         ("program_version", version.to_owned()),
         ("depth_unit", "m".to_owned()),
-        ("depth_min_m", model.range.min_m.to_string()),
-        ("depth_max_m", model.range.max_m.to_string()),
     ];
     if let Some(focal) = model.trained_with {
         entries.push(("training_fx_px", focal.fx.to_string()));
         entries.push(("training_fy_px", focal.fy.to_string()));
     }
+    // What must be there stands last: a file that ends early is then never taken for a whole one.
+    entries.push(("depth_min_m", model.range.min_m.to_string()));
+    entries.push(("depth_max_m", model.range.max_m.to_string()));
     let entry = |(key, value): (&str, String)| StringStringEntryProto {
         key: key.to_owned(),
         value,

@@ -3,7 +3,8 @@
 
 use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{BatchSize, Criterion, criterion_group};
-use deepfusion_nn::{DepthNet, DepthNetConfig, ResNetDepth};
+use deepfusion_infer::{Engine, Precision};
+use deepfusion_nn::{DepthNet, DepthNetConfig, ResNetDepth, depth_graph, weights};
 use deepfusion_train::{Adam, Model, Motion, NamedGradients, Preset, SnippetBatch};
 
 #[global_allocator]
@@ -136,18 +137,34 @@ fn light_step(criterion: &mut Criterion) {
     });
 }
 
-/// Inference of a ResNet's depth network at 640×192.
+/// Inference of a ResNet's depth network at 640×192: through Burn, and in the fused engine.
 fn inference(criterion: &mut Criterion) {
     let device = Device::flex();
     for (name, depth) in [
-        ("inference, ResNet-18, 640x192", ResNetDepth::ResNet18),
-        ("inference, ResNet-50, 640x192", ResNetDepth::ResNet50),
+        ("ResNet-18", ResNetDepth::ResNet18),
+        ("ResNet-50", ResNetDepth::ResNet50),
     ] {
         let net = depth_net(depth, &device);
         let x = images(1, 192, 640, &device);
-        criterion.bench_function(name, |b| {
+        criterion.bench_function(&format!("inference, {name}, 640x192, burn"), |b| {
             b.iter(|| net.forward(x.clone()).swap_remove(0).into_data());
         });
+        let image: Vec<f32> = x.into_data().iter::<f32>().collect();
+        for (precision, word) in [(Precision::F32, "f32"), (Precision::Bf16, "bf16")] {
+            if precision == Precision::Bf16 && !Engine::has_bf16() {
+                continue;
+            }
+            let config = DepthNetConfig::new(depth);
+            let graph = depth_graph(&config, weights::collect(&net)).expect("its own weights");
+            let mut engine = Engine::new(graph, 640, 192, precision).expect("the size halves");
+            let name = format!("inference, {name}, 640x192, fused {word}");
+            criterion.bench_function(&name, |b| {
+                b.iter(|| {
+                    engine.run(&image);
+                    engine.output(0)
+                });
+            });
+        }
     }
 }
 

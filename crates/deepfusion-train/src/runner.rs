@@ -2,6 +2,7 @@
 
 use std::fmt::Debug;
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_geometry::DepthRange;
@@ -25,6 +26,12 @@ pub trait DepthRunner: Debug + Send + Sync {
     /// # Errors
     /// Where a library that runs the network fails.
     fn disparity(&self, image: &[f32]) -> Result<Vec<f32>, Error>;
+
+    /// Runs once and tells what each step took, by name; `None` where the engine cannot say.
+    fn profile(&self, image: &[f32]) -> Option<Vec<(String, Duration)>> {
+        let _ = image;
+        None
+    }
 }
 
 /// The network as it is trained, on any of Burn's devices.
@@ -108,6 +115,11 @@ impl DepthRunner for FusedRunner {
         let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
         engine.run(image);
         Ok(metric(self.range, engine.output(0).into_iter()))
+    }
+
+    fn profile(&self, image: &[f32]) -> Option<Vec<(String, Duration)>> {
+        let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(engine.profile(image))
     }
 }
 

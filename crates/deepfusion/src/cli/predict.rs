@@ -122,6 +122,9 @@ pub struct BenchArgs {
     /// How often each stage is measured.
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub repeats: usize,
+    /// Also show what each step of the fused engine takes.
+    #[arg(long)]
+    pub profile: bool,
     /// What runs the network.
     #[command(flatten)]
     pub engine: EngineArgs,

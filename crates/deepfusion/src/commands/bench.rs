@@ -40,6 +40,9 @@ struct Report {
     fps: f64,
     peak_rss_mb: Option<f64>,
     peak_device_mb: Option<f64>,
+    /// Least milliseconds of each step of the network, where asked for and known.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    profile_ms: Vec<(String, f64)>,
 }
 
 #[derive(Debug, Default, Serialize)]
@@ -58,6 +61,11 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     let repeats = args.repeats.max(1);
     let bench = Bench::new(&config, &*runner)?;
     let stages = bench.stages(repeats)?;
+    let profile_ms = if args.profile {
+        bench.profile(repeats)?
+    } else {
+        Vec::new()
+    };
     let report = Report {
         engine: runner.name(),
         device: device::name(args.engine.device),
@@ -68,6 +76,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         fps: bench.overlapped_fps(repeats)?,
         peak_rss_mb: peak_rss_mb(),
         peak_device_mb: None,
+        profile_ms,
         stages_ms: stages,
     };
     if args.json {
@@ -106,7 +115,16 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         report.latency_ms,
         report.fps,
         repeats * IMAGES_PER_REPEAT,
-    ))
+    ))?;
+    output::print(&profile_table(&report.profile_ms))
+}
+
+/// The steps in order, a line each with its share.
+fn profile_table(steps: &[(String, f64)]) -> String {
+    let total: f64 = steps.iter().map(|(_, ms)| ms).sum();
+    let line =
+        |(name, ms): &(String, f64)| format!("{ms:8.2} {:5.1} %   {name}\n", 100.0 * ms / total);
+    steps.iter().map(line).collect()
 }
 
 /// The network asked for: its name, its number of parameters, its configuration and what runs it.
@@ -212,6 +230,28 @@ impl<'a> Bench<'a> {
                 Ok(depth_picture(&depth, &DepthScale::default()))
             })?,
         })
+    }
+
+    /// The least each step of the network took.
+    fn profile(&self, repeats: usize) -> Result<Vec<(String, f64)>> {
+        let input = self.resize(&self.decode()?);
+        let mut least: Vec<(String, f64)> = Vec::new();
+        for _ in 0..repeats {
+            let Some(steps) = self.runner.profile(&input) else {
+                break;
+            };
+            let steps = steps
+                .into_iter()
+                .map(|(name, t)| (name, t.as_secs_f64() * 1e3));
+            if least.is_empty() {
+                least = steps.collect();
+                continue;
+            }
+            for ((_, least), (_, ms)) in least.iter_mut().zip(steps) {
+                *least = least.min(ms);
+            }
+        }
+        Ok(least)
     }
 
     /// Images a second through all stages at once, from the JPEG to cloud and coloured depth in memory.
