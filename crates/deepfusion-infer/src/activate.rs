@@ -11,7 +11,7 @@ fn exp_negative<S: Simd>(simd: S, v: S::f32s) -> S::f32s {
     let madd = |a, b, c| simd.mul_add_f32s(a, b, c);
     // Adding 1.5·2²³ rounds to the nearest integer, which then stands in the lowest bits.
     let round = by(12_582_912.0);
-    let v = simd.max_f32s(v, by(-87.0));
+    let v = simd.max_f32s(by(-87.0), v);
     let rounded = madd(v, by(std::f32::consts::LOG2_E), round);
     let n = simd.sub_f32s(rounded, round);
     let r = madd(n, by(2.121_944_4e-4), madd(n, by(-0.693_359_4), v));
@@ -30,10 +30,11 @@ impl Activation {
         let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
         match self {
             Self::Identity => v,
-            Self::Relu => simd.max_f32s(v, zero),
+            // Constants first: x86 then keeps what is no number.
+            Self::Relu => simd.max_f32s(zero, v),
             Self::Elu => {
-                let negative = exp_negative(simd, simd.min_f32s(v, zero));
-                simd.add_f32s(simd.max_f32s(v, zero), simd.sub_f32s(negative, one))
+                let negative = exp_negative(simd, simd.min_f32s(zero, v));
+                simd.add_f32s(simd.max_f32s(zero, v), simd.sub_f32s(negative, one))
             }
             Self::Sigmoid => {
                 // e^−|x| never overflows.
@@ -109,5 +110,19 @@ mod tests {
             3e-7,
         );
         check(Activation::Sigmoid, |x| 1.0 / (1.0 + (-x).exp()), 2e-7);
+    }
+
+    #[test]
+    fn what_is_no_number_stays_so() {
+        for activation in [
+            Activation::Identity,
+            Activation::Relu,
+            Activation::Elu,
+            Activation::Sigmoid,
+        ] {
+            let mut y = [f32::NAN; 16];
+            Arch::new().dispatch(Apply(activation, &mut y));
+            assert!(y.iter().all(|y| y.is_nan()), "{activation:?}: {y:?}");
+        }
     }
 }

@@ -37,7 +37,8 @@ impl Engine {
     /// Packs the graph for images of this size.
     ///
     /// # Errors
-    /// [`Error::Size`] where the graph cannot work on such images, [`Error::NoBf16`].
+    /// [`Error::Size`] where the graph cannot work on such images, [`Error::Graph`] where a residual is a concatenation
+    /// or the image, [`Error::NoBf16`].
     pub fn new(
         graph: Graph,
         width: usize,
@@ -45,6 +46,7 @@ impl Engine {
         precision: Precision,
     ) -> Result<Self, Error> {
         graph.check_size(width, height)?;
+        graph.check_residuals()?;
         let runner = match precision {
             Precision::F32 => Runner::F32(Typed::new(graph, width, height)),
             Precision::Bf16 if !Self::has_bf16() => return Err(Error::NoBf16),
@@ -126,6 +128,9 @@ pub(crate) struct Typed<E, C> {
     plan: Plan<C>,
     arena: Aligned<E>,
     normalisation: Normalisation,
+    /// Whether the last image held something that is no number. Kernels read on a little and multiply by zero, so
+    /// nothing of it may stay for the next.
+    spoilt: bool,
 }
 
 impl<E: Element, C: ConvForm<E>> Typed<E, C> {
@@ -141,10 +146,15 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
             arena: Aligned::zeros(plan.arena),
             plan,
             normalisation,
+            spoilt: false,
         }
     }
 
     pub(crate) fn run(&mut self, image: &[f32], mut after: impl FnMut(&str, &str)) {
+        if self.spoilt {
+            self.arena.fill(E::default());
+        }
+        self.spoilt = !all_finite(image);
         let arena = Shared(self.arena.as_mut_ptr());
         for (name, step) in &self.plan.steps {
             // SAFETY: the plan's views lie in the arena; steps run one after the other, and the output of
@@ -192,4 +202,11 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
         }
         out
     }
+}
+
+/// Without a branch a value, so that it becomes vector code.
+fn all_finite(values: &[f32]) -> bool {
+    const EXPONENT: u32 = 0x7f80_0000;
+    let broken = |v: &f32| u32::from(v.to_bits() & EXPONENT == EXPONENT);
+    values.iter().fold(0, |any, v| any | broken(v)) == 0
 }

@@ -33,7 +33,7 @@ impl ConvForm<f32> for F32Conv {
     fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
         if geometry.out.result {
             Self::Head(Head::new(conv, geometry, channel_of))
-        } else if Winograd::fits(conv, &geometry) {
+        } else if Winograd::fits(conv, &geometry, channel_of) {
             Self::Winograd(Winograd::new(conv, geometry, channel_of))
         } else {
             Self::Direct(Direct::new(conv, geometry, channel_of))

@@ -163,7 +163,11 @@ impl Graph {
                         conv.channels_in, input.channels
                     ));
                 }
-                let weights = conv.channels_out * conv.channels_in * conv.kernel * conv.kernel;
+                let parts = [conv.channels_in, conv.kernel, conv.kernel];
+                let weights = parts
+                    .into_iter()
+                    .try_fold(conv.channels_out, usize::checked_mul);
+                let weights = weights.ok_or("more weights than any memory holds")?;
                 if conv.weight.len() != weights || conv.bias.len() != conv.channels_out {
                     return Err(format!(
                         "{} weights and {} biases expected, {} and {} given",
@@ -181,7 +185,7 @@ impl Graph {
                 }
                 let output = ValueShape {
                     channels: conv.channels_out,
-                    halvings: input.halvings + u32::from(conv.stride == 2),
+                    halvings: halved(input.halvings, conv.stride == 2)?,
                 };
                 match conv.residual.map(shape).transpose()? {
                     Some(residual) if residual != output => {
@@ -193,7 +197,7 @@ impl Graph {
             Op::MaxPool { input } => {
                 let input = shape(*input)?;
                 Ok(ValueShape {
-                    halvings: input.halvings + 1,
+                    halvings: halved(input.halvings, true)?,
                     ..input
                 })
             }
@@ -212,6 +216,35 @@ impl Graph {
                     halvings,
                 })
             }
+        }
+    }
+
+    /// That residuals lie as the engine adds them: channel by channel beside the sums, without the gaps of a
+    /// concatenation.
+    ///
+    /// # Errors
+    /// [`Error::Graph`] naming the first convolution whose residual is a concatenation or the image.
+    pub(crate) fn check_residuals(&self) -> Result<(), Error> {
+        let gappy = |node: &Node| match &node.op {
+            Op::Conv(conv) => conv.residual.is_some_and(|r| !self.is_convolved(r)),
+            _ => false,
+        };
+        match self.nodes.iter().position(gappy) {
+            None => Ok(()),
+            Some(node) => Err(Error::Graph {
+                node,
+                name: self.nodes[node].name.clone(),
+                reason: "its residual is a concatenation or the image".into(),
+            }),
+        }
+    }
+
+    /// Whether a value comes from a convolution, maxima between allowed.
+    fn is_convolved(&self, value: ValueId) -> bool {
+        match value.0.checked_sub(1).map(|i| &self.nodes[i].op) {
+            Some(Op::Conv(_)) => true,
+            Some(Op::MaxPool { input }) => self.is_convolved(*input),
+            Some(Op::UpsampleConcat { .. }) | None => false,
         }
     }
 
@@ -276,12 +309,18 @@ impl Graph {
     /// That the graph can work on images of this size.
     ///
     /// # Errors
-    /// [`Error::Size`] unless every halving is exact and nothing is smaller than what a reflected border
-    /// mirrors.
+    /// [`Error::Size`] unless every halving is exact and every reflected border has pixels to mirror.
     pub fn check_size(&self, width: usize, height: usize) -> Result<(), Error> {
         let deepest = self.shapes.iter().map(|s| s.halvings).max().unwrap_or(0);
-        let step = 1 << deepest;
-        let fits = |side: usize| side >= 2 * step && side.is_multiple_of(step);
+        let step = 1_usize.checked_shl(deepest).unwrap_or(usize::MAX);
+        let mirrored = self.nodes.iter().map(|node| match &node.op {
+            Op::Conv(conv) if conv.border == Border::Reflect => {
+                (conv.kernel / 2 + 1) << self.shapes[conv.input.0].halvings
+            }
+            _ => 0,
+        });
+        let least = mirrored.fold(step.saturating_mul(2), usize::max);
+        let fits = |side: usize| side >= least && side.is_multiple_of(step);
         if fits(width) && fits(height) {
             return Ok(());
         }
@@ -289,8 +328,17 @@ impl Graph {
             width,
             height,
             step,
-            least: 2 * step,
+            least,
         })
+    }
+}
+
+/// One halving more; no image is so large that it could be halved more often.
+fn halved(halvings: u32, again: bool) -> Result<u32, String> {
+    const MOST: u32 = 20;
+    match halvings + u32::from(again) {
+        n if n <= MOST => Ok(n),
+        n => Err(format!("the {n}th halving of the image")),
     }
 }
 

@@ -1,4 +1,4 @@
-//! A convolution to very few channels: lanes along the inputs.
+//! A convolution to one channel: lanes along the inputs.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;

@@ -103,7 +103,10 @@ pub(crate) unsafe fn max_pool<E: Element>(arena: Shared<E>, from: &View, to: &Vi
                         continue;
                     }
                     for (out, v) in out.iter_mut().zip(pixel) {
-                        *out = if *v > *out { *v } else { *out };
+                        // What is no number stays so.
+                        let v = *v;
+                        let wins = v > *out || v.partial_cmp(&v).is_none();
+                        *out = if wins { v } else { *out };
                     }
                 }
             }

@@ -33,6 +33,9 @@ pub(crate) struct Plan<C> {
     pub(crate) outputs: Vec<(View, Vec<usize>)>,
 }
 
+/// Elements after a buffer's last pixel that a kernel may read and multiply by zero.
+const OVERREAD: usize = 64;
+
 /// A buffer holds one value, or a concatenation with the values that are its parts.
 #[derive(Debug, Clone, Default)]
 struct Buffer {
@@ -151,32 +154,13 @@ impl Layout {
         let count = graph.nodes().len() + 1;
         let mut homes: Vec<Option<Home>> = vec![None; count];
         let mut buffers = Vec::new();
-        // Channels of a value on its own.
-        let own = |value: usize| -> Vec<Option<usize>> {
-            let channels = graph.shape(ValueId(value)).channels;
-            // The image is not filled up.
-            let physical = match value {
-                0 => channels,
-                _ if is_result(graph, ValueId(value)) => slots,
-                _ => channels.next_multiple_of(LANES),
-            };
-            let logical = |c: usize| (c < channels).then_some(c);
-            (0..physical).map(logical).collect()
-        };
+        let channels = channels(graph, slots);
         // The last ones first: a concatenation's parts come before it.
         for value in (0..count).rev() {
+            let channel_of = channels[value].clone();
             let concat = match value.checked_sub(1).map(|i| &graph.nodes()[i].op) {
                 Some(Op::UpsampleConcat { input, skip }) => Some((*input, *skip)),
                 _ => None,
-            };
-            let channel_of = match concat {
-                Some((input, Some(skip))) => {
-                    let shift = graph.shape(input).channels;
-                    let behind = own(skip.0).into_iter().map(|c| c.map(|c| c + shift));
-                    own(input.0).into_iter().chain(behind).collect()
-                }
-                Some((input, None)) => own(input.0),
-                None => own(value),
             };
             let home = homes[value].get_or_insert_with(|| {
                 buffers.push(Buffer {
@@ -199,8 +183,8 @@ impl Layout {
             {
                 homes[skip.0] = Some(Home {
                     buffer,
-                    first: own(input.0).len(),
-                    channel_of: own(skip.0),
+                    first: channels[input.0].len(),
+                    channel_of: channels[skip.0].clone(),
                     result: false,
                 });
             }
@@ -269,7 +253,7 @@ impl Layout {
         let mut order: Vec<usize> = (0..self.buffers.len()).collect();
         let size = |b: &Buffer| {
             let side = |n: usize| (n >> b.halvings) + 2 * b.border;
-            (side(width) * side(height) * b.channels).next_multiple_of(64)
+            (side(width) * side(height) * b.channels + OVERREAD).next_multiple_of(64)
         };
         let results: Vec<bool> = (0..self.buffers.len())
             .map(|b| {
@@ -346,6 +330,35 @@ impl Layout {
             result: home.result,
         }
     }
+}
+
+/// For each value and each of its physical channels the logical one; none for those that fill up. A result takes
+/// `slots` elements.
+fn channels(graph: &Graph, slots: usize) -> Vec<Vec<Option<usize>>> {
+    let mut all: Vec<Vec<Option<usize>>> = vec![(0..3).map(Some).collect()];
+    for (index, node) in graph.nodes().iter().enumerate() {
+        let value = ValueId(index + 1);
+        let count = graph.shape(value).channels;
+        let of = match &node.op {
+            Op::Conv(_) => {
+                let physical = if is_result(graph, value) {
+                    slots
+                } else {
+                    count.next_multiple_of(LANES)
+                };
+                (0..physical).map(|c| (c < count).then_some(c)).collect()
+            }
+            Op::MaxPool { input } => all[input.0].clone(),
+            Op::UpsampleConcat { input, skip } => {
+                let shift = graph.shape(*input).channels;
+                let behind = skip.map_or(&[][..], |skip| &all[skip.0]);
+                let behind = behind.iter().map(|c| c.map(|c| c + shift));
+                all[input.0].iter().copied().chain(behind).collect()
+            }
+        };
+        all.push(of);
+    }
+    all
 }
 
 /// A single channel that a convolution without a residual gives and nothing reads.

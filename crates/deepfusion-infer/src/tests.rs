@@ -336,6 +336,114 @@ fn results_do_not_depend_on_the_number_of_threads() {
     }
 }
 
+/// What no depth network has: the image convolved at full size and appended, a value appended twice, a
+/// concatenation enlarged and pooled, wide reflection, several outputs.
+fn odd_network() -> Graph {
+    let mut b = Builder {
+        graph: Graph::new([0.4; 3], [0.3; 3]),
+        noise: noise(77),
+    };
+    let wide = |c: &mut Conv| (c.kernel, c.border) = (5, Border::Reflect);
+    let full = b.conv(ValueId::IMAGE, 24, wide);
+    let small = b
+        .graph
+        .push(
+            "pool",
+            Op::MaxPool {
+                input: ValueId::IMAGE,
+            },
+        )
+        .unwrap();
+    let half = b.conv(small, 8, |c| c.activation = Activation::Elu);
+    let quarter = b.conv(half, 8, |c| c.stride = 2);
+    let concat = |b: &mut Builder<_>, input, skip| {
+        let op = Op::UpsampleConcat { input, skip };
+        b.graph.push("concat", op).unwrap()
+    };
+    let once = concat(&mut b, quarter, Some(half));
+    let again = concat(&mut b, quarter, Some(half));
+    let pooled = b.graph.push("pool", Op::MaxPool { input: once }).unwrap();
+    let third = b.conv(pooled, 8, |c| c.residual = Some(quarter));
+    let enlarged = concat(&mut b, again, Some(ValueId::IMAGE));
+    let nested = concat(&mut b, third, Some(once));
+    let end = b.conv(enlarged, 20, |c| c.residual = None);
+    let end = b.conv(end, 24, |c| c.residual = Some(full));
+    let head = b.conv(end, 1, |c| c.activation = Activation::Sigmoid);
+    for output in [head, end, nested, enlarged] {
+        b.graph.add_output(output);
+    }
+    b.graph
+}
+
+#[test]
+fn graphs_of_any_shape_are_laid_out_right_and_images_do_not_meet() {
+    let graph = odd_network();
+    let (width, height) = (64, 40);
+    let mut engine = Engine::new(graph.clone(), width, height, Precision::F32).unwrap();
+    for seed in [1, 2, 3] {
+        let mut image = noise_image(seed, width, height);
+        if seed == 2 {
+            // An image that is none must not be seen in the next.
+            image.fill(f32::NAN);
+            engine.run(&image);
+            assert!(engine.output(0).iter().all(|v| v.is_nan()));
+            continue;
+        }
+        let values = run(&graph, &image, height, width);
+        engine.run(&image);
+        for (i, value) in graph.outputs().iter().enumerate() {
+            let output = engine.output(i);
+            assert_eq!(output.len(), values[value.0].data.len());
+            let off = deviation(&output, &values[value.0]);
+            assert!(off < 1e-4, "output {i} of image {seed} off by {off}");
+        }
+        if Engine::has_bf16() {
+            let mut engine = Engine::new(graph.clone(), width, height, Precision::Bf16).unwrap();
+            engine.run(&image);
+            let off = deviation(&engine.output(0), &values[graph.outputs()[0].0]);
+            assert!(off < 0.06, "bf16 off by {off}");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_laid_out_is_refused() {
+    let mut graph = Graph::new([0.4; 3], [0.3; 3]);
+    let conv = Conv {
+        input: ValueId::IMAGE,
+        weight: vec![0.1; 3 * 3 * 49],
+        bias: vec![0.0; 3],
+        channels_in: 3,
+        channels_out: 3,
+        kernel: 7,
+        stride: 1,
+        border: Border::Reflect,
+        residual: Some(ValueId::IMAGE),
+        activation: Activation::Identity,
+    };
+    let mut added = graph.clone();
+    let end = added.push("c", Op::Conv(Box::new(conv.clone()))).unwrap();
+    added.add_output(end);
+    let error = Engine::new(added, 8, 8, Precision::F32).unwrap_err();
+    assert!(error.to_string().contains("residual"), "{error}");
+    let plain = Conv {
+        residual: None,
+        ..conv.clone()
+    };
+    graph.push("c", Op::Conv(Box::new(plain))).unwrap();
+    assert!(
+        graph.check_size(3, 8).is_err(),
+        "seven pixels see four to mirror"
+    );
+    assert!(graph.check_size(4, 8).is_ok());
+    let huge = Conv {
+        channels_in: 3,
+        kernel: usize::MAX,
+        ..conv
+    };
+    assert!(graph.push("c", Op::Conv(Box::new(huge))).is_err());
+}
+
 #[test]
 fn sizes_that_do_not_halve_are_refused() {
     let graph = network(7, [8, 8, 8, 8], true, 7);

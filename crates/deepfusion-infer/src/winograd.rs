@@ -53,8 +53,12 @@ pub(crate) struct Winograd {
 impl Winograd {
     /// Whether this form pays for a convolution: 3×3 at stride 1, on enough pixels to share the
     /// transformed weights, which are four times as many.
-    pub(crate) fn fits(conv: &Conv, geometry: &Geometry) -> bool {
-        conv.kernel == 3 && conv.stride == 1 && geometry.out.pixels() >= 1024
+    /// Input channels must be whole vectors: they are transformed a vector at a time.
+    pub(crate) fn fits(conv: &Conv, geometry: &Geometry, channel_of: &[Option<usize>]) -> bool {
+        channel_of.len().is_multiple_of(LANES)
+            && conv.kernel == 3
+            && conv.stride == 1
+            && geometry.out.pixels() >= 1024
     }
 
     pub(crate) fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {

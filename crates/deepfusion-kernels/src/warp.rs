@@ -24,7 +24,10 @@ pub struct WarpShape {
 const LANES: usize = 16;
 
 /// What coordinates and pixels are made of.
-pub trait WarpFloat: Float + Send + Sync {
+///
+/// # Safety
+/// [`Self::whole`] must give the whole part: pixels are then read without a check.
+pub unsafe trait WarpFloat: Float + Send + Sync {
     /// The whole part.
     ///
     /// # Safety
@@ -33,7 +36,8 @@ pub trait WarpFloat: Float + Send + Sync {
     unsafe fn whole(self) -> i32;
 }
 
-impl WarpFloat for f32 {
+// SAFETY: the conversion cuts off what follows the point.
+unsafe impl WarpFloat for f32 {
     #[inline(always)]
     unsafe fn whole(self) -> i32 {
         // SAFETY: the caller's promise.
@@ -41,7 +45,8 @@ impl WarpFloat for f32 {
     }
 }
 
-impl WarpFloat for f64 {
+// SAFETY: as above.
+unsafe impl WarpFloat for f64 {
     #[inline(always)]
     unsafe fn whole(self) -> i32 {
         // SAFETY: the caller's promise.
@@ -94,6 +99,11 @@ impl WarpShape {
             "images have pixels"
         );
         assert!(i32::try_from(self.in_area()).is_ok(), "pixels of a plane");
+        // Beyond, an f32 does not tell the last pixel from the one after it.
+        assert!(
+            self.in_width.max(self.in_height) <= 1 << 24,
+            "pixels of a side"
+        );
         assert_eq!(image % (self.channels * self.in_area()), 0, "whole images");
         let batch = image / (self.channels * self.in_area());
         assert_eq!(coords, batch * 2 * self.out_area, "two coordinates a pixel");

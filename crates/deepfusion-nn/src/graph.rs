@@ -10,12 +10,12 @@ use crate::weights::Weights;
 /// The graph of a [`crate::DepthNet`] with these weights: from an RGB image to the sigmoid disparity at full
 /// size.
 ///
-/// The weights carry the network's own names (`encoder.layer1.0.conv1.weight`) and become the graph's; others
-/// beside them are dropped.
+/// The weights carry the network's own names (`encoder.layer1.0.conv1.weight`) and become the graph's, but for the
+/// heads of the coarser scales, which are dropped.
 ///
 /// # Errors
 /// [`Error::Config`] for a network that cannot be built, [`Error::MissingTensor`] or
-/// [`Error::TensorShape`] where the weights are another network's.
+/// [`Error::TensorShape`] or [`Error::UnexpectedTensor`] where the weights are another network's, [`Error::NotFinite`].
 pub fn depth_graph(config: &DepthNetConfig, weights: Weights) -> Result<Graph, Error> {
     config.validate()?;
     let normalisation = config.encoder.normalisation;
@@ -26,6 +26,7 @@ pub fn depth_graph(config: &DepthNetConfig, weights: Weights) -> Result<Graph, E
     let features = builder.encoder(config)?;
     let finest = builder.decoder(config, features)?;
     builder.graph.add_output(finest);
+    builder.nothing_left()?;
     Ok(builder.graph)
 }
 
@@ -240,7 +241,35 @@ impl Builder {
                 others: 0,
             });
         }
+        let count = tensor.values.iter().filter(|v| !v.is_finite()).count();
+        if count > 0 {
+            return Err(Error::NotFinite {
+                origin: self.weights.origin.clone(),
+                name: name.into(),
+                count,
+            });
+        }
         Ok(tensor.values)
+    }
+
+    /// That every tensor found its place, but for the heads of the coarser scales, which only training needs.
+    fn nothing_left(&self) -> Result<(), Error> {
+        let head = |name: &str| {
+            ["1", "2", "3"]
+                .map(|s| format!("decoder.heads.{s}."))
+                .iter()
+                .any(|h| name.starts_with(h))
+        };
+        let mut left = self.weights.tensors.iter().filter(|(name, _)| !head(name));
+        match left.next() {
+            None => Ok(()),
+            Some((name, tensor)) => Err(Error::UnexpectedTensor {
+                origin: self.weights.origin.clone(),
+                name: name.clone(),
+                found: tensor.shape.clone(),
+                others: left.count(),
+            }),
+        }
     }
 
     fn push(&mut self, name: String, op: Op) -> Result<ValueId, Error> {

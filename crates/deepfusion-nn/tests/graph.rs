@@ -99,6 +99,21 @@ fn weights_of_another_network_are_refused_by_name() {
         }
         other => panic!("{other:?}"),
     }
+    let mut broken = trained(&config);
+    let first = broken.tensors.get_mut("encoder.conv1.weight").unwrap();
+    first.values[7] = f32::NAN;
+    let error = depth_graph(&config, broken);
+    assert!(
+        matches!(error, Err(Error::NotFinite { count: 1, .. })),
+        "{error:?}"
+    );
+    // ResNet-34's tensors are ResNet-18's and more.
+    let deeper = trained(&DepthNetConfig::new(ResNetDepth::ResNet34));
+    let error = depth_graph(&config, deeper);
+    assert!(
+        matches!(error, Err(Error::UnexpectedTensor { .. })),
+        "{error:?}"
+    );
     let mut wide = config.clone();
     wide.encoder.base_width = 96;
     let shape = depth_graph(&wide, trained(&config));

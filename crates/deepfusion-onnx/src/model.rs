@@ -1,5 +1,5 @@
 use deepfusion_geometry::DepthRange;
-use deepfusion_infer::{Border, Graph, Op, ValueId};
+use deepfusion_infer::Graph;
 
 use crate::Error;
 
@@ -41,8 +41,8 @@ impl DepthModel {
     /// That the model can work on its images, and that there is one map of depth in it.
     ///
     /// # Errors
-    /// [`Error::Network`] for a size the network cannot halve, [`Error::Node`] for a border that is wider
-    /// than the image it mirrors, [`Error::Model`] for a range that is none or other outputs.
+    /// [`Error::Network`] for a size the network cannot halve or whose borders are wider than what they mirror,
+    /// [`Error::Model`] for a range that is none or other outputs.
     pub fn validate(&self) -> Result<(), Error> {
         self.graph.check_size(self.width, self.height)?;
         let fail = |part: &'static str, reason: String| Err(Error::Model { part, reason });
@@ -66,27 +66,7 @@ impl DepthModel {
             }
             others => return fail("outputs", format!("{}, expected one", others.len())),
         }
-        for node in self.graph.nodes() {
-            if let Op::Conv(conv) = &node.op
-                && conv.border == Border::Reflect
-            {
-                let [width, height] = self.size_of(conv.input);
-                if conv.kernel / 2 >= width.min(height) {
-                    return Err(Error::Node {
-                        name: node.name.clone(),
-                        op: "Pad".into(),
-                        reason: format!("mirrors {} pixels of {width}x{height}", conv.kernel / 2),
-                    });
-                }
-            }
-        }
         Ok(())
-    }
-
-    /// Width and height of a value of the graph, in its own pixels.
-    pub(crate) fn size_of(&self, value: ValueId) -> [usize; 2] {
-        let halvings = self.graph.shape(value).halvings;
-        [self.width >> halvings, self.height >> halvings]
     }
 
     /// 1/D_max and 1/D_min − 1/D_max as the files hold them: disparity = first + second · σ.

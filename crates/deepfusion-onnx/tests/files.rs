@@ -116,7 +116,7 @@ fn models_that_cannot_be_written_are_told() {
     assert_eq!(part(&model), "outputs", "half the image's size");
     // Seven rows mirrored at the edge of an image of six.
     let wide = |conv: &mut Conv| (conv.kernel, conv.weight) = (13, vec![0.0; 3 * 13 * 13]);
-    assert_eq!(part(&single(wide)), "only");
+    assert!(part(&single(wide)).contains("at least 7"));
     let mut model = single(|_| ());
     model.width = 1;
     assert!(part(&model).contains("1x4"));

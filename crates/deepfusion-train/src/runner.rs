@@ -12,7 +12,8 @@ use deepfusion_nn::{DepthNet, InputSize, depth_graph};
 
 use crate::{Error, TrainConfig};
 
-/// Runs a depth network, one image at a time, from any thread.
+/// Runs a depth network, one image at a time, from any thread; but not from many tasks of rayon's at once: while one
+/// of them waits for the network's own parallel work, its thread may begin another, which then waits for the first.
 pub trait DepthRunner: Debug + Send + Sync {
     /// What reports call it.
     fn name(&self) -> &'static str;

@@ -38,6 +38,9 @@ pub fn runner(
     if engine != EngineChoice::Fused && args.precision != PrecisionChoice::F32 {
         return Err(CliError::OnlyFused.into());
     }
+    if engine != EngineChoice::Ort && args.ort_lib.is_some() {
+        return Err(CliError::OnlyOrt.into());
+    }
     Ok(match engine {
         EngineChoice::Burn | EngineChoice::Auto => {
             allocator::keep_memory();

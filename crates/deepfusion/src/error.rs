@@ -53,6 +53,9 @@ pub enum CliError {
     /// An engine for processors on another device.
     #[error("only `--engine burn` computes on other devices than the processor")]
     OnlyOnCpu,
+    /// A library for another engine.
+    #[error("`--ort-lib` is of use to `--engine ort` alone")]
+    OnlyOrt,
     /// A precision that an engine does not have.
     #[error("`--precision bf16` is the fused engine's")]
     OnlyFused,
@@ -120,6 +123,7 @@ impl CliError {
                 Some("this is a fault of the program or of the library that ran the file; please report it".into())
             }
             Self::OnlyOnCpu => Some("leave out --engine, or give --device cpu".into()),
+            Self::OnlyOrt => Some("add --engine ort, or leave out --ort-lib".into()),
             Self::OnlyFused => Some("give --engine fused --device cpu, or leave out --precision".into()),
             Self::Stale { .. } => Some(
                 "--overwrite replaces what was made differently; or choose another folder".into(),

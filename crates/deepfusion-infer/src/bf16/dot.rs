@@ -1,8 +1,8 @@
 //! Convolutions in bf16 with AVX-512's dot products: each lane adds the products of a pair of inputs.
 
 use std::arch::x86_64::{
-    _mm512_dpbf16_ps, _mm512_loadu_ps, _mm512_loadu_si512, _mm512_set1_epi32, _mm512_setzero_ps,
-    _mm512_storeu_ps,
+    __m512bh, __m512i, _mm512_dpbf16_ps, _mm512_loadu_ps, _mm512_loadu_si512, _mm512_set1_epi32,
+    _mm512_setzero_ps, _mm512_storeu_ps,
 };
 use std::mem::transmute;
 
@@ -149,15 +149,20 @@ impl Dot {
     ) {
         let g = &self.geometry;
         let finish = Finish::new(g, &self.bias, arena);
-        let places = pixels.map(|p| Place::new(g, p % g.out.width, p / g.out.width));
+        let place = |p: usize| Place::new(g, p % g.out.width, p / g.out.width);
         if g.out.result {
-            let places: Vec<_> = places.map(Some).collect();
-            for (i, places) in places.chunks(LANES).enumerate() {
+            for first in pixels.clone().step_by(LANES) {
+                let inside = |p: &usize| *p < pixels.end;
+                let places = std::array::from_fn::<_, LANES, _>(|i| {
+                    Some(first + i).filter(inside).map(place)
+                });
+                let sum = |i: usize| sums.get((first + i - pixels.start) * GROUP).copied();
                 // SAFETY: the caller's promise.
-                unsafe { finish.results(places, |p| sums[(i * LANES + p) * GROUP]) };
+                unsafe { finish.results(&places, |i| sum(i).unwrap_or(0.0)) };
             }
             return;
         }
+        let places = pixels.map(place);
         for (place, sums) in places.zip(sums.chunks(GROUP)) {
             for c in (0..self.width(group)).step_by(LANES) {
                 // SAFETY: as above.
@@ -211,8 +216,8 @@ impl Tile<'_> {
                         for v in 0..V {
                             sums[r][v] = _mm512_dpbf16_ps(
                                 sums[r][v],
-                                transmute(pair),
-                                transmute(weights[v]),
+                                transmute::<__m512i, __m512bh>(pair),
+                                transmute::<__m512i, __m512bh>(weights[v]),
                             );
                         }
                     }

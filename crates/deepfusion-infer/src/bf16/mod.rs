@@ -4,8 +4,9 @@ mod amx;
 mod dot;
 
 use std::arch::x86_64::{
-    __m256i, __m512, _mm256_loadu_si256, _mm256_storeu_si256, _mm512_add_ps, _mm512_castsi512_ps,
-    _mm512_cvtepu16_epi32, _mm512_cvtneps_pbh, _mm512_loadu_ps, _mm512_slli_epi32,
+    __m256bh, __m256i, __m512, _mm256_loadu_si256, _mm256_storeu_si256, _mm512_add_ps,
+    _mm512_castsi512_ps, _mm512_cvtepu16_epi32, _mm512_cvtneps_pbh, _mm512_loadu_ps,
+    _mm512_slli_epi32,
 };
 use std::mem::transmute;
 
@@ -84,8 +85,10 @@ impl<'a> Finish<'a> {
                 let bits = _mm512_slli_epi32::<16>(_mm512_cvtepu16_epi32(bits));
                 sum = _mm512_add_ps(sum, _mm512_castsi512_ps(bits));
             }
-            let value = self.geometry.activation.of(self.simd, transmute(sum));
-            let rounded: __m256i = transmute(_mm512_cvtneps_pbh(transmute::<_, __m512>(value)));
+            let sum = transmute::<__m512, pulp::f32x16>(sum);
+            let value = self.geometry.activation.of(self.simd, sum);
+            let value = transmute::<pulp::f32x16, __m512>(value);
+            let rounded = transmute::<__m256bh, __m256i>(_mm512_cvtneps_pbh(value));
             _mm256_storeu_si256(self.arena.at(place.out + c).cast(), rounded);
         }
     }

@@ -19,24 +19,24 @@ use crate::Error;
 /// # Errors
 /// [`Error::Io`] for a file that cannot be read, [`Error::Format`] for one that holds no weights.
 pub fn read(path: &Path) -> Result<Weights, Error> {
-    read_under(path, "")
-}
-
-/// The same for the tensors alone whose names start with `prefix`, without it. The others of a safetensors
-/// file are not even read: a checkpoint holds the optimiser's state beside the networks.
-///
-/// # Errors
-/// As [`read`]; a file without such tensors is one that holds no weights.
-pub fn read_under(path: &Path, prefix: &str) -> Result<Weights, Error> {
-    let weights = if is_pytorch(path)? {
-        read_pytorch(path)?.under(prefix)
-    } else {
-        read_safetensors(path, prefix)?
-    };
+    let weights = read_under(path, "")?;
     if weights.tensors.is_empty() {
         return Err(format_error(path, "it holds no float tensors"));
     }
     Ok(weights)
+}
+
+/// The same for the tensors alone whose names start with `prefix`, without it; there may be none. The others of a
+/// safetensors file are not even read: a checkpoint holds the optimiser's state beside the networks.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_under(path: &Path, prefix: &str) -> Result<Weights, Error> {
+    if is_pytorch(path)? {
+        Ok(read_pytorch(path)?.under(prefix))
+    } else {
+        read_safetensors(path, prefix)
+    }
 }
 
 /// PyTorch writes a zip archive ("PK"), before version 1.6 a bare pickle (0x80, protocol). A

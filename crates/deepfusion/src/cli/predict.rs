@@ -116,8 +116,8 @@ pub struct BenchArgs {
     /// A preset's network with random weights [default: tiny].
     #[arg(long, value_enum)]
     pub preset: Option<PresetChoice>,
-    /// Size of the network's input [default: the network's own].
-    #[arg(long, value_name = "WxH")]
+    /// Size of a preset's input [default: the preset's own].
+    #[arg(long, value_name = "WxH", conflicts_with = "model")]
     pub size: Option<Size>,
     /// How often each stage is measured.
     #[arg(long, value_name = "N", default_value_t = 20)]

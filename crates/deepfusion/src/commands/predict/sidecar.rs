@@ -10,6 +10,7 @@ use deepfusion_train::{Predictor, RunFolder};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::super::device;
 use super::camera::CameraSource;
 use crate::cli::{PredictArgs, Save};
 
@@ -70,7 +71,8 @@ impl FileMark {
     }
 }
 
-/// Program, weights and options: outputs of the same image with equal ones are equal.
+/// Program, weights and options: outputs of the same image with equal ones are equal (on one machine; the last digits
+/// depend on the processor).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MadeWith {
     /// The program's version.
@@ -109,7 +111,11 @@ impl MadeWith {
         Ok(Self {
             version: env!("CARGO_PKG_VERSION").into(),
             weights: format!("{:x}", hash.finalize()),
-            engine: predictor.runner().name().into(),
+            engine: format!(
+                "{} on {}",
+                predictor.runner().name(),
+                device::name(args.engine.device)
+            ),
             save: args.save.iter().map(|s| word(*s)).collect(),
             max_depth_m: args.max_depth,
             intrinsics: match camera {
