@@ -34,6 +34,10 @@ impl Element for Bf16 {
     /// To the nearest, ties to even.
     #[inline(always)]
     fn of(value: f32) -> Self {
+        if value.is_nan() {
+            // Rounding up could carry through to a zero.
+            return Self(0x7fc0);
+        }
         let bits = value.to_bits();
         let rounded = bits.wrapping_add(0x7fff + ((bits >> 16) & 1));
         Self((rounded >> 16) as u16)
@@ -42,5 +46,22 @@ impl Element for Bf16 {
     #[inline(always)]
     fn value(self) -> f32 {
         f32::from_bits(u32::from(self.0) << 16)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bf16_rounds_to_the_nearest_and_keeps_what_is_no_number() {
+        let rounded = |v: f32| Bf16::of(v).value();
+        // Between 1 and 2 the step is 2⁻⁷; halfway goes to the even one.
+        assert_eq!(rounded(1.0 + 0.6 / 128.0), 1.0 + 1.0 / 128.0);
+        assert_eq!(rounded(1.0 + 0.5 / 128.0), 1.0);
+        assert_eq!(rounded(1.0 + 1.5 / 128.0), 1.0 + 2.0 / 128.0);
+        assert_eq!(rounded(-3.0), -3.0);
+        assert_eq!(rounded(f32::INFINITY), f32::INFINITY);
+        assert!(rounded(f32::from_bits(0x7fff_ffff)).is_nan());
     }
 }

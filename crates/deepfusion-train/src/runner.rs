@@ -75,7 +75,7 @@ impl DepthRunner for BurnRunner {
 
 /// The network laid out and packed once for this processor.
 ///
-/// In f32 its sigmoid differs from [`BurnRunner`]'s by rounding alone (below 1e-4 in the tests, usually 1e-6); in
+/// In f32 its sigmoid differs from [`BurnRunner`]'s by rounding alone (below 1e-4 in the tests); in
 /// bf16 by what eight bits of mantissa lose.
 #[derive(Debug)]
 pub struct FusedRunner {

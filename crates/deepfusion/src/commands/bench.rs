@@ -238,6 +238,7 @@ impl<'a> Bench<'a> {
         let mut least: Vec<(String, f64)> = Vec::new();
         for _ in 0..repeats {
             let Some(steps) = self.runner.profile(&input) else {
+                tracing::warn!("only the fused engine tells what its steps take");
                 break;
             };
             let steps = steps
