@@ -170,7 +170,16 @@ impl DepthNet {
     /// # Panics
     /// When the images' size is no [`InputSize`]; check it where it enters the program.
     pub fn forward(&self, images: Tensor<4>) -> Vec<Tensor<4>> {
-        self.decoder.forward(self.encoder.forward(images))
+        self.decode(self.encoder.forward(images))
+    }
+
+    /// The same from the encoder's features, for whoever shares the encoder with another decoder.
+    ///
+    /// # Shapes
+    /// - `features`: those of [`ResNet::forward`]
+    /// - output: as [`Self::forward`]
+    pub fn decode(&self, features: [Tensor<4>; 5]) -> Vec<Tensor<4>> {
+        self.decoder.forward(features)
     }
 }
 
