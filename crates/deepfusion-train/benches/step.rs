@@ -5,7 +5,7 @@ use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{BatchSize, Criterion, criterion_group};
 use deepfusion_infer::{Engine, Precision};
 use deepfusion_nn::{DepthNet, DepthNetConfig, ResNetDepth, depth_graph, weights};
-use deepfusion_train::{Adam, Model, Motion, NamedGradients, Preset, SnippetBatch};
+use deepfusion_train::{Adam, Model, Motion, NamedGradients, Preset, Schedule, SnippetBatch};
 
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
@@ -115,10 +115,14 @@ fn light_step(criterion: &mut Criterion) {
     let mut model = Model::new(&config, &device).expect("the preset is valid");
     let mut adam = Adam::default();
     let batch = snippets(4, 96, 320, &device);
+    let schedule = Schedule {
+        speed_weight: config.loss.speed,
+        masks_active: true,
+    };
     criterion.bench_function("training step, preset light, 320x96, batch 4", |b| {
         b.iter(|| {
             let pass = model.forward(&batch);
-            let loss = model.loss(&pass, &batch, config.loss.speed);
+            let loss = model.loss(&pass, &batch, schedule);
             let mut raw = loss.total.backward();
             let mut gradients = NamedGradients::default();
             gradients.add("depth", &model.depth_net, &mut raw, 1.0);

@@ -150,6 +150,10 @@ impl RunFolder {
     ) -> Result<PathBuf, Error> {
         let mut all = weights::collect(&model.depth_net).with_prefix("depth.");
         all = all.merged(weights::collect(&model.pose_net).with_prefix("pose."));
+        // What training alone needs goes into the checkpoint to go on from.
+        if let (Some(decoder), CheckpointKind::Last) = (&model.flow_decoder, kind) {
+            all = all.merged(weights::collect(decoder).with_prefix("flow."));
+        }
         if let Some(adam) = adam {
             all = all.merged(adam.state().with_prefix("adam."));
             all.metadata
@@ -187,6 +191,14 @@ impl RunFolder {
         let blank = Model::new(config, device)?;
         let depth_net = weights::apply(blank.depth_net, &named("depth."))?;
         let pose_net = weights::apply(blank.pose_net, &named("pose."))?;
+        // A run that starts from the networks of one without a flow decoder begins with a new one.
+        let flow_weights = named("flow.");
+        let flow_decoder = match blank.flow_decoder {
+            Some(decoder) if !flow_weights.tensors.is_empty() => {
+                Some(weights::apply(decoder, &flow_weights)?)
+            }
+            other => other,
+        };
         let adam = match all.metadata.get("adam_steps") {
             Some(_) => {
                 let steps = number(&path, &all, "adam_steps")?;
@@ -195,7 +207,8 @@ impl RunFolder {
             }
             None => None,
         };
-        let model = Model::with_networks(config, depth_net, pose_net, device);
+        let mut model = Model::with_networks(config, depth_net, pose_net, device);
+        model.flow_decoder = flow_decoder;
         Ok((model, adam, state))
     }
 

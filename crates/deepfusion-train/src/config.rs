@@ -1,6 +1,8 @@
-use crate::{Error, Preset};
+use crate::{Error, LossConfig, Preset};
 use deepfusion_geometry::Intrinsics;
-use deepfusion_nn::{DepthNetConfig, InputSize, PoseNetConfig};
+use deepfusion_nn::{
+    AttentionConfig, DepthNetConfig, FlowDecoderConfig, HceConfig, InputSize, PoseNetConfig,
+};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -36,65 +38,6 @@ pub enum ViewMotion {
     Distance,
     /// The vehicle's own, from speed and yaw rate (SPEC 3.4). PoseNet learns that motion beside it.
     Vehicle,
-}
-
-/// The size at which the views of a coarser scale are compared with their targets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum CompareAt {
-    /// Full size, to which its disparity is enlarged: fewer holes and copied textures (SPEC 2).
-    #[default]
-    Full,
-    /// The scale's own: a pixel there sees 2ˢ times as far, so that near things, which move far, are found
-    /// from a wrong first depth; and it costs a third.
-    Own,
-}
-
-/// Weights and switches of the loss terms (SPEC 2). A weight of 0 switches a term off.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LossConfig {
-    /// α of the photometric error: the share of SSIM beside the absolute difference.
-    pub ssim_weight: f64,
-    /// The size at which the views of a coarser scale are compared.
-    #[serde(default)]
-    pub compare_at: CompareAt,
-    /// λ_s of the edge-aware smoothness at full resolution; halved at each coarser scale.
-    pub smoothness: f64,
-    /// λ_v of the speed loss.
-    pub speed: f64,
-    /// β_R: weight of the rotation inside the speed loss. Not read where the views are synthesised with
-    /// the vehicle's motion: PoseNet then learns the whole of it, at a weight of its own.
-    pub rotation: f64,
-    /// Steps over which λ_v rises from 0; at most a tenth of the run.
-    pub speed_warmup_steps: usize,
-    /// Whether pixels that the unwarped source explains better contribute that constant instead.
-    pub automask: bool,
-}
-
-impl LossConfig {
-    /// The names that [`Self::without`] takes.
-    pub const TERMS: [&'static str; 3] = ["smoothness", "speed", "automask"];
-
-    /// Switches a term off by its name.
-    ///
-    /// # Errors
-    /// [`Error::Config`] for a name that is none of [`Self::TERMS`].
-    pub fn without(&mut self, term: &str) -> Result<(), Error> {
-        match term {
-            "smoothness" => self.smoothness = 0.0,
-            "speed" => self.speed = 0.0,
-            "automask" => self.automask = false,
-            _ => {
-                return Err(Error::Config {
-                    field: "without",
-                    expected: format!("one of {}", Self::TERMS.join(", ")),
-                    found: term.to_owned(),
-                });
-            }
-        }
-        Ok(())
-    }
 }
 
 /// What is done to the images before the networks see them.
@@ -186,9 +129,26 @@ pub struct TrainConfig {
     pub depth_net: DepthNetConfig,
     /// The pose network. `metres_per_unit` 0 means the data's mean displacement per pair.
     pub pose_net: PoseNetConfig,
+    /// The flow decoder, which training alone has, and only where `loss.flow.weight` is above 0.
+    #[serde(default)]
+    pub flow_net: FlowDecoderConfig,
 }
 
 impl TrainConfig {
+    /// The names that [`Self::with`] and [`Self::without`] take: parts of the depth network, then the terms
+    /// of the loss.
+    pub const TERMS: [&'static str; 9] = [
+        "hce",
+        "attention",
+        "aggregation",
+        "smoothness",
+        "speed",
+        "automask",
+        "affine",
+        "flow",
+        "moving",
+    ];
+
     /// Reads a TOML file.
     ///
     /// # Errors
@@ -215,13 +175,38 @@ impl TrainConfig {
         })
     }
 
-    /// Switches a term of the loss off by its name. Without the speed term nothing measured fixes the
-    /// scale: the views then follow PoseNet alone.
+    /// Switches a part of the depth network or a term of the loss on by its name, as the paper has it unless
+    /// it is on already.
     ///
     /// # Errors
-    /// As [`LossConfig::without`].
+    /// [`Error::Config`] for a name that is none of [`Self::TERMS`].
+    pub fn with(&mut self, term: &str) -> Result<(), Error> {
+        let net = &mut self.depth_net;
+        match known(term, "with")? {
+            "hce" => {
+                net.hce.get_or_insert_with(HceConfig::default);
+            }
+            "attention" => {
+                net.attention.get_or_insert_with(AttentionConfig::default);
+            }
+            "aggregation" => net.aggregation = true,
+            term => self.loss.with(term)?,
+        }
+        Ok(())
+    }
+
+    /// Switches a part of the depth network or a term of the loss off by its name. Without the speed term
+    /// nothing measured fixes the scale: the views then follow PoseNet alone.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a name that is none of [`Self::TERMS`].
     pub fn without(&mut self, term: &str) -> Result<(), Error> {
-        self.loss.without(term)?;
+        match known(term, "without")? {
+            "hce" => self.depth_net.hce = None,
+            "attention" => self.depth_net.attention = None,
+            "aggregation" => self.depth_net.aggregation = false,
+            term => self.loss.without(term)?,
+        }
         if self.loss.speed == 0.0 {
             self.view_motion = ViewMotion::PoseNet;
         }
@@ -241,6 +226,8 @@ impl TrainConfig {
         self.size.validate()?;
         self.depth_net.validate()?;
         self.pose_net.encoder.validate()?;
+        self.flow_net.validate()?;
+        self.loss.validate()?;
         if self.batch == 0 {
             return fail("batch", "at least 1", "0".into());
         }
@@ -265,9 +252,6 @@ impl TrainConfig {
             );
         }
         let weights = [
-            ("loss.smoothness", self.loss.smoothness),
-            ("loss.speed", self.loss.speed),
-            ("loss.rotation", self.loss.rotation),
             ("clip_norm", self.clip_norm),
             ("min_speed_mps", self.min_speed_mps),
             ("pose_net.metres_per_unit", self.pose_net.metres_per_unit),
@@ -278,7 +262,6 @@ impl TrainConfig {
             }
         }
         for (field, share) in [
-            ("loss.ssim_weight", self.loss.ssim_weight),
             ("augmentation.jitter", self.augmentation.jitter),
             (
                 "augmentation.brightness",
@@ -296,6 +279,14 @@ impl TrainConfig {
             let found = format!("{:?}", self.view_motion).to_lowercase();
             return fail("view_motion", "posenet where loss.speed is 0", found);
         }
+        if self.loss.affine > 0.0 && self.reprojection != Reprojection::Bidirectional {
+            let found = self.loss.affine.to_string();
+            return fail(
+                "loss.affine",
+                "0 where reprojection is not bidirectional: it compares both frames' depths",
+                found,
+            );
+        }
         match (self.reprojection, self.frames.as_slice()) {
             (_, []) => fail("frames", "at least one offset", "[]".into()),
             (_, frames) if frames.contains(&0) => {
@@ -311,9 +302,38 @@ impl TrainConfig {
     }
 }
 
+/// The term of this name.
+fn known(term: &str, field: &'static str) -> Result<&'static str, Error> {
+    let terms = TrainConfig::TERMS;
+    let found = terms.iter().find(|t| **t == term).copied();
+    found.ok_or_else(|| Error::Config {
+        field,
+        expected: format!("one of {}", terms.join(", ")),
+        found: term.to_owned(),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_of_the_network_go_on_and_off_by_name() {
+        let start = Preset::Light.config();
+        let mut config = start.clone();
+        for term in TrainConfig::TERMS {
+            config.with(term).unwrap();
+        }
+        config.validate().unwrap();
+        let net = &config.depth_net;
+        assert!(net.hce.is_some() && net.attention.is_some() && net.aggregation);
+        for term in ["hce", "attention", "aggregation"] {
+            config.without(term).unwrap();
+        }
+        assert_eq!(config.depth_net, start.depth_net);
+        let error = config.with("hope").unwrap_err().to_string();
+        assert!(error.contains("hce, attention, aggregation"), "{error}");
+    }
 
     /// Without the speed term the views follow PoseNet: `without` sees to it, and whoever says otherwise
     /// afterwards is told.

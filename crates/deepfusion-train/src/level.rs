@@ -1,5 +1,4 @@
-use crate::ForwardPass;
-use crate::config::CompareAt;
+use crate::{CompareAt, ForwardPass};
 use burn::tensor::module::avg_pool2d;
 use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Device, Tensor};

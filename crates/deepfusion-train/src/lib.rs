@@ -13,8 +13,10 @@ mod error;
 mod event;
 mod level;
 pub mod log;
+mod loss_config;
 pub mod losses;
 mod model;
+mod objective;
 mod panel;
 mod pose;
 mod predictor;
@@ -32,13 +34,14 @@ pub use augment::Jitter;
 pub use batch::{BatchLoader, SnippetBatch};
 pub use checkpoint::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder, load_depth_net};
 pub use config::{
-    Augmentation, CompareAt, DataConfig, LossConfig, Reprojection, ReversedPose, TrainConfig,
-    ViewMotion,
+    Augmentation, DataConfig, Reprojection, ReversedPose, TrainConfig, ViewMotion,
 };
 pub use error::Error;
 pub use event::{Control, TrainEvent};
+pub use loss_config::{CompareAt, FlowLossConfig, LossConfig, MovingConfig};
 pub use losses::LossTerms;
-pub use model::{BatchLoss, ForwardPass, Model};
+pub use model::{ForwardPass, Model, ViewFlow};
+pub use objective::{BatchLoss, Schedule};
 pub use panel::SamplePanel;
 pub use pose::{Motion, rotation_from_axis_angle};
 pub use predictor::{Prediction, Predictor};

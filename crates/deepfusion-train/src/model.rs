@@ -1,11 +1,9 @@
-use crate::config::{CompareAt, Reprojection, ReversedPose, ViewMotion};
-use crate::level::{levels, pyramid};
-use crate::losses::{self, LossTerms, ReprojectionOutput, View};
-use crate::{BilinearResize, Error, Motion, SnippetBatch, TrainConfig, synthesise};
+use crate::config::{Reprojection, ReversedPose};
+use crate::{BilinearResize, Error, Motion, SnippetBatch, TrainConfig};
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use deepfusion_geometry::DepthRange;
-use deepfusion_nn::{DepthNet, PoseNet, SCALES};
+use deepfusion_nn::{DepthNet, FlowDecoder, PoseNet, SCALES, WeightRng};
 
 /// The networks of a run, and what their training step needs.
 #[derive(Debug, Clone)]
@@ -14,9 +12,20 @@ pub struct Model {
     pub depth_net: DepthNet,
     /// Motion between two.
     pub pose_net: PoseNet,
-    config: TrainConfig,
+    /// Optical flow from the depth network's features of both; only while training with a flow loss.
+    pub flow_decoder: Option<FlowDecoder>,
+    pub(crate) config: TrainConfig,
     /// From scale s to full resolution.
-    enlarge: Vec<BilinearResize>,
+    pub(crate) enlarge: Vec<BilinearResize>,
+}
+
+/// The optical flow between targets and sources, T×2×H×W each, in pixels.
+#[derive(Debug, Clone)]
+pub struct ViewFlow {
+    /// From the targets to the sources: what is at p is at p + f(p) there.
+    pub flow: Tensor<4>,
+    /// From the sources to the targets.
+    pub back: Tensor<4>,
 }
 
 /// What the networks say about a batch: T targets, which are frame 0 alone, or frames 0 and 1.
@@ -28,6 +37,8 @@ pub struct ForwardPass {
     pub motions: Vec<Motion>,
     /// The same by the vehicle's sensors.
     pub measured: Vec<Motion>,
+    /// The optical flow by view; empty without a flow decoder.
+    pub flows: Vec<ViewFlow>,
     /// Clean images of the targets, T×3×H×W.
     pub targets: Tensor<4>,
     /// Clean images of the sources by view, T×3×H×W.
@@ -36,19 +47,6 @@ pub struct ForwardPass {
     pub intrinsics: Tensor<3>,
     /// K⁻¹ of the targets, T×3×3.
     pub inverse_intrinsics: Tensor<3>,
-}
-
-/// The loss of a batch: the sum to differentiate, its terms, and what the finest scale saw.
-#[derive(Debug, Clone)]
-pub struct BatchLoss {
-    /// What is minimised, one value.
-    pub total: Tensor<1>,
-    /// Its terms.
-    pub terms: LossTerms,
-    /// The reprojection at the finest scale.
-    pub finest: ReprojectionOutput,
-    /// The first view's source seen from the targets' place at that scale, T×3×H×W.
-    pub warped: Tensor<4>,
 }
 
 /// Share of the predicted displacement that the loss saw: for the scale ratio.
@@ -84,10 +82,16 @@ impl Model {
         if config.start_moving && config.reversed_pose == ReversedPose::Inverted {
             pose_net = start_moving(pose_net);
         }
-        Ok(Self::with_networks(config, depth_net, pose_net, device))
+        let mut model = Self::with_networks(config, depth_net, pose_net, device);
+        if config.loss.flow.weight > 0.0 {
+            let mut rng = WeightRng::new(config.seed.wrapping_add(2));
+            let channels = config.depth_net.encoder.channels();
+            model.flow_decoder = Some(config.flow_net.init(channels, &mut rng, device)?);
+        }
+        Ok(model)
     }
 
-    /// The given networks.
+    /// The given networks, without a flow decoder.
     #[must_use]
     pub fn with_networks(
         config: &TrainConfig,
@@ -102,12 +106,13 @@ impl Model {
         Self {
             depth_net,
             pose_net,
+            flow_decoder: None,
             config: config.clone(),
             enlarge,
         }
     }
 
-    /// The same networks for inference, on the device below autodiff.
+    /// The depth and pose networks for inference, on the device below autodiff.
     #[must_use]
     pub fn valid(&self, device: &Device) -> Self {
         Self::with_networks(
@@ -151,8 +156,15 @@ impl Model {
             }
         };
         let twice = |k: &Tensor<3>| Tensor::cat(vec![k.clone(), k.clone()], 0);
+        let features = self.depth_net.encoder.forward(pair(first, second, 0));
+        let flows = self.flow_decoder.as_ref().map(|decoder| {
+            let flow = decoder.forward(&features, &features.clone().map(swap_halves));
+            let back = swap_halves(flow.clone());
+            ViewFlow { flow, back }
+        });
         ForwardPass {
-            disparities: self.depth_net.forward(pair(first, second, 0)),
+            disparities: self.depth_net.decode(features),
+            flows: flows.into_iter().collect(),
             motions: vec![motion],
             measured: vec![Motion::cat(vec![
                 batch.measured[0].clone(),
@@ -192,8 +204,10 @@ impl Model {
                 motion
             }
         });
+        let (disparities, flows) = self.depth_and_flows(batch);
         ForwardPass {
-            disparities: self.depth_net.forward(target.clone()),
+            disparities,
+            flows,
             motions: motions.collect(),
             measured: batch.measured.clone(),
             targets: batch.clean[0].clone(),
@@ -203,146 +217,40 @@ impl Model {
         }
     }
 
+    /// Disparities of the targets, and the flow between them and every source where there is a decoder for
+    /// it: the encoder then looks at the sources too.
+    fn depth_and_flows(&self, batch: &SnippetBatch) -> (Vec<Tensor<4>>, Vec<ViewFlow>) {
+        let Some(decoder) = &self.flow_decoder else {
+            return (self.depth_net.forward(batch.network[0].clone()), Vec::new());
+        };
+        let n = batch.len();
+        let all = self
+            .depth_net
+            .encoder
+            .forward(Tensor::cat(batch.network.clone(), 0));
+        let frame = |index: usize| all.clone().map(|f| f.narrow(0, index * n, n));
+        let targets = frame(0);
+        let flows = (1..batch.network.len()).map(|source| {
+            let source = frame(source);
+            ViewFlow {
+                flow: decoder.forward(&targets, &source),
+                back: decoder.forward(&source, &targets),
+            }
+        });
+        let flows = flows.collect();
+        (self.depth_net.decode(targets), flows)
+    }
+
     fn motion(&self, stacked: Tensor<4>) -> Motion {
         let pose = self.pose_net.forward(stacked);
         Motion::new(pose.axis_angle, pose.translation)
     }
-
-    /// The loss of a forward pass, with λ_v as given: L = Σ_s ¼(L_rp + λ_s·L_smooth) + λ_v·L_speed.
-    #[must_use]
-    pub fn loss(&self, pass: &ForwardPass, batch: &SnippetBatch, speed_weight: f64) -> BatchLoss {
-        let settings = &self.config.loss;
-        let range = self.range();
-        let (low, high) = (1.0 / range.max_m, 1.0 / range.min_m);
-        let motions = self.view_motions(pass, batch);
-        let targets = pyramid(pass.targets.clone());
-        let levels = levels(pass, &targets, settings.compare_at, settings.ssim_weight);
-        let (mut reprojection, mut smooth) = (Vec::new(), Vec::new());
-        let mut finest = None;
-        for (scale, (disparity, level)) in pass.disparities.iter().zip(&levels).enumerate() {
-            let disparity_there = match settings.compare_at {
-                CompareAt::Full => self.enlarge[scale].apply(disparity.clone()),
-                CompareAt::Own => disparity.clone(),
-            };
-            let inverse_depth = disparity_there.mul_scalar(high - low).add_scalar(low);
-            let mut first_warp = None;
-            let views = level.sources.iter().zip(&motions).zip(&level.unwarped).map(
-                |((source, motion), unwarped_error)| {
-                    let synthesised = synthesise(
-                        source.clone(),
-                        inverse_depth.clone(),
-                        motion,
-                        &level.intrinsics,
-                        &level.inverse_intrinsics,
-                    );
-                    first_warp.get_or_insert_with(|| synthesised.image.clone().detach());
-                    View {
-                        synthesised,
-                        unwarped_error: unwarped_error.clone(),
-                    }
-                },
-            );
-            let views = views.collect();
-            let output = losses::reprojection(
-                &level.targets,
-                views,
-                settings.ssim_weight,
-                settings.automask,
-            );
-            reprojection.push(output.loss.clone());
-            if settings.smoothness > 0.0 {
-                let image = targets[scale].clone();
-                let weight = 1.0 / f64::from(1_u32 << scale);
-                smooth.push(losses::smoothness(disparity.clone(), image).mul_scalar(weight));
-            }
-            if let (None, Some(warped)) = (&finest, first_warp) {
-                finest = Some((output, warped));
-            }
-        }
-        let (finest, warped) =
-            finest.expect("the decoder has four scales and a target at least one source");
-        let mean = |terms: Vec<Tensor<1>>| {
-            let sum = terms.into_iter().reduce(|a, b| a + b);
-            sum.map(|sum| sum.mul_scalar(1.0 / SCALES as f64))
-        };
-        let number = |t: &Tensor<1>| f64::from(t.clone().into_scalar::<f32>());
-        let reprojection = mean(reprojection).expect("the decoder has four scales");
-        let mut terms = LossTerms {
-            reprojection: number(&reprojection),
-            valid_share: share(&finest.valid),
-            explained_share: share(&finest.explained),
-            ..LossTerms::default()
-        };
-        let mut total = reprojection;
-        if let Some(smooth) = mean(smooth) {
-            terms.smoothness = number(&smooth);
-            total = total + smooth.mul_scalar(settings.smoothness);
-        }
-        if settings.speed > 0.0 {
-            let speed = match self.config.view_motion {
-                ViewMotion::PoseNet | ViewMotion::Distance => self.speed_loss(pass, batch),
-                ViewMotion::Vehicle => mean_of(pass.motions.iter().zip(&pass.measured), |pair| {
-                    losses::motion(pair.0, pair.1)
-                }),
-            };
-            terms.speed = number(&speed);
-            total = total + speed.mul_scalar(speed_weight);
-        }
-        terms.total = number(&total);
-        BatchLoss {
-            total,
-            terms,
-            finest,
-            warped,
-        }
-    }
-
-    fn speed_loss(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Tensor<1> {
-        let weight = self.config.loss.rotation;
-        let views = pass.motions.iter().zip(&pass.measured);
-        mean_of(views.enumerate(), |(view, (motion, measured))| {
-            let distance = self.distance_m(batch, view);
-            losses::speed(motion, distance, &measured.rotation, weight)
-        })
-    }
-
-    /// The measured distance of a view's targets, T.
-    fn distance_m(&self, batch: &SnippetBatch, view: usize) -> Tensor<1> {
-        let distance = batch.distance_m[view].clone();
-        match self.config.reprojection {
-            // The second half of the targets looks back, as far.
-            Reprojection::Bidirectional => Tensor::cat(vec![distance.clone(), distance], 0),
-            Reprojection::Minimum => distance,
-        }
-    }
-
-    /// The motions that the views are synthesised with.
-    fn view_motions(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Vec<Motion> {
-        match self.config.view_motion {
-            ViewMotion::PoseNet => pass.motions.clone(),
-            ViewMotion::Vehicle => pass.measured.clone(),
-            ViewMotion::Distance => {
-                let views = pass.motions.iter().enumerate();
-                let scaled = views.map(|(view, m)| m.with_distance(self.distance_m(batch, view)));
-                scaled.collect()
-            }
-        }
-    }
 }
 
-/// The mean of a loss over views.
-fn mean_of<T>(views: impl ExactSizeIterator<Item = T>, loss: impl Fn(T) -> Tensor<1>) -> Tensor<1> {
-    let count = views.len() as f64;
-    views
-        .map(loss)
-        .reduce(|a, b| a + b)
-        .expect("a target has at least one source: the configuration is validated")
-        .mul_scalar(1.0 / count)
-}
-
-/// The share of true pixels.
-fn share(mask: &Tensor<4, burn::tensor::Bool>) -> f64 {
-    f64::from(mask.clone().float().mean().into_scalar::<f32>())
+/// The second half of the batch, then the first.
+pub(crate) fn swap_halves(x: Tensor<4>) -> Tensor<4> {
+    let half = x.dims()[0] / 2;
+    Tensor::cat(vec![x.clone().narrow(0, half, half), x.narrow(0, 0, half)], 0)
 }
 
 /// The pose network with a bias that means one unit of translation ahead: a point of frame 0 has a

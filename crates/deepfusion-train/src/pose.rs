@@ -90,12 +90,6 @@ impl Motion {
 pub fn rotation_from_axis_angle(axis_angle: Tensor<2>) -> Tensor<3> {
     let [n, _] = axis_angle.dims();
     let device = axis_angle.device();
-    // [v]× is linear in v: row i of this matrix is the cross matrix of unit vector i.
-    let cross: [[f32; 9]; 3] = [
-        [0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0],
-        [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0],
-        [0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-    ];
     let theta = axis_angle
         .clone()
         .powi_scalar(2)
@@ -103,9 +97,7 @@ pub fn rotation_from_axis_angle(axis_angle: Tensor<2>) -> Tensor<3> {
         .add_scalar(1e-12)
         .sqrt()
         .reshape([n, 1, 1]);
-    let skew = axis_angle
-        .matmul(Tensor::<2>::from_data(cross, &device))
-        .reshape([n, 3, 3]);
+    let skew = cross_matrix(axis_angle);
     let a = theta.clone().sin().div(theta.clone());
     let b = theta
         .clone()
@@ -116,6 +108,24 @@ pub fn rotation_from_axis_angle(axis_angle: Tensor<2>) -> Tensor<3> {
     let square = skew.clone().matmul(skew.clone());
     let identity = Tensor::<2>::eye(3, &device).reshape([1, 3, 3]);
     skew.mul(a).add(square.mul(b)).add(identity)
+}
+
+/// [v]×, the matrix that multiplies like the cross product with v.
+///
+/// # Shapes
+/// - `v`: `[N, 3]`
+/// - output: `[N, 3, 3]`
+#[must_use]
+pub fn cross_matrix(v: Tensor<2>) -> Tensor<3> {
+    let [n, _] = v.dims();
+    // It is linear in v: row i of this matrix is the cross matrix of unit vector i.
+    let units: [[f32; 9]; 3] = [
+        [0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    ];
+    let units = Tensor::<2>::from_data(units, &v.device());
+    v.matmul(units).reshape([n, 3, 3])
 }
 
 #[cfg(test)]

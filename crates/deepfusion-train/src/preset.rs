@@ -1,9 +1,10 @@
 use crate::config::{
-    Augmentation, CompareAt, DataConfig, LossConfig, Reprojection, ReversedPose, TrainConfig,
-    ViewMotion,
+    Augmentation, DataConfig, Reprojection, ReversedPose, TrainConfig, ViewMotion,
 };
+use crate::loss_config::{CompareAt, FlowLossConfig, LossConfig, MovingConfig};
 use deepfusion_nn::{
-    DecoderConfig, DepthNetConfig, InputSize, PoseNetConfig, ResNetConfig, ResNetDepth,
+    DecoderConfig, DepthNetConfig, FlowDecoderConfig, InputSize, PoseNetConfig, ResNetConfig,
+    ResNetDepth,
 };
 use serde::{Deserialize, Serialize};
 
@@ -66,6 +67,9 @@ impl Preset {
                 rotation: 0.0,
                 speed_warmup_steps: 500,
                 automask: true,
+                affine: 0.0,
+                flow: FlowLossConfig::default(),
+                moving: MovingConfig::default(),
             },
             augmentation: Augmentation {
                 flip: true,
@@ -79,6 +83,7 @@ impl Preset {
                 metres_per_unit: 0.0,
                 ..PoseNetConfig::new(depth)
             },
+            flow_net: FlowDecoderConfig::default(),
         };
         match self {
             Self::Tiny => {

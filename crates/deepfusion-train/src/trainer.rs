@@ -2,8 +2,8 @@ use crate::losses::speed_weight;
 use crate::model::displacement_ratio;
 use crate::{
     Adam, BatchLoader, BatchLoss, Checkpoint, CheckpointKind, Control, Error, ForwardPass,
-    LossTerms, Model, NamedGradients, RunFolder, SamplePanel, SampleSet, Sampler, SnippetBatch,
-    StepOutcome, TrainConfig, TrainEvent,
+    LossTerms, Model, NamedGradients, RunFolder, SamplePanel, SampleSet, Sampler, Schedule,
+    SnippetBatch, StepOutcome, TrainConfig, TrainEvent,
 };
 use burn::tensor::Device;
 use std::path::Path;
@@ -15,6 +15,8 @@ const MAX_SKIPPED: usize = 20;
 const SMOOTHING: f64 = 20.0;
 /// Below this share of pixels in view the geometry has come apart (SPEC 2).
 const MIN_VALID_SHARE: f64 = 0.2;
+/// Above this share of moving pixels the masks take away what depth should learn from (SPEC 2).
+const MAX_MOVING_SHARE: f64 = 0.4;
 
 /// A training run.
 pub struct Trainer {
@@ -189,23 +191,18 @@ impl Trainer {
         let (mut skipped_in_row, mut stopped) = (0, false);
         let mut ratio = Smoothed::new();
         let mut low_view = Smoothed::new();
+        let mut moving = Smoothed::new();
         while self.state.step < steps && !stopped {
             let mut gradients = NamedGradients::default();
             let (mut losses, mut names) = (LossTerms::default(), Vec::new());
-            let weight = speed_weight(
-                self.config.loss.speed,
-                self.state.step,
-                steps,
-                self.epoch_steps(),
-                self.config.loss.speed_warmup_steps,
-            );
+            let schedule = self.schedule(steps);
             let mut images = 0;
             let mut last: Option<(ForwardPass, BatchLoss)> = None;
             for _ in 0..accumulate {
                 let batch = next_batch(&loader, &self.device)?;
                 images += batch.len() * (1 + batch.offsets.len());
                 let pass = self.model.forward(&batch);
-                let loss = self.model.loss(&pass, &batch, weight);
+                let loss = self.model.loss(&pass, &batch, schedule);
                 losses = loss.terms;
                 if let Some((term, value)) = losses.not_finite() {
                     return Err(Error::NotFinite {
@@ -220,6 +217,9 @@ impl Trainer {
                 let scale = 1.0 / accumulate as f32;
                 gradients.add("depth", &self.model.depth_net, &mut raw, scale);
                 gradients.add("pose", &self.model.pose_net, &mut raw, scale);
+                if let Some(decoder) = &self.model.flow_decoder {
+                    gradients.add("flow", decoder, &mut raw, scale);
+                }
                 names.extend(batch.names);
                 last = Some((pass, loss));
             }
@@ -231,10 +231,13 @@ impl Trainer {
                 let Model {
                     depth_net,
                     pose_net,
+                    flow_decoder,
                     ..
                 } = self.model.clone();
                 self.model.depth_net = self.adam.apply(&step, "depth", depth_net, &gradients);
                 self.model.pose_net = self.adam.apply(&step, "pose", pose_net, &gradients);
+                self.model.flow_decoder = flow_decoder
+                    .map(|decoder| self.adam.apply(&step, "flow", decoder, &gradients));
             }
             self.state.step += 1;
             let gradient_norm = match outcome {
@@ -264,6 +267,7 @@ impl Trainer {
                 }
             };
             low_view.add(losses.valid_share);
+            moving.add(losses.moving_share);
             pace.step(images);
             let control = listen(TrainEvent::Step {
                 step: self.state.step,
@@ -278,7 +282,8 @@ impl Trainer {
             stopped = control == Control::Stop;
             let due = self.state.step.is_multiple_of(every) || self.state.step == steps;
             if due || stopped {
-                self.report(listen, last, &names, low_view.value(), due)?;
+                let shares = [low_view.value(), moving.value()];
+                self.report(listen, last, &names, shares, due)?;
             }
         }
         Ok(TrainSummary {
@@ -289,6 +294,21 @@ impl Trainer {
             seconds: start.elapsed().as_secs_f64(),
             stopped,
         })
+    }
+
+    /// What of the loss depends on the step.
+    fn schedule(&self, steps: usize) -> Schedule {
+        let (step, loss) = (self.state.step, &self.config.loss);
+        Schedule {
+            speed_weight: speed_weight(
+                loss.speed,
+                step,
+                steps,
+                self.epoch_steps(),
+                loss.speed_warmup_steps,
+            ),
+            masks_active: step as f64 >= loss.moving.warmup_share * steps as f64,
+        }
     }
 
     fn learning_rate(&self, steps: usize) -> f64 {
@@ -309,7 +329,7 @@ impl Trainer {
         listen: &mut dyn FnMut(TrainEvent) -> Control,
         last: Option<(ForwardPass, BatchLoss)>,
         names: &[String],
-        valid_share: f64,
+        [valid_share, moving_share]: [f64; 2],
         validate: bool,
     ) -> Result<(), Error> {
         let step = self.state.step;
@@ -323,6 +343,14 @@ impl Trainer {
             let message = format!(
                 "only {:.0} % of the pixels are in view of the other frame: depth or motion has come apart",
                 100.0 * valid_share
+            );
+            listen(TrainEvent::Warning { step, message });
+        }
+        if moving_share > MAX_MOVING_SHARE {
+            let message = format!(
+                "{:.0} % of the pixels are taken to move by themselves: the flow explains more than depth and motion do; \
+                 a longer warm-up (`loss.moving.warmup_share`) lets depth learn first",
+                100.0 * moving_share
             );
             listen(TrainEvent::Warning { step, message });
         }
@@ -367,8 +395,8 @@ fn next_batch(loader: &BatchLoader, device: &Device) -> Result<SnippetBatch, Err
     })
 }
 
-/// The mean loss over the held-out samples, with λ_v at its full weight, and the ratio of measured to
-/// predicted displacement.
+/// The mean loss over the held-out samples, with λ_v at its full weight and without the flow, which training
+/// alone has; and the ratio of measured to predicted displacement.
 ///
 /// # Errors
 /// [`Error::Data`] for an image that cannot be read.
@@ -385,27 +413,20 @@ pub fn validation_loss(
     while let Some(batch) = loader.next(&device) {
         let batch = batch?;
         let pass = model.forward(&batch);
-        let terms = model.loss(&pass, &batch, config.loss.speed).terms;
+        let schedule = Schedule {
+            speed_weight: config.loss.speed,
+            masks_active: false,
+        };
+        let terms = model.loss(&pass, &batch, schedule).terms;
         let n = batch.len() as f64;
         count += n;
         ratio += n * displacement_ratio(&pass, &batch);
-        sum.total += n * terms.total;
-        sum.reprojection += n * terms.reprojection;
-        sum.smoothness += n * terms.smoothness;
-        sum.speed += n * terms.speed;
-        sum.valid_share += n * terms.valid_share;
-        sum.explained_share += n * terms.explained_share;
+        sum.add(&terms, n);
     }
-    let mean = |v: f64| v / f64::max(count, 1.0);
-    let terms = LossTerms {
-        total: mean(sum.total),
-        reprojection: mean(sum.reprojection),
-        smoothness: mean(sum.smoothness),
-        speed: mean(sum.speed),
-        valid_share: mean(sum.valid_share),
-        explained_share: mean(sum.explained_share),
-    };
-    Ok((terms, mean(ratio)))
+    let count = f64::max(count, 1.0);
+    let mut terms = LossTerms::default();
+    terms.add(&sum, 1.0 / count);
+    Ok((terms, ratio / count))
 }
 
 /// An exponential mean that starts at its first value.

@@ -7,6 +7,8 @@ use deepfusion_nn::ops;
 pub struct Synthesised {
     /// Î, N×C×H×W; border-padded where out of view.
     pub image: Tensor<4>,
+    /// p', where each pixel of the target lies in the source, N×2×H×W, in pixels.
+    pub coords: Tensor<4>,
     /// Where the pixel lies in front of the source camera and inside its image, N×1×H×W.
     pub valid: Tensor<4, Bool>,
 }
@@ -37,6 +39,7 @@ pub fn synthesise(
     let coords = ops::project(target_inverse_depth, homography, shift);
     Synthesised {
         valid: ops::in_view(coords.clone(), [height, width]),
-        image: ops::warp(source, coords),
+        image: ops::warp(source, coords.clone()),
+        coords,
     }
 }

@@ -6,8 +6,8 @@ use deepfusion_geometry::Se3;
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{
     BatchLoader, CheckpointKind, CompareAt, Control, Error, LossTerms, Model, Motion, Preset,
-    RunFolder, SampleSet, TrainConfig, TrainEvent, Trainer, ViewMotion, synthesise,
-    validation_loss,
+    Reprojection, RunFolder, SampleSet, Schedule, TrainConfig, TrainEvent, Trainer, ViewMotion,
+    synthesise, validation_loss,
 };
 use std::path::Path;
 
@@ -148,11 +148,33 @@ fn losses(trainer: &mut Trainer, stop: Option<usize>) -> Vec<(usize, LossTerms)>
 
 #[test]
 fn a_resumed_run_repeats_the_uninterrupted_one_to_the_last_digit() {
+    resumed_equals_whole(|_| {});
+}
+
+#[test]
+fn so_does_a_run_with_every_term_of_the_loss() {
+    let whole = resumed_equals_whole(|config| {
+        for term in ["affine", "flow", "moving"] {
+            config.with(term).unwrap();
+        }
+        config.loss.moving.warmup_share = 0.2;
+    });
+    let steps: Vec<_> = whole.iter().filter(|(_, l)| l.flow > 0.0).collect();
+    assert_eq!(steps.len(), 7, "training sees the flow, validation does not");
+    assert!(whole.iter().all(|(_, l)| l.affine > 0.0));
+    // The agreement waits for the flow to be learned: 20 % of seven steps.
+    let agreeing: Vec<_> = steps.iter().map(|(_, l)| l.agreement > 0.0).collect();
+    assert_eq!(agreeing, [false, false, true, true, true, true, true]);
+}
+
+/// Trains seven steps at once, and again with an interruption after three; gives the losses.
+fn resumed_equals_whole(change: impl Fn(&mut TrainConfig)) -> Vec<(usize, LossTerms)> {
     let folder = tempfile::tempdir().unwrap();
     let drive = drive(&folder.path().join("street"), 14);
     let device = Device::flex();
     let start = |name: &str| {
-        let (config, train, validation) = small(&drive, 7);
+        let (mut config, train, validation) = small(&drive, 7);
+        change(&mut config);
         let folder = RunFolder::create(&folder.path().join(name)).unwrap();
         Trainer::create(config, folder, (train, validation), &device, Ok).unwrap()
     };
@@ -170,6 +192,42 @@ fn a_resumed_run_repeats_the_uninterrupted_one_to_the_last_digit() {
             .iter()
             .all(|(_, l)| l.total.is_finite() && l.total > 0.0)
     );
+    whole
+}
+
+/// Two frames are each other's target; three have one target and the flow to both sides.
+#[test]
+fn the_flow_is_seen_from_every_target_in_both_arrangements() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut config, samples, _) = small(&drive(folder.path(), 8), 1);
+    let device = Device::flex().autodiff();
+    config.loss.with("flow").unwrap();
+    for (reprojection, frames, targets) in [
+        (Reprojection::Bidirectional, vec![1], 4),
+        (Reprojection::Minimum, vec![-1, 1], 2),
+    ] {
+        (config.reprojection, config.frames) = (reprojection, frames);
+        let datasets = samples.datasets.clone();
+        let (samples, _, _) = SampleSet::split(&config, datasets.to_vec(), None).unwrap();
+        let model = Model::new(&config, &device).unwrap();
+        let batch = BatchLoader::training(&config, samples, 0)
+            .next(&device)
+            .unwrap()
+            .unwrap();
+        let pass = model.forward(&batch);
+        assert_eq!(pass.flows.len(), config.frames.len());
+        for view in &pass.flows {
+            assert_eq!(view.flow.dims(), [targets, 2, 64, 96]);
+            assert_eq!(view.back.dims(), [targets, 2, 64, 96]);
+        }
+        assert_eq!(pass.disparities[0].dims(), [targets, 1, 64, 96]);
+        let schedule = Schedule {
+            speed_weight: 0.2,
+            masks_active: true,
+        };
+        let loss = model.loss(&pass, &batch, schedule);
+        assert!(loss.terms.flow > 0.0 && loss.terms.total.is_finite());
+    }
 }
 
 #[test]

@@ -1,4 +1,5 @@
 use crate::{Error, LossTerms};
+use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -22,6 +23,15 @@ fn header() -> String {
     format!("step,split,{},{EXTRA}", terms.join(","))
 }
 
+/// A line of a log that may have been begun with other columns, in the columns of today; what it lacks is
+/// empty.
+fn arranged(columns: &str, line: &str) -> String {
+    let values: HashMap<&str, &str> = columns.split(',').zip(line.split(',')).collect();
+    let header = header();
+    let of = |name| values.get(name).copied().unwrap_or_default();
+    header.split(',').map(of).collect::<Vec<_>>().join(",")
+}
+
 impl CsvLog {
     /// Opens the log; records after `step`, left by a run that was interrupted later, are dropped.
     ///
@@ -32,11 +42,14 @@ impl CsvLog {
         let mut kept = vec![header()];
         if step > 0 && path.exists() {
             let file = File::open(path).map_err(io("read"))?;
-            for line in BufReader::new(file).lines().skip(1) {
+            let mut lines = BufReader::new(file).lines();
+            let columns = lines.next().transpose().map_err(io("read"))?;
+            let columns = columns.unwrap_or_default();
+            for line in lines {
                 let line = line.map_err(io("read"))?;
                 let of = line.split(',').next().and_then(|s| s.parse::<usize>().ok());
                 if of.is_some_and(|of| of <= step) {
-                    kept.push(line);
+                    kept.push(arranged(&columns, &line));
                 }
             }
         }
@@ -97,5 +110,18 @@ mod tests {
         let steps: Vec<_> = text.lines().skip(1).map(|l| &l[..1]).collect();
         assert_eq!(steps, ["1", "2", "3", "4", "5", "6"]);
         assert!(text.starts_with("step,split,total,reprojection"), "{text}");
+    }
+
+    /// A log of an earlier version lacks a column: its lines stay, and what is missing is empty.
+    #[test]
+    fn a_log_with_other_columns_goes_on_with_those_of_today() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        std::fs::write(&path, "step,total,split\n1,0.5,train\n2,0.4,train\n").unwrap();
+        drop(CsvLog::open(&path, 1).unwrap());
+        let text = std::fs::read_to_string(&path).unwrap();
+        let commas = header().matches(',').count();
+        let expected = format!("{}\n1,train,0.5{}\n", header(), ",".repeat(commas - 2));
+        assert_eq!(text, expected);
     }
 }

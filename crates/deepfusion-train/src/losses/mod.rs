@@ -1,9 +1,19 @@
 //! The loss terms of SPEC 2, one file each, and their sum.
 
+mod affine;
+mod agreement;
+mod flow;
+mod mean;
+mod moving;
 mod reprojection;
 mod smoothness;
 mod speed;
 
+pub use affine::{affine_invariant, depth_seen_from_target};
+pub use agreement::agreement;
+pub use flow::{FlowView, flow, flow_smoothness, flow_view, pixel_grid};
+pub use mean::{mean_where, share};
+pub use moving::{RigidView, epipolar_distance, moving_pixels};
 pub use reprojection::{ReprojectionOutput, View, reprojection};
 pub use smoothness::smoothness;
 pub use speed::{motion, speed, speed_weight};
@@ -20,24 +30,50 @@ pub struct LossTerms {
     /// L_speed in metres per pair, unweighted; the distance of PoseNet's motion from the measured one
     /// while that synthesises the views.
     pub speed: f64,
+    /// The affine invariant loss, unweighted.
+    pub affine: f64,
+    /// L_flow: photometric error both ways, consistency and smoothness, unweighted.
+    pub flow: f64,
+    /// Distance of the rigid flow from the flow where both explain the pixel, in pixels, unweighted.
+    pub agreement: f64,
     /// Share of pixels that the warp finds in view, at full resolution.
     pub valid_share: f64,
     /// Share of pixels that the warped source explains best (the rest are masked).
     pub explained_share: f64,
+    /// Share of pixels taken out of the reprojection because they move by themselves.
+    pub moving_share: f64,
 }
 
 impl LossTerms {
     /// Names and values, in the order of `log.csv`.
     #[must_use]
-    pub fn named(&self) -> [(&'static str, f64); 6] {
+    pub fn named(&self) -> [(&'static str, f64); 10] {
         [
             ("total", self.total),
             ("reprojection", self.reprojection),
             ("smoothness", self.smoothness),
             ("speed", self.speed),
+            ("affine", self.affine),
+            ("flow", self.flow),
+            ("agreement", self.agreement),
             ("valid_share", self.valid_share),
             ("explained_share", self.explained_share),
+            ("moving_share", self.moving_share),
         ]
+    }
+
+    /// Adds every term of another batch, `weight` times: sums up to a weighted mean.
+    pub fn add(&mut self, other: &Self, weight: f64) {
+        self.total += weight * other.total;
+        self.reprojection += weight * other.reprojection;
+        self.smoothness += weight * other.smoothness;
+        self.speed += weight * other.speed;
+        self.affine += weight * other.affine;
+        self.flow += weight * other.flow;
+        self.agreement += weight * other.agreement;
+        self.valid_share += weight * other.valid_share;
+        self.explained_share += weight * other.explained_share;
+        self.moving_share += weight * other.moving_share;
     }
 
     /// The first term that is not a finite number; the parts before the sum.

@@ -1,14 +1,16 @@
-use crate::Synthesised;
 use burn::tensor::{Bool, Tensor};
-use deepfusion_nn::ops;
 
 /// One source of the targets, warped and as it is.
 #[derive(Debug, Clone)]
 pub struct View {
-    /// The source seen from the target's place.
-    pub synthesised: Synthesised,
+    /// pe(warped source, target), N×1×H×W.
+    pub error: Tensor<4>,
+    /// Where the pixel is in view of the source, N×1×H×W.
+    pub valid: Tensor<4, Bool>,
     /// pe(unwarped source, target), N×1×H×W, without gradient: what standing still would explain.
     pub unwarped_error: Tensor<4>,
+    /// Where the pixel moves by itself, N×1×H×W: the warp must not explain it.
+    pub moving: Option<Tensor<4, Bool>>,
 }
 
 /// The reprojection loss and what it saw.
@@ -27,32 +29,25 @@ pub struct ReprojectionOutput {
 /// L_rp of one scale: the mean over **all** pixels of the smallest error among the views.
 ///
 /// A pixel's warped error counts where it is in view; the unwarped error, a constant, stands in where
-/// it is not, and competes everywhere with `automask`. The denominator never shrinks, so that
-/// throwing pixels out of view does not pay.
-///
-/// # Shapes
-/// - `target`: `[N, C, H, W]`
+/// it is not and where the pixel moves by itself, and competes everywhere with `automask`. The denominator
+/// never shrinks, so that throwing pixels out of view does not pay.
 ///
 /// # Panics
 /// Without a view.
 #[must_use]
-pub fn reprojection(
-    target: &Tensor<4>,
-    views: Vec<View>,
-    ssim_weight: f64,
-    automask: bool,
-) -> ReprojectionOutput {
+pub fn reprojection(views: Vec<View>, automask: bool) -> ReprojectionOutput {
     let mut merged: Option<ReprojectionOutput> = None;
     for view in views {
-        let valid = view.synthesised.valid;
-        let warped = ops::photometric_error(view.synthesised.image, target.clone(), ssim_weight);
+        let (valid, warped) = (view.valid, view.error);
         let constant = view.unwarped_error.detach();
-        let explained = if automask {
+        let mut explained = valid.clone();
+        if automask {
             let better = warped.clone().detach().lower(constant.clone());
-            valid.clone().bool_and(better)
-        } else {
-            valid.clone()
-        };
+            explained = explained.bool_and(better);
+        }
+        if let Some(moving) = view.moving {
+            explained = explained.bool_and(moving.bool_not());
+        }
         let error = constant.mask_where(explained.clone(), warped);
         merged = Some(match merged {
             None => ReprojectionOutput {
@@ -84,16 +79,16 @@ pub fn reprojection(
 mod tests {
     use super::*;
     use burn::tensor::{Device, Distribution};
+    use deepfusion_nn::ops;
 
-    fn view(image: Tensor<4>, unwarped: Tensor<4>, valid: bool) -> View {
+    fn view(target: &Tensor<4>, image: Tensor<4>, unwarped: Tensor<4>, valid: bool) -> View {
         let [n, _, h, w] = image.dims();
         let ones = Tensor::<4>::ones([n, 1, h, w], &image.device());
         View {
-            synthesised: Synthesised {
-                image,
-                valid: ones.greater_elem(if valid { 0.0 } else { 2.0 }),
-            },
+            error: ops::photometric_error(image, target.clone(), 0.85),
+            valid: ones.greater_elem(if valid { 0.0 } else { 2.0 }),
             unwarped_error: unwarped,
+            moving: None,
         }
     }
 
@@ -108,12 +103,7 @@ mod tests {
         let image = Tensor::<4>::random([1, 3, 8, 8], Distribution::Uniform(0.0, 1.0), &device)
             .require_grad();
         let constant = Tensor::<4>::full([1, 1, 8, 8], 0.25, &device);
-        let out = reprojection(
-            &target,
-            vec![view(image.clone(), constant, false)],
-            0.85,
-            false,
-        );
+        let out = reprojection(vec![view(&target, image.clone(), constant, false)], false);
         assert!((number(out.loss.clone()) - 0.25).abs() < 1e-6);
         let gradients = out.loss.backward();
         if let Some(gradient) = image.grad(&gradients) {
@@ -127,16 +117,37 @@ mod tests {
         let target = Tensor::<4>::random([2, 3, 8, 8], Distribution::Uniform(0.0, 1.0), &device);
         let other = Tensor::<4>::random([2, 3, 8, 8], Distribution::Uniform(0.0, 1.0), &device);
         let none = Tensor::<4>::zeros([2, 1, 8, 8], &device);
-        let still = vec![view(other.clone(), none.clone(), true)];
-        let masked = reprojection(&target, still.clone(), 0.85, true);
+        let still = vec![view(&target, other.clone(), none.clone(), true)];
+        let masked = reprojection(still.clone(), true);
         assert_eq!(number(masked.loss), 0.0);
-        assert!(number(reprojection(&target, still, 0.85, false).loss) > 0.1);
+        assert!(number(reprojection(still, false).loss) > 0.1);
         // With two views the better one counts at every pixel.
         let large = Tensor::<4>::ones([2, 1, 8, 8], &device);
         let views = vec![
-            view(other, large.clone(), true),
-            view(target.clone(), large, true),
+            view(&target, other, large.clone(), true),
+            view(&target, target.clone(), large, true),
         ];
-        assert!(number(reprojection(&target, views, 0.85, true).loss) < 1e-6);
+        assert!(number(reprojection(views, true).loss) < 1e-6);
+    }
+
+    #[test]
+    fn a_pixel_that_moves_costs_the_constant_and_gives_no_gradient() {
+        let device = Device::flex().autodiff();
+        let target = Tensor::<4>::random([1, 3, 8, 8], Distribution::Uniform(0.0, 1.0), &device);
+        let image = Tensor::<4>::random([1, 3, 8, 8], Distribution::Uniform(0.0, 1.0), &device)
+            .require_grad();
+        let constant = Tensor::<4>::full([1, 1, 8, 8], 0.9, &device);
+        let mut left = view(&target, image.clone(), constant, true);
+        // The left half moves; SSIM's windows reach one column over the border.
+        let column = Tensor::<1>::from_data([0., 1., 2., 3., 4., 5., 6., 7.], &device);
+        let moving = column.lower_elem(4.0).reshape([1, 1, 1, 8]);
+        left.moving = Some(moving.expand([1, 1, 8, 8]));
+        let out = reprojection(vec![left], false);
+        let of = |t: &Tensor<4>, first, count| t.clone().narrow(3, first, count).mean();
+        assert!((number(of(&out.error, 0, 4)) - 0.9).abs() < 1e-6);
+        assert!(number(of(&out.error, 4, 4)) < 0.7);
+        let gradient = image.grad(&out.loss.backward()).unwrap();
+        assert_eq!(number(of(&gradient.clone().abs(), 0, 3)), 0.0);
+        assert!(number(of(&gradient.abs(), 4, 4)) > 0.0);
     }
 }

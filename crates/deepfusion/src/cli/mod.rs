@@ -1,5 +1,6 @@
 //! The command line's shape: what can be said, not what it does.
 
+mod ablate;
 mod data;
 mod engine;
 mod eval;
@@ -12,6 +13,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+pub use ablate::AblateArgs;
 pub use data::{DataCommand, ExportGtArgs, GtDepth, InspectArgs};
 pub use engine::{EngineArgs, EngineChoice, PrecisionChoice};
 pub use eval::{EvalArgs, PredKind};
@@ -49,6 +51,8 @@ pub enum Command {
     Data(DataCommand),
     /// Train on drives, without depth labels.
     Train(Box<TrainArgs>),
+    /// Train and measure with parts of the system switched off: the on/off table of the paper.
+    Ablate(Box<AblateArgs>),
     /// Measure depth: the field's seven metrics, unscaled and median-scaled.
     Eval(Box<EvalArgs>),
     /// Metric depth of images.

@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use deepfusion_data::CameraChoice;
+use deepfusion_train::TrainConfig;
 
 use super::Size;
 
@@ -63,8 +64,11 @@ pub struct TrainArgs {
     /// Whose motion the views are synthesised with [default: the preset's].
     #[arg(long, value_enum, value_name = "MOTION")]
     pub view_motion: Option<ViewMotionChoice>,
-    /// Terms of the loss to leave out.
-    #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = ["smoothness", "speed", "automask"])]
+    /// Parts of the network and terms of the loss to switch on.
+    #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = TrainConfig::TERMS)]
+    pub with: Vec<String>,
+    /// Parts of the network and terms of the loss to leave out.
+    #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = TrainConfig::TERMS)]
     pub without: Vec<String>,
 }
 

@@ -1,5 +1,6 @@
 //! What each command does, one file a command.
 
+mod ablate;
 mod bench;
 mod demo;
 pub mod device;
@@ -30,6 +31,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Data(DataCommand::Inspect(args)) => inspect::run(&args),
         Command::Data(DataCommand::ExportGt(args)) => export_gt::run(&args),
         Command::Train(args) => train::run(&args),
+        Command::Ablate(args) => ablate::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Predict(args) => predict::run(&args),
         Command::Export(args) => export::run(&args),

@@ -129,8 +129,14 @@ impl Recorder {
                 let tagged: Vec<_> = tagged.iter().map(|(n, v)| (n.as_str(), *v)).collect();
                 self.events.scalars(step, &tagged)?;
                 self.curves.add(step, losses.reprojection, scale_ratio);
+                let flow = if losses.flow > 0.0 {
+                    let moving = 100.0 * losses.moving_share;
+                    format!(", flow {:.4}, moving {moving:.1} %", losses.flow)
+                } else {
+                    String::new()
+                };
                 let line = format!(
-                    "loss {:.4} (reprojection {:.4}, smoothness {:.4}, speed {:.3} m), scale ratio \
+                    "loss {:.4} (reprojection {:.4}, smoothness {:.4}, speed {:.3} m{flow}), scale ratio \
                      {scale_ratio:.3}, {images_per_second:.1} images/s, {} left",
                     losses.total,
                     losses.reprojection,

@@ -96,6 +96,9 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     }
     config.batch = args.batch.unwrap_or(config.batch);
     config.seed = args.seed.unwrap_or(config.seed);
+    for term in &args.with {
+        config.with(term)?;
+    }
     for term in &args.without {
         config.without(term)?;
     }

@@ -1,0 +1,274 @@
+use crate::Error;
+use serde::{Deserialize, Serialize};
+
+/// The size at which the views of a coarser scale are compared with their targets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CompareAt {
+    /// Full size, to which its disparity is enlarged: fewer holes and copied textures (SPEC 2).
+    #[default]
+    Full,
+    /// The scale's own: a pixel there sees 2ˢ times as far, so that near things, which move far, are found
+    /// from a wrong first depth; and it costs a third.
+    Own,
+}
+
+/// Weights and switches of the loss terms (SPEC 2). A weight of 0 switches a term off.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LossConfig {
+    /// α of the photometric error: the share of SSIM beside the absolute difference.
+    pub ssim_weight: f64,
+    /// The size at which the views of a coarser scale are compared.
+    #[serde(default)]
+    pub compare_at: CompareAt,
+    /// λ_s of the edge-aware smoothness at full resolution; halved at each coarser scale.
+    pub smoothness: f64,
+    /// λ_v of the speed loss.
+    pub speed: f64,
+    /// β_R: weight of the rotation inside the speed loss. Not read where the views are synthesised with
+    /// the vehicle's motion: PoseNet then learns the whole of it, at a weight of its own.
+    pub rotation: f64,
+    /// Steps over which λ_v rises from 0; at most a tenth of the run.
+    pub speed_warmup_steps: usize,
+    /// Whether pixels that the unwarped source explains better contribute that constant instead.
+    pub automask: bool,
+    /// λ_a of the affine invariant loss, which both frames' depths are needed for.
+    #[serde(default)]
+    pub affine: f64,
+    /// The terms of the optical flow.
+    #[serde(default)]
+    pub flow: FlowLossConfig,
+    /// The pixels that move by themselves.
+    #[serde(default)]
+    pub moving: MovingConfig,
+}
+
+/// The terms of the optical flow (Eq. 16–20), all of them inside L_flow but for the agreement.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FlowLossConfig {
+    /// λ_f of the whole; 0 trains no flow decoder.
+    pub weight: f64,
+    /// Weight of the consistency L_c beside the photometric terms (the paper's 0.1).
+    pub consistency: f64,
+    /// Weight of the flow's edge-aware smoothness beside them.
+    pub smoothness: f64,
+    /// Weight, in the whole loss, of the agreement between the flow and the rigid flow where both explain
+    /// the pixel, per pixel of distance; from the moment on at which moving pixels are looked for.
+    pub agreement: f64,
+}
+
+impl Default for FlowLossConfig {
+    /// Off, with the other weights as [`LossConfig::with`] switches them on.
+    fn default() -> Self {
+        Self {
+            weight: 0.0,
+            consistency: 0.1,
+            smoothness: 0.05,
+            agreement: 0.002,
+        }
+    }
+}
+
+/// Which pixels count as moving by themselves, and so are taken out of the rigid reprojection: those that
+/// the flow explains better than the rigid warp by `margin`, while the two flows differ by more than
+/// `min_flow_px` and `min_flow_share`, and the flow leaves the epipolar line by `min_epipolar_px` or goes along
+/// it `min_parallax_ratio` times as far as the depth says, or as little. Neither limit set: neither is asked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MovingConfig {
+    /// Whether they are looked for; needs the flow.
+    pub enabled: bool,
+    /// How much smaller the flow's photometric error must be.
+    pub margin: f64,
+    /// Least distance between the flow and the rigid flow, in pixels of the training size.
+    pub min_flow_px: f64,
+    /// The same as a share of the longer of the two.
+    pub min_flow_share: f64,
+    /// Distance of the flow's end from the epipolar line of the motion from which it cannot stand still, in
+    /// pixels; 0: not looked at.
+    pub min_epipolar_px: f64,
+    /// Ratio of the flow's parallax to that of the predicted depth, or the other way round, from which it
+    /// cannot stand still: what drives along the road moves along its epipolar lines. 0: not looked at.
+    pub min_parallax_ratio: f64,
+    /// Share of the run before which nothing is taken out: the flow has to be learned first.
+    pub warmup_share: f64,
+}
+
+impl Default for MovingConfig {
+    /// Off, with SPEC 2's limits.
+    fn default() -> Self {
+        Self {
+            enabled: false,
+            margin: 0.02,
+            min_flow_px: 1.0,
+            min_flow_share: 0.05,
+            min_epipolar_px: 1.0,
+            min_parallax_ratio: 1.5,
+            warmup_share: 0.25,
+        }
+    }
+}
+
+impl LossConfig {
+    /// The names that [`Self::with`] and [`Self::without`] take.
+    pub const TERMS: [&'static str; 6] =
+        ["smoothness", "speed", "automask", "affine", "flow", "moving"];
+
+    /// λ of the terms as [`Self::with`] switches them on: the paper's.
+    const SMOOTHNESS: f64 = 1e-3;
+    const SPEED: f64 = 0.2;
+    const AFFINE: f64 = 0.01;
+    const FLOW: f64 = 0.1;
+
+    /// Switches a term on by its name, at the paper's weight unless it has one already. Moving pixels bring
+    /// the flow with them.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a name that is none of [`Self::TERMS`].
+    pub fn with(&mut self, term: &str) -> Result<(), Error> {
+        let switch_on = |weight: &mut f64, value: f64| {
+            if *weight == 0.0 {
+                *weight = value;
+            }
+        };
+        match term {
+            "smoothness" => switch_on(&mut self.smoothness, Self::SMOOTHNESS),
+            "speed" => switch_on(&mut self.speed, Self::SPEED),
+            "automask" => self.automask = true,
+            "affine" => switch_on(&mut self.affine, Self::AFFINE),
+            "flow" => switch_on(&mut self.flow.weight, Self::FLOW),
+            "moving" => {
+                switch_on(&mut self.flow.weight, Self::FLOW);
+                self.moving.enabled = true;
+            }
+            _ => return Err(unknown("with", term)),
+        }
+        Ok(())
+    }
+
+    /// Switches a term off by its name. Without the flow no pixel is known to move.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a name that is none of [`Self::TERMS`].
+    pub fn without(&mut self, term: &str) -> Result<(), Error> {
+        match term {
+            "smoothness" => self.smoothness = 0.0,
+            "speed" => self.speed = 0.0,
+            "automask" => self.automask = false,
+            "affine" => self.affine = 0.0,
+            "flow" => {
+                self.flow.weight = 0.0;
+                self.moving.enabled = false;
+            }
+            "moving" => self.moving.enabled = false,
+            _ => return Err(unknown("without", term)),
+        }
+        Ok(())
+    }
+
+    /// # Errors
+    /// [`Error::Config`] naming the first weight that means nothing.
+    pub fn validate(&self) -> Result<(), Error> {
+        let weights = [
+            ("loss.smoothness", self.smoothness),
+            ("loss.speed", self.speed),
+            ("loss.rotation", self.rotation),
+            ("loss.affine", self.affine),
+            ("loss.flow.weight", self.flow.weight),
+            ("loss.flow.consistency", self.flow.consistency),
+            ("loss.flow.smoothness", self.flow.smoothness),
+            ("loss.flow.agreement", self.flow.agreement),
+            ("loss.moving.margin", self.moving.margin),
+            ("loss.moving.min_flow_px", self.moving.min_flow_px),
+            ("loss.moving.min_epipolar_px", self.moving.min_epipolar_px),
+            (
+                "loss.moving.min_parallax_ratio",
+                self.moving.min_parallax_ratio,
+            ),
+        ];
+        for (field, weight) in weights {
+            if !(weight >= 0.0 && weight.is_finite()) {
+                return Err(wrong(field, "0 or more", weight.to_string()));
+            }
+        }
+        for (field, share) in [
+            ("loss.ssim_weight", self.ssim_weight),
+            ("loss.moving.min_flow_share", self.moving.min_flow_share),
+            ("loss.moving.warmup_share", self.moving.warmup_share),
+        ] {
+            if !(0.0..=1.0).contains(&share) {
+                return Err(wrong(field, "0 to 1", share.to_string()));
+            }
+        }
+        if self.moving.enabled && self.flow.weight == 0.0 {
+            let expected = "false where loss.flow.weight is 0: the flow tells what moves";
+            return Err(wrong("loss.moving.enabled", expected, "true".into()));
+        }
+        Ok(())
+    }
+}
+
+fn wrong(field: &'static str, expected: &str, found: String) -> Error {
+    Error::Config {
+        field,
+        expected: expected.into(),
+        found,
+    }
+}
+
+fn unknown(field: &'static str, term: &str) -> Error {
+    let expected = format!("one of {}", LossConfig::TERMS.join(", "));
+    wrong(field, &expected, term.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Error, Preset};
+
+    #[test]
+    fn terms_go_off_and_on_by_name() {
+        let start = Preset::Light.config().loss;
+        let mut loss = start.clone();
+        for term in super::LossConfig::TERMS {
+            loss.with(term).unwrap();
+        }
+        loss.validate().unwrap();
+        assert!(loss.moving.enabled && loss.flow.weight == 0.1 && loss.affine == 0.01);
+        loss.without("flow").unwrap();
+        assert!(!loss.moving.enabled && loss.flow.weight == 0.0);
+        loss.with("moving").unwrap();
+        assert!(loss.moving.enabled && loss.flow.weight == 0.1);
+        for term in super::LossConfig::TERMS {
+            loss.without(term).unwrap();
+        }
+        assert_eq!((loss.speed, loss.smoothness, loss.affine), (0.0, 0.0, 0.0));
+        // A weight that is there stays.
+        let mut own = start;
+        own.speed = 0.7;
+        own.with("speed").unwrap();
+        assert_eq!(own.speed, 0.7);
+    }
+
+    #[test]
+    fn what_means_nothing_is_refused_by_field() {
+        let start = Preset::Light.config().loss;
+        let field = |change: fn(&mut super::LossConfig)| {
+            let mut loss = start.clone();
+            change(&mut loss);
+            match loss.validate() {
+                Err(Error::Config { field, .. }) => field,
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(field(|l| l.affine = -1.0), "loss.affine");
+        assert_eq!(field(|l| l.flow.weight = f64::NAN), "loss.flow.weight");
+        assert_eq!(field(|l| l.moving.enabled = true), "loss.moving.enabled");
+        let share = "loss.moving.warmup_share";
+        assert_eq!(field(|l| l.moving.warmup_share = 1.5), share);
+        let mut loss = start.clone();
+        let error = loss.without("hope").unwrap_err().to_string();
+        assert!(error.contains("automask, affine, flow"), "{error}");
+    }
+}

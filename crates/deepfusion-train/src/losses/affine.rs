@@ -1,0 +1,94 @@
+use crate::Motion;
+use burn::tensor::{Bool, Int, Tensor};
+
+/// Least spread and residual that count, as a share of the depths themselves: a flat prediction gives
+/// finite gradients, and the loss stays blind to the scale.
+const FLATNESS: f64 = 1e-2;
+
+/// The affine invariant loss (Eq. 9): a and b by least squares of a·x + b on y over the valid pixels of
+/// each image; mean |a·x + b − y| / (mean |y − median(y)| + ε), averaged over the images. It neither sees
+/// nor moves the scale of either: ε is a hundredth of y's median, and a, b and the median are differentiated
+/// too.
+///
+/// # Shapes
+/// - `x`, `y`: `[N, 1, H, W]`, depths in metres
+/// - `valid`: `[N, 1, H, W]`
+/// - output: one value; an image without two valid pixels counts as 0
+#[must_use]
+pub fn affine_invariant(x: Tensor<4>, y: Tensor<4>, valid: &Tensor<4, Bool>) -> Tensor<1> {
+    let [n, _, height, width] = x.dims();
+    let flat = |t: Tensor<4>| t.reshape([n, height * width]);
+    let outside = valid.clone().bool_not();
+    let inside = flat(valid.clone().float());
+    let count = inside.clone().sum_dim(1).clamp_min(1.0);
+    // What is outside may be anything, also no number.
+    let x = flat(x.mask_fill(outside.clone(), 0.0));
+    let y = flat(y.mask_fill(outside, 0.0));
+    let mean = |t: Tensor<2>| t.sum_dim(1).div(count.clone());
+    let (mean_x, mean_y) = (mean(x.clone()), mean(y.clone()));
+    // About the means, so that f32 does not lose the spread in the sums.
+    let dx = x.sub(mean_x.clone()).mul(inside.clone());
+    let dy = y.clone().sub(mean_y).mul(inside.clone());
+    let ridge = mean_x.mul_scalar(FLATNESS).powi_scalar(2).add_scalar(1e-12);
+    let variance = mean(dx.clone().powi_scalar(2)) + ridge;
+    let a = mean(dx.clone().mul(dy.clone())).div(variance);
+    let residual = mean(dx.mul(a).sub(dy).abs());
+    let median = medians(&y, &inside);
+    let spread = mean(y.sub(median.clone()).mul(inside).abs());
+    residual
+        .div(spread + median.abs().mul_scalar(FLATNESS).add_scalar(1e-6))
+        .mean()
+}
+
+/// The median of each row's values inside, N×1, with its gradient; of an even number the upper one of the
+/// middle two. A row without any gives its first value.
+fn medians(values: &Tensor<2>, inside: &Tensor<2>) -> Tensor<2> {
+    let [n, pixels] = values.dims();
+    let device = values.device().inner();
+    let read =
+        |t: &Tensor<2>| -> Vec<f32> { t.clone().detach().into_data().iter::<f32>().collect() };
+    let (plain, inside) = (read(values), read(inside));
+    let rows = plain.chunks_exact(pixels).zip(inside.chunks_exact(pixels));
+    let places: Vec<i64> = rows
+        .map(|(row, inside)| {
+            let mut kept: Vec<usize> = (0..pixels).filter(|i| inside[*i] > 0.5).collect();
+            if kept.is_empty() {
+                return 0;
+            }
+            let middle = kept.len() / 2;
+            let by_value = |a: &usize, b: &usize| row[*a].total_cmp(&row[*b]);
+            *kept.select_nth_unstable_by(middle, by_value).1 as i64
+        })
+        .collect();
+    let places = Tensor::<1, Int>::from_data(places.as_slice(), &device);
+    values.clone().gather(1, places.reshape([n, 1]))
+}
+
+/// D₁→₀, the depth of the other frame seen from this one: the other depth map read where each pixel goes,
+/// back-projected there, brought back, and its z.
+///
+/// # Shapes
+/// - `other_depth_there`: the source's depth at `coords`, `[N, 1, H, W]`, in metres
+/// - `coords`: where each target pixel lies in the source, `[N, 2, H, W]`, in pixels
+/// - `target_from_source`: N motions
+/// - `inverse_intrinsics`: K⁻¹ of the source, `[N, 3, 3]`
+/// - output: `[N, 1, H, W]`, in metres along the target's z
+#[must_use]
+pub fn depth_seen_from_target(
+    other_depth_there: Tensor<4>,
+    coords: Tensor<4>,
+    target_from_source: &Motion,
+    inverse_intrinsics: &Tensor<3>,
+) -> Tensor<4> {
+    let [n, _, _, _] = coords.dims();
+    // z = r₃·(D·K⁻¹·p̃') + t₃ = D·(m·p̃') + t₃, m the third row of R·K⁻¹.
+    let row = target_from_source
+        .rotation
+        .clone()
+        .narrow(1, 2, 1)
+        .matmul(inverse_intrinsics.clone());
+    let entry = |i: usize| row.clone().narrow(2, i, 1).reshape([n, 1, 1, 1]);
+    let axis = |i: usize| coords.clone().narrow(1, i, 1).mul(entry(i));
+    let forward = target_from_source.translation.clone().narrow(1, 2, 1);
+    other_depth_there.mul(axis(0) + axis(1) + entry(2)) + forward.reshape([n, 1, 1, 1])
+}

@@ -1,0 +1,131 @@
+use super::mean::mean_where;
+use crate::loss_config::FlowLossConfig;
+use burn::tensor::{Bool, Device, Int, Tensor};
+use deepfusion_nn::ops;
+
+/// The pixels' own places, u then v.
+///
+/// # Shapes
+/// - output: `[1, 2, height, width]`
+#[must_use]
+pub fn pixel_grid([height, width]: [usize; 2], device: &Device) -> Tensor<4> {
+    let device = device.clone().inner();
+    let along = |size: usize| Tensor::<1, Int>::arange(0..size as i64, &device).float();
+    let u = along(width).reshape([1, 1, 1, width]);
+    let v = along(height).reshape([1, 1, height, 1]);
+    let size = [1, 1, height, width];
+    Tensor::cat(vec![u.expand(size), v.expand(size)], 1)
+}
+
+/// A source seen from the targets by an optical flow.
+#[derive(Debug, Clone)]
+pub struct FlowView {
+    /// Photometric error of the source at the flow's end against the target, N×1×H×W.
+    pub error: Tensor<4>,
+    /// Where the flow ends, p + f(p), N×2×H×W, in pixels.
+    pub coords: Tensor<4>,
+    /// f(p) + f'(p + f(p)), N×2×H×W, in pixels: zero where going there and back ends at the start.
+    pub round_trip: Tensor<4>,
+    /// Where the flow ends in view and at a pixel that comes back: ‖f + f'‖² < 0.01·(‖f‖² + ‖f'‖²) + 0.5.
+    /// N×1×H×W, without gradient.
+    pub visible: Tensor<4, Bool>,
+}
+
+/// Sees a source from the targets by the flow between them.
+///
+/// # Shapes
+/// - `target`, `source`: `[N, C, H, W]`
+/// - `flow`: `[N, 2, H, W]`, pixels of the target to those of the source
+/// - `back`: `[N, 2, H, W]`, pixels of the source to those of the target
+#[must_use]
+pub fn flow_view(
+    target: &Tensor<4>,
+    source: &Tensor<4>,
+    flow: &Tensor<4>,
+    back: &Tensor<4>,
+    ssim_weight: f64,
+) -> FlowView {
+    let [_, _, height, width] = flow.dims();
+    let coords = flow.clone() + pixel_grid([height, width], &flow.device());
+    let image = ops::warp(source.clone(), coords.clone());
+    let returning = ops::warp(back.clone(), coords.clone());
+    let round_trip = flow.clone() + returning.clone();
+    let square = |t: &Tensor<4>| t.clone().detach().powi_scalar(2).sum_dim(1);
+    let allowed = (square(flow) + square(&returning))
+        .mul_scalar(0.01)
+        .add_scalar(0.5);
+    let visible = ops::in_view(coords.clone(), [height, width])
+        .bool_and(square(&round_trip).lower(allowed));
+    FlowView {
+        error: ops::photometric_error(image, target.clone(), ssim_weight),
+        coords,
+        round_trip,
+        visible,
+    }
+}
+
+/// L_f + L_b + w_c·L_c (Eq. 16–20) and the smoothness, of a flow looked at in both directions. The two
+/// directions' pixels are pooled: L_f + L_b is twice the mean error, L_c the mean over both.
+///
+/// # Shapes
+/// - `views`: the flow's and the reversed flow's, N and N, or one view that holds both along the batch
+/// - `flows`, `images`: of each view, `[N, 2, H, W]` and `[N, C, H, W]`
+/// - output: one value
+#[must_use]
+pub fn flow(
+    views: &[FlowView],
+    flows: &[Tensor<4>],
+    images: &[Tensor<4>],
+    settings: &FlowLossConfig,
+) -> Tensor<1> {
+    let count = views.len() as f64;
+    let of_view = |view: &FlowView| {
+        let photometric = mean_where(view.error.clone(), &view.visible).mul_scalar(2.0);
+        // The mean over u and v is half of the L1 norm.
+        let round_trip = mean_where(view.round_trip.clone().abs(), &view.visible);
+        photometric + round_trip.mul_scalar(2.0 * settings.consistency)
+    };
+    let terms = views.iter().map(of_view);
+    let mut loss = sum(terms).mul_scalar(1.0 / count);
+    if settings.smoothness > 0.0 {
+        let rough = flows.iter().zip(images).map(|(f, i)| flow_smoothness(f, i));
+        loss = loss + sum(rough).mul_scalar(settings.smoothness / count);
+    }
+    loss
+}
+
+fn sum(terms: impl Iterator<Item = Tensor<1>>) -> Tensor<1> {
+    terms
+        .reduce(|a, b| a + b)
+        .expect("a flow is looked at from at least one side")
+}
+
+/// How sharp an edge of the image must be to excuse one of the flow: e^(−10·|∂I|), as flow networks use it.
+const EDGE_SHARPNESS: f64 = 10.0;
+
+/// Edge-aware smoothness of a flow, of second order, since a plane's flow is linear:
+/// mean(|∂ₓ²f|·e^(−10|∂ₓI|)) + mean(|∂ᵧ²f|·e^(−10|∂ᵧI|)), in pixels, |∂I| the larger of both steps and
+/// averaged over channels.
+///
+/// # Shapes
+/// - `flow`: `[N, 2, H, W]`, H and W at least 3
+/// - `image`: `[N, C, H, W]`
+/// - output: one value
+#[must_use]
+pub fn flow_smoothness(flow: &Tensor<4>, image: &Tensor<4>) -> Tensor<1> {
+    let along = |axis: usize| {
+        let difference = |t: Tensor<4>| {
+            let size = t.dims()[axis];
+            t.clone().narrow(axis, 1, size - 1) - t.narrow(axis, 0, size - 1)
+        };
+        let bend = difference(difference(flow.clone())).abs();
+        let step = difference(image.clone()).abs().mean_dim(1).detach();
+        let size = step.dims()[axis];
+        let edge = step
+            .clone()
+            .narrow(axis, 1, size - 1)
+            .max_pair(step.narrow(axis, 0, size - 1));
+        bend.mul(edge.mul_scalar(-EDGE_SHARPNESS).exp()).mean()
+    };
+    along(3) + along(2)
+}

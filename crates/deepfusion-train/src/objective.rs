@@ -1,0 +1,349 @@
+//! What is minimised: L = Σ_s ¼(L_rp + λ_s·L_smooth) + λ_v·L_speed + λ_a·L_aff + λ_f·L_flow + agreement.
+
+use crate::config::{Reprojection, ViewMotion};
+use crate::level::{Level, levels, pyramid};
+use crate::losses::{self, FlowView, LossTerms, ReprojectionOutput, RigidView, View, share};
+use crate::{CompareAt, ForwardPass, Model, Motion, SnippetBatch, Synthesised, synthesise};
+use burn::tensor::module::avg_pool2d;
+use burn::tensor::ops::AvgPoolOptions;
+use burn::tensor::{Bool, Tensor};
+use deepfusion_nn::{SCALES, ops};
+
+/// What of the loss depends on how far training is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Schedule {
+    /// λ_v.
+    pub speed_weight: f64,
+    /// Whether moving pixels are looked for, and the flow and the rigid flow have to agree.
+    pub masks_active: bool,
+}
+
+/// The loss of a batch: the sum to differentiate, its terms, and what the finest scale saw.
+#[derive(Debug, Clone)]
+pub struct BatchLoss {
+    /// What is minimised, one value.
+    pub total: Tensor<1>,
+    /// Its terms.
+    pub terms: LossTerms,
+    /// The reprojection at the finest scale.
+    pub finest: ReprojectionOutput,
+    /// The first view's source seen from the targets' place at that scale, T×3×H×W.
+    pub warped: Tensor<4>,
+}
+
+/// The views of one scale.
+struct ScaleViews {
+    synthesised: Vec<Synthesised>,
+    errors: Vec<Tensor<4>>,
+}
+
+impl Model {
+    /// The loss of a forward pass.
+    #[must_use]
+    pub fn loss(&self, pass: &ForwardPass, batch: &SnippetBatch, schedule: Schedule) -> BatchLoss {
+        let settings = &self.config.loss;
+        let motions = self.view_motions(pass, batch);
+        let targets = pyramid(pass.targets.clone());
+        let levels = levels(pass, &targets, settings.compare_at, settings.ssim_weight);
+        let mut sum = Sum::default();
+
+        let finest = self.views(pass, 0, &levels[0], &motions);
+        let flow_views = self.flow_views(pass);
+        let masks = (schedule.masks_active && settings.moving.enabled)
+            .then(|| moving_masks(self, &finest, &flow_views, &motions, &levels[0]));
+        if let Some(masks) = &masks {
+            let shares = masks.iter().map(share);
+            sum.terms.moving_share = shares.sum::<f64>() / masks.len() as f64;
+        }
+
+        let warped = finest.synthesised[0].image.clone().detach();
+        let (mut reprojection, mut smooth) = (Vec::new(), Vec::new());
+        let mut finest_output = None;
+        for (scale, level) in levels.iter().enumerate() {
+            let views = match scale {
+                0 => &finest,
+                _ => &self.views(pass, scale, level, &motions),
+            };
+            let output = losses::reprojection(
+                compared(views, level, masks.as_deref()),
+                settings.automask,
+            );
+            reprojection.push(output.loss.clone());
+            finest_output.get_or_insert(output);
+            if settings.smoothness > 0.0 {
+                let disparity = pass.disparities[scale].clone();
+                let weight = 1.0 / f64::from(1_u32 << scale);
+                let rough = losses::smoothness(disparity, targets[scale].clone());
+                smooth.push(rough.mul_scalar(weight));
+            }
+        }
+        let output = finest_output.expect("the decoder has four scales");
+        sum.terms.valid_share = share(&output.valid);
+        sum.terms.explained_share = share(&output.explained);
+        let mean = |terms: Vec<Tensor<1>>| {
+            let sum = terms.into_iter().reduce(|a, b| a + b);
+            sum.map(|sum| sum.mul_scalar(1.0 / SCALES as f64))
+        };
+        sum.terms.reprojection = sum.add(mean(reprojection), 1.0);
+        sum.terms.smoothness = sum.add(mean(smooth), settings.smoothness);
+        let speed = (settings.speed > 0.0).then(|| self.motion_loss(pass, batch));
+        sum.terms.speed = sum.add(speed, schedule.speed_weight);
+        let affine = (settings.affine > 0.0).then(|| self.affine_loss(pass, &finest, &motions));
+        sum.terms.affine = sum.add(affine, settings.affine);
+        if !flow_views.is_empty() {
+            let flow = self.flow_loss(pass, &flow_views);
+            sum.terms.flow = sum.add(Some(flow), settings.flow.weight);
+            if schedule.masks_active && settings.flow.agreement > 0.0 {
+                let apart = agreement(&finest, &flow_views, masks.as_deref());
+                sum.terms.agreement = sum.add(Some(apart), settings.flow.agreement);
+            }
+        }
+        let total = sum.total.expect("the reprojection is always a part of it");
+        sum.terms.total = number(&total);
+        BatchLoss {
+            total,
+            terms: sum.terms,
+            finest: output,
+            warped,
+        }
+    }
+
+    /// The sources as a scale's disparity sees them, and their errors.
+    fn views(
+        &self,
+        pass: &ForwardPass,
+        scale: usize,
+        level: &Level,
+        motions: &[Motion],
+    ) -> ScaleViews {
+        let settings = &self.config.loss;
+        let disparity = pass.disparities[scale].clone();
+        let disparity = match settings.compare_at {
+            CompareAt::Full => self.enlarge[scale].apply(disparity),
+            CompareAt::Own => disparity,
+        };
+        let inverse_depth = self.inverse_depth(disparity);
+        let synthesised: Vec<_> = level
+            .sources
+            .iter()
+            .zip(motions)
+            .map(|(source, motion)| {
+                synthesise(
+                    source.clone(),
+                    inverse_depth.clone(),
+                    motion,
+                    &level.intrinsics,
+                    &level.inverse_intrinsics,
+                )
+            })
+            .collect();
+        let error = |view: &Synthesised| {
+            let (image, target) = (view.image.clone(), level.targets.clone());
+            ops::photometric_error(image, target, settings.ssim_weight)
+        };
+        ScaleViews {
+            errors: synthesised.iter().map(error).collect(),
+            synthesised,
+        }
+    }
+
+    /// 1/depth in 1/m, of a sigmoid disparity: d = 1/D_max + (1/D_min − 1/D_max)·σ.
+    fn inverse_depth(&self, disparity: Tensor<4>) -> Tensor<4> {
+        let range = self.range();
+        let (low, high) = (1.0 / range.max_m, 1.0 / range.min_m);
+        disparity.mul_scalar(high - low).add_scalar(low)
+    }
+
+    /// The sources as the flow sees them, by view; none without a flow.
+    fn flow_views(&self, pass: &ForwardPass) -> Vec<FlowView> {
+        let ssim_weight = self.config.loss.ssim_weight;
+        let views = pass.flows.iter().zip(&pass.sources);
+        views
+            .map(|(f, source)| {
+                losses::flow_view(&pass.targets, source, &f.flow, &f.back, ssim_weight)
+            })
+            .collect()
+    }
+
+    /// L_flow, mean over the views.
+    fn flow_loss(&self, pass: &ForwardPass, flow_views: &[FlowView]) -> Tensor<1> {
+        let settings = &self.config.loss;
+        let views = pass.flows.iter().zip(&pass.sources).zip(flow_views);
+        mean_of(views, |((f, source), view)| {
+            let one_way = match self.config.reprojection {
+                // The view's two halves are the two directions.
+                Reprojection::Bidirectional => None,
+                Reprojection::Minimum => Some(losses::flow_view(
+                    source,
+                    &pass.targets,
+                    &f.back,
+                    &f.flow,
+                    settings.ssim_weight,
+                )),
+            };
+            let mut sides = vec![view.clone()];
+            let (mut flows, mut images) = (vec![f.flow.clone()], vec![pass.targets.clone()]);
+            if let Some(back) = one_way {
+                sides.push(back);
+                flows.push(f.back.clone());
+                images.push(source.clone());
+            }
+            losses::flow(&sides, &flows, &images, &settings.flow)
+        })
+    }
+
+    /// The affine invariant loss between each frame's depth and the other's seen from it. Both frames are
+    /// targets here: the other depth is that of the batch's other half.
+    fn affine_loss(&self, pass: &ForwardPass, finest: &ScaleViews, motions: &[Motion]) -> Tensor<1> {
+        let depth = self.inverse_depth(pass.disparities[0].clone()).recip();
+        let views = finest.synthesised.iter().zip(motions);
+        mean_of(views, |(view, motion)| {
+            let there = ops::warp(crate::model::swap_halves(depth.clone()), view.coords.clone());
+            let seen = losses::depth_seen_from_target(
+                there,
+                view.coords.clone(),
+                &motion.inverse(),
+                &pass.inverse_intrinsics,
+            );
+            losses::affine_invariant(depth.clone(), seen, &view.valid)
+        })
+    }
+
+    /// What PoseNet learns from the vehicle.
+    fn motion_loss(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Tensor<1> {
+        let views = pass.motions.iter().zip(&pass.measured);
+        match self.config.view_motion {
+            ViewMotion::Vehicle => mean_of(views, |pair| losses::motion(pair.0, pair.1)),
+            ViewMotion::PoseNet | ViewMotion::Distance => {
+                let weight = self.config.loss.rotation;
+                mean_of(views.enumerate(), |(view, (motion, measured))| {
+                    let distance = self.distance_m(batch, view);
+                    losses::speed(motion, distance, &measured.rotation, weight)
+                })
+            }
+        }
+    }
+
+    /// The measured distance of a view's targets, T.
+    fn distance_m(&self, batch: &SnippetBatch, view: usize) -> Tensor<1> {
+        let distance = batch.distance_m[view].clone();
+        match self.config.reprojection {
+            // The second half of the targets looks back, as far.
+            Reprojection::Bidirectional => Tensor::cat(vec![distance.clone(), distance], 0),
+            Reprojection::Minimum => distance,
+        }
+    }
+
+    /// The motions that the views are synthesised with.
+    fn view_motions(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Vec<Motion> {
+        match self.config.view_motion {
+            ViewMotion::PoseNet => pass.motions.clone(),
+            ViewMotion::Vehicle => pass.measured.clone(),
+            ViewMotion::Distance => {
+                let views = pass.motions.iter().enumerate();
+                let scaled = views.map(|(view, m)| m.with_distance(self.distance_m(batch, view)));
+                scaled.collect()
+            }
+        }
+    }
+}
+
+/// The pixels that move by themselves at the finest scale, by view, T×1×H×W.
+fn moving_masks(
+    model: &Model,
+    finest: &ScaleViews,
+    flow_views: &[FlowView],
+    motions: &[Motion],
+    level: &Level,
+) -> Vec<Tensor<4, Bool>> {
+    let views = finest.synthesised.iter().zip(&finest.errors);
+    let views = views.zip(flow_views).zip(motions);
+    views
+        .map(|(((synthesised, error), flow), source_from_target)| {
+            let rigid = RigidView {
+                synthesised,
+                error,
+                source_from_target,
+                intrinsics: &level.intrinsics,
+                inverse_intrinsics: &level.inverse_intrinsics,
+            };
+            losses::moving_pixels(&rigid, flow, &model.config.loss.moving)
+        })
+        .collect()
+}
+
+/// A scale's views as the reprojection compares them, the masks brought to their size.
+fn compared(views: &ScaleViews, level: &Level, masks: Option<&[Tensor<4, Bool>]>) -> Vec<View> {
+    let parts = views.synthesised.iter().zip(&views.errors);
+    let parts = parts.zip(&level.unwarped).enumerate();
+    parts
+        .map(|(index, ((synthesised, error), unwarped_error))| View {
+            error: error.clone(),
+            valid: synthesised.valid.clone(),
+            unwarped_error: unwarped_error.clone(),
+            moving: masks.map(|masks| shrunk(&masks[index], error.dims()[3])),
+        })
+        .collect()
+}
+
+/// A mask at a smaller width, true where most of its pixels are.
+fn shrunk(mask: &Tensor<4, Bool>, width: usize) -> Tensor<4, Bool> {
+    let factor = mask.dims()[3] / width;
+    if factor == 1 {
+        return mask.clone();
+    }
+    let options = AvgPoolOptions::new([factor, factor]).with_stride([factor, factor]);
+    avg_pool2d(mask.clone().float(), options).greater_elem(0.5)
+}
+
+/// Mean over the views of the distance between rigid flow and flow, where both explain the pixel: in view,
+/// back again, and not moving by itself.
+fn agreement(
+    finest: &ScaleViews,
+    flow_views: &[FlowView],
+    masks: Option<&[Tensor<4, Bool>]>,
+) -> Tensor<1> {
+    let views = finest.synthesised.iter().zip(flow_views).enumerate();
+    mean_of(views, |(index, (rigid, flow))| {
+        let mut both = rigid.valid.clone().bool_and(flow.visible.clone());
+        if let Some(masks) = masks {
+            both = both.bool_and(masks[index].clone().bool_not());
+        }
+        losses::agreement(rigid.coords.clone(), flow.coords.clone(), &both)
+    })
+}
+
+/// The sum that is differentiated, and its terms.
+#[derive(Default)]
+struct Sum {
+    total: Option<Tensor<1>>,
+    terms: LossTerms,
+}
+
+impl Sum {
+    /// Adds a term where there is one, and gives its unweighted value.
+    fn add(&mut self, term: Option<Tensor<1>>, weight: f64) -> f64 {
+        let Some(term) = term else { return 0.0 };
+        let value = number(&term);
+        let weighted = term.mul_scalar(weight);
+        self.total = Some(match self.total.take() {
+            Some(total) => total + weighted,
+            None => weighted,
+        });
+        value
+    }
+}
+
+fn number(value: &Tensor<1>) -> f64 {
+    f64::from(value.clone().into_scalar::<f32>())
+}
+
+/// The mean of a loss over views.
+fn mean_of<T>(views: impl ExactSizeIterator<Item = T>, loss: impl Fn(T) -> Tensor<1>) -> Tensor<1> {
+    let count = views.len() as f64;
+    views
+        .map(loss)
+        .reduce(|a, b| a + b)
+        .expect("a target has at least one source: the configuration is validated")
+        .mul_scalar(1.0 / count)
+}

@@ -1,0 +1,310 @@
+//! The terms of the loss against PyTorch (`reference/losses.py`) and against finite differences.
+
+use burn::tensor::{Bool, Device, Tensor, TensorData};
+use deepfusion_nn::weights::{self, Weights};
+use deepfusion_train::losses::{
+    RigidView, affine_invariant, agreement, depth_seen_from_target, epipolar_distance, flow,
+    flow_view, moving_pixels,
+};
+use deepfusion_train::{FlowLossConfig, Motion, MovingConfig, Synthesised};
+use std::path::Path;
+
+const SSIM_WEIGHT: f64 = 0.85;
+
+/// The fixture's tensors, on a device that differentiates.
+struct Reference {
+    tensors: Weights,
+    device: Device,
+}
+
+impl Reference {
+    fn read() -> Self {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference");
+        Self {
+            tensors: weights::read(&folder.join("losses.safetensors")).unwrap(),
+            device: Device::flex().autodiff(),
+        }
+    }
+
+    fn values(&self, name: &str) -> &[f32] {
+        &self.tensors.tensors[name].values
+    }
+
+    fn tensor<const D: usize>(&self, name: &str) -> Tensor<D> {
+        let tensor = &self.tensors.tensors[name];
+        let shape: [usize; D] = tensor.shape.clone().try_into().unwrap();
+        Tensor::from_data(TensorData::new(tensor.values.clone(), shape), &self.device)
+    }
+
+    fn mask(&self, name: &str) -> Tensor<4, Bool> {
+        self.tensor::<4>(name).greater_elem(0.5)
+    }
+
+    /// The value and every input's gradient equal PyTorch's.
+    fn check(&self, term: &str, loss: Tensor<1>, inputs: &[(&str, Tensor<4>)]) {
+        let value = loss.clone().into_scalar::<f32>();
+        let expected = self.values(&format!("{term}/loss"))[0];
+        assert!(
+            (value - expected).abs() <= 1e-5 * expected.abs(),
+            "{term}: {value} instead of {expected}"
+        );
+        let gradients = loss.backward();
+        for (name, input) in inputs {
+            let ours = input.grad(&gradients).unwrap();
+            close(
+                &format!("{term}/{name}.grad"),
+                &read(ours),
+                self.values(&format!("{term}/{name}.grad")),
+            );
+        }
+    }
+}
+
+fn read<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    tensor.into_data().try_into_vec().unwrap()
+}
+
+fn truth(mask: Tensor<4, Bool>) -> Vec<f32> {
+    read(mask.float())
+}
+
+/// Equal to 1e-4 of the expected values' root mean square: f32 against doubles, sums of a few hundred
+/// values, and SSIM's quotients, in which a hundredth of 1e-4 is lost.
+fn close(what: &str, ours: &[f32], expected: &[f32]) {
+    assert_eq!(ours.len(), expected.len(), "{what}");
+    let rms = expected.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / expected.len() as f64;
+    let worst = ours.iter().zip(expected).map(|(a, b)| (a - b).abs());
+    let worst = f64::from(worst.fold(0.0, f32::max));
+    assert!(worst <= 1e-4 * rms.sqrt(), "{what}: {worst} of {}", rms.sqrt());
+}
+
+fn settings() -> FlowLossConfig {
+    FlowLossConfig {
+        weight: 0.1,
+        consistency: 0.1,
+        smoothness: 0.05,
+        agreement: 0.0,
+    }
+}
+
+#[test]
+fn the_flow_loss_equals_pytorch_in_both_arrangements() {
+    let reference = Reference::read();
+    let (first, second) = (reference.tensor("flow/first"), reference.tensor("flow/second"));
+    let forward = reference.tensor::<4>("flow/forward").require_grad();
+    let backward = reference.tensor::<4>("flow/backward").require_grad();
+    let view = |a: &Tensor<4>, b: &Tensor<4>, f: &Tensor<4>, g: &Tensor<4>| {
+        flow_view(a, b, f, g, SSIM_WEIGHT)
+    };
+    let there = view(&first, &second, &forward, &backward);
+    close("error", &read(there.error), reference.values("flow/error"));
+    assert_eq!(truth(there.visible), reference.values("flow/visible"));
+
+    let cat = |a: &Tensor<4>, b: &Tensor<4>| Tensor::cat(vec![a.clone(), b.clone()], 0);
+    let (targets, sources) = (cat(&first, &second), cat(&second, &first));
+    let (flows, backs) = (cat(&forward, &backward), cat(&backward, &forward));
+    let pooled = view(&targets, &sources, &flows, &backs);
+    let loss = flow(&[pooled], &[flows], &[targets], &settings());
+    let inputs = [("forward", forward), ("backward", backward)];
+    reference.check("flow", loss, &inputs);
+}
+
+#[test]
+fn the_affine_invariant_loss_equals_pytorch() {
+    let reference = Reference::read();
+    let x = reference.tensor::<4>("affine/x").require_grad();
+    let y = reference.tensor::<4>("affine/y").require_grad();
+    let loss = affine_invariant(x.clone(), y.clone(), &reference.mask("affine/valid"));
+    reference.check("affine", loss, &[("x", x), ("y", y)]);
+}
+
+#[test]
+fn the_other_depth_seen_from_here_equals_pytorch() {
+    let reference = Reference::read();
+    let depth = reference.tensor::<4>("seen/depth").require_grad();
+    let coords = reference.tensor::<4>("seen/coords").require_grad();
+    let turn = reference.tensor::<2>("seen/axis_angle").require_grad();
+    let step = reference.tensor::<2>("seen/translation").require_grad();
+    let motion = Motion::new(turn.clone(), step.clone());
+    let inverse = reference.tensor::<3>("seen/inverse_intrinsics");
+    let seen = depth_seen_from_target(depth.clone(), coords.clone(), &motion, &inverse);
+    close("seen", &read(seen.clone()), reference.values("seen/seen"));
+    let count = seen.dims().iter().product::<usize>();
+    let pattern: Vec<f32> = (0..count).map(|i| (i as f64).cos() as f32).collect();
+    let pattern = Tensor::<1>::from_data(pattern.as_slice(), &reference.device);
+    let loss = seen.clone().mul(pattern.reshape(seen.dims())).sum();
+    let gradients = loss.backward();
+    let motion_gradients = [("axis_angle", turn), ("translation", step)];
+    for (name, input) in motion_gradients {
+        let expected = reference.values(&format!("seen/{name}.grad"));
+        close(name, &read(input.grad(&gradients).unwrap()), expected);
+    }
+    for (name, input) in [("depth", depth), ("coords", coords)] {
+        let expected = reference.values(&format!("seen/{name}.grad"));
+        close(name, &read(input.grad(&gradients).unwrap()), expected);
+    }
+}
+
+#[test]
+fn agreement_equals_pytorch() {
+    let reference = Reference::read();
+    let rigid = reference.tensor::<4>("agreement/rigid").require_grad();
+    let flow = reference.tensor::<4>("agreement/flow").require_grad();
+    let both = reference.mask("affine/valid");
+    let loss = agreement(rigid.clone(), flow.clone(), &both);
+    reference.check("agreement", loss, &[("rigid", rigid), ("flow", flow)]);
+}
+
+#[test]
+fn moving_pixels_equal_pytorch() {
+    let reference = Reference::read();
+    let ends = reference.tensor::<4>("seen/coords");
+    let motion = Motion::new(
+        reference.tensor("seen/axis_angle"),
+        reference.tensor("seen/translation"),
+    );
+    let inverse = reference.tensor::<3>("seen/inverse_intrinsics");
+    let intrinsics = reference.tensor::<3>("seen/intrinsics");
+    let distance = epipolar_distance(&ends, &motion, &inverse);
+    close("distance", &read(distance), reference.values("moving/distance"));
+
+    let everywhere = reference.tensor::<4>("moving/flow_error").greater_elem(-1.0);
+    let synthesised = Synthesised {
+        image: reference.tensor("moving/flow_error"),
+        coords: reference.tensor("moving/rigid_coords"),
+        valid: everywhere.clone(),
+    };
+    let error = reference.tensor("moving/rigid_error");
+    let rigid = RigidView {
+        synthesised: &synthesised,
+        error: &error,
+        source_from_target: &motion,
+        intrinsics: &intrinsics,
+        inverse_intrinsics: &inverse,
+    };
+    let seen = deepfusion_train::losses::FlowView {
+        error: reference.tensor("moving/flow_error"),
+        round_trip: Tensor::zeros(ends.dims(), &reference.device),
+        coords: ends,
+        visible: everywhere,
+    };
+    // The moving pixels of each limit on what cannot stand still, of both, and of none.
+    for (min_epipolar_px, min_parallax_ratio, name) in [
+        (0.5, 0.0, "moving"),
+        (0.0, 2.0, "along"),
+        (0.5, 2.0, "either"),
+        (0.0, 0.0, "neither"),
+    ] {
+        let limits = MovingConfig {
+            enabled: true,
+            margin: 0.02,
+            min_flow_px: 1.0,
+            min_flow_share: 0.4,
+            min_epipolar_px,
+            min_parallax_ratio,
+            warmup_share: 0.0,
+        };
+        let moving = truth(moving_pixels(&rigid, &seen, &limits));
+        let expected = reference.values(&format!("moving/{name}"));
+        assert_eq!(moving, expected, "{name}");
+        assert!(moving.contains(&1.0) && moving.contains(&0.0), "{name}");
+    }
+}
+
+/// Neither depth's scale nor an offset changes the loss, and its gradient does not pull at them.
+#[test]
+fn the_affine_invariant_loss_is_blind_to_the_scale() {
+    let reference = Reference::read();
+    let (x, y) = (reference.tensor::<4>("affine/x"), reference.tensor::<4>("affine/y"));
+    let valid = reference.mask("affine/valid");
+    let at = |scale_x: f32, scale_y: f32| {
+        let s = Tensor::<1>::from_data([scale_x, scale_y], &reference.device).require_grad();
+        let part = |i| s.clone().narrow(0, i, 1).reshape([1, 1, 1, 1]);
+        let loss = affine_invariant(x.clone() * part(0), y.clone() * part(1), &valid);
+        let gradient = s.grad(&loss.clone().backward()).unwrap();
+        (loss.into_scalar::<f32>(), read(gradient))
+    };
+    let (one, gradient) = at(1.0, 1.0);
+    assert!(one > 0.1, "{one}");
+    assert!(gradient.iter().all(|g| g.abs() < 1e-4 * one), "{gradient:?}");
+    for (a, b) in [(3.0, 1.0), (1.0, 0.2), (0.05, 7.0)] {
+        let (other, _) = at(a, b);
+        assert!((other - one).abs() < 2e-5 * one, "{other} {one}");
+    }
+    // Flat depths have no spread to divide by: the gradient stays finite.
+    let flat = Tensor::<4>::full([1, 1, 4, 6], 10.0, &reference.device).require_grad();
+    let everywhere = flat.clone().greater_elem(0.0);
+    let loss = affine_invariant(flat.clone(), flat.clone(), &everywhere);
+    let gradient = read(flat.grad(&loss.backward()).unwrap());
+    assert!(gradient.iter().all(|g| g.is_finite()));
+}
+
+/// Without a visible pixel there is nothing to learn, and no NaN.
+#[test]
+fn a_flow_out_of_view_costs_its_smoothness_alone() {
+    let device = Device::flex().autodiff();
+    let image = Tensor::<4>::ones([1, 3, 6, 8], &device);
+    let away = Tensor::<4>::full([1, 2, 6, 8], 100.0, &device).require_grad();
+    let view = flow_view(&image, &image, &away, &away, SSIM_WEIGHT);
+    let loss = flow(&[view], &[away.clone()], &[image], &settings());
+    assert_eq!(loss.clone().into_scalar::<f32>(), 0.0);
+    let gradient = read(away.grad(&loss.backward()).unwrap());
+    assert!(gradient.iter().all(|g| g.is_finite()));
+}
+
+/// Central differences along random directions: a kink of one pixel's |·| or of a bilinear cell is then one
+/// among hundreds. The steps leave 1e-3 of the derivative in f32; `seen` is quadratic and takes a long one.
+#[test]
+fn gradients_equal_finite_differences() {
+    let reference = Reference::read();
+    let check = |what: &str, point: &str, loss: &dyn Fn(Tensor<4>) -> Tensor<1>, step: f64| {
+        let x = reference.tensor::<4>(point).require_grad();
+        let gradient = x.grad(&loss(x.clone()).backward()).unwrap();
+        for seed in 1..=3 {
+            let count: usize = x.dims().iter().product();
+            let direction = (0..count).map(|i| ((i * i * seed + i) as f64).sin() as f32);
+            let direction: Vec<f32> = direction.collect();
+            let direction = Tensor::<1>::from_data(direction.as_slice(), &reference.device);
+            let direction = direction.reshape(x.dims());
+            let expected = gradient.clone().mul(direction.clone()).sum().into_scalar::<f32>();
+            let at = |step: f64| {
+                let moved = x.clone().detach() + direction.clone().mul_scalar(step);
+                f64::from(loss(moved).into_scalar::<f32>())
+            };
+            let numeric = (at(step) - at(-step)) / (2.0 * step);
+            let tolerance = 2e-2 * f64::from(expected.abs()) + 1e-3;
+            assert!(
+                (numeric - f64::from(expected)).abs() < tolerance,
+                "{what}, direction {seed}: {expected} instead of {numeric}"
+            );
+        }
+    };
+    let (first, second) = (reference.tensor("flow/first"), reference.tensor("flow/second"));
+    let back = reference.tensor("flow/backward");
+    let flow_loss = |f: Tensor<4>| {
+        let view = flow_view(&first, &second, &f, &back, SSIM_WEIGHT);
+        flow(&[view], &[f], &[first.clone()], &settings())
+    };
+    check("flow", "flow/forward", &flow_loss, 1e-3);
+    let y = reference.tensor::<4>("affine/y");
+    let valid = reference.mask("affine/valid");
+    let affine = |x: Tensor<4>| affine_invariant(x, y.clone(), &valid);
+    check("affine x", "affine/x", &affine, 1e-2);
+    let x = reference.tensor::<4>("affine/x");
+    let affine = |y: Tensor<4>| affine_invariant(x.clone(), y, &valid);
+    check("affine y", "affine/y", &affine, 1e-2);
+    let other = reference.tensor::<4>("agreement/flow");
+    let apart = |rigid: Tensor<4>| agreement(rigid, other.clone(), &valid);
+    check("agreement", "agreement/rigid", &apart, 1e-3);
+    let motion = Motion::new(
+        reference.tensor("seen/axis_angle"),
+        reference.tensor("seen/translation"),
+    );
+    let inverse = reference.tensor::<3>("seen/inverse_intrinsics");
+    let coords = reference.tensor::<4>("seen/coords");
+    let seen = |depth: Tensor<4>| {
+        let seen = depth_seen_from_target(depth, coords.clone(), &motion, &inverse);
+        seen.powi_scalar(2).mean()
+    };
+    check("seen", "seen/depth", &seen, 1e-1);
+}

@@ -1,0 +1,62 @@
+use std::path::PathBuf;
+
+use clap::Args;
+use deepfusion_data::CameraChoice;
+
+use super::{DeviceChoice, PresetChoice, Size};
+
+/// `deepfusion ablate`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Trains and measures the on/off table of the paper's Table 3: the context encoding (HCE with its attention), the \
+    speed loss and the flow loss (with the masks of what moves), all eight combinations, and the full system with three frames \
+    and minimum reprojection instead of two frames in both directions. Everything else, the steps included, is equal.\n\n\
+    Every seed of a row is a run of its own, kept in DIR/rows; --resume goes on where it stopped, also inside a row. The table is \
+    written after every run: table.txt, .csv, .md, .tex.\n\n\
+    Examples:\n  deepfusion ablate --data street --eval-data other-street --budget 1200 --seeds 3 --out runs/ablation\n  \
+    deepfusion ablate --out runs/ablation --resume"
+)]
+pub struct AblateArgs {
+    /// Recordings to train on: drive folders, date folders or KITTI roots.
+    #[arg(long, value_name = "PATH", num_args = 1.., required_unless_present = "resume")]
+    pub data: Vec<PathBuf>,
+    /// Recordings to measure on [default: those trained on, which the table says].
+    #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "resume")]
+    pub eval_data: Vec<PathBuf>,
+    /// Optimiser steps of every run.
+    #[arg(long, value_name = "N", required_unless_present = "resume", conflicts_with = "resume")]
+    pub budget: Option<usize>,
+    /// Runs of every row, with the seeds 0 to K − 1; more than before adds them to a resumed table [default: 1].
+    #[arg(long, value_name = "K")]
+    pub seeds: Option<usize>,
+    /// Settings of everything that the rows do not change [default: light].
+    #[arg(long, value_enum, conflicts_with = "resume")]
+    pub preset: Option<PresetChoice>,
+    /// Settings from a file, as written into every run as config.toml.
+    #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["preset", "resume"])]
+    pub config: Option<PathBuf>,
+    /// Only these rows.
+    #[arg(long, value_name = "ROW,…", value_delimiter = ',', conflicts_with = "resume")]
+    pub rows: Vec<String>,
+    /// Size of the network's input.
+    #[arg(long, value_name = "WxH", conflicts_with = "resume")]
+    pub size: Option<Size>,
+    /// Samples a step.
+    #[arg(long, value_name = "N", conflicts_with = "resume")]
+    pub batch: Option<usize>,
+    /// Which cameras.
+    #[arg(long, value_name = "2|3|both", default_value = "2", conflicts_with = "resume")]
+    pub camera: CameraChoice,
+    /// Folder of the table and its runs [default: runs/ablate-TIME].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Go on with the table in --out.
+    #[arg(long, requires = "out")]
+    pub resume: bool,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value_t)]
+    pub device: DeviceChoice,
+    /// Print the table as JSON on stdout.
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,287 @@
+//! `deepfusion ablate`: the on/off table of the paper's Table 3, row by row.
+
+mod rows;
+mod table;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use burn::tensor::Device;
+use deepfusion_data::{Camera, CameraChoice, GtKind};
+use deepfusion_eval::{Crop, GroundTruth, Protocol, Report};
+use deepfusion_train::{CheckpointKind, RunFolder, TrainConfig, Trainer};
+use serde::{Deserialize, Serialize};
+
+use self::rows::Row;
+use self::table::RunResult;
+use super::eval::predict;
+use super::evaluate::{Truth, evaluate_datasets, open_datasets, trivial_from_datasets};
+use super::{device, train};
+use crate::cli::{AblateArgs, DeviceChoice, EngineArgs, PresetChoice};
+use crate::progress::{Progress, say};
+use crate::{engine, output};
+
+/// What the table is made of; stored beside it, so that it can be gone on with.
+#[derive(Debug, Serialize, Deserialize)]
+struct Plan {
+    /// Optimiser steps of every run.
+    budget: usize,
+    /// Seeds 0 to this less one.
+    seeds: u64,
+    /// The rows.
+    rows: Vec<Row>,
+    /// Recordings to measure on; empty: those trained on.
+    eval_data: Vec<PathBuf>,
+    /// What all rows share.
+    config: TrainConfig,
+}
+
+const PLAN: &str = "ablate.toml";
+
+/// `deepfusion ablate`.
+pub fn run(args: &AblateArgs) -> Result<()> {
+    let (out, plan) = if args.resume {
+        let out = args.out.clone().unwrap_or_default();
+        let mut plan = read_plan(&out)?;
+        plan.seeds = plan.seeds.max(args.seeds.unwrap_or(0) as u64);
+        if !args.data.is_empty() {
+            plan.config.data.paths.clone_from(&args.data);
+        }
+        (out, plan)
+    } else {
+        let plan = new_plan(args)?;
+        (output::run_folder(args.out.as_deref(), "ablate")?, plan)
+    };
+    // Every row is looked at before the first trains for hours.
+    let configs = plan.rows.iter().map(|row| row.config(&plan.config));
+    let configs = configs.collect::<Result<Vec<_>, _>>()?;
+    train::open_samples(&configs[0])?;
+    open_eval_data(&plan)?;
+    write(&out.join(PLAN), &toml::to_string_pretty(&plan)?)?;
+
+    let mut results = Vec::new();
+    let runs = plan.seeds as usize * plan.rows.len();
+    for seed in 0..plan.seeds {
+        for (row, config) in plan.rows.iter().zip(&configs) {
+            let folder = out.join("rows").join(row.name()).join(format!("seed-{seed}"));
+            let place = results.len() + 1;
+            say(&format!("run {place} of {runs}: {}, seed {seed}", row.name()));
+            let config = TrainConfig {
+                seed,
+                steps: Some(plan.budget),
+                ..config.clone()
+            };
+            let Some(result) = one_run(&folder, *row, config, &plan, args.device)? else {
+                say(&format!(
+                    "stopped; go on with: deepfusion ablate --out {} --resume",
+                    out.display()
+                ));
+                return Ok(());
+            };
+            results.push(result);
+            write_tables(&out, &plan, &results)?;
+        }
+    }
+    let table = table::table(&plan.rows, &results);
+    if args.json {
+        output::print_json(&table)
+    } else {
+        output::print(&format!("{}{}\n", table::text(&table), out.display()))
+    }
+}
+
+fn new_plan(args: &AblateArgs) -> Result<Plan> {
+    let mut config = match &args.config {
+        Some(path) => TrainConfig::read(path)?,
+        None => train::preset(args.preset.unwrap_or(PresetChoice::Light)).config(),
+    };
+    if let Some(size) = args.size {
+        config.size.width = size.width as usize;
+        config.size.height = size.height as usize;
+    }
+    config.batch = args.batch.unwrap_or(config.batch);
+    config.data.paths.clone_from(&args.data);
+    config.data.camera = match args.camera.cameras() {
+        [Camera::Left] => "2",
+        [Camera::Right] => "3",
+        _ => "both",
+    }
+    .into();
+    Ok(Plan {
+        budget: args.budget.unwrap_or(0).max(1),
+        seeds: args.seeds.unwrap_or(1).max(1) as u64,
+        rows: chosen(&args.rows)?,
+        eval_data: args.eval_data.clone(),
+        config,
+    })
+}
+
+/// The rows of these names; all where none is named.
+fn chosen(names: &[String]) -> Result<Vec<Row>> {
+    let all = Row::all();
+    if names.is_empty() {
+        return Ok(all);
+    }
+    let find = |name: &String| {
+        let row = all.iter().find(|row| row.name() == *name).copied();
+        row.ok_or_else(|| {
+            let known: Vec<String> = all.iter().map(|row| row.name()).collect();
+            deepfusion_train::Error::Config {
+                field: "rows",
+                expected: format!("one of {}", known.join(", ")),
+                found: name.clone(),
+            }
+            .into()
+        })
+    };
+    names.iter().map(find).collect()
+}
+
+fn read_plan(out: &Path) -> Result<Plan> {
+    let path = out.join(PLAN);
+    let text = std::fs::read_to_string(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+    Ok(
+        toml::from_str(&text).map_err(|e| deepfusion_train::Error::ConfigFile {
+            path,
+            reason: e.to_string(),
+        })?,
+    )
+}
+
+/// Trains and measures one run, or as much of it as is not done yet; `None` if it was interrupted.
+fn one_run(
+    folder: &Path,
+    row: Row,
+    config: TrainConfig,
+    plan: &Plan,
+    device: DeviceChoice,
+) -> Result<Option<RunResult>> {
+    let done = folder.join("result.json");
+    if done.exists() {
+        let text = std::fs::read_to_string(&done).map_err(|e| deepfusion_data::Error::file(&done, e))?;
+        let result = serde_json::from_str(&text)
+            .with_context(|| format!("{}: not a result of ablate; delete it to run this row again", done.display()))?;
+        return Ok(Some(result));
+    }
+    let run = folder.join("run");
+    let mut trainer = open_run(&run, config, &device::open(device)?)?;
+    let start = Instant::now();
+    let finished = train_to_the_end(&mut trainer)?;
+    let seconds = spent(folder, start.elapsed().as_secs_f64())?;
+    if !finished {
+        return Ok(None);
+    }
+    drop(trainer);
+    let result = RunResult {
+        row,
+        seed: RunFolder::open(&run)?.0.read_config()?.seed,
+        train_seconds: seconds,
+        report: measure(&run, plan, device)?,
+    };
+    write(&done, &serde_json::to_string_pretty(&result)?)?;
+    Ok(Some(result))
+}
+
+/// The run where its last checkpoint stands, or a new one.
+fn open_run(run: &Path, config: TrainConfig, device: &Device) -> Result<Trainer> {
+    let sets = train::open_samples(&config)?;
+    if let Ok((folder, _)) = RunFolder::open(run) {
+        if folder.checkpoint_path(CheckpointKind::Last).exists() {
+            let stored = folder.read_config()?;
+            return Ok(Trainer::resume(stored, folder, sets, device)?);
+        }
+        // It ended before its first checkpoint: nothing is lost with it.
+        std::fs::remove_dir_all(run).map_err(|e| deepfusion_data::Error::file(run, e))?;
+    }
+    Ok(Trainer::create(config, RunFolder::create(run)?, sets, device, Ok)?)
+}
+
+/// Whether the last step was reached.
+fn train_to_the_end(trainer: &mut Trainer) -> Result<bool> {
+    if trainer.step() < trainer.steps() {
+        train::train(trainer)?;
+    }
+    Ok(trainer.step() >= trainer.steps())
+}
+
+/// Seconds of training so far, these included; kept beside the run for the next time.
+fn spent(folder: &Path, seconds: f64) -> Result<f64> {
+    let path = folder.join("seconds");
+    let before = std::fs::read_to_string(&path).ok();
+    let before: f64 = before.and_then(|t| t.trim().parse().ok()).unwrap_or(0.0);
+    write(&path, &format!("{}\n", before + seconds))?;
+    Ok(before + seconds)
+}
+
+/// The run's last checkpoint, measured like `eval` does: equal budgets are compared, and not choices of a checkpoint.
+fn measure(run: &Path, plan: &Plan, device: DeviceChoice) -> Result<Report> {
+    let predictor = engine::load(&run.join("last.safetensors"), &EngineArgs::on(device))?;
+    let (train_sets, eval_sets) = open_eval_data(plan)?;
+    let protocol = Protocol {
+        crop: Crop::Garg,
+        gt: GroundTruth::Z,
+        ..Protocol::default()
+    };
+    let mut progress = Progress::new("evaluating");
+    evaluate_datasets(
+        &eval_sets,
+        Truth::Scans(GtKind::Z),
+        &protocol,
+        Some(trivial_from_datasets(&train_sets, GtKind::Z)?),
+        &mut |dataset, frame| {
+            let image = dataset.load_image(frame)?;
+            predict(&predictor, &image, &dataset.intrinsics(frame), true)
+        },
+        &mut |done, total| progress.set(done, total),
+    )
+}
+
+type Datasets = Vec<deepfusion_data::Dataset>;
+
+/// The recordings trained on, for the trivial row, and those measured on.
+fn open_eval_data(plan: &Plan) -> Result<(Datasets, Datasets)> {
+    let train = train::recordings(&plan.config, &plan.config.data.paths)?;
+    let eval = match plan.eval_data.as_slice() {
+        [] => train::recordings(&plan.config, &plan.config.data.paths)?,
+        paths => open_datasets(paths, None, CameraChoice::default())?,
+    };
+    Ok((train, eval))
+}
+
+fn write_tables(out: &Path, plan: &Plan, results: &[RunResult]) -> Result<()> {
+    let table = table::table(&plan.rows, results);
+    let mut text = table::text(&table);
+    let place = if plan.eval_data.is_empty() {
+        "measured on the recordings trained on"
+    } else {
+        "measured on other recordings than those trained on"
+    };
+    text.push_str(&format!(
+        "\n{} steps a run, {place}; mean ± standard deviation over seeds; abs_rel, rmse and a1 unscaled\n",
+        plan.budget
+    ));
+    if let Some(trivial) = results.iter().find_map(|r| r.report.trivial.as_ref()) {
+        text.push_str(&format!(
+            "trivial row: abs_rel {:.3} unscaled, {:.3} median-scaled\n",
+            trivial.unscaled.abs_rel, trivial.median_scaled.abs_rel
+        ));
+    }
+    write(&out.join("table.txt"), &text)?;
+    write(&out.join("table.csv"), &table::csv(&table))?;
+    write(&out.join("table.md"), &table::markdown(&table))?;
+    write(&out.join("table.tex"), &table::latex(&table))
+}
+
+/// Writes a text file whole or not at all.
+fn write(path: &Path, text: &str) -> Result<()> {
+    if let Some(parent) = path.parent() {
+        std::fs::create_dir_all(parent).map_err(|e| deepfusion_data::Error::file(parent, e))?;
+    }
+    deepfusion_data::write_atomically::<deepfusion_data::Error>(path, |file| {
+        file.write_all(text.as_bytes())
+            .map_err(|e| deepfusion_data::Error::file(path, e))
+    })?;
+    Ok(())
+}
