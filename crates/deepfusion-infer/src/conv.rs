@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::view::View;
-use crate::{Activation, Conv};
+use crate::{Activation, Border, Conv};
 
 /// A convolution's place in the arena.
 #[derive(Debug, Clone)]
@@ -15,7 +15,40 @@ pub(crate) struct Geometry {
     pub(crate) residual: Option<View>,
     pub(crate) kernel: usize,
     pub(crate) stride: usize,
+    pub(crate) dilation: usize,
+    pub(crate) border: Border,
     pub(crate) activation: Activation,
+}
+
+impl Geometry {
+    /// Where the first tap of output pixel (0, 0) lies.
+    pub(crate) fn corner(&self) -> usize {
+        let reach = self.kernel / 2 * self.dilation;
+        self.input.offset - reach * (self.input.row + self.input.pitch)
+    }
+
+    /// Whether a tap that lies `k` steps along an axis of `n` pixels ever meets one of them: a wide kernel's
+    /// outermost taps may see nothing but a border of zeros.
+    fn sees(&self, k: usize, n: usize) -> bool {
+        let off = k.abs_diff(self.kernel / 2) * self.dilation;
+        self.border == Border::Reflect || off < n
+    }
+
+    /// The rows of the kernel whose taps count.
+    fn tap_rows(&self) -> impl Iterator<Item = usize> {
+        (0..self.kernel).filter(|ky| self.sees(*ky, self.input.height))
+    }
+
+    /// How many taps count.
+    pub(crate) fn taps(&self) -> usize {
+        let columns = (0..self.kernel).filter(|kx| self.sees(*kx, self.input.width));
+        self.tap_rows().count() * columns.count()
+    }
+
+    /// From the first tap of a pixel to another.
+    fn tap(&self, ky: usize, kx: usize) -> usize {
+        self.dilation * (ky * self.input.row + kx * self.input.pitch)
+    }
 }
 
 /// Inputs of one output pixel that lie one after the other in memory.
@@ -34,15 +67,15 @@ impl Runs {
     /// The runs of a convolution over a view whose first channels are the logical ones named by
     /// `channel_of` (physical → logical); runs are at most `most` long and multiples of `multiple`.
     pub(crate) fn new(
-        view: &View,
-        kernel: usize,
+        g: &Geometry,
         channel_of: &[Option<usize>],
         most: usize,
         multiple: usize,
     ) -> Self {
         let channels = channel_of.len();
         // Where nothing stands between two pixels' channels, a row of the kernel is one run.
-        let joined = if channels == view.pitch { kernel } else { 1 };
+        let neighbours = channels == g.input.pitch && g.dilation == 1;
+        let joined = if neighbours { g.kernel } else { 1 };
         let whole = channels * joined;
         let parts = whole.div_ceil(most);
         let len = whole.div_ceil(parts).next_multiple_of(multiple);
@@ -51,13 +84,15 @@ impl Runs {
             len,
             sources: Vec::new(),
         };
-        for ky in 0..kernel {
-            for kx in (0..kernel).step_by(joined) {
+        for ky in g.tap_rows() {
+            for kx in (0..g.kernel).step_by(joined) {
+                if joined == 1 && !g.sees(kx, g.input.width) {
+                    continue;
+                }
                 for part in 0..whole.div_ceil(len) {
-                    runs.offsets
-                        .push(ky * view.row + kx * view.pitch + part * len);
+                    runs.offsets.push(g.tap(ky, kx) + part * len);
                     for k in part * len..(part + 1) * len {
-                        let tap = ky * kernel + kx + k / channels;
+                        let tap = ky * g.kernel + kx + k / channels;
                         let channel = if k < whole {
                             channel_of[k % channels]
                         } else {
@@ -73,24 +108,21 @@ impl Runs {
 
     /// Runs of `len` channels each, all taps of the same channels together: neighbouring taps see the same
     /// pixels, which then still lie in the first cache.
-    pub(crate) fn by_channels(
-        view: &View,
-        kernel: usize,
-        channel_of: &[Option<usize>],
-        len: usize,
-    ) -> Self {
+    pub(crate) fn by_channels(g: &Geometry, channel_of: &[Option<usize>], len: usize) -> Self {
         let mut runs = Self {
             offsets: Vec::new(),
             len,
             sources: Vec::new(),
         };
         for first in (0..channel_of.len()).step_by(len) {
-            for tap in 0..kernel * kernel {
-                let (ky, kx) = (tap / kernel, tap % kernel);
-                runs.offsets.push(ky * view.row + kx * view.pitch + first);
-                let channel = |c: usize| channel_of.get(c).copied().flatten();
-                let sources = (first..first + len).map(|c| channel(c).map(|c| (c, tap)));
-                runs.sources.extend(sources);
+            for ky in g.tap_rows() {
+                for kx in (0..g.kernel).filter(|kx| g.sees(*kx, g.input.width)) {
+                    runs.offsets.push(g.tap(ky, kx) + first);
+                    let tap = ky * g.kernel + kx;
+                    let channel = |c: usize| channel_of.get(c).copied().flatten();
+                    let sources = (first..first + len).map(|c| channel(c).map(|c| (c, tap)));
+                    runs.sources.extend(sources);
+                }
             }
         }
         runs

@@ -27,13 +27,7 @@ pub(crate) struct Direct {
 
 impl Direct {
     pub(crate) fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
-        let runs = Runs::new(
-            &geometry.input,
-            geometry.kernel,
-            channel_of,
-            INPUTS_AT_ONCE,
-            1,
-        );
+        let runs = Runs::new(&geometry, channel_of, INPUTS_AT_ONCE, 1);
         let columns = conv.channels_out.next_multiple_of(LANES);
         let mut panels = Aligned::zeros(runs.sources.len() * columns);
         let mut rest = panels.iter_mut();
@@ -93,8 +87,7 @@ impl WithSimd for Task<'_> {
             places,
         } = self;
         let g = &conv.geometry;
-        let half = g.kernel / 2;
-        let corner = g.input.offset - half * (g.input.row + g.input.pitch);
+        let corner = g.corner();
         let at_once = (INPUTS_AT_ONCE / conv.runs.len).max(1);
         let columns = conv.bias.len();
         places.clear();

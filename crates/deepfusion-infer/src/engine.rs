@@ -10,6 +10,7 @@ use crate::movement::{self, Normalisation};
 use crate::plan::{Plan, Step};
 use crate::view::Shared;
 use crate::{Border, Error, Graph};
+use crate::{masks, means};
 
 /// In which numbers the network computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,8 +38,8 @@ impl Engine {
     /// Packs the graph for images of this size.
     ///
     /// # Errors
-    /// [`Error::Size`] where the graph cannot work on such images, [`Error::Graph`] where a residual is a concatenation
-    /// or the image, [`Error::NoBf16`].
+    /// [`Error::Size`] where the graph cannot work on such images, [`Error::Graph`] where a residual or a
+    /// mask's operand is a concatenation or the image, [`Error::NoBf16`].
     pub fn new(
         graph: Graph,
         width: usize,
@@ -46,7 +47,7 @@ impl Engine {
         precision: Precision,
     ) -> Result<Self, Error> {
         graph.check_size(width, height)?;
-        graph.check_residuals()?;
+        graph.check_operands()?;
         let runner = match precision {
             Precision::F32 => Runner::F32(Typed::new(graph, width, height)),
             Precision::Bf16 if !Self::has_bf16() => return Err(Error::NoBf16),
@@ -170,6 +171,12 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
                     Step::MaxPool(from, to) => movement::max_pool(arena, from, to),
                     Step::Upsample(from, to) => movement::upsample(arena, from, to),
                     Step::Copy(from, to) => movement::copy(arena, from, to),
+                    Step::GlobalMean(from, to) => means::global_mean(arena, from, to),
+                    Step::ChannelExtent(from, channels, to) => {
+                        means::channel_extent(arena, from, channels, to);
+                    }
+                    Step::Gate(gate) => gate.run(arena),
+                    Step::AddPixel(from, pixel, to) => masks::add_pixel(arena, from, pixel, to),
                 }
             }
             let kind = match step {
@@ -179,6 +186,10 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
                 Step::MaxPool(..) => "maximum",
                 Step::Upsample(..) => "upsample",
                 Step::Copy(..) => "copy",
+                Step::GlobalMean(..) => "mean",
+                Step::ChannelExtent(..) => "extent",
+                Step::Gate(_) => "gate",
+                Step::AddPixel(..) => "add",
             };
             after(name, kind);
         }

@@ -24,13 +24,7 @@ impl Head {
     /// When there is more than one output channel.
     pub(crate) fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
         assert_eq!(conv.channels_out, 1, "a head has one channel");
-        let runs = Runs::new(
-            &geometry.input,
-            geometry.kernel,
-            channel_of,
-            usize::MAX,
-            LANES,
-        );
+        let runs = Runs::new(&geometry, channel_of, usize::MAX, LANES);
         let weights = runs.sources.iter().map(|s| weight(conv, 0, *s)).collect();
         Self {
             geometry,
@@ -66,9 +60,7 @@ impl WithSimd for Row<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { head, arena, y } = self;
         let g = &head.geometry;
-        let half = g.kernel / 2;
-        let corner =
-            g.input.offset + y * g.stride * g.input.row - half * (g.input.row + g.input.pitch);
+        let corner = g.corner() + y * g.stride * g.input.row;
         let vectors = head.runs.len / S::F32_LANES;
         for x in 0..g.out.width {
             let mut sum = simd.splat_f32s(0.0);

@@ -13,9 +13,14 @@ mod error;
 mod forms;
 mod graph;
 mod head;
+mod layout;
+mod masks;
+mod means;
 mod movement;
+mod op;
 mod plan;
 mod scratch;
+mod shape;
 #[cfg(test)]
 mod tests;
 mod tile;
@@ -24,4 +29,5 @@ mod winograd;
 
 pub use engine::{Engine, Precision};
 pub use error::Error;
-pub use graph::{Activation, Border, Conv, Graph, Node, Op, ValueId, ValueShape};
+pub use graph::{Graph, ValueId, ValueShape};
+pub use op::{Activation, Border, Conv, Node, Op};

@@ -32,6 +32,15 @@ impl View {
         self.offset - self.border * (self.row + self.pitch)
     }
 
+    /// The same pixel wherever one looks.
+    pub(crate) fn everywhere(self) -> Self {
+        Self {
+            row: 0,
+            pitch: 0,
+            ..self
+        }
+    }
+
     pub(crate) fn pixels(&self) -> usize {
         self.width * self.height
     }

@@ -3,6 +3,9 @@
 //! y = Aᵀ [ (G g Gᵀ) ⊙ (Bᵀ d B) ] A for a tile of 6×6 inputs d, kernel g and 4×4 outputs y (Lavin and Gray,
 //! "Fast Algorithms for Convolutional Neural Networks", 2016). The sums over channels of ⊙ are 36
 //! matrix products.
+//!
+//! A kernel dilated by r sees an image as r×r images, each every r-th row and column (phases): its tiles take
+//! every r-th pixel.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -55,10 +58,13 @@ impl Winograd {
     /// transformed weights, which are four times as many.
     /// Input channels must be whole vectors: they are transformed a vector at a time.
     pub(crate) fn fits(conv: &Conv, geometry: &Geometry, channel_of: &[Option<usize>]) -> bool {
-        channel_of.len().is_multiple_of(LANES)
-            && conv.kernel == 3
-            && conv.stride == 1
-            && geometry.out.pixels() >= 1024
+        let pixels = geometry.out.pixels();
+        if conv.kernel != 3 || conv.stride != 1 || pixels < 1024 {
+            return false;
+        }
+        // Products with the pixels that only fill up tiles, of which a phase of few pixels has many.
+        let products = AREA * Tiles::new(geometry).count();
+        channel_of.len().is_multiple_of(LANES) && 2 * products <= geometry.taps() * pixels
     }
 
     pub(crate) fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
@@ -104,8 +110,7 @@ impl Winograd {
     /// # Safety
     /// As [`crate::direct::Direct::run`].
     pub(crate) unsafe fn run(&self, arena: Shared<f32>) {
-        let out = &self.geometry.out;
-        let all = out.width.div_ceil(OUT) * out.height.div_ceil(OUT);
+        let all = Tiles::new(&self.geometry).count();
         // Whole rounds for all threads, where there are few tasks.
         let rounds = all
             .div_ceil(self.tiles)
@@ -147,6 +152,53 @@ fn transformed_kernel(g: &[f64; 9]) -> [f64; AREA] {
     out
 }
 
+/// The tiles of all phases of an image.
+#[derive(Debug, Clone, Copy)]
+struct Tiles {
+    /// Of a phase.
+    across: usize,
+    /// Of a phase.
+    down: usize,
+    /// Pixels from one of a phase to the next.
+    step: usize,
+}
+
+/// Where a tile lies: its first output pixel, and the step to the next.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    x: usize,
+    y: usize,
+    step: usize,
+}
+
+impl Tiles {
+    fn new(g: &Geometry) -> Self {
+        let of = |side: usize| side.div_ceil(g.dilation).div_ceil(OUT);
+        Self {
+            across: of(g.out.width),
+            down: of(g.out.height),
+            step: g.dilation,
+        }
+    }
+
+    fn count(self) -> usize {
+        self.across * self.down * self.step * self.step
+    }
+
+    fn of(self, tile: usize) -> Place {
+        let (phase, tile) = (
+            tile / (self.across * self.down),
+            tile % (self.across * self.down),
+        );
+        let along = |tile: usize, phase: usize| tile * OUT * self.step + phase;
+        Place {
+            x: along(tile % self.across, phase % self.step),
+            y: along(tile / self.across, phase / self.step),
+            step: self.step,
+        }
+    }
+}
+
 struct Task<'a> {
     conv: &'a Winograd,
     arena: Shared<f32>,
@@ -172,6 +224,7 @@ impl WithSimd for Task<'_> {
             rows,
         } = self;
         let (count, columns) = (range.len(), conv.bias.len());
+        let places = Tiles::new(&conv.geometry);
         for (i, part) in conv.parts.iter().enumerate() {
             let size = part.len();
             let input = View {
@@ -182,7 +235,7 @@ impl WithSimd for Task<'_> {
             for (t, tile) in range.clone().enumerate() {
                 let to = inputs[t * AREA * size..].as_mut_ptr();
                 // SAFETY: the input lies in the arena; the scratch holds `count` tiles.
-                unsafe { transform_input(simd, arena, &input, conv.place(tile), to) };
+                unsafe { transform_input(simd, arena, &input, places.of(tile), to) };
             }
             rows.clear();
             rows.extend((0..count).map(|t| Pixel {
@@ -214,7 +267,7 @@ impl WithSimd for Task<'_> {
         for (t, tile) in range.enumerate() {
             let from = products[t * AREA * columns..].as_ptr();
             // SAFETY: the output lies in the arena, each tile of it belongs to one task.
-            unsafe { conv.transform_output(simd, arena, from, conv.place(tile)) };
+            unsafe { conv.transform_output(simd, arena, from, places.of(tile)) };
         }
     }
 }
@@ -263,13 +316,13 @@ unsafe fn transform_input<S: Simd>(
     simd: S,
     arena: Shared<f32>,
     view: &View,
-    (x, y): (usize, usize),
+    Place { x, y, step }: Place,
     to: *mut f32,
 ) {
     // What lies beyond the border only reaches outputs beyond the image.
-    let column = |i: usize| (x + i).min(view.width + 1) * view.pitch;
-    let row = |i: usize| (y + i).min(view.height + 1) * view.row;
-    let corner = view.offset - view.row - view.pitch;
+    let column = |i: usize| (x + i * step).min(view.width - 1 + 2 * step) * view.pitch;
+    let row = |i: usize| (y + i * step).min(view.height - 1 + 2 * step) * view.row;
+    let corner = view.offset - step * (view.row + view.pitch);
     let columns: [usize; IN] = std::array::from_fn(column);
     for c in (0..view.channels).step_by(S::F32_LANES) {
         let zero = simd.splat_f32s(0.0);
@@ -299,12 +352,6 @@ unsafe fn transform_input<S: Simd>(
 }
 
 impl Winograd {
-    /// First output pixel of a tile.
-    fn place(&self, tile: usize) -> (usize, usize) {
-        let across = self.geometry.out.width.div_ceil(OUT);
-        (tile % across * OUT, tile / across * OUT)
-    }
-
     /// Aᵀ m A with bias, residual and activation, for the pixels of the tile that are in the image.
     #[inline(always)]
     unsafe fn transform_output<S: Simd>(
@@ -312,12 +359,13 @@ impl Winograd {
         simd: S,
         arena: Shared<f32>,
         from: *const f32,
-        (x, y): (usize, usize),
+        Place { x, y, step }: Place,
     ) {
         let g = &self.geometry;
         let columns = self.bias.len();
-        let across = OUT.min(g.out.width - x);
-        let down = OUT.min(g.out.height - y);
+        let within = |first: usize, side: usize| OUT.min(side.saturating_sub(first).div_ceil(step));
+        let across = within(x, g.out.width);
+        let down = within(y, g.out.height);
         let zero = simd.splat_f32s(0.0);
         for c in (0..columns).step_by(S::F32_LANES) {
             let mut half = [[zero; IN]; OUT];
@@ -339,10 +387,10 @@ impl Winograd {
                     for j in 0..across {
                         let mut value = simd.add_f32s(values[j], bias);
                         if let Some(residual) = &g.residual {
-                            let r = arena.at(residual.at(x + j, y + i) + c);
+                            let r = arena.at(residual.at(x + j * step, y + i * step) + c);
                             value = simd.add_f32s(value, r.cast::<S::f32s>().read_unaligned());
                         }
-                        let out = arena.at(g.out.at(x + j, y + i) + c);
+                        let out = arena.at(g.out.at(x + j * step, y + i * step) + c);
                         let value = g.activation.of(simd, value);
                         out.cast::<S::f32s>().write_unaligned(value);
                     }

@@ -43,14 +43,16 @@ impl DecoderConfig {
         Ok(())
     }
 
-    /// A new decoder for features of `encoder_channels` (fine to coarse). A `head_bias` makes each
-    /// head start with that bias instead of a random one.
+    /// A new decoder for features of `encoder_channels` (fine to coarse). Where the two coarsest features
+    /// have one size (`output_stride` 16), the first stage does not enlarge. A `head_bias` makes each head
+    /// start with that bias instead of a random one.
     ///
     /// # Errors
     /// As [`Self::validate`].
     pub fn init(
         &self,
         encoder_channels: [usize; 5],
+        output_stride: usize,
         head_bias: Option<f32>,
         rng: &mut WeightRng,
         device: &Device,
@@ -73,6 +75,7 @@ impl DecoderConfig {
                     fuse: Conv2dConfig::new(width + skip, width, 3)
                         .reflected()
                         .init(rng, device),
+                    enlarge: index > 0 || output_stride == 32,
                 };
                 channels_in = width;
                 stage
@@ -93,23 +96,31 @@ impl DecoderConfig {
     }
 }
 
-/// One stage: 3×3 + ELU, nearest ×2, the skip feature appended, 3×3 + ELU; all reflection-padded.
+/// One stage: 3×3 + ELU, nearest ×2 (but for the first at output stride 16), the skip feature appended,
+/// 3×3 + ELU; all reflection-padded.
 #[derive(Module, Debug)]
 pub struct DecoderStage {
     /// Before the upsampling.
     pub reduce: Conv2d,
     /// After the concatenation.
     pub fuse: Conv2d,
+    #[module(skip)]
+    enlarge: bool,
 }
 
 impl DecoderStage {
     /// # Shapes
     /// - `x`: `[batch, in, height, width]`
     /// - `skip`: `[batch, skip, 2·height, 2·width]`
-    /// - output: `[batch, out, 2·height, 2·width]`
+    /// - output: `[batch, out, 2·height, 2·width]`; without the factors where the stage does not enlarge
     pub fn forward(&self, x: Tensor<4>, skip: Option<Tensor<4>>) -> Tensor<4> {
         let reduced = elu(self.reduce.forward(x));
-        elu(self.fuse.forward(upsample_concat(reduced, skip)))
+        let joined = match skip {
+            skip if self.enlarge => upsample_concat(reduced, skip),
+            Some(skip) => Tensor::cat(vec![reduced, skip], 1),
+            None => reduced,
+        };
+        elu(self.fuse.forward(joined))
     }
 }
 
@@ -126,7 +137,8 @@ impl DisparityDecoder {
     /// σ = sigmoid(head(stage)), a disparity between the ends of the network's depth range.
     ///
     /// # Shapes
-    /// - `features`: the encoder's five, `[batch, channels[k], height / 2ᵏ⁺¹, width / 2ᵏ⁺¹]`
+    /// - `features`: five, `[batch, channels[k], height / 2ᵏ⁺¹, width / 2ᵏ⁺¹]`, the last one as large as the one
+    ///   before it at output stride 16
     /// - output: `[batch, 1, height / 2ˢ, width / 2ˢ]` in (0, 1) for scales s = 0…3, finest first
     pub fn forward(&self, features: [Tensor<4>; 5]) -> Vec<Tensor<4>> {
         let [f0, f1, f2, f3, f4] = features;

@@ -67,6 +67,21 @@ impl Conv2dConfig {
         self
     }
 
+    /// The same with its taps `rate` pixels apart, still keeping the size; a 1×1 has but one tap.
+    #[must_use]
+    pub fn dilated(mut self, rate: usize) -> Self {
+        self.options.dilation = rate;
+        self.options.padding = self.kernel / 2 * rate;
+        self
+    }
+
+    /// The same without a bias.
+    #[must_use]
+    pub fn without_bias(mut self) -> Self {
+        self.bias = false;
+        self
+    }
+
     /// Draws the weights.
     #[must_use]
     pub fn init(&self, rng: &mut WeightRng, device: &Device) -> Conv2d {
@@ -128,6 +143,55 @@ impl Conv2d {
     pub fn options(&self) -> ConvOptions {
         self.options
     }
+}
+
+/// A convolution without bias, batch normalisation, ReLU.
+#[derive(Module, Debug)]
+pub struct ConvNorm {
+    /// The convolution.
+    pub conv: Conv2d,
+    /// The batch normalisation.
+    pub bn: BatchNorm2d,
+}
+
+impl ConvNorm {
+    /// A new one that keeps the size, its taps `rate` pixels apart.
+    #[must_use]
+    pub fn new(
+        [channels_in, channels_out]: [usize; 2],
+        kernel: usize,
+        rate: usize,
+        rng: &mut WeightRng,
+        device: &Device,
+    ) -> Self {
+        let conv = Conv2dConfig::before_batch_norm(channels_in, channels_out, kernel, 1);
+        Self {
+            conv: conv.dilated(rate).init(rng, device),
+            bn: BatchNorm2d::new(channels_out, device),
+        }
+    }
+
+    /// relu(bn(w ⋆ x)).
+    ///
+    /// # Shapes
+    /// - `x`: `[batch, in, height, width]`
+    /// - output: `[batch, out, height, width]`
+    pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        self.bn.forward_relu(self.conv.forward(x))
+    }
+}
+
+/// The mean over the image.
+///
+/// # Shapes
+/// - `x`: `[batch, channels, height, width]`
+/// - output: `[batch, channels, 1, 1]`
+#[must_use]
+pub fn global_mean(x: Tensor<4>) -> Tensor<4> {
+    let [batch, channels, height, width] = x.dims();
+    x.reshape([batch, channels, height * width])
+        .mean_dim(2)
+        .reshape([batch, channels, 1, 1])
 }
 
 /// Batch normalisation over (batch, height, width), y = γ (x − μ) / √(σ² + ε) + β, with

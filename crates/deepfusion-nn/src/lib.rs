@@ -7,21 +7,29 @@
 //!
 //! Tensors are N×C×H×W. Images are RGB in [0, 1]; their normalisation is part of the network.
 
+mod attention;
+mod cost;
 mod decoder;
 mod depth_net;
 mod error;
 mod graph;
+mod hce;
 mod init;
 pub mod layers;
 pub mod ops;
 mod pose_net;
+mod residual_block;
 mod resnet;
 pub mod weights;
 
+pub use attention::{Attention, AttentionConfig, AttentionForm, AttentionMasks, GlobalAggregation};
+pub use cost::ModuleCost;
 pub use decoder::{DecoderConfig, DecoderStage, DisparityDecoder, SCALES};
-pub use depth_net::{DepthNet, DepthNetConfig, InputSize};
+pub use depth_net::{DepthNet, DepthNetConfig, InputSize, Inspection};
 pub use error::Error;
 pub use graph::depth_graph;
+pub use hce::{HceConfig, HierarchicalContext};
 pub use init::{WeightInit, WeightRng};
 pub use pose_net::{PoseDecoder, PoseNet, PoseNetConfig, PoseOutput, RADIANS_PER_UNIT};
-pub use resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth, ResidualBlock};
+pub use residual_block::ResidualBlock;
+pub use resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth};

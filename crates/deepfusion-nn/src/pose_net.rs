@@ -10,7 +10,7 @@ use crate::layers::{Conv2d, Conv2dConfig};
 use crate::resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth};
 
 /// Channels between the pose decoder's convolutions.
-const WIDTH: usize = 256;
+pub(crate) const WIDTH: usize = 256;
 
 /// Radians per unit of the raw output: a new network then starts near no rotation at all.
 pub const RADIANS_PER_UNIT: f64 = 0.01;

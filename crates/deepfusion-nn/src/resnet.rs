@@ -1,12 +1,13 @@
 //! ResNet encoders in torchvision's layout and with its parameter names.
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor, activation::relu};
+use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::init::WeightRng;
 use crate::layers::{BatchNorm2d, Conv2d, Conv2dConfig, freeze_statistics, max_pool_3x3_stride_2};
+use crate::residual_block::{BlockConfig, ResidualBlock};
 
 /// Which of the published ResNets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -121,6 +122,14 @@ pub struct ResNetConfig {
     /// to have statistics of their own; needs imported weights).
     #[serde(default)]
     pub frozen_statistics: bool,
+    /// By what the coarsest feature is smaller than the image: 32, or 16. At 16 `layer4` keeps the stride of
+    /// 1 and its 3×3 convolutions are dilated instead, by 2 × `multi_grid` (DeepLabv3); its weights are the
+    /// same ones.
+    #[serde(default = "default_output_stride")]
+    pub output_stride: usize,
+    /// The dilation of `layer4`'s blocks over 2, at output stride 16; cut to as many as there are blocks.
+    #[serde(default = "default_multi_grid")]
+    pub multi_grid: [usize; 3],
 }
 
 fn default_base_width() -> usize {
@@ -135,6 +144,14 @@ fn default_normalisation() -> InputNormalisation {
     InputNormalisation::ImageNet
 }
 
+fn default_output_stride() -> usize {
+    32
+}
+
+fn default_multi_grid() -> [usize; 3] {
+    [1, 2, 4]
+}
+
 impl ResNetConfig {
     /// The published network on single images, normalised as ImageNet.
     #[must_use]
@@ -145,6 +162,8 @@ impl ResNetConfig {
             frames: default_frames(),
             normalisation: default_normalisation(),
             frozen_statistics: false,
+            output_stride: default_output_stride(),
+            multi_grid: default_multi_grid(),
         }
     }
 
@@ -169,7 +188,28 @@ impl ResNetConfig {
         self
     }
 
-    /// Channels of the five features, at strides 2, 4, 8, 16 and 32.
+    /// The same with another output stride.
+    #[must_use]
+    pub fn with_output_stride(mut self, output_stride: usize) -> Self {
+        self.output_stride = output_stride;
+        self
+    }
+
+    /// Whether `layer4` dilates where the published network halves the image.
+    #[must_use]
+    pub fn is_dilated(&self) -> bool {
+        self.output_stride == 16
+    }
+
+    /// Stride and dilation of a block of `layer1`…`layer4` (0…3).
+    pub(crate) fn steps(&self, layer: usize, block: usize) -> [usize; 2] {
+        if layer == 3 && self.is_dilated() {
+            return [1, 2 * self.multi_grid[block.min(2)]];
+        }
+        [if layer > 0 && block == 0 { 2 } else { 1 }, 1]
+    }
+
+    /// Channels of the five features, at strides 2, 4, 8, 16 and the output stride.
     #[must_use]
     pub fn channels(&self) -> [usize; 5] {
         let (w, e) = (self.base_width, self.depth.expansion());
@@ -189,6 +229,18 @@ impl ResNetConfig {
         if !(1..=16).contains(&self.frames) {
             return Err(Error::config("encoder.frames", "1 to 16", self.frames));
         }
+        if !matches!(self.output_stride, 16 | 32) {
+            let found = self.output_stride;
+            return Err(Error::config("encoder.output_stride", "16 or 32", found));
+        }
+        if self.multi_grid.iter().any(|rate| !(1..=16).contains(rate)) {
+            let found = self.multi_grid;
+            return Err(Error::config(
+                "encoder.multi_grid",
+                "three factors of 1 to 16",
+                found,
+            ));
+        }
         Ok(())
     }
 
@@ -200,27 +252,31 @@ impl ResNetConfig {
         self.validate()?;
         let conv1 = Conv2dConfig::before_batch_norm(3 * self.frames, self.base_width, 7, 2)
             .init(rng, device);
-        let [b1, b2, b3, b4] = self.depth.blocks();
         let mut channels_in = self.base_width;
-        let mut layer = |blocks: usize, width: usize, stride: usize, rng: &mut WeightRng| {
-            (0..blocks)
-                .map(|index| {
-                    let stride = if index == 0 { stride } else { 1 };
-                    let block =
-                        ResidualBlock::new(self.depth, channels_in, width, stride, rng, device);
+        let mut layer = |index: usize, rng: &mut WeightRng| {
+            let width = self.base_width << index;
+            (0..self.depth.blocks()[index])
+                .map(|block| {
+                    let [stride, dilation] = self.steps(index, block);
+                    let config = BlockConfig {
+                        depth: self.depth,
+                        channels_in,
+                        width,
+                        stride,
+                        dilation,
+                    };
                     channels_in = width * self.depth.expansion();
-                    block
+                    ResidualBlock::new(config, rng, device)
                 })
                 .collect()
         };
-        let w = self.base_width;
         let resnet = ResNet {
             conv1,
-            bn1: BatchNorm2d::new(w, device),
-            layer1: layer(b1, w, 1, rng),
-            layer2: layer(b2, 2 * w, 2, rng),
-            layer3: layer(b3, 4 * w, 2, rng),
-            layer4: layer(b4, 8 * w, 2, rng),
+            bn1: BatchNorm2d::new(self.base_width, device),
+            layer1: layer(0, rng),
+            layer2: layer(1, rng),
+            layer3: layer(2, rng),
+            layer4: layer(3, rng),
             normalisation: self.normalisation,
         };
         Ok(freeze_statistics(resnet, self.frozen_statistics))
@@ -241,7 +297,7 @@ pub struct ResNet {
     pub layer2: Vec<ResidualBlock>,
     /// Stride 16.
     pub layer3: Vec<ResidualBlock>,
-    /// Stride 32.
+    /// Stride 32, or 16 and dilated.
     pub layer4: Vec<ResidualBlock>,
     #[module(skip)]
     normalisation: InputNormalisation,
@@ -252,7 +308,8 @@ impl ResNet {
     ///
     /// # Shapes
     /// - `images`: `[batch, 3·frames, height, width]`, RGB in [0, 1]
-    /// - output: five features `[batch, channels[k], height / 2ᵏ⁺¹, width / 2ᵏ⁺¹]`, k = 0…4
+    /// - output: five features `[batch, channels[k], height / 2ᵏ⁺¹, width / 2ᵏ⁺¹]`, k = 0…4; the last one is as
+    ///   large as the one before it at output stride 16
     pub fn forward(&self, images: Tensor<4>) -> [Tensor<4>; 5] {
         let x = self.normalisation.apply(images);
         let f0 = self.bn1.forward_relu(self.conv1.forward(x));
@@ -272,89 +329,4 @@ impl ResNet {
 
 fn run(layer: &[ResidualBlock], x: Tensor<4>) -> Tensor<4> {
     layer.iter().fold(x, |x, block| block.forward(x))
-}
-
-/// One residual block: basic (two 3×3 convolutions), or bottleneck (1×1, 3×3, 1×1) where `conv3`
-/// is there. The stride sits in the 3×3 convolution of a bottleneck, as in torchvision.
-#[derive(Module, Debug)]
-pub struct ResidualBlock {
-    /// Basic: 3×3 with the stride. Bottleneck: 1×1 to the block's width.
-    pub conv1: Conv2d,
-    /// After `conv1`.
-    pub bn1: BatchNorm2d,
-    /// Basic: 3×3. Bottleneck: 3×3 with the stride.
-    pub conv2: Conv2d,
-    /// After `conv2`.
-    pub bn2: BatchNorm2d,
-    /// Bottleneck only: 1×1 to four times the width.
-    pub conv3: Option<Conv2d>,
-    /// After `conv3`.
-    pub bn3: Option<BatchNorm2d>,
-    /// The shortcut's 1×1 convolution and batch norm, where the shape changes.
-    pub downsample: Option<(Conv2d, BatchNorm2d)>,
-}
-
-impl ResidualBlock {
-    fn new(
-        depth: ResNetDepth,
-        channels_in: usize,
-        width: usize,
-        stride: usize,
-        rng: &mut WeightRng,
-        device: &Device,
-    ) -> Self {
-        let channels_out = width * depth.expansion();
-        let mut conv = |input: usize, output: usize, kernel: usize, stride: usize| {
-            Conv2dConfig::before_batch_norm(input, output, kernel, stride).init(rng, device)
-        };
-        let (conv1, conv2, conv3) = if depth.is_bottleneck() {
-            (
-                conv(channels_in, width, 1, 1),
-                conv(width, width, 3, stride),
-                Some(conv(width, channels_out, 1, 1)),
-            )
-        } else {
-            (
-                conv(channels_in, width, 3, stride),
-                conv(width, width, 3, 1),
-                None,
-            )
-        };
-        let downsample = (stride != 1 || channels_in != channels_out).then(|| {
-            (
-                conv(channels_in, channels_out, 1, stride),
-                BatchNorm2d::new(channels_out, device),
-            )
-        });
-        Self {
-            conv1,
-            bn1: BatchNorm2d::new(width, device),
-            conv2,
-            bn2: BatchNorm2d::new(width, device),
-            bn3: conv3
-                .is_some()
-                .then(|| BatchNorm2d::new(channels_out, device)),
-            conv3,
-            downsample,
-        }
-    }
-
-    /// y = relu(residual(x) + shortcut(x)).
-    ///
-    /// # Shapes
-    /// - `x`: `[batch, in, height, width]`
-    /// - output: `[batch, out, height / stride, width / stride]`
-    pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        let shortcut = match &self.downsample {
-            Some((conv, bn)) => bn.forward(conv.forward(x.clone())),
-            None => x.clone(),
-        };
-        let mut y = self.bn1.forward_relu(self.conv1.forward(x));
-        y = self.conv2.forward(y);
-        y = match (&self.conv3, &self.bn3) {
-            (Some(conv3), Some(bn3)) => bn3.forward(conv3.forward(self.bn2.forward_relu(y))),
-            _ => self.bn2.forward(y),
-        };
-        relu(y.add(shortcut))
-    }
 }

@@ -3,7 +3,9 @@
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_infer::{Engine, Precision};
 use deepfusion_nn::weights::{self, Weights};
-use deepfusion_nn::{DepthNetConfig, Error, ResNetDepth, depth_graph};
+use deepfusion_nn::{
+    AttentionConfig, AttentionForm, DepthNetConfig, Error, HceConfig, ResNetDepth, depth_graph,
+};
 
 /// Weights as after some training: batch norms with statistics and factors of their own.
 fn trained(config: &DepthNetConfig) -> Weights {
@@ -86,6 +88,50 @@ fn a_narrow_network_whose_channels_fill_no_vector() {
     config.encoder.base_width = 12;
     config.decoder.widths = [40, 24, 20, 10, 6];
     check(&config, 96, 64);
+}
+
+/// The paper's, narrower. Its rate of 12 is wider than the coarsest features are high.
+fn paper() -> DepthNetConfig {
+    let mut config = DepthNetConfig::paper();
+    config.encoder.base_width = 24;
+    config.decoder.widths = [48, 32, 24, 16, 16];
+    config
+}
+
+#[test]
+fn the_papers_network() {
+    check(&paper(), 256, 128);
+}
+
+#[test]
+fn each_part_of_the_papers_network_alone() {
+    let mut plain = DepthNetConfig::new(ResNetDepth::ResNet18);
+    plain.encoder.base_width = 16;
+    plain.decoder.widths = [24, 16, 16, 8, 8];
+    let parts: [fn(&mut DepthNetConfig); 5] = [
+        |c| c.hce = paper().hce,
+        |c| {
+            c.hce = Some(HceConfig {
+                rates: vec![2],
+                global_pool: false,
+                reduce_first: false,
+                ..HceConfig::default()
+            });
+        },
+        |c| {
+            c.attention = Some(AttentionConfig {
+                form: AttentionForm::Residual,
+                ..AttentionConfig::default()
+            });
+        },
+        |c| c.aggregation = true,
+        |c| c.encoder.output_stride = 16,
+    ];
+    for part in parts {
+        let mut config = plain.clone();
+        part(&mut config);
+        check(&config, 96, 64);
+    }
 }
 
 #[test]

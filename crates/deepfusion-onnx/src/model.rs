@@ -55,11 +55,14 @@ impl DepthModel {
         match self.graph.outputs() {
             [output] => {
                 let shape = self.graph.shape(*output);
-                if (shape.channels, shape.halvings) != (1, 0) {
+                if (shape.channels, shape.halvings, shape.pooled) != (1, 0, false) {
                     let reason = format!(
-                        "{} channels at 1/{} of the image's size, expected one at its size",
+                        "{} channels at {}, expected one at the image's size",
                         shape.channels,
-                        1_u64 << shape.halvings
+                        match shape.pooled {
+                            true => "a single pixel".to_owned(),
+                            false => format!("1/{} of the image's size", 1_u64 << shape.halvings),
+                        }
                     );
                     return fail("outputs", reason);
                 }

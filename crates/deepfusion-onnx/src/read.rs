@@ -160,16 +160,37 @@ impl<'a> Reader<'a> {
         loop {
             let node = self.next()?;
             let (name, op, last) = match node.op_type.as_str() {
-                "Mul" => {
+                // The disparity, after the network: a value times a constant.
+                "Mul" if self.input(node, 1).is_err() => {
                     graph.add_output(self.input(node, 0)?);
                     return Ok(graph);
                 }
+                "Mul" => self.gate(node)?,
                 "Conv" | "Pad" => self.conv(node)?,
                 "MaxPool" => {
                     let input = self.input(node, 0)?;
                     (&node.name, Op::MaxPool { input }, node)
                 }
                 "Resize" => self.upsample(node)?,
+                "Concat" => {
+                    let inputs = (0..node.input.len()).map(|i| self.input(node, i));
+                    let inputs = inputs.collect::<Result<_, _>>()?;
+                    (&node.name, Op::Concat { inputs }, node)
+                }
+                "GlobalAveragePool" => {
+                    let input = self.input(node, 0)?;
+                    (&node.name, Op::GlobalMean { input }, node)
+                }
+                "ReduceMean" => {
+                    let input = self.input(node, 0)?;
+                    self.expect("ReduceMax")?;
+                    let node = self.expect("Concat")?;
+                    (&node.name, Op::ChannelExtent { input }, node)
+                }
+                "Add" => {
+                    let (input, pixel) = (self.input(node, 0)?, self.input(node, 1)?);
+                    (&node.name, Op::AddPixel { input, pixel }, node)
+                }
                 _ => return Err(node_error(node, "not an operation that is expected here")),
             };
             let value = graph.push(name, op)?;
@@ -194,8 +215,11 @@ impl<'a> Reader<'a> {
         let size = |n: i64| usize::try_from(n).unwrap_or(0);
         let strides = node.attribute.iter().find(|a| a.name == "strides");
         let stride = strides.and_then(|a| a.ints.first().copied()).unwrap_or(1);
+        let dilations = node.attribute.iter().find(|a| a.name == "dilations");
+        let dilation = dilations.and_then(|a| a.ints.first().copied());
         let mut last = node;
-        let residual = match self.after(last, &["Add"]) {
+        // By its name: what follows may also be an operation of its own.
+        let residual = match self.after_named(last, "Add", &format!("{}.add", node.name)) {
             Some(add) => {
                 last = add;
                 Some(self.input(add, 1)?)
@@ -224,6 +248,7 @@ impl<'a> Reader<'a> {
             channels_out: size(channels_out),
             kernel: size(kernel),
             stride: size(stride),
+            dilation: size(dilation.unwrap_or(1)),
             border,
             residual,
             activation,
@@ -234,11 +259,27 @@ impl<'a> Reader<'a> {
     /// `Resize [→ Concat]`: name, operation, last node.
     fn upsample(&mut self, node: &'a NodeProto) -> Result<(&'a String, Op, &'a NodeProto), Error> {
         let input = self.input(node, 0)?;
-        let (skip, last) = match self.after(node, &["Concat"]) {
+        let joined = node.name.strip_suffix(".resize");
+        let concat = joined.and_then(|name| self.after_named(node, "Concat", name));
+        let (skip, last) = match concat {
             Some(concat) => (Some(self.input(concat, 1)?), concat),
             None => (None, node),
         };
         Ok((&last.name, Op::UpsampleConcat { input, skip }, last))
+    }
+
+    /// `Mul [→ Add] → Mul`: name, operation, last node.
+    fn gate(&mut self, node: &'a NodeProto) -> Result<(&'a String, Op, &'a NodeProto), Error> {
+        let (spatial, channel) = (self.input(node, 0)?, self.input(node, 1)?);
+        let pass = self.after(node, &["Add"]);
+        let last = self.expect("Mul")?;
+        let gate = Op::Gate {
+            input: self.input(last, 0)?,
+            spatial,
+            channel,
+            residual: pass.is_some(),
+        };
+        Ok((&last.name, gate, last))
     }
 
     fn next(&mut self) -> Result<&'a NodeProto, Error> {
@@ -262,6 +303,13 @@ impl<'a> Reader<'a> {
                 && !node.input.is_empty()
                 && node.input.first() == before.output.first()
         })
+    }
+
+    /// The same, where it has this name.
+    fn after_named(&mut self, before: &NodeProto, op: &str, name: &str) -> Option<&'a NodeProto> {
+        let next = self.nodes.peek();
+        next.filter(|node| node.name == name)?;
+        self.after(before, &[op])
     }
 
     fn input(&self, node: &NodeProto, index: usize) -> Result<ValueId, Error> {

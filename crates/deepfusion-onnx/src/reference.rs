@@ -88,7 +88,7 @@ impl Plan<'_> {
     /// Channels, height and width of a value.
     fn shape(&self, value: ValueId) -> [usize; 3] {
         let shape = self.graph.shape(value);
-        let [h, w] = [self.height, self.width].map(|side| side >> shape.halvings);
+        let (w, h) = shape.size(self.width, self.height);
         [shape.channels, h, w]
     }
 
@@ -103,6 +103,42 @@ impl Plan<'_> {
                 }
                 large
             }
+            Op::Concat { inputs } => {
+                let parts = inputs.iter().flat_map(|input| &values[input.0]);
+                parts.copied().collect()
+            }
+            Op::GlobalMean { input } => {
+                let [_, height, width] = self.shape(*input);
+                let area = height * width;
+                let planes = values[input.0].chunks_exact(area);
+                planes
+                    .map(|plane| (sum(plane) / area as f64) as f32)
+                    .collect()
+            }
+            Op::ChannelExtent { input } => {
+                let [channels, height, width] = self.shape(*input);
+                let (x, area) = (&values[input.0], height * width);
+                let along = |p: usize| x[p..].iter().step_by(area).take(channels);
+                let mean = (0..area).map(|p| (sum(along(p)) / channels as f64) as f32);
+                let most = (0..area).map(|p| along(p).copied().fold(f32::NEG_INFINITY, f32::max));
+                mean.chain(most).collect()
+            }
+            Op::Gate {
+                input,
+                spatial,
+                channel,
+                residual,
+            } => {
+                let [x, spatial, channel] = [input, spatial, channel].map(|v| &values[v.0]);
+                let shift = if *residual { 1.0 } else { 0.0 };
+                let planes = x.chunks_exact(spatial.len()).zip(channel);
+                let gated = planes.flat_map(|(plane, c)| {
+                    let pixels = plane.iter().zip(spatial);
+                    pixels.map(move |(x, s)| x * (s * c + shift))
+                });
+                gated.collect()
+            }
+            Op::AddPixel { input, pixel } => with_pixel(&values[input.0], &values[pixel.0]),
         }
     }
 
@@ -117,8 +153,8 @@ impl Plan<'_> {
             kernel_height: conv.kernel,
             kernel_width: conv.kernel,
             stride: conv.stride,
-            padding: conv.kernel / 2,
-            dilation: 1,
+            padding: conv.reach(),
+            dilation: conv.dilation,
             reflect: conv.border == Border::Reflect,
         };
         let mut y = vec![0.0; shape.out_len()];
@@ -130,9 +166,12 @@ impl Plan<'_> {
             &mut y,
         );
         if let Some(residual) = conv.residual {
-            y.iter_mut()
-                .zip(&values[residual.0])
-                .for_each(|(y, r)| *y += r);
+            let residual = &values[residual.0];
+            if residual.len() == y.len() {
+                y.iter_mut().zip(residual).for_each(|(y, r)| *y += r);
+            } else {
+                y = with_pixel(&y, residual);
+            }
         }
         let activate = |x: f32| match conv.activation {
             Activation::Identity => x,
@@ -144,6 +183,19 @@ impl Plan<'_> {
         y.iter_mut().for_each(|y| *y = activate(*y));
         y
     }
+}
+
+/// In double precision: the order of many summands then does not show.
+fn sum<'a>(values: impl IntoIterator<Item = &'a f32>) -> f64 {
+    values.into_iter().map(|v| f64::from(*v)).sum()
+}
+
+/// Each plane with the pixel's value of that channel added.
+fn with_pixel(x: &[f32], pixel: &[f32]) -> Vec<f32> {
+    let planes = x.chunks_exact((x.len() / pixel.len()).max(1)).zip(pixel);
+    planes
+        .flat_map(|(plane, added)| plane.iter().map(move |x| x + added))
+        .collect()
 }
 
 /// The maximum over 3×3 pixels around every other pixel; pixels beyond the edge do not count.

@@ -116,6 +116,10 @@ fn metadata(model: &DepthModel, version: &str) -> Vec<StringStringEntryProto> {
     entries.into_iter().map(entry).collect()
 }
 
+fn along_channels() -> Vec<AttributeProto> {
+    vec![AttributeProto::int("axis", 1)]
+}
+
 #[derive(Default)]
 struct Writer {
     nodes: Vec<NodeProto>,
@@ -226,6 +230,44 @@ impl Writer {
                 self.emit("MaxPool", name, &[&self.value(*input)], attributes)?
             }
             Op::UpsampleConcat { input, skip } => self.upsample(name, *input, *skip)?,
+            Op::Concat { inputs } => {
+                let inputs: Vec<_> = inputs.iter().map(|input| self.value(*input)).collect();
+                let inputs: Vec<_> = inputs.iter().map(String::as_str).collect();
+                self.emit("Concat", name, &inputs, along_channels())?
+            }
+            Op::GlobalMean { input } => {
+                self.emit("GlobalAveragePool", name, &[&self.value(*input)], vec![])?
+            }
+            Op::ChannelExtent { input } => {
+                let x = self.value(*input);
+                let mut reduce = |op: &str, name: String| {
+                    let axes = AttributeProto::ints("axes", &[1]);
+                    let attributes = vec![axes, AttributeProto::int("keepdims", 1)];
+                    self.emit(op, &name, &[&x], attributes)
+                };
+                let mean = reduce("ReduceMean", format!("{name}.mean"))?;
+                let most = reduce("ReduceMax", format!("{name}.max"))?;
+                self.emit("Concat", name, &[&mean, &most], along_channels())?
+            }
+            Op::Gate {
+                input,
+                spatial,
+                channel,
+                residual,
+            } => {
+                let [x, spatial, channel] = [input, spatial, channel].map(|v| self.value(*v));
+                let mask = format!("{name}.mask");
+                let mut mask = self.emit("Mul", &mask, &[&spatial, &channel], vec![])?;
+                if *residual {
+                    let one = self.shared(TensorProto::floats("one", &[], &[1.0]))?;
+                    mask = self.emit("Add", &format!("{name}.pass"), &[&mask, &one], vec![])?;
+                }
+                self.emit("Mul", name, &[&x, &mask], vec![])?
+            }
+            Op::AddPixel { input, pixel } => {
+                let [x, pixel] = [input, pixel].map(|v| self.value(*v));
+                self.emit("Add", name, &[&x, &pixel], vec![])?
+            }
         };
         self.values.push(value);
         Ok(())
@@ -251,12 +293,16 @@ impl Writer {
             return self.emit("Resize", name, &inputs, attributes);
         };
         let large = self.emit("Resize", &format!("{name}.resize"), &inputs, attributes)?;
-        let axis = vec![AttributeProto::int("axis", 1)];
-        self.emit("Concat", name, &[&large, &self.value(skip)], axis)
+        self.emit(
+            "Concat",
+            name,
+            &[&large, &self.value(skip)],
+            along_channels(),
+        )
     }
 
     fn conv(&mut self, name: &str, conv: &Conv) -> Result<String, Error> {
-        let half = (conv.kernel / 2) as i64;
+        let half = conv.reach() as i64;
         let mut x = self.value(conv.input);
         let mut pads = [half; 4];
         if conv.border == Border::Reflect {
@@ -276,11 +322,15 @@ impl Writer {
         let weight = self.constant(name, weight)?;
         let bias = TensorProto::floats(&format!("{name}.bias"), &dims[..1], &conv.bias);
         let bias = self.constant(name, bias)?;
-        let attributes = vec![
+        let mut attributes = vec![
             AttributeProto::ints("kernel_shape", &[conv.kernel as i64; 2]),
             AttributeProto::ints("pads", &pads),
             AttributeProto::ints("strides", &[conv.stride as i64; 2]),
         ];
+        if conv.dilation > 1 {
+            let taps = [conv.dilation as i64; 2];
+            attributes.push(AttributeProto::ints("dilations", &taps));
+        }
         x = self.emit("Conv", name, &[&x, &weight, &bias], attributes)?;
         if let Some(residual) = conv.residual {
             let residual = self.value(residual);

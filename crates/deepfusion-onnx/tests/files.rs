@@ -48,6 +48,7 @@ fn single(change: impl FnOnce(&mut Conv)) -> DepthModel {
         channels_out: 1,
         kernel: 3,
         stride: 1,
+        dilation: 1,
         border: Border::Reflect,
         residual: None,
         activation: Activation::Sigmoid,
@@ -132,6 +133,7 @@ fn models_that_cannot_be_written_are_told() {
             channels_out: 1,
             kernel: 1,
             stride: 1,
+            dilation: 1,
             border: Border::Zero,
             residual: None,
             activation: Activation::Identity,
@@ -214,6 +216,65 @@ fn pooling_and_enlarging() {
     assert_eq!(outputs[1].len(), 6 * 16);
     assert_eq!(outputs[1][..8], unit(&[5, 5, 7, 7, 5, 5, 7, 7]));
     assert_eq!(outputs[1][48..52], unit(&[0, 1, 2, 3]));
+}
+
+/// Every operation of an attention's path on numbers that can be followed by hand.
+#[test]
+fn means_masks_and_concatenations() {
+    let mut graph = Graph::new([0.0; 3], [1.0; 3]);
+    let mut push = |name: &str, op: Op| graph.push(name, op).unwrap();
+    let input = ValueId::IMAGE;
+    let mean = push("mean", Op::GlobalMean { input });
+    let extent = push("extent", Op::ChannelExtent { input });
+    // Twice the pixel to the right of the mean over the channels, three apart.
+    let mut weight = vec![0.0; 2 * 9];
+    weight[5] = 2.0;
+    let spatial = Conv {
+        input: extent,
+        weight,
+        bias: vec![0.0],
+        channels_in: 2,
+        channels_out: 1,
+        kernel: 3,
+        stride: 1,
+        dilation: 3,
+        border: Border::Zero,
+        residual: None,
+        activation: Activation::Identity,
+    };
+    let spatial = push("spatial", Op::Conv(Box::new(spatial)));
+    let gate = |residual| Op::Gate {
+        input,
+        spatial,
+        channel: mean,
+        residual,
+    };
+    let (product, passed) = (push("product", gate(false)), push("passed", gate(true)));
+    let sum = push("sum", Op::AddPixel { input, pixel: mean });
+    let inputs = vec![sum, extent];
+    let joined = push("joined", Op::Concat { inputs });
+    for output in [mean, extent, spatial, product, passed, joined] {
+        graph.add_output(output);
+    }
+    // Red 0, 51 … 765/15 a column, green 102, blue 0.
+    let rgb: Vec<u8> = (0..8).flat_map(|i| [i % 4 * 51, 102, 0]).collect();
+    let outputs = reference::run(&graph, &rgb, 4, 2).unwrap();
+    let close = |values: &[f32], expected: &[f32]| {
+        assert_eq!(values.len(), expected.len());
+        for (v, e) in values.iter().zip(expected) {
+            assert!((v - e).abs() < 1e-6, "{values:?} for {expected:?}");
+        }
+    };
+    close(&outputs[0], &[0.3, 0.4, 0.0]);
+    let means = [0.4, 0.6, 0.8, 1.0].map(|v| v / 3.0);
+    close(&outputs[1][..4], &means);
+    close(&outputs[1][8..12], &[0.4, 0.4, 0.4, 0.6]);
+    close(&outputs[2][..4], &[2.0 / 3.0, 0.0, 0.0, 0.0]);
+    // Green's first pixel: 0.4 · (2/3 · 0.4), and its own value more.
+    close(&outputs[3][8..10], &[0.4 * 0.4 * 2.0 / 3.0, 0.0]);
+    close(&outputs[4][8..10], &[0.4 + 0.4 * 0.4 * 2.0 / 3.0, 0.4]);
+    close(&outputs[5][8..10], &[0.8, 0.8]);
+    close(&outputs[5][24..28], &means);
 }
 
 #[test]

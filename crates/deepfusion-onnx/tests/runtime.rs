@@ -86,6 +86,7 @@ fn the_far_end_of_the_range_is_exact() {
         channels_out: 1,
         kernel: 1,
         stride: 1,
+        dilation: 1,
         border: Border::Zero,
         residual: None,
         activation: Activation::Sigmoid,

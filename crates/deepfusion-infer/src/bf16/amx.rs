@@ -97,12 +97,11 @@ struct Strip {
 
 impl ConvForm<Bf16> for Amx {
     fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
-        let (view, kernel) = (&geometry.input, geometry.kernel);
         // Of few channels, several taps fill one row of a tile.
         let runs = if channel_of.len() < INPUTS {
-            Runs::new(view, kernel, channel_of, usize::MAX, INPUTS)
+            Runs::new(&geometry, channel_of, usize::MAX, INPUTS)
         } else {
-            Runs::by_channels(view, kernel, channel_of, INPUTS)
+            Runs::by_channels(&geometry, channel_of, INPUTS)
         };
         let columns = conv.channels_out.next_multiple_of(LANES);
         let mut panels = Vec::with_capacity(runs.sources.len() * columns);
@@ -231,17 +230,17 @@ impl Amx {
 
 /// The strips of all output pixels.
 fn strips(g: &Geometry) -> Vec<Strip> {
-    let half = g.kernel / 2;
-    let corner = g.input.offset - half * (g.input.row + g.input.pitch);
+    let corner = g.corner();
     let place = |x: usize, y: usize| {
         let inside = x < g.out.width && y < g.out.height;
         inside.then(|| Place::new(g, x, y))
     };
-    if g.stride == 1 {
-        // From a row's last pixel to the next row's first it is as far as over the border between them, so
-        // strips run on over it.
-        let across = g.input.row / g.input.pitch;
-        let last = (g.out.height - 1) * across + g.out.width;
+    // From a row's last pixel to the next row's first it is as far as over the border between them, so
+    // strips can run on over it; over a wide border that is more strips than a row at a time.
+    let across = g.input.row / g.input.pitch;
+    let last = (g.out.height - 1) * across + g.out.width;
+    let by_rows = g.out.height * g.out.width.div_ceil(PIXELS);
+    if g.stride == 1 && last.div_ceil(PIXELS) <= by_rows {
         let strip = |start: usize| Strip {
             input: corner + start * g.input.pitch,
             places: std::array::from_fn(|i| place((start + i) % across, (start + i) / across)),

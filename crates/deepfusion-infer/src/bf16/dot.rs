@@ -35,8 +35,7 @@ pub(crate) struct Dot {
 
 impl ConvForm<Bf16> for Dot {
     fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
-        let (view, kernel) = (&geometry.input, geometry.kernel);
-        let runs = Runs::new(view, kernel, channel_of, INPUTS_AT_ONCE, 2);
+        let runs = Runs::new(&geometry, channel_of, INPUTS_AT_ONCE, 2);
         let columns = conv.channels_out.next_multiple_of(LANES);
         let mut panels = Vec::with_capacity(runs.sources.len() * columns);
         for first in (0..columns).step_by(GROUP) {
@@ -85,10 +84,8 @@ impl Dot {
     /// Where a pixel's first tap lies.
     fn input(&self, pixel: usize) -> usize {
         let g = &self.geometry;
-        let half = g.kernel / 2;
-        let corner = g.input.offset - half * (g.input.row + g.input.pitch);
         let (x, y) = (pixel % g.out.width, pixel / g.out.width);
-        corner + g.stride * (y * g.input.row + x * g.input.pitch)
+        g.corner() + g.stride * (y * g.input.row + x * g.input.pitch)
     }
 
     fn width(&self, group: usize) -> usize {

@@ -34,6 +34,12 @@ pub fn conv(random: &mut Random, graph: &Graph, input: ValueId, channels_out: us
     let kernel = random.pick(&[1, 3, 3, 5]);
     let taps = channels_in * kernel * kernel;
     let scale = 2.0 / (taps as f32).sqrt();
+    let border = random.pick(&[Border::Zero, Border::Reflect]);
+    // A reflected border is no wider than what it mirrors.
+    let dilation = match border {
+        Border::Zero => random.pick(&[1, 1, 2, 5]),
+        Border::Reflect => 1,
+    };
     Conv {
         input,
         weight: (0..channels_out * taps)
@@ -44,7 +50,8 @@ pub fn conv(random: &mut Random, graph: &Graph, input: ValueId, channels_out: us
         channels_out,
         kernel,
         stride: 1,
-        border: random.pick(&[Border::Zero, Border::Reflect]),
+        dilation,
+        border,
         residual: None,
         activation: random.pick(&[
             Activation::Identity,
@@ -52,6 +59,47 @@ pub fn conv(random: &mut Random, graph: &Graph, input: ValueId, channels_out: us
             Activation::Elu,
             Activation::Sigmoid,
         ]),
+    }
+}
+
+/// A 1×1 of a single pixel.
+fn point(random: &mut Random, graph: &Graph, input: ValueId, channels_out: usize) -> Op {
+    let channels_in = graph.shape(input).channels;
+    let mut weights = |n: usize| (0..n).map(|_| random.signed()).collect::<Vec<_>>();
+    Op::Conv(Box::new(Conv {
+        input,
+        weight: weights(channels_in * channels_out),
+        bias: weights(channels_out),
+        channels_in,
+        channels_out,
+        kernel: 1,
+        stride: 1,
+        dilation: 1,
+        border: Border::Zero,
+        residual: None,
+        activation: Activation::Sigmoid,
+    }))
+}
+
+/// Masks from a value, a convolution with a pixel added everywhere, and the last operation of all: its gate.
+fn attended(random: &mut Random, graph: &mut Graph, x: ValueId, name: &str) -> Op {
+    let push =
+        |part: &str, op: Op, graph: &mut Graph| graph.push(format!("{name}.{part}"), op).unwrap();
+    let channels_out = graph.shape(x).channels;
+    let mean = push("mean", Op::GlobalMean { input: x }, graph);
+    let channel = point(random, graph, mean, channels_out);
+    let channel = push("channel", channel, graph);
+    let mut shifted = conv(random, graph, x, channels_out);
+    shifted.residual = Some(channel);
+    let input = push("shifted", Op::Conv(Box::new(shifted)), graph);
+    let extent = push("extent", Op::ChannelExtent { input }, graph);
+    let spatial = conv(random, graph, extent, 1);
+    let spatial = push("spatial", Op::Conv(Box::new(spatial)), graph);
+    Op::Gate {
+        input,
+        spatial,
+        channel,
+        residual: random.below(2) == 0,
     }
 }
 
@@ -68,7 +116,7 @@ pub fn model(seed: u64) -> DepthModel {
         let shape = graph.shape(input);
         let channels_out = 1 + r.below(5);
         let name = format!("stage.{i}");
-        let op = match r.below(4) {
+        let op = match r.below(6) {
             0 if shape.halvings < 2 => Op::MaxPool { input },
             1 if shape.halvings > 0 => {
                 let fitting = |v: &&ValueId| graph.shape(**v).halvings + 1 == shape.halvings;
@@ -76,6 +124,13 @@ pub fn model(seed: u64) -> DepthModel {
                 let skip = (!skips.is_empty() && r.below(3) > 0).then(|| r.pick(&skips));
                 Op::UpsampleConcat { input, skip }
             }
+            4 => {
+                let fitting = |v: &&ValueId| graph.shape(**v).halvings == shape.halvings;
+                let others: Vec<_> = values.iter().filter(fitting).copied().collect();
+                let inputs = vec![input, r.pick(&others), r.pick(&others)];
+                Op::Concat { inputs }
+            }
+            5 => attended(r, &mut graph, input, &name),
             _ => {
                 let mut conv = conv(r, &graph, input, channels_out);
                 if shape.halvings < 2 && r.below(3) == 0 {
@@ -92,7 +147,12 @@ pub fn model(seed: u64) -> DepthModel {
         };
         values.push(graph.push(name, op).unwrap());
     }
-    let mut last = values[values.len() - 1];
+    let last = values[values.len() - 1];
+    let mean = graph.push("mean", Op::GlobalMean { input: last }).unwrap();
+    let pixel = point(r, &graph, mean, graph.shape(last).channels);
+    let pixel = graph.push("pixel", pixel).unwrap();
+    let input = last;
+    let mut last = graph.push("sum", Op::AddPixel { input, pixel }).unwrap();
     for i in 0..graph.shape(last).halvings {
         let op = Op::UpsampleConcat {
             input: last,

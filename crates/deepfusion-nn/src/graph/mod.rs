@@ -2,6 +2,10 @@
 
 use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
 
+mod decoder;
+mod encoder;
+mod skips;
+
 use crate::Error;
 use crate::depth_net::DepthNetConfig;
 use crate::layers::BatchNorm2d;
@@ -23,7 +27,8 @@ pub fn depth_graph(config: &DepthNetConfig, weights: Weights) -> Result<Graph, E
         graph: Graph::new(normalisation.mean(), normalisation.std()),
         weights,
     };
-    let features = builder.encoder(config)?;
+    let features = builder.encoder(&config.encoder)?;
+    let features = builder.skips(config, features)?;
     let finest = builder.decoder(config, features)?;
     builder.graph.add_output(finest);
     builder.nothing_left()?;
@@ -36,159 +41,60 @@ struct Builder {
     weights: Weights,
 }
 
+/// What is added to a convolution's sum.
+enum Offset {
+    /// Its own bias.
+    Bias,
+    /// That of the batch normalisation with this name.
+    Norm(String),
+    /// Nothing.
+    None,
+}
+
 /// What a convolution is beside its weights.
 struct Layer<'a> {
     /// Of the convolution's tensors.
     name: String,
-    /// Of the batch normalisation's tensors, where one follows; a bias is read where none does.
-    norm: Option<String>,
+    /// What is added to its sum.
+    offset: Offset,
     input: ValueId,
     channels: [usize; 2],
     kernel: usize,
     stride: usize,
+    dilation: usize,
     border: Border,
     residual: Option<ValueId>,
     activation: &'a Activation,
 }
 
 impl Builder {
-    fn encoder(&mut self, config: &DepthNetConfig) -> Result<[ValueId; 5], Error> {
-        let encoder = &config.encoder;
-        let width = encoder.base_width;
-        let expansion = encoder.depth.expansion();
-        let f0 = self.conv(&Layer {
-            name: "encoder.conv1".into(),
-            norm: Some("encoder.bn1".into()),
-            input: ValueId::IMAGE,
-            channels: [3, width],
-            kernel: 7,
-            stride: 2,
-            border: Border::Zero,
-            residual: None,
-            activation: &Activation::Relu,
-        })?;
-        let mut features = [f0; 5];
-        let mut x = self.push("encoder.maxpool".into(), Op::MaxPool { input: f0 })?;
-        let mut channels = width;
-        for (index, blocks) in encoder.depth.blocks().into_iter().enumerate() {
-            let inner = width << index;
-            for block in 0..blocks {
-                let stride = if index > 0 && block == 0 { 2 } else { 1 };
-                let path = format!("encoder.layer{}.{block}", index + 1);
-                let outer = inner * expansion;
-                x = self.block(&path, x, [channels, inner, outer], stride)?;
-                channels = outer;
-            }
-            features[index + 1] = x;
-        }
-        Ok(features)
-    }
-
-    /// relu(residual(x) + shortcut(x)): a basic block where the inner and the outer channels agree.
-    fn block(
-        &mut self,
-        path: &str,
-        x: ValueId,
-        [channels, inner, outer]: [usize; 3],
-        stride: usize,
-    ) -> Result<ValueId, Error> {
-        let layer = |conv: &str, norm: &str, input, channels, kernel, stride| Layer {
-            name: format!("{path}.{conv}"),
-            norm: Some(format!("{path}.{norm}")),
-            input,
-            channels,
-            kernel,
-            stride,
-            border: Border::Zero,
-            residual: None,
-            activation: &Activation::Relu,
-        };
-        let shortcut = if stride != 1 || channels != outer {
-            self.conv(&Layer {
-                activation: &Activation::Identity,
-                ..layer(
-                    "downsample.0",
-                    "downsample.1",
-                    x,
-                    [channels, outer],
-                    1,
-                    stride,
-                )
-            })?
-        } else {
-            x
-        };
-        let last = if inner == outer {
-            let y = self.conv(&layer("conv1", "bn1", x, [channels, inner], 3, stride))?;
-            layer("conv2", "bn2", y, [inner, outer], 3, 1)
-        } else {
-            let y = self.conv(&layer("conv1", "bn1", x, [channels, inner], 1, 1))?;
-            let y = self.conv(&layer("conv2", "bn2", y, [inner, inner], 3, stride))?;
-            layer("conv3", "bn3", y, [inner, outer], 1, 1)
-        };
-        self.conv(&Layer {
-            residual: Some(shortcut),
-            ..last
-        })
-    }
-
-    fn decoder(
-        &mut self,
-        config: &DepthNetConfig,
-        [f0, f1, f2, f3, f4]: [ValueId; 5],
-    ) -> Result<ValueId, Error> {
-        let layer = |name: String, input, channels, activation| Layer {
-            name,
-            norm: None,
-            input,
-            channels,
-            kernel: 3,
-            stride: 1,
-            border: Border::Reflect,
-            residual: None,
-            activation,
-        };
-        let mut x = f4;
-        let skips = [Some(f3), Some(f2), Some(f1), Some(f0), None];
-        for (index, skip) in skips.into_iter().enumerate() {
-            let width = config.decoder.widths[index];
-            let path = format!("decoder.stages.{index}");
-            let channels = [self.graph.shape(x).channels, width];
-            x = self.conv(&layer(
-                format!("{path}.reduce"),
-                x,
-                channels,
-                &Activation::Elu,
-            ))?;
-            x = self.push(
-                format!("{path}.concat"),
-                Op::UpsampleConcat { input: x, skip },
-            )?;
-            let channels = [self.graph.shape(x).channels, width];
-            x = self.conv(&layer(
-                format!("{path}.fuse"),
-                x,
-                channels,
-                &Activation::Elu,
-            ))?;
-        }
-        let channels = [config.decoder.widths[4], 1];
-        self.conv(&layer(
-            "decoder.heads.0".into(),
-            x,
-            channels,
-            &Activation::Sigmoid,
-        ))
-    }
-
     fn conv(&mut self, layer: &Layer) -> Result<ValueId, Error> {
         let [channels_in, channels_out] = layer.channels;
         let shape = [channels_out, channels_in, layer.kernel, layer.kernel];
+        let (weight, bias) = self.folded(layer, shape)?;
+        self.conv_with(layer, weight, bias)
+    }
+
+    /// The layer's weights and bias, its batch normalisation folded in.
+    fn folded(&mut self, layer: &Layer, shape: [usize; 4]) -> Result<(Vec<f32>, Vec<f32>), Error> {
+        let channels_out = shape[0];
         let mut weight = self.take(&format!("{}.weight", layer.name), &shape)?;
-        let bias = match &layer.norm {
-            None => self.take(&format!("{}.bias", layer.name), &[channels_out])?,
-            Some(norm) => self.fold(norm, &mut weight, channels_out)?,
+        let bias = match &layer.offset {
+            Offset::Bias => self.take(&format!("{}.bias", layer.name), &[channels_out])?,
+            Offset::Norm(norm) => self.fold(norm, &mut weight, channels_out)?,
+            Offset::None => vec![0.0; channels_out],
         };
+        Ok((weight, bias))
+    }
+
+    /// The layer with these weights.
+    fn conv_with(
+        &mut self,
+        layer: &Layer,
+        weight: Vec<f32>,
+        bias: Vec<f32>,
+    ) -> Result<ValueId, Error> {
+        let [channels_in, channels_out] = layer.channels;
         let conv = Conv {
             input: layer.input,
             weight,
@@ -197,6 +103,7 @@ impl Builder {
             channels_out,
             kernel: layer.kernel,
             stride: layer.stride,
+            dilation: layer.dilation,
             border: layer.border,
             residual: layer.residual,
             activation: *layer.activation,

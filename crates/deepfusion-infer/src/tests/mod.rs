@@ -1,5 +1,9 @@
 //! The engine against the operations' definitions in f64, on small random networks.
 
+mod attention;
+mod build;
+mod oracle;
+
 use proptest::prelude::*;
 
 use crate::dispatch::tests::{Level, with_level};
@@ -7,157 +11,8 @@ use crate::element::Element;
 use crate::engine::Typed;
 use crate::forms::ConvForm;
 use crate::{Activation, Border, Conv, Engine, Graph, Op, Precision, ValueId};
-
-/// Channels × height × width.
-#[derive(Clone)]
-struct Image {
-    channels: usize,
-    height: usize,
-    width: usize,
-    data: Vec<f64>,
-}
-
-impl Image {
-    fn from_fn(
-        channels: usize,
-        height: usize,
-        width: usize,
-        f: impl Fn(usize, usize, usize) -> f64,
-    ) -> Self {
-        let mut data = Vec::with_capacity(channels * height * width);
-        for c in 0..channels {
-            for y in 0..height {
-                data.extend((0..width).map(|x| f(c, y, x)));
-            }
-        }
-        Self {
-            channels,
-            height,
-            width,
-            data,
-        }
-    }
-
-    fn at(&self, c: usize, y: usize, x: usize) -> f64 {
-        self.data[(c * self.height + y) * self.width + x]
-    }
-}
-
-fn conv(conv: &Conv, values: &[Image]) -> Image {
-    let input = &values[conv.input.0];
-    let half = conv.kernel as isize / 2;
-    // Where a tap looks, none for zeros.
-    let place = |i: isize, n: usize| {
-        let n = n as isize;
-        match conv.border {
-            _ if (0..n).contains(&i) => Some(i as usize),
-            Border::Zero => None,
-            Border::Reflect if i < 0 => Some((-i) as usize),
-            Border::Reflect => Some((2 * (n - 1) - i) as usize),
-        }
-    };
-    let (h, w) = (input.height / conv.stride, input.width / conv.stride);
-    Image::from_fn(conv.channels_out, h, w, |o, y, x| {
-        let mut sum = f64::from(conv.bias[o]);
-        for c in 0..conv.channels_in {
-            for ky in 0..conv.kernel {
-                for kx in 0..conv.kernel {
-                    let look =
-                        |i: usize, k: usize, n| place((i * conv.stride + k) as isize - half, n);
-                    let places = (look(y, ky, input.height), look(x, kx, input.width));
-                    if let (Some(i), Some(j)) = places {
-                        let tap =
-                            ((o * conv.channels_in + c) * conv.kernel + ky) * conv.kernel + kx;
-                        sum += f64::from(conv.weight[tap]) * input.at(c, i, j);
-                    }
-                }
-            }
-        }
-        sum += conv.residual.map_or(0.0, |r| values[r.0].at(o, y, x));
-        match conv.activation {
-            Activation::Identity => sum,
-            Activation::Relu => sum.max(0.0),
-            Activation::Elu if sum < 0.0 => sum.exp_m1(),
-            Activation::Elu => sum,
-            Activation::Sigmoid => 1.0 / (1.0 + (-sum).exp()),
-        }
-    })
-}
-
-/// All values of the graph.
-fn run(graph: &Graph, image: &[f32], height: usize, width: usize) -> Vec<Image> {
-    let mut values = vec![Image::from_fn(3, height, width, |c, y, x| {
-        let value = f64::from(image[(c * height + y) * width + x]);
-        (value - f64::from(graph.mean()[c])) / f64::from(graph.std()[c])
-    })];
-    for node in graph.nodes() {
-        let value = match &node.op {
-            Op::Conv(op) => conv(op, &values),
-            Op::MaxPool { input } => {
-                let v = &values[input.0];
-                Image::from_fn(v.channels, v.height / 2, v.width / 2, |c, y, x| {
-                    let around = |i: usize, n: usize| (2 * i).saturating_sub(1)..(2 * i + 2).min(n);
-                    around(y, v.height)
-                        .flat_map(|i| around(x, v.width).map(move |j| (i, j)))
-                        .map(|(i, j)| v.at(c, i, j))
-                        .fold(f64::NEG_INFINITY, f64::max)
-                })
-            }
-            Op::UpsampleConcat { input, skip } => {
-                let v = &values[input.0];
-                let skip = skip.map(|s| &values[s.0]);
-                let channels = v.channels + skip.map_or(0, |s| s.channels);
-                Image::from_fn(channels, v.height * 2, v.width * 2, |c, y, x| match skip {
-                    Some(skip) if c >= v.channels => skip.at(c - v.channels, y, x),
-                    _ => v.at(c, y / 2, x / 2),
-                })
-            }
-        };
-        values.push(value);
-    }
-    values
-}
-
-/// Numbers without a pattern in [−1, 1).
-fn noise(seed: u64) -> impl FnMut() -> f32 {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    move || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 40) as f32 / (1_u64 << 23) as f32 - 1.0
-    }
-}
-
-struct Builder<F> {
-    graph: Graph,
-    noise: F,
-}
-
-impl<F: FnMut() -> f32> Builder<F> {
-    fn conv(&mut self, input: ValueId, channels: usize, change: impl Fn(&mut Conv)) -> ValueId {
-        let mut conv = Conv {
-            input,
-            weight: Vec::new(),
-            bias: Vec::new(),
-            channels_in: self.graph.shape(input).channels,
-            channels_out: channels,
-            kernel: 3,
-            stride: 1,
-            border: Border::Zero,
-            residual: None,
-            activation: Activation::Relu,
-        };
-        change(&mut conv);
-        let taps = conv.channels_in * conv.kernel * conv.kernel;
-        let scale = (3.0 / taps as f32).sqrt();
-        conv.weight = (0..channels * taps)
-            .map(|_| (self.noise)() * scale)
-            .collect();
-        conv.bias = (0..channels).map(|_| (self.noise)() * 0.3).collect();
-        self.graph.push("conv", Op::Conv(Box::new(conv))).unwrap()
-    }
-}
+use build::{Builder, deviation, noise, noise_image};
+use oracle::run;
 
 /// The depth network's shapes in small: stem, pooling, blocks with and without a shortcut convolution, an
 /// enlarging decoder with skips, a head.
@@ -199,19 +54,6 @@ fn network(seed: u64, widths: [usize; 4], bottleneck: bool, stem: usize) -> Grap
     });
     b.graph.add_output(head);
     b.graph
-}
-
-fn deviation(engine: &[f32], exact: &Image) -> f64 {
-    let off = engine.iter().zip(&exact.data);
-    off.map(|(a, b)| (f64::from(*a) - b).abs())
-        .fold(0.0, f64::max)
-}
-
-/// An image of noise in [0, 1).
-fn noise_image(seed: u64, width: usize, height: usize) -> Vec<f32> {
-    let mut next = noise(seed);
-    let values = (0..3 * width * height).map(|_| (next() + 1.0) / 2.0);
-    values.collect()
 }
 
 /// The first output of an engine whose convolutions all take one form.
@@ -417,6 +259,7 @@ fn what_cannot_be_laid_out_is_refused() {
         channels_out: 3,
         kernel: 7,
         stride: 1,
+        dilation: 1,
         border: Border::Reflect,
         residual: Some(ValueId::IMAGE),
         activation: Activation::Identity,

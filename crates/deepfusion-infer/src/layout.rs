@@ -1,0 +1,240 @@
+//! Where every value of a graph lies in the arena.
+
+use crate::tile::LANES;
+use crate::view::View;
+use crate::{Graph, Op, ValueId, ValueShape};
+
+/// Elements after a buffer's last pixel that a kernel may read and multiply by zero.
+const OVERREAD: usize = 64;
+
+/// A buffer holds one value, or a concatenation with the values that are its parts.
+#[derive(Debug, Clone)]
+pub(crate) struct Buffer {
+    /// Physical channels.
+    channels: usize,
+    /// Of its values, whose size it has.
+    shape: ValueShape,
+    pub(crate) border: usize,
+    /// First and last step that uses it.
+    live: Option<(usize, usize)>,
+    offset: usize,
+}
+
+/// A value's place: some channels of a buffer.
+#[derive(Debug, Clone)]
+pub(crate) struct Home {
+    pub(crate) buffer: usize,
+    first: usize,
+    /// For each physical channel the logical one; none for those that fill up.
+    pub(crate) channel_of: Vec<Option<usize>>,
+    result: bool,
+}
+
+pub(crate) struct Layout {
+    pub(crate) buffers: Vec<Buffer>,
+    pub(crate) homes: Vec<Home>,
+}
+
+impl Layout {
+    /// A home for every value: what is appended in a concatenation is written there from the start.
+    /// A result takes `slots` elements.
+    pub(crate) fn new(graph: &Graph, slots: usize) -> Self {
+        let count = graph.nodes().len() + 1;
+        let mut homes: Vec<Option<Home>> = vec![None; count];
+        let mut buffers = Vec::new();
+        let channels = channels(graph, slots);
+        // The last ones first: a concatenation's parts come before it.
+        for value in (0..count).rev() {
+            let channel_of = channels[value].clone();
+            let home = homes[value].get_or_insert_with(|| {
+                buffers.push(Buffer {
+                    channels: channel_of.len(),
+                    shape: graph.shape(ValueId(value)),
+                    border: 0,
+                    live: None,
+                    offset: 0,
+                });
+                Home {
+                    buffer: buffers.len() - 1,
+                    first: 0,
+                    channel_of,
+                    result: is_result(graph, ValueId(value)),
+                }
+            });
+            let buffer = home.buffer;
+            let mut first = 0;
+            for (part, in_place) in parts(graph, ValueId(value)) {
+                if in_place && homes[part.0].is_none() && !is_concat(graph, part) {
+                    homes[part.0] = Some(Home {
+                        buffer,
+                        first,
+                        channel_of: channels[part.0].clone(),
+                        result: false,
+                    });
+                }
+                first += channels[part.0].len();
+            }
+        }
+        let homes = homes.into_iter().flatten().collect();
+        Self { buffers, homes }
+    }
+
+    /// Whether a value was given its place in a concatenation, from channel `first` on.
+    pub(crate) fn lies_in(&self, part: ValueId, concat: ValueId, first: usize) -> bool {
+        let (part, concat) = (&self.homes[part.0], &self.homes[concat.0]);
+        part.buffer == concat.buffer && part.first == concat.first + first
+    }
+
+    pub(crate) fn used(&mut self, value: ValueId, step: usize) {
+        let live = &mut self.buffers[self.homes[value.0].buffer].live;
+        let (first, last) = live.unwrap_or((step, step));
+        *live = Some((first.min(step), last.max(step)));
+    }
+
+    /// Gives every buffer an offset; buffers that are never alive together may share memory. Results lie
+    /// behind them all: a kernel that reads on past a buffer's end, times zero, must not meet the halves of
+    /// an f32, which may be no number. Returns the size of the whole.
+    pub(crate) fn place(&mut self, width: usize, height: usize) -> usize {
+        let mut order: Vec<usize> = (0..self.buffers.len()).collect();
+        let size = |b: &Buffer| {
+            let (width, height) = b.shape.size(width, height);
+            let side = |n: usize| n + 2 * b.border;
+            (side(width) * side(height) * b.channels + OVERREAD).next_multiple_of(64)
+        };
+        let results: Vec<bool> = (0..self.buffers.len())
+            .map(|b| {
+                self.homes
+                    .iter()
+                    .any(|home| home.buffer == b && home.result)
+            })
+            .collect();
+        // Large ones first: the small ones fill the gaps.
+        order.sort_by_key(|i| std::cmp::Reverse(size(&self.buffers[*i])));
+        let mut placed: Vec<usize> = Vec::new();
+        let mut end = 0;
+        for index in order.iter().copied().filter(|i| !results[*i]) {
+            let Some(live) = self.buffers[index].live else {
+                continue;
+            };
+            let wanted = size(&self.buffers[index]);
+            let together = |other: &&usize| {
+                let (first, last) = self.buffers[**other].live.unwrap_or((1, 0));
+                first <= live.1 && live.0 <= last
+            };
+            let mut taken: Vec<(usize, usize)> = placed
+                .iter()
+                .filter(together)
+                .map(|i| (self.buffers[*i].offset, size(&self.buffers[*i])))
+                .collect();
+            taken.sort_unstable();
+            let mut offset = 0;
+            for (start, length) in taken {
+                if offset + wanted <= start {
+                    break;
+                }
+                offset = offset.max(start + length);
+            }
+            self.buffers[index].offset = offset;
+            end = end.max(offset + wanted);
+            placed.push(index);
+        }
+        end += self.slack();
+        for index in order.into_iter().filter(|i| results[*i]) {
+            self.buffers[index].offset = end;
+            end += size(&self.buffers[index]);
+        }
+        end
+    }
+
+    /// Elements after the last buffer that kernels may read, and multiply by zero or drop: whole vectors,
+    /// and pixels that fill up a tile.
+    fn slack(&self) -> usize {
+        let widest = self.buffers.iter().map(|b| b.channels).max().unwrap_or(0);
+        (40 * widest + 1024).next_multiple_of(64)
+    }
+
+    /// Where each logical channel of a value lies in a pixel.
+    pub(crate) fn places(&self, value: ValueId) -> Vec<usize> {
+        let channels = self.homes[value.0].channel_of.iter().enumerate();
+        channels.filter_map(|(i, c)| c.map(|_| i)).collect()
+    }
+
+    pub(crate) fn view(&self, value: ValueId, width: usize, height: usize) -> View {
+        let home = &self.homes[value.0];
+        let buffer = &self.buffers[home.buffer];
+        let (width, height) = buffer.shape.size(width, height);
+        let pitch = buffer.channels;
+        let row = (width + 2 * buffer.border) * pitch;
+        View {
+            offset: buffer.offset + buffer.border * (row + pitch) + home.first,
+            row,
+            pitch,
+            width,
+            height,
+            channels: home.channel_of.len(),
+            border: buffer.border,
+            result: home.result,
+        }
+    }
+}
+
+/// For each value and each of its physical channels the logical one; none for those that fill up. A result takes
+/// `slots` elements.
+fn channels(graph: &Graph, slots: usize) -> Vec<Vec<Option<usize>>> {
+    let mut all: Vec<Vec<Option<usize>>> = vec![(0..3).map(Some).collect()];
+    for (index, node) in graph.nodes().iter().enumerate() {
+        let value = ValueId(index + 1);
+        let count = graph.shape(value).channels;
+        let of = match &node.op {
+            Op::Conv(_) => {
+                let physical = if is_result(graph, value) {
+                    slots
+                } else {
+                    count.next_multiple_of(LANES)
+                };
+                (0..physical).map(|c| (c < count).then_some(c)).collect()
+            }
+            Op::MaxPool { input }
+            | Op::GlobalMean { input }
+            | Op::Gate { input, .. }
+            | Op::AddPixel { input, .. } => all[input.0].clone(),
+            Op::ChannelExtent { .. } => (0..count).map(Some).collect(),
+            Op::UpsampleConcat { .. } | Op::Concat { .. } => {
+                let mut joined = Vec::new();
+                let mut shift = 0;
+                for (part, _) in parts(graph, value) {
+                    joined.extend(all[part.0].iter().map(|c| c.map(|c| c + shift)));
+                    shift += graph.shape(part).channels;
+                }
+                joined
+            }
+        };
+        all.push(of);
+    }
+    all
+}
+
+/// The values whose channels a concatenation joins, in order, and whether each can be written there from the start:
+/// what is enlarged cannot.
+pub(crate) fn parts(graph: &Graph, value: ValueId) -> Vec<(ValueId, bool)> {
+    match value.0.checked_sub(1).map(|i| &graph.nodes()[i].op) {
+        Some(Op::UpsampleConcat { input, skip }) => {
+            let skip = skip.map(|skip| (skip, true));
+            std::iter::once((*input, false)).chain(skip).collect()
+        }
+        Some(Op::Concat { inputs }) => inputs.iter().map(|input| (*input, true)).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// A single channel that a convolution without a residual gives and nothing reads.
+fn is_result(graph: &Graph, value: ValueId) -> bool {
+    let node = value.0.checked_sub(1).map(|i| &graph.nodes()[i].op);
+    let plain = matches!(node, Some(Op::Conv(conv)) if conv.residual.is_none());
+    plain && graph.shape(value).channels == 1 && !graph.is_read(value)
+}
+
+fn is_concat(graph: &Graph, value: ValueId) -> bool {
+    let node = value.0.checked_sub(1).map(|i| &graph.nodes()[i].op);
+    matches!(node, Some(Op::UpsampleConcat { .. } | Op::Concat { .. }))
+}

@@ -1,0 +1,148 @@
+//! The operations that a network's graph is made of.
+
+use crate::ValueId;
+
+/// Applied to a convolution's sum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Activation {
+    /// y = x.
+    Identity,
+    /// y = max(x, 0).
+    Relu,
+    /// y = x where x > 0, eˣ − 1 elsewhere.
+    Elu,
+    /// y = 1 / (1 + e⁻ˣ).
+    Sigmoid,
+}
+
+/// What stands beyond the edge of a convolution's input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Border {
+    /// Zeros.
+    Zero,
+    /// The image mirrored at its outermost pixels, which are not repeated.
+    Reflect,
+}
+
+/// A convolution with square kernels that keeps the size (`kernel` odd, padded by half of its reach) or halves it
+/// (`stride` 2), then adds a residual and applies an activation: y = a(w ⋆ x + b + r).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conv {
+    /// Its input.
+    pub input: ValueId,
+    /// Out × in × kernel × kernel, row-major; batch normalisation folded in.
+    pub weight: Vec<f32>,
+    /// One value an output channel.
+    pub bias: Vec<f32>,
+    /// Input channels.
+    pub channels_in: usize,
+    /// Output channels.
+    pub channels_out: usize,
+    /// Side of the kernel in pixels, odd.
+    pub kernel: usize,
+    /// 1 or 2.
+    pub stride: usize,
+    /// Pixels from a tap of the kernel to the next, at least 1.
+    pub dilation: usize,
+    /// What the kernel sees beyond the edge.
+    pub border: Border,
+    /// r, of the output's shape; or a single pixel, which is added everywhere.
+    pub residual: Option<ValueId>,
+    /// a.
+    pub activation: Activation,
+}
+
+/// One operation.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Op {
+    /// A convolution.
+    Conv(Box<Conv>),
+    /// The maximum over 3×3 pixels at stride 2, padded by one.
+    MaxPool {
+        /// Its input.
+        input: ValueId,
+    },
+    /// Every pixel becomes 2×2, and the channels of `skip` are appended.
+    UpsampleConcat {
+        /// What is enlarged.
+        input: ValueId,
+        /// Appended, twice the size of the input.
+        skip: Option<ValueId>,
+    },
+    /// The channels of several values of one size, one after the other.
+    Concat {
+        /// At least one.
+        inputs: Vec<ValueId>,
+    },
+    /// The mean over the image: a single pixel.
+    GlobalMean {
+        /// Its input.
+        input: ValueId,
+    },
+    /// Each pixel's mean and maximum over the channels: two channels.
+    ChannelExtent {
+        /// Its input.
+        input: ValueId,
+    },
+    /// y = x ⊙ (s · c), or x ⊙ (1 + s · c): attention.
+    Gate {
+        /// x.
+        input: ValueId,
+        /// s, one channel.
+        spatial: ValueId,
+        /// c, a single pixel.
+        channel: ValueId,
+        /// Whether 1 is added.
+        residual: bool,
+    },
+    /// y = x + v at every pixel.
+    AddPixel {
+        /// x.
+        input: ValueId,
+        /// v, a single pixel.
+        pixel: ValueId,
+    },
+}
+
+impl Conv {
+    /// How far the kernel reaches from its centre, in pixels.
+    #[must_use]
+    pub fn reach(&self) -> usize {
+        (self.kernel / 2).saturating_mul(self.dilation)
+    }
+}
+
+/// An operation with a name, for messages and for exported files.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Node {
+    /// Its path in the network, such as `encoder.layer1.0.conv1`.
+    pub name: String,
+    /// What it does.
+    pub op: Op,
+}
+
+impl Op {
+    /// What the operation reads.
+    pub fn inputs(&self) -> impl Iterator<Item = ValueId> {
+        let mut several: &[ValueId] = &[];
+        let few = match self {
+            Self::Conv(conv) => [Some(conv.input), conv.residual, None],
+            Self::MaxPool { input }
+            | Self::GlobalMean { input }
+            | Self::ChannelExtent { input } => [Some(*input), None, None],
+            Self::UpsampleConcat { input, skip } => [Some(*input), *skip, None],
+            Self::Concat { inputs } => {
+                several = inputs;
+                [None; 3]
+            }
+            Self::Gate {
+                input,
+                spatial,
+                channel,
+                ..
+            } => [Some(*input), Some(*spatial), Some(*channel)],
+            Self::AddPixel { input, pixel } => [Some(*input), Some(*pixel), None],
+        };
+        few.into_iter().flatten().chain(several.iter().copied())
+    }
+}

@@ -1,0 +1,155 @@
+//! What shape an operation gives, and whether it fits what it reads.
+
+use crate::{Conv, Op, ValueId, ValueShape};
+
+/// The shape that `op` gives where these are the values before it; else why it does not fit them.
+pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, String> {
+    let shape = |value: ValueId| {
+        let known = shapes.get(value.0).copied();
+        known.ok_or_else(|| format!("value {} does not exist yet", value.0))
+    };
+    match op {
+        Op::Conv(conv) => {
+            let residual = conv.residual.map(shape).transpose()?;
+            after_conv(conv, shape(conv.input)?, residual)
+        }
+        Op::MaxPool { input } => {
+            let input = image(shape(*input)?)?;
+            Ok(ValueShape {
+                halvings: halved(input.halvings, true)?,
+                ..input
+            })
+        }
+        Op::UpsampleConcat { input, skip } => {
+            let input = image(shape(*input)?)?;
+            let halvings = input.halvings.checked_sub(1);
+            let halvings = halvings.ok_or("larger than the image")?;
+            let large = ValueShape { halvings, ..input };
+            match skip.map(shape).transpose()? {
+                Some(skip) => appended(large, skip),
+                None => Ok(large),
+            }
+        }
+        Op::Concat { inputs } => {
+            let (first, rest) = inputs.split_first().ok_or("nothing to concatenate")?;
+            rest.iter()
+                .try_fold(shape(*first)?, |all, next| appended(all, shape(*next)?))
+        }
+        Op::GlobalMean { input } => Ok(ValueShape {
+            halvings: 0,
+            pooled: true,
+            ..image(shape(*input)?)?
+        }),
+        Op::ChannelExtent { input } => Ok(ValueShape {
+            channels: 2,
+            ..image(shape(*input)?)?
+        }),
+        Op::Gate {
+            input,
+            spatial,
+            channel,
+            ..
+        } => {
+            let input = image(shape(*input)?)?;
+            let spatial = shape(*spatial)?;
+            if spatial
+                != (ValueShape {
+                    channels: 1,
+                    ..input
+                })
+            {
+                return Err(format!("a spatial mask of {spatial:?} on {input:?}"));
+            }
+            with_pixel(input, shape(*channel)?)
+        }
+        Op::AddPixel { input, pixel } => with_pixel(image(shape(*input)?)?, shape(*pixel)?),
+    }
+}
+
+fn after_conv(
+    conv: &Conv,
+    input: ValueShape,
+    residual: Option<ValueShape>,
+) -> Result<ValueShape, String> {
+    if conv.channels_in != input.channels {
+        return Err(format!(
+            "{} channels expected, its input has {}",
+            conv.channels_in, input.channels
+        ));
+    }
+    let parts = [conv.channels_in, conv.kernel, conv.kernel];
+    let weights = parts
+        .into_iter()
+        .try_fold(conv.channels_out, usize::checked_mul);
+    let weights = weights.ok_or("more weights than any memory holds")?;
+    if conv.weight.len() != weights || conv.bias.len() != conv.channels_out {
+        return Err(format!(
+            "{} weights and {} biases expected, {} and {} given",
+            weights,
+            conv.channels_out,
+            conv.weight.len(),
+            conv.bias.len()
+        ));
+    }
+    if conv.kernel % 2 == 0 || conv.channels_out == 0 {
+        return Err("kernels are odd, and there is at least one output".into());
+    }
+    if !matches!(conv.stride, 1 | 2) {
+        return Err(format!("stride {}, expected 1 or 2", conv.stride));
+    }
+    // A border as wide as this is no network's; wider ones would not fit in memory.
+    if conv.dilation == 0 || conv.dilation > 256 {
+        return Err(format!("dilation {}, expected 1 to 256", conv.dilation));
+    }
+    if input.pooled && (conv.kernel > 1 || conv.stride > 1) {
+        return Err("a single pixel takes a 1×1 kernel at stride 1".into());
+    }
+    let output = ValueShape {
+        channels: conv.channels_out,
+        halvings: halved(input.halvings, conv.stride == 2)?,
+        pooled: input.pooled,
+    };
+    match residual {
+        Some(residual) if residual.pooled => with_pixel(output, residual),
+        Some(residual) if residual != output => {
+            Err(format!("a residual of {residual:?} on {output:?}"))
+        }
+        _ => Ok(output),
+    }
+}
+
+/// A value of which there is more than a pixel.
+fn image(shape: ValueShape) -> Result<ValueShape, String> {
+    if shape.pooled {
+        return Err("a single pixel where an image is expected".into());
+    }
+    Ok(shape)
+}
+
+/// A value that a single pixel acts on.
+fn with_pixel(input: ValueShape, pixel: ValueShape) -> Result<ValueShape, String> {
+    if !pixel.pooled || pixel.channels != input.channels {
+        return Err(format!("{pixel:?} at every pixel of {input:?}"));
+    }
+    Ok(input)
+}
+
+/// The channels of one value behind those of another.
+fn appended(first: ValueShape, second: ValueShape) -> Result<ValueShape, String> {
+    if (first.halvings, first.pooled) != (second.halvings, second.pooled) {
+        return Err(format!("{second:?} appended to {first:?}"));
+    }
+    Ok(ValueShape {
+        channels: first.channels + second.channels,
+        ..first
+    })
+}
+
+/// One halving more; no image is so large that it could be halved more often.
+fn halved(halvings: u32, again: bool) -> Result<u32, String> {
+    const MOST: u32 = 20;
+    match halvings + u32::from(again) {
+        n if n <= MOST => Ok(n),
+        n => Err(format!("the {n}th halving of the image")),
+    }
+}

@@ -1,0 +1,164 @@
+//! What the operations mean, in f64.
+
+use crate::{Activation, Border, Conv, Graph, Op};
+
+/// Channels × height × width.
+#[derive(Clone)]
+pub(super) struct Image {
+    pub(super) channels: usize,
+    pub(super) height: usize,
+    pub(super) width: usize,
+    pub(super) data: Vec<f64>,
+}
+
+impl Image {
+    fn from_fn(
+        channels: usize,
+        height: usize,
+        width: usize,
+        f: impl Fn(usize, usize, usize) -> f64,
+    ) -> Self {
+        let mut data = Vec::with_capacity(channels * height * width);
+        for c in 0..channels {
+            for y in 0..height {
+                data.extend((0..width).map(|x| f(c, y, x)));
+            }
+        }
+        Self {
+            channels,
+            height,
+            width,
+            data,
+        }
+    }
+
+    fn at(&self, c: usize, y: usize, x: usize) -> f64 {
+        self.data[(c * self.height + y) * self.width + x]
+    }
+
+    /// The same; of a single pixel wherever one looks.
+    fn near(&self, c: usize, y: usize, x: usize) -> f64 {
+        self.at(c, y.min(self.height - 1), x.min(self.width - 1))
+    }
+}
+
+fn conv(conv: &Conv, values: &[Image]) -> Image {
+    let input = &values[conv.input.0];
+    let half = conv.reach() as isize;
+    // Where a tap looks, none for zeros.
+    let place = |i: isize, n: usize| {
+        let n = n as isize;
+        match conv.border {
+            _ if (0..n).contains(&i) => Some(i as usize),
+            Border::Zero => None,
+            Border::Reflect if i < 0 => Some((-i) as usize),
+            Border::Reflect => Some((2 * (n - 1) - i) as usize),
+        }
+    };
+    let (h, w) = (input.height / conv.stride, input.width / conv.stride);
+    Image::from_fn(conv.channels_out, h, w, |o, y, x| {
+        let mut sum = f64::from(conv.bias[o]);
+        for c in 0..conv.channels_in {
+            for ky in 0..conv.kernel {
+                for kx in 0..conv.kernel {
+                    let look = |i: usize, k: usize, n| {
+                        place((i * conv.stride + k * conv.dilation) as isize - half, n)
+                    };
+                    let places = (look(y, ky, input.height), look(x, kx, input.width));
+                    if let (Some(i), Some(j)) = places {
+                        let tap =
+                            ((o * conv.channels_in + c) * conv.kernel + ky) * conv.kernel + kx;
+                        sum += f64::from(conv.weight[tap]) * input.at(c, i, j);
+                    }
+                }
+            }
+        }
+        sum += conv.residual.map_or(0.0, |r| values[r.0].near(o, y, x));
+        match conv.activation {
+            Activation::Identity => sum,
+            Activation::Relu => sum.max(0.0),
+            Activation::Elu if sum < 0.0 => sum.exp_m1(),
+            Activation::Elu => sum,
+            Activation::Sigmoid => 1.0 / (1.0 + (-sum).exp()),
+        }
+    })
+}
+
+/// All values of the graph.
+pub(super) fn run(graph: &Graph, image: &[f32], height: usize, width: usize) -> Vec<Image> {
+    let mut values = vec![Image::from_fn(3, height, width, |c, y, x| {
+        let value = f64::from(image[(c * height + y) * width + x]);
+        (value - f64::from(graph.mean()[c])) / f64::from(graph.std()[c])
+    })];
+    for node in graph.nodes() {
+        let value = match &node.op {
+            Op::Conv(op) => conv(op, &values),
+            Op::MaxPool { input } => {
+                let v = &values[input.0];
+                Image::from_fn(v.channels, v.height / 2, v.width / 2, |c, y, x| {
+                    let around = |i: usize, n: usize| (2 * i).saturating_sub(1)..(2 * i + 2).min(n);
+                    around(y, v.height)
+                        .flat_map(|i| around(x, v.width).map(move |j| (i, j)))
+                        .map(|(i, j)| v.at(c, i, j))
+                        .fold(f64::NEG_INFINITY, f64::max)
+                })
+            }
+            Op::UpsampleConcat { input, skip } => {
+                let v = &values[input.0];
+                let skip = skip.map(|s| &values[s.0]);
+                let channels = v.channels + skip.map_or(0, |s| s.channels);
+                Image::from_fn(channels, v.height * 2, v.width * 2, |c, y, x| match skip {
+                    Some(skip) if c >= v.channels => skip.at(c - v.channels, y, x),
+                    _ => v.at(c, y / 2, x / 2),
+                })
+            }
+            Op::Concat { inputs } => {
+                let parts: Vec<_> = inputs.iter().map(|v| &values[v.0]).collect();
+                let data: Vec<f64> = parts.iter().flat_map(|p| p.data.clone()).collect();
+                Image {
+                    channels: parts.iter().map(|p| p.channels).sum(),
+                    data,
+                    ..*parts[0]
+                }
+            }
+            Op::GlobalMean { input } => {
+                let v = &values[input.0];
+                let area = v.height * v.width;
+                Image::from_fn(v.channels, 1, 1, |c, _, _| {
+                    v.data[c * area..][..area].iter().sum::<f64>() / area as f64
+                })
+            }
+            Op::ChannelExtent { input } => {
+                let v = &values[input.0];
+                Image::from_fn(2, v.height, v.width, |c, y, x| {
+                    let along = (0..v.channels).map(|k| v.at(k, y, x));
+                    if c == 0 {
+                        along.sum::<f64>() / v.channels as f64
+                    } else {
+                        along.fold(f64::NEG_INFINITY, f64::max)
+                    }
+                })
+            }
+            Op::Gate {
+                input,
+                spatial,
+                channel,
+                residual,
+            } => {
+                let [v, s, m] = [input, spatial, channel].map(|v| &values[v.0]);
+                let shift = if *residual { 1.0 } else { 0.0 };
+                Image::from_fn(v.channels, v.height, v.width, |c, y, x| {
+                    v.at(c, y, x) * (shift + s.at(0, y, x) * m.at(c, 0, 0))
+                })
+            }
+            Op::AddPixel { input, pixel } => {
+                let (v, p) = (&values[input.0], &values[pixel.0]);
+                Image::from_fn(v.channels, v.height, v.width, |c, y, x| {
+                    v.at(c, y, x) + p.at(c, 0, 0)
+                })
+            }
+        };
+        values.push(value);
+    }
+    values
+}

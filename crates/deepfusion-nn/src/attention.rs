@@ -1,0 +1,176 @@
+//! Channel and spatial attention (SPEC 1.1, Eq. 13–15), and the aggregation of a global feature.
+
+use burn::module::Module;
+use burn::tensor::activation::{relu, sigmoid};
+use burn::tensor::{Device, Tensor};
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+use crate::init::WeightRng;
+use crate::layers::{Conv2d, Conv2dConfig, global_mean};
+
+/// How the masks act on the feature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AttentionForm {
+    /// F' = F ⊙ M_s ⊙ M_c, the paper's Eq. 15. Masks that know nothing yet are ½ each: the feature starts
+    /// at a quarter.
+    #[default]
+    Product,
+    /// F' = F ⊙ (1 + M_s ⊙ M_c): the feature always passes.
+    Residual,
+}
+
+/// What an [`Attention`] is built from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct AttentionConfig {
+    /// How the masks act.
+    pub form: AttentionForm,
+    /// The channel mask's hidden layer has this share of the feature's channels (rounded up).
+    pub reduction: usize,
+    /// Side of the spatial mask's kernel in pixels, odd.
+    pub kernel: usize,
+}
+
+impl Default for AttentionConfig {
+    /// The plain product, a reduction by 16, 7×7.
+    fn default() -> Self {
+        Self {
+            form: AttentionForm::default(),
+            reduction: 16,
+            kernel: 7,
+        }
+    }
+}
+
+impl AttentionConfig {
+    /// Channels of the channel mask's hidden layer.
+    #[must_use]
+    pub fn hidden(&self, channels: usize) -> usize {
+        channels.div_ceil(self.reduction.max(1))
+    }
+
+    /// # Errors
+    /// [`Error::Config`] for a reduction or a kernel that means no network.
+    pub fn validate(&self) -> Result<(), Error> {
+        if !(1..=1024).contains(&self.reduction) {
+            let found = self.reduction;
+            return Err(Error::config("attention.reduction", "1 to 1024", found));
+        }
+        if self.kernel.is_multiple_of(2) || self.kernel > 15 {
+            let found = self.kernel;
+            return Err(Error::config("attention.kernel", "odd, at most 15", found));
+        }
+        Ok(())
+    }
+
+    /// A new one for a feature of `channels`.
+    ///
+    /// # Errors
+    /// As [`Self::validate`].
+    pub fn init(
+        &self,
+        channels: usize,
+        rng: &mut WeightRng,
+        device: &Device,
+    ) -> Result<Attention, Error> {
+        self.validate()?;
+        let mut conv = |from: usize, to: usize, kernel: usize| {
+            let conv = Conv2dConfig::new(from, to, kernel).without_bias();
+            conv.init(rng, device)
+        };
+        let hidden = self.hidden(channels);
+        Ok(Attention {
+            squeeze: conv(channels, hidden, 1),
+            excite: conv(hidden, channels, 1),
+            spatial: conv(2, 1, self.kernel),
+            form: self.form,
+        })
+    }
+}
+
+/// Where an [`Attention`] looks, between 0 and 1.
+#[derive(Debug, Clone)]
+pub struct AttentionMasks {
+    /// M_c, `[batch, channels, 1, 1]`.
+    pub channel: Tensor<4>,
+    /// M_s, `[batch, 1, height, width]`.
+    pub spatial: Tensor<4>,
+}
+
+/// Two masks side by side, both computed from the feature that they act on.
+#[derive(Module, Debug)]
+pub struct Attention {
+    /// W₁, 1×1 to the hidden layer.
+    pub squeeze: Conv2d,
+    /// W₂, 1×1 back to the channels.
+    pub excite: Conv2d,
+    /// From the channels' mean and maximum to the spatial mask.
+    pub spatial: Conv2d,
+    #[module(skip)]
+    form: AttentionForm,
+}
+
+impl Attention {
+    /// M_c = σ(W₂·relu(W₁·mean(F))) over the image, M_s = σ(w ⋆ [mean_c F; max_c F]).
+    ///
+    /// # Shapes
+    /// - `x`: `[batch, channels, height, width]`
+    pub fn masks(&self, x: &Tensor<4>) -> AttentionMasks {
+        let hidden = relu(self.squeeze.forward(global_mean(x.clone())));
+        let extent = vec![x.clone().mean_dim(1), x.clone().max_dim(1)];
+        AttentionMasks {
+            channel: sigmoid(self.excite.forward(hidden)),
+            spatial: sigmoid(self.spatial.forward(Tensor::cat(extent, 1))),
+        }
+    }
+
+    /// The feature under its masks, in the configured [`AttentionForm`].
+    ///
+    /// # Shapes
+    /// - `x`, output: `[batch, channels, height, width]`
+    pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        let masks = self.masks(&x);
+        self.apply(x, masks)
+    }
+
+    /// The feature under these masks.
+    ///
+    /// # Shapes
+    /// As [`Self::forward`].
+    pub fn apply(&self, x: Tensor<4>, masks: AttentionMasks) -> Tensor<4> {
+        // One factor a value, so that the feature is read once.
+        let both = masks.spatial.mul(masks.channel);
+        match self.form {
+            AttentionForm::Product => x.mul(both),
+            AttentionForm::Residual => x.mul(both.add_scalar(1.0)),
+        }
+    }
+}
+
+/// Global feature aggregation: what the whole image says about each channel, added at every pixel.
+#[derive(Module, Debug)]
+pub struct GlobalAggregation {
+    /// 1×1 on the mean over the image.
+    pub project: Conv2d,
+}
+
+impl GlobalAggregation {
+    /// A new one for a feature of `channels`.
+    #[must_use]
+    pub fn new(channels: usize, rng: &mut WeightRng, device: &Device) -> Self {
+        Self {
+            project: Conv2dConfig::new(channels, channels, 1).init(rng, device),
+        }
+    }
+
+    /// x + W·mean(x) + b.
+    ///
+    /// # Shapes
+    /// - `x`, output: `[batch, channels, height, width]`
+    pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        let global = self.project.forward(global_mean(x.clone()));
+        x.add(global)
+    }
+}
