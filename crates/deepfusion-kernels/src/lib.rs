@@ -1,5 +1,5 @@
 //! The numeric work under the networks, on plain slices, forward and backward: convolution, bilinear
-//! warp, photometric error, batch normalisation, activations.
+//! warp, local correlation, photometric error, batch normalisation, activations.
 //!
 //! Nothing here knows Burn. Images are N×C×H×W, contiguous; work is shared out over rayon's threads,
 //! and every result is independent of how many there are.
@@ -9,6 +9,7 @@ mod adam;
 mod batch_norm;
 mod box_filter;
 mod conv;
+mod correlation;
 mod lanes;
 mod photometric;
 mod project;
@@ -25,6 +26,10 @@ pub use activation::{channel_sums, elu, elu_backward};
 pub use adam::{AdamStep, adam, sum_of_squares};
 pub use batch_norm::{BatchNormSaved, batch_norm, batch_norm_backward, batch_norm_inference};
 pub use conv::{ConvShape, conv2d, conv2d_backward_input, conv2d_backward_weight};
+pub use correlation::{
+    CorrelationShape, local_correlation, local_correlation_backward_first,
+    local_correlation_backward_second,
+};
 pub use photometric::{PhotometricShape, photometric_error, photometric_error_backward};
 pub use project::{MIN_DEPTH_M, NOWHERE, ProjectGradients, in_view, project, project_backward};
 pub use smoothness::{SmoothnessShape, smoothness, smoothness_backward};

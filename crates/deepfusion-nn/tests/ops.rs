@@ -194,6 +194,31 @@ fn warp_and_photometric_error() {
 }
 
 #[test]
+fn local_correlation() {
+    let device = Device::flex().autodiff();
+    // Smaller than the radius, and larger.
+    for (size, radius) in [([2, 3, 2, 3], 4), ([2, 5, 9, 21], 2), ([1, 4, 6, 5], 0)] {
+        let (first, second) = (random(size, &device), random(size, &device));
+        let run = |ours: bool| {
+            let (a, b) = (leaf(&first), leaf(&second));
+            let f = if ours {
+                ops::local_correlation
+            } else {
+                ops::composed_local_correlation
+            };
+            let y = f(a.clone(), b.clone(), radius);
+            let gradients = weigh(y.clone()).backward();
+            let (ga, gb) = (a.grad(&gradients), b.grad(&gradients));
+            (y.inner(), ga.unwrap(), gb.unwrap())
+        };
+        let (a, b) = (run(true), run(false));
+        assert_close("output", a.0, b.0);
+        assert_close("first", a.1, b.1);
+        assert_close("second", a.2, b.2);
+    }
+}
+
+#[test]
 fn projection_and_smoothness() {
     let device = Device::flex().autodiff();
     // Every third point lies behind the second camera. None is near its plane, where the projection is so steep

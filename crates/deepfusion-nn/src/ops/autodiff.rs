@@ -144,6 +144,32 @@ impl<B: KernelBackward> Backward<B, 2> for Warp {
 }
 
 #[derive(Debug)]
+struct LocalCorrelation;
+
+impl<B: KernelBackward> Backward<B, 2> for LocalCorrelation {
+    type State = (FloatTensor<B>, FloatTensor<B>, usize);
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 2>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let (first, second, radius) = ops.state;
+        let [first_node, second_node] = ops.parents;
+        let grad = grads.consume::<B>(&ops.node);
+        if let Some(node) = first_node {
+            let grad = B::local_correlation_grad_first(second, grad.clone(), radius);
+            grads.register::<B>(node.id, grad);
+        }
+        if let Some(node) = second_node {
+            let grad = B::local_correlation_grad_second(first, grad, radius);
+            grads.register::<B>(node.id, grad);
+        }
+    }
+}
+
+#[derive(Debug)]
 struct Project;
 
 impl<B: KernelBackward> Backward<B, 3> for Project {
@@ -263,6 +289,18 @@ where
         let output = B::kernel_warp(image.clone(), coords.clone());
         let nodes = [image_node, coords_node];
         record!(Warp, C, nodes, output, (image, coords))
+    }
+
+    fn kernel_local_correlation(
+        first: FloatTensor<Self>,
+        second: FloatTensor<Self>,
+        radius: usize,
+    ) -> FloatTensor<Self> {
+        let ((first, first_node), (second, second_node)) =
+            (first.into_parts(), second.into_parts());
+        let output = B::kernel_local_correlation(first.clone(), second.clone(), radius);
+        let nodes = [first_node, second_node];
+        record!(LocalCorrelation, C, nodes, output, (first, second, radius))
     }
 
     fn kernel_project(

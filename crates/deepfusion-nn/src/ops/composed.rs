@@ -124,6 +124,23 @@ pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
     mix(top, bottom, fy).reshape([batch, channels, out_height, out_width])
 }
 
+/// [`super::local_correlation`].
+#[must_use]
+pub fn local_correlation(first: Tensor<4>, second: Tensor<4>, radius: usize) -> Tensor<4> {
+    let [_, _, height, width] = first.dims();
+    let side = 2 * radius + 1;
+    let margin = (radius, radius, radius, radius);
+    let second = second.pad(margin, PadMode::Constant(0.0));
+    let products = (0..side * side).map(|d| {
+        let shifted = second
+            .clone()
+            .narrow(2, d / side, height)
+            .narrow(3, d % side, width);
+        first.clone().mul(shifted).mean_dim(1)
+    });
+    Tensor::cat(products.collect(), 1)
+}
+
 /// [`super::photometric_error`].
 #[must_use]
 pub fn photometric_error(a: Tensor<4>, b: Tensor<4>, alpha: f64) -> Tensor<4> {

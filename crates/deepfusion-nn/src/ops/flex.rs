@@ -4,7 +4,8 @@ use super::kernel::{ConvOptions, KernelBackward, KernelOps};
 use burn::backend::{Flex, TensorMetadata, ops::FloatTensorOps, tensor::FloatTensor};
 use burn::tensor::TensorData;
 use deepfusion_kernels::{
-    self as kernels, BatchNormSaved, ConvShape, PhotometricShape, SmoothnessShape, WarpShape,
+    self as kernels, BatchNormSaved, ConvShape, CorrelationShape, PhotometricShape,
+    SmoothnessShape, WarpShape,
 };
 
 type Float = FloatTensor<Flex>;
@@ -71,6 +72,17 @@ fn warp_shape(image: &Float, coords: &Float) -> ([usize; 4], WarpShape) {
             out_area: out_height * out_width,
         },
     )
+}
+
+/// Of N×C×H×W images.
+fn correlation_shape(sizes: [usize; 4], radius: usize) -> CorrelationShape {
+    let [_, channels, height, width] = sizes;
+    CorrelationShape {
+        channels,
+        height,
+        width,
+        radius,
+    }
 }
 
 fn photometric_shape(a: &Float, alpha: f64) -> ([usize; 4], PhotometricShape) {
@@ -173,6 +185,16 @@ impl KernelOps for Flex {
         let (image, coords) = (Values::of(image), Values::of(coords));
         let mut out = unwritten(sizes.iter().product());
         kernels::warp(&shape, image.slice(), coords.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn kernel_local_correlation(first: Float, second: Float, radius: usize) -> Float {
+        let sizes: [usize; 4] = dims(&first);
+        let shape = correlation_shape(sizes, radius);
+        let (first, second) = (Values::of(first), Values::of(second));
+        let sizes = [sizes[0], shape.displacements(), sizes[2], sizes[3]];
+        let mut out = unwritten(sizes.iter().product());
+        kernels::local_correlation(&shape, first.slice(), second.slice(), &mut out);
         tensor(out, sizes)
     }
 
@@ -325,6 +347,26 @@ impl KernelBackward for Flex {
             grad.slice(),
             &mut out,
         );
+        tensor(out, sizes)
+    }
+
+    fn local_correlation_grad_first(second: Float, grad: Float, radius: usize) -> Float {
+        let sizes: [usize; 4] = dims(&second);
+        let shape = correlation_shape(sizes, radius);
+        let (second, grad) = (Values::of(second), Values::of(grad));
+        let mut out = unwritten(sizes.iter().product());
+        let (second, grad) = (second.slice(), grad.slice());
+        kernels::local_correlation_backward_first(&shape, second, grad, &mut out);
+        tensor(out, sizes)
+    }
+
+    fn local_correlation_grad_second(first: Float, grad: Float, radius: usize) -> Float {
+        let sizes: [usize; 4] = dims(&first);
+        let shape = correlation_shape(sizes, radius);
+        let (first, grad) = (Values::of(first), Values::of(grad));
+        let mut out = unwritten(sizes.iter().product());
+        let (first, grad) = (first.slice(), grad.slice());
+        kernels::local_correlation_backward_second(&shape, first, grad, &mut out);
         tensor(out, sizes)
     }
 

@@ -57,6 +57,13 @@ pub trait KernelOps: Backend {
     /// See [`super::warp`].
     fn kernel_warp(image: FloatTensor<Self>, coords: FloatTensor<Self>) -> FloatTensor<Self>;
 
+    /// See [`super::local_correlation`].
+    fn kernel_local_correlation(
+        first: FloatTensor<Self>,
+        second: FloatTensor<Self>,
+        radius: usize,
+    ) -> FloatTensor<Self>;
+
     /// See [`super::project`].
     fn kernel_project(
         inverse_depth: FloatTensor<Self>,
@@ -131,6 +138,20 @@ pub trait KernelBackward: Backend {
         image: FloatTensor<Self>,
         coords: FloatTensor<Self>,
         grad: FloatTensor<Self>,
+    ) -> FloatTensor<Self>;
+
+    /// Gradient of the first image of [`KernelOps::kernel_local_correlation`].
+    fn local_correlation_grad_first(
+        second: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+        radius: usize,
+    ) -> FloatTensor<Self>;
+
+    /// Gradient of its second image.
+    fn local_correlation_grad_second(
+        first: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+        radius: usize,
     ) -> FloatTensor<Self>;
 
     /// Gradients of inverse depth, homography and shift of [`KernelOps::kernel_project`].

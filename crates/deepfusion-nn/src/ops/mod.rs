@@ -16,6 +16,7 @@ use kernel::KernelOps;
 
 pub use composed::{
     batch_norm as composed_batch_norm, conv2d as composed_conv2d, elu as composed_elu,
+    local_correlation as composed_local_correlation,
     photometric_error as composed_photometric_error, project as composed_project,
     smoothness as composed_smoothness, upsample_concat as composed_upsample_concat,
     warp as composed_warp,
@@ -160,6 +161,31 @@ pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
     Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_warp(
         image.into_dispatch(),
         coords.into_dispatch(),
+    ))
+}
+
+/// Local correlation: how alike each pixel's feature is to those around the same place in another image,
+/// out(d, p) = (1/C) Σ_c first(c, p)·second(c, p + d) for every displacement d of at most `radius` pixels along each
+/// axis; outside of its image `second` is zero. Displacement d is channel
+/// (d_y + radius)·(2·radius + 1) + (d_x + radius).
+///
+/// # Shapes
+/// - `first`, `second`: `[N, C, H, W]`
+/// - output: `[N, (2·radius + 1)², H, W]`
+#[must_use]
+pub fn local_correlation(first: Tensor<4>, second: Tensor<4>, radius: usize) -> Tensor<4> {
+    assert_eq!(
+        first.dims(),
+        second.dims(),
+        "both images have the same size"
+    );
+    if !on_cpu(&first) {
+        return composed::local_correlation(first, second, radius);
+    }
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_local_correlation(
+        first.into_dispatch(),
+        second.into_dispatch(),
+        radius,
     ))
 }
 

@@ -33,6 +33,7 @@ struct Options {
     reflect: bool,
     relu: bool,
     alpha: f64,
+    radius: usize,
 }
 
 /// An input as a leaf of the graph.
@@ -62,6 +63,9 @@ fn run(case: &Case, inputs: &[Input]) -> Tensor<4> {
             ops::conv2d(x.tensor(), weight.tensor(), bias, options)
         }
         ("warp", [image, coords]) => ops::warp(image.tensor(), coords.tensor()),
+        ("local_correlation", [a, b]) => {
+            ops::local_correlation(a.tensor(), b.tensor(), options.radius)
+        }
         ("photometric", [a, b]) => ops::photometric_error(a.tensor(), b.tensor(), options.alpha),
         ("batch_norm", [x, gamma, beta]) => {
             ops::batch_norm(

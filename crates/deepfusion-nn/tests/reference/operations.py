@@ -68,6 +68,14 @@ def warp(image, coords):
     return F.grid_sample(image, grid, padding_mode="border", align_corners=True)
 
 
+def local_correlation(first, second, *, radius):
+    """The windows of the second image around each pixel, unfolded; a window's displacements come row by row."""
+    n, channels, height, width = first.shape
+    windows = F.unfold(second, 2 * radius + 1, padding=radius)
+    windows = windows.reshape(n, channels, (2 * radius + 1) ** 2, height, width)
+    return (first[:, :, None] * windows).mean(1)
+
+
 def photometric(a, b, *, alpha):
     def mean(t):
         return F.avg_pool2d(F.pad(t, (1, 1, 1, 1), mode="reflect"), 3, 1)
@@ -172,10 +180,19 @@ def others(rng):
         case("smoothness", smoothness, inputs, {}, constant=("image",))
 
 
+def correlations(rng):
+    # Images smaller than the radius, and wider than a vector.
+    for radius in (4, 4, 4, 3, 2, 1, 0):
+        shape = rng.randint(1, 3), rng.randint(1, 19), rng.randint(1, 12), rng.randint(1, 40)
+        inputs = [("first", shape, 1.0, 0.0), ("second", shape, 1.0, 0.1)]
+        case("local_correlation", local_correlation, inputs, {"radius": radius})
+
+
 def main():
     rng = random.Random(1)
     convolutions(rng)
     others(rng)
+    correlations(rng)
     write_safetensors(HERE / "operations.safetensors", expected)
     lines = ",\n".join(json.dumps(c, separators=(",", ":")) for c in cases)
     (HERE / "operations.json").write_text(f"[\n{lines}\n]\n")

@@ -1,0 +1,223 @@
+//! Local correlation: how alike each pixel's feature is to those around the same place in another image.
+//!
+//! out(d, p) = (1/C) Σ_c a(c, p)·b(c, p + d) for every displacement d of at most r pixels along each axis; outside
+//! of its image b is zero. Displacements come row by row: channel (d_y + r)·(2r + 1) + (d_x + r).
+
+mod product;
+#[cfg(test)]
+mod tests;
+
+use crate::scratch::with_scratch;
+use crate::send_ptr::SharedMut;
+use product::{DisplacementSums, LANES, RowCorrelation};
+use pulp::Arch;
+use rayon::prelude::*;
+
+/// The sizes of a local correlation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CorrelationShape {
+    /// Channels of both images, C.
+    pub channels: usize,
+    /// Height of both.
+    pub height: usize,
+    /// Width of both.
+    pub width: usize,
+    /// The largest displacement along each axis, r, in pixels.
+    pub radius: usize,
+}
+
+/// Rows copied by one task.
+const ROWS_AT_ONCE: usize = 64;
+
+impl CorrelationShape {
+    /// Displacements along one axis, 2r + 1.
+    fn side(&self) -> usize {
+        2 * self.radius + 1
+    }
+
+    /// Channels of the output, (2r + 1)².
+    #[must_use]
+    pub fn displacements(&self) -> usize {
+        self.side() * self.side()
+    }
+
+    fn area(&self) -> usize {
+        self.height * self.width
+    }
+
+    /// From one padded row to the next: whole vectors, and zeros on both sides.
+    fn stride(&self) -> usize {
+        self.width.next_multiple_of(LANES) + 2 * self.radius
+    }
+
+    /// From one padded plane to the next.
+    fn plane(&self) -> usize {
+        self.height * self.stride()
+    }
+
+    /// The images of a batch.
+    fn batch(&self, image: usize, out: usize) -> usize {
+        assert!(self.channels * self.area() > 0, "images have pixels");
+        assert_eq!(image % (self.channels * self.area()), 0, "whole images");
+        let batch = image / (self.channels * self.area());
+        let expected = batch * self.displacements() * self.area();
+        assert_eq!(out, expected, "one output a displacement and pixel");
+        batch
+    }
+
+    /// Lends `work` a copy of the planes with `radius` zeros before each row and at least as many behind it.
+    fn padded<R>(&self, planes: &[f32], work: impl FnOnce(&[f32]) -> R) -> R {
+        let (stride, radius) = (self.stride(), self.radius);
+        with_scratch(planes.len() / self.width * stride, |to| {
+            to.par_chunks_mut(stride)
+                .zip(planes.par_chunks(self.width))
+                .with_min_len(ROWS_AT_ONCE)
+                .for_each(|(to, from)| {
+                    to[..radius].fill(0.0);
+                    to[radius..][..from.len()].copy_from_slice(from);
+                    to[radius + from.len()..].fill(0.0);
+                });
+            work(to)
+        })
+    }
+
+    /// 1/C.
+    fn share(&self) -> f32 {
+        1.0 / self.channels as f32
+    }
+}
+
+/// out(d, p) = (1/C) Σ_c first(c, p)·second(c, p + d).
+///
+/// # Shapes
+/// `first`, `second` N×C×H×W, `out` N×(2r + 1)²×H×W.
+///
+/// # Panics
+/// When a length does not fit.
+pub fn local_correlation(shape: &CorrelationShape, first: &[f32], second: &[f32], out: &mut [f32]) {
+    let batch = shape.batch(first.len(), out.len());
+    assert_eq!(first.len(), second.len(), "both images have the same size");
+    let (height, radius, side) = (shape.height, shape.radius, shape.side());
+    let to = SharedMut::new(out);
+    let correlate = |first: &[f32], second: &[f32]| {
+        // A task has one row of the second image, which meets 2r + 1 rows of the first. Rows beyond the image are
+        // tasks too: theirs are the outputs that look out of it.
+        let rows = height + 2 * radius;
+        (0..batch * rows).into_par_iter().for_each(|task| {
+            let (n, beyond) = (task / rows, task % rows);
+            let image = n * shape.channels * shape.plane();
+            // Row y of the first image lies d_y = y₂ − y above; with y₂ + r = `beyond`, d_y + r = `beyond` − y.
+            let pairs = (0..side).filter_map(|down| {
+                let y = beyond.checked_sub(down).filter(|&y| y < height)?;
+                let outputs = (n * side + down) * side * height + y;
+                Some((image + y * shape.stride() + radius, outputs * shape.width))
+            });
+            match beyond.checked_sub(radius).filter(|&y| y < height) {
+                Some(y) => Arch::new().dispatch(RowCorrelation {
+                    shape,
+                    pairs: &pairs.collect::<Vec<_>>(),
+                    first,
+                    second: &second[image + y * shape.stride()..],
+                    out: to,
+                }),
+                None => pairs.for_each(|(_, outputs)| {
+                    for right in 0..side {
+                        // SAFETY: every output row belongs to one row of the second image.
+                        unsafe { to.slice(outputs + right * shape.area(), shape.width) }.fill(0.0);
+                    }
+                }),
+            }
+        });
+    };
+    shape.padded(first, |first| {
+        shape.padded(second, |second| correlate(first, second));
+    });
+}
+
+/// Gradient of [`local_correlation`] with respect to its first image.
+///
+/// # Shapes
+/// As [`local_correlation`]; `grad_first` N×C×H×W, overwritten.
+///
+/// # Panics
+/// When a length does not fit.
+pub fn local_correlation_backward_first(
+    shape: &CorrelationShape,
+    second: &[f32],
+    grad_out: &[f32],
+    grad_first: &mut [f32],
+) {
+    // Σ_d grad(d, p)·second(p + d).
+    sum_displacements(shape, second, grad_out, grad_first, |y, down, right| {
+        let other = (y + down).checked_sub(shape.radius)?;
+        (other < shape.height).then_some(Tap {
+            grad: (y, shape.radius),
+            other: (other, right),
+        })
+    });
+}
+
+/// Gradient of [`local_correlation`] with respect to its second image.
+///
+/// # Shapes
+/// As [`local_correlation`]; `grad_second` N×C×H×W, overwritten.
+///
+/// # Panics
+/// When a length does not fit.
+pub fn local_correlation_backward_second(
+    shape: &CorrelationShape,
+    first: &[f32],
+    grad_out: &[f32],
+    grad_second: &mut [f32],
+) {
+    // Σ_d grad(d, p − d)·first(p − d).
+    sum_displacements(shape, first, grad_out, grad_second, |y, down, right| {
+        let other = (y + shape.radius).checked_sub(down)?;
+        let from = (other, 2 * shape.radius - right);
+        (other < shape.height).then_some(Tap {
+            grad: from,
+            other: from,
+        })
+    });
+}
+
+/// Where one displacement's products are read for the first pixel of a row: row, and column of the padded copies.
+struct Tap {
+    grad: (usize, usize),
+    other: (usize, usize),
+}
+
+/// out(c, p) = (1/C) Σ_d grad(d, ·)·other(c, ·), read where `tap(row of p, d_y + r, d_x + r)` says.
+fn sum_displacements(
+    shape: &CorrelationShape,
+    other: &[f32],
+    grad: &[f32],
+    out: &mut [f32],
+    tap: impl Fn(usize, usize, usize) -> Option<Tap> + Sync,
+) {
+    let batch = shape.batch(other.len(), grad.len());
+    assert_eq!(out.len(), other.len(), "gradient length");
+    let (height, side) = (shape.height, shape.side());
+    let at = |(row, column): (usize, usize)| row * shape.stride() + column;
+    let to = SharedMut::new(out);
+    let sum = |grad: &[f32], other: &[f32]| {
+        (0..batch * height).into_par_iter().for_each(|task| {
+            let (n, y) = (task / height, task % height);
+            let taps: Vec<_> = (0..shape.displacements())
+                .filter_map(|d| {
+                    let tap = tap(y, d / side, d % side)?;
+                    Some((d * shape.plane() + at(tap.grad), at(tap.other)))
+                })
+                .collect();
+            Arch::new().dispatch(DisplacementSums {
+                shape,
+                taps: &taps,
+                grad: &grad[n * shape.displacements() * shape.plane()..],
+                other: &other[n * shape.channels * shape.plane()..],
+                out: to,
+                start: n * shape.channels * shape.area() + y * shape.width,
+            });
+        });
+    };
+    shape.padded(grad, |grad| shape.padded(other, |other| sum(grad, other)));
+}
