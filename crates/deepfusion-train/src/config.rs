@@ -131,7 +131,7 @@ pub struct TrainConfig {
     pub pose_net: PoseNetConfig,
     /// The flow decoder, which training alone has, and only where `loss.flow.weight` is above 0.
     #[serde(default)]
-    pub flow_net: FlowDecoderConfig,
+    pub flow_decoder: FlowDecoderConfig,
 }
 
 impl TrainConfig {
@@ -226,7 +226,7 @@ impl TrainConfig {
         self.size.validate()?;
         self.depth_net.validate()?;
         self.pose_net.encoder.validate()?;
-        self.flow_net.validate()?;
+        self.flow_decoder.validate()?;
         self.loss.validate()?;
         if self.batch == 0 {
             return fail("batch", "at least 1", "0".into());

@@ -86,7 +86,7 @@ impl Model {
         if config.loss.flow.weight > 0.0 {
             let mut rng = WeightRng::new(config.seed.wrapping_add(2));
             let channels = config.depth_net.encoder.channels();
-            model.flow_decoder = Some(config.flow_net.init(channels, &mut rng, device)?);
+            model.flow_decoder = Some(config.flow_decoder.init(channels, &mut rng, device)?);
         }
         Ok(model)
     }
@@ -158,9 +158,13 @@ impl Model {
         let twice = |k: &Tensor<3>| Tensor::cat(vec![k.clone(), k.clone()], 0);
         let features = self.depth_net.encoder.forward(pair(first, second, 0));
         let flows = self.flow_decoder.as_ref().map(|decoder| {
-            let flow = decoder.forward(&features, &features.clone().map(swap_halves));
-            let back = swap_halves(flow.clone());
-            ViewFlow { flow, back }
+            let n = batch.len();
+            let [one, other] = [0, n].map(|at| features.clone().map(|f| f.narrow(0, at, n)));
+            let [flow, back] = decoder.forward_both(&one, &other).map(|f| f.flow);
+            ViewFlow {
+                flow: pair(&flow, &back, 0),
+                back: pair(&back, &flow, 0),
+            }
         });
         ForwardPass {
             disparities: self.depth_net.decode(features),
@@ -231,11 +235,9 @@ impl Model {
         let frame = |index: usize| all.clone().map(|f| f.narrow(0, index * n, n));
         let targets = frame(0);
         let flows = (1..batch.network.len()).map(|source| {
-            let source = frame(source);
-            ViewFlow {
-                flow: decoder.forward(&targets, &source),
-                back: decoder.forward(&source, &targets),
-            }
+            let both = decoder.forward_both(&targets, &frame(source));
+            let [flow, back] = both.map(|f| f.flow);
+            ViewFlow { flow, back }
         });
         let flows = flows.collect();
         (self.depth_net.decode(targets), flows)

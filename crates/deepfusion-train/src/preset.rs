@@ -83,7 +83,7 @@ impl Preset {
                 metres_per_unit: 0.0,
                 ..PoseNetConfig::new(depth)
             },
-            flow_net: FlowDecoderConfig::default(),
+            flow_decoder: FlowDecoderConfig::default(),
         };
         match self {
             Self::Tiny => {

@@ -1,6 +1,6 @@
 use super::mean::mean_where;
 use crate::loss_config::FlowLossConfig;
-use burn::tensor::{Bool, Device, Int, Tensor};
+use burn::tensor::{Bool, Device, Tensor};
 use deepfusion_nn::ops;
 
 /// The pixels' own places, u then v.
@@ -9,12 +9,7 @@ use deepfusion_nn::ops;
 /// - output: `[1, 2, height, width]`
 #[must_use]
 pub fn pixel_grid([height, width]: [usize; 2], device: &Device) -> Tensor<4> {
-    let device = device.clone().inner();
-    let along = |size: usize| Tensor::<1, Int>::arange(0..size as i64, &device).float();
-    let u = along(width).reshape([1, 1, 1, width]);
-    let v = along(height).reshape([1, 1, height, 1]);
-    let size = [1, 1, height, width];
-    Tensor::cat(vec![u.expand(size), v.expand(size)], 1)
+    ops::flow_coords(Tensor::zeros([1, 2, height, width], &device.clone().inner()))
 }
 
 /// A source seen from the targets by an optical flow.
@@ -46,7 +41,7 @@ pub fn flow_view(
     ssim_weight: f64,
 ) -> FlowView {
     let [_, _, height, width] = flow.dims();
-    let coords = flow.clone() + pixel_grid([height, width], &flow.device());
+    let coords = ops::flow_coords(flow.clone());
     let image = ops::warp(source.clone(), coords.clone());
     let returning = ops::warp(back.clone(), coords.clone());
     let round_trip = flow.clone() + returning.clone();
