@@ -22,7 +22,6 @@ mod pose;
 mod predictor;
 mod prepare;
 mod preset;
-mod resample;
 mod runner;
 mod sampler;
 mod source;
@@ -36,6 +35,7 @@ pub use checkpoint::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder, 
 pub use config::{
     Augmentation, DataConfig, Reprojection, ReversedPose, TrainConfig, ViewMotion,
 };
+pub use deepfusion_nn::BilinearResize;
 pub use error::Error;
 pub use event::{Control, TrainEvent};
 pub use loss_config::{CompareAt, FlowLossConfig, LossConfig, MovingConfig};
@@ -47,7 +47,7 @@ pub use pose::{Motion, rotation_from_axis_angle};
 pub use predictor::{Prediction, Predictor};
 pub use prepare::{PreparedImage, Preparer};
 pub use preset::Preset;
-pub use resample::BilinearResize;
+
 pub use runner::{BurnRunner, DepthRunner, FusedRunner};
 pub use sampler::Sampler;
 pub use source::{Sample, SampleSet};

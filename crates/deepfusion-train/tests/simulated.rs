@@ -202,6 +202,7 @@ fn the_flow_is_seen_from_every_target_in_both_arrangements() {
     let (mut config, samples, _) = small(&drive(folder.path(), 8), 1);
     let device = Device::flex().autodiff();
     config.loss.with("flow").unwrap();
+    config.pose_net.metres_per_unit = 0.8;
     for (reprojection, frames, targets) in [
         (Reprojection::Bidirectional, vec![1], 4),
         (Reprojection::Minimum, vec![-1, 1], 2),
