@@ -11,6 +11,7 @@ mod checkpoint;
 mod config;
 mod error;
 mod event;
+mod inspector;
 mod level;
 pub mod log;
 pub mod losses;
@@ -37,6 +38,7 @@ pub use config::{
 };
 pub use error::Error;
 pub use event::{Control, TrainEvent};
+pub use inspector::{FeatureMap, Inspector, LayerMaps};
 pub use losses::LossTerms;
 pub use model::{BatchLoss, ForwardPass, Model};
 pub use panel::SamplePanel;
