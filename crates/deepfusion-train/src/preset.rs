@@ -18,16 +18,19 @@ pub enum Preset {
     Light,
     /// ResNet-50, 640×192, batch 12: the paper's sizes.
     Resnet50,
+    /// The paper's network (ResNet-50, context encoding, attention), 640×192, batch 12.
+    Paper,
     /// Monodepth2's network and losses (three frames, minimum reprojection) with the speed term.
     Monodepth2,
 }
 
 impl Preset {
     /// All presets with the names the command line takes.
-    pub const ALL: [(Self, &'static str); 4] = [
+    pub const ALL: [(Self, &'static str); 5] = [
         (Self::Tiny, "tiny"),
         (Self::Light, "light"),
         (Self::Resnet50, "resnet50"),
+        (Self::Paper, "paper"),
         (Self::Monodepth2, "monodepth2"),
     ];
 
@@ -114,6 +117,10 @@ impl Preset {
                 config
             }
             Self::Resnet50 => base(ResNetDepth::ResNet50),
+            Self::Paper => TrainConfig {
+                depth_net: DepthNetConfig::paper(),
+                ..base(ResNetDepth::ResNet50)
+            },
             Self::Monodepth2 => {
                 let mut config = base(ResNetDepth::ResNet18);
                 config.frames = vec![-1, 1];

@@ -241,6 +241,13 @@ fn weights_and_bench_tell_what_they_do() {
     );
     assert!(bench["peak_device_mb"].is_null());
     assert!(bench["parameters"].as_u64().unwrap() > 100_000);
+    let modules = bench["modules"].as_array().unwrap();
+    let (pose, depth) = modules.split_last().unwrap();
+    assert_eq!(pose["name"], "pose_net");
+    for total in ["parameters", "multiply_adds"] {
+        let parts = depth.iter().map(|m| m[total].as_u64().unwrap());
+        assert_eq!(bench[total].as_u64().unwrap(), parts.sum::<u64>());
+    }
     #[cfg(target_os = "linux")]
     assert!(bench["peak_rss_mb"].as_f64().unwrap() > 1.0);
 }

@@ -77,6 +77,8 @@ pub enum Save {
     SideBySide,
     /// Coloured point cloud in the camera's axes.
     Ply,
+    /// What the network sees: its features and attention masks on the image.
+    Features,
 }
 
 /// `deepfusion weights …`.

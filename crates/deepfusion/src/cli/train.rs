@@ -81,6 +81,8 @@ pub enum PresetChoice {
     Light,
     /// ResNet-50, 640×192, batch 12.
     Resnet50,
+    /// The paper's network: ResNet-50 with context and attention, 640×192, batch 12.
+    Paper,
     /// Monodepth2's network and losses, with the speed term.
     Monodepth2,
 }

@@ -128,6 +128,7 @@ pub fn preset(choice: PresetChoice) -> Preset {
         PresetChoice::Tiny => Preset::Tiny,
         PresetChoice::Light => Preset::Light,
         PresetChoice::Resnet50 => Preset::Resnet50,
+        PresetChoice::Paper => Preset::Paper,
         PresetChoice::Monodepth2 => Preset::Monodepth2,
     }
 }

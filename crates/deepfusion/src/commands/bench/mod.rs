@@ -1,3 +1,7 @@
+//! `deepfusion bench`: what a network costs, and how fast every stage around it is.
+
+mod modules;
+
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -10,10 +14,11 @@ use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_nn::weights::collect;
 use deepfusion_render::{DepthScale, depth_picture};
 use deepfusion_sim::{SimConfig, Simulation};
-use deepfusion_train::{DepthRunner, Predictor, TrainConfig};
+use deepfusion_train::{DepthRunner, TrainConfig};
 use image::codecs::jpeg::JpegEncoder;
 use serde::Serialize;
 
+use self::modules::{Module, Modules};
 use super::{device, train::preset};
 use crate::cli::{BenchArgs, PresetChoice};
 use crate::pipeline::{self, Threads};
@@ -31,7 +36,10 @@ struct Report {
     device: &'static str,
     network: String,
     size: [usize; 2],
-    parameters: usize,
+    /// That the depth network learns.
+    parameters: u64,
+    /// In the depth network's convolutions, for one image.
+    multiply_adds: u64,
     /// Median of each stage.
     stages_ms: Stages,
     /// From decode to colour, one after another.
@@ -40,6 +48,8 @@ struct Report {
     fps: f64,
     peak_rss_mb: Option<f64>,
     peak_device_mb: Option<f64>,
+    /// What each part of the networks costs.
+    modules: Vec<Module>,
     /// Least milliseconds of each step of the network, where asked for and known.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     profile_ms: Vec<(String, f64)>,
@@ -57,7 +67,9 @@ struct Stages {
 
 /// `deepfusion bench`.
 pub fn run(args: &BenchArgs) -> Result<()> {
-    let (name, parameters, config, runner) = network(args)?;
+    let (name, config, runner) = network(args)?;
+    let modules = Modules::new(&config);
+    let table = modules.table();
     let repeats = args.repeats.max(1);
     let bench = Bench::new(&config, &*runner)?;
     let stages = bench.stages(repeats)?;
@@ -71,7 +83,9 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         device: device::name(args.engine.device),
         network: name,
         size: [config.size.width, config.size.height],
-        parameters,
+        parameters: modules.parameters(),
+        multiply_adds: modules.multiply_adds(),
+        modules: modules.into_list(),
         latency_ms: stages.sum(),
         fps: bench.overlapped_fps(repeats)?,
         peak_rss_mb: peak_rss_mb(),
@@ -87,7 +101,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         .peak_rss_mb
         .map_or("?".into(), |m| format!("{m:.0} MB"));
     output::print(&format!(
-        "{} at {}x{}, {:.2} M parameters, {} engine on {}\n\
+        "{} at {}x{}, {:.2} M parameters, {:.2} G multiply-adds, {} engine on {}\n\
          median of {} runs, ms\n\
          decode  {:8.2}   JPEG {}x{}\n\
          resize  {:8.2}   Lanczos, to a tensor\n\
@@ -101,6 +115,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         report.size[0],
         report.size[1],
         report.parameters as f64 / 1e6,
+        report.multiply_adds as f64 / 1e9,
         report.engine,
         report.device,
         repeats,
@@ -116,6 +131,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         report.fps,
         repeats * IMAGES_PER_REPEAT,
     ))?;
+    output::print(&format!("\n{table}"))?;
     output::print(&profile_table(&report.profile_ms))
 }
 
@@ -127,21 +143,12 @@ fn profile_table(steps: &[(String, f64)]) -> String {
     steps.iter().map(line).collect()
 }
 
-/// The network asked for: its name, its number of parameters, its configuration and what runs it.
-fn network(args: &BenchArgs) -> Result<(String, usize, TrainConfig, Arc<dyn DepthRunner>)> {
+/// The network asked for: its name, its configuration and what runs it.
+fn network(args: &BenchArgs) -> Result<(String, TrainConfig, Arc<dyn DepthRunner>)> {
     if let Some(path) = &args.model {
-        let mut parameters = 0;
-        let predictor = Predictor::load(path, |config, weights| {
-            parameters = weights.value_count();
-            engine::runner(&args.engine, config, weights)
-        })?;
+        let predictor = engine::load(path, &args.engine)?;
         let config = predictor.config().clone();
-        return Ok((
-            path.display().to_string(),
-            parameters,
-            config,
-            predictor.into_runner(),
-        ));
+        return Ok((path.display().to_string(), config, predictor.into_runner()));
     }
     let preset = preset(args.preset.unwrap_or(PresetChoice::Tiny));
     let mut config = preset.config();
@@ -151,9 +158,8 @@ fn network(args: &BenchArgs) -> Result<(String, usize, TrainConfig, Arc<dyn Dept
     }
     config.validate()?;
     let weights = collect(&config.depth_net.init(&Device::flex())?);
-    let parameters = weights.value_count();
     let runner = engine::runner(&args.engine, &config, weights)?;
-    Ok((preset.to_string(), parameters, config, runner))
+    Ok((preset.to_string(), config, runner))
 }
 
 impl Stages {

@@ -1,6 +1,7 @@
 //! `deepfusion predict`: images to metric depth, in bulk.
 
 mod camera;
+mod features;
 mod inputs;
 mod ledger;
 mod manifest;
@@ -11,13 +12,14 @@ mod sidecar;
 use anyhow::{Context, Result};
 use deepfusion_data::{RgbImage, load_rgb};
 use deepfusion_geometry::Intrinsics;
-use deepfusion_train::{Prediction, Predictor, PreparedImage, Preparer};
+use deepfusion_train::{Inspector, LayerMaps, Prediction, Predictor, PreparedImage, Preparer};
 
 use self::camera::CameraSource;
 use self::inputs::Input;
 use self::ledger::Ledger;
 use self::manifest::{Lock, Manifest};
 use self::sidecar::{FileMark, MadeWith, Sidecar};
+use super::device;
 use crate::cli::{PredictArgs, Save};
 use crate::engine;
 use crate::error::CliError;
@@ -34,6 +36,8 @@ struct Job<'a> {
     step: usize,
     /// Whether the run learned metres.
     metric: bool,
+    /// Where features are to be saved.
+    inspector: Option<Inspector>,
 }
 
 /// An image on its way through the network.
@@ -41,6 +45,13 @@ struct Loaded {
     mark: FileMark,
     image: RgbImage,
     camera: Option<Intrinsics>,
+}
+
+/// What the network says about an image.
+struct Seen {
+    prediction: Prediction,
+    /// Empty where nobody asked for features.
+    layers: Vec<LayerMaps>,
 }
 
 /// `deepfusion predict`.
@@ -59,6 +70,13 @@ pub fn run(args: &PredictArgs) -> Result<()> {
         made_with: MadeWith::new(args, &predictor, &camera)?,
         step: predictor.step,
         metric: predictor.training_camera().is_some() && predictor.config().loss.speed > 0.0,
+        inspector: match args.save.contains(&Save::Features) {
+            true => Some(Inspector::load(
+                &args.model,
+                &device::open(args.engine.device)?,
+            )?),
+            false => None,
+        },
     };
     std::fs::create_dir_all(&args.out).map_err(|e| deepfusion_data::Error::file(&args.out, e))?;
     interrupt::catch("stopping after the images at work; the same command goes on from there");
@@ -131,11 +149,20 @@ fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], le
         let loaded = job.load(mine[todo[i]]);
         loaded.map_err(|e| ledger.failed(todo[i], e)).ok()
     };
-    let infer = |(loaded, prepared): (Loaded, PreparedImage)| (loaded, predictor.infer(&prepared));
-    let write = |i: usize, (loaded, prediction): (Loaded, Result<Prediction, _>)| {
-        let sidecar = prediction
+    let infer = |(loaded, prepared): (Loaded, PreparedImage)| {
+        let seen = predictor.infer(&prepared).map(|prediction| Seen {
+            prediction,
+            layers: match &job.inspector {
+                Some(inspector) => inspector.inspect(&prepared.input),
+                None => Vec::new(),
+            },
+        });
+        (loaded, seen)
+    };
+    let write = |i: usize, (loaded, seen): (Loaded, Result<Seen, _>)| {
+        let sidecar = seen
             .map_err(anyhow::Error::from)
-            .and_then(|prediction| job.write(mine[todo[i]], &loaded, &prediction));
+            .and_then(|seen| job.write(mine[todo[i]], &loaded, &seen));
         match sidecar {
             Ok(sidecar) => ledger.done(todo[i], sidecar),
             Err(error) => ledger.stop(error),
@@ -167,18 +194,19 @@ impl Job<'_> {
     }
 
     /// Writes an image's outputs, then its sidecar.
-    fn write(&self, input: &Input, loaded: &Loaded, prediction: &Prediction) -> Result<Sidecar> {
-        let (args, image) = (self.args, &loaded.image);
+    fn write(&self, input: &Input, loaded: &Loaded, seen: &Seen) -> Result<Sidecar> {
+        let (args, image, prediction) = (self.args, &loaded.image, &seen.prediction);
         let depth = prediction.depth();
         let (mut files, mut file_bytes) = (Vec::new(), Vec::new());
         for save in &args.save {
             let file = outputs::file_name(&input.name, *save);
             let path = args.out.join(&file);
-            outputs::write(args, *save, image, loaded.camera.as_ref(), &depth, &path)?;
+            let (camera, maps) = (loaded.camera.as_ref(), (prediction, &depth));
+            outputs::write(args, *save, image, camera, maps, &seen.layers, &path)?;
             file_bytes.push(FileMark::of(&path)?.bytes);
             files.push(file);
         }
-        let seen = depth.data.iter().copied().filter(|d| *d > 0.0);
+        let known = depth.data.iter().copied().filter(|d| *d > 0.0);
         let ends = |[low, high]: [f32; 2], d: f32| [low.min(d), high.max(d)];
         let sidecar = Sidecar {
             image: input.path.clone(),
@@ -192,7 +220,7 @@ impl Job<'_> {
             scale_trusted: self.metric && self.camera.word() == "given",
             focal_factor: prediction.focal_factor,
             window: prediction.window,
-            depth_m: seen
+            depth_m: known
                 .map(|d| [d, d])
                 .reduce(|ends_so_far, [d, _]| ends(ends_so_far, d)),
             files,

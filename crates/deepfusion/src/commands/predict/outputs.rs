@@ -8,7 +8,9 @@ use deepfusion_cloud::PointCloud;
 use deepfusion_data::{RgbImage, save_png, write_atomically, write_depth_png};
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_render::{DepthScale, depth_picture, side_by_side, with_depth_legend};
+use deepfusion_train::{LayerMaps, Prediction};
 
+use super::features;
 use crate::cli::{PredictArgs, Save};
 use crate::error::CliError;
 
@@ -20,17 +22,19 @@ pub fn file_name(name: &str, save: Save) -> String {
         Save::Color => "_color.png",
         Save::SideBySide => "_side.png",
         Save::Ply => ".ply",
+        Save::Features => "_features.png",
     };
     format!("{name}{ending}")
 }
 
-/// Writes one output, atomically.
+/// Writes one output, atomically; `layers` are the network's, where [`Save::Features`] was asked for.
 pub fn write(
     args: &PredictArgs,
     save: Save,
     image: &RgbImage,
     camera: Option<&Intrinsics>,
-    depth: &DepthMap,
+    (prediction, depth): (&Prediction, &DepthMap),
+    layers: &[LayerMaps],
     path: &Path,
 ) -> Result<()> {
     let scale = DepthScale::default();
@@ -42,6 +46,10 @@ pub fn write(
             save_png(&picture, path)?;
         }
         Save::SideBySide => save_png(&side_by_side(image, depth, &scale)?, path)?,
+        Save::Features => {
+            let picture = features::picture(image, depth, prediction.window, layers)?;
+            save_png(&picture, path)?;
+        }
         Save::Ply => {
             let k = camera.ok_or(CliError::NoCamera)?;
             let rgb = Some(image.as_raw().as_slice());
