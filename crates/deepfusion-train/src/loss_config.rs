@@ -122,6 +122,15 @@ impl LossConfig {
     const AFFINE: f64 = 0.01;
     const FLOW: f64 = 0.1;
 
+    /// The same with every term on.
+    #[must_use]
+    pub fn with_every_term(mut self) -> Self {
+        for term in Self::TERMS {
+            self.with(term).expect("TERMS are the names that it takes");
+        }
+        self
+    }
+
     /// Switches a term on by its name, at the paper's weight unless it has one already. Moving pixels bring
     /// the flow with them.
     ///

@@ -117,10 +117,12 @@ impl Preset {
                 config
             }
             Self::Resnet50 => base(ResNetDepth::ResNet50),
-            Self::Paper => TrainConfig {
-                depth_net: DepthNetConfig::paper(),
-                ..base(ResNetDepth::ResNet50)
-            },
+            Self::Paper => {
+                let mut config = base(ResNetDepth::ResNet50);
+                config.depth_net = DepthNetConfig::paper();
+                config.loss = config.loss.with_every_term();
+                config
+            }
             Self::Monodepth2 => {
                 let mut config = base(ResNetDepth::ResNet18);
                 config.frames = vec![-1, 1];
