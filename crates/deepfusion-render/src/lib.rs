@@ -13,6 +13,7 @@ mod error_picture;
 mod html;
 mod panel;
 mod text;
+mod top_view;
 
 pub use captioned::{Tile, sheet};
 pub use chart::{LineChart, Series};
@@ -24,3 +25,4 @@ pub use error_picture::error_picture;
 pub use html::{HtmlReport, PictureFormat};
 pub use panel::{SamplePanel, sample_panel};
 pub use text::{TextSize, draw_text, text_width};
+pub use top_view::TopView;

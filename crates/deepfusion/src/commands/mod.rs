@@ -4,6 +4,7 @@ mod bench;
 mod demo;
 pub mod device;
 mod eval;
+mod eval_odometry;
 mod evaluate;
 mod export;
 mod export_gt;
@@ -31,6 +32,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Data(DataCommand::ExportGt(args)) => export_gt::run(&args),
         Command::Train(args) => train::run(&args),
         Command::Eval(args) => eval::run(&args),
+        Command::EvalOdometry(args) => eval_odometry::run(&args),
         Command::Predict(args) => predict::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Weights(WeightsCommand::Import { files, out }) => weights::import(&files, &out),
