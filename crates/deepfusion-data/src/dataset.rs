@@ -116,6 +116,10 @@ pub struct Dataset {
     frames: Vec<Frame>,
     selected: Vec<usize>,
     calibration: Calibration,
+    /// Nanoseconds since 1970 from which seconds are counted: the camera's first time stamp.
+    origin_ns: Option<i64>,
+    /// Seconds by frame number, also of frames without an image.
+    times_s: Vec<Option<f64>>,
     track: Option<VehicleTrack>,
 }
 
@@ -220,6 +224,11 @@ impl Dataset {
             frames,
             selected,
             calibration,
+            origin_ns,
+            times_s: match (&times, origin_ns) {
+                (Some(times), Some(origin)) => times.all_seconds(origin),
+                _ => Vec::new(),
+            },
             track,
         };
         // Reading a header takes some microseconds, and a wrong size found now is not found at night.
@@ -281,6 +290,19 @@ impl Dataset {
     #[must_use]
     pub fn track(&self) -> Option<&VehicleTrack> {
         self.track.as_ref()
+    }
+
+    /// Nanoseconds since 1970 from which its seconds are counted, where it has time stamps.
+    #[must_use]
+    pub fn origin_ns(&self) -> Option<i64> {
+        self.origin_ns
+    }
+
+    /// The time of a frame number, whether or not there is an image of it, in seconds from the drive's
+    /// first time stamp.
+    #[must_use]
+    pub fn time_of(&self, number: u64) -> Option<f64> {
+        *self.times_s.get(usize::try_from(number).ok()?)?
     }
 
     /// The camera of a frame's full-size image.

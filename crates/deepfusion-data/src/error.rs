@@ -116,6 +116,16 @@ pub enum Error {
         /// What is wrong with it.
         problem: String,
     },
+    /// A file of tracklets cannot be read.
+    #[error("{}: {place}: {problem}", path.display())]
+    Tracklets {
+        /// The file.
+        path: PathBuf,
+        /// The tracklet, pose and field (counted from 0), or the byte where the text stops being XML.
+        place: String,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// A split file's line cannot be read.
     #[error("{}:{line}: {problem}", path.display())]
     Split {
@@ -272,6 +282,9 @@ impl Error {
             }
             Self::Oxts { .. } => {
                 "a packet is 30 numbers (oxts/dataformat.txt): repair it, or delete the file to leave the sample out"
+            }
+            Self::Tracklets { .. } => {
+                "fetch the drive's tracklets again, or move the file away to evaluate without them"
             }
             Self::Split { .. } => "lines look like: 2011_09_26/2011_09_26_drive_0009_sync 16 l",
             Self::SplitSelectsNothing { .. } => {

@@ -113,7 +113,7 @@ impl Error {
         match self {
             Self::InvalidPrediction { kind, .. } => Some(format!(
                 "a network's {kind} is positive everywhere; where these values mean \"no prediction\", pass --allow-holes: \
-                 they are left out and counted as hole_rate"
+                 they are left out and counted as missing_rate"
             )),
             Self::Shape { .. } => Some("arrays are H×W, row by row".into()),
             Self::Protocol { field, expected, .. } => Some(format!("set {field} to {expected}")),

@@ -1,6 +1,7 @@
 use deepfusion_geometry::Intrinsics;
 
 use crate::error::first_names;
+use crate::holes;
 use crate::metrics::{Metrics, Sums};
 use crate::report::{FixedScaled, Points, ProtocolSummary, RangeBin, Report, Scale};
 use crate::resample::{Axis, sample};
@@ -66,7 +67,10 @@ pub struct Evaluator {
     points: Reservoir,
     /// Pixels with ground truth inside the mask, and those of them without prediction.
     masked: usize,
-    holes: usize,
+    missing: usize,
+    /// Hole rates of the images that have near pixels, and of their moving pixels.
+    hole_rates: Vec<f64>,
+    moving_hole_rates: Vec<f64>,
 }
 
 impl Evaluator {
@@ -82,7 +86,9 @@ impl Evaluator {
             bins: Default::default(),
             points: Reservoir::new(protocol.points, protocol.seed),
             masked: 0,
-            holes: 0,
+            missing: 0,
+            hole_rates: Vec::new(),
+            moving_hole_rates: Vec::new(),
             protocol,
         })
     }
@@ -214,8 +220,11 @@ impl Evaluator {
             ranges: self.ranges(),
             still: average(|i| i.still.as_ref()),
             moving: average(|i| i.moving.as_ref()),
-            hole_rate: (self.protocol.holes == Holes::Skip)
-                .then(|| self.holes as f64 / self.masked.max(1) as f64),
+            moving_images: images.iter().filter(|i| i.moving.is_some()).count(),
+            hole_rate: mean(&self.hole_rates),
+            hole_rate_moving: mean(&self.moving_hole_rates),
+            missing_rate: (self.protocol.holes == Holes::Skip)
+                .then(|| self.missing as f64 / self.masked.max(1) as f64),
             points: self.point_statistics(),
             trivial: None,
             skipped: self.skipped.clone(),
@@ -304,6 +313,7 @@ impl Evaluator {
         let rows = Axis::new(grid.height(), truth.height());
         let (window_rows, window_columns) =
             self.protocol.crop.window(truth.width(), truth.height());
+        let (mut near, mut near_moving) = (holes::Holes::default(), holes::Holes::default());
         let mut pixels = Vec::new();
         for y in window_rows {
             for x in window_columns.clone() {
@@ -313,16 +323,20 @@ impl Evaluator {
                     continue;
                 }
                 self.masked += 1;
-                match sample(disparities, grid.width(), &columns, &rows, x, y) {
-                    Some(disparity) => pixels.push(Pixel {
-                        index,
-                        gt,
-                        pred: 1.0 / disparity,
-                    }),
-                    None => self.holes += 1,
+                let pred = sample(disparities, grid.width(), &columns, &rows, x, y)
+                    .map(|disparity| 1.0 / disparity);
+                near.push(gt, pred, self.protocol.cap_m);
+                if image.moving.is_some_and(|labels| labels[index]) {
+                    near_moving.push(gt, pred, self.protocol.cap_m);
+                }
+                match pred {
+                    Some(pred) => pixels.push(Pixel { index, gt, pred }),
+                    None => self.missing += 1,
                 }
             }
         }
+        self.hole_rates.extend(near.rate());
+        self.moving_hole_rates.extend(near_moving.rate());
         pixels
     }
 }

@@ -3,7 +3,7 @@
 //! The way of an image: a [`Prediction`] (depth or disparity, any size) and a ground truth [`Grid`] go into
 //! [`Evaluator::add`]; [`Evaluator::report`] gives the [`Report`], whose JSON is the one scripts rely on and whose
 //! `Display` is the table for people. [`TrivialBaseline`] makes the row that any useful network must beat: the mean
-//! depth of each pixel over the training scans.
+//! depth of each pixel over the training scans. Paths of the camera are compared in [`odometry`].
 //!
 //! # Conventions
 //! Depth is camera z in metres; ground truth 0 (or NaN, or negative) means none. Disparity is 1/depth in 1/m. Arrays are
@@ -13,7 +13,9 @@ mod array_set;
 mod error;
 mod evaluator;
 mod grid;
+mod holes;
 mod metrics;
+pub mod odometry;
 mod protocol;
 mod report;
 mod resample;

@@ -53,7 +53,7 @@ pub enum Holes {
     /// An error that names the array: the default, since a network has no holes.
     #[default]
     Refuse,
-    /// They mean "no prediction here": left out of the metrics and counted in `hole_rate`.
+    /// They mean "no prediction here": left out of the metrics and counted in `missing_rate`.
     Skip,
 }
 

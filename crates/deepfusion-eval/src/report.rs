@@ -21,15 +21,25 @@ pub struct Report {
     pub scale: Scale,
     /// Unscaled, by distance; pooled over pixels.
     pub ranges: Vec<RangeBin>,
-    /// Unscaled metrics of what does not move, where labels tell.
+    /// Unscaled metrics of what does not move, where labels tell; means over the images that have such pixels.
     #[serde(default, rename = "static", skip_serializing_if = "Option::is_none")]
     pub still: Option<Metrics>,
-    /// Unscaled metrics of what moves, where labels tell.
+    /// Unscaled metrics of what moves, where labels tell; means over the images in which something does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moving: Option<Metrics>,
-    /// Share of the ground truth without prediction, where predictions may have holes.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// How many images these are.
+    #[serde(default, skip_serializing_if = "none")]
+    pub moving_images: usize,
+    /// Share of the near ground truth (nearer than half the cap) whose prediction is at the far limit (0.9 of the cap
+    /// or more), more than three times too far, or absent; the mean over images with near ground truth. Unscaled.
+    #[serde(default)]
     pub hole_rate: Option<f64>,
+    /// The same of what moves, where labels tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hole_rate_moving: Option<f64>,
+    /// Share of the ground truth without prediction, where predictions may be absent; pooled over pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missing_rate: Option<f64>,
     /// Distances of randomly drawn points from the truth, where asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points: Option<Points>,
@@ -39,6 +49,11 @@ pub struct Report {
     /// Names of images without a pixel to compare, if any.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub skipped: Vec<String>,
+}
+
+/// Whether a count is not worth a field.
+fn none(count: &usize) -> bool {
+    *count == 0
 }
 
 impl Report {

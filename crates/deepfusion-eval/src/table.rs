@@ -61,11 +61,17 @@ impl Report {
         if let Some(fixed) = &self.fixed_scaled {
             row(f, &format!("scaled by {}", fixed.factor), &fixed.metrics)?;
         }
-        if let Some(metrics) = &self.still {
-            row(f, "static", metrics)?;
-        }
+        // Where nothing moves, the static row would only repeat the first.
         if let Some(metrics) = &self.moving {
-            row(f, "moving", metrics)?;
+            if let Some(still) = &self.still {
+                row(f, "static", still)?;
+            }
+            let plural = if self.moving_images == 1 { "" } else { "s" };
+            row(
+                f,
+                &format!("moving, {} image{plural}", self.moving_images),
+                metrics,
+            )?;
         }
         if let Some(trivial) = &self.trivial {
             row(f, "trivial", &trivial.unscaled)?;
@@ -91,9 +97,21 @@ impl Report {
             scale.bias
         )?;
         if let Some(rate) = self.hole_rate {
+            let near = self.protocol.cap_m * 0.5;
+            write!(
+                f,
+                "holes   {:.2} % of what is nearer than {near} m is seen at the far limit or over 3 times too far",
+                100.0 * rate
+            )?;
+            match self.hole_rate_moving {
+                Some(rate) => writeln!(f, "; {:.2} % of what moves", 100.0 * rate)?,
+                None => writeln!(f)?,
+            }
+        }
+        if let Some(rate) = self.missing_rate {
             writeln!(
                 f,
-                "holes   {:.2} % of the ground truth has no prediction",
+                "missing {:.2} % of the ground truth has no prediction",
                 100.0 * rate
             )?;
         }

@@ -49,7 +49,7 @@ fn json_has_the_promised_fields_and_survives_a_round_trip() {
     };
     assert_eq!(
         keys(&json),
-        "median_scaled n protocol ranges scale trivial unscaled"
+        "hole_rate median_scaled n protocol ranges scale trivial unscaled"
     );
     assert_eq!(keys(&json["protocol"]), "cap_m crop gt min_m");
     assert_eq!(

@@ -134,7 +134,7 @@ fn predictions_that_are_no_depth_are_refused_or_counted() {
         .unwrap();
         evaluator.add("0000000007", &prediction, &truth).unwrap();
         let report = evaluator.report().unwrap();
-        assert_eq!(report.hole_rate, Some(1.0 / (WIDTH * HEIGHT) as f64));
+        assert_eq!(report.missing_rate, Some(1.0 / (WIDTH * HEIGHT) as f64));
         assert!(report.unscaled.abs_rel < 1e-12);
     }
 }

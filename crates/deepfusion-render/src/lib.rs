@@ -14,6 +14,7 @@ mod feature_picture;
 mod html;
 mod panel;
 mod text;
+mod top_view;
 
 pub use captioned::{Tile, sheet};
 pub use chart::{LineChart, Series};
@@ -26,3 +27,4 @@ pub use feature_picture::{feature_picture, feature_range};
 pub use html::{HtmlReport, PictureFormat};
 pub use panel::{SamplePanel, sample_panel};
 pub use text::{TextSize, draw_text, text_width};
+pub use top_view::TopView;

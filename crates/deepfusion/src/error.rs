@@ -210,6 +210,8 @@ pub fn hint_of(problem: &anyhow::Error) -> Option<String> {
             deepfusion_cloud::Error,
             deepfusion_data::Error,
             deepfusion_eval::Error,
+            deepfusion_eval::odometry::PoseFileError,
+            deepfusion_eval::odometry::TrackError,
             deepfusion_train::Error,
             deepfusion_nn::Error,
             deepfusion_onnx::Error,

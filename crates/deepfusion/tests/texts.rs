@@ -21,6 +21,7 @@ fn help_texts() {
         "data export-gt",
         "train",
         "eval",
+        "eval-odometry",
         "predict",
         "export",
         "weights",

@@ -5,10 +5,13 @@ mod calibration;
 pub(crate) mod layout;
 mod oxts;
 mod timestamps;
+mod tracklets;
 mod velodyne;
 
 pub use calibration::Calibration;
 pub use layout::{Drive, find_drives};
+pub(crate) use oxts::read_packets;
 pub use oxts::{OxtsPacket, read_oxts};
 pub use timestamps::TimeStamps;
-pub use velodyne::{GtKind, depth_map};
+pub use tracklets::{Tracklet, TrackletPose};
+pub use velodyne::{GtKind, depth_map, velo_point};

@@ -77,6 +77,20 @@ impl OxtsPacket {
 /// [`Error::Missing`] without the folder, its time stamps or any packet; [`Error::TimeStamp`],
 /// [`Error::NoTimeStamp`] or [`Error::Oxts`] for bad content.
 pub fn read_oxts(folder: &Path, origin_ns: i64) -> Result<VehicleTrack> {
+    let sample = |(time_s, packet): &(f64, OxtsPacket)| {
+        (*time_s, packet.velocity_mps[0], packet.rate_radps[2])
+    };
+    let packets = read_packets(folder, origin_ns)?;
+    Ok(VehicleTrack::new(
+        &packets.iter().map(sample).collect::<Vec<_>>(),
+    ))
+}
+
+/// The packets of an `oxts` folder with their times in seconds from `origin_ns`, by number.
+///
+/// # Errors
+/// As [`read_oxts`].
+pub(crate) fn read_packets(folder: &Path, origin_ns: i64) -> Result<Vec<(f64, OxtsPacket)>> {
     const REMEDY: &str = "fetch the drive's oxts folder: its speeds are what makes depth metric";
     let data = folder.join("data");
     let missing = || Error::Missing {
@@ -96,10 +110,10 @@ pub fn read_oxts(folder: &Path, origin_ns: i64) -> Result<VehicleTrack> {
     for (number, path) in packets {
         let packet = OxtsPacket::read(&path)?;
         if let Some(time_s) = times.seconds(number, origin_ns)? {
-            samples.push((time_s, packet.velocity_mps[0], packet.rate_radps[2]));
+            samples.push((time_s, packet));
         }
     }
-    Ok(VehicleTrack::new(&samples))
+    Ok(samples)
 }
 
 #[cfg(test)]

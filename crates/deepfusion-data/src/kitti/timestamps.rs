@@ -67,6 +67,13 @@ impl TimeStamps {
         })?;
         Ok(ns.map(|ns| (ns - origin_ns) as f64 * 1e-9))
     }
+
+    /// Seconds from `origin_ns` to the time of every frame.
+    #[must_use]
+    pub fn all_seconds(&self, origin_ns: i64) -> Vec<Option<f64>> {
+        let seconds = |ns: &Option<i64>| ns.map(|ns| (ns - origin_ns) as f64 * 1e-9);
+        self.ns.iter().map(seconds).collect()
+    }
 }
 
 /// Nanoseconds since 1970 of `2011-09-26 13:04:32.345808896`; the fraction has 0 to 9 digits.

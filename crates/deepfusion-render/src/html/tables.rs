@@ -104,11 +104,14 @@ fn metric_rows(report: &Report) -> Vec<Vec<String>> {
     if let Some(fixed) = &report.fixed_scaled {
         rows.push(row(&format!("scaled by {}", fixed.factor), &fixed.metrics));
     }
-    if let Some(metrics) = &report.still {
-        rows.push(row("static", metrics));
-    }
+    // Where nothing moves, the static row would only repeat the first.
     if let Some(metrics) = &report.moving {
-        rows.push(row("moving", metrics));
+        if let Some(still) = &report.still {
+            rows.push(row("static", still));
+        }
+        let plural = if report.moving_images == 1 { "" } else { "s" };
+        let label = format!("moving, {} image{plural}", report.moving_images);
+        rows.push(row(&label, metrics));
     }
     if let Some(trivial) = &report.trivial {
         rows.push(row("trivial", &trivial.unscaled));
@@ -139,6 +142,18 @@ fn scale_table(report: &Report) -> String {
         vec!["its 95 % interval".into(), interval],
     ];
     if let Some(rate) = report.hole_rate {
+        let moving = report.hole_rate_moving.map_or_else(String::new, |rate| {
+            format!("; {:.2} % of what moves", 100.0 * rate)
+        });
+        rows.push(vec![
+            format!(
+                "holes: nearer than {} m, seen at the far limit or over 3 times too far",
+                report.protocol.cap_m * 0.5
+            ),
+            format!("{:.2} %{moving}", 100.0 * rate),
+        ]);
+    }
+    if let Some(rate) = report.missing_rate {
         rows.push(vec![
             "ground truth without prediction".into(),
             format!("{:.2} %", 100.0 * rate),

@@ -11,7 +11,8 @@ use super::{EngineArgs, GtDepth};
 #[derive(Debug, Args)]
 #[command(
     group(ArgGroup::new("what").required(true).args(["model", "pred"])),
-    after_help = "Metrics are means over images, unscaled and median-scaled, both always. Array files: .npz (matched by \
+    after_help = "Metrics are means over images, unscaled and median-scaled, both always; static and moving pixels apart where \
+    the simulator's masks or KITTI's tracklets tell. Array files: .npz (matched by \
     name) or N×H×W .npy (in split order), float32 or float64, any size: predictions are resized as disparity.\n\n\
     Examples:\n  deepfusion eval --model runs/train-1 --data kitti --split eigen/test_files.txt\n  \
     deepfusion eval --pred depth.npz --pred-kind depth --gt gt.npz --crop garg --json"
@@ -43,7 +44,7 @@ pub struct EvalArgs {
     /// Ground-truth depth in metres, 0 = none; with --model, instead of the recording's scans.
     #[arg(long, value_name = "FILE")]
     pub gt: Option<PathBuf>,
-    /// Which depth the ground truth is (of a --gt file: only recorded in the report).
+    /// Which depth the ground truth is.
     #[arg(long, value_enum, default_value_t)]
     pub gt_depth: GtDepth,
     /// Part of the image to compare [default: garg for KITTI raw, else none].

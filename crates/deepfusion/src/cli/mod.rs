@@ -4,6 +4,7 @@ mod ablate;
 mod data;
 mod engine;
 mod eval;
+mod eval_odometry;
 mod export;
 mod predict;
 mod train;
@@ -17,6 +18,7 @@ pub use ablate::AblateArgs;
 pub use data::{DataCommand, ExportGtArgs, GtDepth, InspectArgs};
 pub use engine::{EngineArgs, EngineChoice, PrecisionChoice};
 pub use eval::{EvalArgs, PredKind};
+pub use eval_odometry::EvalOdometryArgs;
 pub use export::ExportArgs;
 pub use predict::{BenchArgs, PredictArgs, Save, WeightsCommand};
 pub use train::{DeviceChoice, PresetChoice, TrainArgs, ViewMotionChoice};
@@ -55,6 +57,8 @@ pub enum Command {
     Ablate(Box<AblateArgs>),
     /// Measure depth: the field's seven metrics, unscaled and median-scaled.
     Eval(Box<EvalArgs>),
+    /// Measure the camera's path: drift, five-frame error, scale.
+    EvalOdometry(EvalOdometryArgs),
     /// Metric depth of images.
     Predict(Box<PredictArgs>),
     /// A trained network as an ONNX file, checked before it is kept.

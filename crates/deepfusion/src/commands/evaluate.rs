@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use deepfusion_data::{CameraChoice, Dataset, GtKind, OpenOptions, Split, ground_truth_names};
 use deepfusion_eval::{
-    ArraySet, Evaluator, Grid, Prediction, Protocol, Report, Sample, TrivialBaseline,
+    ArraySet, Evaluator, Grid, GroundTruth, Prediction, Protocol, Report, Sample, TrivialBaseline,
 };
+use deepfusion_geometry::DepthMap;
 
 /// Opens the recordings at several paths, each drive and camera a data set.
 pub fn open_datasets(
@@ -115,6 +116,7 @@ pub fn evaluate_datasets(
     };
     let mut done = 0;
     for (dataset, names) in datasets.iter().zip(&names) {
+        let labels = dataset.moving_labels()?;
         for (&frame, name) in dataset.selected().iter().zip(names) {
             let known = match &mut truth {
                 Truth::Scans(kind) => dataset
@@ -130,11 +132,18 @@ pub fn evaluate_datasets(
                 let k = dataset.intrinsics(frame);
                 let same_size = (k.width as usize, k.height as usize)
                     == (ground_truth.width(), ground_truth.height());
+                let moving = match &labels {
+                    Some(labels) if same_size => {
+                        let number = dataset.frames()[frame].number;
+                        labels.pixels(number, &depth_map(&ground_truth), gt_kind(protocol))?
+                    }
+                    _ => None,
+                };
                 comparison.add(&Sample {
                     name,
                     prediction: &prediction,
                     ground_truth: &ground_truth,
-                    moving: None,
+                    moving: moving.as_deref(),
                     intrinsics: same_size.then_some(&k),
                 })?;
             }
@@ -143,6 +152,23 @@ pub fn evaluate_datasets(
         }
     }
     comparison.report()
+}
+
+/// Which depth the ground truth holds, in the recordings' words.
+fn gt_kind(protocol: &Protocol) -> GtKind {
+    match protocol.gt {
+        GroundTruth::Z => GtKind::Z,
+        GroundTruth::Velodyne => GtKind::Velodyne,
+    }
+}
+
+/// Ground truth as the recordings take it.
+fn depth_map(truth: &Grid) -> DepthMap {
+    DepthMap {
+        width: truth.width(),
+        height: truth.height(),
+        data: truth.values().iter().map(|d| *d as f32).collect(),
+    }
 }
 
 /// Frame names to places in the file: by name, or, for a stack without names, in the frames' order.

@@ -5,6 +5,7 @@ mod bench;
 mod demo;
 pub mod device;
 mod eval;
+mod eval_odometry;
 mod evaluate;
 mod export;
 mod export_gt;
@@ -33,6 +34,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Train(args) => train::run(&args),
         Command::Ablate(args) => ablate::run(&args),
         Command::Eval(args) => eval::run(&args),
+        Command::EvalOdometry(args) => eval_odometry::run(&args),
         Command::Predict(args) => predict::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Weights(WeightsCommand::Import { files, out }) => weights::import(&files, &out),

@@ -1,0 +1,355 @@
+//! `tracklet_labels.xml`: boxes around traffic, followed over a drive's frames.
+
+use crate::Error;
+use nalgebra::Vector3;
+use quick_xml::Reader;
+use quick_xml::events::Event;
+use std::io::BufRead;
+use std::path::Path;
+
+/// A labelled object: a box of one size with a place in each of some consecutive frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tracklet {
+    /// What it is, in KITTI's words: `Car`, `Van`, `Pedestrian`, `Cyclist`, …
+    pub object: String,
+    /// Length, width and height, in metres.
+    pub size_m: [f64; 3],
+    /// Number of the frame that its first pose belongs to.
+    pub first_frame: u64,
+    /// Its places, one a frame.
+    pub poses: Vec<TrackletPose>,
+}
+
+/// Where a box stands in one frame, in the velodyne's axes (x forward, y left, z up).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackletPose {
+    /// Centre of the box's bottom, in metres.
+    pub bottom_m: Vector3<f64>,
+    /// Turn about z from the velodyne's x to the box's length, in radians.
+    pub yaw_rad: f64,
+}
+
+impl Tracklet {
+    /// The file's name in a drive's folder.
+    pub const FILE: &str = "tracklet_labels.xml";
+
+    /// Its place in a frame; `None` where it was not seen.
+    #[must_use]
+    pub fn pose(&self, frame: u64) -> Option<TrackletPose> {
+        let index = usize::try_from(frame.checked_sub(self.first_frame)?).ok()?;
+        self.poses.get(index).copied()
+    }
+
+    /// Reads a file of tracklets, element by element.
+    ///
+    /// # Errors
+    /// [`Error::Missing`] if there is no such file; [`Error::Tracklets`] naming the tracklet, pose and
+    /// field where the text is no XML, ends early, lacks a number or has fewer entries than it says.
+    pub fn read(path: &Path) -> crate::Result<Vec<Self>> {
+        let file = std::fs::File::open(path).map_err(|e| match e.kind() {
+            std::io::ErrorKind::NotFound => Error::Missing {
+                path: path.to_owned(),
+                what: "the labelled boxes of traffic",
+                remedy: "fetch the drive's tracklets, or evaluate without them",
+            },
+            _ => Error::file(path, e),
+        })?;
+        Self::parse(std::io::BufReader::new(file)).map_err(|(place, problem)| Error::Tracklets {
+            path: path.to_owned(),
+            place,
+            problem,
+        })
+    }
+
+    fn parse(text: impl BufRead) -> Result<Vec<Self>, (String, String)> {
+        let mut reader = Reader::from_reader(text);
+        let (mut buffer, mut document) = (Vec::new(), Document::default());
+        loop {
+            let event = reader.read_event_into(&mut buffer);
+            let at_byte = || format!("byte {}", reader.buffer_position());
+            match event.map_err(|e| (at_byte(), e.to_string()))? {
+                Event::Start(tag) => document.open(&String::from_utf8_lossy(tag.name().as_ref())),
+                Event::Text(text) => document.text += &String::from_utf8_lossy(&text),
+                Event::End(_) => document.close()?,
+                Event::Eof => return document.finish().map_err(|problem| (at_byte(), problem)),
+                _ => {}
+            }
+            buffer.clear();
+        }
+    }
+}
+
+/// What was read so far, and the element that is being read.
+#[derive(Default)]
+struct Document {
+    /// Names of the open elements, the outermost first.
+    path: Vec<String>,
+    /// Text of the innermost.
+    text: String,
+    tracklets: Vec<Tracklet>,
+    announced: Option<usize>,
+    tracklet: OpenTracklet,
+    pose: OpenPose,
+}
+
+/// A tracklet whose end has not come yet.
+#[derive(Default)]
+struct OpenTracklet {
+    object: Option<String>,
+    length: Option<f64>,
+    width: Option<f64>,
+    height: Option<f64>,
+    first_frame: Option<u64>,
+    announced: Option<usize>,
+    poses: Vec<TrackletPose>,
+}
+
+/// A pose whose end has not come yet.
+#[derive(Default)]
+struct OpenPose {
+    tx: Option<f64>,
+    ty: Option<f64>,
+    tz: Option<f64>,
+    rz: Option<f64>,
+}
+
+impl Document {
+    fn open(&mut self, name: &str) {
+        self.path.push(name.to_owned());
+        self.text.clear();
+    }
+
+    fn close(&mut self) -> Result<(), (String, String)> {
+        let path: Vec<&str> = self.path.iter().map(String::as_str).collect();
+        let outcome = match path.as_slice() {
+            ["boost_serialization", "tracklets", inner @ ..] => match inner {
+                ["count"] => number(&self.text).map(|n| self.announced = Some(n)),
+                ["item"] => self.tracklet.take().map(|t| self.tracklets.push(t)),
+                ["item", "poses", "item"] => {
+                    self.pose.take().map(|pose| self.tracklet.poses.push(pose))
+                }
+                ["item", "poses", "item", field] => self.pose.set(field, &self.text),
+                ["item", "poses", "count"] => {
+                    number(&self.text).map(|n| self.tracklet.announced = Some(n))
+                }
+                ["item", field] => self.tracklet.set(field, &self.text),
+                _ => Ok(()),
+            },
+            _ => Ok(()),
+        };
+        let outcome = outcome.map_err(|problem| (self.place(&path), problem));
+        self.path.pop();
+        self.text.clear();
+        outcome
+    }
+
+    /// Where the document stands, in the words of a message.
+    fn place(&self, path: &[&str]) -> String {
+        let mut place = match path.get(2) {
+            Some(&"item") => format!("tracklet {}", self.tracklets.len()),
+            _ => "the list of tracklets".to_owned(),
+        };
+        if path.get(4) == Some(&"item") {
+            place += &format!(", pose {}", self.tracklet.poses.len());
+        }
+        match path.last() {
+            Some(&name) if name != "item" => place + ", " + name,
+            _ => place,
+        }
+    }
+
+    fn finish(self) -> Result<Vec<Tracklet>, String> {
+        match (self.path.first(), self.announced) {
+            (Some(_), _) => Err(format!("ends within <{}>", self.path.join("><"))),
+            (None, None) => {
+                Err("has no <boost_serialization><tracklets><count>: it holds no tracklets".into())
+            }
+            (None, Some(count)) => {
+                enough(count, self.tracklets.len(), "tracklets").map(|()| self.tracklets)
+            }
+        }
+    }
+}
+
+impl OpenTracklet {
+    fn set(&mut self, field: &str, text: &str) -> Result<(), String> {
+        match field {
+            "objectType" => self.object = Some(text.trim().to_owned()),
+            "l" => self.length = Some(length(text)?),
+            "w" => self.width = Some(length(text)?),
+            "h" => self.height = Some(length(text)?),
+            "first_frame" => self.first_frame = Some(number(text)?),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn take(&mut self) -> Result<Tracklet, String> {
+        let open = std::mem::take(self);
+        let count = open.announced.ok_or("has no <poses>")?;
+        enough(count, open.poses.len(), "poses")?;
+        Ok(Tracklet {
+            object: open.object.ok_or("has no <objectType>")?,
+            size_m: [
+                open.length.ok_or("has no <l>")?,
+                open.width.ok_or("has no <w>")?,
+                open.height.ok_or("has no <h>")?,
+            ],
+            first_frame: open.first_frame.ok_or("has no <first_frame>")?,
+            poses: open.poses,
+        })
+    }
+}
+
+impl OpenPose {
+    fn set(&mut self, field: &str, text: &str) -> Result<(), String> {
+        let place = match field {
+            "tx" => &mut self.tx,
+            "ty" => &mut self.ty,
+            "tz" => &mut self.tz,
+            "rz" => &mut self.rz,
+            _ => return Ok(()),
+        };
+        *place = Some(finite(text)?);
+        Ok(())
+    }
+
+    fn take(&mut self) -> Result<TrackletPose, String> {
+        let open = std::mem::take(self);
+        Ok(TrackletPose {
+            bottom_m: Vector3::new(
+                open.tx.ok_or("has no <tx>")?,
+                open.ty.ok_or("has no <ty>")?,
+                open.tz.ok_or("has no <tz>")?,
+            ),
+            yaw_rad: open.rz.ok_or("has no <rz>")?,
+        })
+    }
+}
+
+fn number<T: std::str::FromStr>(text: &str) -> Result<T, String> {
+    let problem = || format!("'{}' is not a whole number", shown(text));
+    text.trim().parse().map_err(|_| problem())
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    let value: Option<f64> = text.trim().parse().ok().filter(|v: &f64| v.is_finite());
+    value.ok_or_else(|| format!("'{}' is not a finite number", shown(text)))
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    match finite(text)? {
+        value if value > 0.0 => Ok(value),
+        value => Err(format!("{value} is not a length")),
+    }
+}
+
+/// As much of a text as belongs into a message.
+fn shown(text: &str) -> String {
+    text.trim().chars().take(40).collect()
+}
+
+fn enough(announced: usize, found: usize, what: &str) -> Result<(), String> {
+    if announced == found {
+        Ok(())
+    } else {
+        Err(format!("{found} {what}, its count says {announced}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn file(poses: &str, count: usize) -> String {
+        format!(
+            r#"<?xml version="1.0" encoding="UTF-8" standalone="yes" ?>
+<!DOCTYPE boost_serialization>
+<boost_serialization signature="serialization::archive" version="9">
+<tracklets class_id="0" tracking_level="0" version="0">
+	<count>1</count>
+	<item_version>1</item_version>
+	<item class_id="1" tracking_level="0" version="1">
+		<objectType>Van</objectType>
+		<h>2</h>
+		<w>1.8</w>
+		<l>4.5</l>
+		<first_frame>7</first_frame>
+		<poses class_id="2" tracking_level="0" version="0">
+			<count>{count}</count>
+			<item_version>2</item_version>
+			{poses}
+		</poses>
+		<finished>1</finished>
+	</item>
+</tracklets>
+</boost_serialization>"#
+        )
+    }
+
+    const POSE: &str = "<item><tx>13.7</tx><ty>4.5</ty><tz>-1.74</tz><rx>0</rx><ry>0</ry>\
+                        <rz>0.54</rz><state>2</state><occlusion>0</occlusion></item>";
+
+    fn parse(text: &str) -> Result<Vec<Tracklet>, (String, String)> {
+        Tracklet::parse(text.as_bytes())
+    }
+
+    #[test]
+    fn a_box_is_where_the_file_puts_it() {
+        let read = parse(&file(&POSE.repeat(2), 2)).unwrap();
+        let van = &read[0];
+        assert_eq!((read.len(), van.object.as_str()), (1, "Van"));
+        assert_eq!(van.size_m, [4.5, 1.8, 2.0]);
+        assert_eq!(van.pose(6), None);
+        assert_eq!(van.pose(9), None);
+        let pose = van.pose(8).unwrap();
+        assert_eq!(pose.bottom_m, Vector3::new(13.7, 4.5, -1.74));
+        assert_eq!(pose.yaw_rad, 0.54);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_place() {
+        let cases = [
+            (
+                file(&POSE.replace("13.7", "NaN"), 1),
+                "tracklet 0, pose 0, tx",
+                "'NaN' is not a finite number",
+            ),
+            (
+                file(&POSE.replace("<tz>-1.74</tz>", ""), 1),
+                "tracklet 0, pose 0",
+                "has no <tz>",
+            ),
+            (file(POSE, 3), "tracklet 0", "1 poses, its count says 3"),
+            (
+                file(POSE, 1).replace("<l>4.5</l>", "<l>-4.5</l>"),
+                "tracklet 0, l",
+                "-4.5 is not a length",
+            ),
+            (
+                file(POSE, 1).replacen("<count>1</count>", "<count>2</count>", 1),
+                "byte",
+                "1 tracklets, its count says 2",
+            ),
+            (file(POSE, 1).replace("</tx>", "</ty>"), "byte", "tx"),
+            (file(POSE, 1)[..700].to_owned(), "byte", "ends within"),
+            ("<html></html>".to_owned(), "byte", "holds no tracklets"),
+        ];
+        for (text, place, problem) in cases {
+            let error = parse(&text).unwrap_err();
+            assert!(error.0.starts_with(place), "{error:?}");
+            assert!(error.1.contains(problem), "{error:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_never_panics(text in ".{0,200}", at in 0..900usize) {
+            let _ = parse(&text);
+            let whole = file(POSE, 1);
+            let (a, b) = whole.split_at(at.min(whole.len()));
+            let _ = parse(&format!("{a}{text}{b}"));
+        }
+    }
+}

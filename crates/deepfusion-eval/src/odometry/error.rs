@@ -1,0 +1,108 @@
+use std::path::PathBuf;
+
+/// Two paths that cannot be compared.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrackError {
+    /// They have different numbers of poses.
+    #[error("{name}: {predicted} predicted poses, {truth} true ones")]
+    Lengths {
+        /// The drive.
+        name: String,
+        /// Number of predicted poses.
+        predicted: usize,
+        /// Number of true poses.
+        truth: usize,
+    },
+    /// There is no motion to compare.
+    #[error("{name}: {poses} pose{}, and a motion takes two", if *poses == 1 { "" } else { "s" })]
+    TooShort {
+        /// The drive.
+        name: String,
+        /// How many poses there are.
+        poses: usize,
+    },
+    /// Files with times of which too few agree.
+    #[error(
+        "{name}: only {matched} of {predicted} predicted times are within {within_s} s of one of the {truth} true ones"
+    )]
+    Times {
+        /// The predicted file.
+        name: String,
+        /// How many poses have a partner.
+        matched: usize,
+        /// Number of predicted poses.
+        predicted: usize,
+        /// Number of true poses.
+        truth: usize,
+        /// How near two times must be, in seconds.
+        within_s: f64,
+    },
+}
+
+impl TrackError {
+    /// What to do about it, in one line.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        Some(
+            match self {
+                Self::Lengths { .. } => {
+                    "files without times are matched line by line: write a pose for every frame of both, or TUM files"
+                }
+                Self::TooShort { .. } => "give at least two consecutive frames",
+                Self::Times { .. } => "both files must count seconds from the same moment",
+            }
+            .into(),
+        )
+    }
+}
+
+/// A pose file that cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PoseFileError {
+    /// It cannot be opened or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A line is no pose.
+    #[error("{}:{line}: {problem}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// It holds no pose at all.
+    #[error("{}: no pose in it", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl PoseFileError {
+    /// What to do about it, in one line.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        Some(
+            match self {
+                Self::Io { source, .. } => match source.kind() {
+                    std::io::ErrorKind::NotFound => "check the spelling, and that the disk is mounted",
+                    _ => return None,
+                },
+                Self::Line { .. } | Self::Empty { .. } => {
+                    "a line is a pose of the camera in the world: KITTI's 12 numbers (the rows of [R t]), or TUM's \
+                     8 (time tx ty tz qx qy qz qw); # starts a comment"
+                }
+            }
+            .into(),
+        )
+    }
+}

@@ -1,0 +1,143 @@
+//! Lines of pose files.
+
+use super::PoseFormat;
+use deepfusion_geometry::Se3;
+use nalgebra::{Matrix3, Vector3};
+use std::fmt::Write as _;
+
+/// How far R·Rᵀ may be from the identity (Frobenius norm), and a quaternion's length from 1: files carry six digits,
+/// some programs single precision, and what is no rotation is off by its scale.
+const ROTATION_TOLERANCE: f64 = 1e-2;
+
+/// What a line says.
+pub(super) struct Line {
+    pub(super) format: PoseFormat,
+    pub(super) pose: Se3,
+    pub(super) time_s: Option<f64>,
+}
+
+/// Reads a line in the format of those before it, or, for the first, in the one its number of columns means.
+pub(super) fn parse_line(line: &str, before: Option<PoseFormat>) -> Result<Line, String> {
+    let values = line
+        .split([' ', '\t', ','])
+        .filter(|word| !word.is_empty())
+        .map(number)
+        .collect::<Result<Vec<f64>, String>>()?;
+    let format = match (values.len(), before) {
+        (12, None | Some(PoseFormat::Kitti)) => PoseFormat::Kitti,
+        (8, None | Some(PoseFormat::Tum)) => PoseFormat::Tum,
+        (n, None) => return Err(format!("{n} columns, expected 12 (KITTI) or 8 (TUM)")),
+        (n, Some(PoseFormat::Kitti)) => {
+            return Err(format!("{n} columns, the lines before have 12"));
+        }
+        (n, Some(PoseFormat::Tum)) => return Err(format!("{n} columns, the lines before have 8")),
+    };
+    match format {
+        PoseFormat::Kitti => Ok(Line {
+            format,
+            pose: from_rows(&values)?,
+            time_s: None,
+        }),
+        PoseFormat::Tum => Ok(Line {
+            format,
+            pose: from_quaternion(&values[1..])?,
+            time_s: Some(values[0]),
+        }),
+    }
+}
+
+fn number(word: &str) -> Result<f64, String> {
+    let shown: String = word.chars().take(40).collect();
+    let value: f64 = word
+        .parse()
+        .map_err(|_| format!("'{shown}' is not a number"))?;
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(format!("{value} is no finite number"))
+    }
+}
+
+fn from_rows(v: &[f64]) -> Result<Se3, String> {
+    let rotation = Matrix3::new(v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10]);
+    let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
+    if off > ROTATION_TOLERANCE || rotation.determinant() < 0.0 {
+        return Err(format!(
+            "its first three columns are no rotation (R·Rᵀ is {off:.2e} from the identity, its determinant {:.3})",
+            rotation.determinant()
+        ));
+    }
+    Ok(Se3::from_parts(&rotation, Vector3::new(v[3], v[7], v[11])))
+}
+
+fn from_quaternion(v: &[f64]) -> Result<Se3, String> {
+    let length = v[3..7].iter().map(|q| q * q).sum::<f64>().sqrt();
+    if (length - 1.0).abs() > ROTATION_TOLERANCE {
+        return Err(format!(
+            "its quaternion has length {length:.4}, a rotation's has 1"
+        ));
+    }
+    Ok(Se3::from_quaternion(
+        [v[6], v[3], v[4], v[5]],
+        Vector3::new(v[0], v[1], v[2]),
+    ))
+}
+
+/// Poses in KITTI's format: the upper three rows of `world_from_cam`, 12 numbers a line.
+#[must_use]
+pub fn kitti_text(poses: &[Se3]) -> String {
+    let mut text = String::new();
+    for pose in poses {
+        let matrix = pose.matrix();
+        let words: Vec<String> = (0..12)
+            .map(|i| scientific(matrix[(i / 4, i % 4)]))
+            .collect();
+        text += &words.join(" ");
+        text.push('\n');
+    }
+    text
+}
+
+/// Poses in TUM's format, with a comment that names the columns; the longer slice is cut to the shorter.
+#[must_use]
+pub fn tum_text(poses: &[Se3], times_s: &[f64]) -> String {
+    let mut text = String::from("# time_s tx ty tz qx qy qz qw\n");
+    for (pose, time_s) in poses.iter().zip(times_s) {
+        let (t, [w, x, y, z]) = (pose.translation(), quaternion(pose));
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "{time_s} {:.9} {:.9} {:.9} {x:.12} {y:.12} {z:.12} {w:.12}",
+            t.x, t.y, t.z
+        );
+    }
+    text
+}
+
+/// w, x, y, z of the rotation.
+fn quaternion(pose: &Se3) -> [f64; 4] {
+    let v = pose.axis_angle();
+    let half = 0.5 * v.norm();
+    // sin(θ/2)/θ, whose limit at 0 is ½.
+    let factor = if half < 1e-9 {
+        0.5
+    } else {
+        half.sin() / (2.0 * half)
+    };
+    [half.cos(), v.x * factor, v.y * factor, v.z * factor]
+}
+
+/// C's `%.12e`.
+fn scientific(value: f64) -> String {
+    let text = format!("{value:.12e}");
+    match text.split_once('e') {
+        Some((mantissa, exponent)) => {
+            let (sign, digits) = match exponent.strip_prefix('-') {
+                Some(digits) => ('-', digits),
+                None => ('+', exponent),
+            };
+            format!("{mantissa}e{sign}{digits:0>2}")
+        }
+        None => text,
+    }
+}

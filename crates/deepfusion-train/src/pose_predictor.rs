@@ -1,0 +1,88 @@
+use crate::{CheckpointKind, Error, RunFolder, TrainConfig};
+use burn::tensor::{Device, Tensor, TensorData};
+use deepfusion_data::{RgbImage, to_network_input};
+use deepfusion_geometry::Se3;
+use deepfusion_nn::PoseNet;
+use nalgebra::Vector3;
+use std::path::Path;
+
+/// A trained pose network, ready for consecutive images of a drive.
+///
+/// Nothing is corrected for another camera than the one trained on: PoseNet sees pixels, and a camera of
+/// another focal length at network size shows it other pixels for the same motion.
+#[derive(Debug)]
+pub struct PosePredictor {
+    config: TrainConfig,
+    pose_net: PoseNet,
+    device: Device,
+    /// Which checkpoint it was loaded from.
+    pub checkpoint: CheckpointKind,
+    /// Steps it was trained for.
+    pub step: usize,
+}
+
+impl PosePredictor {
+    /// Loads a run's folder or a checkpoint in it; the folder means `best` where there is one.
+    ///
+    /// # Errors
+    /// As [`RunFolder::open`] and [`RunFolder::load`].
+    pub fn load(path: &Path, device: &Device) -> Result<Self, Error> {
+        let (folder, kind) = RunFolder::open(path)?;
+        let config = folder.read_config()?;
+        let checkpoint = kind.unwrap_or_else(|| folder.preferred());
+        let (model, _, state) = folder.load(checkpoint, &config, device)?;
+        Ok(Self {
+            config,
+            pose_net: model.pose_net,
+            device: device.clone(),
+            checkpoint,
+            step: state.step,
+        })
+    }
+
+    /// The run's configuration.
+    #[must_use]
+    pub fn config(&self) -> &TrainConfig {
+        &self.config
+    }
+
+    /// An image as the network takes it, as in training: all of it, resized.
+    ///
+    /// # Shapes
+    /// - output: 3×H×W at network size, in [0, 1], channel by channel
+    #[must_use]
+    pub fn prepare(&self, image: &RgbImage) -> Vec<f32> {
+        let whole = [0, 0, image.width(), image.height()];
+        let size = self.config.size;
+        to_network_input(image, whole, size.width as u32, size.height as u32)
+    }
+
+    /// `frame(i+1)_from_frame(i)` of prepared images in time order: one motion less than images.
+    ///
+    /// # Shapes
+    /// - `images`: 3×H×W at network size each
+    #[must_use]
+    pub fn motions(&self, images: &[Vec<f32>]) -> Vec<Se3> {
+        let pairs: Vec<f32> = images
+            .windows(2)
+            .flat_map(|pair| pair[0].iter().chain(&pair[1]).copied())
+            .collect();
+        let n = images.len().saturating_sub(1);
+        if n == 0 {
+            return Vec::new();
+        }
+        let size = self.config.size;
+        let shape = [n, 6, size.height, size.width];
+        let stacked = Tensor::<4>::from_data(TensorData::new(pairs, shape), &self.device);
+        let pose = self.pose_net.forward(stacked);
+        let numbers = |t: Tensor<2>| -> Vec<f64> { t.into_data().iter::<f64>().collect() };
+        let (turns, moves) = (numbers(pose.axis_angle), numbers(pose.translation));
+        turns
+            .chunks_exact(3)
+            .zip(moves.chunks_exact(3))
+            .map(|(r, t)| {
+                Se3::from_axis_angle(Vector3::from_column_slice(r), Vector3::from_column_slice(t))
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,48 @@
+use std::path::PathBuf;
+
+use clap::{ArgGroup, Args};
+use deepfusion_data::CameraChoice;
+
+use super::DeviceChoice;
+
+/// `deepfusion eval-odometry`.
+#[derive(Debug, Args)]
+#[command(
+    group(ArgGroup::new("what").required(true).args(["model", "pred"])),
+    after_help = "Unscaled. Drift is KITTI's t_rel and r_rel over 100 to 800 m, on shorter drives over 10 to 50 m; ATE is over \
+    five frames. Truth is the simulator's exact poses, else the path integrated from OXTS. Pose files: a line is a pose \
+    of the camera in the world, KITTI's 12 numbers or TUM's 8 (time tx ty tz qx qy qz qw).\n\n\
+    Examples:\n  deepfusion eval-odometry --model runs/train-1 --data kitti/2011_09_26 --out odometry\n  \
+    deepfusion eval-odometry --pred 09.txt --gt poses/09.txt --json"
+)]
+pub struct EvalOdometryArgs {
+    /// A run folder or a checkpoint in it.
+    #[arg(long, value_name = "RUN", requires = "data")]
+    pub model: Option<PathBuf>,
+    /// Recordings to evaluate on: drive folders, date folders or KITTI roots.
+    #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pred")]
+    pub data: Vec<PathBuf>,
+    /// Which camera.
+    #[arg(
+        long,
+        value_name = "2|3|both",
+        default_value = "2",
+        conflicts_with = "pred"
+    )]
+    pub camera: CameraChoice,
+    /// Predicted poses.
+    #[arg(long, value_name = "FILE", requires = "gt")]
+    pub pred: Option<PathBuf>,
+    /// True poses.
+    #[arg(long, value_name = "FILE", requires = "pred")]
+    pub gt: Option<PathBuf>,
+    /// Folder for both paths as KITTI and TUM files, and their picture from above.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value_t)]
+    pub device: DeviceChoice,
+    /// Print as JSON.
+    #[arg(long)]
+    pub json: bool,
+}

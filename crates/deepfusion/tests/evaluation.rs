@@ -1,0 +1,138 @@
+//! What a trained model sees of moving things, and the path its pose network takes, through the program alone.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use deepfusion_eval::odometry::PoseFile;
+use serde_json::Value;
+use support::{Run, in_folder};
+
+fn run(folder: &Path, args: &str) -> Run {
+    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
+}
+
+fn ok(folder: &Path, args: &str) -> Run {
+    let run = run(folder, args);
+    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
+    run
+}
+
+fn json(folder: &Path, args: &str) -> Value {
+    serde_json::from_str(&ok(folder, args).stdout).unwrap()
+}
+
+fn fails(folder: &Path, args: &str, expected: &str) {
+    let run = run(folder, args);
+    assert_eq!(run.code, 1, "{args}: {}", run.stdout);
+    assert!(run.stderr.contains(expected), "{args}: {}", run.stderr);
+    assert!(run.stderr.contains("hint: "), "{args}: {}", run.stderr);
+}
+
+#[test]
+fn a_model_is_measured_on_traffic_and_along_the_road() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out sim --frames 40 --seed 3 --scan-every 8 --moving-cars 6 --size 320x96",
+    );
+    ok(
+        at,
+        "train --data sim --size 96x64 --batch 2 --steps 2 --out run",
+    );
+
+    let report = json(at, "eval --model run --data sim --crop none --json");
+    assert_eq!(report["n"], 5);
+    for part in ["static", "moving"] {
+        assert!(report[part]["abs_rel"].is_f64(), "{part}: {report}");
+        assert_eq!(report[part].as_object().unwrap().len(), 7);
+    }
+    assert!(report["hole_rate"].is_f64() && report["hole_rate_moving"].is_f64());
+    let images = report["moving_images"].as_u64().unwrap();
+    assert!((1..=5).contains(&images));
+    let table = ok(at, "eval --model run --data sim --crop none").stdout;
+    assert!(table.contains("\nstatic ") && table.contains("\nmoving, "));
+
+    let odometry = "eval-odometry --model run --data sim";
+    let report = json(at, &format!("{odometry} --out paths --json"));
+    assert_eq!(report["n"], 40);
+    assert_eq!(report["truth"], "the simulator's exact poses");
+    assert!(report["scale"].as_f64().unwrap() > 0.0);
+    assert!(report["ate_m"].as_f64().unwrap() > 0.0);
+    let distance = report["distance_m"].as_f64().unwrap();
+    let lengths = report["lengths_m"].as_array().unwrap();
+    assert_eq!(lengths.is_empty(), distance <= 10.0);
+    assert_eq!(report["t_rel_percent"].is_f64(), distance > 10.0);
+
+    // What was written scores the same as what was computed, in both formats.
+    let name = "2026_01_01_drive_0003_sync";
+    for kind in ["txt", "tum"] {
+        let files = format!("--pred {name}_predicted.{kind} --gt {name}_truth.{kind}");
+        let again = json(&at.join("paths"), &format!("eval-odometry {files} --json"));
+        for field in ["ate_m", "scale", "distance_m", "rpe_deg"] {
+            let (a, b) = (report[field].as_f64(), again[field].as_f64());
+            let (a, b) = (a.unwrap(), b.unwrap());
+            assert!((a - b).abs() < 1e-6 * a.abs(), "{field}: {a} and {b}");
+        }
+    }
+    let svg = fs::read_to_string(at.join(format!("paths/{name}.svg"))).unwrap();
+    assert_eq!(svg.matches("<polyline").count(), 2);
+    let truth = PoseFile::read(&at.join(format!("paths/{name}_truth.tum"))).unwrap();
+    assert_eq!(truth.poses.len(), truth.times_s.len());
+
+    // Without the exact poses the truth is the path that OXTS gives: the same road, to a few per mille.
+    let poses = at.join(format!("sim/2026_01_01/{name}/poses.txt"));
+    fs::rename(&poses, at.join("poses.txt")).unwrap();
+    let oxts = json(at, &format!("{odometry} --out oxts --json"));
+    assert_eq!(oxts["truth"], "OXTS attitude and integrated velocity");
+    let files = format!("--pred oxts/{name}_truth.txt --gt paths/{name}_truth.txt");
+    let off = json(at, &format!("eval-odometry {files} --json"));
+    assert!(off["ate_m"].as_f64().unwrap() < 0.01, "{off}");
+    assert!((off["scale"].as_f64().unwrap() - 1.0).abs() < 2e-3, "{off}");
+}
+
+#[test]
+fn poses_that_cannot_be_compared_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let row = |z: f64| format!("1 0 0 0 0 1 0 0 0 0 1 {z}\n");
+    let rows = |n: u32| -> String { (0..n).map(|i| row(f64::from(i))).collect() };
+    fs::write(at.join("six.txt"), rows(6)).unwrap();
+    fs::write(at.join("five.txt"), rows(5)).unwrap();
+    fs::write(at.join("one.txt"), rows(1)).unwrap();
+    fs::write(at.join("short.txt"), format!("{}1 2 3\n", rows(2))).unwrap();
+    fs::write(at.join("nan.txt"), rows(3).replace("1 2\n", "1 nan\n")).unwrap();
+    fs::write(at.join("skew.txt"), rows(2).replace("1 0 0", "3 0 0")).unwrap();
+    let tum = "0.2 0 0 0 0 0 0 1\n0.1 0 0 1 0 0 0 1\n";
+    fs::write(at.join("back.tum"), tum).unwrap();
+    for (file, expected) in [
+        ("five.txt", "5 predicted poses, 6 true ones"),
+        ("short.txt", "short.txt:3: 3 columns"),
+        ("nan.txt", "nan.txt:3: NaN is no finite number"),
+        (
+            "skew.txt",
+            "skew.txt:1: its first three columns are no rotation",
+        ),
+        ("back.tum", "back.tum:2: time 0.1 is not after 0.2"),
+        ("none.txt", "none.txt"),
+    ] {
+        fails(
+            at,
+            &format!("eval-odometry --pred {file} --gt six.txt"),
+            expected,
+        );
+    }
+    fails(
+        at,
+        "eval-odometry --pred one.txt --gt one.txt",
+        "a motion takes two",
+    );
+    let same = json(at, "eval-odometry --pred six.txt --gt six.txt --json");
+    assert_eq!(same["scale"], 1.0);
+    assert_eq!(same["ate_m"], 0.0);
+    assert!(same["t_rel_percent"].is_null());
+    let table = ok(at, "eval-odometry --pred six.txt --gt six.txt").stdout;
+    assert!(table.contains("no stretch of 10 m"), "{table}");
+}
