@@ -69,6 +69,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         warped: &to_chw(&first.rgb),
         error: &difference,
         mask: &mask,
+        flow: None,
+        moving: None,
     })?;
     save("panel.png", &panel)?;
 

@@ -11,6 +11,7 @@ mod depth_picture;
 mod error;
 mod error_picture;
 mod feature_picture;
+mod flow_picture;
 mod html;
 mod panel;
 mod text;
@@ -24,6 +25,7 @@ pub use depth_picture::{depth_picture, disparity_picture, side_by_side, with_dep
 pub use error::{Error, Result};
 pub use error_picture::error_picture;
 pub use feature_picture::{feature_picture, feature_range};
+pub use flow_picture::flow_picture;
 pub use html::{HtmlReport, PictureFormat};
 pub use panel::{SamplePanel, sample_panel};
 pub use text::{TextSize, draw_text, text_width};

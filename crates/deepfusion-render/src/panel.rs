@@ -3,6 +3,7 @@ use image::{Rgb, RgbImage};
 use crate::captioned::{Tile, sheet};
 use crate::depth_picture::{disparity_picture, from_pixels, percentile};
 use crate::error::require_size;
+use crate::flow_picture::flow_picture;
 use crate::{ColourMap, Result};
 
 /// What a training step saw and made of one pair: planes of `width` × `height`, row by row.
@@ -22,9 +23,14 @@ pub struct SamplePanel<'a> {
     pub error: &'a [f32],
     /// How much each pixel's warp counts in the loss, H×W: 1 yes, 0 masked out.
     pub mask: &'a [f32],
+    /// The optical flow to the source, 2×H×W in pixels, where one is learned.
+    pub flow: Option<&'a [f32]>,
+    /// 1 where a pixel is taken to move by itself, H×W, where that is looked for.
+    pub moving: Option<&'a [f32]>,
 }
 
-/// Image, disparity, warped source, error and mask with their captions, for the eye that watches a training.
+/// Image, disparity, warped source, error and mask (red: moves by itself) with their captions, and the flow where there
+/// is one, for the eye that watches a training.
 ///
 /// # Errors
 /// [`crate::Error::Size`] naming the part that has another size than the image.
@@ -33,8 +39,16 @@ pub fn sample_panel(panel: &SamplePanel<'_>) -> Result<RgbImage> {
     require_size("photometric error", panel.error.len(), size)?;
     require_size("mask", panel.mask.len(), size)?;
     let worst = percentile(panel.error, 0.98).max(f32::MIN_POSITIVE);
-    let masked = |m: &f32| Rgb([(m.clamp(0.0, 1.0) * 255.0) as u8; 3]);
-    let tiles = [
+    let moves = |i: usize| panel.moving.is_some_and(|moving| moving[i] > 0.5);
+    if let Some(moving) = panel.moving {
+        require_size("moving pixels", moving.len(), size)?;
+    }
+    let masked = |i: &usize| match moves(*i) {
+        true => Rgb([200, 30, 30]),
+        false => Rgb([(panel.mask[*i].clamp(0.0, 1.0) * 255.0) as u8; 3]),
+    };
+    let places: Vec<usize> = (0..panel.mask.len()).collect();
+    let mut tiles = vec![
         Tile::new("image", picture_from_chw("image", panel.image, size)?),
         Tile::new(
             "disparity",
@@ -51,10 +65,21 @@ pub fn sample_panel(panel: &SamplePanel<'_>) -> Result<RgbImage> {
             }),
         ),
         Tile::new(
-            format!("mask, {:.0} % counts", 100.0 * mean(panel.mask)),
-            from_pixels(width as usize, panel.mask, masked),
+            match panel.moving {
+                Some(moving) => format!(
+                    "mask, {:.0} % counts, {:.1} % moves",
+                    100.0 * mean(panel.mask),
+                    100.0 * mean(moving)
+                ),
+                None => format!("mask, {:.0} % counts", 100.0 * mean(panel.mask)),
+            },
+            from_pixels(width as usize, &places, masked),
         ),
     ];
+    if let Some(flow) = panel.flow {
+        let (picture, full) = flow_picture(flow, width, height)?;
+        tiles.push(Tile::new(format!("flow, up to {full:.1} pixels"), picture));
+    }
     Ok(sheet(&tiles, if width > 2 * height { 2 } else { 3 }))
 }
 
@@ -96,6 +121,8 @@ mod tests {
             warped: &three,
             error: &one,
             mask: &one,
+            flow: None,
+            moving: None,
         };
         let drawn = sample_panel(&panel).unwrap();
         assert!(drawn.pixels().any(|p| p.0 == [64; 3]), "the image is there");
@@ -134,6 +161,26 @@ mod tests {
                 ..panel
             })
             .contains("disparity")
+        );
+        let (short, two) = (&one[1..], [2.0; 64]);
+        let flow = |flow| SamplePanel {
+            flow: Some(flow),
+            ..panel
+        };
+        assert!(message(flow(short)).contains("flow"));
+        let moving = |moving| SamplePanel {
+            moving: Some(moving),
+            ..flow(&two)
+        };
+        assert!(message(moving(short)).contains("moving"));
+        let drawn = sample_panel(&moving(&[1.0; 32])).unwrap();
+        assert!(
+            drawn.pixels().any(|p| p.0 == [200, 30, 30]),
+            "what moves is red"
+        );
+        assert!(
+            drawn.pixels().any(|p| p.0[0] == 255 && p.0[2] == 0),
+            "the flow has colours"
         );
     }
 }

@@ -34,14 +34,12 @@ pub use adam::{Adam, NamedGradients, StepOutcome};
 pub use augment::Jitter;
 pub use batch::{BatchLoader, SnippetBatch};
 pub use checkpoint::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder, load_depth_net};
-pub use config::{
-    Augmentation, DataConfig, Reprojection, ReversedPose, TrainConfig, ViewMotion,
-};
+pub use config::{Augmentation, DataConfig, Reprojection, ReversedPose, TrainConfig, ViewMotion};
 pub use deepfusion_nn::BilinearResize;
 pub use error::Error;
 pub use event::{Control, TrainEvent};
-pub use loss_config::{CompareAt, FlowLossConfig, LossConfig, MovingConfig};
 pub use inspector::{FeatureMap, Inspector, LayerMaps};
+pub use loss_config::{CompareAt, FlowLossConfig, LossConfig, MovingConfig};
 pub use losses::LossTerms;
 pub use model::{ForwardPass, Model, ViewFlow};
 pub use objective::{BatchLoss, Schedule};

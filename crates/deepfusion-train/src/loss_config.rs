@@ -113,8 +113,14 @@ impl Default for MovingConfig {
 
 impl LossConfig {
     /// The names that [`Self::with`] and [`Self::without`] take.
-    pub const TERMS: [&'static str; 6] =
-        ["smoothness", "speed", "automask", "affine", "flow", "moving"];
+    pub const TERMS: [&'static str; 6] = [
+        "smoothness",
+        "speed",
+        "automask",
+        "affine",
+        "flow",
+        "moving",
+    ];
 
     /// λ of the terms as [`Self::with`] switches them on: the paper's.
     const SMOOTHNESS: f64 = 1e-3;

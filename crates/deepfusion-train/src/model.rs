@@ -252,7 +252,10 @@ impl Model {
 /// The second half of the batch, then the first.
 pub(crate) fn swap_halves(x: Tensor<4>) -> Tensor<4> {
     let half = x.dims()[0] / 2;
-    Tensor::cat(vec![x.clone().narrow(0, half, half), x.narrow(0, 0, half)], 0)
+    Tensor::cat(
+        vec![x.clone().narrow(0, half, half), x.narrow(0, 0, half)],
+        0,
+    )
 }
 
 /// The pose network with a bias that means one unit of translation ahead: a point of frame 0 has a

@@ -29,6 +29,8 @@ pub struct BatchLoss {
     pub finest: ReprojectionOutput,
     /// The first view's source seen from the targets' place at that scale, T×3×H×W.
     pub warped: Tensor<4>,
+    /// The pixels of the first view that move by themselves, T×1×H×W, where they were looked for.
+    pub moving: Option<Tensor<4, Bool>>,
 }
 
 /// The views of one scale.
@@ -64,10 +66,8 @@ impl Model {
                 0 => &finest,
                 _ => &self.views(pass, scale, level, &motions),
             };
-            let output = losses::reprojection(
-                compared(views, level, masks.as_deref()),
-                settings.automask,
-            );
+            let output =
+                losses::reprojection(compared(views, level, masks.as_deref()), settings.automask);
             reprojection.push(output.loss.clone());
             finest_output.get_or_insert(output);
             if settings.smoothness > 0.0 {
@@ -105,6 +105,7 @@ impl Model {
             terms: sum.terms,
             finest: output,
             warped,
+            moving: masks.and_then(|masks| masks.into_iter().next()),
         }
     }
 
@@ -194,11 +195,19 @@ impl Model {
 
     /// The affine invariant loss between each frame's depth and the other's seen from it. Both frames are
     /// targets here: the other depth is that of the batch's other half.
-    fn affine_loss(&self, pass: &ForwardPass, finest: &ScaleViews, motions: &[Motion]) -> Tensor<1> {
+    fn affine_loss(
+        &self,
+        pass: &ForwardPass,
+        finest: &ScaleViews,
+        motions: &[Motion],
+    ) -> Tensor<1> {
         let depth = self.inverse_depth(pass.disparities[0].clone()).recip();
         let views = finest.synthesised.iter().zip(motions);
         mean_of(views, |(view, motion)| {
-            let there = ops::warp(crate::model::swap_halves(depth.clone()), view.coords.clone());
+            let there = ops::warp(
+                crate::model::swap_halves(depth.clone()),
+                view.coords.clone(),
+            );
             let seen = losses::depth_seen_from_target(
                 there,
                 view.coords.clone(),

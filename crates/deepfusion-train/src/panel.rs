@@ -20,6 +20,10 @@ pub struct SamplePanel {
     pub error: Vec<f32>,
     /// 1 where the warped source explains the pixel, 0 where it is masked, H×W.
     pub mask: Vec<f32>,
+    /// The optical flow to the source, 2×H×W in pixels, where one is learned.
+    pub flow: Option<Vec<f32>>,
+    /// 1 where the pixel is taken to move by itself, H×W, once that is looked for.
+    pub moving: Option<Vec<f32>>,
 }
 
 impl SamplePanel {
@@ -42,6 +46,8 @@ impl SamplePanel {
             warped: first(&loss.warped),
             error: first(&loss.finest.error),
             mask: first(&loss.finest.explained.clone().float()),
+            flow: pass.flows.first().map(|view| first(&view.flow)),
+            moving: loss.moving.as_ref().map(|m| first(&m.clone().float())),
         }
     }
 }

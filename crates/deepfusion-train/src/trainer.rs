@@ -236,8 +236,8 @@ impl Trainer {
                 } = self.model.clone();
                 self.model.depth_net = self.adam.apply(&step, "depth", depth_net, &gradients);
                 self.model.pose_net = self.adam.apply(&step, "pose", pose_net, &gradients);
-                self.model.flow_decoder = flow_decoder
-                    .map(|decoder| self.adam.apply(&step, "flow", decoder, &gradients));
+                self.model.flow_decoder =
+                    flow_decoder.map(|decoder| self.adam.apply(&step, "flow", decoder, &gradients));
             }
             self.state.step += 1;
             let gradient_norm = match outcome {

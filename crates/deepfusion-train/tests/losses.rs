@@ -75,7 +75,11 @@ fn close(what: &str, ours: &[f32], expected: &[f32]) {
     let rms = expected.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / expected.len() as f64;
     let worst = ours.iter().zip(expected).map(|(a, b)| (a - b).abs());
     let worst = f64::from(worst.fold(0.0, f32::max));
-    assert!(worst <= 1e-4 * rms.sqrt(), "{what}: {worst} of {}", rms.sqrt());
+    assert!(
+        worst <= 1e-4 * rms.sqrt(),
+        "{what}: {worst} of {}",
+        rms.sqrt()
+    );
 }
 
 fn settings() -> FlowLossConfig {
@@ -90,7 +94,10 @@ fn settings() -> FlowLossConfig {
 #[test]
 fn the_flow_loss_equals_pytorch_in_both_arrangements() {
     let reference = Reference::read();
-    let (first, second) = (reference.tensor("flow/first"), reference.tensor("flow/second"));
+    let (first, second) = (
+        reference.tensor("flow/first"),
+        reference.tensor("flow/second"),
+    );
     let forward = reference.tensor::<4>("flow/forward").require_grad();
     let backward = reference.tensor::<4>("flow/backward").require_grad();
     let view = |a: &Tensor<4>, b: &Tensor<4>, f: &Tensor<4>, g: &Tensor<4>| {
@@ -166,9 +173,15 @@ fn moving_pixels_equal_pytorch() {
     let inverse = reference.tensor::<3>("seen/inverse_intrinsics");
     let intrinsics = reference.tensor::<3>("seen/intrinsics");
     let distance = epipolar_distance(&ends, &motion, &inverse);
-    close("distance", &read(distance), reference.values("moving/distance"));
+    close(
+        "distance",
+        &read(distance),
+        reference.values("moving/distance"),
+    );
 
-    let everywhere = reference.tensor::<4>("moving/flow_error").greater_elem(-1.0);
+    let everywhere = reference
+        .tensor::<4>("moving/flow_error")
+        .greater_elem(-1.0);
     let synthesised = Synthesised {
         image: reference.tensor("moving/flow_error"),
         coords: reference.tensor("moving/rigid_coords"),
@@ -215,7 +228,10 @@ fn moving_pixels_equal_pytorch() {
 #[test]
 fn the_affine_invariant_loss_is_blind_to_the_scale() {
     let reference = Reference::read();
-    let (x, y) = (reference.tensor::<4>("affine/x"), reference.tensor::<4>("affine/y"));
+    let (x, y) = (
+        reference.tensor::<4>("affine/x"),
+        reference.tensor::<4>("affine/y"),
+    );
     let valid = reference.mask("affine/valid");
     let at = |scale_x: f32, scale_y: f32| {
         let s = Tensor::<1>::from_data([scale_x, scale_y], &reference.device).require_grad();
@@ -226,7 +242,10 @@ fn the_affine_invariant_loss_is_blind_to_the_scale() {
     };
     let (one, gradient) = at(1.0, 1.0);
     assert!(one > 0.1, "{one}");
-    assert!(gradient.iter().all(|g| g.abs() < 1e-4 * one), "{gradient:?}");
+    assert!(
+        gradient.iter().all(|g| g.abs() < 1e-4 * one),
+        "{gradient:?}"
+    );
     for (a, b) in [(3.0, 1.0), (1.0, 0.2), (0.05, 7.0)] {
         let (other, _) = at(a, b);
         assert!((other - one).abs() < 2e-5 * one, "{other} {one}");
@@ -266,7 +285,11 @@ fn gradients_equal_finite_differences() {
             let direction: Vec<f32> = direction.collect();
             let direction = Tensor::<1>::from_data(direction.as_slice(), &reference.device);
             let direction = direction.reshape(x.dims());
-            let expected = gradient.clone().mul(direction.clone()).sum().into_scalar::<f32>();
+            let expected = gradient
+                .clone()
+                .mul(direction.clone())
+                .sum()
+                .into_scalar::<f32>();
             let at = |step: f64| {
                 let moved = x.clone().detach() + direction.clone().mul_scalar(step);
                 f64::from(loss(moved).into_scalar::<f32>())
@@ -279,7 +302,10 @@ fn gradients_equal_finite_differences() {
             );
         }
     };
-    let (first, second) = (reference.tensor("flow/first"), reference.tensor("flow/second"));
+    let (first, second) = (
+        reference.tensor("flow/first"),
+        reference.tensor("flow/second"),
+    );
     let back = reference.tensor("flow/backward");
     let flow_loss = |f: Tensor<4>| {
         let view = flow_view(&first, &second, &f, &back, SSIM_WEIGHT);

@@ -160,7 +160,11 @@ fn so_does_a_run_with_every_term_of_the_loss() {
         config.loss.moving.warmup_share = 0.2;
     });
     let steps: Vec<_> = whole.iter().filter(|(_, l)| l.flow > 0.0).collect();
-    assert_eq!(steps.len(), 7, "training sees the flow, validation does not");
+    assert_eq!(
+        steps.len(),
+        7,
+        "training sees the flow, validation does not"
+    );
     assert!(whole.iter().all(|(_, l)| l.affine > 0.0));
     // The agreement waits for the flow to be learned: 20 % of seven steps.
     let agreeing: Vec<_> = steps.iter().map(|(_, l)| l.agreement > 0.0).collect();

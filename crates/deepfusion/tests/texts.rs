@@ -20,6 +20,7 @@ fn help_texts() {
         "data inspect",
         "data export-gt",
         "train",
+        "ablate",
         "eval",
         "eval-odometry",
         "predict",

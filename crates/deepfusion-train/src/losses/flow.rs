@@ -9,7 +9,10 @@ use deepfusion_nn::ops;
 /// - output: `[1, 2, height, width]`
 #[must_use]
 pub fn pixel_grid([height, width]: [usize; 2], device: &Device) -> Tensor<4> {
-    ops::flow_coords(Tensor::zeros([1, 2, height, width], &device.clone().inner()))
+    ops::flow_coords(Tensor::zeros(
+        [1, 2, height, width],
+        &device.clone().inner(),
+    ))
 }
 
 /// A source seen from the targets by an optical flow.
@@ -49,8 +52,8 @@ pub fn flow_view(
     let allowed = (square(flow) + square(&returning))
         .mul_scalar(0.01)
         .add_scalar(0.5);
-    let visible = ops::in_view(coords.clone(), [height, width])
-        .bool_and(square(&round_trip).lower(allowed));
+    let visible =
+        ops::in_view(coords.clone(), [height, width]).bool_and(square(&round_trip).lower(allowed));
     FlowView {
         error: ops::photometric_error(image, target.clone(), ssim_weight),
         coords,

@@ -45,8 +45,7 @@ pub fn moving_pixels(
     let rigid_ends = rigid.synthesised.coords.clone().detach();
     let square = |t: Tensor<4>| t.powi_scalar(2).sum_dim(1);
     let apart = square(rigid_ends.clone() - ends.clone());
-    let longest =
-        square(ends.clone() - grid.clone()).max_pair(square(rigid_ends.clone() - grid));
+    let longest = square(ends.clone() - grid.clone()).max_pair(square(rigid_ends.clone() - grid));
     let limit = longest
         .mul_scalar(settings.min_flow_share.powi(2))
         .clamp_min(settings.min_flow_px.powi(2));
@@ -96,7 +95,10 @@ fn infinitely_far(
 ) -> Tensor<4> {
     let [n, _, height, width] = like.dims();
     let rotation = source_from_target.rotation.clone().detach();
-    let homography = intrinsics.clone().matmul(rotation).matmul(inverse_intrinsics.clone());
+    let homography = intrinsics
+        .clone()
+        .matmul(rotation)
+        .matmul(inverse_intrinsics.clone());
     let device = like.device();
     let far = Tensor::<4>::zeros([n, 1, height, width], &device);
     ops::project(far, homography, Tensor::zeros([n, 3], &device))
@@ -119,7 +121,9 @@ pub fn epipolar_distance(
     let fundamental = inverse
         .clone()
         .swap_dims(1, 2)
-        .matmul(cross_matrix(source_from_target.translation.clone().detach()))
+        .matmul(cross_matrix(
+            source_from_target.translation.clone().detach(),
+        ))
         .matmul(source_from_target.rotation.clone().detach())
         .matmul(inverse);
     let grid = pixel_grid([height, width], &ends.device());
@@ -131,9 +135,7 @@ pub fn epipolar_distance(
                 .narrow(2, column, 1)
                 .reshape([n, 1, 1, 1])
         };
-        grid.clone().narrow(1, 0, 1) * entry(0)
-            + grid.clone().narrow(1, 1, 1) * entry(1)
-            + entry(2)
+        grid.clone().narrow(1, 0, 1) * entry(0) + grid.clone().narrow(1, 1, 1) * entry(1) + entry(2)
     };
     let (a, b, c) = (line(0), line(1), line(2));
     let off = a.clone() * ends.clone().narrow(1, 0, 1) + b.clone() * ends.narrow(1, 1, 1) + c;

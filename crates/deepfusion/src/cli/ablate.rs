@@ -24,7 +24,12 @@ pub struct AblateArgs {
     #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "resume")]
     pub eval_data: Vec<PathBuf>,
     /// Optimiser steps of every run.
-    #[arg(long, value_name = "N", required_unless_present = "resume", conflicts_with = "resume")]
+    #[arg(
+        long,
+        value_name = "N",
+        required_unless_present = "resume",
+        conflicts_with = "resume"
+    )]
     pub budget: Option<usize>,
     /// Runs of every row, with the seeds 0 to K − 1; more than before adds them to a resumed table [default: 1].
     #[arg(long, value_name = "K")]
@@ -36,7 +41,12 @@ pub struct AblateArgs {
     #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["preset", "resume"])]
     pub config: Option<PathBuf>,
     /// Only these rows.
-    #[arg(long, value_name = "ROW,…", value_delimiter = ',', conflicts_with = "resume")]
+    #[arg(
+        long,
+        value_name = "ROW,…",
+        value_delimiter = ',',
+        conflicts_with = "resume"
+    )]
     pub rows: Vec<String>,
     /// Size of the network's input.
     #[arg(long, value_name = "WxH", conflicts_with = "resume")]
@@ -45,7 +55,12 @@ pub struct AblateArgs {
     #[arg(long, value_name = "N", conflicts_with = "resume")]
     pub batch: Option<usize>,
     /// Which cameras.
-    #[arg(long, value_name = "2|3|both", default_value = "2", conflicts_with = "resume")]
+    #[arg(
+        long,
+        value_name = "2|3|both",
+        default_value = "2",
+        conflicts_with = "resume"
+    )]
     pub camera: CameraChoice,
     /// Folder of the table and its runs [default: runs/ablate-TIME].
     #[arg(long, value_name = "DIR")]

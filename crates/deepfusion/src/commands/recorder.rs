@@ -188,6 +188,8 @@ impl Recorder {
                     warped: &panel.warped,
                     error: &panel.error,
                     mask: &panel.mask,
+                    flow: panel.flow.as_deref(),
+                    moving: panel.moving.as_deref(),
                 })?;
                 deepfusion_data::save_png(&picture, &self.panels.join(format!("{step:06}.png")))?;
             }

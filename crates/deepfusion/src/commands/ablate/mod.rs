@@ -65,9 +65,15 @@ pub fn run(args: &AblateArgs) -> Result<()> {
     let runs = plan.seeds as usize * plan.rows.len();
     for seed in 0..plan.seeds {
         for (row, config) in plan.rows.iter().zip(&configs) {
-            let folder = out.join("rows").join(row.name()).join(format!("seed-{seed}"));
+            let folder = out
+                .join("rows")
+                .join(row.name())
+                .join(format!("seed-{seed}"));
             let place = results.len() + 1;
-            say(&format!("run {place} of {runs}: {}, seed {seed}", row.name()));
+            say(&format!(
+                "run {place} of {runs}: {}, seed {seed}",
+                row.name()
+            ));
             let config = TrainConfig {
                 seed,
                 steps: Some(plan.budget),
@@ -141,7 +147,8 @@ fn chosen(names: &[String]) -> Result<Vec<Row>> {
 
 fn read_plan(out: &Path) -> Result<Plan> {
     let path = out.join(PLAN);
-    let text = std::fs::read_to_string(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+    let text =
+        std::fs::read_to_string(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
     Ok(
         toml::from_str(&text).map_err(|e| deepfusion_train::Error::ConfigFile {
             path,
@@ -160,9 +167,14 @@ fn one_run(
 ) -> Result<Option<RunResult>> {
     let done = folder.join("result.json");
     if done.exists() {
-        let text = std::fs::read_to_string(&done).map_err(|e| deepfusion_data::Error::file(&done, e))?;
-        let result = serde_json::from_str(&text)
-            .with_context(|| format!("{}: not a result of ablate; delete it to run this row again", done.display()))?;
+        let text =
+            std::fs::read_to_string(&done).map_err(|e| deepfusion_data::Error::file(&done, e))?;
+        let result = serde_json::from_str(&text).with_context(|| {
+            format!(
+                "{}: not a result of ablate; delete it to run this row again",
+                done.display()
+            )
+        })?;
         return Ok(Some(result));
     }
     let run = folder.join("run");
@@ -195,7 +207,13 @@ fn open_run(run: &Path, config: TrainConfig, device: &Device) -> Result<Trainer>
         // It ended before its first checkpoint: nothing is lost with it.
         std::fs::remove_dir_all(run).map_err(|e| deepfusion_data::Error::file(run, e))?;
     }
-    Ok(Trainer::create(config, RunFolder::create(run)?, sets, device, Ok)?)
+    Ok(Trainer::create(
+        config,
+        RunFolder::create(run)?,
+        sets,
+        device,
+        Ok,
+    )?)
 }
 
 /// Whether the last step was reached.

@@ -38,8 +38,16 @@ impl Row {
         if self.minimum {
             return "minimum".into();
         }
-        let parts = [("hce", self.hce), ("speed", self.speed), ("flow", self.flow)];
-        let on: Vec<_> = parts.iter().filter(|(_, on)| *on).map(|(n, _)| *n).collect();
+        let parts = [
+            ("hce", self.hce),
+            ("speed", self.speed),
+            ("flow", self.flow),
+        ];
+        let on: Vec<_> = parts
+            .iter()
+            .filter(|(_, on)| *on)
+            .map(|(n, _)| *n)
+            .collect();
         if on.is_empty() {
             "none".into()
         } else {
@@ -87,7 +95,10 @@ mod tests {
         assert_eq!(rows.len(), 9);
         let names: HashSet<String> = rows.iter().map(|row| row.name()).collect();
         assert_eq!(names.len(), 9, "{names:?}");
-        assert_eq!((rows[0].name(), rows[7].name()), ("hce+speed+flow".into(), "none".into()));
+        assert_eq!(
+            (rows[0].name(), rows[7].name()),
+            ("hce+speed+flow".into(), "none".into())
+        );
         for row in rows {
             let config = row.config(&shared).unwrap();
             assert_eq!(config.loss.speed > 0.0, row.speed);

@@ -106,7 +106,16 @@ pub struct TableRow {
     /// Seeds that are done.
     pub seeds: usize,
     /// The figures by name, in the columns' order; absent where no run has one.
+    #[serde(serialize_with = "by_name")]
     pub figures: Vec<(&'static str, Option<Spread>)>,
+}
+
+/// A map in the columns' order.
+fn by_name<S: serde::Serializer>(
+    figures: &[(&'static str, Option<Spread>)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(figures.iter().map(|(name, figure)| (name, figure)))
 }
 
 /// The rows of `rows` that have a run, with what their runs came to.
@@ -139,13 +148,20 @@ fn cell(row: &TableRow, column: usize, plus_minus: &str) -> String {
 }
 
 fn views(row: Row) -> &'static str {
-    if row.minimum { "three, minimum" } else { "two, both ways" }
+    if row.minimum {
+        "three, minimum"
+    } else {
+        "two, both ways"
+    }
 }
 
 /// For people at a terminal.
 pub fn text(table: &[TableRow]) -> String {
     let columns = shown(table);
-    let mut out = format!("{:5}{:7}{:6}{:16}{:>6}", "HCE", "speed", "flow", "frames", "seeds");
+    let mut out = format!(
+        "{:5}{:7}{:6}{:16}{:>6}",
+        "HCE", "speed", "flow", "frames", "seeds"
+    );
     for i in &columns {
         let _ = write!(out, "{:>16}", COLUMNS[*i].name);
     }
@@ -227,7 +243,10 @@ pub fn markdown(table: &[TableRow]) -> String {
 /// For a paper: a `tabular` that needs amssymb's check mark.
 pub fn latex(table: &[TableRow]) -> String {
     let columns = shown(table);
-    let mut out = format!("\\begin{{tabular}}{{cccl{}}}\n\\hline\n", "r".repeat(columns.len()));
+    let mut out = format!(
+        "\\begin{{tabular}}{{cccl{}}}\n\\hline\n",
+        "r".repeat(columns.len())
+    );
     out.push_str("HCE & Speed & Flow & Frames");
     for i in &columns {
         let _ = write!(out, " & {}", COLUMNS[*i].name.replace('_', "\\_"));

@@ -1,0 +1,108 @@
+//! The on/off table through the program alone: made, gone on with, and refused.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use support::{Run, in_folder};
+
+fn run(folder: &Path, args: &str) -> Run {
+    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
+}
+
+fn ok(folder: &Path, args: &str) -> Run {
+    let run = run(folder, args);
+    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
+    run
+}
+
+#[test]
+fn the_table_grows_by_seeds_and_keeps_what_is_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out sim --frames 10 --seed 3 --scan-every 4 --moving-cars 3",
+    );
+    let settings = "--preset tiny --size 96x64 --batch 2 --budget 2";
+    ok(
+        at,
+        &format!("ablate --data sim {settings} --rows hce+speed+flow,none,minimum --out table"),
+    );
+    for file in [
+        "table.txt",
+        "table.csv",
+        "table.md",
+        "table.tex",
+        "ablate.toml",
+    ] {
+        assert!(at.join("table").join(file).is_file(), "{file}");
+    }
+    let csv = fs::read_to_string(at.join("table/table.csv")).unwrap();
+    let rows: Vec<_> = csv
+        .lines()
+        .skip(1)
+        .map(|l| l.split(',').next().unwrap())
+        .collect();
+    assert_eq!(rows, ["hce+speed+flow", "none", "minimum"]);
+    // What a row switches off, its run has off.
+    let config = |row: &str| {
+        fs::read_to_string(at.join(format!("table/rows/{row}/seed-0/run/config.toml"))).unwrap()
+    };
+    assert!(config("hce+speed+flow").contains("[depth_net.hce]"));
+    assert!(!config("none").contains("[depth_net.hce]"));
+    assert!(config("minimum").contains("reprojection = \"minimum\""));
+
+    // A second seed is added; the runs that are done are not made again, one that is half done goes on.
+    let result = at.join("table/rows/none/seed-0/result.json");
+    let before = fs::metadata(&result).unwrap().modified().unwrap();
+    fs::remove_file(at.join("table/rows/minimum/seed-0/result.json")).unwrap();
+    let table: Value =
+        serde_json::from_str(&ok(at, "ablate --out table --resume --seeds 2 --json").stdout)
+            .unwrap();
+    assert_eq!(fs::metadata(&result).unwrap().modified().unwrap(), before);
+    let rows = table.as_array().unwrap();
+    assert_eq!(rows.len(), 3);
+    for row in rows {
+        assert_eq!(row["seeds"], 2);
+        let abs_rel = &row["figures"]["abs_rel"];
+        assert!(abs_rel["mean"].as_f64().unwrap() > 0.01, "{row}");
+        assert!(abs_rel["std"].as_f64().unwrap() > 0.0, "{row}");
+    }
+    let text = fs::read_to_string(at.join("table/table.txt")).unwrap();
+    assert!(
+        text.contains("measured on the recordings trained on"),
+        "{text}"
+    );
+}
+
+#[test]
+fn what_cannot_be_a_table_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    for (args, names) in [
+        (
+            "ablate --data sim --budget 1 --rows hce+hope --out a",
+            &["rows", "hce+hope", "hce+speed+flow"][..],
+        ),
+        ("ablate --out nothing --resume", &["nothing", "ablate.toml"]),
+        (
+            "ablate --data sim --budget 1 --eval-data gone --out b",
+            &["gone"],
+        ),
+    ] {
+        let run = run(at, args);
+        assert_eq!(run.code, 1, "{args}: {}", run.stderr);
+        for name in names {
+            assert!(
+                run.stderr.contains(name),
+                "{args}: no `{name}` in {}",
+                run.stderr
+            );
+        }
+        assert!(!run.stderr.contains("panicked"), "{args}: {}", run.stderr);
+    }
+}
