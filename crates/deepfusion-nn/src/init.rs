@@ -51,6 +51,8 @@ pub enum WeightInit {
     KaimingNormalFanOut,
     /// Uniform in ±1/√fan_in, the bias too: PyTorch's default for a convolution.
     UniformFanIn,
+    /// Zero, the bias too: an output that starts at nothing.
+    Zeros,
 }
 
 #[cfg(test)]

@@ -82,6 +82,7 @@ impl Conv2dConfig {
                 let weight = rng.uniform(count, bound);
                 (weight, rng.uniform(self.channels_out, bound))
             }
+            WeightInit::Zeros => (vec![0.0; count], vec![0.0; self.channels_out]),
         };
         let shape = [
             self.channels_out,

@@ -1,4 +1,4 @@
-//! The depth and pose networks, and the differentiable operations under them.
+//! The depth, pose and flow networks, and the differentiable operations under them.
 //!
 //! A config struct ([`DepthNetConfig`], [`PoseNetConfig`]) says what a network is and is stored beside
 //! its weights; `.init(&device)` builds it; `forward` runs it. Networks on an autodiff device train
@@ -10,18 +10,22 @@
 mod decoder;
 mod depth_net;
 mod error;
+mod flow_decoder;
 mod graph;
 mod init;
 pub mod layers;
 pub mod ops;
 mod pose_net;
+mod resample;
 mod resnet;
 pub mod weights;
 
 pub use decoder::{DecoderConfig, DecoderStage, DisparityDecoder, SCALES};
 pub use depth_net::{DepthNet, DepthNetConfig, InputSize};
 pub use error::Error;
+pub use flow_decoder::{FLOW_LEVELS, FlowDecoder, FlowDecoderConfig, FlowLevel, FlowOutput};
 pub use graph::depth_graph;
 pub use init::{WeightInit, WeightRng};
 pub use pose_net::{PoseDecoder, PoseNet, PoseNetConfig, PoseOutput, RADIANS_PER_UNIT};
+pub use resample::BilinearResize;
 pub use resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth, ResidualBlock};

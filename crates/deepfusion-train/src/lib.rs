@@ -20,7 +20,6 @@ mod pose;
 mod predictor;
 mod prepare;
 mod preset;
-mod resample;
 mod runner;
 mod sampler;
 mod source;
@@ -35,6 +34,7 @@ pub use config::{
     Augmentation, CompareAt, DataConfig, LossConfig, Reprojection, ReversedPose, TrainConfig,
     ViewMotion,
 };
+pub use deepfusion_nn::BilinearResize;
 pub use error::Error;
 pub use event::{Control, TrainEvent};
 pub use losses::LossTerms;
@@ -44,7 +44,6 @@ pub use pose::{Motion, rotation_from_axis_angle};
 pub use predictor::{Prediction, Predictor};
 pub use prepare::{PreparedImage, Preparer};
 pub use preset::Preset;
-pub use resample::BilinearResize;
 pub use runner::{BurnRunner, DepthRunner, FusedRunner};
 pub use sampler::Sampler;
 pub use source::{Sample, SampleSet};

@@ -11,7 +11,7 @@ mod flex;
 mod kernel;
 
 use burn::backend::{Dispatch, DispatchDevice};
-use burn::tensor::{Bool, Tensor};
+use burn::tensor::{Bool, Tensor, TensorData};
 use kernel::KernelOps;
 
 pub use composed::{
@@ -162,6 +162,22 @@ pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
         image.into_dispatch(),
         coords.into_dispatch(),
     ))
+}
+
+/// Where a flow leads, p + f(p): what [`warp`] reads the second image at.
+///
+/// # Shapes
+/// - `flow`: `[N, 2, H, W]`, u and v in pixels
+/// - output: `[N, 2, H, W]`, u and v in pixels
+#[must_use]
+pub fn flow_coords(flow: Tensor<4>) -> Tensor<4> {
+    let [_, _, height, width] = flow.dims();
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x as f32, y as f32)));
+    let (mut grid, rows): (Vec<f32>, Vec<f32>) = pixels.unzip();
+    grid.extend(rows);
+    let grid = TensorData::new(grid, [1, 2, height, width]);
+    let device = flow.device();
+    flow.add(Tensor::from_data(grid, &device))
 }
 
 /// Local correlation: how alike each pixel's feature is to those around the same place in another image,

@@ -3,7 +3,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 /// Differentiable bilinear enlargement with half-pixel centres, as two matrix products: out = A·X·Bᵀ.
 ///
 /// The two matrices hold the weights of the bilinear filter; the products have a gradient on every
-/// backend, and for single-channel maps they are cheaper than gathering four neighbours.
+/// backend, and for maps of a channel or two they are cheaper than gathering four neighbours.
 #[derive(Debug, Clone)]
 pub struct BilinearResize {
     rows: Tensor<3>,
@@ -28,11 +28,12 @@ impl BilinearResize {
     }
 
     /// # Shapes
-    /// - `x`: `[N, 1, h, w]` of the size this was made for
-    /// - output: `[N, 1, H, W]`
+    /// - `x`: `[N, C, h, w]` of the size this was made for
+    /// - output: `[N, C, H, W]`
     #[must_use]
     pub fn apply(&self, x: Tensor<4>) -> Tensor<4> {
-        let [n, _, h, w] = x.dims();
+        let [batch, channels, h, w] = x.dims();
+        let n = batch * channels;
         let [height, width] = self.size;
         if [h, w] == self.size {
             return x;
@@ -40,7 +41,7 @@ impl BilinearResize {
         let rows = self.rows.clone().expand([n, height, h]);
         let columns = self.columns.clone().expand([n, w, width]);
         rows.matmul(x.reshape([n, h, w]).matmul(columns))
-            .reshape([n, 1, height, width])
+            .reshape([batch, channels, height, width])
     }
 }
 
@@ -70,5 +71,20 @@ mod tests {
         let x = Tensor::<1>::from_data([0.0, 1.0], &device).reshape([1, 1, 1, 2]);
         let y: Vec<f32> = resize.apply(x).into_data().try_into_vec().unwrap();
         assert_eq!(y, [0.0, 0.25, 0.75, 1.0]);
+    }
+
+    #[test]
+    fn channels_and_images_stay_apart() {
+        let device = Device::flex();
+        let resize = BilinearResize::new([2, 1], [4, 2], &device);
+        let values: Vec<f32> = (0..12).map(|i| (i * i) as f32).collect();
+        let x = Tensor::<1>::from_data(values.as_slice(), &device).reshape([2, 3, 2, 1]);
+        let y = resize.apply(x.clone());
+        assert_eq!(y.dims(), [2, 3, 4, 2]);
+        for (n, c) in [(0, 0), (0, 2), (1, 1)] {
+            let one = |t: Tensor<4>| t.narrow(0, n, 1).narrow(1, c, 1);
+            let alone = resize.apply(one(x.clone())).into_data();
+            assert_eq!(one(y.clone()).into_data(), alone);
+        }
     }
 }

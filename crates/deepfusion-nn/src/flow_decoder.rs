@@ -1,0 +1,256 @@
+//! The optical-flow decoder on the depth network's encoder (SPEC 1.3). Training only.
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+use serde::{Deserialize, Serialize};
+
+use crate::init::{WeightInit, WeightRng};
+use crate::layers::{Conv2d, Conv2dConfig};
+use crate::ops::{elu, flow_coords, local_correlation, warp};
+use crate::{BilinearResize, Error};
+
+/// How many sizes the flow is predicted at, coarse to fine: 1/16, 1/8 and 1/4 of the image.
+pub const FLOW_LEVELS: usize = 3;
+
+/// From the finest level to the image.
+const LAST_ENLARGEMENT: usize = 4;
+
+/// Added to a feature's mean square before it is divided by its root.
+const FEATURE_EPSILON: f64 = 1e-6;
+
+/// What a [`FlowDecoder`] is built from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FlowDecoderConfig {
+    /// The largest residual displacement that a level looks for along each axis, in its own pixels.
+    pub radius: usize,
+    /// Channels that the encoder's features are projected to before they are correlated.
+    pub feature_width: usize,
+    /// Channels of each level's 3×3 convolutions, in order.
+    pub widths: Vec<usize>,
+}
+
+impl Default for FlowDecoderConfig {
+    /// Radius 4 (81 displacements), 32 channels, widths 64, 48, 32.
+    fn default() -> Self {
+        Self {
+            radius: 4,
+            feature_width: 32,
+            widths: vec![64, 48, 32],
+        }
+    }
+}
+
+impl FlowDecoderConfig {
+    /// # Errors
+    /// [`Error::Config`] for a decoder that cannot be built.
+    pub fn validate(&self) -> Result<(), Error> {
+        if !(1..=16).contains(&self.radius) {
+            return Err(Error::config("flow_decoder.radius", "1 to 16", self.radius));
+        }
+        if !(1..=1024).contains(&self.feature_width) {
+            let (field, found) = ("flow_decoder.feature_width", self.feature_width);
+            return Err(Error::config(field, "1 to 1024", found));
+        }
+        let fits = |width: &usize| (1..=4096).contains(width);
+        if self.widths.is_empty() || !self.widths.iter().all(fits) {
+            return Err(Error::config(
+                "flow_decoder.widths",
+                "one width or more, of 1 to 4096",
+                &self.widths,
+            ));
+        }
+        Ok(())
+    }
+
+    /// A new decoder for features of `encoder_channels` (fine to coarse). Its first flow is zero everywhere: the last
+    /// convolution of every level starts at zero.
+    ///
+    /// # Errors
+    /// As [`Self::validate`].
+    pub fn init(
+        &self,
+        encoder_channels: [usize; 5],
+        rng: &mut WeightRng,
+        device: &Device,
+    ) -> Result<FlowDecoder, Error> {
+        self.validate()?;
+        let side = 2 * self.radius + 1;
+        let levels = (0..FLOW_LEVELS)
+            .map(|index| {
+                let from = encoder_channels[feature(index)];
+                let project = Conv2dConfig::new(from, self.feature_width, 1).init(rng, device);
+                // The correlation, the first frame's feature, and the flow so far.
+                let mut channels_in = side * side + self.feature_width + 2;
+                let hidden = self.widths.iter().map(|&width| {
+                    let conv = Conv2dConfig::new(channels_in, width, 3).init(rng, device);
+                    channels_in = width;
+                    conv
+                });
+                let hidden = hidden.collect();
+                let mut output = Conv2dConfig::new(channels_in, 2, 3);
+                output.init = WeightInit::Zeros;
+                FlowLevel {
+                    project,
+                    hidden,
+                    output: output.init(rng, device),
+                }
+            })
+            .collect();
+        Ok(FlowDecoder {
+            levels,
+            radius: self.radius,
+        })
+    }
+}
+
+/// Which of the encoder's five features a level reads: those at strides 16, 8 and 4, which are the same whether the
+/// encoder ends at stride 32 or 16.
+fn feature(level: usize) -> usize {
+    FLOW_LEVELS - level
+}
+
+/// A flow at several sizes. u points right, v down: the pixel p of the first frame is found at p + flow(p) in the
+/// second.
+#[derive(Debug, Clone)]
+pub struct FlowOutput {
+    /// `[batch, 2, height, width]`, the image's own size, in its pixels.
+    pub flow: Tensor<4>,
+    /// `[batch, 2, height / s, width / s]` for s = 16, 8, 4, each in pixels of its own size; `flow` is the last one,
+    /// enlarged.
+    pub levels: [Tensor<4>; FLOW_LEVELS],
+}
+
+/// One size of the flow.
+#[derive(Module, Debug)]
+pub struct FlowLevel {
+    /// 1×1, from the encoder's feature to what is correlated.
+    pub project: Conv2d,
+    /// 3×3 + ELU each.
+    pub hidden: Vec<Conv2d>,
+    /// 3×3 to the residual flow.
+    pub output: Conv2d,
+}
+
+impl FlowLevel {
+    /// The projected feature, divided by its root mean square over the channels in each pixel: a correlation is then
+    /// the cosine of the angle between two features, within ±1 whatever the encoder's scale, and rises with their
+    /// likeness alone.
+    ///
+    /// # Shapes
+    /// - `feature`: `[batch, channels, height, width]`
+    /// - output: `[batch, feature_width, height, width]`
+    fn features(&self, feature: &Tensor<4>) -> Tensor<4> {
+        let x = self.project.forward(feature.clone());
+        let mean_square = x.clone().mul(x.clone()).mean_dim(1);
+        x.div(mean_square.add_scalar(FEATURE_EPSILON).sqrt())
+    }
+
+    /// f + residual(corr(F₀, F₁⟨p + f⟩), F₀, f).
+    ///
+    /// # Shapes
+    /// - `first`, `second`: `[batch, feature_width, height, width]`
+    /// - `flow`: `[batch, 2, height, width]`, in pixels of this size; none at the coarsest level
+    /// - output: as `flow`
+    fn refine(
+        &self,
+        first: Tensor<4>,
+        second: Tensor<4>,
+        flow: Option<Tensor<4>>,
+        radius: usize,
+    ) -> Tensor<4> {
+        let (flow, second) = match flow {
+            Some(flow) => (flow.clone(), warp(second, flow_coords(flow))),
+            None => {
+                let [batch, _, height, width] = first.dims();
+                let size = [batch, 2, height, width];
+                (Tensor::zeros(size, &first.device()), second)
+            }
+        };
+        let correlation = local_correlation(first.clone(), second, radius);
+        let mut x = Tensor::cat(vec![correlation, first, flow.clone()], 1);
+        for conv in &self.hidden {
+            x = elu(conv.forward(x));
+        }
+        flow.add(self.output.forward(x))
+    }
+}
+
+/// Optical flow from the encoder's features of two frames, coarse to fine: at each size the second frame's features
+/// are warped by the flow so far, and what a local correlation still finds is added to it.
+#[derive(Module, Debug)]
+pub struct FlowDecoder {
+    /// Coarse to fine.
+    pub levels: Vec<FlowLevel>,
+    #[module(skip)]
+    radius: usize,
+}
+
+impl FlowDecoder {
+    /// The flow from the first frame to the second.
+    ///
+    /// # Shapes
+    /// - `first`, `second`: the features of [`ResNet::forward`](crate::ResNet::forward) for images of
+    ///   `[batch, 3, height, width]`; those at strides 4, 8 and 16 are read
+    /// - output: see [`FlowOutput`]
+    #[must_use]
+    pub fn forward(&self, first: &[Tensor<4>; 5], second: &[Tensor<4>; 5]) -> FlowOutput {
+        self.decode(|index, level| {
+            let k = feature(index);
+            (level.features(&first[k]), level.features(&second[k]))
+        })
+    }
+
+    /// The flow from the first frame to the second and the one back, in one pass over a batch twice as large.
+    ///
+    /// # Shapes
+    /// As [`Self::forward`].
+    #[must_use]
+    pub fn forward_both(&self, first: &[Tensor<4>; 5], second: &[Tensor<4>; 5]) -> [FlowOutput; 2] {
+        let batch = first[0].dims()[0];
+        let both = self.decode(|index, level| {
+            let k = feature(index);
+            let features = [&first[k], &second[k]].map(|x| level.features(x));
+            let [f, s] = features.clone();
+            (
+                Tensor::cat(features.to_vec(), 0),
+                Tensor::cat(vec![s, f], 0),
+            )
+        });
+        [0, 1].map(|direction| {
+            let part = |t: Tensor<4>| t.narrow(0, direction * batch, batch);
+            FlowOutput {
+                flow: part(both.flow.clone()),
+                levels: both.levels.clone().map(part),
+            }
+        })
+    }
+
+    /// `features` gives both frames' at each level.
+    fn decode(&self, features: impl Fn(usize, &FlowLevel) -> (Tensor<4>, Tensor<4>)) -> FlowOutput {
+        let refine = |index: usize, flow: Option<Tensor<4>>| {
+            let level = &self.levels[index];
+            let (first, second) = features(index, level);
+            level.refine(first, second, flow, self.radius)
+        };
+        let coarse = refine(0, None);
+        let middle = refine(1, Some(enlarged(coarse.clone(), 2)));
+        let fine = refine(2, Some(enlarged(middle.clone(), 2)));
+        FlowOutput {
+            flow: enlarged(fine.clone(), LAST_ENLARGEMENT),
+            levels: [coarse, middle, fine],
+        }
+    }
+}
+
+/// The flow at `factor` times the size, bilinear with half-pixel centres; its pixels are as much smaller, so that its
+/// values grow too.
+fn enlarged(flow: Tensor<4>, factor: usize) -> Tensor<4> {
+    let [_, _, height, width] = flow.dims();
+    let device = flow.device();
+    let resize = BilinearResize::new([height, width], [factor * height, factor * width], &device);
+    resize.apply(flow).mul_scalar(factor as f64)
+}
+
+#[cfg(test)]
+mod tests;
