@@ -1,4 +1,4 @@
-//! The depth and pose networks, and the differentiable operations under them.
+//! The depth, pose and flow networks, and the differentiable operations under them.
 //!
 //! A config struct ([`DepthNetConfig`], [`PoseNetConfig`]) says what a network is and is stored beside
 //! its weights; `.init(&device)` builds it; `forward` runs it. Networks on an autodiff device train
@@ -20,7 +20,6 @@ pub mod layers;
 pub mod ops;
 mod pose_net;
 mod resample;
-mod residual_block;
 mod resnet;
 pub mod weights;
 
@@ -35,5 +34,4 @@ pub use hce::{HceConfig, HierarchicalContext};
 pub use init::{WeightInit, WeightRng};
 pub use pose_net::{PoseDecoder, PoseNet, PoseNetConfig, PoseOutput, RADIANS_PER_UNIT};
 pub use resample::BilinearResize;
-pub use residual_block::ResidualBlock;
-pub use resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth};
+pub use resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth, ResidualBlock};

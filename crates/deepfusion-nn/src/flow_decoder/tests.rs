@@ -81,26 +81,25 @@ fn matcher(config: &FlowDecoderConfig, channels: [usize; 5], device: &Device) ->
         tensor.values.fill(0.0);
     }
     for level in 0..FLOW_LEVELS {
-        let mut tensor = |name: &str| {
+        let mut edit = |name: &str, edit: &dyn Fn(&mut WeightTensor)| {
             let name = format!("levels.{level}.{name}");
-            by_hand.tensors.get_mut(&name).unwrap()
+            edit(by_hand.tensors.get_mut(&name).unwrap());
         };
-        let project = tensor("project.weight");
-        for c in 0..config.feature_width {
-            set(project, [c, c], 1.0);
-        }
+        edit("project.weight", &|project| {
+            (0..config.feature_width).for_each(|c| set(project, [c, c], 1.0));
+        });
         // ELU(20·corr − 16): 4 at a match, nearly −1 elsewhere; the −1s cancel but for the match's own.
-        tensor("hidden.0.bias").values.fill(-16.0);
-        let hidden = tensor("hidden.0.weight");
-        for d in 0..side * side {
-            set(hidden, [d, d], 20.0);
-        }
-        let output = tensor("output.weight");
-        let by = |index: usize| (index as f32 - config.radius as f32) / 5.0;
-        for d in 0..side * side {
-            set(output, [0, d], by(d % side));
-            set(output, [1, d], by(d / side));
-        }
+        edit("hidden.0.bias", &|bias| bias.values.fill(-16.0));
+        edit("hidden.0.weight", &|hidden| {
+            (0..side * side).for_each(|d| set(hidden, [d, d], 20.0));
+        });
+        edit("output.weight", &|output| {
+            let by = |index: usize| (index as f32 - config.radius as f32) / 5.0;
+            for d in 0..side * side {
+                set(output, [0, d], by(d % side));
+                set(output, [1, d], by(d / side));
+            }
+        });
     }
     weights::apply(decoder, &by_hand).unwrap()
 }

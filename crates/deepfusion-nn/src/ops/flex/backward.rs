@@ -1,0 +1,185 @@
+//! The backward passes on the CPU.
+
+use super::super::kernel::{ConvOptions, KernelBackward};
+use super::{
+    Float, Values, conv_shape, correlation_shape, dims, photometric_shape, single,
+    smoothness_shape, tensor, unwritten, warp_shape,
+};
+use burn::backend::Flex;
+use deepfusion_kernels::{self as kernels, BatchNormSaved};
+
+impl KernelBackward for Flex {
+    fn conv2d_grad_x(x: Float, weight: Float, grad: Float, options: ConvOptions) -> Float {
+        let sizes: [usize; 4] = dims(&x);
+        let shape = conv_shape(sizes, dims(&weight), options);
+        let (weight, grad) = (Values::of(weight), Values::of(grad));
+        let mut out = unwritten(shape.in_len());
+        kernels::conv2d_backward_input(&shape, weight.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn conv2d_grad_weight(x: Float, weight: Float, grad: Float, options: ConvOptions) -> Float {
+        let sizes: [usize; 4] = dims(&weight);
+        let shape = conv_shape(dims(&x), sizes, options);
+        let (x, grad) = (Values::of(x), Values::of(grad));
+        let mut out = unwritten(shape.weight_len());
+        kernels::conv2d_backward_weight(&shape, x.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn conv2d_grad_bias(grad: Float) -> Float {
+        let [batch, channels, height, width] = dims(&grad);
+        let grad = Values::of(grad);
+        let mut out = unwritten(channels);
+        kernels::channel_sums(grad.slice(), batch, height * width, &mut out);
+        tensor(out, [channels])
+    }
+
+    fn batch_norm_grad(
+        x: Float,
+        [gamma, beta]: [Float; 2],
+        [mean, variance]: [Float; 2],
+        grad: Float,
+        epsilon: f64,
+        relu: bool,
+    ) -> [Float; 3] {
+        let sizes: [usize; 4] = dims(&x);
+        let (x, gamma, beta) = (Values::of(x), Values::of(gamma), Values::of(beta));
+        let (grad, mean, variance) = (Values::of(grad), Values::of(mean), Values::of(variance));
+        let saved = BatchNormSaved {
+            mean: mean.slice().to_vec(),
+            variance: variance.slice().to_vec(),
+        };
+        let mut grad_x = unwritten(x.slice().len());
+        let (grad_gamma, grad_beta) = kernels::batch_norm_backward(
+            x.slice(),
+            gamma.slice(),
+            beta.slice(),
+            &saved,
+            grad.slice(),
+            sizes[2] * sizes[3],
+            single(epsilon),
+            relu,
+            &mut grad_x,
+        );
+        let channels = [sizes[1]];
+        [
+            tensor(grad_x, sizes),
+            tensor(grad_gamma, channels),
+            tensor(grad_beta, channels),
+        ]
+    }
+
+    fn elu_grad(output: Float, grad: Float) -> Float {
+        let sizes: [usize; 4] = dims(&output);
+        let (output, grad) = (Values::of(output), Values::of(grad));
+        let mut out = unwritten(grad.slice().len());
+        kernels::elu_backward(output.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn upsample_concat_grad(grad: Float, channels: usize) -> [Float; 2] {
+        let [batch, all, height, width] = dims(&grad);
+        let x_sizes = [batch, channels, height / 2, width / 2];
+        let skip_sizes = [batch, all - channels, height, width];
+        let grad = Values::of(grad);
+        let mut grad_x = unwritten(x_sizes.iter().product());
+        let mut grad_skip = unwritten(skip_sizes.iter().product());
+        kernels::upsample_concat_backward(
+            grad.slice(),
+            batch,
+            channels,
+            width / 2,
+            &mut grad_x,
+            &mut grad_skip,
+        );
+        [tensor(grad_x, x_sizes), tensor(grad_skip, skip_sizes)]
+    }
+
+    fn warp_grad_image(image: Float, coords: Float, grad: Float) -> Float {
+        let sizes: [usize; 4] = dims(&image);
+        let (_, shape) = warp_shape(&image, &coords);
+        let (coords, grad) = (Values::of(coords), Values::of(grad));
+        let mut out = unwritten(sizes.iter().product());
+        kernels::warp_backward_image(&shape, coords.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn warp_grad_coords(image: Float, coords: Float, grad: Float) -> Float {
+        let sizes: [usize; 4] = dims(&coords);
+        let (_, shape) = warp_shape(&image, &coords);
+        let (image, coords, grad) = (Values::of(image), Values::of(coords), Values::of(grad));
+        let mut out = unwritten(sizes.iter().product());
+        kernels::warp_backward_coords(
+            &shape,
+            image.slice(),
+            coords.slice(),
+            grad.slice(),
+            &mut out,
+        );
+        tensor(out, sizes)
+    }
+
+    fn local_correlation_grad_first(second: Float, grad: Float, radius: usize) -> Float {
+        let sizes: [usize; 4] = dims(&second);
+        let shape = correlation_shape(sizes, radius);
+        let (second, grad) = (Values::of(second), Values::of(grad));
+        let mut out = unwritten(sizes.iter().product());
+        let (second, grad) = (second.slice(), grad.slice());
+        kernels::local_correlation_backward_first(&shape, second, grad, &mut out);
+        tensor(out, sizes)
+    }
+
+    fn local_correlation_grad_second(first: Float, grad: Float, radius: usize) -> Float {
+        let sizes: [usize; 4] = dims(&first);
+        let shape = correlation_shape(sizes, radius);
+        let (first, grad) = (Values::of(first), Values::of(grad));
+        let mut out = unwritten(sizes.iter().product());
+        let (first, grad) = (first.slice(), grad.slice());
+        kernels::local_correlation_backward_second(&shape, first, grad, &mut out);
+        tensor(out, sizes)
+    }
+
+    fn project_grad(
+        inverse_depth: Float,
+        homography: Float,
+        shift: Float,
+        grad: Float,
+    ) -> [Float; 3] {
+        let sizes: [usize; 4] = dims(&inverse_depth);
+        let (depth, homography) = (Values::of(inverse_depth), Values::of(homography));
+        let (shift, grad) = (Values::of(shift), Values::of(grad));
+        let mut grad_depth = unwritten(sizes.iter().product());
+        let gradients = kernels::project_backward(
+            (sizes[2], sizes[3]),
+            depth.slice(),
+            homography.slice(),
+            shift.slice(),
+            grad.slice(),
+            &mut grad_depth,
+        );
+        [
+            tensor(grad_depth, sizes),
+            tensor(gradients.homography, [sizes[0], 3, 3]),
+            tensor(gradients.shift, [sizes[0], 3]),
+        ]
+    }
+
+    fn smoothness_grad(disparity: Float, image: Float, grad: Float) -> Float {
+        let sizes: [usize; 4] = dims(&disparity);
+        let shape = smoothness_shape(&image);
+        let (disparity, image) = (Values::of(disparity), Values::of(image));
+        let grad = Values::of(grad).slice()[0];
+        let mut out = unwritten(sizes.iter().product());
+        kernels::smoothness_backward(&shape, disparity.slice(), image.slice(), grad, &mut out);
+        tensor(out, sizes)
+    }
+
+    fn photometric_grad(a: Float, b: Float, grad: Float, alpha: f64) -> Float {
+        let (sizes, shape) = photometric_shape(&a, alpha);
+        let (a, b, grad) = (Values::of(a), Values::of(b), Values::of(grad));
+        let mut out = unwritten(a.slice().len());
+        kernels::photometric_error_backward(&shape, a.slice(), b.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+}
