@@ -20,6 +20,7 @@ pub mod layers;
 pub mod ops;
 mod pose_net;
 mod resample;
+mod residual_block;
 mod resnet;
 pub mod weights;
 
@@ -34,4 +35,5 @@ pub use hce::{HceConfig, HierarchicalContext};
 pub use init::{WeightInit, WeightRng};
 pub use pose_net::{PoseDecoder, PoseNet, PoseNetConfig, PoseOutput, RADIANS_PER_UNIT};
 pub use resample::BilinearResize;
-pub use resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth, ResidualBlock};
+pub use residual_block::ResidualBlock;
+pub use resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth};

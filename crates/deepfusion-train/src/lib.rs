@@ -34,10 +34,7 @@ pub use adam::{Adam, NamedGradients, StepOutcome};
 pub use augment::Jitter;
 pub use batch::{BatchLoader, SnippetBatch};
 pub use checkpoint::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder, load_depth_net};
-pub use config::{
-    Augmentation, CompareAt, DataConfig, LossConfig, Reprojection, ReversedPose, TrainConfig,
-    ViewMotion,
-};
+pub use config::{Augmentation, DataConfig, Reprojection, ReversedPose, TrainConfig, ViewMotion};
 pub use deepfusion_nn::BilinearResize;
 pub use error::Error;
 pub use event::{Control, TrainEvent};
@@ -52,6 +49,7 @@ pub use pose_predictor::PosePredictor;
 pub use predictor::{Prediction, Predictor};
 pub use prepare::{PreparedImage, Preparer};
 pub use preset::Preset;
+
 pub use runner::{BurnRunner, DepthRunner, FusedRunner};
 pub use sampler::Sampler;
 pub use source::{Sample, SampleSet};

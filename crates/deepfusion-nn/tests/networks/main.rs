@@ -3,6 +3,7 @@
 
 mod against_pytorch;
 mod common;
+mod depth_network;
 mod flow_decoder;
 mod operations;
 mod training_step;
