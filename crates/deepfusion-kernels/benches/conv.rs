@@ -32,6 +32,7 @@ fn shapes() -> Vec<(&'static str, ConvShape)> {
         ("decoder 96-32", layer((96, 32), (48, 160), 3, 1, true)),
         ("decoder 16-16", layer((16, 16), (96, 320), 3, 1, true)),
         ("head 16-1", layer((16, 1), (96, 320), 3, 1, true)),
+        ("flow 32-2", layer((32, 2), (24, 80), 3, 1, false)),
     ]
 }
 

@@ -54,16 +54,14 @@ pub fn conv2d_backward_input(
 }
 
 fn backward_input(shape: &ConvShape, phases: &[Phase], grad_out: &[f32], grad_x: &mut [f32]) {
-    let (s, p) = (shape.stride, shape.padding);
-    let window = gradient_window(shape);
+    let (s, margin) = (shape.stride, margin(shape));
+    let window = gradient_window(shape, margin);
     // Rows of a phase; without reflection those that lie wholly in the padding are left out.
+    let all = shape.out_height() + shape.reach().0 / s;
     let rows = if shape.reflect {
-        0..shape.out_height() + window.padding.0
+        0..all
     } else {
-        p / s
-            ..(p + shape.in_height)
-                .div_ceil(s)
-                .min(shape.out_height() + window.padding.0)
+        margin / s..(margin + shape.in_height).div_ceil(s).min(all)
     };
     let row_floats = shape.out_channels * (window.width + 2 * window.padding.1)
         + shape.in_channels * (window.out_width + 2);
@@ -90,18 +88,29 @@ fn backward_input(shape: &ConvShape, phases: &[Phase], grad_out: &[f32], grad_x:
     }
 }
 
-/// How a phase of the padded input looks at ∂Y.
-fn gradient_window(shape: &ConvShape) -> Window {
+/// Rows and columns around the image whose gradient is worked out too.
+///
+/// What lands in a padding of zeros is needed by nobody: at stride 1 it is left out, which for 10×3 pixels is a
+/// third of the work. Elsewhere it costs less than to tell it apart, or, mirrored, belongs to pixels of the image.
+fn margin(shape: &ConvShape) -> usize {
+    let (down, right) = shape.reach();
+    let needless = shape.stride == 1 && !shape.reflect && shape.padding <= down.min(right);
+    if needless { 0 } else { shape.padding }
+}
+
+/// How a phase of the input, with its margin, looks at ∂Y.
+fn gradient_window(shape: &ConvShape, margin: usize) -> Window {
     let (down, right) = shape.reach();
     let reach = (down / shape.stride, right / shape.stride);
+    let skipped = shape.padding - margin;
     Window {
         height: shape.out_height(),
         width: shape.out_width(),
-        padding: reach,
+        padding: (reach.0 - skipped, reach.1 - skipped),
         reflect: false,
         stride: 1,
         reach,
-        out_width: shape.out_width() + reach.1,
+        out_width: shape.out_width() + reach.1 - 2 * skipped,
     }
 }
 
@@ -218,9 +227,9 @@ fn scatter(
     result: &[f32],
     to: &SharedMut<f32>,
 ) {
-    let (s, p) = (shape.stride, shape.padding);
+    let (s, p) = (shape.stride, margin(shape));
     let (height, width) = (shape.in_height, shape.in_width);
-    let count = shape.out_width() + shape.reach().1 / s;
+    let count = gradient_window(shape, p).out_width;
     // Columns whose pixel lies inside: 0 <= s·x + right − p < width.
     let first = p.saturating_sub(phase.right).div_ceil(s).min(count);
     let last = (width + p)

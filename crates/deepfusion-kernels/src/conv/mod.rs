@@ -10,6 +10,7 @@
 //! Tiles are sized for the second cache; where an image has few pixels (deep layers), a tile holds several
 //! images, so that the weights are read once for all of them.
 
+mod few_outputs;
 mod forward;
 mod input_gradient;
 mod lattice;

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::noise::noise32 as noise;
+use crate::scratch::with_scratch;
 use proptest::prelude::*;
 
 /// Every product of the convolution: (output index, input index, weight index).
@@ -122,45 +123,58 @@ proptest! {
     }
 }
 
-/// Large enough for several tiles in an image, and for tiles of several images.
+/// Large enough for several tiles in an image, and for tiles of several images; with few outputs and more.
 #[test]
 fn equals_the_definition_across_tiles() {
-    let shape = ConvShape {
-        batch: 2,
-        in_channels: 16,
-        in_height: 64,
-        in_width: 96,
-        out_channels: 4,
-        kernel_height: 3,
-        kernel_width: 3,
-        stride: 1,
-        padding: 1,
-        dilation: 1,
-        reflect: true,
-    };
-    check(&shape);
-    check(&ConvShape {
-        batch: 9,
-        in_channels: 40,
-        in_height: 6,
-        in_width: 9,
-        reflect: false,
-        ..shape
-    });
-    check(&ConvShape {
-        batch: 3,
-        in_channels: 3,
-        kernel_height: 7,
-        kernel_width: 7,
-        stride: 2,
-        padding: 3,
-        reflect: false,
-        ..shape
+    for out_channels in [4, 11] {
+        let shape = ConvShape {
+            batch: 2,
+            in_channels: 16,
+            in_height: 64,
+            in_width: 96,
+            out_channels,
+            kernel_height: 3,
+            kernel_width: 3,
+            stride: 1,
+            padding: 1,
+            dilation: 1,
+            reflect: true,
+        };
+        check(&shape);
+        check(&ConvShape {
+            batch: 9,
+            in_channels: 40,
+            in_height: 6,
+            in_width: 9,
+            reflect: false,
+            ..shape
+        });
+        check(&ConvShape {
+            batch: 3,
+            in_channels: 3,
+            kernel_height: 7,
+            kernel_width: 7,
+            stride: 2,
+            padding: 3,
+            reflect: false,
+            ..shape
+        });
+    }
+}
+
+/// Leaves buffers full of NaN to whoever borrows them next on this thread.
+fn spoil_scratch() {
+    let fill = |buffer: &mut [f32]| buffer.fill(f32::NAN);
+    with_scratch(1 << 20, |outer| {
+        with_scratch(1 << 20, |inner| {
+            fill(inner);
+            fill(outer);
+        });
     });
 }
 
 /// Sums are cut by the shape alone, never by the number of threads: one thread and three give the same
-/// bits, whether tasks share tiles, channels or weights.
+/// bits, whether tasks share tiles, channels or weights, and whatever their buffers held before.
 #[test]
 fn threads_do_not_change_a_bit() {
     let shape = ConvShape {
@@ -192,11 +206,18 @@ fn threads_do_not_change_a_bit() {
             ..shape
         },
         ConvShape { stride: 2, ..shape },
+        ConvShape {
+            out_channels: 2,
+            ..shape
+        },
     ];
     for shape in cases {
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-            pool.build().unwrap().install(|| all_passes(&shape))
+            pool.build().unwrap().install(|| {
+                spoil_scratch();
+                all_passes(&shape)
+            })
         };
         let alone = on(1);
         assert!(alone.iter().flatten().all(|v| v.is_finite()));

@@ -1,5 +1,5 @@
 use super::{
-    ConvShape,
+    ConvShape, few_outputs,
     forward::gather,
     lattice::{Lattice, Tile, tiles},
     product::{LANES, PixelProduct, padded},
@@ -52,6 +52,12 @@ pub fn conv2d_backward_weight(
     let row_floats = shape.in_channels * shape.stride * (shape.in_width + 2 * shape.padding)
         + padded(shape.out_channels) * shape.out_width();
     let tiles = tiles(shape.batch, 0, shape.out_height(), row_floats);
+    if shape.out_channels < few_outputs::FEW {
+        let add =
+            |_: &mut (), tile, sum: &mut [f32]| few_outputs::add(shape, tile, x, grad_out, sum);
+        grad_weight.copy_from_slice(&sum_over(&tiles, shape.weight_len(), || (), add));
+        return;
+    }
     let to = SharedMut::new(grad_weight);
     let all = 0..shape.in_channels;
     if shape.weight_len() > FEW_WEIGHTS && shape.in_channels >= TASKS {
@@ -82,16 +88,33 @@ pub fn conv2d_backward_weight(
         });
         return;
     }
+    let total = sum_over(
+        &tiles,
+        sum_len(shape, &all),
+        Adder::default,
+        |adder, tile, sum| {
+            with_scratch(grad_len(shape, &tile), |grad| {
+                transposed_grad(shape, &tile, grad_out, grad);
+                adder.add(shape, tile, all.clone(), x, grad, sum);
+            });
+        },
+    );
+    write(shape, all.clone(), &total, &to);
+}
+
+/// `len` sums over tiles, to which `add` adds a tile's; every task has a state of its own.
+fn sum_over<S>(
+    tiles: &[Tile],
+    len: usize,
+    state: impl Fn() -> S + Sync,
+    add: impl Fn(&mut S, Tile, &mut [f32]) + Sync,
+) -> Vec<f32> {
     let mut parts: Vec<Vec<f32>> = split(tiles.len(), TASKS)
         .into_par_iter()
         .map(|range| {
-            let mut sum = vec![0.0; sum_len(shape, &all)];
-            let mut adder = Adder::default();
+            let (mut state, mut sum) = (state(), vec![0.0; len]);
             for tile in &tiles[range] {
-                with_scratch(grad_len(shape, tile), |grad| {
-                    transposed_grad(shape, tile, grad_out, grad);
-                    adder.add(shape, *tile, all.clone(), x, grad, &mut sum);
-                });
+                add(&mut state, *tile, &mut sum);
             }
             sum
         })
@@ -102,7 +125,7 @@ pub fn conv2d_backward_weight(
             *sum += *add;
         }
     }
-    write(shape, all, &total, &to);
+    total
 }
 
 /// Length of a tile's transposed gradient: pixels × padded outputs.
