@@ -258,6 +258,24 @@ fn the_affine_invariant_loss_is_blind_to_the_scale() {
     assert!(gradient.iter().all(|g| g.is_finite()));
 }
 
+/// Two flows that contradict each other everywhere still see what is in view: their error teaches them.
+#[test]
+fn a_flow_that_never_comes_back_keeps_learning() {
+    let reference = Reference::read();
+    let (first, second) = (
+        reference.tensor("flow/first"),
+        reference.tensor("flow/second"),
+    );
+    let [n, _, h, w] = Tensor::<4>::dims(&first);
+    let same = Tensor::<4>::full([n, 2, h, w], 3.0, &reference.device).require_grad();
+    let view = flow_view(&first, &second, &same, &same, SSIM_WEIGHT);
+    let seen = truth(view.visible.clone()).iter().sum::<f32>();
+    assert_eq!(seen as usize, n * (h - 3) * (w - 3), "all that is in view");
+    let loss = flow(&[view], &[same.clone()], &[first], &settings());
+    let gradient = read(same.grad(&loss.backward()).unwrap());
+    assert!(gradient.iter().filter(|g| **g != 0.0).count() > gradient.len() / 2);
+}
+
 /// Without a visible pixel there is nothing to learn, and no NaN.
 #[test]
 fn a_flow_out_of_view_costs_its_smoothness_alone() {

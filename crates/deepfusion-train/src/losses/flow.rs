@@ -24,10 +24,15 @@ pub struct FlowView {
     pub coords: Tensor<4>,
     /// f(p) + f'(p + f(p)), N×2×H×W, in pixels: zero where going there and back ends at the start.
     pub round_trip: Tensor<4>,
-    /// Where the flow ends in view and at a pixel that comes back: ‖f + f'‖² < 0.01·(‖f‖² + ‖f'‖²) + 0.5.
-    /// N×1×H×W, without gradient.
+    /// Where the flow ends in view and at a pixel that comes back: ‖f + f'‖² < 0.01·(‖f‖² + ‖f'‖²) + 0.5. In an
+    /// image of which less than half comes back, wherever it ends in view: there the flow is wrong, and not
+    /// the pixels hidden. N×1×H×W, without gradient.
     pub visible: Tensor<4, Bool>,
 }
+
+/// Share of an image's pixels in view that must come back for the rest to count as hidden. Without this limit
+/// two flows that contradict each other everywhere see nothing, learn nothing, and stay so.
+const LEAST_CONSISTENT: f64 = 0.5;
 
 /// Sees a source from the targets by the flow between them.
 ///
@@ -60,6 +65,13 @@ pub fn flow_view(
         round_trip,
         visible,
     }
+}
+
+/// The images of which too little of what is in view comes back, N×1×1×1 made as large as the masks.
+fn contradictory(back_again: &Tensor<4, Bool>, in_view: &Tensor<4, Bool>) -> Tensor<4, Bool> {
+    let count = |mask: &Tensor<4, Bool>| mask.clone().float().sum_dim(2).sum_dim(3);
+    let few = count(back_again).lower(count(in_view).mul_scalar(LEAST_CONSISTENT));
+    few.expand(in_view.dims())
 }
 
 /// L_f + L_b + w_c·L_c (Eq. 16–20) and the smoothness, of a flow looked at in both directions. The two
