@@ -57,8 +57,10 @@ pub fn flow_view(
     let allowed = (square(flow) + square(&returning))
         .mul_scalar(0.01)
         .add_scalar(0.5);
-    let visible =
-        ops::in_view(coords.clone(), [height, width]).bool_and(square(&round_trip).lower(allowed));
+    let in_view = ops::in_view(coords.clone(), [height, width]);
+    let back_again = square(&round_trip).lower(allowed).bool_and(in_view.clone());
+    let wrong = contradictory(&back_again, &in_view);
+    let visible = in_view.bool_and(back_again.bool_or(wrong));
     FlowView {
         error: ops::photometric_error(image, target.clone(), ssim_weight),
         coords,

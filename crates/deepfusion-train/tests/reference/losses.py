@@ -103,7 +103,11 @@ def flow_view(target, source, flow, back):
     square = lambda t: (t.detach() ** 2).sum(1, keepdim=True)  # noqa: E731
     spare = 0.01 * (square(flow) + square(back_there)) + 0.5 - square(trip)
     edges = [coords[:, :1], W - 1 - coords[:, :1], coords[:, 1:], H - 1 - coords[:, 1:]]
-    visible = (in_view(coords) & (spare > 0)).detach()
+    inside = in_view(coords)
+    back_again = inside & (spare > 0)
+    # Where less than half of an image comes back, its flow is wrong and not its pixels hidden.
+    wrong = back_again.sum((1, 2, 3), keepdim=True) < 0.5 * inside.sum((1, 2, 3), keepdim=True)
+    visible = (back_again | (inside & wrong)).detach()
     error = photometric(sample(source, coords), target)
     return error, coords, trip, visible, [spare, *edges]
 
