@@ -69,8 +69,9 @@ impl TopView {
         for (i, (name, points)) in self.paths.iter().enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
             let stroke = if i == 0 { 6.0 } else { 2.0 };
-            let usable = points.iter().filter(|p| p.iter().all(|v| v.is_finite()));
-            let line: Vec<String> = usable
+            let line: Vec<String> = points
+                .iter()
+                .filter(is_somewhere)
                 .map(|p| {
                     let (px, py) = pixel(p);
                     format!("{px:.1},{py:.1}")
@@ -86,7 +87,8 @@ impl TopView {
             );
             key_x += 44.0 + 7.5 * name.chars().count() as f64;
         }
-        if let Some(start) = self.paths.first().and_then(|(_, points)| points.first()) {
+        let first = self.paths.first();
+        if let Some(start) = first.and_then(|(_, points)| points.iter().find(is_somewhere)) {
             let (px, py) = pixel(start);
             let _ = write!(
                 svg,
@@ -108,6 +110,11 @@ impl TopView {
 }
 
 const INK: &str = "#0f172a";
+
+/// Whether a point can be drawn.
+fn is_somewhere(point: &&[f64; 2]) -> bool {
+    point.iter().all(|v| v.is_finite())
+}
 
 /// The largest of 1, 2, 5 times a power of ten that is no more than `length`.
 fn round_length(length: f64) -> f64 {

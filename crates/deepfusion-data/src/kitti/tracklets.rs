@@ -308,6 +308,12 @@ mod tests {
         assert_eq!(pose.yaw_rad, 0.54);
     }
 
+    /// A whole file's text up to the first `mark`.
+    fn cut_at(mark: &str) -> String {
+        let whole = file(POSE, 1);
+        whole[..whole.find(mark).unwrap()].to_owned()
+    }
+
     #[test]
     fn what_is_wrong_is_named_with_its_place() {
         let cases = [
@@ -333,7 +339,8 @@ mod tests {
                 "1 tracklets, its count says 2",
             ),
             (file(POSE, 1).replace("</tx>", "</ty>"), "byte", "tx"),
-            (file(POSE, 1)[..700].to_owned(), "byte", "ends within"),
+            (cut_at("</item>"), "byte", "ends within"),
+            (cut_at("tem>"), "byte", "not closed"),
             ("<html></html>".to_owned(), "byte", "holds no tracklets"),
         ];
         for (text, place, problem) in cases {
