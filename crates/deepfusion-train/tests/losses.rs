@@ -271,7 +271,7 @@ fn a_flow_that_never_comes_back_keeps_learning() {
     let view = flow_view(&first, &second, &same, &same, SSIM_WEIGHT);
     let seen = truth(view.visible.clone()).iter().sum::<f32>();
     assert_eq!(seen as usize, n * (h - 3) * (w - 3), "all that is in view");
-    let loss = flow(&[view], &[same.clone()], &[first], &settings());
+    let loss = flow(&[view], std::slice::from_ref(&same), &[first], &settings());
     let gradient = read(same.grad(&loss.backward()).unwrap());
     assert!(gradient.iter().filter(|g| **g != 0.0).count() > gradient.len() / 2);
 }
@@ -283,7 +283,7 @@ fn a_flow_out_of_view_costs_its_smoothness_alone() {
     let image = Tensor::<4>::ones([1, 3, 6, 8], &device);
     let away = Tensor::<4>::full([1, 2, 6, 8], 100.0, &device).require_grad();
     let view = flow_view(&image, &image, &away, &away, SSIM_WEIGHT);
-    let loss = flow(&[view], &[away.clone()], &[image], &settings());
+    let loss = flow(&[view], std::slice::from_ref(&away), &[image], &settings());
     assert_eq!(loss.clone().into_scalar::<f32>(), 0.0);
     let gradient = read(away.grad(&loss.backward()).unwrap());
     assert!(gradient.iter().all(|g| g.is_finite()));
@@ -327,7 +327,7 @@ fn gradients_equal_finite_differences() {
     let back = reference.tensor("flow/backward");
     let flow_loss = |f: Tensor<4>| {
         let view = flow_view(&first, &second, &f, &back, SSIM_WEIGHT);
-        flow(&[view], &[f], &[first.clone()], &settings())
+        flow(&[view], &[f], std::slice::from_ref(&first), &settings())
     };
     check("flow", "flow/forward", &flow_loss, 1e-3);
     let y = reference.tensor::<4>("affine/y");
