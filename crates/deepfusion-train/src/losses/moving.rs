@@ -104,7 +104,7 @@ fn infinitely_far(
     ops::project(far, homography, Tensor::zeros([n, 3], &device))
 }
 
-/// How far each pixel's end lies from its epipolar line l = F·p̃, F = K⁻ᵀ·[t]×·R·K⁻¹. No gradient.
+/// How far each pixel's end lies from its epipolar line l = F·p̃, F = K⁻ᵀ·\[t\]×·R·K⁻¹. No gradient.
 ///
 /// # Shapes
 /// - `ends`: where the pixels go, `[N, 2, H, W]`, in pixels
