@@ -1,4 +1,4 @@
-use crate::{Error, Preset};
+use crate::{DataSetConfig, Error, Preset};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_nn::{DepthNetConfig, InputSize, PoseNetConfig};
 use serde::{Deserialize, Serialize};
@@ -124,6 +124,9 @@ pub struct DataConfig {
     pub split: Option<PathBuf>,
     /// Which cameras: `2`, `3` or `both`; empty means 2.
     pub camera: String,
+    /// Several data sets with cameras, ranges and displacements of their own, instead of `paths`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sets: Vec<DataSetConfig>,
 }
 
 /// Everything that decides a training run. One struct serves the command line, the `--config` file
@@ -241,6 +244,7 @@ impl TrainConfig {
         self.size.validate()?;
         self.depth_net.validate()?;
         self.pose_net.encoder.validate()?;
+        self.validate_sets()?;
         if self.batch == 0 {
             return fail("batch", "at least 1", "0".into());
         }

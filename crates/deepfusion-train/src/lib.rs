@@ -9,8 +9,10 @@ mod augment;
 mod batch;
 mod checkpoint;
 mod config;
+mod data_set;
 mod error;
 mod event;
+mod factors;
 mod level;
 pub mod log;
 pub mod losses;
@@ -36,8 +38,10 @@ pub use config::{
     Augmentation, CompareAt, DataConfig, LossConfig, Reprojection, ReversedPose, TrainConfig,
     ViewMotion,
 };
+pub use data_set::DataSetConfig;
 pub use error::Error;
 pub use event::{Control, TrainEvent};
+pub use factors::BatchFactors;
 pub use losses::LossTerms;
 pub use model::{BatchLoss, ForwardPass, Model};
 pub use panel::SamplePanel;

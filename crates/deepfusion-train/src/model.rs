@@ -127,10 +127,14 @@ impl Model {
     /// Runs the networks on a batch.
     #[must_use]
     pub fn forward(&self, batch: &SnippetBatch) -> ForwardPass {
-        match self.config.reprojection {
+        let mut pass = match self.config.reprojection {
             Reprojection::Bidirectional => self.forward_bidirectional(batch),
             Reprojection::Minimum => self.forward_minimum(batch),
+        };
+        if let Some(factors) = &batch.factors {
+            pass.motions = pass.motions.iter().map(|m| factors.scale(m)).collect();
         }
+        pass
     }
 
     /// Frames 0 and 1 are each other's target: T = 2B, one view.
@@ -224,7 +228,10 @@ impl Model {
                 CompareAt::Full => self.enlarge[scale].apply(disparity.clone()),
                 CompareAt::Own => disparity.clone(),
             };
-            let inverse_depth = disparity_there.mul_scalar(high - low).add_scalar(low);
+            let inverse_depth = match &batch.factors {
+                Some(factors) => factors.inverse_depth(disparity_there),
+                None => disparity_there.mul_scalar(high - low).add_scalar(low),
+            };
             let mut first_warp = None;
             let views = level.sources.iter().zip(&motions).zip(&level.unwarped).map(
                 |((source, motion), unwarped_error)| {

@@ -131,7 +131,8 @@ fn profile_table(steps: &[(String, f64)]) -> String {
 fn network(args: &BenchArgs) -> Result<(String, usize, TrainConfig, Arc<dyn DepthRunner>)> {
     if let Some(path) = &args.model {
         let mut parameters = 0;
-        let predictor = Predictor::load(path, |config, weights| {
+        let set = args.engine.set.as_deref();
+        let predictor = Predictor::load_for(path, set, |config, weights| {
             parameters = weights.value_count();
             engine::runner(&args.engine, config, weights)
         })?;
