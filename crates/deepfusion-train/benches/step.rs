@@ -91,6 +91,7 @@ fn snippets(batch: usize, height: usize, width: usize, device: &Device) -> Snipp
     let ahead = Tensor::<2>::from_data([[0.0, 0.0, -0.8]], device);
     let frames = [0, 1].map(|_| images(batch, height, width, device));
     SnippetBatch {
+        factors: None,
         clean: frames.to_vec(),
         network: frames.to_vec(),
         intrinsics: matrices(k),

@@ -1,7 +1,9 @@
-use crate::{Error, Jitter, Motion, SampleSet, Sampler, TrainConfig, sampler::stream};
+use crate::{
+    BatchFactors, Error, Jitter, Motion, SampleSet, Sampler, TrainConfig, sampler::stream,
+};
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_data::{resize_rgb, to_chw};
-use deepfusion_geometry::Se3;
+use deepfusion_geometry::{DepthRange, Se3};
 use rand::Rng;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -34,6 +36,8 @@ pub struct SnippetBatch {
     pub offsets: Vec<i32>,
     /// Drive and frame of each target.
     pub names: Vec<String>,
+    /// What each sample's data set means by the networks' outputs; `None` where the run has no sets.
+    pub factors: Option<BatchFactors>,
 }
 
 impl SnippetBatch {
@@ -61,6 +65,8 @@ struct RawBatch {
     translation: Vec<Vec<f32>>,
     offsets: Vec<i32>,
     names: Vec<String>,
+    /// Range and metres per unit of each sample's set; empty where the run has none.
+    factors: Vec<(DepthRange, f64)>,
 }
 
 /// Resized images, H×W×3 bytes, by data set and frame.
@@ -79,6 +85,8 @@ struct Maker {
 pub struct BatchLoader {
     batches: Receiver<Result<RawBatch, Error>>,
     size: (usize, usize),
+    /// The pose network's own metres per unit.
+    unit_m: f64,
 }
 
 impl std::fmt::Debug for BatchLoader {
@@ -142,6 +150,7 @@ impl BatchLoader {
         Self {
             batches: receiver,
             size: (config.size.height, config.size.width),
+            unit_m: config.pose_net.metres_per_unit,
         }
     }
 
@@ -180,6 +189,8 @@ impl BatchLoader {
                 .collect(),
             offsets: raw.offsets,
             names: raw.names,
+            factors: (!raw.factors.is_empty())
+                .then(|| BatchFactors::new(&raw.factors, self.unit_m, device)),
         }))
     }
 }
@@ -247,7 +258,16 @@ impl Maker {
                 .collect(),
             offsets: self.config.frames.clone(),
             names: samples.iter().map(|s| self.set.name(*s)).collect(),
+            factors: match self.config.data.sets.len() {
+                0 => Vec::new(),
+                _ => samples.iter().map(|s| self.factors(*s)).collect(),
+            },
         })
+    }
+
+    fn factors(&self, sample: usize) -> (DepthRange, f64) {
+        let dataset = self.set.samples[sample].dataset;
+        self.config.factors(self.set.set_of[dataset])
     }
 
     fn item(&self, sample: usize, draw: usize) -> Result<Item, Error> {

@@ -1,4 +1,4 @@
-use crate::{Error, LossConfig, Preset};
+use crate::{DataSetConfig, Error, LossConfig, Preset};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_nn::{
     AttentionConfig, DepthNetConfig, FlowDecoderConfig, HceConfig, InputSize, PoseNetConfig,
@@ -67,6 +67,9 @@ pub struct DataConfig {
     pub split: Option<PathBuf>,
     /// Which cameras: `2`, `3` or `both`; empty means 2.
     pub camera: String,
+    /// Several data sets with cameras, ranges and displacements of their own, instead of `paths`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sets: Vec<DataSetConfig>,
 }
 
 /// Everything that decides a training run. One struct serves the command line, the `--config` file
@@ -228,6 +231,7 @@ impl TrainConfig {
         self.pose_net.encoder.validate()?;
         self.flow_decoder.validate()?;
         self.loss.validate()?;
+        self.validate_sets()?;
         if self.batch == 0 {
             return fail("batch", "at least 1", "0".into());
         }

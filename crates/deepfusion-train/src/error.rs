@@ -114,6 +114,12 @@ impl Error {
     #[must_use]
     pub fn hint(&self) -> Option<String> {
         match self {
+            Self::Config { field: "--set", .. } => {
+                Some("give the name of the data set whose metres are meant: --set NAME".into())
+            }
+            Self::Config { field: "data" | "data.paths", .. } => Some(
+                "give recordings with --data, or as data.paths or [[data.sets]] in the config file, one of the three".into(),
+            ),
             Self::Config { .. } => None,
             Self::ConfigFile { .. } => Some(
                 "a run's own config.toml is a complete example; start from one and change it".into(),

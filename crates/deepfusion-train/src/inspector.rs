@@ -38,12 +38,12 @@ pub struct Inspector {
 }
 
 impl Inspector {
-    /// That of a run's folder or a checkpoint in it.
+    /// That of a run's folder or a checkpoint in it; `set` as in [`load_depth_net`].
     ///
     /// # Errors
     /// As [`load_depth_net`].
-    pub fn load(path: &Path, device: &Device) -> Result<Self, Error> {
-        let (config, net) = load_depth_net(path, device)?;
+    pub fn load(path: &Path, set: Option<&str>, device: &Device) -> Result<Self, Error> {
+        let (config, net) = load_depth_net(path, set, device)?;
         Ok(Self {
             net,
             size: config.size,

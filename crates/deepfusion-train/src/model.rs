@@ -132,10 +132,14 @@ impl Model {
     /// Runs the networks on a batch.
     #[must_use]
     pub fn forward(&self, batch: &SnippetBatch) -> ForwardPass {
-        match self.config.reprojection {
+        let mut pass = match self.config.reprojection {
             Reprojection::Bidirectional => self.forward_bidirectional(batch),
             Reprojection::Minimum => self.forward_minimum(batch),
+        };
+        if let Some(factors) = &batch.factors {
+            pass.motions = pass.motions.iter().map(|m| factors.scale(m)).collect();
         }
+        pass
     }
 
     /// Frames 0 and 1 are each other's target: T = 2B, one view.

@@ -49,7 +49,7 @@ impl Model {
         let levels = levels(pass, &targets, settings.compare_at, settings.ssim_weight);
         let mut sum = Sum::default();
 
-        let finest = self.views(pass, 0, &levels[0], &motions);
+        let finest = self.views((pass, batch), 0, &levels[0], &motions);
         let flow_views = self.flow_views(pass);
         let masks = (schedule.masks_active && settings.moving.enabled)
             .then(|| moving_masks(self, &finest, &flow_views, &motions, &levels[0]));
@@ -64,7 +64,7 @@ impl Model {
         for (scale, level) in levels.iter().enumerate() {
             let views = match scale {
                 0 => &finest,
-                _ => &self.views(pass, scale, level, &motions),
+                _ => &self.views((pass, batch), scale, level, &motions),
             };
             let output =
                 losses::reprojection(compared(views, level, masks.as_deref()), settings.automask);
@@ -88,7 +88,8 @@ impl Model {
         sum.terms.smoothness = sum.add(mean(smooth), settings.smoothness);
         let speed = (settings.speed > 0.0).then(|| self.motion_loss(pass, batch));
         sum.terms.speed = sum.add(speed, schedule.speed_weight);
-        let affine = (settings.affine > 0.0).then(|| self.affine_loss(pass, &finest, &motions));
+        let affine =
+            (settings.affine > 0.0).then(|| self.affine_loss((pass, batch), &finest, &motions));
         sum.terms.affine = sum.add(affine, settings.affine);
         if !flow_views.is_empty() {
             let flow = self.flow_loss(pass, &flow_views);
@@ -112,7 +113,7 @@ impl Model {
     /// The sources as a scale's disparity sees them, and their errors.
     fn views(
         &self,
-        pass: &ForwardPass,
+        (pass, batch): (&ForwardPass, &SnippetBatch),
         scale: usize,
         level: &Level,
         motions: &[Motion],
@@ -123,7 +124,7 @@ impl Model {
             CompareAt::Full => self.enlarge[scale].apply(disparity),
             CompareAt::Own => disparity,
         };
-        let inverse_depth = self.inverse_depth(disparity);
+        let inverse_depth = self.inverse_depth(disparity, batch);
         let synthesised: Vec<_> = level
             .sources
             .iter()
@@ -148,8 +149,12 @@ impl Model {
         }
     }
 
-    /// 1/depth in 1/m, of a sigmoid disparity: d = 1/D_max + (1/D_min − 1/D_max)·σ.
-    fn inverse_depth(&self, disparity: Tensor<4>) -> Tensor<4> {
+    /// 1/depth in 1/m, of a sigmoid disparity: d = 1/D_max + (1/D_min − 1/D_max)·σ, the range that of the run
+    /// or of each sample's data set.
+    fn inverse_depth(&self, disparity: Tensor<4>, batch: &SnippetBatch) -> Tensor<4> {
+        if let Some(factors) = &batch.factors {
+            return factors.inverse_depth(disparity);
+        }
         let range = self.range();
         let (low, high) = (1.0 / range.max_m, 1.0 / range.min_m);
         disparity.mul_scalar(high - low).add_scalar(low)
@@ -197,11 +202,13 @@ impl Model {
     /// targets here: the other depth is that of the batch's other half.
     fn affine_loss(
         &self,
-        pass: &ForwardPass,
+        (pass, batch): (&ForwardPass, &SnippetBatch),
         finest: &ScaleViews,
         motions: &[Motion],
     ) -> Tensor<1> {
-        let depth = self.inverse_depth(pass.disparities[0].clone()).recip();
+        let depth = self
+            .inverse_depth(pass.disparities[0].clone(), batch)
+            .recip();
         let views = finest.synthesised.iter().zip(motions);
         mean_of(views, |(view, motion)| {
             let there = ops::warp(

@@ -23,12 +23,13 @@ pub struct PosePredictor {
 
 impl PosePredictor {
     /// Loads a run's folder or a checkpoint in it; the folder means `best` where there is one.
+    /// `set` names one of the data sets the run learned from, where it learned several.
     ///
     /// # Errors
-    /// As [`RunFolder::open`] and [`RunFolder::load`].
-    pub fn load(path: &Path, device: &Device) -> Result<Self, Error> {
+    /// As [`RunFolder::open`], [`RunFolder::load`] and [`TrainConfig::for_set`].
+    pub fn load(path: &Path, set: Option<&str>, device: &Device) -> Result<Self, Error> {
         let (folder, kind) = RunFolder::open(path)?;
-        let config = folder.read_config()?;
+        let config = folder.read_config()?.for_set(set)?;
         let checkpoint = kind.unwrap_or_else(|| folder.preferred());
         let (model, _, state) = folder.load(checkpoint, &config, device)?;
         Ok(Self {

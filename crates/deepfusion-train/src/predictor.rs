@@ -72,8 +72,20 @@ impl Predictor {
         path: &Path,
         runner: impl FnOnce(&TrainConfig, Weights) -> Result<Arc<dyn DepthRunner>, E>,
     ) -> Result<Self, E> {
+        Self::load_for(path, None, runner)
+    }
+
+    /// As [`Self::load`], with the metres of one of the data sets that the run learned from.
+    ///
+    /// # Errors
+    /// As [`Self::load`] and [`TrainConfig::for_set`].
+    pub fn load_for<E: From<Error>>(
+        path: &Path,
+        set: Option<&str>,
+        runner: impl FnOnce(&TrainConfig, Weights) -> Result<Arc<dyn DepthRunner>, E>,
+    ) -> Result<Self, E> {
         let (folder, kind) = RunFolder::open(path)?;
-        let config = folder.read_config()?;
+        let config = folder.read_config()?.for_set(set)?;
         let checkpoint = kind.unwrap_or_else(|| folder.preferred());
         let (weights, state) = folder.load_depth_weights(checkpoint)?;
         Ok(Self {

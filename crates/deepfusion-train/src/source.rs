@@ -17,6 +17,8 @@ pub struct Sample {
 pub struct SampleSet {
     /// The recordings.
     pub datasets: Arc<Vec<Dataset>>,
+    /// The place in `data.sets` of each recording; 0 where the run has no sets.
+    pub set_of: Arc<Vec<usize>>,
     /// The samples.
     pub samples: Vec<Sample>,
 }
@@ -33,29 +35,60 @@ impl SampleSet {
         train: Vec<Dataset>,
         validation: Option<Vec<Dataset>>,
     ) -> Result<(Self, Self, Vec<String>), Error> {
+        let one_set = |datasets: Vec<Dataset>| datasets.into_iter().map(|d| (0, d)).collect();
+        Self::split_sets(config, one_set(train), validation.map(one_set))
+    }
+
+    /// As [`Self::split`], of recordings with the place of their set in `data.sets`.
+    ///
+    /// # Errors
+    /// As [`Self::split`]; [`Error::NoSamples`] for a set of which nothing is left to train on.
+    pub fn split_sets(
+        config: &TrainConfig,
+        train: Vec<(usize, Dataset)>,
+        validation: Option<Vec<(usize, Dataset)>>,
+    ) -> Result<(Self, Self, Vec<String>), Error> {
         let mut skipped = Vec::new();
         let share = if validation.is_some() {
             0.0
         } else {
             config.validation_share
         };
-        let train = Arc::new(train);
+        let shared = |recordings: Vec<(usize, Dataset)>| {
+            let (sets, datasets): (Vec<usize>, Vec<Dataset>) = recordings.into_iter().unzip();
+            (Arc::new(sets), Arc::new(datasets))
+        };
+        let (set_of, train) = shared(train);
         let (samples, held_out) = Self::gather(config, &train, share, &mut skipped)?;
         let validation = match validation {
             Some(datasets) => {
-                let datasets = Arc::new(datasets);
+                let (set_of, datasets) = shared(datasets);
                 let (samples, _) = Self::gather(config, &datasets, 0.0, &mut skipped)?;
-                Self { datasets, samples }
+                Self {
+                    datasets,
+                    set_of,
+                    samples,
+                }
             }
             None => Self {
                 datasets: Arc::clone(&train),
+                set_of: Arc::clone(&set_of),
                 samples: held_out,
             },
         };
         let train = Self {
             datasets: train,
+            set_of,
             samples,
         };
+        for (i, set) in config.data.sets.iter().enumerate() {
+            if !train.samples.iter().any(|s| train.set_of[s.dataset] == i) {
+                return Err(Error::NoSamples {
+                    data: format!("data set {}", set.name),
+                    reason: skipped.last().cloned().unwrap_or_default(),
+                });
+            }
+        }
         Ok((train, validation, skipped))
     }
 
@@ -96,6 +129,17 @@ impl SampleSet {
     pub fn mean_displacement_m(&self) -> f64 {
         let pairs = || self.samples.iter().flat_map(|s| &s.snippet.sources);
         pairs().map(|s| s.motion.distance_m).sum::<f64>() / pairs().count().max(1) as f64
+    }
+
+    /// The samples of one set of `data.sets`.
+    #[must_use]
+    pub fn of_set(&self, set: usize) -> Self {
+        let own = |s: &&Sample| self.set_of[s.dataset] == set;
+        Self {
+            datasets: Arc::clone(&self.datasets),
+            set_of: Arc::clone(&self.set_of),
+            samples: self.samples.iter().filter(own).cloned().collect(),
+        }
     }
 
     /// The camera of the first sample, at the image's own size.

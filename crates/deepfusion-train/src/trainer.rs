@@ -74,6 +74,14 @@ impl Trainer {
             config.pose_net.metres_per_unit = train.mean_displacement_m();
         }
         config.camera = train.camera();
+        for i in 0..config.data.sets.len() {
+            let own = train.of_set(i);
+            let set = &mut config.data.sets[i];
+            if set.metres_per_unit == 0.0 {
+                set.metres_per_unit = own.mean_displacement_m();
+            }
+            set.trained_with = own.camera();
+        }
         let device = device.clone().autodiff();
         let model = init(Model::new(&config, &device)?)?;
         folder.write_config(&config)?;

@@ -17,7 +17,8 @@ use crate::error::CliError;
 
 /// Loads a run with the engine asked for.
 pub fn load(model: &std::path::Path, args: &EngineArgs) -> Result<Predictor> {
-    Predictor::load(model, |config, weights| runner(args, config, weights))
+    let set = args.set.as_deref();
+    Predictor::load_for(model, set, |config, weights| runner(args, config, weights))
 }
 
 /// The engine asked for, with a network of this configuration and these weights.

@@ -6,6 +6,8 @@ use std::fs;
 use std::path::Path;
 
 use deepfusion_eval::odometry::PoseFile;
+use deepfusion_geometry::DepthRange;
+use deepfusion_train::{DataConfig, DataSetConfig, TrainConfig};
 use serde_json::Value;
 use support::{Run, in_folder};
 
@@ -135,4 +137,77 @@ fn poses_that_cannot_be_compared_are_told() {
     assert!(same["t_rel_percent"].is_null());
     let table = ok(at, "eval-odometry --pred six.txt --gt six.txt").stdout;
     assert!(table.contains("no stretch of 10 m"), "{table}");
+}
+
+/// Two data sets in one run: from then on metres are one of theirs, and which one has to be said.
+#[test]
+fn several_data_sets_are_learned_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out road --frames 12 --seed 3 --scan-every 4 --size 320x96",
+    );
+    ok(
+        at,
+        "simulate --out yard --frames 12 --seed 4 --scan-every 4 --size 240x96 --fps 30",
+    );
+    ok(
+        at,
+        "train --data road --size 96x64 --batch 2 --steps 1 --out first",
+    );
+    let mut config = TrainConfig::read(&at.join("first/config.toml")).unwrap();
+    config.pose_net.metres_per_unit = 0.0;
+    let set = |name: &str, range| DataSetConfig {
+        name: name.into(),
+        paths: vec![name.into()],
+        range,
+        ..DataSetConfig::default()
+    };
+    let near = DepthRange {
+        min_m: 0.2,
+        max_m: 40.0,
+    };
+    config.data = DataConfig {
+        sets: vec![set("road", None), set("yard", Some(near))],
+        ..DataConfig::default()
+    };
+    fs::write(at.join("both.toml"), config.to_toml().unwrap()).unwrap();
+    ok(at, "train --config both.toml --out both");
+    let trained = TrainConfig::read(&at.join("both/config.toml")).unwrap();
+    let [road, yard] = [0, 1].map(|i| &trained.data.sets[i]);
+    assert!(road.metres_per_unit > 1.5 * yard.metres_per_unit && yard.metres_per_unit > 0.0);
+
+    for command in [
+        "eval --model both --data road",
+        "eval-odometry --model both --data yard",
+    ] {
+        fails(at, command, "one of road, yard");
+        fails(at, &format!("{command} --set yrad"), "found yrad");
+    }
+    fails(
+        at,
+        "train --data road --config both.toml --resume --out both",
+        "data.paths",
+    );
+    let scale = |set: &str| {
+        let report = json(
+            at,
+            &format!("eval --model both --data road --set {set} --json"),
+        );
+        report["unscaled"]["abs_rel"].as_f64().unwrap()
+    };
+    // Another range and another focal length: other metres.
+    assert_ne!(scale("road"), scale("yard"));
+    let ratio = |set: &str| {
+        let args = format!("eval-odometry --model both --data road --set {set} --json");
+        json(at, &args)["scale"].as_f64().unwrap()
+    };
+    let expected = road.metres_per_unit / yard.metres_per_unit;
+    let found = ratio("yard") / ratio("road");
+    assert!(
+        (found / expected - 1.0).abs() < 0.01,
+        "{found} and {expected}"
+    );
+    ok(at, "train --resume --out both --steps 2");
 }

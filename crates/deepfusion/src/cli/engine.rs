@@ -19,6 +19,9 @@ pub struct EngineArgs {
     /// Where to compute.
     #[arg(long, value_enum, default_value_t)]
     pub device: DeviceChoice,
+    /// Which of the data sets that the run learned from its metres are of, where it learned several.
+    #[arg(long, value_name = "NAME")]
+    pub set: Option<String>,
 }
 
 impl EngineArgs {
@@ -29,6 +32,7 @@ impl EngineArgs {
             precision: PrecisionChoice::default(),
             ort_lib: None,
             device,
+            set: None,
         }
     }
 }

@@ -19,6 +19,9 @@ pub struct EvalOdometryArgs {
     /// A run folder or a checkpoint in it.
     #[arg(long, value_name = "RUN", requires = "data")]
     pub model: Option<PathBuf>,
+    /// Which of the data sets that the run learned from its metres are of, where it learned several.
+    #[arg(long, value_name = "NAME", conflicts_with = "pred")]
+    pub set: Option<String>,
     /// Recordings to evaluate on: drive folders, date folders or KITTI roots.
     #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pred")]
     pub data: Vec<PathBuf>,

@@ -17,6 +17,9 @@ pub struct ExportArgs {
     /// A run folder or a checkpoint in it.
     #[arg(long, value_name = "RUN")]
     pub model: PathBuf,
+    /// Which of the data sets that the run learned from its metres are of, where it learned several.
+    #[arg(long, value_name = "NAME")]
+    pub set: Option<String>,
     /// File to write.
     #[arg(long, value_name = "FILE.onnx")]
     pub out: PathBuf,

@@ -80,7 +80,8 @@ pub fn predict(
 /// The trivial row from the recordings the model was trained on, where they are still there.
 fn training_scans(predictor: &Predictor, kind: GtKind) -> Option<TrivialBaseline> {
     let config = predictor.config();
-    let datasets = super::train::recordings(config, &config.data.paths).ok()?;
+    let recordings = super::train::training_recordings(config).ok()?;
+    let datasets: Vec<_> = recordings.into_iter().map(|(_, dataset)| dataset).collect();
     trivial_from_datasets(&datasets, kind).ok()
 }
 

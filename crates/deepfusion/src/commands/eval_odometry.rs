@@ -52,7 +52,7 @@ pub fn run(args: &EvalOdometryArgs) -> Result<()> {
 fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
     allocator::keep_memory();
     let model = args.model.as_deref().unwrap_or(Path::new("."));
-    let predictor = PosePredictor::load(model, &device::open(args.device)?)?;
+    let predictor = PosePredictor::load(model, args.set.as_deref(), &device::open(args.device)?)?;
     let datasets = open_datasets(&args.data, None, args.camera)?;
     let mut stretches = Vec::new();
     let (mut exact, mut integrated) = (0, 0);

@@ -48,7 +48,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         .into());
     }
     let device = Device::flex();
-    let (config, net) = load_depth_net(&args.model, &device)?;
+    let (config, net) = load_depth_net(&args.model, args.set.as_deref(), &device)?;
     let model = model_of(&config, &net, args)?;
     let bytes = write(&model)?;
     let partial = partial_file(out, &bytes)?;

@@ -4,7 +4,8 @@ use anyhow::Result;
 use deepfusion_data::{Camera, CameraChoice, Dataset, speed_unit_warning};
 use deepfusion_nn::weights::load_torchvision_resnet;
 use deepfusion_train::{
-    Error, Model, Preset, RunFolder, SampleSet, TrainConfig, Trainer, ViewMotion,
+    DataConfig, DataSetConfig, Error, Model, Preset, RunFolder, SampleSet, TrainConfig, Trainer,
+    ViewMotion,
 };
 
 use super::device;
@@ -32,6 +33,7 @@ pub fn run(args: &TrainArgs) -> Result<()> {
         (config.epochs, config.steps) = (epochs, None);
     }
     if !args.data.is_empty() {
+        // A resumed run's sets have factors that new recordings would not have: `validate` refuses both.
         config.data.paths.clone_from(&args.data);
     }
     config.validate()?;
@@ -110,15 +112,30 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
             ViewMotionChoice::Vehicle => ViewMotion::Vehicle,
         };
     }
-    config.data.paths.clone_from(&args.data);
-    config.data.validation.clone_from(&args.val_data);
-    config.data.split.clone_from(&args.split);
-    config.data.camera = match args.camera.cameras() {
-        [Camera::Left] => "2",
-        [Camera::Right] => "3",
-        _ => "both",
+    if args.data.is_empty() {
+        // The file's own recordings, of which at least one is needed.
+        if config.data.paths.is_empty() && config.data.sets.is_empty() {
+            return Err(Error::Config {
+                field: "data",
+                expected: "--data, or data.paths or [[data.sets]] in the config file".into(),
+                found: "none".into(),
+            }
+            .into());
+        }
+        return Ok(config);
     }
-    .into();
+    config.data = DataConfig {
+        paths: args.data.clone(),
+        validation: args.val_data.clone(),
+        split: args.split.clone(),
+        camera: match args.camera.cameras() {
+            [Camera::Left] => "2",
+            [Camera::Right] => "3",
+            _ => "both",
+        }
+        .into(),
+        sets: Vec::new(),
+    };
     Ok(config)
 }
 
@@ -136,22 +153,65 @@ pub fn preset(choice: PresetChoice) -> Preset {
 /// The training and validation samples of a configuration; warns of drives that are skipped and of
 /// speeds that cannot be m/s.
 pub fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
-    let train = recordings(config, &config.data.paths)?;
-    warn_of_speeds(&train);
-    let validation = match config.data.validation.as_slice() {
-        [] => None,
-        paths => Some(recordings(config, paths)?),
-    };
-    let (train, validation, skipped) = SampleSet::split(config, train, validation)?;
+    let train = training_recordings(config)?;
+    for (_, dataset) in &train {
+        warn_of_speed(dataset);
+    }
+    let validation = validation_recordings(config)?;
+    let (train, validation, skipped) = SampleSet::split_sets(config, train, validation)?;
     for reason in skipped {
         tracing::warn!("skipped: {reason}");
     }
     Ok((train, validation))
 }
 
-/// The recordings at `paths`, with the configuration's cameras and split.
-pub fn recordings(config: &TrainConfig, paths: &[PathBuf]) -> Result<Vec<Dataset>> {
-    let camera: CameraChoice = match config.data.camera.as_str() {
+/// All recordings to train on, with the place of their set in `data.sets`.
+pub fn training_recordings(config: &TrainConfig) -> Result<Vec<(usize, Dataset)>> {
+    if config.data.sets.is_empty() {
+        let data = &config.data;
+        let datasets = recordings(&data.paths, data.split.as_deref(), &data.camera)?;
+        return Ok(placed(0, datasets));
+    }
+    of_sets(config, |set| &set.paths)
+}
+
+/// The recordings to validate on, where they are others.
+fn validation_recordings(config: &TrainConfig) -> Result<Option<Vec<(usize, Dataset)>>> {
+    let data = &config.data;
+    if data.sets.iter().any(|set| !set.validation.is_empty()) {
+        return of_sets(config, |set| &set.validation).map(Some);
+    }
+    if data.validation.is_empty() {
+        return Ok(None);
+    }
+    let datasets = recordings(&data.validation, data.split.as_deref(), &data.camera)?;
+    Ok(Some(placed(0, datasets)))
+}
+
+fn of_sets(
+    config: &TrainConfig,
+    paths: impl Fn(&DataSetConfig) -> &[PathBuf],
+) -> Result<Vec<(usize, Dataset)>> {
+    let mut all = Vec::new();
+    for (i, set) in config.data.sets.iter().enumerate() {
+        let camera = match set.camera.as_str() {
+            "" => &config.data.camera,
+            own => own,
+        };
+        let datasets = recordings(paths(set), set.split.as_deref(), camera)?;
+        all.extend(placed(i, datasets));
+    }
+    Ok(all)
+}
+
+/// Each with the place of its set.
+fn placed(set: usize, datasets: Vec<Dataset>) -> Vec<(usize, Dataset)> {
+    datasets.into_iter().map(|d| (set, d)).collect()
+}
+
+/// The recordings at `paths` of the cameras that a configuration names.
+fn recordings(paths: &[PathBuf], split: Option<&Path>, camera: &str) -> Result<Vec<Dataset>> {
+    let camera: CameraChoice = match camera {
         "" => CameraChoice::default(),
         text => text.parse().map_err(|_| Error::Config {
             field: "data.camera",
@@ -159,17 +219,15 @@ pub fn recordings(config: &TrainConfig, paths: &[PathBuf]) -> Result<Vec<Dataset
             found: text.into(),
         })?,
     };
-    open_datasets(paths, config.data.split.as_deref(), camera)
+    open_datasets(paths, split, camera)
 }
 
-fn warn_of_speeds(datasets: &[Dataset]) {
-    for dataset in datasets {
-        match speed_unit_warning(dataset) {
-            Ok(Some(warning)) => tracing::warn!("{}: {warning}", dataset.name()),
-            Ok(None) => {}
-            // The check is a service: what is really wrong with the images, training will say.
-            Err(error) => tracing::debug!("speed check of {}: {error}", dataset.name()),
-        }
+fn warn_of_speed(dataset: &Dataset) {
+    match speed_unit_warning(dataset) {
+        Ok(Some(warning)) => tracing::warn!("{}: {warning}", dataset.name()),
+        Ok(None) => {}
+        // The check is a service: what is really wrong with the images, training will say.
+        Err(error) => tracing::debug!("speed check of {}: {error}", dataset.name()),
     }
 }
 

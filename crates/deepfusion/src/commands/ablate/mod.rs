@@ -260,11 +260,15 @@ type Datasets = Vec<deepfusion_data::Dataset>;
 
 /// The recordings trained on, for the trivial row, and those measured on.
 fn open_eval_data(plan: &Plan) -> Result<(Datasets, Datasets)> {
-    let train = train::recordings(&plan.config, &plan.config.data.paths)?;
+    let trained_on = || -> Result<Datasets> {
+        let recordings = train::training_recordings(&plan.config)?;
+        Ok(recordings.into_iter().map(|(_, dataset)| dataset).collect())
+    };
     let eval = match plan.eval_data.as_slice() {
-        [] => train::recordings(&plan.config, &plan.config.data.paths)?,
+        [] => trained_on()?,
         paths => open_datasets(paths, None, CameraChoice::default())?,
     };
+    let train = trained_on()?;
     Ok((train, eval))
 }
 

@@ -73,6 +73,7 @@ pub fn run(args: &PredictArgs) -> Result<()> {
         inspector: match args.save.contains(&Save::Features) {
             true => Some(Inspector::load(
                 &args.model,
+                args.engine.set.as_deref(),
                 &device::open(args.engine.device)?,
             )?),
             false => None,

@@ -91,6 +91,9 @@ pub struct MadeWith {
     pub focal_correction: bool,
     /// `--stretch`.
     pub stretch: bool,
+    /// `--set`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub set: Option<String>,
 }
 
 impl MadeWith {
@@ -125,6 +128,7 @@ impl MadeWith {
             },
             focal_correction: !args.no_focal_correction,
             stretch: args.stretch,
+            set: args.engine.set.clone(),
         })
     }
 
@@ -145,6 +149,7 @@ impl MadeWith {
                 "another engine (--engine, --precision)",
             ),
             (self.save != other.save, "another --save"),
+            (self.set != other.set, "another --set"),
             (
                 !equal(self.max_depth_m, other.max_depth_m),
                 "another --max-depth",

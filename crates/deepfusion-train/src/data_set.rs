@@ -1,0 +1,215 @@
+//! Several data sets in one run, each with its own cameras, range of depths and unit of displacement.
+
+use crate::{Error, TrainConfig};
+use deepfusion_geometry::{DepthRange, Intrinsics};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// One of the data sets that a run learns from together (`[[data.sets]]` in a configuration file).
+///
+/// The networks' raw outputs stay near one for each of them: the sigmoid spans the set's own range of depths,
+/// and a unit of PoseNet's translation is the set's own mean displacement. What the networks say about an image
+/// therefore means metres only together with a set: [`TrainConfig::for_set`].
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DataSetConfig {
+    /// What `--set` calls it.
+    pub name: String,
+    /// Drive folders, date folders or KITTI roots.
+    pub paths: Vec<PathBuf>,
+    /// Recordings to validate on; none: the held-out end of each drive. Given for all sets or for none.
+    pub validation: Vec<PathBuf>,
+    /// A split file that selects frames.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub split: Option<PathBuf>,
+    /// Which cameras: `2`, `3` or `both`; empty means `data.camera`.
+    pub camera: String,
+    /// The depths that the sigmoid spans; absent: the depth network's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range: Option<DepthRange>,
+    /// Metres of translation per unit of PoseNet's output; 0 means the set's mean displacement per pair, which is
+    /// then filled in.
+    pub metres_per_unit: f64,
+    /// The camera of its first sample, at network size; filled in from the data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trained_with: Option<Intrinsics>,
+}
+
+impl TrainConfig {
+    /// The range of depths and the metres per unit of PoseNet's translation of a data set, by its place in
+    /// `data.sets`; those of the networks where the run has no sets.
+    #[must_use]
+    pub fn factors(&self, set: usize) -> (DepthRange, f64) {
+        let own = (self.depth_net.range, self.pose_net.metres_per_unit);
+        self.data
+            .sets
+            .get(set)
+            .map_or(own, |set| (set.range.unwrap_or(own.0), set.metres_per_unit))
+    }
+
+    /// The configuration of a run as one of its data sets sees it: depths, displacements and focal lengths mean
+    /// metres of that set's cameras. A run without sets is its own; of one with a single set, that is meant.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where the run has several sets and none is named, or none of that name.
+    pub fn for_set(mut self, name: Option<&str>) -> Result<Self, Error> {
+        let names = || -> Vec<&str> { self.data.sets.iter().map(|s| s.name.as_str()).collect() };
+        let found = match (self.data.sets.as_slice(), name) {
+            ([], None) => return Ok(self),
+            ([only], None) => Some(only),
+            (sets, Some(name)) => sets.iter().find(|s| s.name == name),
+            (_, None) => None,
+        };
+        let Some(set) = found.cloned() else {
+            let expected = match names().as_slice() {
+                [] => "none: this run learned from one data set".to_owned(),
+                names => format!(
+                    "one of {}: this run learned several data sets, and metres are each one's own",
+                    names.join(", ")
+                ),
+            };
+            return Err(Error::Config {
+                field: "--set",
+                expected,
+                found: name.unwrap_or("none").to_owned(),
+            });
+        };
+        self.depth_net.range = set.range.unwrap_or(self.depth_net.range);
+        self.pose_net.metres_per_unit = set.metres_per_unit;
+        self.camera = set.trained_with.or(self.camera);
+        Ok(self)
+    }
+
+    /// # Errors
+    /// [`Error::Config`] naming the first set that means nothing.
+    pub(crate) fn validate_sets(&self) -> Result<(), Error> {
+        let sets = &self.data.sets;
+        let fail = |field, expected: &str, found: String| {
+            Err(Error::Config {
+                field,
+                expected: expected.into(),
+                found,
+            })
+        };
+        let beside = self.data.paths.iter().chain(&self.data.validation).next();
+        if !sets.is_empty() && beside.is_some() {
+            let expected = "none beside data.sets: each set has its own";
+            return fail("data.paths", expected, "some".into());
+        }
+        let validated = sets.iter().filter(|s| !s.validation.is_empty()).count();
+        if validated != 0 && validated != sets.len() {
+            let found = format!("{validated} of {} sets", sets.len());
+            return fail(
+                "data.sets.validation",
+                "given for all sets or for none",
+                found,
+            );
+        }
+        for (i, set) in sets.iter().enumerate() {
+            if set.name.is_empty() || sets[..i].iter().any(|s| s.name == set.name) {
+                let found = format!("'{}'", set.name);
+                return fail("data.sets.name", "a name of its own", found);
+            }
+            if set.paths.is_empty() {
+                return fail(
+                    "data.sets.paths",
+                    "at least one",
+                    format!("none in {}", set.name),
+                );
+            }
+            if !(set.metres_per_unit >= 0.0 && set.metres_per_unit.is_finite()) {
+                let found = set.metres_per_unit.to_string();
+                return fail("data.sets.metres_per_unit", "0 or more", found);
+            }
+            if let Some(DepthRange { min_m, max_m }) = set.range
+                && !(min_m > 0.0 && min_m < max_m && max_m.is_finite())
+            {
+                let found = format!("{min_m} to {max_m}");
+                return fail("data.sets.range", "0 < min_m < max_m", found);
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Preset;
+
+    const SETS: &str = r#"
+        [[sets]]
+        name = "road"
+        paths = ["kitti"]
+        camera = "both"
+
+        [[sets]]
+        name = "garage"
+        paths = ["a", "b"]
+        range = { min_m = 0.2, max_m = 30.0 }
+        metres_per_unit = 0.1
+    "#;
+
+    fn config() -> TrainConfig {
+        let mut config = Preset::Tiny.config();
+        config.data = toml::from_str(SETS).unwrap();
+        config.pose_net.metres_per_unit = 0.7;
+        config
+    }
+
+    #[test]
+    fn a_set_brings_its_own_metres() {
+        let config = config();
+        config.validate().unwrap();
+        assert_eq!(config.factors(0).0, config.depth_net.range);
+        let garage = config.clone().for_set(Some("garage")).unwrap();
+        assert_eq!(garage.depth_net.range.max_m, 30.0);
+        assert_eq!(garage.pose_net.metres_per_unit, 0.1);
+        assert_eq!(config.factors(1), (garage.depth_net.range, 0.1));
+        for name in [None, Some("house")] {
+            let error = config.clone().for_set(name).unwrap_err().to_string();
+            assert!(error.contains("road, garage"), "{error}");
+        }
+        // It survives the run's folder.
+        let text = config.to_toml().unwrap();
+        assert_eq!(toml::from_str::<TrainConfig>(&text).unwrap(), config);
+    }
+
+    #[test]
+    fn runs_without_sets_are_as_before() {
+        let mut config = Preset::Tiny.config();
+        config.pose_net.metres_per_unit = 0.7;
+        assert!(!config.to_toml().unwrap().contains("sets"));
+        assert_eq!(config.factors(0), (config.depth_net.range, 0.7));
+        assert_eq!(config.clone().for_set(None).unwrap(), config);
+        assert!(config.for_set(Some("road")).is_err());
+    }
+
+    #[test]
+    fn sets_that_mean_nothing_are_refused() {
+        type Change = fn(&mut TrainConfig);
+        let cases: [(&str, Change); 6] = [
+            ("data.sets.name", |c| c.data.sets[1].name = "road".into()),
+            ("data.sets.paths", |c| c.data.sets[0].paths.clear()),
+            ("data.paths", |c| c.data.paths.push("x".into())),
+            ("data.sets.metres_per_unit", |c| {
+                c.data.sets[0].metres_per_unit = -1.0;
+            }),
+            ("data.sets.range", |c| {
+                c.data.sets[1].range = Some(DepthRange {
+                    min_m: 3.0,
+                    max_m: 2.0,
+                });
+            }),
+            ("data.sets.validation", |c| {
+                c.data.sets[0].validation.push("x".into());
+            }),
+        ];
+        for (field, change) in cases {
+            let mut config = config();
+            change(&mut config);
+            let error = config.validate().unwrap_err().to_string();
+            assert!(error.contains(&format!("`{field}`")), "{error}");
+        }
+    }
+}

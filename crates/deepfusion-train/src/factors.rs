@@ -1,0 +1,109 @@
+use crate::Motion;
+use burn::tensor::{Device, Tensor};
+use deepfusion_geometry::DepthRange;
+
+/// What turns the networks' raw outputs into metres, for each sample of a batch whose data sets differ in it.
+#[derive(Debug, Clone)]
+pub struct BatchFactors {
+    /// The set's metres per unit of translation over the pose network's own, B.
+    pub translation: Tensor<1>,
+    /// 1/D_max, B, in 1/m.
+    pub nearest_zero: Tensor<1>,
+    /// 1/D_min − 1/D_max, B, in 1/m.
+    pub span: Tensor<1>,
+}
+
+impl BatchFactors {
+    /// Of the samples' ranges and metres per unit; `unit_m` is the pose network's own.
+    #[must_use]
+    pub fn new(samples: &[(DepthRange, f64)], unit_m: f64, device: &Device) -> Self {
+        let tensor = |value: &dyn Fn(&(DepthRange, f64)) -> f64| {
+            let values: Vec<f32> = samples.iter().map(|s| value(s) as f32).collect();
+            Tensor::<1>::from_data(values.as_slice(), device)
+        };
+        Self {
+            translation: tensor(&|s| s.1 / unit_m),
+            nearest_zero: tensor(&|s| 1.0 / s.0.max_m),
+            span: tensor(&|s| 1.0 / s.0.min_m - 1.0 / s.0.max_m),
+        }
+    }
+
+    /// Motions with their sets' unit of translation. T is B, or a multiple of it: the samples again and again.
+    #[must_use]
+    pub fn scale(&self, motion: &Motion) -> Motion {
+        let [n, _] = motion.translation.dims();
+        let factor = repeated(&self.translation, n).reshape([n, 1]);
+        Motion {
+            rotation: motion.rotation.clone(),
+            translation: motion.translation.clone().mul(factor),
+        }
+    }
+
+    /// Inverse depth, 1/m, of sigmoid disparities: d = 1/D_max + (1/D_min − 1/D_max)·σ with each sample's range.
+    ///
+    /// # Shapes
+    /// - `sigmoid`, output: `[T, 1, H, W]`, T as in [`Self::scale`]
+    #[must_use]
+    pub fn inverse_depth(&self, sigmoid: Tensor<4>) -> Tensor<4> {
+        let [n, ..] = sigmoid.dims();
+        let of = |values: &Tensor<1>| repeated(values, n).reshape([n, 1, 1, 1]);
+        sigmoid.mul(of(&self.span)).add(of(&self.nearest_zero))
+    }
+}
+
+/// The values again and again, until there are `n`.
+fn repeated(values: &Tensor<1>, n: usize) -> Tensor<1> {
+    let [len] = values.dims();
+    match n / len.max(1) {
+        1 => values.clone(),
+        times => values.clone().repeat_dim(0, times),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use burn::tensor::TensorData;
+
+    const ROAD: DepthRange = DepthRange {
+        min_m: 0.1,
+        max_m: 90.0,
+    };
+    const GARAGE: DepthRange = DepthRange {
+        min_m: 0.2,
+        max_m: 30.0,
+    };
+
+    /// Each sample's depth and motion are exactly its own set's, in both halves of a batch that looks both ways.
+    #[test]
+    fn every_sample_has_its_own_metres() {
+        let device = Device::flex();
+        let samples = [(ROAD, 1.2), (GARAGE, 0.1)];
+        let factors = BatchFactors::new(&samples, 0.6, &device);
+        let sigmoid = [0.0_f32, 1.0, 0.25, 0.5, 0.1, 0.9, 0.0, 1.0];
+        let tensor = Tensor::from_data(TensorData::new(sigmoid.to_vec(), [4, 1, 1, 2]), &device);
+        let found: Vec<f32> = factors.inverse_depth(tensor).into_data().iter().collect();
+        for (i, (found, sigmoid)) in found.iter().zip(sigmoid).enumerate() {
+            let range = samples[(i / 2) % 2].0;
+            let expected = range.disparity(f64::from(sigmoid));
+            assert!(
+                (f64::from(*found) - expected).abs() < 1e-6 * expected,
+                "{i}"
+            );
+        }
+        let motion = Motion::new(
+            Tensor::from_data([[0.1_f32, 0.0, 0.0]; 4], &device),
+            Tensor::from_data([[0.0_f32, 0.3, -0.6]; 4], &device),
+        );
+        let scaled: Vec<f32> = factors
+            .scale(&motion)
+            .translation
+            .into_data()
+            .iter()
+            .collect();
+        for (i, z) in scaled.chunks(3).map(|t| t[2]).enumerate() {
+            let metres = samples[i % 2].1;
+            assert!((f64::from(z) + metres).abs() < 1e-6, "{z} and {metres}");
+        }
+    }
+}
