@@ -91,7 +91,7 @@ fn after_conv(
             conv.bias.len()
         ));
     }
-    if conv.kernel % 2 == 0 || conv.channels_out == 0 {
+    if conv.kernel.is_multiple_of(2) || conv.channels_out == 0 {
         return Err("kernels are odd, and there is at least one output".into());
     }
     if !matches!(conv.stride, 1 | 2) {
