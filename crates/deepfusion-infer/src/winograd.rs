@@ -55,8 +55,7 @@ pub(crate) struct Winograd {
 
 impl Winograd {
     /// Whether this form pays for a convolution: 3×3 at stride 1, on enough pixels to share the
-    /// transformed weights, which are four times as many.
-    /// Input channels must be whole vectors: they are transformed a vector at a time.
+    /// transformed weights, which are four times as many. Input channels must be whole vectors.
     pub(crate) fn fits(conv: &Conv, geometry: &Geometry, channel_of: &[Option<usize>]) -> bool {
         let pixels = geometry.out.pixels();
         if conv.kernel != 3 || conv.stride != 1 || pixels < 1024 {
