@@ -30,7 +30,7 @@ pub struct DataSetConfig {
     /// Metres of translation per unit of PoseNet's output; 0 means the set's mean displacement per pair, which is
     /// then filled in.
     pub metres_per_unit: f64,
-    /// The camera of its first sample, at network size; filled in from the data.
+    /// The camera of its first sample, at the size of its images; filled in from the data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trained_with: Option<Intrinsics>,
 }

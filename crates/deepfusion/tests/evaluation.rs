@@ -58,7 +58,10 @@ fn a_model_is_measured_on_traffic_and_along_the_road() {
     assert!(table.contains("\nstatic ") && table.contains("\nmoving, "));
 
     let odometry = "eval-odometry --model run --data sim";
-    let report = json(at, &format!("{odometry} --out paths --json"));
+    let told = ok(at, &format!("{odometry} --out paths --json"));
+    // The camera trained with: nothing to warn of.
+    assert!(!told.stderr.contains("focal length"), "{}", told.stderr);
+    let report: Value = serde_json::from_str(&told.stdout).unwrap();
     assert_eq!(report["n"], 40);
     assert_eq!(report["truth"], "the simulator's exact poses");
     assert!(report["scale"].as_f64().unwrap() > 0.0);
@@ -203,6 +206,9 @@ fn several_data_sets_are_learned_together() {
         let args = format!("eval-odometry --model both --data road --set {set} --json");
         json(at, &args)["scale"].as_f64().unwrap()
     };
+    // The yard's pictures are narrower: the road's camera is another one than that set was trained with.
+    let args = "eval-odometry --model both --data road --set yard";
+    assert!(ok(at, args).stderr.contains("focal length"));
     let expected = road.metres_per_unit / yard.metres_per_unit;
     let found = ratio("yard") / ratio("road");
     assert!(

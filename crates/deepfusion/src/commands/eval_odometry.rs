@@ -6,7 +6,7 @@ use deepfusion_data::{Camera, CameraPath, Dataset, Error, write_atomically};
 use deepfusion_eval::odometry::{
     OdometryReport, PoseFile, TrackError, TrackPair, chain, from_first, kitti_text, tum_text,
 };
-use deepfusion_geometry::Se3;
+use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_render::TopView;
 use deepfusion_train::PosePredictor;
 
@@ -156,10 +156,9 @@ fn warn_of_focal_length(predictor: &PosePredictor, dataset: &Dataset) {
         return;
     };
     let size = predictor.config().size;
-    let here = dataset
-        .intrinsics(frame)
-        .resized(size.width as u32, size.height as u32);
-    let ratio = here.fx / train.fx;
+    let at_network_size = |k: Intrinsics| k.resized(size.width as u32, size.height as u32);
+    let here = at_network_size(dataset.intrinsics(frame));
+    let ratio = here.fx / at_network_size(train).fx;
     if (ratio - 1.0).abs() > FOCAL_TOLERANCE {
         tracing::warn!(
             "{}: its focal length is {ratio:.2} times the one trained with, at network size; poses are not corrected for it",
