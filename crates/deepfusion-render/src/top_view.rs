@@ -51,7 +51,9 @@ impl TopView {
         let extent = (x.1 - x.0).max(y.1 - y.0).max(1.0);
         let extent = if extent.is_finite() { extent } else { 1.0 };
         let scale = (SIZE - 2.0 * MARGIN) / extent;
-        let width = ((x.1 - x.0).max(0.0) * scale + 2.0 * MARGIN).clamp(320.0, SIZE);
+        // At 15 pixels a letter is 8 to 9 wide: a title of any usual length is seen whole.
+        let title = 32.0 + 8.8 * self.title.chars().count() as f64;
+        let width = ((x.1 - x.0).max(0.0) * scale + 2.0 * MARGIN).max(title.clamp(320.0, SIZE));
         let height = (y.1 - y.0).max(0.0) * scale + 2.0 * MARGIN + TOP;
         let shift = (width - (x.1 - x.0).max(0.0) * scale) / 2.0;
         let pixel = |p: &[f64; 2]| {

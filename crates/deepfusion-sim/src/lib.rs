@@ -31,6 +31,7 @@ mod primitive;
 mod render;
 mod rig;
 mod road;
+mod scanner;
 mod scene;
 mod simulation;
 mod texture;

@@ -2,7 +2,7 @@
 
 use crate::light::GroundLight;
 use crate::primitive::{Primitive, V3};
-use crate::render::{Eye, FrameSolid, Shader, Surface, gather};
+use crate::scanner::{Scanner, gaussian};
 use crate::scene::World;
 use crate::texture::noise::{hash, unit};
 use deepfusion_cloud::PointCloud;
@@ -14,9 +14,6 @@ const RANGE: (f32, f32) = (1.5, 110.0);
 
 /// Standard deviation of the range noise, metres.
 const NOISE: f32 = 0.02;
-
-/// Sectors of azimuth that share a list of candidates.
-const SECTORS: usize = 240;
 
 /// Elevations of the lines of an HDL-64E, radians, top to bottom.
 fn elevations() -> [f32; 64] {
@@ -41,56 +38,9 @@ pub fn scan(
     step_deg: f64,
     key: u32,
 ) -> PointCloud {
-    let position = world_from_velo.translation();
-    let mut solids: Vec<(FrameSolid, f32, f32)> = gather(world, moving, &position)
-        .into_iter()
-        .filter_map(|primitive| {
-            let (half_x, half_y, ..) = primitive.bounds(&world.hulls);
-            let radius = half_x.hypot(half_y);
-            let dx = (primitive.position[0] - position.x) as f32;
-            let dy = (primitive.position[1] - position.y) as f32;
-            let away = dx.hypot(dy);
-            if away - radius > RANGE.1 {
-                return None;
-            }
-            // Half the angle it covers; everything around where the scanner is over it.
-            let half = if away > radius * 1.001 {
-                (radius / away).asin()
-            } else {
-                std::f32::consts::PI
-            };
-            let solid = FrameSolid {
-                eye: primitive.local_point(&position),
-                primitive,
-                nearest: (away - radius).max(0.0) * 0.999,
-            };
-            Some((solid, dy.atan2(dx), half))
-        })
-        .collect();
-    solids.sort_by(|a, b| a.0.nearest.total_cmp(&b.0.nearest));
-    let sector = std::f32::consts::TAU / SECTORS as f32;
-    let mut lists = vec![Vec::new(); SECTORS];
-    for (index, (_, azimuth, half)) in solids.iter().enumerate() {
-        let first = ((azimuth - half) / sector).floor() as i64 - 1;
-        let last = ((azimuth + half) / sector).floor() as i64 + 1;
-        for number in first..=last.min(first + SECTORS as i64 - 1) {
-            lists[number.rem_euclid(SECTORS as i64) as usize].push(index as u32);
-        }
-    }
-    let eye = Eye {
-        world,
-        position,
-        solids: solids.into_iter().map(|s| s.0).collect(),
-    };
     let columns = (360.0 / step_deg).round().max(1.0) as usize;
-    let shader = Shader {
-        eye: &eye,
-        light,
-        pixel: (step_deg as f32).to_radians().max(0.003),
-        samples: 1.0,
-        moving: &[],
-    };
-    let rotation = world_from_velo.rotation().map(|x| x as f32);
+    let pixel = (step_deg as f32).to_radians().max(0.003);
+    let scanner = Scanner::new(world, light, moving, world_from_velo, (RANGE.1, pixel));
     let lines: Vec<Vec<([f32; 3], f32)>> = elevations()
         .par_iter()
         .enumerate()
@@ -101,23 +51,18 @@ pub fn scan(
                 // KITTI's scans begin ahead and turn to the left.
                 let azimuth = std::f32::consts::TAU * (column as f32 + 0.5) / columns as f32;
                 let local = V3::new(cos * azimuth.cos(), cos * azimuth.sin(), sin);
-                let d = rotation * local;
-                let heading = d.y.atan2(d.x).rem_euclid(std::f32::consts::TAU);
-                let number = ((heading / sector) as usize).min(SECTORS - 1);
-                let hit = eye.trace(&lists[number], &d);
-                if hit.surface == Surface::Sky || hit.t > RANGE.1 {
+                let Some(echo) = scanner.cast(&local).filter(|echo| echo.range <= RANGE.1) else {
                     continue;
-                }
+                };
                 let code = hash(column as i32, line as i32, key);
-                let albedo = shader.albedo(&hit, &d);
-                let bright: f32 = 0.3 * albedo.x + 0.5 * albedo.y + 0.2 * albedo.z;
+                let bright: f32 = echo.brightness;
                 // Weak returns are lost: dark things, far away.
-                let lost: f32 =
-                    0.02 + 0.25 * (hit.t / RANGE.1).powi(2) * (1.2 - 2.0 * bright).clamp(0.1, 1.2);
+                let lost: f32 = 0.02
+                    + 0.25 * (echo.range / RANGE.1).powi(2) * (1.2 - 2.0 * bright).clamp(0.1, 1.2);
                 if unit(code, 0) < lost {
                     continue;
                 }
-                let range = hit.t + NOISE * gaussian(code, key);
+                let range = echo.range + NOISE * gaussian(code, key);
                 if range < RANGE.0 {
                     continue;
                 }
@@ -139,29 +84,9 @@ pub fn scan(
     }
 }
 
-/// A standard normal number by Box and Muller's method.
-fn gaussian(code: u32, key: u32) -> f32 {
-    let other = hash(code as i32, 17, key);
-    let a = ((code >> 8) as f32 + 0.5) / 16_777_216.0;
-    let b = (other >> 8) as f32 / 16_777_216.0;
-    (-2.0 * a.ln()).sqrt() * (std::f32::consts::TAU * b).cos()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_noise_is_standard_normal() {
-        let n = 20_000;
-        let samples: Vec<f32> = (0..n).map(|i| gaussian(hash(i, 3, 9), 9)).collect();
-        let mean = samples.iter().sum::<f32>() / n as f32;
-        let variance = samples.iter().map(|x| (x - mean).powi(2)).sum::<f32>() / n as f32;
-        assert!(
-            mean.abs() < 0.03 && (variance - 1.0).abs() < 0.05,
-            "{mean} {variance}"
-        );
-    }
 
     #[test]
     fn the_lines_go_down() {

@@ -1,6 +1,7 @@
 //! The flow decoder in both directions, forward and backward: `cargo bench -p deepfusion-train --bench flow`. The peer is
 //! `benches/peers/torch_flow.py`.
 
+use burn::module::Module;
 use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{Criterion, criterion_group};
 use deepfusion_nn::{FlowDecoderConfig, ResNetConfig, ResNetDepth, WeightRng};
@@ -10,7 +11,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 const BATCH: usize = 4;
 
-/// On features of a ResNet-18, with the gradients of features and weights.
+/// On features of a ResNet-18; backward with the gradients of features and weights.
 fn flow_decoder(criterion: &mut Criterion) {
     let device = Device::flex().autodiff();
     let channels = ResNetConfig::new(ResNetDepth::ResNet18).channels();
@@ -27,8 +28,10 @@ fn flow_decoder(criterion: &mut Criterion) {
         let name = |what: &str| {
             format!("flow decoder {what}, both directions, {width}x{height}, batch {BATCH}")
         };
+        let valid = decoder.valid();
+        let [plain, other] = [&first, &second].map(|f| f.clone().map(Tensor::inner));
         criterion.bench_function(&name("forward"), |b| {
-            b.iter(|| decoder.forward_both(&first, &second));
+            b.iter(|| valid.forward_both(&plain, &other));
         });
         criterion.bench_function(&name("forward + backward"), |b| {
             b.iter(|| {

@@ -1,11 +1,13 @@
 //! Training steps and inference on random images: `cargo bench -p deepfusion-train`. The peers are
-//! `benches/peers/torch_step.py` and, for the whole step, `benches/peers/torch_light_step.py`.
+//! `benches/peers/torch_step.py` and, for the whole step, `torch_light_step.py` and `torch_full_step.py` beside it.
 
 use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{BatchSize, Criterion, criterion_group};
 use deepfusion_infer::{Engine, Precision};
 use deepfusion_nn::{DepthNet, DepthNetConfig, ResNetDepth, depth_graph, weights};
-use deepfusion_train::{Adam, Model, Motion, NamedGradients, Preset, Schedule, SnippetBatch};
+use deepfusion_train::{
+    Adam, Model, Motion, NamedGradients, Preset, Schedule, SnippetBatch, TrainConfig,
+};
 
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
@@ -106,11 +108,23 @@ fn snippets(batch: usize, height: usize, width: usize, device: &Device) -> Snipp
     }
 }
 
-/// A whole training step of the preset `light` at 320×96, batch 4: depth of both frames, motion, views, all
-/// losses, backward, clipped Adam; the batch is there already.
+/// A whole training step of the preset `light` at 320×96, batch 4: depth of both frames, motion, views, the
+/// preset's losses, backward, clipped Adam; the batch is there already.
 fn light_step(criterion: &mut Criterion) {
-    let device = Device::flex().autodiff();
+    let config = Preset::Light.config();
+    training_step(criterion, "training step, preset light", config);
+}
+
+/// The same with every loss: optical flow both ways, what moves, agreement, affine invariance.
+fn full_step(criterion: &mut Criterion) {
     let mut config = Preset::Light.config();
+    config.loss = config.loss.with_every_term();
+    let name = "training step, preset light, every loss";
+    training_step(criterion, name, config);
+}
+
+fn training_step(criterion: &mut Criterion, name: &str, mut config: TrainConfig) {
+    let device = Device::flex().autodiff();
     config.pose_net.metres_per_unit = 0.8;
     (config.size.width, config.size.height) = (320, 96);
     let mut model = Model::new(&config, &device).expect("the preset is valid");
@@ -120,7 +134,7 @@ fn light_step(criterion: &mut Criterion) {
         speed_weight: config.loss.speed,
         masks_active: true,
     };
-    criterion.bench_function("training step, preset light, 320x96, batch 4", |b| {
+    criterion.bench_function(&format!("{name}, 320x96, batch 4"), |b| {
         b.iter(|| {
             let pass = model.forward(&batch);
             let loss = model.loss(&pass, &batch, schedule);
@@ -128,15 +142,21 @@ fn light_step(criterion: &mut Criterion) {
             let mut gradients = NamedGradients::default();
             gradients.add("depth", &model.depth_net, &mut raw, 1.0);
             gradients.add("pose", &model.pose_net, &mut raw, 1.0);
+            if let Some(decoder) = &model.flow_decoder {
+                gradients.add("flow", decoder, &mut raw, 1.0);
+            }
             let (_, step) = adam.begin(&gradients, LEARNING_RATE, CLIP_NORM);
             let step = step.expect("the gradient is finite");
             let Model {
                 depth_net,
                 pose_net,
+                flow_decoder,
                 ..
             } = model.clone();
             model.depth_net = adam.apply(&step, "depth", depth_net, &gradients);
             model.pose_net = adam.apply(&step, "pose", pose_net, &gradients);
+            model.flow_decoder =
+                flow_decoder.map(|decoder| adam.apply(&step, "flow", decoder, &gradients));
             loss.terms.total
         });
     });
@@ -177,13 +197,14 @@ fn inference(criterion: &mut Criterion) {
 #[allow(missing_docs)]
 mod group {
     use super::{
-        Criterion, criterion_group, depth_net_gradients, depth_net_step, inference, light_step,
+        Criterion, criterion_group, depth_net_gradients, depth_net_step, full_step, inference,
+        light_step,
     };
 
     criterion_group! {
         name = step;
         config = Criterion::default().sample_size(10);
-        targets = depth_net_gradients, depth_net_step, light_step, inference
+        targets = depth_net_gradients, depth_net_step, light_step, full_step, inference
     }
 }
 

@@ -95,7 +95,7 @@ impl Model {
             let flow = self.flow_loss(pass, &flow_views);
             sum.terms.flow = sum.add(Some(flow), settings.flow.weight);
             if schedule.masks_active && settings.flow.agreement > 0.0 {
-                let apart = agreement(&finest, &flow_views, masks.as_deref());
+                let apart = agreement(&finest, &flow_views, &levels[0], masks.as_deref());
                 sum.terms.agreement = sum.add(Some(apart), settings.flow.agreement);
             }
         }
@@ -312,16 +312,18 @@ fn shrunk(mask: &Tensor<4, Bool>, width: usize) -> Tensor<4, Bool> {
     avg_pool2d(mask.clone().float(), options).greater_elem(0.5)
 }
 
-/// Mean over the views of the distance between rigid flow and flow, where both explain the pixel: in view,
-/// back again, and not moving by itself.
+/// Mean over the views of the distance between rigid flow and flow, where both explain the pixel and it does
+/// not move by itself.
 fn agreement(
     finest: &ScaleViews,
     flow_views: &[FlowView],
+    level: &Level,
     masks: Option<&[Tensor<4, Bool>]>,
 ) -> Tensor<1> {
-    let views = finest.synthesised.iter().zip(flow_views).enumerate();
-    mean_of(views, |(index, (rigid, flow))| {
-        let mut both = rigid.valid.clone().bool_and(flow.visible.clone());
+    let views = finest.synthesised.iter().zip(&finest.errors);
+    let views = views.zip(flow_views).zip(&level.unwarped).enumerate();
+    mean_of(views, |(index, (((rigid, error), flow), unwarped))| {
+        let mut both = losses::both_explain(error, &rigid.valid, flow, unwarped);
         if let Some(masks) = masks {
             both = both.bool_and(masks[index].clone().bool_not());
         }

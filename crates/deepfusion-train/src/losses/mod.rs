@@ -10,7 +10,7 @@ mod smoothness;
 mod speed;
 
 pub use affine::{affine_invariant, depth_seen_from_target};
-pub use agreement::agreement;
+pub use agreement::{agreement, both_explain};
 pub use flow::{FlowView, flow, flow_smoothness, flow_view, pixel_grid};
 pub use mean::{mean_where, share};
 pub use moving::{RigidView, epipolar_distance, moving_pixels};
