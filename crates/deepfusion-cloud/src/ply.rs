@@ -1,5 +1,5 @@
-//! PLY, binary little-endian: `x y z` as float, then `red green blue` as uchar, `intensity` and
-//! `confidence` as float, each where the cloud has it.
+//! PLY, binary little-endian: `x y z` as float, then `red green blue` as uchar, `intensity`, `radial_velocity`
+//! and `confidence` as float, each where the cloud has it.
 
 use crate::{Error, PointCloud, Result};
 use std::io::{BufRead, Read, Write};
@@ -27,6 +27,9 @@ impl PointCloud {
         if self.intensity.is_some() {
             header += "property float intensity\n";
         }
+        if self.radial_velocity.is_some() {
+            header += "property float radial_velocity\n";
+        }
         if self.confidence.is_some() {
             header += "property float confidence\n";
         }
@@ -40,7 +43,8 @@ impl PointCloud {
             if let Some(rgb) = &self.rgb {
                 bytes.extend_from_slice(&rgb[i]);
             }
-            for column in [&self.intensity, &self.confidence].into_iter().flatten() {
+            let columns = [&self.intensity, &self.radial_velocity, &self.confidence];
+            for column in columns.into_iter().flatten() {
                 bytes.extend_from_slice(&column[i].to_le_bytes());
             }
         }
@@ -66,10 +70,12 @@ impl PointCloud {
             _ => None,
         };
         let intensity = header.find("intensity");
+        let radial_velocity = header.find("radial_velocity");
         let confidence = header.find("confidence");
         let mut cloud = Self {
             rgb: colour.map(|_| Vec::new()),
             intensity: intensity.map(|_| Vec::new()),
+            radial_velocity: radial_velocity.map(|_| Vec::new()),
             confidence: confidence.map(|_| Vec::new()),
             ..Self::default()
         };
@@ -91,6 +97,9 @@ impl PointCloud {
                     rgb.push(properties.map(|p| p.colour(vertex)));
                 }
                 if let (Some(column), Some(p)) = (&mut cloud.intensity, intensity) {
+                    column.push(p.value(vertex) as f32);
+                }
+                if let (Some(column), Some(p)) = (&mut cloud.radial_velocity, radial_velocity) {
                     column.push(p.value(vertex) as f32);
                 }
                 if let (Some(column), Some(p)) = (&mut cloud.confidence, confidence) {
@@ -283,6 +292,7 @@ mod tests {
             xyz: (0..n).map(|i| [x(i), -x(i), 1.0]).collect(),
             rgb: Some((0..n).map(|i| [i as u8, 7, 255]).collect()),
             intensity: Some((0..n).map(x).collect()),
+            radial_velocity: Some((0..n).map(|i| 3.0 - x(i)).collect()),
             confidence: Some(vec![0.5; n]),
         }
     }

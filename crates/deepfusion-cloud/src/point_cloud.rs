@@ -10,6 +10,8 @@ pub struct PointCloud {
     pub rgb: Option<Vec<[u8; 3]>>,
     /// Strength of the return, in the sensor's own unit (KITTI: 0 to 1).
     pub intensity: Option<Vec<f32>>,
+    /// Speed at which it recedes from the sensor, in m/s; negative when it comes nearer.
+    pub radial_velocity: Option<Vec<f32>>,
     /// How far the position can be trusted, 0 to 1.
     pub confidence: Option<Vec<f32>>,
 }
@@ -72,6 +74,10 @@ impl PointCloud {
         let columns = [
             ("rgb", self.rgb.as_ref().map(Vec::len)),
             ("intensity", self.intensity.as_ref().map(Vec::len)),
+            (
+                "radial_velocity",
+                self.radial_velocity.as_ref().map(Vec::len),
+            ),
             ("confidence", self.confidence.as_ref().map(Vec::len)),
         ];
         for (what, len) in columns {

@@ -26,6 +26,17 @@ impl std::str::FromStr for Scene {
     }
 }
 
+/// What the car carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sensors {
+    /// KITTI's camera, velodyne and inertial unit.
+    #[default]
+    Kitti,
+    /// UMAD's camera, FMCW LiDAR, 6-axis unit and CAN.
+    Umad,
+}
+
 /// A street of half an hour's drive still fits into memory, and its coordinates into f32.
 const LONGEST_DRIVE_S: f64 = 1800.0;
 
@@ -47,6 +58,8 @@ pub struct SimConfig {
     pub fps: f64,
     /// The kind of place.
     pub scene: Scene,
+    /// What the car carries, and where.
+    pub sensors: Sensors,
     /// [`crate::write_kitti`] writes a velodyne scan for every n-th frame; 0 writes none.
     pub scan_every: usize,
     /// Angle between two columns of a velodyne scan, in degrees.
@@ -63,6 +76,7 @@ impl Default for SimConfig {
             moving_cars: 0,
             fps: 10.0,
             scene: Scene::Urban,
+            sensors: Sensors::Kitti,
             scan_every: 1,
             scan_step_deg: 0.3,
         }

@@ -21,8 +21,11 @@
 //! resolve is averaged rather than aliased: one frame warped by its true depth and pose is the next
 //! one. Shadows under moving cars move with them; the mask of moving pixels holds the cars only.
 
+mod can;
 mod config;
 mod error;
+mod fmcw;
+mod imu;
 mod kitti;
 mod light;
 mod motion;
@@ -38,8 +41,11 @@ mod texture;
 mod traffic;
 mod velodyne;
 
-pub use config::{Scene, SimConfig};
+pub use can::{SpeedReading, SteeringReading, WHEELBASE_M};
+pub use config::{Scene, Sensors, SimConfig};
 pub use error::{Error, Result};
+pub use fmcw::FmcwScan;
+pub use imu::ImuReading;
 pub use kitti::write_kitti;
 pub use oxts::OxtsReading;
 pub use rig::Rig;

@@ -1,4 +1,4 @@
-//! The sensors' mounting and the camera's intrinsics, after KITTI's car.
+//! The sensors' mounting and the camera's intrinsics, after KITTI's car or UMAD's.
 
 use crate::motion::IMU_HEIGHT;
 use deepfusion_geometry::{Intrinsics, Se3};
@@ -10,13 +10,16 @@ pub const CAMERA_HEIGHT: f64 = 1.65;
 /// Camera 2 sits this far left of camera 0, metres (KITTI's P_rect_02 has the same 6 cm).
 pub const CAM2_FROM_CAM0_X: f64 = 0.06;
 
-/// Where the sensors are on the car.
+/// Where the sensors are on the car. "The IMU" is KITTI's: it stands for the car itself, above the middle of the
+/// rear axle.
 #[derive(Debug, Clone, Copy)]
 pub struct Rig {
-    /// Rectified camera 0 from the velodyne.
+    /// Rectified camera 0 from the velodyne (with UMAD: from the FMCW LiDAR).
     pub cam0_from_velo: Se3,
     /// Velodyne from the IMU.
     pub velo_from_imu: Se3,
+    /// The 6-axis unit in the sensor head from the IMU; the same where there is but one.
+    pub head_imu_from_imu: Se3,
 }
 
 impl Rig {
@@ -38,6 +41,22 @@ impl Rig {
         Self {
             cam0_from_velo,
             velo_from_imu,
+            head_imu_from_imu: Se3::identity(),
+        }
+    }
+
+    /// UMAD's arrangement on a roof: the camera 80 mm above the LiDAR, a 6-axis unit 50 mm behind it, all of them
+    /// 1.6 m before the rear axle; the LiDAR turned against the car by fractions of a degree.
+    pub fn umad_like() -> Self {
+        let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+        let cam_axes_from_vehicle_axes = Se3::from_parts(&axes, Vector3::zeros());
+        let shift = |x, y, z| Se3::from_axis_angle(Vector3::zeros(), Vector3::new(x, y, z));
+        let tilt = Se3::from_axis_angle(Vector3::new(0.003, -0.005, 0.006), Vector3::zeros());
+        let lidar_height = CAMERA_HEIGHT - 0.08 - IMU_HEIGHT;
+        Self {
+            cam0_from_velo: shift(-CAM2_FROM_CAM0_X, 0.08, 0.0) * cam_axes_from_vehicle_axes * tilt,
+            velo_from_imu: tilt.inverse() * shift(-1.6, 0.0, -lidar_height),
+            head_imu_from_imu: shift(-1.55, 0.0, -lidar_height),
         }
     }
 
@@ -66,9 +85,39 @@ pub fn kitti_like_intrinsics(width: u32, height: u32) -> Intrinsics {
     .resized(width, height)
 }
 
+/// UMAD's camera as the paper prints it, 640×480, but for the row of its centre: the printed 117.6 cannot be
+/// right for 480 rows, and the middle is taken instead. Resized to `width` × `height`.
+pub fn umad_like_intrinsics(width: u32, height: u32) -> Intrinsics {
+    Intrinsics {
+        fx: 703.64,
+        fy: 724.82,
+        cx: 322.55,
+        cy: 239.5,
+        width: 640,
+        height: 480,
+    }
+    .resized(width, height)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_roof_s_sensors_are_where_the_paper_has_them() {
+        let rig = Rig::umad_like();
+        let lidar_from_cam = rig.cam_from_velo().inverse();
+        let above = lidar_from_cam.translation();
+        assert!(
+            (above.norm() - 0.08).abs() < 1e-12 && above.z > 0.079,
+            "{above}"
+        );
+        let imu_from_cam = rig.cam_from_imu().inverse();
+        assert!((imu_from_cam.translation().z + IMU_HEIGHT - CAMERA_HEIGHT).abs() < 1e-9);
+        assert!((imu_from_cam.rotate(&Vector3::z()) - Vector3::x()).norm() < 1e-9);
+        let head_from_lidar = rig.head_imu_from_imu * rig.velo_from_imu.inverse();
+        assert!((head_from_lidar.translation() - Vector3::new(0.05, 0.0, 0.0)).norm() < 1e-9);
+    }
 
     #[test]
     fn the_camera_looks_forward_from_its_height() {

@@ -1,8 +1,11 @@
-use crate::config::SimConfig;
+use crate::can::{SPEED_RATE_HZ, STEERING_RATE_HZ, SpeedReading, SteeringReading};
+use crate::config::{Sensors, SimConfig};
+use crate::fmcw::{self, FmcwScan, MovingSolids, VELOCITY_STEP_S};
+use crate::imu::{self, BodyMotion, ImuReading};
 use crate::light::GroundLight;
 use crate::motion::Drive;
 use crate::oxts::OxtsReading;
-use crate::rig::{Rig, kitti_like_intrinsics};
+use crate::rig::{Rig, kitti_like_intrinsics, umad_like_intrinsics};
 use crate::road::Road;
 use crate::scene::{SceneObject, World};
 use crate::texture::noise::hash;
@@ -68,14 +71,19 @@ impl Simulation {
         let light = GroundLight::bake(&world);
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x7AFF_1C00);
         let traffic = Traffic::new(&mut rng, &world, &drive, duration_s, config.moving_cars);
+        let (width, height) = (config.width, config.height);
+        let (rig, intrinsics) = match config.sensors {
+            Sensors::Kitti => (Rig::kitti_like(), kitti_like_intrinsics(width, height)),
+            Sensors::Umad => (Rig::umad_like(), umad_like_intrinsics(width, height)),
+        };
         Ok(Self {
             config: config.clone(),
             world,
             light,
             drive,
             traffic,
-            rig: Rig::kitti_like(),
-            intrinsics: kitti_like_intrinsics(config.width, config.height),
+            rig,
+            intrinsics,
             times,
         })
     }
@@ -193,6 +201,90 @@ impl Simulation {
             self.config.scan_step_deg,
             key,
         )
+    }
+
+    /// One scan of an FMCW LiDAR at the velodyne's place at a time, in seconds since the drive's begin, with
+    /// the truth about each point.
+    #[must_use]
+    pub fn fmcw(&self, time_s: f64) -> FmcwScan {
+        let solids = |time_s| self.traffic.solids(&self.world, time_s);
+        let velo_from_imu = self.rig.velo_from_imu;
+        let motion = BodyMotion::at(|t| self.imu_at(t) * velo_from_imu.inverse(), time_s);
+        let (now, later) = (solids(time_s), solids(time_s + VELOCITY_STEP_S));
+        // A car that leaves the street within the millisecond is taken as gone.
+        let moving = if now.len() == later.len() {
+            MovingSolids { now, later }
+        } else {
+            MovingSolids {
+                now: later.clone(),
+                later,
+            }
+        };
+        let key = hash((time_s * 1e3).round() as i32, 31, self.world.seed);
+        fmcw::scan(
+            &self.world,
+            &self.light,
+            &moving,
+            &motion.pose,
+            &motion.velocity,
+            key,
+        )
+    }
+
+    /// The readings of the sensor head's 6-axis unit over the drive, with bias and noise.
+    #[must_use]
+    pub fn imu_readings(&self) -> Vec<ImuReading> {
+        let head = self.rig.head_imu_from_imu.inverse();
+        let seed = self.world.seed;
+        let reading = |index: usize| {
+            let time_s = index as f64 / imu::RATE_HZ;
+            let motion = BodyMotion::at(|t| self.imu_at(t) * head, time_s);
+            ImuReading::of(&motion, time_s, (index, seed))
+        };
+        (0..self.readings(imu::RATE_HZ)).map(reading).collect()
+    }
+
+    /// The CAN bus's speeds over the drive.
+    #[must_use]
+    pub fn speed_readings(&self) -> Vec<SpeedReading> {
+        let reading = |index: usize| {
+            let time_s = index as f64 / SPEED_RATE_HZ;
+            SpeedReading::of(
+                time_s,
+                self.speed_and_yaw_rate(time_s).0,
+                index,
+                self.world.seed,
+            )
+        };
+        (0..self.readings(SPEED_RATE_HZ)).map(reading).collect()
+    }
+
+    /// The CAN bus's road-wheel angles over the drive.
+    #[must_use]
+    pub fn steering_readings(&self) -> Vec<SteeringReading> {
+        let reading = |index: usize| {
+            let time_s = index as f64 / STEERING_RATE_HZ;
+            let motion = self.speed_and_yaw_rate(time_s);
+            SteeringReading::of(time_s, motion, index, self.world.seed)
+        };
+        (0..self.readings(STEERING_RATE_HZ)).map(reading).collect()
+    }
+
+    /// How many readings at a rate cover the drive.
+    fn readings(&self, rate_hz: f64) -> usize {
+        (self.times[self.times.len() - 1] * rate_hz).ceil() as usize + 1
+    }
+
+    /// World from the IMU at any time.
+    fn imu_at(&self, time_s: f64) -> Se3 {
+        self.drive.world_from_imu(&self.world.road, time_s)
+    }
+
+    /// Forward speed (m/s) and yaw rate (rad/s) of the rear axle, without noise.
+    fn speed_and_yaw_rate(&self, time_s: f64) -> (f64, f64) {
+        let motion = BodyMotion::at(|t| self.imu_at(t), time_s);
+        let yaw_rate = motion.pose.rotate(&motion.angular_rate).z;
+        (motion.velocity.xy().norm(), yaw_rate)
     }
 
     /// Everything on the street at a frame, standing or moving, with exact boxes.
