@@ -9,20 +9,58 @@ pub enum Scene {
     /// A street of houses, shops, gardens and parks, by day.
     #[default]
     Urban,
+    /// An enclosed park: a narrow road between lawns and trees, few cars, slowly driven.
+    Park,
+    /// A car park under ground: dark, near walls, pillars, a low ceiling, at walking speed.
+    Garage,
+    /// A shopping street: large houses on both sides, wide pavements, many parked cars.
+    Commercial,
+    /// The urban street by night, under its lamps.
+    Night,
+}
+
+impl Scene {
+    /// Every scene, UMAD's five scenarios.
+    pub const ALL: [Self; 5] = [
+        Self::Urban,
+        Self::Park,
+        Self::Garage,
+        Self::Commercial,
+        Self::Night,
+    ];
+
+    /// Its name, as `--scene` takes it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Urban => "urban",
+            Self::Park => "park",
+            Self::Garage => "garage",
+            Self::Commercial => "commercial",
+            Self::Night => "night",
+        }
+    }
+
+    /// How fast it is driven through, as a share of what a street allows.
+    pub(crate) fn pace(self) -> f64 {
+        match self {
+            Self::Garage => 0.3,
+            Self::Park => 0.6,
+            _ => 1.0,
+        }
+    }
 }
 
 impl std::str::FromStr for Scene {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        match name {
-            "urban" => Ok(Self::Urban),
-            other => Err(Error::Config {
-                field: "scene",
-                value: other.to_owned(),
-                expected: "urban",
-            }),
-        }
+        let found = Self::ALL.into_iter().find(|scene| scene.name() == name);
+        found.ok_or_else(|| Error::Config {
+            field: "scene",
+            value: name.to_owned(),
+            expected: "urban, park, garage, commercial or night",
+        })
     }
 }
 
@@ -210,6 +248,8 @@ mod tests {
     fn an_unknown_scene_says_what_there_is() {
         let error = "moon".parse::<Scene>().unwrap_err();
         assert!(error.to_string().contains("moon") && error.to_string().contains("urban"));
-        assert_eq!("urban".parse::<Scene>().ok(), Some(Scene::Urban));
+        for scene in Scene::ALL {
+            assert_eq!(scene.name().parse::<Scene>().ok(), Some(scene));
+        }
     }
 }

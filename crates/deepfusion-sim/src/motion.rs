@@ -81,17 +81,16 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Drives along `road` from s = 0 for `duration_s` seconds.
-    pub fn simulate(rng: &mut ChaCha8Rng, road: &Road, duration_s: f64) -> Self {
+    /// Drives along `road` from s = 0 for `duration_s` seconds, `pace` times as fast as a street allows.
+    pub fn simulate(rng: &mut ChaCha8Rng, road: &Road, duration_s: f64, pace: f64) -> Self {
         let wish = Wander::new(rng, 7.0, 9.0, 40.0);
         let mean = rng.random_range(7.5..9.5);
         let wanted = |s: f64, t: f64| {
             let bend = (0..12)
                 .map(|i| road.centre(s + 2.5 * f64::from(i)).3.abs())
                 .fold(1e-6, f64::max);
-            (mean + wish.at(t))
-                .clamp(SPEED.0 + 0.3, SPEED.1 - 0.4)
-                .min((MAX_LATERAL / bend).sqrt())
+            let free = (mean + wish.at(t)).clamp(SPEED.0 + 0.3, SPEED.1 - 0.4);
+            (pace * free).min((MAX_LATERAL / bend).sqrt())
         };
         let mut speed = wanted(0.0, 0.0);
         let (mut s, mut acceleration) = (-speed * LEAD, 0.0f64);
@@ -105,7 +104,7 @@ impl Drive {
             let next = acceleration + STEP / 0.35 * (command - acceleration);
             let middle = 0.5 * (acceleration + next);
             s += STEP * speed + 0.5 * STEP * STEP * acceleration;
-            speed = (speed + STEP * middle).clamp(SPEED.0, SPEED.1);
+            speed = (speed + STEP * middle).clamp(pace * SPEED.0, pace * SPEED.1);
             acceleration = next;
         }
         // Start exactly at s = 0.
@@ -191,7 +190,7 @@ mod tests {
     fn drive(seed: u64, duration_s: f64) -> (Road, Drive) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let road = Road::generate(&mut rng, -60.0, 60.0 + 14.0 * duration_s);
-        let drive = Drive::simulate(&mut rng, &road, duration_s);
+        let drive = Drive::simulate(&mut rng, &road, duration_s, 1.0);
         (road, drive)
     }
 

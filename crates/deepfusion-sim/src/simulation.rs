@@ -65,9 +65,9 @@ impl Simulation {
         let duration_s = times[times.len() - 1];
         let longest = 14.0 * (duration_s + 3.0);
         let mut road = Road::generate(&mut rng, -LEAD_IN, longest + LEAD_OUT);
-        let drive = Drive::simulate(&mut rng, &road, duration_s);
+        let drive = Drive::simulate(&mut rng, &road, duration_s, config.scene.pace());
         road.truncate(drive.progress(duration_s).0 + LEAD_OUT);
-        let world = World::furnish(road, config.seed);
+        let world = World::furnish(road, config.seed, config.scene);
         let light = GroundLight::bake(&world);
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x7AFF_1C00);
         let traffic = Traffic::new(&mut rng, &world, &drive, duration_s, config.moving_cars);

@@ -40,9 +40,10 @@ impl Traffic {
         duration_s: f64,
         count: usize,
     ) -> Self {
+        let pace = world.scene.pace();
         let travelled = drive.progress(duration_s).0;
-        let with = (travelled / duration_s.max(0.1)).clamp(3.0, 14.0);
-        let against = -rng.random_range(6.0..11.0);
+        let with = (travelled / duration_s.max(0.1)).clamp(3.0 * pace, 14.0);
+        let against = -pace * rng.random_range(6.0..11.0);
         // The first car ahead starts so far on that the camera never comes nearer than a few metres.
         let closest = (0..=(duration_s * 10.0) as usize)
             .map(|i| {

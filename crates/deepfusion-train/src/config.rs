@@ -130,7 +130,8 @@ pub struct TrainConfig {
     pub augmentation: Augmentation,
     /// The depth network.
     pub depth_net: DepthNetConfig,
-    /// The pose network. `metres_per_unit` 0 means the data's mean displacement per pair.
+    /// The pose network. `metres_per_unit` 0 means the data's mean displacement per pair, and 1 without
+    /// the speed loss.
     pub pose_net: PoseNetConfig,
     /// The flow decoder, which training alone has, and only where `loss.flow.weight` is above 0.
     #[serde(default)]
@@ -151,6 +152,17 @@ impl TrainConfig {
         "flow",
         "moving",
     ];
+
+    /// The metres that one unit of PoseNet's translation stands for where nothing else is said: the data's mean
+    /// displacement, so that the raw outputs stay near 1. Without the speed loss it is 1: nothing measured may
+    /// enter, not even by the start.
+    pub(crate) fn first_unit(&self, mean_displacement_m: f64) -> f64 {
+        if self.loss.speed > 0.0 {
+            mean_displacement_m
+        } else {
+            1.0
+        }
+    }
 
     /// Reads a TOML file.
     ///
@@ -345,7 +357,9 @@ mod tests {
     fn without_speed_the_views_follow_posenet() {
         let mut config = Preset::Tiny.config();
         assert_ne!(config.view_motion, ViewMotion::PoseNet);
+        assert_eq!(config.first_unit(0.7), 0.7);
         config.without("speed").unwrap();
+        assert_eq!(config.first_unit(0.7), 1.0, "nothing measured enters");
         config.validate().unwrap();
         for motion in [ViewMotion::Distance, ViewMotion::Vehicle] {
             config.view_motion = motion;

@@ -71,14 +71,15 @@ impl Trainer {
     ) -> Result<Self, Error> {
         config.validate()?;
         if config.pose_net.metres_per_unit == 0.0 {
-            config.pose_net.metres_per_unit = train.mean_displacement_m();
+            config.pose_net.metres_per_unit = config.first_unit(train.mean_displacement_m());
         }
         config.camera = train.camera();
         for i in 0..config.data.sets.len() {
             let own = train.of_set(i);
+            let unit = config.first_unit(own.mean_displacement_m());
             let set = &mut config.data.sets[i];
             if set.metres_per_unit == 0.0 {
-                set.metres_per_unit = own.mean_displacement_m();
+                set.metres_per_unit = unit;
             }
             set.trained_with = own.camera();
         }

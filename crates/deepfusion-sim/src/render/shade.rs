@@ -7,6 +7,7 @@ use crate::road::KERB_HEIGHT;
 use crate::texture::ground::{self, GroundPatch};
 use crate::texture::noise::hash;
 use crate::texture::{Patch, Rgb};
+use nalgebra::Vector3;
 use std::sync::LazyLock;
 
 /// A pixel's longer side is at most this much of the surface, metres.
@@ -84,7 +85,18 @@ impl Shader<'_> {
         // The lower half of the sky is ground, which is darker; near it the sky is shut off.
         let height = self.eye.position.z as f32 + d.z * t;
         let open = (0.62 + 0.38 * normal.z) * (1.0 - 0.35 * (-height.max(0.0) / 0.7).exp());
-        albedo.component_mul(&(sun * lit + sky * open))
+        let lamps = self.lamps(hit_place(&self.eye.position, d, t), &normal);
+        albedo.component_mul(&(sun * lit + sky * open + lamps))
+    }
+
+    /// What the lamps send onto a surface.
+    fn lamps(&self, place: Vector3<f64>, normal: &V3) -> Rgb {
+        let world = self.eye.world;
+        if world.lamps.is_empty() {
+            return Rgb::zeros();
+        }
+        let s = world.road.locate(place.x, place.y).s;
+        world.lamps.irradiance(&place, s, normal)
     }
 
     /// Albedo of the ground and the shares of sun and sky it sees.
@@ -165,8 +177,20 @@ impl Shader<'_> {
         } else {
             (world.sun.z, 1.0)
         };
-        albedo.component_mul(&(sun_light * (facing * sun) + sky_light * (open * sky)))
+        let normal = if hit.surface == Surface::Kerb {
+            -V3::new(d.x, d.y, 0.0).normalize()
+        } else {
+            V3::z()
+        };
+        // Below a car it is dark by night too.
+        let lamps = self.lamps(hit_place(&self.eye.position, d, hit.t), &normal) * sky;
+        albedo.component_mul(&(sun_light * (facing * sun) + sky_light * (open * sky) + lamps))
     }
+}
+
+/// Where a ray ends, world axes, metres.
+fn hit_place(eye: &Vector3<f64>, d: &V3, t: f32) -> Vector3<f64> {
+    eye + (d * t).map(f64::from)
 }
 
 /// The longer side of a pixel's footprint on a surface, and how many samples it takes.

@@ -111,6 +111,8 @@ impl Furniture {
             height: 0.14,
         };
         world.solid(lamp, head, towards, self.pale, seed);
+        let under = [head[0], head[1], head[2] - 0.1];
+        world.light_lamp(under, Rgb::new(1.0, 0.78, 0.5) * (1.2 * height * height));
         world.object(
             ObjectClass::Pole,
             [x, y, GROUND],

@@ -5,6 +5,7 @@ use super::buildings::{self, Plot, Style};
 use super::cars;
 use super::furniture::Furniture;
 use super::greenery::Greens;
+use crate::config::Scene;
 use crate::road::{KERB_HEIGHT, SIDE_STREET_LENGTH, STEP, SideStreet};
 use crate::texture::ground::{Beyond, Paving, Stretch};
 use crate::texture::noise::{lerp, smoothstep};
@@ -30,6 +31,27 @@ struct Section {
     to: f64,
     half_width: f32,
     sides: [Side; 2],
+}
+
+impl Side {
+    /// What a scene asks for, whatever was drawn.
+    fn suited_to(mut self, scene: Scene) -> Self {
+        match scene {
+            Scene::Night => self.lamps = true,
+            Scene::Park => {
+                self.parked = self.parked.min(0.15);
+                self.trees = if self.trees > 0.0 { self.trees } else { 9.0 };
+                self.verge = self.verge.max(0.8);
+            }
+            Scene::Commercial => {
+                self.parked = self.parked.max(0.45);
+                self.pavement = self.pavement.max(2.6);
+                self.setback = self.setback.min(3.0);
+            }
+            _ => {}
+        }
+        self
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -74,17 +96,28 @@ pub fn furnish(world: &mut World, rng: &mut ChaCha8Rng) {
 
 fn sections(world: &mut World, rng: &mut ChaCha8Rng) -> Vec<Section> {
     let (mut from, end) = (world.road.start, world.road.end());
+    let scene = world.scene;
     let mut sections = Vec::new();
     while from < end {
         let to = from + rng.random_range(35.0..95.0);
-        let half_width =
+        let drawn_width =
             [3.4f32, 3.9, 4.6, 5.3, 6.1][rng.random_range(0..5)] + rng.random_range(-0.2..0.3);
+        let half_width = match scene {
+            Scene::Park => drawn_width.min(3.9),
+            Scene::Commercial => drawn_width.max(5.3),
+            _ => drawn_width,
+        };
         let side = |rng: &mut ChaCha8Rng| {
-            let frontage = match rng.random_range(0..100) {
+            let drawn = match rng.random_range(0..100) {
                 0..=37 => Frontage::Terrace,
                 38..=66 => Frontage::Detached,
                 67..=83 => Frontage::Commercial,
                 _ => Frontage::Park,
+            };
+            let frontage = match scene {
+                Scene::Park => Frontage::Park,
+                Scene::Commercial if drawn != Frontage::Terrace => Frontage::Commercial,
+                _ => drawn,
             };
             let setback = match frontage {
                 Frontage::Terrace => rng.random_range(0.1..2.5),
@@ -109,6 +142,7 @@ fn sections(world: &mut World, rng: &mut ChaCha8Rng) -> Vec<Section> {
                 },
                 lamps: rng.random_bool(0.6),
             }
+            .suited_to(scene)
         };
         let sides = [side(rng), side(rng)];
         let beyond = |side: &Side, rng: &mut ChaCha8Rng| match side.frontage {

@@ -3,9 +3,12 @@
 mod buildings;
 pub mod cars;
 mod furniture;
+mod garage;
 mod greenery;
+mod lamps;
 mod layout;
 
+use crate::config::Scene;
 use crate::primitive::{Hull, Primitive, Shape, V3};
 use crate::road::Road;
 use crate::texture::ground::Stretch;
@@ -13,6 +16,7 @@ use crate::texture::noise::Noise;
 use crate::texture::sky::Sky;
 use crate::texture::{Material, Rgb};
 use deepfusion_geometry::Se3;
+use lamps::Lamps;
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -76,13 +80,17 @@ pub struct World {
     pub sun: V3,
     /// Irradiance of the sun and of the sky.
     pub light: (Rgb, Rgb),
+    /// Lamps that burn.
+    pub lamps: Lamps,
+    /// The kind of place.
+    pub scene: Scene,
     /// The drive's seed, folded.
     pub seed: u32,
 }
 
 impl World {
     /// Furnishes `road` for the drive of `seed`.
-    pub fn furnish(road: Road, seed: u64) -> Self {
+    pub fn furnish(road: Road, seed: u64, scene: Scene) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5EED_57AE_E700_0001);
         let azimuth: f32 = rng.random_range(0.0..std::f32::consts::TAU);
         let elevation: f32 = rng.random_range(0.5..1.0);
@@ -114,12 +122,41 @@ impl World {
                 Rgb::new(1.0, 0.95, 0.86) * sun_strength,
                 Rgb::new(0.62, 0.68, 0.78) * (0.5 + 0.4 * clouds),
             ),
+            lamps: Lamps::default(),
+            scene,
             seed: (seed ^ (seed >> 32)) as u32,
         };
+        world.dim();
         world.models = cars::models(&mut world, &mut rng);
-        layout::furnish(&mut world, &mut rng);
+        match scene {
+            Scene::Garage => garage::furnish(&mut world, &mut rng),
+            _ => layout::furnish(&mut world, &mut rng),
+        }
         world.sort();
+        world.lamps.sort();
         world
+    }
+
+    /// Takes the day away where there is none.
+    fn dim(&mut self) {
+        match self.scene {
+            Scene::Night => {
+                self.sky.horizon = Rgb::new(0.035, 0.033, 0.04);
+                self.sky.zenith = Rgb::new(0.006, 0.008, 0.016);
+                self.sky.clouds = -1.0;
+                self.light = (Rgb::new(0.02, 0.022, 0.03), Rgb::new(0.035, 0.038, 0.05));
+            }
+            Scene::Garage => self.light = (Rgb::zeros(), Rgb::new(0.09, 0.09, 0.086)),
+            _ => {}
+        }
+    }
+
+    /// Lights a lamp, where the scene is dark.
+    fn light_lamp(&mut self, place: [f64; 3], strength: Rgb) {
+        if self.scene == Scene::Night {
+            let s = self.road.locate(place[0], place[1]).s;
+            self.lamps.add(s, place, strength);
+        }
     }
 
     /// Sorts the solids along the street, so that a camera finds those around it.

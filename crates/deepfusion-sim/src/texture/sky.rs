@@ -11,7 +11,7 @@ pub struct Sky {
     pub horizon: Rgb,
     /// Colour overhead.
     pub zenith: Rgb,
-    /// Clouds, 0 (clear) to 1 (overcast).
+    /// Clouds, 0 (a few) to 1 (overcast); none at −1.
     pub clouds: f32,
 }
 

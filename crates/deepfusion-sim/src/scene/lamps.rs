@@ -1,0 +1,84 @@
+//! Lamps: what lights a street by night and a garage by day.
+
+use crate::primitive::V3;
+use crate::texture::Rgb;
+use nalgebra::Vector3;
+
+/// A lamp farther along the street than this lights nothing, metres.
+const REACH: f32 = 30.0;
+
+/// Light that reaches a surface turned away from a lamp, by way of others, as a share.
+const INDIRECT: f32 = 0.12;
+
+#[derive(Debug, Clone, Copy)]
+struct Lamp {
+    place: Vector3<f64>,
+    /// Radiant intensity: irradiance at one metre.
+    strength: Rgb,
+}
+
+/// All lamps that burn, by their place along the street.
+#[derive(Debug, Clone, Default)]
+pub struct Lamps {
+    lamps: Vec<(f32, Lamp)>,
+}
+
+impl Lamps {
+    /// Adds a lamp `s` metres along the street.
+    pub fn add(&mut self, s: f32, place: [f64; 3], strength: Rgb) {
+        let place = Vector3::from(place);
+        self.lamps.push((s, Lamp { place, strength }));
+    }
+
+    /// Whether none burns.
+    pub fn is_empty(&self) -> bool {
+        self.lamps.is_empty()
+    }
+
+    /// To be called once all are there.
+    pub fn sort(&mut self) {
+        self.lamps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    }
+
+    /// What they send onto a surface at `place`, `s` metres along the street. It hangs on the surface's place and
+    /// direction alone, never on the viewer's. Nothing casts a shadow in it.
+    pub fn irradiance(&self, place: &Vector3<f64>, s: f32, normal: &V3) -> Rgb {
+        let first = self.lamps.partition_point(|lamp| lamp.0 < s - REACH);
+        let near = self.lamps[first..]
+            .iter()
+            .take_while(|lamp| lamp.0 <= s + REACH);
+        let mut sum = Rgb::zeros();
+        for (_, lamp) in near {
+            let towards = (lamp.place - place).map(|x| x as f32);
+            // A lamp has a size: right beside it the light does not grow without end.
+            let square = towards.norm_squared().max(0.25);
+            let facing = normal.dot(&towards) / square.sqrt();
+            let fade = (1.0 - square.sqrt() / REACH).max(0.0);
+            sum += lamp.strength * (facing.max(INDIRECT) / square * fade);
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_falls_with_distance_and_ends_softly() {
+        let mut lamps = Lamps::default();
+        lamps.add(40.0, [40.0, 0.0, 6.0], Rgb::new(10.0, 9.0, 8.0));
+        lamps.add(0.0, [0.0, 0.0, 6.0], Rgb::new(10.0, 9.0, 8.0));
+        lamps.sort();
+        let at = |x: f64| {
+            lamps
+                .irradiance(&Vector3::new(x, 0.0, 0.0), x as f32, &V3::z())
+                .x
+        };
+        assert!(at(0.0) > at(5.0) && at(5.0) > at(12.0));
+        assert!((at(0.0) - 10.0 / 36.0 * 0.8).abs() < 1e-3, "{}", at(0.0));
+        assert!(at(75.0) == 0.0);
+        let away = lamps.irradiance(&Vector3::zeros(), 0.0, &-V3::z()).x;
+        assert!(away > 0.0 && away < 0.2 * at(0.0));
+    }
+}
