@@ -1,0 +1,106 @@
+//! Chunks decompressed ahead of need, on threads of their own.
+
+use crate::content::{self, Opened};
+use crate::error::Fault;
+use crate::index::ChunkInfo;
+use crate::source::Source;
+use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+
+type Outcome = Result<Opened, Fault>;
+
+/// A chunk that is being opened, or will be.
+pub(crate) enum Ticket {
+    /// By a thread, which sends it here.
+    Ahead(Receiver<Outcome>),
+    /// When it is asked for.
+    OnDemand,
+}
+
+struct Job {
+    info: ChunkInfo,
+    done: Sender<Outcome>,
+}
+
+/// The threads. They are the iterator's own, not a shared pool's: it waits for them, and a pool whose threads all wait
+/// for its own work stands still.
+pub(crate) struct Ahead {
+    source: Arc<Source>,
+    limit: usize,
+    threads: usize,
+    /// Both ends of the queue: the second is for taking back what nobody needs any more.
+    queue: Option<(Sender<Job>, Receiver<Job>)>,
+    workers: Vec<JoinHandle<()>>,
+}
+
+impl Ahead {
+    pub fn new(source: Arc<Source>, limit: usize, threads: usize) -> Self {
+        Self {
+            source,
+            limit,
+            threads,
+            queue: None,
+            workers: Vec::new(),
+        }
+    }
+
+    /// Begins to open a chunk, where that is work; the threads start with the first one that is.
+    pub fn submit(&mut self, info: &ChunkInfo) -> Ticket {
+        if self.threads == 0 || !content::is_compressed(&self.source, info) {
+            return Ticket::OnDemand;
+        }
+        let (done, ticket) = bounded(1);
+        let job = Job {
+            info: info.clone(),
+            done,
+        };
+        let (jobs, _) = self.queue.get_or_insert_with(|| {
+            let (jobs, queue) = unbounded();
+            self.workers = (0..self.threads)
+                .filter_map(|_| worker(&self.source, &queue, self.limit))
+                .collect();
+            (jobs, queue)
+        });
+        // Where the system has no thread to give, chunks are opened on demand.
+        match self.workers.is_empty() || jobs.send(job).is_err() {
+            true => Ticket::OnDemand,
+            false => Ticket::Ahead(ticket),
+        }
+    }
+
+    /// The chunk, as soon as it is open.
+    pub fn redeem(&self, ticket: Ticket, info: &ChunkInfo) -> Outcome {
+        let outcome = match ticket {
+            Ticket::Ahead(ticket) => ticket.recv().ok(),
+            Ticket::OnDemand => None,
+        };
+        outcome.unwrap_or_else(|| content::open(&self.source, info, self.limit))
+    }
+}
+
+fn worker(source: &Arc<Source>, queue: &Receiver<Job>, limit: usize) -> Option<JoinHandle<()>> {
+    let (source, queue) = (Arc::clone(source), queue.clone());
+    let work = move || {
+        for job in queue {
+            // Nobody waits any more where the iterator was dropped.
+            let _ = job.done.send(content::open(&source, &job.info, limit));
+        }
+    };
+    thread::Builder::new()
+        .name("bag chunk".to_owned())
+        .spawn(work)
+        .ok()
+}
+
+impl Drop for Ahead {
+    fn drop(&mut self) {
+        if let Some((_, queue)) = self.queue.take() {
+            while queue.try_recv().is_ok() {}
+        }
+        for worker in self.workers.drain(..) {
+            // A panic has already been printed by its thread; its chunk is opened on demand.
+            let _ = worker.join();
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! A chunk record: its bytes as they are, or decompressed.
+
+use crate::compression::Compression;
+use crate::error::Fault;
+use crate::record::{Record, op};
+
+/// A chunk as it lies in the file.
+pub(crate) struct Chunk<'a> {
+    pub compression: Compression,
+    /// How many bytes it has decompressed, as its header says.
+    pub size: usize,
+    pub stored: &'a [u8],
+    /// Where the records after it begin.
+    pub end: usize,
+}
+
+impl<'a> Chunk<'a> {
+    pub fn read(bytes: &'a [u8], position: u64) -> Result<Self, Fault> {
+        Self::from_record(&Record::read(bytes, place(position))?)
+    }
+
+    /// Up to a break: `stored` is what there is of it, and all that is left where the recorder wrote its header but
+    /// never came back to fill in the length.
+    pub fn read_to_break(bytes: &'a [u8], position: u64) -> Result<Self, Fault> {
+        let record = Record::read_header(bytes, place(position))?;
+        let mut chunk = Self::from_record(&record)?;
+        if record.data_len == 0 && !another_follows(bytes, record.data_at) {
+            chunk.stored = &bytes[record.data_at..];
+            chunk.end = bytes.len();
+            chunk.size = usize::MAX;
+        }
+        Ok(chunk)
+    }
+
+    fn from_record(record: &Record<'a>) -> Result<Self, Fault> {
+        record.expect_op(op::CHUNK, "a chunk")?;
+        let name = record.fields.get("compression").unwrap_or(b"none");
+        let compression = Compression::from_name(name).ok_or_else(|| {
+            let name = name.escape_ascii();
+            record.fault(format!("compression {name}; none, lz4 and bz2 are read"))
+        })?;
+        Ok(Self {
+            compression,
+            size: record.u32("size")? as usize,
+            stored: record.data,
+            end: record.end(),
+        })
+    }
+
+    /// The bytes of a compressed chunk. Memory grows with what comes out, never beyond `limit` or the size that the
+    /// header promises; what came out before an error is left in `out`.
+    pub fn decompress(&self, limit: usize, out: &mut Vec<u8>) -> Result<(), String> {
+        if self.size != usize::MAX && self.size > limit {
+            return Err(format!(
+                "{} bytes decompressed, the limit is {limit} (max_chunk_bytes)",
+                self.size
+            ));
+        }
+        let most = self.size.min(limit);
+        let done = self.compression.decompress(self.stored, most, out);
+        done.map_err(|error| format!("{}: {error}", self.compression.name()))?;
+        if self.size != usize::MAX && out.len() < self.size {
+            return Err(format!(
+                "{} bytes decompressed, its header says {}",
+                out.len(),
+                self.size
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn place(position: u64) -> usize {
+    usize::try_from(position).unwrap_or(usize::MAX)
+}
+
+/// Whether a record that can stand after a chunk begins at `at`, so that the chunk before it is truly empty.
+fn another_follows(bytes: &[u8], at: usize) -> bool {
+    let next = Record::read_header(bytes, at)
+        .ok()
+        .and_then(|record| record.op());
+    matches!(next, Some(op::CHUNK | op::INDEX_DATA | op::CHUNK_INFO))
+}

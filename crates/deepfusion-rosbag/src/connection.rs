@@ -1,0 +1,49 @@
+use crate::error::Fault;
+use crate::record::{Fields, Record};
+
+/// A topic as one publisher filled it: what the messages of a connection are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Connection {
+    /// The number its messages carry in the file. In a [`BagSet`](crate::BagSet) its place in the set's list.
+    pub id: u32,
+    /// The topic, with its leading slash as recorded.
+    pub topic: String,
+    /// The message type, such as `sensor_msgs/Imu`.
+    pub type_name: String,
+    /// The MD5 of the type's definition, 32 hexadecimal digits.
+    pub md5: String,
+    /// The definition: the type's fields, then those of every type it uses.
+    pub definition: String,
+    /// The node that published, where it was recorded.
+    pub caller_id: Option<String>,
+    /// Whether new subscribers got the last message again.
+    pub latching: bool,
+    /// How many messages the bag holds.
+    pub count: u64,
+}
+
+impl Connection {
+    /// From a connection record: number and topic in its header, all else in its data, which is a header again.
+    pub(crate) fn read(record: &Record<'_>) -> Result<Self, Fault> {
+        let data = Record {
+            fields: Fields(record.data),
+            ..*record
+        };
+        let optional = |name| {
+            data.fields
+                .get(name)
+                .map(|v| String::from_utf8_lossy(v).into_owned())
+        };
+        Ok(Self {
+            id: record.u32("conn")?,
+            topic: record.text("topic")?,
+            type_name: data.text("type")?,
+            md5: data.text("md5sum")?,
+            // Comments in definitions are in whatever encoding their author used.
+            definition: optional("message_definition").unwrap_or_default(),
+            caller_id: optional("callerid"),
+            latching: optional("latching").is_some_and(|v| v == "1"),
+            count: 0,
+        })
+    }
+}

@@ -1,0 +1,86 @@
+//! A chunk made readable: its bytes in the file, or a buffer that lives as long as somebody holds it.
+
+use crate::chunk::Chunk;
+use crate::compression::Compression;
+use crate::error::Fault;
+use crate::index::ChunkInfo;
+use crate::source::Source;
+use std::sync::Arc;
+
+/// A chunk's content.
+#[derive(Clone)]
+pub(crate) enum Content {
+    /// `from..to` of the file.
+    Stored {
+        from: usize,
+        to: usize,
+    },
+    Unpacked(Arc<Vec<u8>>),
+}
+
+impl Content {
+    pub fn bytes<'a>(&'a self, file: &'a [u8]) -> &'a [u8] {
+        match self {
+            Self::Stored { from, to } => &file[*from..*to],
+            Self::Unpacked(buffer) => buffer,
+        }
+    }
+}
+
+/// A chunk made readable, and where its index data begins.
+pub(crate) struct Opened {
+    pub content: Content,
+    pub end: usize,
+    /// What is wrong with a chunk of a scanned bag, whose content goes up to that.
+    pub broken: Option<Fault>,
+}
+
+/// Makes a chunk readable. Chunks of a scanned bag are read as far as they go.
+pub(crate) fn open(source: &Source, info: &ChunkInfo, limit: usize) -> Result<Opened, Fault> {
+    let chunk = if info.scanned {
+        Chunk::read_to_break(source, info.position)?
+    } else {
+        Chunk::read(source, info.position)?
+    };
+    let fault = |problem| Fault {
+        offset: info.position,
+        problem,
+    };
+    let mut broken = None;
+    let content = match chunk.compression {
+        Compression::None => {
+            let from = chunk.end - chunk.stored.len();
+            if chunk.size != chunk.stored.len() && !info.scanned {
+                return Err(fault(format!(
+                    "{} bytes, its header says {}",
+                    chunk.stored.len(),
+                    chunk.size
+                )));
+            }
+            Content::Stored {
+                from,
+                to: chunk.end,
+            }
+        }
+        Compression::Lz4 | Compression::Bz2 => {
+            let mut buffer = Vec::new();
+            match chunk.decompress(limit, &mut buffer) {
+                Ok(()) => {}
+                Err(problem) if info.scanned => broken = Some(fault(problem)),
+                Err(problem) => return Err(fault(problem)),
+            }
+            Content::Unpacked(Arc::new(buffer))
+        }
+    };
+    Ok(Opened {
+        content,
+        end: chunk.end,
+        broken,
+    })
+}
+
+/// Whether opening the chunk is work worth a thread.
+pub(crate) fn is_compressed(source: &Source, info: &ChunkInfo) -> bool {
+    let chunk = Chunk::read_to_break(source, info.position);
+    chunk.is_ok_and(|chunk| chunk.compression != Compression::None)
+}

@@ -1,0 +1,143 @@
+//! Where a chunk's messages are: from the index data behind it, or by walking through its content.
+
+use crate::Time;
+use crate::connection::Connection;
+use crate::error::Fault;
+use crate::index::ChunkInfo;
+use crate::record::{self, Record, op, u32_at};
+use std::collections::HashMap;
+
+/// A message within a chunk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Entry {
+    pub time: Time,
+    /// Place in the list of connections.
+    pub connection: u32,
+    /// Where its record begins in the chunk's content.
+    pub offset: u32,
+}
+
+/// The messages of a chunk by the index data records from `at`, where the chunk ends. `wanted` says by place which
+/// connections; the others' entries are skipped unread.
+pub(crate) fn indexed(
+    bytes: &[u8],
+    mut at: usize,
+    info: &ChunkInfo,
+    places: &HashMap<u32, u32>,
+    wanted: impl Fn(u32) -> bool,
+) -> Result<Vec<Entry>, Fault> {
+    let mut entries = Vec::new();
+    for _ in 0..info.counts.len() {
+        let record = Record::read(bytes, at)?;
+        at = record.end();
+        record.expect_op(op::INDEX_DATA, "index data of the chunk")?;
+        match record.u32("ver")? {
+            1 => {}
+            version => {
+                return Err(record.fault(format!("index data of version {version}, expected 1")));
+            }
+        }
+        let (id, count) = (record.u32("conn")?, record.u32("count")? as usize);
+        let place = places.get(&id).copied();
+        let promised = info.counts.iter().find(|(p, _)| Some(*p) == place);
+        let Some(&(place, promised)) = promised else {
+            return Err(record.fault(format!(
+                "index data of connection {id}, which the chunk should not hold"
+            )));
+        };
+        if record.data.len() as u64 != 12 * count as u64 || promised as usize != count {
+            let problem = format!(
+                "index data of {count} messages in {} bytes, the index says {promised}",
+                record.data.len()
+            );
+            return Err(record.fault(problem));
+        }
+        if wanted(place) {
+            entries.extend(record.data.chunks_exact(12).map(|entry| Entry {
+                time: stamp(entry),
+                connection: place,
+                offset: u32_at(entry, 8).unwrap_or(u32::MAX),
+            }));
+        }
+    }
+    Ok(entries)
+}
+
+fn stamp(entry: &[u8]) -> Time {
+    entry
+        .first_chunk()
+        .map_or(Time::ZERO, |time| record::time(*time))
+}
+
+/// What walking through a chunk's content finds.
+#[derive(Default)]
+pub(crate) struct Walk {
+    /// Connections' records; chunks hold those that were first used in them.
+    pub connections: Vec<Connection>,
+    /// Connection number in the file, time and offset of each message up to the break.
+    pub messages: Vec<(u32, Time, u32)>,
+    /// What ended it before the content's end.
+    pub broken: Option<Fault>,
+}
+
+/// Walks through a chunk's content, record by record, to its end or its break.
+pub(crate) fn walk(content: &[u8]) -> Walk {
+    let mut walk = Walk::default();
+    let mut at = 0;
+    while at < content.len() {
+        match step(content, at, &mut walk) {
+            Ok(end) => at = end,
+            Err(fault) => {
+                walk.broken = Some(fault);
+                break;
+            }
+        }
+    }
+    walk
+}
+
+fn step(content: &[u8], at: usize, walk: &mut Walk) -> Result<usize, Fault> {
+    let record = Record::read(content, at)?;
+    match record.op() {
+        Some(op::CONNECTION) => walk.connections.push(Connection::read(&record)?),
+        _ => {
+            let (connection, time) = record.message()?;
+            let offset = u32::try_from(at).map_err(|_| record.fault("a chunk beyond 4 GiB"))?;
+            walk.messages.push((connection, time, offset));
+        }
+    }
+    Ok(record.end())
+}
+
+impl Walk {
+    /// The messages of known connections.
+    pub fn entries(&self, places: &HashMap<u32, u32>) -> Vec<Entry> {
+        let known = |&(id, time, offset): &(u32, Time, u32)| {
+            let connection = *places.get(&id)?;
+            Some(Entry {
+                time,
+                connection,
+                offset,
+            })
+        };
+        self.messages.iter().filter_map(known).collect()
+    }
+}
+
+/// The bytes of the message at `entry`, checked against it.
+pub(crate) fn message<'a>(content: &'a [u8], entry: &Entry, id: u32) -> Result<&'a [u8], Fault> {
+    let mut record = Record::read(content, entry.offset as usize)?;
+    // Some recorders' offsets point to the connection's record in front of its first message.
+    while record.op() == Some(op::CONNECTION) {
+        record = Record::read(content, record.end())?;
+    }
+    let (connection, time) = record.message()?;
+    if (connection, time) != (id, entry.time) {
+        let problem = format!(
+            "the index has a message of connection {id} at {}, the chunk one of {connection} at {time}",
+            entry.time
+        );
+        return Err(record.fault(problem));
+    }
+    Ok(record.data)
+}

@@ -1,0 +1,201 @@
+use crate::{MessageError, Time};
+use std::path::{Path, PathBuf};
+
+/// What can go wrong with a bag.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// There is nothing at the path.
+    #[error("{}: no such file or folder", path.display())]
+    NoSuchPath {
+        /// The path given.
+        path: PathBuf,
+    },
+    /// A file could not be opened, read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is no bag.
+    #[error("{}: not a ROS bag: expected `#ROSBAG V2.0`, it begins with {found}", path.display())]
+    NotABag {
+        /// The file.
+        path: PathBuf,
+        /// Its first bytes, escaped.
+        found: String,
+    },
+    /// The bag has another format version than 2.0.
+    #[error("{}: a bag of format {version}; format 2.0 is read", path.display())]
+    Version {
+        /// The bag.
+        path: PathBuf,
+        /// Its version, such as `1.2`.
+        version: String,
+    },
+    /// The bag's chunks are encrypted.
+    #[error("{}: encrypted with {encryptor}", path.display())]
+    Encrypted {
+        /// The bag.
+        path: PathBuf,
+        /// The plugin that encrypted it.
+        encryptor: String,
+    },
+    /// A record is not what the format says.
+    #[error("{}: byte {offset}: {problem}", path.display())]
+    Record {
+        /// The bag.
+        path: PathBuf,
+        /// Where in the file.
+        offset: u64,
+        /// What is wrong there.
+        problem: String,
+    },
+    /// A chunk's messages cannot be read; those of other chunks can.
+    #[error("{}: chunk at byte {offset} ({messages} messages): {problem}", path.display())]
+    Chunk {
+        /// The bag.
+        path: PathBuf,
+        /// Where the chunk begins.
+        offset: u64,
+        /// How many messages the index says it holds, of all topics.
+        messages: u64,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// No connection has the topic asked for.
+    #[error("{}: no topic {topic}; there are {}", path.display(), list(topics))]
+    NoSuchTopic {
+        /// The bag, or the first of a set.
+        path: PathBuf,
+        /// The topic asked for.
+        topic: String,
+        /// The topics there are.
+        topics: Vec<String>,
+    },
+    /// A message was decoded as another type than its connection's.
+    #[error("{}: {topic} holds {found}, expected {expected}", path.display())]
+    WrongType {
+        /// The bag.
+        path: PathBuf,
+        /// The message's topic.
+        topic: String,
+        /// The connection's type, with its MD5 where only that differs.
+        found: String,
+        /// The type asked for.
+        expected: String,
+    },
+    /// A message's bytes are not what its type says.
+    #[error("{}: {topic} at {time}: {type_name}: {source}", path.display())]
+    Message {
+        /// The bag.
+        path: PathBuf,
+        /// The message's topic.
+        topic: String,
+        /// When it was recorded.
+        time: Time,
+        /// Its type.
+        type_name: &'static str,
+        /// The field and what is wrong with it.
+        source: Box<MessageError>,
+    },
+    /// A message or a name does not fit into the format's 32-bit lengths.
+    #[error("{}: {what} of {bytes} bytes: the format holds up to {limit}", path.display())]
+    TooLarge {
+        /// The bag being written.
+        path: PathBuf,
+        /// What is too large.
+        what: String,
+        /// Its size.
+        bytes: u64,
+        /// The largest size there is.
+        limit: u64,
+    },
+    /// A connection of another writer was used.
+    #[error("{}: connection {connection} was not added to this bag", path.display())]
+    NoSuchConnection {
+        /// The bag being written.
+        path: PathBuf,
+        /// The connection's number.
+        connection: u32,
+    },
+    /// A set of no bags.
+    #[error("a set of bags needs at least one bag")]
+    EmptySet,
+}
+
+/// A result with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+fn list(names: &[String]) -> String {
+    match names {
+        [] => "none".to_owned(),
+        names => names.join(", "),
+    }
+}
+
+impl Error {
+    /// An error of the system's at `path`; a missing file is [`Error::NoSuchPath`].
+    pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
+        let path = path.to_owned();
+        match source.kind() {
+            std::io::ErrorKind::NotFound => Self::NoSuchPath { path },
+            _ => Self::File { path, source },
+        }
+    }
+
+    /// What to do about it, in one line.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        use std::io::ErrorKind;
+        let text = match self {
+            Self::NoSuchPath { .. } => "check the spelling, and that the disk is mounted",
+            Self::File { source, .. } => match source.kind() {
+                ErrorKind::StorageFull => "the disk is full: free some space and run again",
+                ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
+                ErrorKind::IsADirectory => "give the .bag file itself",
+                _ => return None,
+            },
+            Self::NotABag { .. } => {
+                "ROS 2 recordings (.mcap, .db3) are another format; convert them with rosbags-convert"
+            }
+            Self::Version { .. } => {
+                "bags from before 2010: `rosbag fix` or `rosbag reindex` of ROS 1 writes them as 2.0"
+            }
+            Self::Encrypted { .. } => "decrypt it first: rosbag decrypt",
+            Self::Record { .. } => {
+                "the file is damaged: copy it again, or open it with `ignore_index` to scan it"
+            }
+            Self::Chunk { .. } => {
+                "copy the bag again; the messages of the other chunks can be read"
+            }
+            Self::NoSuchTopic { .. } => "topics are matched whole, with their leading slash",
+            Self::WrongType { .. } => {
+                "choose the topic by its type, or read the message's raw bytes"
+            }
+            Self::Message { source, .. } => return source.hint(),
+            Self::TooLarge { .. } => "split it over several messages",
+            Self::NoSuchConnection { .. } => "use what `add_connection` of this writer returned",
+            Self::EmptySet => return None,
+        };
+        Some(text.to_owned())
+    }
+}
+
+/// Something wrong at an offset, before the file's name is known.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Fault {
+    pub offset: u64,
+    pub problem: String,
+}
+
+impl Fault {
+    pub fn new(offset: usize, problem: impl Into<String>) -> Self {
+        Self {
+            offset: offset as u64,
+            problem: problem.into(),
+        }
+    }
+}

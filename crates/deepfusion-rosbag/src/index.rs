@@ -1,0 +1,148 @@
+//! The index at the end of a finished bag: its connections, and of each chunk the time range and message counts.
+
+use crate::Time;
+use crate::connection::Connection;
+use crate::error::Fault;
+use crate::record::{Record, op, u32_at};
+use std::collections::HashMap;
+
+/// The bag header record, the first of the file.
+pub(crate) struct BagHeader {
+    /// Where the index begins; 0 where the recorder never came to write it.
+    pub index_pos: u64,
+    pub connections: u32,
+    pub chunks: u32,
+    pub encryptor: Option<String>,
+    /// Where the records after it begin.
+    pub end: usize,
+}
+
+impl BagHeader {
+    pub fn read(bytes: &[u8], at: usize) -> Result<Self, Fault> {
+        let record = Record::read(bytes, at)?;
+        record.expect_op(op::BAG_HEADER, "the bag header")?;
+        Ok(Self {
+            index_pos: record.u64("index_pos")?,
+            connections: record.u32("conn_count")?,
+            chunks: record.u32("chunk_count")?,
+            encryptor: record.text("encryptor").ok().filter(|e| !e.is_empty()),
+            end: record.end(),
+        })
+    }
+}
+
+/// What is known of a chunk before it is touched.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct ChunkInfo {
+    /// Where its record begins.
+    pub position: u64,
+    pub first: Time,
+    pub last: Time,
+    /// Place in the list of connections, number of messages.
+    pub counts: Vec<(u32, u32)>,
+    /// Its messages are found by walking through it, up to a break if there is one: the bag has no index.
+    pub scanned: bool,
+}
+
+impl ChunkInfo {
+    pub fn messages(&self) -> u64 {
+        self.counts.iter().map(|&(_, n)| u64::from(n)).sum()
+    }
+}
+
+/// Connections and chunks, in the file's order.
+#[derive(Default)]
+pub(crate) struct Index {
+    pub connections: Vec<Connection>,
+    /// From a connection's number in the file to its place in `connections`.
+    pub places: HashMap<u32, u32>,
+    pub chunks: Vec<ChunkInfo>,
+}
+
+impl Index {
+    /// The index section that `header` points to. The counts are not trusted: memory is taken record by record.
+    pub fn read(bytes: &[u8], header: &BagHeader) -> Result<Self, Fault> {
+        let mut index = Self::default();
+        let mut at = usize::try_from(header.index_pos).unwrap_or(usize::MAX);
+        if at < header.end || at > bytes.len() {
+            let problem = format!(
+                "the index should be at byte {at}, the file has {}",
+                bytes.len()
+            );
+            return Err(Fault::new(bytes.len(), problem));
+        }
+        for _ in 0..header.connections {
+            let record = Record::read(bytes, at)?;
+            record.expect_op(op::CONNECTION, "a connection of the index")?;
+            index.add_connection(Connection::read(&record)?);
+            at = record.end();
+        }
+        for _ in 0..header.chunks {
+            let record = Record::read(bytes, at)?;
+            let chunk = index.chunk_info(&record, header)?;
+            index.add_chunk(chunk);
+            at = record.end();
+        }
+        Ok(index)
+    }
+
+    /// Adds a connection unless its number is known: chunks repeat the connections of the index.
+    pub fn add_connection(&mut self, connection: Connection) {
+        let place = self.connections.len() as u32;
+        if let std::collections::hash_map::Entry::Vacant(entry) = self.places.entry(connection.id) {
+            entry.insert(place);
+            self.connections.push(connection);
+        }
+    }
+
+    /// Adds a chunk and its messages to the connections' counts.
+    pub fn add_chunk(&mut self, chunk: ChunkInfo) {
+        for &(place, count) in &chunk.counts {
+            self.connections[place as usize].count += u64::from(count);
+        }
+        self.chunks.push(chunk);
+    }
+
+    fn chunk_info(&self, record: &Record<'_>, header: &BagHeader) -> Result<ChunkInfo, Fault> {
+        record.expect_op(op::CHUNK_INFO, "a chunk's entry of the index")?;
+        match record.u32("ver")? {
+            1 => {}
+            version => {
+                return Err(record.fault(format!(
+                    "chunk information of version {version}, expected 1"
+                )));
+            }
+        }
+        let position = record.u64("chunk_pos")?;
+        if position < header.end as u64 || position >= header.index_pos {
+            return Err(record.fault(format!(
+                "a chunk at byte {position}, outside of the bag's chunks"
+            )));
+        }
+        let count = record.u32("count")? as usize;
+        if record.data.len() as u64 != 8 * count as u64 {
+            let problem = format!(
+                "{count} connections of 8 bytes, but {} bytes",
+                record.data.len()
+            );
+            return Err(record.fault(problem));
+        }
+        let mut counts = Vec::with_capacity(count);
+        for pair in record.data.chunks_exact(8) {
+            let (id, messages) = (u32_at(pair, 0).unwrap_or(0), u32_at(pair, 4).unwrap_or(0));
+            let place = self.places.get(&id).ok_or_else(|| {
+                record.fault(format!(
+                    "connection {id} is not among the bag's connections"
+                ))
+            })?;
+            counts.push((*place, messages));
+        }
+        Ok(ChunkInfo {
+            position,
+            first: record.time("start_time")?,
+            last: record.time("end_time")?,
+            counts,
+            scanned: false,
+        })
+    }
+}

@@ -1,0 +1,45 @@
+//! ROS 1 bags (format 2.0): reader, writer, and the messages of a vehicle's recording.
+//!
+//! [`Bag::open`] reads a bag's index; [`Bag::messages`] gives the messages that a [`Selection`] asks for, in time order,
+//! raw or decoded as one of [`msg`]'s types. [`BagSet`] reads several bags as one. [`BagWriter`] writes.
+//!
+//! The way of a message: `record` (a file's building block) → `index` (where chunks are; `scan` where there is none) →
+//! `chunk` and `content` (its bytes, decompressed `ahead`) → `entry` (where its messages are) → [`Messages`] (in time
+//! order) → [`Message`] → `msg`. The format: <http://wiki.ros.org/Bags/Format/2.0>.
+
+mod ahead;
+mod bag;
+mod bag_set;
+mod chunk;
+mod compression;
+mod connection;
+mod content;
+mod encode;
+mod entry;
+mod error;
+mod index;
+mod message;
+mod messages;
+pub mod msg;
+mod record;
+mod scan;
+mod selection;
+mod source;
+mod temporary;
+mod time;
+mod topic;
+mod writer;
+
+pub use bag::{Bag, BagOptions};
+pub use bag_set::{BagSet, SetMessages};
+pub use compression::Compression;
+pub use connection::Connection;
+pub use error::{Error, Result};
+pub use message::Message;
+pub use messages::Messages;
+pub use msg::{MessageError, RosMessage};
+pub use scan::Damage;
+pub use selection::Selection;
+pub use time::Time;
+pub use topic::TopicInfo;
+pub use writer::{BagWriter, ConnectionId, WriterOptions};

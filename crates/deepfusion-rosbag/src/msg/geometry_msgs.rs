@@ -1,0 +1,95 @@
+use super::definition::{definition, header, part, twist, vector3};
+use super::std_msgs::Header;
+use super::wire::message;
+
+message! {
+    /// A vector in the message's frame.
+    #[derive(Copy, Default)]
+    Vector3;
+    /// Along x.
+    x: f64,
+    /// Along y.
+    y: f64,
+    /// Along z.
+    z: f64,
+}
+
+message! {
+    /// A point in metres, in the message's frame.
+    #[derive(Copy, Default)]
+    Point;
+    /// Along x.
+    x: f64,
+    /// Along y.
+    y: f64,
+    /// Along z.
+    z: f64,
+}
+
+message! {
+    /// A rotation as a unit quaternion, w last. All zeros where the publisher has none.
+    #[derive(Copy, Default)]
+    Quaternion;
+    /// x sin(θ/2).
+    x: f64,
+    /// y sin(θ/2).
+    y: f64,
+    /// z sin(θ/2).
+    z: f64,
+    /// cos(θ/2).
+    w: f64,
+}
+
+message! {
+    /// Where something is and how it is turned: `frame_from_child`.
+    #[derive(Copy, Default)]
+    Pose;
+    /// The child's origin in the frame, metres.
+    position: Point,
+    /// The child's axes in the frame.
+    orientation: Quaternion,
+}
+
+message! {
+    /// A pose and how far it is trusted.
+    #[derive(Copy)]
+    PoseWithCovariance;
+    /// The pose.
+    pose: Pose,
+    /// 6×6, row-major: x, y, z (m), rotation about x, y, z (rad).
+    covariance: [f64; 36],
+}
+
+message! {
+    /// Velocity.
+    #[derive(Copy, Default)]
+    Twist;
+    /// m/s.
+    linear: Vector3,
+    /// rad/s.
+    angular: Vector3,
+}
+
+message! {
+    /// A velocity and how far it is trusted.
+    #[derive(Copy)]
+    TwistWithCovariance;
+    /// The velocity.
+    twist: Twist,
+    /// 6×6, row-major: x, y, z (m/s), about x, y, z (rad/s).
+    covariance: [f64; 36],
+}
+
+message! {
+    /// A velocity with its time and frame, such as a vehicle's speed from CAN.
+    #[derive(Default)]
+    TwistStamped = "geometry_msgs/TwistStamped" "98d34b0043a2093cf9d9345ab6eef12e" definition!(
+        "std_msgs/Header header"
+        "geometry_msgs/Twist twist";
+        header!(), twist!(), vector3!()
+    );
+    /// When and in which frame.
+    header: Header,
+    /// The velocity.
+    twist: Twist,
+}

@@ -1,0 +1,51 @@
+//! The messages of a vehicle's recording, one file a package.
+//!
+//! Each type is declared once, as the list of its fields: the struct, its decoder and its encoder follow from that list
+//! (`message!` in `wire`). MD5 and definition are those of the ROS packages, which the tests check against another
+//! implementation. Pixels and points are borrowed from the bag; everything else is owned.
+
+mod ackermann_msgs;
+mod can_msgs;
+mod cloud;
+mod definition;
+mod error;
+mod geometry_msgs;
+mod image;
+mod nav_msgs;
+mod sensor_msgs;
+mod std_msgs;
+mod wire;
+
+pub use ackermann_msgs::{AckermannDrive, AckermannDriveStamped};
+pub use can_msgs::Frame;
+pub use cloud::{Column, Datatype};
+pub use error::MessageError;
+pub use geometry_msgs::{
+    Point, Pose, PoseWithCovariance, Quaternion, Twist, TwistStamped, TwistWithCovariance, Vector3,
+};
+pub use image::{BayerPattern, Encoding};
+pub use nav_msgs::Odometry;
+pub use sensor_msgs::{
+    CameraInfo, CompressedImage, Image, Imu, NavSatFix, NavSatStatus, PointCloud2, PointField,
+    RegionOfInterest,
+};
+pub use std_msgs::{Float32, Float64, Header};
+
+/// A type that messages of a topic can have.
+pub trait RosMessage<'a>: Sized {
+    /// Its name, such as `sensor_msgs/Imu`.
+    const TYPE: &'static str;
+    /// The MD5 of its definition, by which ROS tells versions of a type apart.
+    const MD5: &'static str;
+    /// Its fields, then those of every type it uses, as recorders write them.
+    const DEFINITION: &'static str;
+
+    /// From a message's bytes (little-endian, without padding, strings and arrays behind a u32 length).
+    ///
+    /// # Errors
+    /// [`MessageError`] naming the field that does not fit, or telling how many bytes are left over.
+    fn decode(bytes: &'a [u8]) -> Result<Self, MessageError>;
+
+    /// Appends the message's bytes to `out`.
+    fn encode(&self, out: &mut Vec<u8>);
+}

@@ -1,0 +1,230 @@
+//! The bytes of messages: every field's type reads and writes itself, and `message!` makes a type of a list of fields.
+
+use super::MessageError;
+use crate::Time;
+use std::borrow::Cow;
+
+/// A message's bytes that have not been read yet.
+pub(crate) struct Reader<'a>(pub &'a [u8]);
+
+impl<'a> Reader<'a> {
+    #[inline]
+    fn take(&mut self, count: usize) -> Result<&'a [u8], MessageError> {
+        match self.0.split_at_checked(count) {
+            Some((taken, rest)) => {
+                self.0 = rest;
+                Ok(taken)
+            }
+            None => Err(self.short(count as u64)),
+        }
+    }
+
+    #[inline]
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], MessageError> {
+        match self.0.split_first_chunk() {
+            Some((taken, rest)) => {
+                self.0 = rest;
+                Ok(*taken)
+            }
+            None => Err(self.short(N as u64)),
+        }
+    }
+
+    #[cold]
+    fn short(&self, needed: u64) -> MessageError {
+        MessageError::Short {
+            field: String::new(),
+            needed,
+            left: self.0.len(),
+        }
+    }
+
+    /// The length in front of a string or an array whose items take at least `item` bytes each: never more of them
+    /// than there are bytes for.
+    fn length(&mut self, item: usize) -> Result<usize, MessageError> {
+        let length = u32::read(self)? as usize;
+        match length.saturating_mul(item) > self.0.len() {
+            true => Err(self.short(length as u64 * item as u64)),
+            false => Ok(length),
+        }
+    }
+}
+
+/// Decodes a whole message, up to its last byte.
+pub(crate) fn decode<'a, T: Wire<'a>>(bytes: &'a [u8]) -> Result<T, MessageError> {
+    let mut reader = Reader(bytes);
+    let message = T::read(&mut reader)?;
+    match reader.0.len() {
+        0 => Ok(message),
+        left => Err(MessageError::Long { left }),
+    }
+}
+
+/// A field's type.
+pub(crate) trait Wire<'a>: Sized {
+    /// The fewest bytes it takes.
+    const LEAST: usize;
+    fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError>;
+    fn write(&self, out: &mut Vec<u8>);
+}
+
+macro_rules! number {
+    ($($number:ty),*) => {$(
+        impl<'a> Wire<'a> for $number {
+            const LEAST: usize = size_of::<$number>();
+
+            #[inline]
+            fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
+                reader.array().map(<$number>::from_le_bytes)
+            }
+
+            fn write(&self, out: &mut Vec<u8>) {
+                out.extend_from_slice(&self.to_le_bytes());
+            }
+        }
+    )*};
+}
+number!(u8, i8, u16, u32, f32, f64);
+
+impl<'a> Wire<'a> for bool {
+    const LEAST: usize = 1;
+
+    fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
+        Ok(u8::read(reader)? != 0)
+    }
+
+    fn write(&self, out: &mut Vec<u8>) {
+        out.push(u8::from(*self));
+    }
+}
+
+impl<'a> Wire<'a> for Time {
+    const LEAST: usize = 8;
+
+    fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
+        reader.array().map(crate::record::time)
+    }
+
+    fn write(&self, out: &mut Vec<u8>) {
+        self.sec.write(out);
+        self.nsec.write(out);
+    }
+}
+
+impl<'a> Wire<'a> for String {
+    const LEAST: usize = 4;
+
+    fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
+        let length = reader.length(1)?;
+        let text = std::str::from_utf8(reader.take(length)?);
+        text.map(str::to_owned).map_err(|_| MessageError::Text {
+            field: String::new(),
+        })
+    }
+
+    fn write(&self, out: &mut Vec<u8>) {
+        (self.len() as u32).write(out);
+        out.extend_from_slice(self.as_bytes());
+    }
+}
+
+/// Bulk data: borrowed.
+impl<'a> Wire<'a> for Cow<'a, [u8]> {
+    const LEAST: usize = 4;
+
+    fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
+        let length = reader.length(1)?;
+        reader.take(length).map(Cow::Borrowed)
+    }
+
+    fn write(&self, out: &mut Vec<u8>) {
+        (self.len() as u32).write(out);
+        out.extend_from_slice(self);
+    }
+}
+
+impl<'a, T: Wire<'a> + Default + Copy, const N: usize> Wire<'a> for [T; N] {
+    const LEAST: usize = N * T::LEAST;
+
+    #[inline]
+    fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
+        let mut items = [T::default(); N];
+        for item in &mut items {
+            *item = T::read(reader)?;
+        }
+        Ok(items)
+    }
+
+    fn write(&self, out: &mut Vec<u8>) {
+        self.iter().for_each(|item| item.write(out));
+    }
+}
+
+impl<'a, T: Wire<'a>> Wire<'a> for Vec<T> {
+    const LEAST: usize = 4;
+
+    fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
+        let length = reader.length(T::LEAST)?;
+        (0..length).map(|_| T::read(reader)).collect()
+    }
+
+    fn write(&self, out: &mut Vec<u8>) {
+        (self.len() as u32).write(out);
+        self.iter().for_each(|item| item.write(out));
+    }
+}
+
+/// A struct of fields in the order of the wire, and how it is read and written; with `= "type" "md5" definition` after
+/// its name a message that a topic can have.
+macro_rules! message {
+    (
+        $(#[$about:meta])*
+        $name:ident $(<$life:lifetime>)? $(= $type:literal $md5:literal $definition:expr)? ;
+        $($(#[$what:meta])* $field:ident: $kind:ty,)*
+    ) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, PartialEq)]
+        pub struct $name $(<$life>)? {
+            $($(#[$what])* pub $field: $kind,)*
+        }
+
+        impl<'a> $crate::msg::wire::Wire<'a> for message!(@of 'a $name $(<$life>)?) {
+            const LEAST: usize = 0 $(+ <$kind as $crate::msg::wire::Wire<'a>>::LEAST)*;
+
+            #[inline]
+            fn read(reader: &mut $crate::msg::wire::Reader<'a>) -> Result<Self, $crate::msg::MessageError> {
+                Ok(Self {
+                    $($field: match $crate::msg::wire::Wire::read(reader) {
+                        Ok(value) => value,
+                        Err(error) => return Err(error.within(stringify!($field))),
+                    },)*
+                })
+            }
+
+            fn write(&self, out: &mut Vec<u8>) {
+                $($crate::msg::wire::Wire::write(&self.$field, out);)*
+            }
+        }
+
+        message!(@topic [$name $(<$life>)?] $($type, $md5, $definition)?);
+    };
+    (@topic [$($this:tt)*]) => {};
+    (@topic [$($this:tt)*] $type:expr, $md5:expr, $definition:expr) => {
+        impl<'a> $crate::msg::RosMessage<'a> for message!(@of 'a $($this)*) {
+            const TYPE: &'static str = $type;
+            const MD5: &'static str = $md5;
+            const DEFINITION: &'static str = $definition;
+
+            fn decode(bytes: &'a [u8]) -> Result<Self, $crate::msg::MessageError> {
+                $crate::msg::wire::decode(bytes)
+            }
+
+            fn encode(&self, out: &mut Vec<u8>) {
+                $crate::msg::wire::Wire::write(self, out);
+            }
+        }
+    };
+    (@of $given:lifetime $name:ident) => { $name };
+    (@of $given:lifetime $name:ident <$life:lifetime>) => { $name<$given> };
+}
+pub(crate) use message;

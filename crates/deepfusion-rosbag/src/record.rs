@@ -1,0 +1,231 @@
+//! The format's one building block: `<header length><header><data length><data>`, the header being fields
+//! `<length><name>=<value>`; all lengths are little-endian u32. <http://wiki.ros.org/Bags/Format/2.0>
+
+use crate::Time;
+use crate::error::Fault;
+
+/// What a record is, its field `op`.
+pub(crate) mod op {
+    pub const MESSAGE: u8 = 2;
+    pub const BAG_HEADER: u8 = 3;
+    pub const INDEX_DATA: u8 = 4;
+    pub const CHUNK: u8 = 5;
+    pub const CHUNK_INFO: u8 = 6;
+    pub const CONNECTION: u8 = 7;
+}
+
+/// A record as it lies in `bytes`; nothing is copied or allocated, whatever its lengths claim.
+#[derive(Clone, Copy)]
+pub(crate) struct Record<'a> {
+    /// Where it begins.
+    pub at: usize,
+    pub fields: Fields<'a>,
+    /// Where its data begins.
+    pub data_at: usize,
+    /// How long its data claims to be; [`Record::read`] has checked it, [`Record::read_header`] has not.
+    pub data_len: usize,
+    pub data: &'a [u8],
+}
+
+impl<'a> Record<'a> {
+    /// The record at `at`, whole.
+    pub fn read(bytes: &'a [u8], at: usize) -> Result<Self, Fault> {
+        let record = Self::read_header(bytes, at)?;
+        if record.data.len() < record.data_len {
+            let problem = format!(
+                "a record's data should have {} bytes, {} are left",
+                record.data_len,
+                record.data.len()
+            );
+            return Err(Fault::new(at, problem));
+        }
+        Ok(record)
+    }
+
+    /// The record at `at` with what there is of its data.
+    pub fn read_header(bytes: &'a [u8], at: usize) -> Result<Self, Fault> {
+        let cut = |what: &str| {
+            Fault::new(
+                at,
+                format!("{what} goes beyond the end ({} bytes)", bytes.len()),
+            )
+        };
+        let header_len = u32_at(bytes, at).ok_or_else(|| cut("a record's header length"))? as usize;
+        let header_at = at + 4;
+        let header = bytes
+            .get(header_at..)
+            .and_then(|rest| rest.get(..header_len))
+            .ok_or_else(|| cut(&format!("a record's header of {header_len} bytes")))?;
+        let length_at = header_at + header_len;
+        let data_len =
+            u32_at(bytes, length_at).ok_or_else(|| cut("a record's data length"))? as usize;
+        let data_at = length_at + 4;
+        let left = bytes.len() - data_at;
+        Ok(Self {
+            at,
+            fields: Fields(header),
+            data_at,
+            data_len,
+            data: &bytes[data_at..data_at + data_len.min(left)],
+        })
+    }
+
+    /// Where the next record begins.
+    pub fn end(&self) -> usize {
+        self.data_at + self.data.len()
+    }
+
+    /// A fault of this record.
+    pub fn fault(&self, problem: impl Into<String>) -> Fault {
+        Fault::new(self.at, problem)
+    }
+
+    pub fn op(&self) -> Option<u8> {
+        match self.fields.get("op") {
+            Some(&[op]) => Some(op),
+            _ => None,
+        }
+    }
+
+    pub fn expect_op(&self, op: u8, what: &str) -> Result<(), Fault> {
+        match self.op() {
+            Some(found) if found == op => Ok(()),
+            Some(found) => Err(self.fault(format!("expected {what} (op {op}), found op {found}"))),
+            None => Err(self.fault(format!("expected {what} (op {op}), found no field op"))),
+        }
+    }
+
+    pub fn u32(&self, name: &str) -> Result<u32, Fault> {
+        self.fixed(name).map(u32::from_le_bytes)
+    }
+
+    pub fn u64(&self, name: &str) -> Result<u64, Fault> {
+        self.fixed(name).map(u64::from_le_bytes)
+    }
+
+    pub fn time(&self, name: &str) -> Result<Time, Fault> {
+        self.fixed(name).map(time)
+    }
+
+    pub fn text(&self, name: &str) -> Result<String, Fault> {
+        let value = self.fields.get(name).ok_or_else(|| self.missing(name))?;
+        Ok(String::from_utf8_lossy(value).into_owned())
+    }
+
+    fn fixed<const N: usize>(&self, name: &str) -> Result<[u8; N], Fault> {
+        let value = self.fields.get(name).ok_or_else(|| self.missing(name))?;
+        value.try_into().map_err(|_| {
+            self.fault(format!(
+                "field {name} has {} bytes, expected {N}",
+                value.len()
+            ))
+        })
+    }
+
+    fn missing(&self, name: &str) -> Fault {
+        self.fault(format!("field {name} is missing"))
+    }
+
+    /// Connection and time of a message's record, in one pass over its fields: this runs for every message.
+    #[inline]
+    pub fn message(&self) -> Result<(u32, Time), Fault> {
+        let (mut op, mut connection, mut stamp) = (None, None, None);
+        for (name, value) in self.fields {
+            match name {
+                b"op" => op = value.first(),
+                b"conn" => connection = value.try_into().ok().map(u32::from_le_bytes),
+                b"time" => stamp = value.try_into().ok().map(time),
+                _ => {}
+            }
+        }
+        match (op, connection, stamp) {
+            (Some(&op::MESSAGE), Some(connection), Some(stamp)) => Ok((connection, stamp)),
+            _ => Err(self.fault("expected a message (op 2, conn, time)")),
+        }
+    }
+}
+
+/// The fields of a header: an iterator over names and values that ends where the header stops making sense.
+#[derive(Clone, Copy)]
+pub(crate) struct Fields<'a>(pub &'a [u8]);
+
+impl<'a> Fields<'a> {
+    /// The value of the first field called `name`.
+    pub fn get(mut self, name: &str) -> Option<&'a [u8]> {
+        self.find(|(found, _)| *found == name.as_bytes())
+            .map(|(_, value)| value)
+    }
+}
+
+impl<'a> Iterator for Fields<'a> {
+    type Item = (&'a [u8], &'a [u8]);
+
+    #[inline]
+    fn next(&mut self) -> Option<Self::Item> {
+        let (length, rest) = self.0.split_first_chunk()?;
+        let (field, rest) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
+        // A value may hold the separator, a name may not.
+        let equals = field.iter().position(|&byte| byte == b'=')?;
+        self.0 = rest;
+        Some((&field[..equals], &field[equals + 1..]))
+    }
+}
+
+/// The u32 at `at`, where there are four bytes.
+pub(crate) fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
+    let four = bytes.get(at..)?.first_chunk()?;
+    Some(u32::from_le_bytes(*four))
+}
+
+/// Seconds and nanoseconds, as times are written.
+pub(crate) fn time(bytes: [u8; 8]) -> Time {
+    let [a, b, c, d, e, f, g, h] = bytes;
+    Time {
+        sec: u32::from_le_bytes([a, b, c, d]),
+        nsec: u32::from_le_bytes([e, f, g, h]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn field(name: &str, value: &[u8]) -> Vec<u8> {
+        let length = (name.len() + 1 + value.len()) as u32;
+        [&length.to_le_bytes(), name.as_bytes(), b"=", value].concat()
+    }
+
+    fn record(header: &[u8], data: &[u8]) -> Vec<u8> {
+        let lengths = [header.len() as u32, data.len() as u32].map(u32::to_le_bytes);
+        [&lengths[0], header, &lengths[1], data].concat()
+    }
+
+    #[test]
+    fn fields_are_found_by_name_and_values_may_hold_the_separator() {
+        let header = [field("topic", b"/a=b"), field("op", &[7])].concat();
+        let bytes = record(&header, b"xyz");
+        let record = Record::read(&bytes, 0).unwrap();
+        assert_eq!(record.text("topic").unwrap(), "/a=b");
+        assert_eq!(record.op(), Some(7));
+        assert_eq!(record.data, b"xyz");
+        assert_eq!(record.end(), bytes.len());
+        let missing = record.u32("conn").unwrap_err();
+        assert!(missing.problem.contains("conn"), "{missing:?}");
+    }
+
+    #[test]
+    fn lengths_that_lie_are_faults() {
+        let sound = record(&field("op", &[5]), b"data");
+        for (at, what) in [(0, "header"), (4, "op"), (12, "data")] {
+            let mut bytes = sound.clone();
+            bytes[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+            match Record::read(&bytes, 0) {
+                // A field that lies about its length ends the fields; the record's frame is still sound.
+                Ok(record) => assert!(at == 4 && record.op().is_none()),
+                Err(fault) => assert!(fault.problem.contains(what), "{fault:?}"),
+            }
+        }
+        assert!(Record::read(&sound, sound.len()).is_err());
+        assert!(Record::read(&sound, usize::MAX).is_err());
+    }
+}

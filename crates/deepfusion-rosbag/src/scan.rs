@@ -1,0 +1,207 @@
+//! A bag without a usable index: every record from the front to the break.
+
+use crate::Time;
+use crate::chunk::Chunk;
+use crate::connection::Connection;
+use crate::content::{self, Content};
+use crate::entry::{Walk, walk};
+use crate::error::Fault;
+use crate::index::{ChunkInfo, Index};
+use crate::record::{Record, op};
+use crate::source::Source;
+use rayon::prelude::*;
+use std::fmt;
+
+/// What is wrong with a bag that was scanned instead of opened by its index.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Damage {
+    /// The byte of the file where its records end, or the first one that cannot be read.
+    pub offset: u64,
+    /// What is wrong there.
+    pub what: String,
+    /// How many chunks the bag's header counts beyond those found; `None` where the recorder never wrote the count.
+    pub chunks_lost: Option<u64>,
+    /// How many messages were found and cannot be told, because the record of their connection is lost. Messages that
+    /// were never written, or lie behind the break, are in no count.
+    pub messages_without_connection: u64,
+}
+
+impl fmt::Display for Damage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "byte {}: {}", self.offset, self.what)?;
+        match self.chunks_lost {
+            Some(0) | None => {}
+            Some(n) => write!(f, "; {n} chunks are lost")?,
+        }
+        match self.messages_without_connection {
+            0 => Ok(()),
+            n => write!(f, "; {n} messages belong to connections that are lost"),
+        }
+    }
+}
+
+/// What scanning found: an index of its own, and the first break.
+pub(crate) struct Scan {
+    pub index: Index,
+    pub broken: Option<Fault>,
+    pub messages_without_connection: u64,
+}
+
+/// Reads every record from `start`. Chunks are decompressed on all threads, one each at a time; what stays is their
+/// time range and counts.
+pub(crate) fn scan(source: &Source, start: usize, limit: usize) -> Scan {
+    let frames = Frames::find(source, start);
+    let chunks: Vec<_> = frames
+        .chunks
+        .into_par_iter()
+        .map(|position| Found::read(source, position, limit))
+        .collect();
+    let mut index = Index::default();
+    // Definitions in the chunks first: that is the order in which the recorder met the topics.
+    for found in &chunks {
+        found
+            .connections
+            .iter()
+            .for_each(|c| index.add_connection(c.clone()));
+    }
+    frames
+        .connections
+        .into_iter()
+        .for_each(|c| index.add_connection(c));
+    let mut broken = frames.broken;
+    let mut strays = 0;
+    for found in chunks {
+        if let Some(fault) = found.broken
+            && broken
+                .as_ref()
+                .is_none_or(|first| fault.offset < first.offset)
+        {
+            broken = Some(fault);
+        }
+        let mut info = found.info;
+        info.counts
+            .retain_mut(|(connection, count)| match index.places.get(connection) {
+                Some(&place) => {
+                    *connection = place;
+                    true
+                }
+                None => {
+                    strays += u64::from(*count);
+                    false
+                }
+            });
+        if !info.counts.is_empty() {
+            index.add_chunk(info);
+        }
+    }
+    Scan {
+        index,
+        broken,
+        messages_without_connection: strays,
+    }
+}
+
+/// The records of the file itself, without looking into chunks.
+#[derive(Default)]
+struct Frames {
+    chunks: Vec<u64>,
+    connections: Vec<Connection>,
+    broken: Option<Fault>,
+}
+
+impl Frames {
+    fn find(bytes: &[u8], start: usize) -> Self {
+        let mut frames = Self::default();
+        let mut at = start;
+        while at < bytes.len() && frames.broken.is_none() {
+            match frames.step(bytes, at) {
+                Ok(end) => at = end,
+                Err(fault) => frames.broken = Some(fault),
+            }
+        }
+        frames
+    }
+
+    fn step(&mut self, bytes: &[u8], at: usize) -> Result<usize, Fault> {
+        let record = Record::read_header(bytes, at)?;
+        if record.op() == Some(op::CHUNK) {
+            let chunk = Chunk::read_to_break(bytes, at as u64)?;
+            self.chunks.push(at as u64);
+            if record.data.len() < record.data_len {
+                let problem = format!(
+                    "the last chunk should have {} bytes, {} are there",
+                    record.data_len,
+                    record.data.len()
+                );
+                self.broken = Some(Fault::new(bytes.len(), problem));
+            } else if chunk.size == usize::MAX {
+                self.broken = Some(Fault::new(
+                    bytes.len(),
+                    "the recorder did not finish the last chunk",
+                ));
+            }
+            return Ok(chunk.end);
+        }
+        let record = Record::read(bytes, at)?;
+        match record.op() {
+            Some(op::CONNECTION) => self.connections.push(Connection::read(&record)?),
+            Some(op::INDEX_DATA | op::CHUNK_INFO) => {}
+            Some(other) => {
+                return Err(record.fault(format!("op {other} cannot stand between chunks")));
+            }
+            None => return Err(record.fault("no record begins here (no field op)")),
+        }
+        Ok(record.end())
+    }
+}
+
+/// A chunk looked through; its counts are by connection number, as in the file.
+struct Found {
+    info: ChunkInfo,
+    connections: Vec<Connection>,
+    broken: Option<Fault>,
+}
+
+impl Found {
+    fn read(source: &Source, position: u64, limit: usize) -> Self {
+        let mut info = ChunkInfo {
+            position,
+            first: Time::ZERO,
+            last: Time::ZERO,
+            counts: Vec::new(),
+            scanned: true,
+        };
+        let (walk, broken) = match content::open(source, &info, limit) {
+            Ok(opened) => {
+                let walk = walk(opened.content.bytes(source));
+                let inner = walk.broken.clone().map(|fault| match opened.content {
+                    Content::Stored { from, .. } => Fault {
+                        offset: from as u64 + fault.offset,
+                        ..fault
+                    },
+                    // A byte of a compressed chunk's content is nowhere in the file: the chunk's own place stands.
+                    Content::Unpacked(_) => Fault {
+                        offset: position,
+                        problem: format!("in the chunk, byte {}: {}", fault.offset, fault.problem),
+                    },
+                });
+                (walk, opened.broken.or(inner))
+            }
+            Err(fault) => (Walk::default(), Some(fault)),
+        };
+        for &(connection, time, _) in &walk.messages {
+            match info.counts.iter_mut().find(|(c, _)| *c == connection) {
+                Some((_, count)) => *count += 1,
+                None => info.counts.push((connection, 1)),
+            }
+            info.last = info.last.max(time);
+        }
+        let first = walk.messages.iter().map(|&(_, time, _)| time).min();
+        info.first = first.unwrap_or_default();
+        Self {
+            info,
+            connections: walk.connections,
+            broken,
+        }
+    }
+}

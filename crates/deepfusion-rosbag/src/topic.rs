@@ -1,0 +1,133 @@
+use crate::bag::Bag;
+use crate::chunk::Chunk;
+use crate::connection::Connection;
+use crate::entry;
+use crate::error::Fault;
+use crate::index::ChunkInfo;
+use crate::{Error, Result, Time, content};
+
+/// What a bag holds of a topic.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TopicInfo {
+    /// Its name.
+    pub name: String,
+    /// Its message type; of several connections with different types, the first one's.
+    pub type_name: String,
+    /// The MD5 of that type's definition.
+    pub md5: String,
+    /// How many connections, that is publishers, it has.
+    pub connections: usize,
+    /// How many messages.
+    pub count: u64,
+    /// The recording times of its first and last message; `None` without any.
+    pub range: Option<(Time, Time)>,
+}
+
+impl TopicInfo {
+    /// Messages a second: their number less one over the time between the first and the last, in Hz. `None` for fewer
+    /// than two messages, or all at one time.
+    #[must_use]
+    pub fn rate_hz(&self) -> Option<f64> {
+        let (first, last) = self.range?;
+        let seconds = last.seconds_since(first);
+        (self.count > 1 && seconds > 0.0).then(|| (self.count - 1) as f64 / seconds)
+    }
+}
+
+/// The topics of `bag`, by name.
+pub(crate) fn topics(bag: &Bag) -> Result<Vec<TopicInfo>> {
+    let mut topics = group(bag.connections());
+    for topic in &mut topics {
+        topic.range = range(bag, &topic.name)?;
+    }
+    Ok(topics)
+}
+
+/// Connections gathered by topic, without their times.
+pub(crate) fn group(connections: &[Connection]) -> Vec<TopicInfo> {
+    let mut topics: Vec<TopicInfo> = Vec::new();
+    for connection in connections {
+        match topics.iter_mut().find(|t| t.name == connection.topic) {
+            Some(topic) => {
+                topic.connections += 1;
+                topic.count += connection.count;
+            }
+            None => topics.push(TopicInfo {
+                name: connection.topic.clone(),
+                type_name: connection.type_name.clone(),
+                md5: connection.md5.clone(),
+                connections: 1,
+                count: connection.count,
+                range: None,
+            }),
+        }
+    }
+    topics.sort_by(|a, b| a.name.cmp(&b.name));
+    topics
+}
+
+/// The times of a topic's first and last message.
+fn range(bag: &Bag, topic: &str) -> Result<Option<(Time, Time)>> {
+    let of_topic = |place: u32| bag.connections()[place as usize].topic == topic;
+    let mut chunks: Vec<&ChunkInfo> = bag
+        .chunks()
+        .iter()
+        .filter(|info| {
+            info.counts
+                .iter()
+                .any(|&(place, n)| n > 0 && of_topic(place))
+        })
+        .collect();
+    let (mut first, mut last): (Option<Time>, Option<Time>) = (None, None);
+    // By the chunks' own ranges: once a chunk begins after the best first time, none of the others can beat it.
+    chunks.sort_by_key(|info| info.first);
+    for info in &chunks {
+        if first.is_some_and(|first| info.first > first) {
+            break;
+        }
+        first = times(bag, info, of_topic)?
+            .min()
+            .into_iter()
+            .chain(first)
+            .min();
+    }
+    chunks.sort_by_key(|info| std::cmp::Reverse(info.last));
+    for info in &chunks {
+        if last.is_some_and(|last| info.last < last) {
+            break;
+        }
+        last = times(bag, info, of_topic)?
+            .max()
+            .into_iter()
+            .chain(last)
+            .max();
+    }
+    Ok(first.zip(last))
+}
+
+/// The times of a chunk's messages of one topic; of a chunk with index data, by that alone.
+fn times(
+    bag: &Bag,
+    info: &ChunkInfo,
+    of_topic: impl Fn(u32) -> bool,
+) -> Result<impl Iterator<Item = Time>> {
+    let (file, places): (&[u8], _) = (bag.source(), bag.places());
+    let entries = if info.scanned {
+        content::open(bag.source(), info, bag.options().chunk_limit())
+            .map(|opened| entry::walk(opened.content.bytes(file)).entries(places))
+            .map(|mut entries| {
+                entries.retain(|e| of_topic(e.connection));
+                entries
+            })
+    } else {
+        Chunk::read(file, info.position)
+            .and_then(|chunk| entry::indexed(file, chunk.end, info, places, of_topic))
+    };
+    let failed = |Fault { offset, problem }| Error::Chunk {
+        path: bag.path().to_owned(),
+        offset: info.position,
+        messages: info.messages(),
+        problem: format!("byte {offset}: {problem}"),
+    };
+    Ok(entries.map_err(failed)?.into_iter().map(|e| e.time))
+}
