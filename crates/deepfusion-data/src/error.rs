@@ -18,9 +18,12 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
-    /// The path holds something, but no KITTI raw drive.
-    #[error("{}: not a KITTI raw recording: {found}", path.display())]
-    NotKitti {
+    /// The path holds something, but nothing that is known.
+    #[error(
+        "{}: no recording of a known layout: {found}\nlooked for, and not there:\n{LOOKED_FOR}",
+        path.display()
+    )]
+    UnknownLayout {
         /// The path given.
         path: PathBuf,
         /// What is there instead.
@@ -56,12 +59,12 @@ pub enum Error {
     },
     /// An image has another size than its camera's calibration.
     #[error(
-        "{}: frame {frame} of {drive} is {}x{}, its calibration says {}x{} (S_rect in {})",
-        path.display(), found.0, found.1, expected.0, expected.1, calibration.display()
+        "{image}: frame {frame} of {drive} is {}x{}, its calibration says {}x{} ({field} in {})",
+        found.0, found.1, expected.0, expected.1, calibration.display()
     )]
     FrameSize {
         /// The image.
-        path: PathBuf,
+        image: String,
         /// Its drive.
         drive: String,
         /// Its frame number.
@@ -70,8 +73,115 @@ pub enum Error {
         found: (u32, u32),
         /// The calibration's.
         expected: (u32, u32),
-        /// The calibration file.
+        /// The field that says so.
+        field: &'static str,
+        /// The file it stands in.
         calibration: PathBuf,
+    },
+    /// Another camera is asked for than the only one there is.
+    #[error("{}: there is one camera, which counts as camera 2", path.display())]
+    OneCamera {
+        /// The recording.
+        path: PathBuf,
+    },
+    /// A camera's calibration file cannot be used.
+    #[error("{}: {problem}", path.display())]
+    CameraFile {
+        /// The file.
+        path: PathBuf,
+        /// The field and what is wrong with it.
+        problem: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// A `dataset.toml` cannot be used.
+    #[error("{}: {problem}", path.display())]
+    Config {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A value of a table cannot be used.
+    #[error("{}:{line}: column {column}: {problem}", path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1, the header's included.
+        line: u64,
+        /// The column's name, or its number counted from 1.
+        column: String,
+        /// What is wrong with the value.
+        problem: String,
+    },
+    /// A table lacks a column, or nothing says its unit.
+    #[error("{}: {problem}", path.display())]
+    Columns {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// Two clocks have no time in common.
+    #[error(
+        "{}: its times ({} to {} s) have none in common with the frames' ({} to {} s)",
+        path.display(), times_s.0, times_s.1, frames_s.0, frames_s.1
+    )]
+    Clocks {
+        /// The file of speeds.
+        path: PathBuf,
+        /// Its first and last time, in seconds.
+        times_s: (f64, f64),
+        /// The frames' first and last time, in seconds.
+        frames_s: (f64, f64),
+    },
+    /// A layout without speeds cannot give ego-motion.
+    #[error("{drive}: {why}")]
+    NoTrack {
+        /// The drive.
+        drive: String,
+        /// What is missing.
+        why: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// Nobody measured where the camera went.
+    #[error("{drive}: a recording of this layout ({layout}) holds no path of the camera")]
+    NoPath {
+        /// The drive.
+        drive: String,
+        /// The layout.
+        layout: &'static str,
+    },
+    /// A depth image asked to be what only a scan can be.
+    #[error("{drive}: its depth images hold camera z, not the velodyne's forward distance")]
+    DepthKind {
+        /// The drive.
+        drive: String,
+    },
+    /// A recording that has streams, but no images.
+    #[error("{}: {why}", path.display())]
+    NoFrames {
+        /// The recording.
+        path: PathBuf,
+        /// Why it has none.
+        why: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// A program that is run for it failed, or is not there.
+    #[error("{}: {program} {problem}", path.display())]
+    Program {
+        /// The file it should have read.
+        path: PathBuf,
+        /// The program.
+        program: &'static str,
+        /// What happened.
+        problem: String,
+        /// What to do.
+        remedy: &'static str,
     },
     /// A calibration file lacks a field or has a bad one.
     #[error("{}: {field}: {problem}", path.display())]
@@ -183,7 +293,7 @@ pub enum Error {
     /// No pair is left, for the reasons counted.
     #[error(
         "{drive}: no pair of frames can be used: of {targets} frames, {no_neighbour} lack a neighbour \
-         at offsets {offsets:?}, {bad_time} have time stamps that do not increase, {no_motion} are not covered by oxts"
+         at offsets {offsets:?}, {bad_time} have time stamps that do not increase, {no_motion} are not covered by the speeds (oxts, speed.csv)"
     )]
     NoPairs {
         /// The drive.
@@ -233,9 +343,12 @@ pub enum Error {
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// The layout a drive must have, for hints.
-const LAYOUT: &str = "expected <date>/<date>_drive_<n>_sync/image_02/data/0000000000.png … with oxts/ beside image_02 \
-                      and calib_cam_to_cam.txt in <date>; give the drive, the date or the folder above";
+/// The layouts that are told apart, in the order in which they are looked for.
+const LOOKED_FOR: &str = "  KITTI raw          image_02/ or image_03/ with data/0000000000.png, here or up to two folders below
+  comma2k19 segment  processed_log/CAN/speed/t or global_pose/frame_times
+  RGB-D folder       frame-000000.color.png or .jpg with .depth.png, here or in folders seq-01, …
+  video              a file .mp4, .mkv, .mov, .avi or .hevc, given or the only one here
+  image folder       .png or .jpg files here, in images/, or where dataset.toml says";
 
 impl Error {
     /// An error of the system's at `path`; a missing file is [`Error::NoSuchPath`].
@@ -259,7 +372,22 @@ impl Error {
                 ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
                 _ => return None,
             },
-            Self::NotKitti { .. } => LAYOUT,
+            Self::UnknownLayout { .. } => {
+                "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
+            }
+            Self::OneCamera { .. } => "leave --camera out, or give 2",
+            Self::CameraFile { remedy, .. }
+            | Self::Columns { remedy, .. }
+            | Self::NoTrack { remedy, .. }
+            | Self::NoFrames { remedy, .. } => remedy,
+            Self::Config { .. } => "docs/reference/dataset-toml.md lists every key",
+            Self::Table { .. } => "correct the row or delete it",
+            Self::Clocks { .. } => {
+                "both must count from the same moment; start_s in dataset.toml is the first frame's time on the speeds' clock"
+            }
+            Self::NoPath { .. } => "KITTI raw with oxts and RGB-D folders with poses have one",
+            Self::DepthKind { .. } => "leave --gt-depth out, or give z",
+            Self::Program { remedy, .. } => remedy,
             Self::Missing { remedy, .. } => remedy,
             Self::NoImages { .. } => {
                 "fetch the images, or choose the other camera (2 is left, 3 is right)"
@@ -275,7 +403,7 @@ impl Error {
             }
             Self::Calibration { .. } => "take the calibration files of the drive's own date",
             Self::TimeStamp { .. } => {
-                "lines look like 2011-09-26 13:04:32.345808896, one for each frame of the drive"
+                "lines look like 2011-09-26 13:04:32.345808896 (or, outside of KITTI, like 12.345), one for each frame"
             }
             Self::NoTimeStamp { .. } => {
                 "the file lists the whole drive, a frame's number being its line counted from 0: fetch it again"
@@ -296,7 +424,7 @@ impl Error {
                 "a standing camera shows no parallax: leave the drive out, or lower the smallest speed"
             }
             Self::NoPairs { .. } => {
-                "train on a drive with consecutive frames and oxts for their times"
+                "train on a drive with consecutive frames and speeds about their times, at least every 0.5 s"
             }
             Self::Cloud(inner) => return inner.hint(),
             Self::Array { .. } => "check the free space and the permissions of the folder",

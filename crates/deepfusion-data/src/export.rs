@@ -65,7 +65,7 @@ pub fn export_gt(
             return Err(Error::NoScans {
                 path: datasets
                     .first()
-                    .map_or_else(|| out.to_owned(), |d| d.drive().folder.clone()),
+                    .map_or_else(|| out.to_owned(), |d| d.folder().to_owned()),
                 frames: total,
             });
         }

@@ -1,39 +1,65 @@
 //! Recordings of vehicles as frames, snippets and ground-truth depth.
 //!
-//! [`Dataset::open`] takes a KITTI raw drive, a date folder or a whole root; [`Dataset::snippets`] gives
-//! the training samples with the camera's ego-motion, [`Dataset::ground_truth`] the velodyne's depth.
-//! Nothing here knows of tensors.
+//! [`Dataset::open`] takes a recording of any layout: KITTI raw, a folder of images or a video with tables
+//! beside it, a comma2k19 segment, an RGB-D folder. [`Dataset::snippets`] gives the training samples with
+//! the camera's ego-motion, [`Dataset::ground_truth`] the measured depth. Another layout is another
+//! [`Recording`]. Nothing here knows of tensors.
 
+mod calibration;
+mod camera;
+mod clock;
+mod comma;
+mod config;
 mod dataset;
 mod depth_png;
 mod ego_motion;
 mod error;
 mod export;
+mod folder;
+mod frame;
+mod frame_times;
 mod inspect;
+mod inspect_text;
 mod jpeg;
 pub mod kitti;
+mod layout;
+mod lens;
 mod moving;
 mod overlay;
 mod path;
 mod picture;
+mod plain;
+mod recording;
 mod resize;
+mod rgbd;
+mod selection;
 mod snippet;
 mod speed_check;
+mod speed_log;
 mod split;
+mod table;
+mod video;
 mod write;
 
-pub use dataset::{Camera, CameraChoice, Dataset, DatasetKind, Frame, OpenOptions};
+pub use calibration::CameraCalibration;
+pub use camera::{Camera, CameraChoice};
+pub use dataset::{Dataset, DatasetParts, OpenOptions};
 pub use depth_png::{read_depth_png, write_depth_png};
 pub use ego_motion::{VehicleMotion, VehicleTrack};
 pub use error::{Error, Result};
 pub use export::{export_gt, ground_truth_names};
+pub use frame::{Frame, FrameImage};
 pub use image::RgbImage;
-pub use inspect::{DriveInspection, Inspection, IntrinsicsSummary, SpeedRange, Stream, inspect};
+pub use inspect::{
+    DriveInspection, Inspection, IntrinsicsSummary, SpeedRange, Stream, inspect, inspect_with,
+};
 pub use kitti::GtKind;
+pub use lens::Lens;
 pub use moving::{MovingLabels, MovingSource};
 pub use overlay::overlay;
 pub use path::CameraPath;
 pub use picture::{decode_rgb, image_size, load_rgb, save_png};
+pub use recording::{CalibrationPlace, DatasetKind, Recording};
 pub use resize::{resize_rgb, to_chw, to_network_input};
 pub use snippet::{EgoMotion, Snippet, Source, hold_out};
 pub use speed_check::{

@@ -1,6 +1,6 @@
 //! Which pixels of a frame's ground truth belong to what moves over the ground.
 
-use crate::kitti::{GtKind, Tracklet, TrackletPose, velo_point};
+use crate::kitti::{GtKind, KittiRecording, Tracklet, TrackletPose, velo_point};
 use crate::{Dataset, Error, Result};
 use deepfusion_geometry::{DepthMap, Se3};
 use nalgebra::{Matrix3x4, Vector3};
@@ -50,24 +50,15 @@ struct MovingBox {
     size_m: [f64; 3],
 }
 
-impl Dataset {
-    /// What tells this recording's moving pixels from its static ones: the simulator's masks, or KITTI's
-    /// tracklets together with the car's own motion. `None` where neither is there, or nothing says how
-    /// the car itself moves.
-    ///
-    /// A tracklet is moving in a frame where its box's centre, seen from the ground, moves at 0.75 m/s
-    /// or more from five frames before to five frames after (fewer at its ends). Traffic without a
-    /// tracklet counts as static: KITTI labels what its annotators could follow in the scans.
-    ///
-    /// # Errors
-    /// [`Error::Tracklets`] for a tracklet file that cannot be read.
-    pub fn moving_labels(&self) -> Result<Option<MovingLabels>> {
-        let masks = self.drive().folder.join(MASKS);
-        if self.camera().number() == 2 && masks.is_dir() {
-            return Ok(Some(MovingLabels(Kind::Masks(masks))));
+impl MovingLabels {
+    /// Of a KITTI raw drive; see [`Dataset::moving_labels`].
+    pub(crate) fn of_kitti(recording: &KittiRecording, dataset: &Dataset) -> Result<Option<Self>> {
+        let masks = dataset.folder().join(MASKS);
+        if dataset.camera().number() == 2 && masks.is_dir() {
+            return Ok(Some(Self(Kind::Masks(masks))));
         }
-        let file = self.drive().folder.join(Tracklet::FILE);
-        let calibration = self.calibration();
+        let file = dataset.folder().join(Tracklet::FILE);
+        let calibration = &recording.calibration;
         let (Some(pixels_from_velo), Some(cam_from_velo), Some(cam_from_imu)) = (
             calibration.pixels_from_velo,
             calibration.cam_from_velo,
@@ -75,14 +66,14 @@ impl Dataset {
         ) else {
             return Ok(None);
         };
-        if self.track().is_none() || !file.is_file() {
+        if dataset.track().is_none() || !file.is_file() {
             return Ok(None);
         }
         let imu_from_velo = cam_from_imu.inverse() * cam_from_velo;
         let mut boxes: BTreeMap<u64, Vec<MovingBox>> = BTreeMap::new();
         for tracklet in Tracklet::read(&file)? {
             for (frame, pose) in (tracklet.first_frame..).zip(&tracklet.poses) {
-                let speed = self.speed_over_ground(&tracklet, frame, &imu_from_velo);
+                let speed = dataset.speed_over_ground(&tracklet, frame, &imu_from_velo);
                 if speed.is_some_and(|speed| speed >= MOVING_MPS) {
                     boxes.entry(frame).or_default().push(MovingBox {
                         pose: *pose,
@@ -91,12 +82,14 @@ impl Dataset {
                 }
             }
         }
-        Ok(Some(MovingLabels(Kind::Boxes {
+        Ok(Some(Self(Kind::Boxes {
             pixels_from_velo,
             boxes,
         })))
     }
+}
 
+impl Dataset {
     /// How fast a tracklet's box moves over the ground about a frame, in m/s; `None` where it or the
     /// car's own motion is known in that frame alone.
     fn speed_over_ground(

@@ -1,7 +1,8 @@
 //! Images of another size, as pixels and as a network's numbers.
 
-use fast_image_resize::images::{CroppedImage, Image, ImageRef};
-use fast_image_resize::{FilterType, IntoImageView, PixelType, ResizeAlg, ResizeOptions};
+use fast_image_resize::images::{TypedCroppedImage, TypedImage, TypedImageRef};
+use fast_image_resize::pixels::U8x3;
+use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions};
 use image::RgbImage;
 use std::cell::RefCell;
 
@@ -61,41 +62,48 @@ struct Resizer {
 impl Resizer {
     /// The resized part's bytes, H×W×3.
     fn resize(&mut self, image: &RgbImage, part: [u32; 4], width: u32, height: u32) -> &[u8] {
-        let [x, y, w, h] = part;
+        let [_, _, w, h] = part;
         let bytes = 3 * width as usize * height as usize;
         self.resized.resize(bytes, 0);
         if bytes == 0 || w == 0 || h == 0 {
             self.resized.fill(0);
             return &self.resized;
         }
-        let source = ImageRef::new(image.width(), image.height(), image, PixelType::U8x3)
-            .expect("an RgbImage holds width x height x 3 bytes");
-        let source = CroppedImage::new(&source, x, y, w, h).expect("the part lies in the image");
         // Columns first, then rows, as PIL does. Overshoot at edges is cut off after each pass, so that the
         // other order differs by tens of levels beside high contrasts. A pass that changes nothing copies.
         self.narrowed.resize(3 * width as usize * h as usize, 0);
-        pass(&mut self.inner, &source, &mut self.narrowed, width, h);
-        let narrowed = ImageRef::new(width, h, &self.narrowed, PixelType::U8x3)
-            .expect("the buffer was made as large");
-        pass(&mut self.inner, &narrowed, &mut self.resized, width, height);
+        let whole = (image.width(), image.height());
+        let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Lanczos3));
+        let mut pass = |from: &[u8], size, part, to: &mut [u8], height| {
+            let from = view(from, size, part);
+            let mut to = TypedImage::<U8x3>::from_buffer(width, height, to)
+                .expect("the buffer was made as large");
+            // Not `resize`: that one compiles every pixel type there is, for minutes.
+            self.inner
+                .resize_typed(&from, &mut to, &options)
+                .expect("neither image is empty, the only reason to refuse");
+        };
+        pass(image, whole, part, &mut self.narrowed, h);
+        pass(
+            &self.narrowed,
+            (width, h),
+            [0, 0, width, h],
+            &mut self.resized,
+            height,
+        );
         &self.resized
     }
 }
 
-/// Resizes to a size that differs along one axis at most.
-fn pass(
-    resizer: &mut fast_image_resize::Resizer,
-    source: &impl IntoImageView,
-    to: &mut [u8],
-    width: u32,
-    height: u32,
-) {
-    let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Lanczos3));
-    let mut target = Image::from_slice_u8(width, height, to, PixelType::U8x3)
-        .expect("the buffer was made as large");
-    resizer
-        .resize(source, &mut target, &options)
-        .expect("both images are 8-bit RGB and not empty, the only reasons to refuse");
+/// A part (x, y, width, height) of an image's RGB bytes.
+fn view(
+    bytes: &[u8],
+    (width, height): (u32, u32),
+    [x, y, w, h]: [u32; 4],
+) -> TypedCroppedImage<'_, TypedImageRef<'_, U8x3>> {
+    let whole = TypedImageRef::from_buffer(width, height, bytes)
+        .expect("the image holds width x height x 3 bytes");
+    TypedCroppedImage::new(whole, x, y, w, h).expect("the part lies in the image")
 }
 
 /// Interleaved RGB bytes as three planes of floats in [0, 1].

@@ -14,8 +14,9 @@ pub struct EgoMotion {
     /// The car's mean speed over that time, in m/s, positive also when reversing.
     pub speed_mps: f64,
     /// A point of the target's camera frame in the source's. Driving ahead, its z is negative for the
-    /// frame after the target and positive for the one before.
-    pub source_from_target: Se3,
+    /// frame after the target and positive for the one before. `None` where the recording has no yaw
+    /// rate: then nobody knows how the car turned, and only lengths may be used.
+    pub source_from_target: Option<Se3>,
 }
 
 /// A neighbour of a target.
@@ -44,8 +45,8 @@ impl Dataset {
     /// `min_speed_mps` in every pair. `[1]` makes the two-frame sample (t, t + 1).
     ///
     /// # Errors
-    /// [`Error::Offsets`]; [`Error::Missing`] without time stamps, oxts or the IMU's calibration; and
-    /// where none is left [`Error::OneFrame`], [`Error::Standing`] or [`Error::NoPairs`].
+    /// [`Error::Offsets`]; [`Error::Missing`] or [`Error::NoTrack`] without times, speeds or the camera's
+    /// place on the car; and where none is left [`Error::OneFrame`], [`Error::Standing`] or [`Error::NoPairs`].
     pub fn snippets(&self, offsets: &[i32], min_speed_mps: f64) -> Result<Vec<Snippet>> {
         let distinct: HashSet<_> = offsets.iter().collect();
         if offsets.is_empty() || offsets.contains(&0) || distinct.len() != offsets.len() {

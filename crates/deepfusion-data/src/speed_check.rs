@@ -127,17 +127,17 @@ impl fmt::Display for SpeedWarning {
 }
 
 /// Compares the motion of the road in a sample of the drive's images with its speeds. `None` where
-/// they fit, and where the images do not tell (no texture, no road).
+/// they fit, where the images do not tell (no texture, no road), and where no yaw rate was recorded.
 ///
 /// # Errors
 /// As [`Dataset::snippets`] and [`Dataset::load_image`].
 pub fn speed_unit_warning(dataset: &Dataset) -> Result<Option<SpeedWarning>> {
-    let down_in_cam = -dataset
-        .calibration()
-        .require_cam_from_imu()?
-        .rotate(&Vector3::z());
     let snippets = sample(dataset.snippets(&[-1], 0.5)?);
-    let load = |snippet: &Snippet| -> Result<GroundPair> {
+    let Some(cam_from_vehicle) = dataset.cam_from_vehicle() else {
+        return Ok(None);
+    };
+    let down_in_cam = -cam_from_vehicle.rotate(&Vector3::z());
+    let load = |(snippet, earlier_from_later): (&Snippet, Se3)| -> Result<GroundPair> {
         let later = dataset.load_image(snippet.target)?;
         let k = dataset.intrinsics(snippet.target);
         let height = (k.height * WIDTH).div_ceil(k.width).max(1);
@@ -147,11 +147,17 @@ pub fn speed_unit_warning(dataset: &Dataset) -> Result<Option<SpeedWarning>> {
             earlier: GreyImage::from_rgb(&earlier, WIDTH, height),
             later: GreyImage::from_rgb(&later, WIDTH, height),
             intrinsics: k.resized(WIDTH, height),
-            earlier_from_later: source.motion.source_from_target,
+            earlier_from_later,
             down_in_cam,
         })
     };
-    let pairs = snippets.par_iter().map(load).collect::<Result<Vec<_>>>()?;
+    let known = |s: &'_ Snippet| s.sources[0].motion.source_from_target;
+    let turned = snippets.iter().filter_map(|s| Some((s, known(s)?)));
+    let turned: Vec<_> = turned.collect();
+    let pairs = turned
+        .into_par_iter()
+        .map(load)
+        .collect::<Result<Vec<_>>>()?;
     Ok(implied_camera_height(&pairs).and_then(|h| SpeedWarning::of_height(h, pairs.len())))
 }
 

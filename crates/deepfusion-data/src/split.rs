@@ -1,7 +1,6 @@
 //! The field's split files: lists of frames, one a line.
 
-use crate::dataset::Camera;
-use crate::{Dataset, Error, Result};
+use crate::{Camera, Dataset, Error, Result};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 

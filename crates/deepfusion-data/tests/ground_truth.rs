@@ -97,6 +97,7 @@ fn open(path: &Path, camera: CameraChoice) -> Vec<Dataset> {
         &OpenOptions {
             camera,
             split: None,
+            ..OpenOptions::default()
         },
     )
     .unwrap()

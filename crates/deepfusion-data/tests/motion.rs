@@ -42,7 +42,7 @@ fn driving_straight_moves_the_camera_by_speed_times_real_time() {
             );
             assert!((motion.speed_mps - 10.0).abs() < 1e-9);
             // Ahead is +z of the camera: the world comes nearer in the frame after.
-            let z = motion.source_from_target.translation().z;
+            let z = motion.source_from_target.unwrap().translation().z;
             let expected = -1.03 * f64::from(source.offset);
             assert!((z - expected).abs() < 1e-3, "{z}");
         }
@@ -61,8 +61,8 @@ fn in_a_turn_the_lever_arm_shows_and_the_two_directions_are_inverse() {
     let dataset = open(&drive.write(root.path()));
     let forward = dataset.snippets(&[1], 0.5).unwrap();
     let backward = dataset.snippets(&[-1], 0.5).unwrap();
-    let frame1_from_frame0 = forward[0].sources[0].motion.source_from_target;
-    let frame0_from_frame1 = backward[0].sources[0].motion.source_from_target;
+    let frame1_from_frame0 = forward[0].sources[0].motion.source_from_target.unwrap();
+    let frame0_from_frame1 = backward[0].sources[0].motion.source_from_target.unwrap();
     let both = frame1_from_frame0 * frame0_from_frame1;
     assert!(both.translation().norm() < 1e-9 && both.angle() < 1e-9);
     // Turning left: the later camera looks to the left, so the world turns right in it (x grows).
@@ -70,12 +70,7 @@ fn in_a_turn_the_lever_arm_shows_and_the_two_directions_are_inverse() {
     assert!((seen.x - (0.6_f64 * 0.103).sin()).abs() < 1e-3, "{seen}");
     // The arc from the IMU by hand: the camera sits about 1.08 m ahead of it and swings out by θ times that.
     let (d, theta) = (0.206_f64, 0.0618_f64);
-    let place = dataset
-        .calibration()
-        .cam_from_imu
-        .unwrap()
-        .inverse()
-        .translation();
+    let place = dataset.cam_from_vehicle().unwrap().inverse().translation();
     let chord = d * (theta / 2.0).sin() / (theta / 2.0);
     let at = |p: Vector3<f64>| {
         let (c, s) = (theta.cos(), theta.sin());
@@ -240,7 +235,15 @@ fn a_split_selects_targets_but_not_their_neighbours() {
     let split = Split::read(&file).unwrap();
     let open = |camera| {
         let split = Some(split.clone());
-        Dataset::open(root.path(), &OpenOptions { camera, split }).unwrap()
+        Dataset::open(
+            root.path(),
+            &OpenOptions {
+                camera,
+                split,
+                ..OpenOptions::default()
+            },
+        )
+        .unwrap()
     };
     let left = open(CameraChoice::Left);
     assert_eq!(left[0].frames().len(), 8);
@@ -261,7 +264,15 @@ fn a_split_selects_targets_but_not_their_neighbours() {
     fs::write(&file, "2011_09_26/2011_09_26_drive_0001_sync 3 l\n").unwrap();
     let split = Some(Split::read(&file).unwrap());
     let camera = CameraChoice::Left;
-    let error = Dataset::open(&folder, &OpenOptions { camera, split }).unwrap_err();
+    let error = Dataset::open(
+        &folder,
+        &OpenOptions {
+            camera,
+            split,
+            ..OpenOptions::default()
+        },
+    )
+    .unwrap_err();
     assert!(
         matches!(error, Error::SplitSelectsNothing { entries: 1, .. }),
         "{error}"
@@ -308,7 +319,7 @@ fn real_drives_have_their_length() {
         let moved: f64 = motions().map(|m| m.distance_m).sum();
         assert!((moved / driven - 1.0).abs() < 0.03, "{drive}: {moved}");
         for m in motions() {
-            let t = m.source_from_target.translation();
+            let t = m.source_from_target.unwrap().translation();
             assert!(t.z < -0.95 * m.distance_m, "{drive}: ahead is -z, {t}");
         }
     }

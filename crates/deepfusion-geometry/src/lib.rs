@@ -8,12 +8,14 @@
 
 mod depth_map;
 mod depth_range;
+mod distortion;
 mod intrinsics;
 mod se3;
 mod trajectory;
 
 pub use depth_map::DepthMap;
 pub use depth_range::DepthRange;
+pub use distortion::Distortion;
 pub use intrinsics::Intrinsics;
 pub use se3::Se3;
 pub use trajectory::{StampedPose, Trajectory};

@@ -308,7 +308,12 @@ impl Maker {
         let motion = sources
             .iter()
             .map(|source| {
-                let mut motion: Se3 = source.motion.source_from_target;
+                // Where no yaw rate was recorded nothing reads this: `SampleSet` refuses configurations that
+                // would.
+                let mut motion = source
+                    .motion
+                    .source_from_target
+                    .unwrap_or_else(Se3::identity);
                 if flip {
                     motion = motion.mirrored_x();
                 }

@@ -228,6 +228,17 @@ impl TrainConfig {
         Ok(())
     }
 
+    /// Whether anything in training reads how the vehicle turned, not only how far it went.
+    #[must_use]
+    pub fn reads_rotation(&self) -> bool {
+        match self.view_motion {
+            ViewMotion::Vehicle => true,
+            ViewMotion::PoseNet | ViewMotion::Distance => {
+                self.loss.speed > 0.0 && self.loss.rotation > 0.0
+            }
+        }
+    }
+
     /// # Errors
     /// [`Error::Config`] naming the first setting that means nothing.
     pub fn validate(&self) -> Result<(), Error> {

@@ -55,6 +55,12 @@ pub enum Error {
         /// Why nothing is left.
         reason: String,
     },
+    /// A configuration that reads how the car turned, and a drive that does not say.
+    #[error("{drive}: no yaw rate was recorded, and this configuration reads how the car turned")]
+    NoYawRate {
+        /// The drive.
+        drive: String,
+    },
     /// A loss that is not a number.
     #[error("step {step}: the loss term `{term}` is {value}; frames {frames}")]
     NotFinite {
@@ -140,6 +146,11 @@ impl Error {
             Self::NoSamples { .. } => Some(
                 "training needs consecutive frames of a moving camera, with time stamps and speeds; \
                  `deepfusion data inspect` shows what is there"
+                    .into(),
+            ),
+            Self::NoYawRate { .. } => Some(
+                "train with view_motion posenet or distance and loss.rotation = 0, or give a yaw rate: \
+                 yaw_rate_radps in speed.csv, or imu.csv"
                     .into(),
             ),
             Self::NotFinite { .. } | Self::GradientsNotFinite { .. } => Some(

@@ -29,7 +29,8 @@ impl SampleSet {
     /// and reported in the last result, as long as one is left.
     ///
     /// # Errors
-    /// [`Error::NoSamples`] with the reason for the last drive when no drive has a pair.
+    /// [`Error::NoSamples`] with the reason for the last drive when no drive has a pair;
+    /// [`Error::NoYawRate`] where the configuration reads how the car turned and a drive does not say.
     pub fn split(
         config: &TrainConfig,
         train: Vec<Dataset>,
@@ -102,6 +103,11 @@ impl SampleSet {
         let mut last = None;
         for (dataset, recording) in datasets.iter().enumerate() {
             match recording.snippets(&config.frames, config.min_speed_mps) {
+                Ok(_) if config.reads_rotation() && !recording.yaw_known() => {
+                    return Err(Error::NoYawRate {
+                        drive: recording.name().to_owned(),
+                    });
+                }
                 Ok(snippets) => {
                     let (a, b) = hold_out(snippets, share);
                     let sample = |snippet| Sample { dataset, snippet };

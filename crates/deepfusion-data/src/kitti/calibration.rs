@@ -1,7 +1,6 @@
 //! The three calibration files of a date.
 
-use crate::dataset::Camera;
-use crate::{Error, Result};
+use crate::{Camera, Error, Result};
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4, Vector3};
 use std::collections::HashMap;

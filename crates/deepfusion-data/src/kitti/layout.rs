@@ -60,19 +60,15 @@ impl Drive {
 }
 
 /// The drives at `path`: the drive itself, those of a date folder, or those of all dates in a root;
-/// in order of their names.
+/// in order of their names. None where there is no drive.
 ///
 /// # Errors
-/// [`Error::NoSuchPath`], or [`Error::NotKitti`] saying what is there instead.
+/// [`Error::NoSuchPath`], [`Error::File`].
 pub fn find_drives(path: &Path) -> Result<Vec<Drive>> {
     // `.` and links have names too once they are resolved: the drive's and the date's are needed.
     let root = path.canonicalize().map_err(|e| Error::file(path, e))?;
-    let not_kitti = |found: String| Error::NotKitti {
-        path: path.to_owned(),
-        found,
-    };
     if !root.is_dir() {
-        return Err(not_kitti(describe_file(&root)));
+        return Ok(Vec::new());
     }
     if is_drive(&root) {
         return Ok(vec![Drive::at(&root)]);
@@ -88,9 +84,6 @@ pub fn find_drives(path: &Path) -> Result<Vec<Drive>> {
                 drives.push(Drive::at(&inner));
             }
         }
-    }
-    if drives.is_empty() {
-        return Err(not_kitti(describe_folder(&root)?));
     }
     Ok(drives)
 }
@@ -130,7 +123,7 @@ pub(crate) fn numbered_files(folder: &Path, extensions: &[&str]) -> Result<Vec<(
 }
 
 /// The folders in a folder, in order of their names, without hidden ones.
-fn folders(folder: &Path) -> Result<Vec<PathBuf>> {
+pub(crate) fn folders(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
         let entry = entry.map_err(|e| Error::file(folder, e))?;
@@ -143,62 +136,8 @@ fn folders(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-fn describe_file(path: &Path) -> String {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-    match extension.to_ascii_lowercase().as_str() {
-        "bag" | "mcap" | "db3" => "it is a ROS bag".into(),
-        "png" | "jpg" | "jpeg" => "it is a single image".into(),
-        "mp4" | "mkv" | "avi" | "mov" | "hevc" => "it is a video".into(),
-        "zip" | "tar" | "gz" | "tgz" => "it is an archive that is still packed".into(),
-        _ => "it is a file".into(),
-    }
-}
-
-/// What a folder without drives looks like.
-fn describe_folder(folder: &Path) -> Result<String> {
-    let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
-    let (mut files, mut first) = (0_usize, None);
-    let inner = folders(folder)?;
-    for place in std::iter::once(folder.to_owned()).chain(inner.iter().cloned()) {
-        for entry in std::fs::read_dir(&place).map_err(|e| Error::file(&place, e))? {
-            let path = entry.map_err(|e| Error::file(&place, e))?.path();
-            if path.is_dir() {
-                continue;
-            }
-            files += 1;
-            first.get_or_insert(path.clone());
-            let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-            let kind = match extension.to_ascii_lowercase().as_str() {
-                "png" | "jpg" | "jpeg" => "images",
-                "bag" | "mcap" | "db3" => "ROS bags",
-                "mp4" | "mkv" | "avi" | "mov" | "hevc" => "videos",
-                "zip" | "tar" | "gz" | "tgz" => "packed archives",
-                "bin" => ".bin files",
-                _ => continue,
-            };
-            *kinds.entry(kind).or_default() += 1;
-        }
-    }
-    // A folder within a drive is the likeliest slip of all.
-    let within = folder.ancestors().skip(1).take(2).find(|p| is_drive(p));
-    if let Some(drive) = within {
-        return Ok(format!("it lies within the drive {}", drive.display()));
-    }
-    if files == 0 && inner.is_empty() {
-        return Ok("it is empty".into());
-    }
-    if !kinds.is_empty() {
-        let list: Vec<String> = kinds.iter().map(|(k, n)| format!("{n} {k}")).collect();
-        return Ok(format!(
-            "it holds {} but no image_02 folder",
-            list.join(", ")
-        ));
-    }
-    let shown = first.or_else(|| inner.first().cloned()).unwrap_or_default();
-    let shown = shown.strip_prefix(folder).unwrap_or(&shown).to_owned();
-    Ok(format!(
-        "it holds {files} files and {} folders (such as {}) but no image_02 folder",
-        inner.len(),
-        shown.display()
-    ))
+/// The drive that a folder lies in, if it does: giving a folder within a drive is the likeliest slip.
+pub(crate) fn drive_around(folder: &Path) -> Option<PathBuf> {
+    let around = folder.ancestors().skip(1).take(2);
+    around.map(Path::to_owned).find(|p| is_drive(p))
 }

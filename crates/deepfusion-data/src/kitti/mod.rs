@@ -4,6 +4,8 @@
 mod calibration;
 pub(crate) mod layout;
 mod oxts;
+mod oxts_path;
+mod recording;
 mod timestamps;
 mod tracklets;
 mod velodyne;
@@ -12,6 +14,9 @@ pub use calibration::Calibration;
 pub use layout::{Drive, find_drives};
 pub(crate) use oxts::read_packets;
 pub use oxts::{OxtsPacket, read_oxts};
+pub(crate) use oxts_path::oxts_paths;
+pub(crate) use recording::{KittiRecording, open};
 pub use timestamps::TimeStamps;
+pub(crate) use timestamps::parse_date_time;
 pub use tracklets::{Tracklet, TrackletPose};
 pub use velodyne::{GtKind, depth_map, velo_point};

@@ -76,6 +76,11 @@ impl TimeStamps {
     }
 }
 
+/// [`parse`] for other layouts' lists of times.
+pub(crate) fn parse_date_time(line: &str) -> Option<i64> {
+    parse(line).ok()
+}
+
 /// Nanoseconds since 1970 of `2011-09-26 13:04:32.345808896`; the fraction has 0 to 9 digits.
 fn parse(line: &str) -> std::result::Result<i64, String> {
     let shape = || {

@@ -4,6 +4,8 @@ use clap::{Args, Subcommand, ValueEnum};
 use deepfusion_data::{CameraChoice, GtKind};
 use deepfusion_eval::GroundTruth;
 
+use super::CameraIntrinsics;
+
 /// `deepfusion data …`.
 #[derive(Debug, Subcommand)]
 pub enum DataCommand {
@@ -17,12 +19,16 @@ pub enum DataCommand {
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  deepfusion data inspect kitti/2011_09_26/2011_09_26_drive_0005_sync\n  \
-    deepfusion data inspect kitti/2011_09_26 --overlay --out overlays"
+    deepfusion data inspect kitti/2011_09_26 --overlay --out overlays\n  \
+    deepfusion data inspect drive.mp4   # with speed.csv and calibration.yaml beside it"
 )]
 pub struct InspectArgs {
-    /// A drive folder, a date folder or a KITTI root.
+    /// A KITTI drive, date or root, a folder of images, a video, a comma2k19 segment, an RGB-D folder.
     pub path: PathBuf,
-    /// Also draw the LiDAR on the images of all frames that have a scan.
+    /// The camera of a recording without a calibration, in pixels of its images.
+    #[arg(long, value_name = "fx,fy,cx,cy")]
+    pub intrinsics: Option<CameraIntrinsics>,
+    /// Also draw the measured depth on the images of all frames that have some.
     #[arg(long)]
     pub overlay: bool,
     /// Folder for the pictures of --overlay [default: runs/inspect-TIME].
@@ -41,7 +47,7 @@ pub struct InspectArgs {
     Example:\n  deepfusion data export-gt kitti --split eigen/test_files.txt --out gt.npz"
 )]
 pub struct ExportGtArgs {
-    /// Drive folders, date folders or KITTI roots.
+    /// Recordings with scans or depth images.
     #[arg(required = true, value_name = "PATH")]
     pub paths: Vec<PathBuf>,
     /// Only the frames of this split file (lines "folder index side").

@@ -5,7 +5,7 @@ use deepfusion_data::CameraChoice;
 use deepfusion_eval::{Crop, Holes, Protocol, Scaling};
 
 use super::values::{positive, scaling};
-use super::{EngineArgs, GtDepth};
+use super::{CameraIntrinsics, EngineArgs, GtDepth};
 
 /// `deepfusion eval`.
 #[derive(Debug, Args)]
@@ -21,7 +21,7 @@ pub struct EvalArgs {
     /// A run folder or a checkpoint in it.
     #[arg(long, value_name = "RUN", requires = "data")]
     pub model: Option<PathBuf>,
-    /// Recordings to evaluate on: drive folders, date folders or KITTI roots.
+    /// Recordings to evaluate on: KITTI drives, dates or roots, folders of images, videos, RGB-D folders.
     #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pred")]
     pub data: Vec<PathBuf>,
     /// Only the frames of this split file (lines "folder index side").
@@ -35,6 +35,9 @@ pub struct EvalArgs {
         conflicts_with = "pred"
     )]
     pub camera: CameraChoice,
+    /// The camera of recordings without a calibration, in pixels of their images.
+    #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "pred")]
+    pub intrinsics: Option<CameraIntrinsics>,
     /// Predicted arrays.
     #[arg(long, value_name = "FILE", requires = "pred_kind", requires = "gt")]
     pub pred: Option<PathBuf>,

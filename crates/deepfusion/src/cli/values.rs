@@ -40,6 +40,13 @@ pub struct CameraIntrinsics {
     pub cy: f64,
 }
 
+impl CameraIntrinsics {
+    /// fx, fy, cx, cy.
+    pub fn numbers(self) -> [f64; 4] {
+        [self.fx, self.fy, self.cx, self.cy]
+    }
+}
+
 impl FromStr for CameraIntrinsics {
     type Err = String;
 

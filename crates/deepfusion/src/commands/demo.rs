@@ -175,10 +175,7 @@ fn measure(predictor: &Predictor, train: &[Dataset], test: &[Dataset]) -> Result
 /// Where the simulator keeps the exact depth of a frame.
 fn exact_depth(dataset: &Dataset, frame: usize) -> Result<DepthMap> {
     let name = format!("{:010}.png", dataset.frames()[frame].number);
-    let folder = dataset
-        .drive()
-        .folder
-        .join("proj_depth/groundtruth/image_02");
+    let folder = dataset.folder().join("proj_depth/groundtruth/image_02");
     Ok(deepfusion_data::read_depth_png(&folder.join(name))?)
 }
 

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_data::{GtKind, RgbImage};
+use deepfusion_data::{Dataset, DatasetKind, GtKind, RgbImage};
 use deepfusion_eval::{
     ArraySet, Crop, Grid, Prediction, Report, Sample, TrivialBaseline, match_names,
 };
@@ -9,7 +9,8 @@ use deepfusion_geometry::Intrinsics;
 use deepfusion_train::Predictor;
 
 use super::evaluate::{
-    Comparison, Truth, evaluate_datasets, open_datasets, trivial_from_arrays, trivial_from_datasets,
+    Comparison, Truth, evaluate_datasets, open_with_camera, trivial_from_arrays,
+    trivial_from_datasets,
 };
 use crate::cli::{EvalArgs, PredKind};
 use crate::engine;
@@ -36,7 +37,13 @@ pub fn run(args: &EvalArgs) -> Result<()> {
 fn from_model(args: &EvalArgs) -> Result<Report> {
     let model = args.model.as_deref().unwrap_or(Path::new("."));
     let predictor = engine::load(model, &args.engine)?;
-    let datasets = open_datasets(&args.data, args.split.as_deref(), args.camera)?;
+    let split = args.split.as_deref();
+    let datasets = open_with_camera(&args.data, split, args.camera, args.intrinsics)?;
+    let kitti = |d: &Dataset| d.kind() == DatasetKind::KittiRaw;
+    let crop = match datasets.iter().all(kitti) {
+        true => Crop::Garg,
+        false => Crop::None,
+    };
     let kind = args.gt_depth.kind();
     let truth = match &args.gt {
         Some(path) => Truth::Arrays(Box::new(ArraySet::open(path)?)),
@@ -50,7 +57,7 @@ fn from_model(args: &EvalArgs) -> Result<Report> {
     evaluate_datasets(
         &datasets,
         truth,
-        &args.protocol(Crop::Garg),
+        &args.protocol(crop),
         baseline,
         &mut |dataset, frame| {
             let image = dataset.load_image(frame)?;

@@ -2,7 +2,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_data::{Camera, CameraPath, Dataset, Error, write_atomically};
+use deepfusion_data::{Camera, CameraPath, Dataset, DatasetKind, Error, write_atomically};
 use deepfusion_eval::odometry::{
     OdometryReport, PoseFile, TrackError, TrackPair, chain, from_first, kitti_text, tum_text,
 };
@@ -55,7 +55,7 @@ fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
     let predictor = PosePredictor::load(model, args.set.as_deref(), &device::open(args.device)?)?;
     let datasets = open_datasets(&args.data, None, args.camera)?;
     let mut stretches = Vec::new();
-    let (mut exact, mut integrated) = (0, 0);
+    let (mut exact, mut integrated, mut tracked) = (0, 0, 0);
     for dataset in &datasets {
         warn_of_focal_length(&predictor, dataset);
         let paths = match exact_paths(dataset)? {
@@ -64,8 +64,11 @@ fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
                 paths
             }
             None => {
-                integrated += 1;
-                dataset.oxts_paths()?
+                match dataset.kind() {
+                    DatasetKind::KittiRaw => integrated += 1,
+                    _ => tracked += 1,
+                }
+                dataset.camera_paths()?
             }
         };
         let several = paths.len() > 1;
@@ -100,9 +103,11 @@ fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
         }
         .into());
     }
-    let truth = match (exact, integrated) {
-        (_, 0) => "the simulator's exact poses",
-        (0, _) => "OXTS attitude and integrated velocity",
+    let truth = match (exact, integrated, tracked) {
+        (_, 0, 0) => "the simulator's exact poses",
+        (0, _, 0) => "OXTS attitude and integrated velocity",
+        (0, 0, _) => "the recordings' own poses",
+        (_, _, 1..) => "each recording's own: exact poses, OXTS, or a tracker's poses",
         _ => {
             "the simulator's exact poses where there are any, else OXTS attitude and integrated velocity"
         }
@@ -112,8 +117,11 @@ fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
 
 /// The exact path of a simulated drive; `None` for real ones.
 fn exact_paths(dataset: &Dataset) -> Result<Option<Vec<CameraPath>>> {
-    let file = dataset.drive().folder.join(EXACT_POSES);
-    if dataset.camera() != Camera::Left || !file.is_file() {
+    let file = dataset.folder().join(EXACT_POSES);
+    if dataset.kind() != DatasetKind::KittiRaw
+        || dataset.camera() != Camera::Left
+        || !file.is_file()
+    {
         return Ok(None);
     }
     let poses = PoseFile::read(&file)?.poses;

@@ -10,15 +10,28 @@ use deepfusion_eval::{
 };
 use deepfusion_geometry::DepthMap;
 
+use crate::cli::CameraIntrinsics;
+
 /// Opens the recordings at several paths, each drive and camera a data set.
 pub fn open_datasets(
     paths: &[PathBuf],
     split: Option<&Path>,
     camera: CameraChoice,
 ) -> Result<Vec<Dataset>> {
+    open_with_camera(paths, split, camera, None)
+}
+
+/// [`open_datasets`] with a pinhole camera given for recordings that lack one.
+pub fn open_with_camera(
+    paths: &[PathBuf],
+    split: Option<&Path>,
+    camera: CameraChoice,
+    intrinsics: Option<CameraIntrinsics>,
+) -> Result<Vec<Dataset>> {
     let options = OpenOptions {
         camera,
         split: split.map(Split::read).transpose()?,
+        intrinsics: intrinsics.map(CameraIntrinsics::numbers),
     };
     let mut datasets = Vec::new();
     for path in paths {

@@ -2,16 +2,17 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use deepfusion_data::{
-    Dataset, GtKind, OpenOptions, ground_truth_names, inspect, overlay, save_png,
+    Dataset, GtKind, OpenOptions, ground_truth_names, inspect_with, overlay, save_png,
 };
 
-use crate::cli::InspectArgs;
+use crate::cli::{CameraIntrinsics, InspectArgs};
 use crate::output;
 use crate::progress::{Progress, say};
 
 /// `deepfusion data inspect`.
 pub fn run(args: &InspectArgs) -> Result<()> {
-    let inspection = inspect(&args.path)?;
+    let intrinsics = args.intrinsics.map(CameraIntrinsics::numbers);
+    let inspection = inspect_with(&args.path, intrinsics)?;
     if args.json {
         output::print_json(&inspection)?;
     } else {
@@ -19,15 +20,19 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     }
     if args.overlay {
         let folder = output::run_folder(args.out.as_deref(), "inspect")?;
-        let pictures = write_overlays(&args.path, &folder)?;
+        let pictures = write_overlays(&args.path, intrinsics, &folder)?;
         say(&format!("{pictures} pictures in {}", folder.display()));
     }
     Ok(())
 }
 
-/// A picture for every frame with a scan; how many.
-fn write_overlays(path: &Path, folder: &Path) -> Result<usize> {
-    let datasets = Dataset::open(path, &OpenOptions::default())?;
+/// A picture for every frame with ground truth; how many.
+fn write_overlays(path: &Path, intrinsics: Option<[f64; 4]>, folder: &Path) -> Result<usize> {
+    let options = OpenOptions {
+        intrinsics,
+        ..OpenOptions::default()
+    };
+    let datasets = Dataset::open(path, &options)?;
     let names = ground_truth_names(&datasets);
     let total = names.iter().map(Vec::len).sum();
     let (mut done, mut written) = (0, 0);

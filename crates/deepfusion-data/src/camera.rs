@@ -1,0 +1,64 @@
+//! Which of a car's cameras.
+
+use serde::{Deserialize, Serialize};
+
+/// One of the car's two colour cameras. The only camera of a recording counts as the left one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Camera {
+    /// KITTI's camera 2.
+    Left,
+    /// KITTI's camera 3.
+    Right,
+}
+
+impl Camera {
+    /// KITTI's number: 2 or 3.
+    #[must_use]
+    pub fn number(self) -> u8 {
+        match self {
+            Self::Left => 2,
+            Self::Right => 3,
+        }
+    }
+}
+
+/// Which cameras to open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum CameraChoice {
+    /// Camera 2, the left one.
+    #[default]
+    #[serde(rename = "2")]
+    Left,
+    /// Camera 3, the right one.
+    #[serde(rename = "3")]
+    Right,
+    /// Both, a data set each.
+    #[serde(rename = "both")]
+    Both,
+}
+
+impl CameraChoice {
+    /// The cameras chosen.
+    #[must_use]
+    pub fn cameras(self) -> &'static [Camera] {
+        match self {
+            Self::Left => &[Camera::Left],
+            Self::Right => &[Camera::Right],
+            Self::Both => &[Camera::Left, Camera::Right],
+        }
+    }
+}
+
+impl std::str::FromStr for CameraChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "2" => Ok(Self::Left),
+            "3" => Ok(Self::Right),
+            "both" => Ok(Self::Both),
+            _ => Err(format!("'{text}' is no camera: 2, 3 or both")),
+        }
+    }
+}

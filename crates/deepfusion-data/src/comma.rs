@@ -1,0 +1,238 @@
+//! A comma2k19 segment: `processed_log` and `global_pose` as NumPy arrays without an ending, `video.hevc`.
+
+use crate::clock::seconds;
+use crate::config::FolderConfig;
+use crate::folder::{NO_MOUNT, name_of};
+use crate::frame_times::{TimedImage, numbers_by_time};
+use crate::inspect::{DriveInspection, Inspection, SpeedRange, Stream};
+use crate::plain::{PlainParts, find_camera};
+use crate::speed_log::{Samples, SpeedLog};
+use crate::video::VideoFrames;
+use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
+use ndarray::{ArrayViewD, IxDyn};
+use ndarray_npy::ViewNpyExt;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+const VIDEO: &str = "video.hevc";
+const SPEED: &str = "processed_log/CAN/speed";
+const FRAME_TIMES: &str = "global_pose/frame_times";
+const CAMERA_REMEDY: &str = "comma2k19's own code gives 910, 910, 582, 437 for its 1164x874 videos: set \
+     intrinsics = [910, 910, 582, 437] in dataset.toml";
+
+/// Streams beside the images: folder with `t`, kind.
+const STREAMS: [(&str, &str); 5] = [
+    (SPEED, "speed"),
+    ("processed_log/CAN/wheel_speed", "speed"),
+    ("processed_log/CAN/steering_angle", "steering"),
+    ("processed_log/IMU/accelerometer", "imu"),
+    ("processed_log/IMU/gyro", "imu"),
+];
+
+/// Whether a folder is a segment.
+pub(crate) fn is_segment(folder: &Path) -> bool {
+    folder.join(SPEED).join("t").is_file() || folder.join(FRAME_TIMES).is_file()
+}
+
+/// Whether its images are there.
+pub(crate) fn has_video(folder: &Path) -> bool {
+    folder.join(VIDEO).is_file()
+}
+
+/// Opens a segment.
+pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
+    if !has_video(folder) {
+        return Err(Error::NoFrames {
+            path: folder.join(VIDEO),
+            why: "the segment's images are absent".into(),
+            remedy: "fetch video.hevc of the segment; `deepfusion data inspect` tells of its other streams".into(),
+        });
+    }
+    let config = FolderConfig::read(folder)?;
+    let video = VideoFrames::probe(&folder.join(VIDEO), &config)?;
+    let calibration = find_camera(folder, &config, options, video.size(), CAMERA_REMEDY)?;
+    let times = frame_times(folder)?;
+    let mut remarks = Vec::new();
+    if times.len() != video.len() {
+        remarks.push(format!(
+            "{FRAME_TIMES} has {} times, {VIDEO} {} frames: the first {} are taken",
+            times.len(),
+            video.len(),
+            times.len().min(video.len())
+        ));
+    }
+    let numbers = numbers_by_time(&times);
+    let images = numbers.into_iter().zip(&times).take(video.len());
+    let image = |(number, ns): (u64, &i64)| TimedImage {
+        number,
+        path: video.file().to_owned(),
+        ns: Some(*ns),
+    };
+    if config.mount.is_none() {
+        remarks.push(NO_MOUNT.into());
+    }
+    let mut streams = streams(folder)?;
+    // That of the speeds comes with the speeds.
+    streams.retain(|s| s.name != SPEED);
+    PlainParts {
+        kind: DatasetKind::Comma2k19,
+        folder: folder.to_owned(),
+        name: name_of(folder),
+        images: images.map(image).collect(),
+        video: Some(video),
+        calibration,
+        speeds: speeds(folder)?,
+        cam_from_vehicle: config.cam_from_vehicle(),
+        depth: None,
+        world_from_cam: BTreeMap::new(),
+        streams,
+        remarks,
+        speed_remedy: "fetch processed_log/CAN/speed of the segment",
+    }
+    .into_dataset()
+}
+
+/// A segment without its video.
+pub(crate) fn inspect(folder: &Path) -> Result<Inspection> {
+    let times = frame_times(folder)?;
+    let speeds = speeds(folder)?;
+    let origin = times.first().copied().unwrap_or_default();
+    let track = speeds.as_ref().map(|log| log.track(origin));
+    let at: Vec<f64> = times.iter().map(|t| seconds(*t, origin)).collect();
+    let at_frames = at.iter().filter_map(|t| track.as_ref()?.speed_at(*t));
+    let speed_mps = SpeedRange::of(at_frames);
+    let ends = at.first().zip(at.last());
+    let mut distance_m = None;
+    for pair in at.windows(2) {
+        if let Some(motion) = track.as_ref().and_then(|t| t.motion(pair[0], pair[1])) {
+            *distance_m.get_or_insert(0.0) += motion.distance_m.abs();
+        }
+    }
+    let duration_s = ends.map(|(first, last)| last - first);
+    let mut streams = streams(folder)?;
+    streams.push(Stream::new(FRAME_TIMES, "pose", at.len(), &at));
+    Ok(Inspection {
+        kind: DatasetKind::Comma2k19,
+        frames: 0,
+        size: None,
+        intrinsics: None,
+        streams,
+        speed_mps,
+        distance_m,
+        duration_s,
+        drives: vec![DriveInspection {
+            name: name_of(folder),
+            camera: crate::Camera::Left.number(),
+            frames: 0,
+            missing_frames: Vec::new(),
+            usable_pairs: 0,
+            why_no_pairs: Some(format!(
+                "{VIDEO} is absent: the segment's images are not here"
+            )),
+            scans: 0,
+            speed_mps,
+            distance_m,
+            turn_rad: None,
+            duration_s,
+            remarks: Vec::new(),
+        }],
+    })
+}
+
+/// When the frames were taken, on the clock of the logs.
+fn frame_times(folder: &Path) -> Result<Vec<i64>> {
+    match folder.join(FRAME_TIMES) {
+        path if path.is_file() => nanoseconds(&path),
+        path => Err(Error::Missing {
+            path,
+            what: "the times of the frames",
+            remedy: "fetch global_pose of the segment",
+        }),
+    }
+}
+
+fn speeds(folder: &Path) -> Result<Option<SpeedLog>> {
+    let place = folder.join(SPEED);
+    if !place.join("t").is_file() {
+        return Ok(None);
+    }
+    let ns = nanoseconds(&place.join("t"))?;
+    let path = place.join("value");
+    let values = column(&path)?;
+    if values.len() != ns.len() {
+        return Err(array_error(
+            &path,
+            format!("{} values, but t has {}", values.len(), ns.len()),
+        ));
+    }
+    if let Some(row) = values.iter().position(|v| !v.is_finite()) {
+        return Err(array_error(
+            &path,
+            format!("row {row}: {} is no speed", values[row]),
+        ));
+    }
+    let origin = ns.first().copied().unwrap_or_default();
+    let at: Vec<f64> = ns.iter().map(|t| seconds(*t, origin)).collect();
+    Ok(Some(SpeedLog {
+        path,
+        streams: vec![Stream::new(SPEED, "speed", at.len(), &at)],
+        speeds_mps: Samples { ns, values },
+        yaw_rates_radps: None,
+        remarks: vec!["the yaw rate is not read from the segment's gyroscope yet".into()],
+    }))
+}
+
+fn streams(folder: &Path) -> Result<Vec<Stream>> {
+    let mut streams = Vec::new();
+    for (name, kind) in STREAMS {
+        let path = folder.join(name).join("t");
+        if path.is_file() {
+            let times = column(&path)?;
+            streams.push(Stream::new(name, kind, times.len(), &times));
+        }
+    }
+    Ok(streams)
+}
+
+/// Times of an array of seconds, which must not go back.
+fn nanoseconds(path: &Path) -> Result<Vec<i64>> {
+    let times = column(path)?;
+    let mut last = f64::NEG_INFINITY;
+    for (row, time) in times.iter().enumerate() {
+        if !time.is_finite() || time.abs() > 9e9 || *time < last {
+            let problem = format!("row {row}: {time} s after {last} s is no time");
+            return Err(array_error(path, problem));
+        }
+        last = *time;
+    }
+    Ok(times.iter().map(|t| (t * 1e9).round() as i64).collect())
+}
+
+/// An array of N or N×1 numbers.
+fn column(path: &Path) -> Result<Vec<f64>> {
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+    // A view's size is checked against the file's; nothing is made as large as a header says.
+    let array =
+        ArrayViewD::<f64>::view_npy(&bytes).map_err(|e| array_error(path, e.to_string()))?;
+    let shape: Vec<usize> = array.shape().to_vec();
+    let len = match shape.as_slice() {
+        [n] | [n, 1] => *n,
+        _ => {
+            return Err(array_error(
+                path,
+                format!("shape {shape:?}, expected N or N x 1"),
+            ));
+        }
+    };
+    let array = array.into_shape_with_order(IxDyn(&[len]));
+    let array = array.map_err(|e| array_error(path, e.to_string()))?;
+    Ok(array.iter().copied().collect())
+}
+
+fn array_error(path: &Path, problem: String) -> Error {
+    Error::Columns {
+        path: PathBuf::from(path),
+        problem,
+        remedy: "fetch the segment again: it should be a NumPy array of f64".into(),
+    }
+}

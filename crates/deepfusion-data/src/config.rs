@@ -1,0 +1,220 @@
+//! `dataset.toml`: what a recording's own files do not say.
+
+use crate::{Error, Result};
+use deepfusion_geometry::Se3;
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// A recording's `dataset.toml`. Every key is optional; docs/reference/dataset-toml.md lists them.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct FolderConfig {
+    /// Folder of the images.
+    pub(crate) images: Option<PathBuf>,
+    /// The video file.
+    pub(crate) video: Option<PathBuf>,
+    /// Where a video's frames are kept once decoded.
+    pub(crate) cache: Option<PathBuf>,
+    /// The table of speeds.
+    pub(crate) speed: Option<PathBuf>,
+    /// The table of the IMU.
+    pub(crate) imu: Option<PathBuf>,
+    /// The calibration file.
+    pub(crate) calibration: Option<PathBuf>,
+    /// fx, fy, cx, cy of a camera without distortion.
+    pub(crate) intrinsics: Option<[f64; 4]>,
+    /// Frames a second, where nothing says the frames' times.
+    pub(crate) fps: Option<f64>,
+    /// The first frame's time on the speeds' clock, in seconds, for frames whose times count from 0.
+    pub(crate) start_s: Option<f64>,
+    /// Unit of columns of time without one.
+    pub(crate) time_unit: Option<String>,
+    /// Unit of a column `speed` without one.
+    pub(crate) speed_unit: Option<String>,
+    /// Unit of a yaw rate's column without one.
+    pub(crate) yaw_rate_unit: Option<String>,
+    /// Folder of the depth images.
+    pub(crate) depth: Option<PathBuf>,
+    /// Metres of one step of a depth image.
+    pub(crate) depth_unit_m: Option<f64>,
+    /// A value of the depth images, besides 0, that means none.
+    pub(crate) depth_invalid: Option<u16>,
+    /// Where the camera is on the vehicle.
+    pub(crate) mount: Option<Mount>,
+    /// Where the file is.
+    #[serde(skip)]
+    pub(crate) path: PathBuf,
+}
+
+/// The camera's place on the vehicle: x forward, y left, z up from where the speed is measured (the rear
+/// axle for wheel speeds), in metres; its turns in degrees.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Mount {
+    forward_m: f64,
+    left_m: f64,
+    up_m: f64,
+    /// To the left.
+    yaw_deg: f64,
+    /// Down.
+    pitch_deg: f64,
+    /// To the right: clockwise as the camera looks.
+    roll_deg: f64,
+}
+
+impl FolderConfig {
+    pub(crate) const NAME: &str = "dataset.toml";
+
+    /// Reads `dataset.toml` in a folder; without one, nothing is said.
+    ///
+    /// # Errors
+    /// [`Error::Config`], [`Error::File`].
+    pub(crate) fn read(folder: &Path) -> Result<Self> {
+        let path = folder.join(Self::NAME);
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(e) => return Err(Error::file(&path, e)),
+        };
+        let mut config: Self = toml::from_str(&text).map_err(|e| Error::Config {
+            path: path.clone(),
+            problem: e.to_string().trim_end().to_owned(),
+        })?;
+        config.path = path;
+        let numbers = [("fps", config.fps), ("depth_unit_m", config.depth_unit_m)];
+        for (key, value) in numbers {
+            if let Some(bad) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
+                return Err(config.error(format!("{key} is {bad}, it must be above 0")));
+            }
+        }
+        if let Some(bad) = config.start_s.filter(|v| v.is_nan() || v.abs() > 9e9) {
+            return Err(config.error(format!("start_s is {bad}, it is a time in seconds")));
+        }
+        Ok(config)
+    }
+
+    /// An error about this file.
+    pub(crate) fn error(&self, problem: String) -> Error {
+        Error::Config {
+            path: self.path.clone(),
+            problem,
+        }
+    }
+
+    /// A file that is named here, or is there under a usual name. A named one must be there.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where a named one is not.
+    pub(crate) fn find(
+        &self,
+        folder: &Path,
+        key: &str,
+        named: Option<&PathBuf>,
+        usual: &[&str],
+    ) -> Result<Option<PathBuf>> {
+        if let Some(name) = named {
+            let path = folder.join(name);
+            return match path.exists() {
+                true => Ok(Some(path)),
+                false => Err(self.error(format!("{key}: there is no {}", path.display()))),
+            };
+        }
+        let mut paths = usual.iter().map(|name| folder.join(name));
+        Ok(paths.find(|path| path.exists()))
+    }
+
+    /// A point of the vehicle in the camera; looking straight ahead at the vehicle's origin where nothing
+    /// is said (SPEC 3.4: the camera then moves as the vehicle does).
+    pub(crate) fn cam_from_vehicle(&self) -> Se3 {
+        self.mount.unwrap_or_default().cam_from_vehicle()
+    }
+}
+
+impl Mount {
+    fn cam_from_vehicle(&self) -> Se3 {
+        // The camera's axes in the vehicle's: x is right (-y), y is down (-z), z is ahead (x).
+        let ahead = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+        // About x, y, z of the vehicle, roll first: nose down is positive about y (left).
+        let turn = Rotation3::from_euler_angles(
+            self.roll_deg.to_radians(),
+            self.pitch_deg.to_radians(),
+            self.yaw_deg.to_radians(),
+        );
+        let place = Vector3::new(self.forward_m, self.left_m, self.up_m);
+        Se3::from_parts(&(turn.matrix() * ahead), place).inverse()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<FolderConfig> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(FolderConfig::NAME), text).unwrap();
+        FolderConfig::read(folder.path())
+    }
+
+    #[test]
+    fn a_mounted_camera_sees_ahead() {
+        let config = read("[mount]\nforward_m = 1.5\nup_m = 1.2\n").unwrap();
+        // A stone 10 m before the axle and 1 m to its left lies 8.5 m ahead, to the left, 1.2 m below.
+        let seen = config
+            .cam_from_vehicle()
+            .transform(&Vector3::new(10.0, 1.0, 0.0));
+        assert!(
+            (seen - Vector3::new(-1.0, 1.2, 8.5)).norm() < 1e-12,
+            "{seen}"
+        );
+    }
+
+    #[test]
+    fn angles_turn_the_way_they_say() {
+        let ahead = |text: &str| {
+            let config = read(&format!("[mount]\n{text} = 10\n")).unwrap();
+            config
+                .cam_from_vehicle()
+                .transform(&Vector3::new(10.0, 0.0, 0.0))
+        };
+        // What is ahead of the car appears to the right of a camera that looks left, above one that looks
+        // down, and stays put under roll.
+        assert!(ahead("yaw_deg").x > 1.0);
+        assert!(ahead("pitch_deg").y < -1.0);
+        assert!((ahead("roll_deg") - Vector3::new(0.0, 0.0, 10.0)).norm() < 1e-12);
+        // Rolled to the right, what is to the right moves up in the image.
+        let config = read("[mount]\nroll_deg = 10\n").unwrap();
+        assert!(
+            config
+                .cam_from_vehicle()
+                .transform(&Vector3::new(10.0, -5.0, 0.0))
+                .y
+                < 0.0
+        );
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        for (text, problem) in [
+            ("fsp = 10", "unknown field `fsp`"),
+            ("fps = 0", "fps is 0, it must be above 0"),
+            ("fps = 'fast'", "fps"),
+            ("intrinsics = [1, 2, 3]", "intrinsics"),
+            ("start_s = nan", "start_s is NaN"),
+        ] {
+            let error = read(text).unwrap_err().to_string();
+            assert!(
+                error.contains("dataset.toml") && error.contains(problem),
+                "{error}"
+            );
+        }
+        let config = read("speed = 'gone.csv'").unwrap();
+        let error = config.find(Path::new("."), "speed", config.speed.as_ref(), &[]);
+        assert!(
+            error
+                .unwrap_err()
+                .to_string()
+                .contains("speed: there is no")
+        );
+    }
+}

@@ -1,0 +1,213 @@
+//! KITTI raw as a [`Recording`].
+
+use crate::kitti::layout::numbered_files;
+use crate::kitti::{self, Calibration, Drive, GtKind, TimeStamps, read_oxts};
+use crate::recording::{CalibrationPlace, Recording};
+use crate::selection::Selection;
+use crate::{
+    Camera, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame, FrameImage, MovingLabels,
+    OpenOptions, Result, Stream, load_rgb,
+};
+use deepfusion_cloud::PointCloud;
+use deepfusion_geometry::DepthMap;
+use image::RgbImage;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// One camera of one drive.
+#[derive(Debug)]
+pub(crate) struct KittiRecording {
+    pub(crate) drive: Drive,
+    pub(crate) calibration: Calibration,
+    camera: Camera,
+    /// Seconds by frame number, also of frames without an image.
+    times_s: Vec<Option<f64>>,
+}
+
+/// Opens the cameras of the drives found at `path`.
+pub(crate) fn open(path: &Path, drives: &[Drive], options: &OpenOptions) -> Result<Vec<Dataset>> {
+    let selection = Selection::new(options);
+    let (mut datasets, mut images) = (Vec::new(), 0);
+    for drive in drives {
+        for &camera in options.camera.cameras() {
+            let files = drive.images(camera.number())?;
+            images += files.len();
+            let numbers = files.iter().map(|f| f.0);
+            let selected = selection.of(&drive.split_name(), camera, numbers);
+            if !selected.is_empty() {
+                datasets.push(open_drive(drive, camera, &files)?.with_selected(selected));
+            }
+        }
+    }
+    if !datasets.is_empty() {
+        return Ok(datasets);
+    }
+    Err(match selection.nothing(path) {
+        Some(error) if images > 0 => error,
+        _ => {
+            let camera = options.camera.cameras()[0].number();
+            let folder = drives.first().map_or(path, |d| d.folder.as_path());
+            Error::NoImages {
+                path: folder.join(format!("image_0{camera}/data")),
+                camera,
+            }
+        }
+    })
+}
+
+fn open_drive(drive: &Drive, camera: Camera, files: &[(u64, PathBuf)]) -> Result<Dataset> {
+    let calibration = Calibration::read(&drive.date_folder, camera)?;
+    let folder = drive.folder.join(format!("image_0{}", camera.number()));
+    let times = optional(TimeStamps::read(&folder.join("timestamps.txt")))?;
+    // Both clocks count from the camera's first line, so that seconds keep their nanoseconds.
+    let origin_ns = times.as_ref().and_then(TimeStamps::origin_ns);
+    let track = match origin_ns {
+        Some(origin) => optional(read_oxts(&drive.folder.join("oxts"), origin))?,
+        None => None,
+    };
+    let mut frames = Vec::with_capacity(files.len());
+    for (number, image) in files {
+        let time_s = match (&times, origin_ns) {
+            (Some(times), Some(origin)) => times.seconds(*number, origin)?,
+            _ => None,
+        };
+        frames.push(Frame {
+            drive: drive.name.clone(),
+            number: *number,
+            time_s,
+            image: FrameImage::File(image.clone()),
+            speed_mps: time_s.and_then(|t| track.as_ref()?.speed_at(t)),
+        });
+    }
+    let times_s = match (&times, origin_ns) {
+        (Some(times), Some(origin)) => times.all_seconds(origin),
+        _ => Vec::new(),
+    };
+    let parts = DatasetParts {
+        name: drive.name.clone(),
+        split_name: drive.split_name(),
+        camera,
+        frames,
+        intrinsics: calibration.intrinsics,
+        cam_from_vehicle: calibration.cam_from_imu,
+        track,
+        yaw_known: true,
+        origin_ns,
+    };
+    let recording = KittiRecording {
+        drive: drive.clone(),
+        calibration,
+        camera,
+        times_s,
+    };
+    let dataset = Dataset::new(parts, Arc::new(recording));
+    dataset.check_sizes()?;
+    Ok(dataset)
+}
+
+impl Recording for KittiRecording {
+    fn kind(&self) -> DatasetKind {
+        DatasetKind::KittiRaw
+    }
+
+    fn folder(&self) -> &Path {
+        &self.drive.folder
+    }
+
+    fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
+        load_rgb(frame.image.path())
+    }
+
+    fn calibration(&self) -> CalibrationPlace {
+        CalibrationPlace {
+            file: self.calibration.folder.join(Calibration::CAM_TO_CAM),
+            field: "S_rect",
+        }
+    }
+
+    fn streams(&self) -> Result<Vec<Stream>> {
+        const SENSORS: [(&str, &str, &[&str]); 6] = [
+            ("image_00", "image", &["jpeg", "jpg", "png"]),
+            ("image_01", "image", &["jpeg", "jpg", "png"]),
+            ("image_02", "image", &["jpeg", "jpg", "png"]),
+            ("image_03", "image", &["jpeg", "jpg", "png"]),
+            ("velodyne_points", "point_cloud", &["bin"]),
+            ("oxts", "oxts", &["txt"]),
+        ];
+        let mut streams = Vec::new();
+        for (name, kind, extensions) in SENSORS {
+            let folder = self.drive.folder.join(name);
+            if !folder.join("data").is_dir() {
+                continue;
+            }
+            let files = numbered_files(&folder.join("data"), extensions)?;
+            let times = optional(TimeStamps::read(&folder.join("timestamps.txt")))?;
+            let mut seconds = Vec::new();
+            if let Some(times) = times {
+                let origin = times.origin_ns().unwrap_or(0);
+                for (number, _) in &files {
+                    seconds.extend(times.seconds(*number, origin)?);
+                }
+            }
+            streams.push(Stream::new(name, kind, files.len(), &seconds));
+        }
+        Ok(streams)
+    }
+
+    /// Reading again gives the error that names the file.
+    fn no_motion(&self) -> Error {
+        let folder = &self.drive.folder;
+        if self.times_s.iter().all(Option::is_none) {
+            let images = folder.join(format!("image_0{}", self.camera.number()));
+            if let Err(error) = TimeStamps::read(&images.join("timestamps.txt")) {
+                return error;
+            }
+        }
+        let again = read_oxts(&folder.join("oxts"), 0).map(|_| ());
+        let again = again.and_then(|()| self.calibration.require_cam_from_imu().map(|_| ()));
+        again.err().unwrap_or(Error::Missing {
+            path: folder.join("oxts"),
+            what: "the car's speed and yaw rate",
+            remedy: "open the recording again: it changed meanwhile",
+        })
+    }
+
+    fn has_ground_truth(&self, frame: &Frame) -> bool {
+        self.drive.scan(frame.number).is_some()
+    }
+
+    fn ground_truth(&self, frame: &Frame, kind: GtKind) -> Result<Option<DepthMap>> {
+        let Some(path) = self.drive.scan(frame.number) else {
+            return Ok(None);
+        };
+        let scan = PointCloud::read_kitti_bin(&path)?;
+        let k = self.calibration.intrinsics;
+        Ok(Some(kitti::depth_map(
+            &scan,
+            &self.calibration.require_pixels_from_velo()?,
+            (k.width as usize, k.height as usize),
+            kind,
+        )))
+    }
+
+    fn moving_labels(&self, dataset: &Dataset) -> Result<Option<MovingLabels>> {
+        MovingLabels::of_kitti(self, dataset)
+    }
+
+    fn time_of(&self, number: u64) -> Option<f64> {
+        *self.times_s.get(usize::try_from(number).ok()?)?
+    }
+
+    fn camera_paths(&self, dataset: &Dataset) -> Result<Vec<CameraPath>> {
+        kitti::oxts_paths(self, dataset)
+    }
+}
+
+/// A part that may be absent, but not broken.
+fn optional<T>(part: Result<T>) -> Result<Option<T>> {
+    match part {
+        Ok(part) => Ok(Some(part)),
+        Err(Error::Missing { .. }) => Ok(None),
+        Err(other) => Err(other),
+    }
+}

@@ -1,0 +1,354 @@
+//! What folders, videos, comma2k19 segments and RGB-D folders have in common: frames, tables beside
+//! them, depth images.
+
+use crate::clock::seconds;
+use crate::config::FolderConfig;
+use crate::frame_times::TimedImage;
+use crate::kitti::GtKind;
+use crate::recording::{CalibrationPlace, Recording};
+use crate::speed_log::SpeedLog;
+use crate::video::VideoFrames;
+use crate::{
+    Camera, CameraCalibration, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame,
+    FrameImage, Lens, OpenOptions, Result, Stream, calibration, load_rgb, picture,
+};
+use deepfusion_geometry::{DepthMap, Se3};
+use image::{DynamicImage, RgbImage};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A recording of one camera, put together from what a layout found.
+#[derive(Debug)]
+pub(crate) struct PlainRecording {
+    kind: DatasetKind,
+    name: String,
+    folder: PathBuf,
+    calibration: CameraCalibration,
+    lens: Lens,
+    video: Option<VideoFrames>,
+    depth: Option<DepthImages>,
+    world_from_cam: BTreeMap<u64, Se3>,
+    streams: Vec<Stream>,
+    remarks: Vec<String>,
+    /// Why there is no ego-motion, where there is none.
+    no_motion: (String, String),
+}
+
+/// Depth images by frame number, and what their values mean.
+#[derive(Debug, Clone)]
+pub(crate) struct DepthImages {
+    pub(crate) files: BTreeMap<u64, PathBuf>,
+    /// Metres of one step.
+    pub(crate) unit_m: f64,
+    /// A value besides 0 that means none.
+    pub(crate) invalid: Option<u16>,
+}
+
+/// What a layout found, before it is a [`Dataset`].
+pub(crate) struct PlainParts {
+    pub(crate) kind: DatasetKind,
+    pub(crate) folder: PathBuf,
+    pub(crate) name: String,
+    pub(crate) images: Vec<TimedImage>,
+    pub(crate) video: Option<VideoFrames>,
+    pub(crate) calibration: CameraCalibration,
+    pub(crate) speeds: Option<SpeedLog>,
+    pub(crate) cam_from_vehicle: Se3,
+    pub(crate) depth: Option<DepthImages>,
+    pub(crate) world_from_cam: BTreeMap<u64, Se3>,
+    /// Beside those of the images, the speeds and the depth images.
+    pub(crate) streams: Vec<Stream>,
+    pub(crate) remarks: Vec<String>,
+    /// What to do about missing speeds.
+    pub(crate) speed_remedy: &'static str,
+}
+
+impl PlainParts {
+    /// The recording as a data set of all its frames.
+    ///
+    /// # Errors
+    /// [`Error::Clocks`] where frames and speeds have no time in common, [`Error::CameraFile`],
+    /// [`Error::FrameSize`], [`Error::Image`].
+    pub(crate) fn into_dataset(mut self) -> Result<Dataset> {
+        let origin_ns = self.images.iter().find_map(|i| i.ns);
+        let track = match (&self.speeds, origin_ns) {
+            (Some(log), Some(origin)) => Some(log.track(origin)),
+            _ => None,
+        };
+        let no_motion = match (&self.speeds, origin_ns) {
+            (None, _) => ("it has no speeds".to_owned(), self.speed_remedy.to_owned()),
+            _ => (
+                "nothing says when its frames were taken".to_owned(),
+                "add frames.csv, timestamps.txt or fps in dataset.toml".to_owned(),
+            ),
+        };
+        let lens = self.calibration.lens()?;
+        let mut frames = Vec::with_capacity(self.images.len());
+        for (i, image) in self.images.iter().enumerate() {
+            let time_s = image.ns.zip(origin_ns).map(|(ns, o)| seconds(ns, o));
+            frames.push(Frame {
+                drive: self.name.clone(),
+                number: image.number,
+                time_s,
+                image: match &self.video {
+                    Some(video) => FrameImage::Within {
+                        file: video.file().to_owned(),
+                        index: i as u64,
+                    },
+                    None => FrameImage::File(image.path.clone()),
+                },
+                speed_mps: time_s.and_then(|t| track.as_ref()?.speed_at(t)),
+            });
+        }
+        self.check_clocks(&frames)?;
+        self.describe_camera(&lens);
+        let times: Vec<f64> = frames.iter().filter_map(|f| f.time_s).collect();
+        let mut streams = vec![Stream::new("frames", "image", frames.len(), &times)];
+        if let Some(log) = &self.speeds {
+            streams.extend(log.streams.iter().cloned());
+            self.remarks.extend(log.remarks.iter().cloned());
+        }
+        if let Some(depth) = &self.depth {
+            streams.push(Stream::new("depth", "depth", depth.files.len(), &[]));
+        }
+        if !self.world_from_cam.is_empty() {
+            streams.push(Stream::new("pose", "pose", self.world_from_cam.len(), &[]));
+        }
+        streams.append(&mut self.streams);
+        let parts = DatasetParts {
+            name: self.name.clone(),
+            split_name: self.name.clone(),
+            camera: Camera::Left,
+            frames,
+            intrinsics: lens.intrinsics(),
+            cam_from_vehicle: Some(self.cam_from_vehicle),
+            track,
+            yaw_known: self
+                .speeds
+                .as_ref()
+                .is_some_and(|s| s.yaw_rates_radps.is_some()),
+            origin_ns,
+        };
+        let dataset = Dataset::new(
+            parts,
+            Arc::new(PlainRecording {
+                kind: self.kind,
+                name: self.name,
+                folder: self.folder,
+                calibration: self.calibration,
+                lens,
+                video: self.video,
+                depth: self.depth,
+                world_from_cam: self.world_from_cam,
+                streams,
+                remarks: self.remarks,
+                no_motion,
+            }),
+        );
+        dataset.check_sizes()?;
+        Ok(dataset)
+    }
+
+    /// Frames without a speed are told; if none has one, the clocks differ.
+    fn check_clocks(&mut self, frames: &[Frame]) -> Result<()> {
+        let Some(log) = &self.speeds else {
+            return Ok(());
+        };
+        let timed = frames.iter().filter(|f| f.time_s.is_some()).count();
+        let known = frames.iter().filter(|f| f.speed_mps.is_some()).count();
+        let ns: Vec<i64> = self.images.iter().filter_map(|i| i.ns).collect();
+        if let (Some(f0), Some(f1), Some(s0), Some(s1)) = (
+            ns.iter().min(),
+            ns.iter().max(),
+            log.speeds_mps.ns.first(),
+            log.speeds_mps.ns.last(),
+        ) && (s1 < f0 || f1 < s0)
+        {
+            let s = |ns: &i64| seconds(*ns, 0);
+            return Err(Error::Clocks {
+                path: log.path.clone(),
+                times_s: (s(s0), s(s1)),
+                frames_s: (s(f0), s(f1)),
+            });
+        }
+        if known < timed {
+            self.remarks.push(format!(
+                "{} of {timed} frames have no speed measured about their time",
+                timed - known
+            ));
+        }
+        Ok(())
+    }
+
+    fn describe_camera(&mut self, lens: &Lens) {
+        let file = self.calibration.path.display().to_string();
+        let name = self.calibration.path.file_name();
+        let file = name.map_or(file, |n| n.to_string_lossy().into_owned());
+        if !self.calibration.size_in_file {
+            let k = &self.calibration.intrinsics;
+            self.remarks.push(format!(
+                "{file} does not say for which size its camera is: taken for the images' {}x{}",
+                k.width, k.height
+            ));
+        }
+        if lens.distorts() {
+            self.remarks.push(
+                "the lens' distortion is taken out of the images; fx, fy, cx, cy are those of the result".into(),
+            );
+        }
+    }
+}
+
+/// The camera of images of a size: given on the command line or in `dataset.toml`, or read from a file beside
+/// them, or in the folder above.
+///
+/// # Errors
+/// [`Error::Missing`] where nothing says it, with `remedy`; [`Error::CameraFile`], [`Error::Config`].
+pub(crate) fn find_camera(
+    folder: &Path,
+    config: &FolderConfig,
+    options: &OpenOptions,
+    size: (u32, u32),
+    remedy: &'static str,
+) -> Result<CameraCalibration> {
+    if let Some(given) = options.intrinsics {
+        return CameraCalibration::given(given, size, Path::new("--intrinsics"));
+    }
+    if let Some(given) = config.intrinsics {
+        return CameraCalibration::given(given, size, &config.path);
+    }
+    let named = config.calibration.as_ref();
+    let mut file = config.find(folder, "calibration", named, &calibration::NAMES)?;
+    if file.is_none()
+        && let Some(above) = folder.parent()
+    {
+        file = config.find(above, "calibration", None, &calibration::NAMES)?;
+    }
+    match file {
+        Some(file) => CameraCalibration::read(&file, size),
+        None => Err(Error::Missing {
+            path: folder.join(calibration::NAMES[0]),
+            what: "the camera's fx, fy, cx, cy",
+            remedy,
+        }),
+    }
+}
+
+impl Recording for PlainRecording {
+    fn kind(&self) -> DatasetKind {
+        self.kind
+    }
+
+    fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
+        let image = match (&self.video, &frame.image) {
+            (Some(video), FrameImage::Within { index, .. }) => video.load(*index)?,
+            _ => load_rgb(frame.image.path())?,
+        };
+        let k = self.lens.intrinsics();
+        // One of another size is told by the data set, which knows the frame.
+        match image.dimensions() == (k.width, k.height) {
+            true => self.lens.correct(image),
+            false => Ok(image),
+        }
+    }
+
+    fn calibration(&self) -> CalibrationPlace {
+        CalibrationPlace {
+            file: self.calibration.path.clone(),
+            field: match self.calibration.size_in_file {
+                true => "the image's size",
+                false => "the first image's size, for",
+            },
+        }
+    }
+
+    fn streams(&self) -> Result<Vec<Stream>> {
+        Ok(self.streams.clone())
+    }
+
+    fn no_motion(&self) -> Error {
+        let (why, remedy) = self.no_motion.clone();
+        Error::NoTrack {
+            drive: self.name.clone(),
+            why,
+            remedy,
+        }
+    }
+
+    fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+
+    fn has_ground_truth(&self, frame: &Frame) -> bool {
+        let depth = self.depth.as_ref();
+        depth.is_some_and(|d| d.files.contains_key(&frame.number))
+    }
+
+    fn ground_truth(&self, frame: &Frame, kind: GtKind) -> Result<Option<DepthMap>> {
+        let Some(depth) = &self.depth else {
+            return Ok(None);
+        };
+        let Some(path) = depth.files.get(&frame.number) else {
+            return Ok(None);
+        };
+        if kind != GtKind::Z {
+            return Err(Error::DepthKind {
+                drive: self.name.clone(),
+            });
+        }
+        Ok(Some(self.lens.correct_depth(depth.read(path)?)?))
+    }
+
+    fn camera_paths(&self, dataset: &Dataset) -> Result<Vec<CameraPath>> {
+        if self.world_from_cam.is_empty() {
+            return Err(Error::NoPath {
+                drive: self.name.clone(),
+                layout: self.kind.label(),
+            });
+        }
+        let pose = |frame: &usize| {
+            let frame = dataset.frames().get(*frame)?;
+            self.world_from_cam.get(&frame.number).copied()
+        };
+        let mut paths = Vec::new();
+        for stretch in dataset.stretches() {
+            let has_pose = |a: &usize, b: &usize| pose(a).is_some() && pose(b).is_some();
+            for piece in stretch.chunk_by(has_pose).filter(|p| p.len() > 1) {
+                let times = piece.iter().map(|f| dataset.frames()[*f].time_s);
+                paths.push(CameraPath {
+                    frames: piece.to_vec(),
+                    times_s: times.collect::<Option<Vec<_>>>().unwrap_or_default(),
+                    world_from_cam: piece.iter().filter_map(pose).collect(),
+                });
+            }
+        }
+        Ok(paths)
+    }
+}
+
+impl DepthImages {
+    /// A 16-bit grey PNG as metres.
+    fn read(&self, path: &Path) -> Result<DepthMap> {
+        let DynamicImage::ImageLuma16(image) = picture::decode(path)? else {
+            return Err(Error::Image {
+                path: path.to_owned(),
+                problem: "not a 16-bit grey PNG, which depth images are".into(),
+                truncated: false,
+            });
+        };
+        let metres = |value: &u16| match Some(*value) == self.invalid {
+            true => 0.0,
+            false => (f64::from(*value) * self.unit_m) as f32,
+        };
+        Ok(DepthMap {
+            width: image.width() as usize,
+            height: image.height() as usize,
+            data: image.as_raw().iter().map(metres).collect(),
+        })
+    }
+}

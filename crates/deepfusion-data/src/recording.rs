@@ -1,0 +1,120 @@
+//! What a layout has to offer for its recordings to be a [`Dataset`].
+
+use crate::kitti::GtKind;
+use crate::{CameraPath, Dataset, Error, Frame, MovingLabels, Result, Stream};
+use deepfusion_geometry::DepthMap;
+use image::RgbImage;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// The layout a recording came in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DatasetKind {
+    /// KITTI raw.
+    KittiRaw,
+    /// A folder of images with tables beside it.
+    Folder,
+    /// A video file with tables beside it.
+    Video,
+    /// A comma2k19 segment.
+    Comma2k19,
+    /// A folder of colour, depth and pose files, as 7-Scenes has.
+    RgbD,
+}
+
+impl DatasetKind {
+    /// Its name in text.
+    #[must_use]
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::KittiRaw => "KITTI raw",
+            Self::Folder => "image folder",
+            Self::Video => "video",
+            Self::Comma2k19 => "comma2k19 segment",
+            Self::RgbD => "RGB-D folder",
+        }
+    }
+}
+
+/// Where a data set's images and labels come from; one implementation a layout.
+///
+/// What all layouts share (frames, times, camera, speeds) is in [`crate::DatasetParts`]; this is the rest,
+/// read when it is asked for. The provided methods are those of a recording that has no such thing.
+pub trait Recording: fmt::Debug + Send + Sync {
+    /// The layout.
+    fn kind(&self) -> DatasetKind;
+
+    /// The folder its files are in.
+    fn folder(&self) -> &Path;
+
+    /// A frame's image, freed of its lens' distortion, at the size of the data set's intrinsics.
+    ///
+    /// # Errors
+    /// Where it cannot be read.
+    fn load_image(&self, frame: &Frame) -> Result<RgbImage>;
+
+    /// Where the camera's numbers are from, for the error on an image of another size.
+    fn calibration(&self) -> CalibrationPlace;
+
+    /// What was recorded.
+    ///
+    /// # Errors
+    /// Where a stream is there and cannot be read.
+    fn streams(&self) -> Result<Vec<Stream>>;
+
+    /// What is missing for the car's motion, asked where the data set lacks times, track or mount.
+    fn no_motion(&self) -> Error;
+
+    /// What was taken for granted or looks odd, in sentences for the inspection.
+    fn remarks(&self) -> &[String] {
+        &[]
+    }
+
+    /// Whether [`Self::ground_truth`] will have something for a frame.
+    fn has_ground_truth(&self, _frame: &Frame) -> bool {
+        false
+    }
+
+    /// Depth of a frame in metres (camera z), at the size of its image, 0 = none.
+    ///
+    /// # Errors
+    /// Where it is there and cannot be read.
+    fn ground_truth(&self, _frame: &Frame, _kind: GtKind) -> Result<Option<DepthMap>> {
+        Ok(None)
+    }
+
+    /// What tells moving pixels from static ones.
+    ///
+    /// # Errors
+    /// Where it is there and cannot be read.
+    fn moving_labels(&self, _dataset: &Dataset) -> Result<Option<MovingLabels>> {
+        Ok(None)
+    }
+
+    /// The time of a number without an image, in seconds on the frames' clock.
+    fn time_of(&self, _number: u64) -> Option<f64> {
+        None
+    }
+
+    /// The camera's measured path.
+    ///
+    /// # Errors
+    /// Where it cannot be read; [`Error::NoPath`] where there is none.
+    fn camera_paths(&self, dataset: &Dataset) -> Result<Vec<CameraPath>> {
+        Err(Error::NoPath {
+            drive: dataset.name().to_owned(),
+            layout: self.kind().label(),
+        })
+    }
+}
+
+/// The place in a file that says what the camera is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CalibrationPlace {
+    /// The file.
+    pub file: PathBuf,
+    /// The field that holds the image's size.
+    pub field: &'static str,
+}

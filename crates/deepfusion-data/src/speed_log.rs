@@ -1,0 +1,253 @@
+//! `speed.csv`, and the yaw rate from it or from `imu.csv`.
+
+use crate::clock::{TimeUnit, seconds};
+use crate::config::FolderConfig;
+use crate::table::{Column, Table, describe};
+use crate::{Result, Stream, VehicleTrack};
+use std::path::{Path, PathBuf};
+
+/// Samples farther apart are not bridged, as in [`VehicleTrack`].
+const MAX_GAP_S: f64 = 0.5;
+const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timestamps"];
+const SPEEDS: [&str; 4] = ["speed", "velocity", "vehicle_speed", "v"];
+const YAW_RATES: [&str; 6] = [
+    "yaw_rate",
+    "yawrate",
+    "gyro_z",
+    "wz",
+    "omega_z",
+    "angular_velocity_z",
+];
+
+/// Values at times, on the recording's clock.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Samples {
+    /// In nanoseconds.
+    pub(crate) ns: Vec<i64>,
+    /// In m/s or rad/s.
+    pub(crate) values: Vec<f64>,
+}
+
+/// A recording's speeds.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SpeedLog {
+    pub(crate) path: PathBuf,
+    pub(crate) speeds_mps: Samples,
+    pub(crate) yaw_rates_radps: Option<Samples>,
+    /// What was found, for the inspection.
+    pub(crate) streams: Vec<Stream>,
+    pub(crate) remarks: Vec<String>,
+}
+
+impl SpeedLog {
+    /// Reads the tables that `dataset.toml` names, or `speed.csv` and `imu.csv`; `None` without speeds.
+    ///
+    /// # Errors
+    /// [`crate::Error::Config`] where a named table is absent, [`crate::Error::Columns`] where a column is
+    /// missing or its unit is not said, [`crate::Error::Table`] for a bad value or a time that goes back.
+    pub(crate) fn read(folder: &Path, config: &FolderConfig) -> Result<Option<Self>> {
+        let speed = config.find(folder, "speed", config.speed.as_ref(), &["speed.csv"])?;
+        let imu = config.find(folder, "imu", config.imu.as_ref(), &["imu.csv"])?;
+        let Some(path) = speed else {
+            return Ok(None);
+        };
+        let table = Table::read(&path)?;
+        let mut remarks = Vec::new();
+        let ns = times(&table, config, &mut remarks, &name(&path))?;
+        let column = table.require(&SPEEDS, "time_s,speed_mps")?;
+        let factor = speed_factor(&table, column, config)?;
+        let values = scaled(table.numbers(column)?, factor);
+        let mut streams = vec![stream(&path, "speed", &ns)];
+        let speeds_mps = Samples { ns, values };
+        let mut yaw_rates_radps = None;
+        let mut yaw_table = None;
+        if let Some(column) = table.column(&YAW_RATES) {
+            yaw_table = Some((table.numbers(column)?, yaw_factor(&table, column, config)?));
+        }
+        if let Some((values, factor)) = yaw_table {
+            yaw_rates_radps = Some(Samples {
+                ns: speeds_mps.ns.clone(),
+                values: scaled(values, factor),
+            });
+        } else if let Some(imu) = imu {
+            let table = Table::read(&imu)?;
+            let ns = times(&table, config, &mut remarks, &name(&imu))?;
+            streams.push(stream(&imu, "imu", &ns));
+            let column = table.require(&YAW_RATES, "time_s,gyro_z_radps")?;
+            let factor = yaw_factor(&table, column, config)?;
+            let values = scaled(table.numbers(column)?, factor);
+            yaw_rates_radps = Some(Samples { ns, values });
+        } else {
+            remarks.push(format!(
+                "{}: no yaw rate, here or in imu.csv: how the car turned is unknown, which \
+                 `--view-motion vehicle` and a rotation loss need",
+                name(&path)
+            ));
+        }
+        let rate = streams[0].rate_hz;
+        if let Some(rate) = rate.filter(|r| *r < 1.0 / MAX_GAP_S) {
+            remarks.push(format!(
+                "{}: {rate:.1} samples a second; across more than {MAX_GAP_S} s the speed counts as unknown, \
+                 so no pair can be used",
+                name(&path)
+            ));
+        }
+        Ok(Some(Self {
+            path,
+            speeds_mps,
+            yaw_rates_radps,
+            streams,
+            remarks,
+        }))
+    }
+
+    /// The car's motion on the frames' clock. Where the yaw rate has other times than the speed, the track
+    /// has both: between samples either is straight, so that its integrals stay exact.
+    pub(crate) fn track(&self, origin_ns: i64) -> VehicleTrack {
+        let Some(yaw) = &self.yaw_rates_radps else {
+            let samples = self.speeds_mps.ns.iter().zip(&self.speeds_mps.values);
+            let samples: Vec<_> = samples
+                .map(|(ns, v)| (seconds(*ns, origin_ns), *v, 0.0))
+                .collect();
+            return VehicleTrack::new(&samples);
+        };
+        let mut times: Vec<i64> = self.speeds_mps.ns.iter().chain(&yaw.ns).copied().collect();
+        times.sort_unstable();
+        times.dedup();
+        let known = times.iter().filter_map(|ns| {
+            let (v, w) = (self.speeds_mps.at(*ns)?, yaw.at(*ns)?);
+            Some((seconds(*ns, origin_ns), v, w))
+        });
+        VehicleTrack::new(&known.collect::<Vec<_>>())
+    }
+}
+
+impl Samples {
+    /// The value at a time, straight between its neighbours; `None` beyond the ends and across gaps.
+    fn at(&self, ns: i64) -> Option<f64> {
+        let after = self.ns.partition_point(|t| *t < ns);
+        if self.ns.get(after) == Some(&ns) {
+            return self.values.get(after).copied();
+        }
+        let before = after.checked_sub(1)?;
+        let (t0, t1) = (self.ns[before], *self.ns.get(after)?);
+        let gap_s = seconds(t1, t0);
+        let part = seconds(ns, t0) / gap_s;
+        (gap_s <= MAX_GAP_S)
+            .then(|| self.values[before] + (self.values[after] - self.values[before]) * part)
+    }
+}
+
+/// The table's times in nanoseconds, which must rise; equal ones are told once.
+pub(crate) fn times(
+    table: &Table,
+    config: &FolderConfig,
+    remarks: &mut Vec<String>,
+    name: &str,
+) -> Result<Vec<i64>> {
+    let column = table.require(&TIMES, "time_s,speed_mps")?;
+    if table.len() == 0 {
+        return Err(table.lacks("no row below the header".into(), "record some".into()));
+    }
+    let unit = match (&column.unit, &config.time_unit) {
+        (Some(unit), _) | (None, Some(unit)) => TimeUnit::named(unit),
+        (None, None) => {
+            let unit = TimeUnit::of_numbers(&table.numbers(column)?);
+            if let Some(unit) = unit {
+                remarks.push(format!(
+                    "{name}: column {} has no unit, taken as {} by its numbers",
+                    column.header,
+                    unit.symbol()
+                ));
+            }
+            unit
+        }
+    };
+    let Some(unit) = unit else {
+        return Err(table.lacks(
+            format!("nothing says the unit of time of column {}", column.header),
+            "name the column time_s, time_ms, time_us or time_ns, or set time_unit in dataset.toml"
+                .into(),
+        ));
+    };
+    let mut all: Vec<i64> = Vec::with_capacity(table.len());
+    let mut repeated = Vec::new();
+    for (row, word) in table.words(column).enumerate() {
+        let ns = unit.nanoseconds(word);
+        let ns = ns.ok_or_else(|| table.bad(row, column, &describe(word, "a time")))?;
+        match all.last() {
+            Some(last) if ns < *last => {
+                let back = seconds(*last, ns);
+                let problem = format!("'{word}' is {back} s before the row above");
+                return Err(table.bad(row, column, &problem));
+            }
+            Some(last) if ns == *last => repeated.push(table.line(row)),
+            _ => {}
+        }
+        all.push(ns);
+    }
+    if let Some(first) = repeated.first() {
+        remarks.push(format!(
+            "{name}: {} rows repeat the time of the row above (first in line {first}) and are left out",
+            repeated.len()
+        ));
+    }
+    Ok(all)
+}
+
+/// m/s of one unit of the column.
+fn speed_factor(table: &Table, column: &Column, config: &FolderConfig) -> Result<f64> {
+    let unit = column.unit.as_deref().or(config.speed_unit.as_deref());
+    match unit {
+        Some("mps" | "m/s") => Ok(1.0),
+        Some("kmh" | "km/h" | "kph") => Ok(1.0 / 3.6),
+        Some("mph" | "mi/h") => Ok(0.447_04),
+        Some(other) => Err(table.lacks(
+            format!("the unit of speed '{other}' is not known"),
+            "units are mps (m/s), kmh (km/h) and mph".into(),
+        )),
+        None => Err(table.lacks(
+            format!("nothing says the unit of column {}", column.header),
+            "name the column speed_mps, speed_kmh or speed_mph, or set speed_unit in dataset.toml: \
+             a wrong unit would scale every depth"
+                .into(),
+        )),
+    }
+}
+
+/// rad/s of one unit of the column.
+fn yaw_factor(table: &Table, column: &Column, config: &FolderConfig) -> Result<f64> {
+    let unit = column.unit.as_deref().or(config.yaw_rate_unit.as_deref());
+    match unit {
+        Some("radps" | "rad/s" | "rad s^-1") => Ok(1.0),
+        Some("dps" | "degps" | "deg/s" | "°/s") => Ok(1_f64.to_radians()),
+        other => Err(table.lacks(
+            match other {
+                Some(other) => format!("the unit of yaw rate '{other}' is not known"),
+                None => format!("nothing says the unit of column {}", column.header),
+            },
+            "name the column yaw_rate_radps or yaw_rate_dps (positive to the left), or set yaw_rate_unit \
+             in dataset.toml"
+                .into(),
+        )),
+    }
+}
+
+fn scaled(values: Vec<f64>, factor: f64) -> Vec<f64> {
+    values.into_iter().map(|v| v * factor).collect()
+}
+
+fn name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+fn stream(path: &Path, kind: &'static str, ns: &[i64]) -> Stream {
+    let first = ns.first().copied().unwrap_or_default();
+    let times: Vec<f64> = ns.iter().map(|t| seconds(*t, first)).collect();
+    Stream::new(&name(path), kind, ns.len(), &times)
+}
+
+#[cfg(test)]
+#[path = "speed_log_tests.rs"]
+mod tests;

@@ -1,0 +1,157 @@
+use super::*;
+use crate::Error;
+use std::fs;
+
+fn read(files: &[(&str, &str)]) -> Result<SpeedLog> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    let config = FolderConfig::read(folder.path())?;
+    Ok(SpeedLog::read(folder.path(), &config)?.expect("there is a speed.csv"))
+}
+
+fn refusal(files: &[(&str, &str)]) -> Error {
+    read(files).unwrap_err()
+}
+
+#[test]
+fn units_come_from_the_header_or_the_config() {
+    let expected = [10.0, 20.0];
+    for (files, factor) in [
+        (vec![("speed.csv", "time_s,speed_mps\n0,10\n0.1,20\n")], 1.0),
+        (vec![("speed.csv", "time_s,speed_kmh\n0,36\n0.1,72\n")], 1.0),
+        (
+            vec![("speed.csv", "Timestamp [ms],Speed (km/h)\n0,36\n100,72\n")],
+            1.0,
+        ),
+        (
+            vec![("speed.csv", "t_ns,v_mph\n0,10\n100000000,20\n")],
+            0.44704,
+        ),
+        (
+            vec![
+                ("speed.csv", "time,speed\n0,36\n100,72\n"),
+                ("dataset.toml", "speed_unit = 'km/h'\ntime_unit = 'ms'\n"),
+            ],
+            1.0,
+        ),
+    ] {
+        let log = read(&files).unwrap();
+        assert_eq!(log.speeds_mps.ns, [0, 100_000_000], "{files:?}");
+        for (found, expected) in log.speeds_mps.values.iter().zip(expected) {
+            assert!((found - expected * factor).abs() < 1e-12, "{files:?}");
+        }
+    }
+}
+
+#[test]
+fn a_unit_is_never_guessed() {
+    let error = refusal(&[("speed.csv", "time_s,speed\n0,36\n")]);
+    assert!(
+        error
+            .to_string()
+            .contains("nothing says the unit of column speed"),
+        "{error}"
+    );
+    assert!(error.hint().unwrap().contains("speed_kmh"), "{error}");
+    let error = refusal(&[("speed.csv", "time,speed_mps\n0,36\n40,36\n80,36\n")]);
+    assert!(
+        error.to_string().contains("unit of time of column time"),
+        "{error}"
+    );
+    let error = refusal(&[("speed.csv", "time_s,speed_mps,yaw_rate\n0,36,0\n")]);
+    assert!(
+        error.to_string().contains("unit of column yaw_rate"),
+        "{error}"
+    );
+    let error = refusal(&[("speed.csv", "time_s,speed (furlong/h)\n0,36\n")]);
+    assert!(error.to_string().contains("furlong/h"), "{error}");
+    // A magnitude that can be nothing else is taken, and said.
+    let log = read(&[(
+        "speed.csv",
+        "timestamp,speed_mps\n1403636579763555584,3\n1403636579863555584,3\n",
+    )]);
+    let log = log.unwrap();
+    assert_eq!(log.speeds_mps.ns[0], 1_403_636_579_763_555_584);
+    assert!(log.remarks[0].contains("taken as ns"), "{:?}", log.remarks);
+}
+
+#[test]
+fn bad_rows_are_named() {
+    for (text, expected) in [
+        (
+            "time_s,speed_mps\n0,1\n0.1,fast\n",
+            ":3: column speed_mps: 'fast' is not a finite number",
+        ),
+        (
+            "time_s,speed_mps\n0,1\n0.1,\n",
+            ":3: column speed_mps: empty, expected a finite number",
+        ),
+        (
+            "time_s,speed_mps\n0,1\n0.2,1\n0.1,1\n",
+            ":4: column time_s: '0.1' is 0.1 s before the row above",
+        ),
+        (
+            "time_s,speed_mps\n0,1\nsoon,1\n",
+            ":3: column time_s: 'soon' is not a time",
+        ),
+        ("time_s,speed_mps\n", "no row below the header"),
+        (
+            "time_s,sped_mps\n0,1\n",
+            "no column 'speed', there is: time_s, sped_mps",
+        ),
+        (
+            "when,speed_mps\n0,1\n",
+            "no column 'time', there is: when, speed_mps",
+        ),
+    ] {
+        let error = refusal(&[("speed.csv", text)]).to_string();
+        assert!(
+            error.contains("speed.csv") && error.ends_with(expected),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn repeated_times_and_slow_clocks_are_told() {
+    let log = read(&[("speed.csv", "time_s,speed_mps\n0,1\n0,2\n0.1,1\n")]).unwrap();
+    assert!(
+        log.remarks.iter().any(|r| r.contains("first in line 3")),
+        "{:?}",
+        log.remarks
+    );
+    assert_eq!(log.track(0).times_s(), [0.0, 0.1]);
+    let log = read(&[("speed.csv", "time_s,speed_mps\n0,1\n1,2\n2,1\n")]).unwrap();
+    assert!(
+        log.remarks
+            .iter()
+            .any(|r| r.contains("1.0 samples a second")),
+        "{:?}",
+        log.remarks
+    );
+}
+
+#[test]
+fn the_yaw_rate_comes_from_the_imu_on_its_own_clock() {
+    let imu: String = (0..101)
+        .map(|i| format!("{},{}\n", i * 10, 18.0 * f64::from(i) / 100.0))
+        .collect();
+    let speeds: String = (0..11)
+        .map(|i| format!("{},5\n", f64::from(i) * 0.1))
+        .collect();
+    let log = read(&[
+        ("speed.csv", &format!("time_s,speed_mps\n{speeds}")),
+        ("imu.csv", &format!("time_ms,gyro_z_dps\n{imu}")),
+    ])
+    .unwrap();
+    assert_eq!(log.streams[1].rate_hz.map(f64::round), Some(100.0));
+    // 18 t degrees a second: 9 t² degrees.
+    let motion = log.track(0).motion(0.0, 1.0).unwrap();
+    assert!(
+        (motion.yaw_rad - 9_f64.to_radians()).abs() < 1e-9,
+        "{motion:?}"
+    );
+    assert!((motion.distance_m - 5.0).abs() < 1e-9);
+}

@@ -1,0 +1,123 @@
+//! A video's frames as files.
+//!
+//! Training reads frames in random order, which a video cannot give: every jump decodes from the last
+//! key frame. So all frames are decoded once, into `<video>.frames` beside it (or in the folder that
+//! `cache` in `dataset.toml` names), as JPEGs of ffmpeg's best quality but one; the folder can be deleted at
+//! any time. It takes part under another name and is renamed when it is whole.
+
+use super::program::run;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+/// Which video a folder of frames was made from.
+#[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Origin {
+    bytes: u64,
+    modified_ns: u128,
+    frames: usize,
+}
+
+const ORIGIN: &str = "origin.json";
+
+/// The file of a frame, counted from 0.
+pub(super) fn frame_path(cache: &Path, index: u64) -> PathBuf {
+    cache.join(format!("{index:010}.jpg"))
+}
+
+/// Decodes the video, unless the folder holds its frames already.
+///
+/// # Errors
+/// [`Error::Program`], [`Error::File`].
+pub(super) fn ensure(video: &Path, cache: &Path, frames: usize) -> Result<()> {
+    let origin = Origin::of(video, frames)?;
+    if Origin::read(cache).as_ref() == Some(&origin) {
+        return Ok(());
+    }
+    let part = cache.with_extension(format!("part-{}", std::process::id()));
+    let made = decode(video, &part, &origin).and_then(|()| {
+        // Of another video, or of this one before it changed.
+        let old = Origin::read(cache).is_some();
+        if old {
+            std::fs::remove_dir_all(cache).map_err(|e| Error::file(cache, e))?;
+        }
+        std::fs::rename(&part, cache).map_err(|e| Error::file(cache, e))
+    });
+    if made.is_err() {
+        // Best effort: the error that counts is told.
+        let _ = std::fs::remove_dir_all(&part);
+    }
+    // Another process may have been quicker.
+    match Origin::read(cache).as_ref() == Some(&origin) {
+        true => Ok(()),
+        false => made,
+    }
+}
+
+fn decode(video: &Path, part: &Path, origin: &Origin) -> Result<()> {
+    std::fs::create_dir_all(part).map_err(|e| Error::file(part, e))?;
+    // One file a frame: none doubled or dropped to keep a rate.
+    if ffmpeg(video, part, "-fps_mode").is_err() {
+        // Before ffmpeg 5.1 the option had another name.
+        ffmpeg(video, part, "-vsync")?;
+    }
+    let written = std::fs::read_dir(part)
+        .map_err(|e| Error::file(part, e))?
+        .count();
+    if written != origin.frames {
+        return Err(Error::Program {
+            path: video.to_owned(),
+            program: "ffmpeg",
+            problem: format!("decoded {written} frames, ffprobe counts {}", origin.frames),
+            remedy: "part of the video is damaged: write it anew, such as ffmpeg -i OLD -c:v libx264 -crf 12 NEW.mp4",
+        });
+    }
+    let path = part.join(ORIGIN);
+    let json = serde_json::to_vec(origin).map_err(|e| Error::file(&path, e.into()))?;
+    std::fs::write(&path, json).map_err(|e| Error::file(&path, e))
+}
+
+fn ffmpeg(video: &Path, part: &Path, mode: &str) -> Result<Vec<u8>> {
+    let arguments: [&OsStr; 15] = [
+        "-v".as_ref(),
+        "error".as_ref(),
+        "-y".as_ref(),
+        "-i".as_ref(),
+        video.as_os_str(),
+        "-map".as_ref(),
+        "0:v:0".as_ref(),
+        mode.as_ref(),
+        "passthrough".as_ref(),
+        "-q:v".as_ref(),
+        "2".as_ref(),
+        "-start_number".as_ref(),
+        "0".as_ref(),
+        "-an".as_ref(),
+        // Within the folder: a `%` in its own path would count as a number's place.
+        "%010d.jpg".as_ref(),
+    ];
+    run("ffmpeg", &arguments, video, part)
+}
+
+impl Origin {
+    fn of(video: &Path, frames: usize) -> Result<Self> {
+        let about = std::fs::metadata(video).map_err(|e| Error::file(video, e))?;
+        let modified = about
+            .modified()
+            .ok()
+            .and_then(|t| t.duration_since(UNIX_EPOCH).ok());
+        Ok(Self {
+            bytes: about.len(),
+            modified_ns: modified.map_or(0, |t| t.as_nanos()),
+            frames,
+        })
+    }
+
+    /// `None` where the folder is no whole cache.
+    fn read(cache: &Path) -> Option<Self> {
+        let bytes = std::fs::read(cache.join(ORIGIN)).ok()?;
+        serde_json::from_slice(&bytes).ok()
+    }
+}

@@ -1,0 +1,177 @@
+//! A video file with tables and a calibration beside it, decoded by the user's ffmpeg.
+
+mod decode;
+mod probe;
+mod program;
+
+use crate::config::FolderConfig;
+use crate::folder::{CAMERA_REMEDY, NO_MOUNT};
+use crate::frame_times::{TimedImage, from_start, numbers_by_time};
+use crate::plain::{PlainParts, find_camera};
+use crate::speed_log::SpeedLog;
+use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, load_rgb};
+use image::RgbImage;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// Endings of the files that are taken for videos.
+const ENDINGS: [&str; 7] = ["mp4", "mkv", "mov", "avi", "hevc", "m4v", "webm"];
+const SPEED_REMEDY: &str = "training needs speed.csv (time_s,speed_mps) beside the video; evaluation and prediction do not";
+
+/// Whether a file is named like a video.
+pub(crate) fn is_video(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    ENDINGS.contains(&extension.to_ascii_lowercase().as_str())
+}
+
+/// The video of a folder: that which `dataset.toml` names, or the only one.
+///
+/// # Errors
+/// [`Error::Config`] where a named one is not there or there are several.
+pub(crate) fn in_folder(folder: &Path) -> Result<Option<PathBuf>> {
+    let config = FolderConfig::read(folder)?;
+    if config.images.is_some() {
+        return Ok(None);
+    }
+    if let Some(named) = config.find(folder, "video", config.video.as_ref(), &[])? {
+        return Ok(Some(named));
+    }
+    let mut videos = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
+        let path = entry.map_err(|e| Error::file(folder, e))?.path();
+        if path.is_file() && is_video(&path) {
+            videos.push(path);
+        }
+    }
+    match videos.len() {
+        0 => Ok(None),
+        1 => Ok(videos.pop()),
+        n => Err(config.error(format!(
+            "{n} videos are there: name one, video = \"…\", or give its path"
+        ))),
+    }
+}
+
+/// Opens a video file, or the video of a folder.
+pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
+    let file = match place.is_dir() {
+        true => in_folder(place)?.unwrap_or_else(|| place.to_owned()),
+        false => place.to_owned(),
+    };
+    let folder = file.parent().unwrap_or(Path::new(".")).to_owned();
+    let config = FolderConfig::read(&folder)?;
+    let video = VideoFrames::probe(&file, &config)?;
+    let calibration = find_camera(&folder, &config, options, video.size(), CAMERA_REMEDY)?;
+    let mut remarks = Vec::new();
+    let times = match (&video.probed.times_ns, config.fps) {
+        (_, Some(fps)) => {
+            let ns = |i: usize| Some((i as f64 / fps * 1e9).round() as i64);
+            (0..video.len()).map(ns).collect()
+        }
+        (Some(times), None) => times.iter().copied().map(Some).collect(),
+        (None, None) => {
+            remarks.push("the video has no time stamps: set fps in dataset.toml".into());
+            vec![None; video.len()]
+        }
+    };
+    let times = from_start(times, config.start_s);
+    let known: Option<Vec<i64>> = times.iter().copied().collect();
+    let numbers = match known {
+        Some(known) => numbers_by_time(&known),
+        None => (0..video.len() as u64).collect(),
+    };
+    if config.start_s.is_none() {
+        remarks.push(
+            "the video's first frame is taken to be at time 0 of the tables, or where its time stamps say \
+             (start_s in dataset.toml says otherwise)"
+                .into(),
+        );
+    }
+    if config.mount.is_none() {
+        remarks.push(NO_MOUNT.into());
+    }
+    let image = |(number, ns): (u64, Option<i64>)| TimedImage {
+        number,
+        path: file.clone(),
+        ns,
+    };
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    PlainParts {
+        kind: DatasetKind::Video,
+        name: stem.into_owned(),
+        images: numbers.into_iter().zip(times).map(image).collect(),
+        calibration,
+        speeds: SpeedLog::read(&folder, &config)?,
+        cam_from_vehicle: config.cam_from_vehicle(),
+        depth: None,
+        world_from_cam: BTreeMap::new(),
+        streams: Vec::new(),
+        remarks,
+        speed_remedy: SPEED_REMEDY,
+        video: Some(video),
+        folder,
+    }
+    .into_dataset()
+}
+
+/// A video's frames: counted when it is opened, decoded when the first of them is read.
+#[derive(Debug)]
+pub(crate) struct VideoFrames {
+    file: PathBuf,
+    cache: PathBuf,
+    probed: probe::Probed,
+    /// Whether the cache is complete; held while it is made.
+    decoded: Mutex<bool>,
+}
+
+impl VideoFrames {
+    /// Counts the frames of a video with ffprobe.
+    ///
+    /// # Errors
+    /// [`Error::Program`].
+    pub(crate) fn probe(file: &Path, config: &FolderConfig) -> Result<Self> {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let folder = file.parent().unwrap_or(Path::new("."));
+        let cache = config
+            .cache
+            .as_ref()
+            .map_or(folder.to_owned(), |c| folder.join(c));
+        Ok(Self {
+            probed: probe::probe(file)?,
+            cache: cache.join(format!("{name}.frames")),
+            file: file.to_owned(),
+            decoded: Mutex::new(false),
+        })
+    }
+
+    pub(crate) fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// How many frames there are.
+    pub(crate) fn len(&self) -> usize {
+        self.probed.frames
+    }
+
+    /// Width and height of the frames.
+    pub(crate) fn size(&self) -> (u32, u32) {
+        self.probed.size
+    }
+
+    /// A frame, counted from 0.
+    ///
+    /// # Errors
+    /// [`Error::Program`] where the video cannot be decoded, and as [`load_rgb`].
+    pub(crate) fn load(&self, index: u64) -> Result<RgbImage> {
+        {
+            // A thread that failed while decoding left nothing behind.
+            let mut decoded = self.decoded.lock().unwrap_or_else(|e| e.into_inner());
+            if !*decoded {
+                decode::ensure(&self.file, &self.cache, self.probed.frames)?;
+                *decoded = true;
+            }
+        }
+        load_rgb(&decode::frame_path(&self.cache, index))
+    }
+}

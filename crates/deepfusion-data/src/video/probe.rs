@@ -1,0 +1,159 @@
+//! What ffprobe says of a video, without decoding it.
+
+use super::program::run;
+use crate::clock::TimeUnit;
+use crate::{Error, Result};
+use serde::Deserialize;
+use std::path::Path;
+
+/// A video's frames before they are decoded.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Probed {
+    /// Width and height as shown, the recorder's rotation applied.
+    pub(super) size: (u32, u32),
+    /// How many.
+    pub(super) frames: usize,
+    /// Their times in order, in nanoseconds; `None` where the file has none.
+    pub(super) times_ns: Option<Vec<i64>>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Answer {
+    #[serde(default)]
+    packets: Vec<Packet>,
+    #[serde(default)]
+    streams: Vec<StreamAnswer>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Packet {
+    pts_time: Option<String>,
+    #[serde(default)]
+    flags: String,
+}
+
+#[derive(Debug, Deserialize)]
+struct StreamAnswer {
+    width: Option<u32>,
+    height: Option<u32>,
+    #[serde(default)]
+    side_data_list: Vec<SideData>,
+}
+
+#[derive(Debug, Deserialize)]
+struct SideData {
+    rotation: Option<f64>,
+}
+
+/// Looks at the first video stream. Its packets are listed rather than its frames: that needs no decoding,
+/// and each packet is a frame.
+pub(super) fn probe(file: &Path) -> Result<Probed> {
+    let entries = "packet=pts_time,flags:stream=width,height:stream_side_data=rotation";
+    let arguments = [
+        "-v",
+        "error",
+        "-select_streams",
+        "v:0",
+        "-show_entries",
+        entries,
+        "-of",
+        "json",
+    ];
+    let mut arguments: Vec<&std::ffi::OsStr> = arguments.iter().map(|a| a.as_ref()).collect();
+    arguments.push(file.as_os_str());
+    let folder = file.parent().unwrap_or(Path::new("."));
+    parse(&run("ffprobe", &arguments, file, folder)?).map_err(|problem| Error::Program {
+        path: file.to_owned(),
+        program: "ffprobe",
+        problem,
+        remedy: "is it a video, and whole?",
+    })
+}
+
+fn parse(json: &[u8]) -> std::result::Result<Probed, String> {
+    let answer: Answer =
+        serde_json::from_slice(json).map_err(|e| format!("answered what cannot be read: {e}"))?;
+    let stream = answer.streams.first();
+    let stream = stream.ok_or("finds no video stream in it")?;
+    let (Some(width), Some(height)) = (stream.width, stream.height) else {
+        return Err("does not know the images' size".into());
+    };
+    let rotations = stream.side_data_list.iter().filter_map(|s| s.rotation);
+    let upright = rotations
+        .last()
+        .is_none_or(|r| (r / 90.0).round() % 2.0 == 0.0);
+    // `D`: cut off by the file's edit list, not shown and not decoded into a frame.
+    let shown: Vec<&Packet> = answer
+        .packets
+        .iter()
+        .filter(|p| !p.flags.contains('D'))
+        .collect();
+    if shown.is_empty() {
+        return Err("finds no frame in it".into());
+    }
+    let times = shown
+        .iter()
+        .map(|p| TimeUnit::Seconds.nanoseconds(p.pts_time.as_ref()?));
+    let mut times_ns: Option<Vec<i64>> = times.collect();
+    if let Some(times) = &mut times_ns {
+        // Packets come in the order of decoding.
+        times.sort_unstable();
+    }
+    let distinct = times_ns.filter(|t| t.windows(2).all(|w| w[0] < w[1]));
+    Ok(Probed {
+        size: if upright {
+            (width, height)
+        } else {
+            (height, width)
+        },
+        frames: shown.len(),
+        times_ns: distinct,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn packets_become_frames_in_order_of_time() {
+        let json = br#"{"packets": [
+            {"pts_time": "0.080000", "flags": "K__"}, {"pts_time": "0.200000", "flags": "___"},
+            {"pts_time": "0.120000", "flags": "___"}, {"pts_time": "-0.040000", "flags": "_D_"}],
+            "streams": [{"width": 64, "height": 48}]}"#;
+        let probed = parse(json).unwrap();
+        assert_eq!((probed.size, probed.frames), ((64, 48), 3));
+        assert_eq!(
+            probed.times_ns.unwrap(),
+            [80_000_000, 120_000_000, 200_000_000]
+        );
+    }
+
+    #[test]
+    fn rotated_videos_are_as_wide_as_they_look() {
+        let json = br#"{"packets": [{"flags": "K__"}],
+            "streams": [{"width": 64, "height": 48, "side_data_list": [{"rotation": -90}]}]}"#;
+        let probed = parse(json).unwrap();
+        assert_eq!((probed.size, probed.times_ns), ((48, 64), None));
+    }
+
+    #[test]
+    fn no_video_is_told() {
+        for (json, problem) in [
+            ("{}", "no video stream"),
+            (r#"{"streams": [{}]}"#, "images' size"),
+            (r#"{"streams": [{"width": 1, "height": 1}]}"#, "no frame"),
+            ("x", "cannot be read"),
+        ] {
+            assert!(parse(json.as_bytes()).unwrap_err().contains(problem));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_never_panics(text in ".{0,80}") {
+            let _ = parse(text.as_bytes());
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! Running ffmpeg and ffprobe.
+
+use crate::{Error, Result};
+use std::ffi::OsStr;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// Longest complaint that is passed on, in characters.
+const LONGEST: usize = 400;
+
+/// Runs a program on `file` in a folder, and gives what it printed.
+///
+/// # Errors
+/// [`Error::Program`] where it is not installed, or fails.
+pub(super) fn run<S: AsRef<OsStr>>(
+    program: &'static str,
+    arguments: &[S],
+    file: &Path,
+    folder: &Path,
+) -> Result<Vec<u8>> {
+    let failed = |problem: String, remedy| Error::Program {
+        path: file.to_owned(),
+        program,
+        problem,
+        remedy,
+    };
+    let output = Command::new(program)
+        .args(arguments)
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|e| match e.kind() {
+            std::io::ErrorKind::NotFound => failed(
+                "is needed to read videos and is not installed".into(),
+                "install ffmpeg (it brings ffprobe) so that both are on the PATH, or extract the frames \
+                 elsewhere and give their folder",
+            ),
+            _ => failed(format!("cannot be run: {e}"), "check that it can be run from a terminal"),
+        })?;
+    if output.status.success() {
+        return Ok(output.stdout);
+    }
+    let said = String::from_utf8_lossy(&output.stderr);
+    let said: String = said.trim().chars().take(LONGEST).collect();
+    Err(failed(
+        format!("failed: {said}"),
+        "play the file to see whether it is whole; a newer ffmpeg may know its codec",
+    ))
+}

@@ -1,0 +1,358 @@
+//! Folders of images with tables beside them.
+
+mod common;
+#[path = "common/folder.rs"]
+mod folder;
+
+use common::TinyDrive;
+use deepfusion_data::{
+    CameraChoice, Dataset, DatasetKind, Error, GtKind, OpenOptions, Snippet, inspect,
+};
+use folder::{picture, write_drive, write_images};
+use image::{ImageBuffer, Luma};
+use nalgebra::Vector3;
+use std::fs;
+use std::path::Path;
+
+fn open(path: &Path) -> Dataset {
+    match Dataset::open(path, &OpenOptions::default()) {
+        Ok(mut datasets) => {
+            assert_eq!(datasets.len(), 1);
+            datasets.remove(0)
+        }
+        Err(error) => panic!("{error}\nhint: {:?}", error.hint()),
+    }
+}
+
+fn refusal(path: &Path) -> String {
+    let error = Dataset::open(path, &OpenOptions::default()).unwrap_err();
+    let hint = error.hint().expect("every refusal has a remedy");
+    format!("{error}\nhint: {hint}")
+}
+
+/// `cam_from_vehicle` of the mount that is written into `dataset.toml`, as its numbers there.
+fn mount(of: &Dataset) -> String {
+    let vehicle_from_cam = of.cam_from_vehicle().unwrap().inverse();
+    let place = vehicle_from_cam.translation();
+    // The camera's axes in the vehicle's: ahead, and down.
+    let (ahead, down) = (
+        vehicle_from_cam.rotate(&Vector3::z()),
+        vehicle_from_cam.rotate(&Vector3::y()),
+    );
+    let right = vehicle_from_cam.rotate(&Vector3::x());
+    format!(
+        "[mount]\nforward_m = {:?}\nleft_m = {:?}\nup_m = {:?}\nyaw_deg = {:?}\npitch_deg = {:?}\nroll_deg = {:?}\n",
+        place.x,
+        place.y,
+        place.z,
+        ahead.y.atan2(ahead.x).to_degrees(),
+        (-ahead.z).asin().to_degrees(),
+        (-right.z).atan2(-down.z).to_degrees(),
+    )
+}
+
+/// The same drive, once in KITTI's layout and once as a folder with tables, is the same to training: the
+/// images to the bit, motions to the nanosecond of the time stamps and the ten digits of the tables
+/// (1e-9 of some metres, and of angles below 1).
+#[test]
+fn a_kitti_drive_and_a_folder_of_it_give_the_same_snippets() {
+    let root = tempfile::tempdir().unwrap();
+    let drive = TinyDrive {
+        speed_mps: 8.0,
+        yaw_rate_radps: 0.4,
+        ..TinyDrive::default()
+    };
+    let kitti = open(&drive.write(&root.path().join("kitti")));
+    let own = root.path().join("own");
+    write_drive(&own, 8, 8.0, 0.4);
+    fs::write(own.join("dataset.toml"), mount(&kitti)).unwrap();
+    let own = open(&own);
+    assert_eq!(own.kind(), DatasetKind::Folder);
+    assert_eq!(own.intrinsics(0), kitti.intrinsics(0));
+    for offsets in [&[1][..], &[-1, 1]] {
+        let (a, b) = (
+            kitti.snippets(offsets, 0.5).unwrap(),
+            own.snippets(offsets, 0.5).unwrap(),
+        );
+        assert_eq!(a.len(), b.len());
+        for (a, b) in a.iter().zip(&b) {
+            same(a, b);
+            assert_eq!(
+                kitti.load_image(a.target).unwrap(),
+                own.load_image(b.target).unwrap()
+            );
+        }
+    }
+}
+
+fn same(a: &Snippet, b: &Snippet) {
+    assert_eq!(a.target, b.target);
+    for (a, b) in a.sources.iter().zip(&b.sources) {
+        assert_eq!((a.offset, a.frame), (b.offset, b.frame));
+        let (a, b) = (&a.motion, &b.motion);
+        assert!((a.dt_s - b.dt_s).abs() < 1e-9);
+        assert!((a.distance_m - b.distance_m).abs() < 1e-8, "{a:?} {b:?}");
+        let between = a.source_from_target.unwrap() * b.source_from_target.unwrap().inverse();
+        assert!(
+            between.translation().norm() < 1e-8 && between.angle() < 1e-8,
+            "{a:?} {b:?}"
+        );
+    }
+}
+
+#[test]
+fn without_a_yaw_rate_distances_are_known_and_turns_are_not() {
+    let root = tempfile::tempdir().unwrap();
+    write_drive(root.path(), 8, 10.0, 0.0);
+    let speeds: String = (0..40)
+        .map(|i| format!("{},10\n", f64::from(i) * 0.05))
+        .collect();
+    fs::write(
+        root.path().join("speed.csv"),
+        format!("time_s,speed_mps\n{speeds}"),
+    )
+    .unwrap();
+    let dataset = open(root.path());
+    assert!(!dataset.yaw_known());
+    for snippet in dataset.snippets(&[1], 0.5).unwrap() {
+        let motion = snippet.sources[0].motion;
+        assert!((motion.distance_m - 1.03).abs() < 1e-9);
+        assert_eq!(motion.source_from_target, None);
+    }
+    let seen = inspect(root.path()).unwrap();
+    assert_eq!(seen.drives[0].turn_rad, None);
+    assert!((seen.distance_m.unwrap() - 7.21).abs() < 1e-9);
+    let text = seen.to_string();
+    assert!(
+        text.contains("no yaw rate") && text.contains("turned unknown"),
+        "{text}"
+    );
+}
+
+#[test]
+fn an_inspection_tells_streams_and_what_is_assumed() {
+    let root = tempfile::tempdir().unwrap();
+    write_drive(root.path(), 8, 10.0, 0.1);
+    let seen = inspect(root.path()).unwrap();
+    assert_eq!(
+        (seen.kind, seen.frames, seen.size),
+        (DatasetKind::Folder, 8, Some([62, 19]))
+    );
+    let stream = |name: &str| seen.streams.iter().find(|s| s.name == name).unwrap();
+    assert!((stream("speed.csv").rate_hz.unwrap() - 9.7087).abs() < 1e-3);
+    assert_eq!((stream("frames").kind, stream("frames").gaps), ("image", 0));
+    assert!((seen.drives[0].turn_rad.unwrap() - 0.0721).abs() < 1e-6);
+    let text = seen.to_string();
+    assert!(
+        text.starts_with("image folder, 8 frames of 62x19"),
+        "{text}"
+    );
+    assert!(
+        text.contains("intrinsics.txt does not say for which size"),
+        "{text}"
+    );
+    assert!(text.contains("[mount] in dataset.toml"), "{text}");
+    let json = serde_json::to_value(&seen).unwrap();
+    assert_eq!(
+        (&json["kind"], &json["speed_mps"]["max"]),
+        (&"folder".into(), &10.0.into())
+    );
+}
+
+#[test]
+fn images_alone_open_and_say_why_they_cannot_train() {
+    let root = tempfile::tempdir().unwrap();
+    for n in 0..4 {
+        picture(n)
+            .save(root.path().join(format!("{n:03}.png")))
+            .unwrap();
+    }
+    fs::write(root.path().join("intrinsics.txt"), "36\n36\n30.5\n8.6\n").unwrap();
+    let dataset = open(root.path());
+    assert_eq!(dataset.frames().len(), 4);
+    assert_eq!(dataset.load_image(2).unwrap(), picture(2));
+    let error = dataset.snippets(&[1], 0.5).unwrap_err();
+    assert!(error.to_string().contains("it has no speeds"), "{error}");
+    assert!(error.hint().unwrap().contains("speed.csv"), "{error}");
+    fs::write(
+        root.path().join("speed.csv"),
+        "time_s,speed_mps\n0,1\n0.1,1\n",
+    )
+    .unwrap();
+    let error = open(root.path()).snippets(&[1], 0.5).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("nothing says when its frames were taken"),
+        "{error}"
+    );
+    assert!(
+        error.hint().unwrap().contains("fps in dataset.toml"),
+        "{error}"
+    );
+    assert!(dataset.moving_labels().unwrap().is_none());
+    assert!(matches!(
+        dataset.camera_paths().unwrap_err(),
+        Error::NoPath { .. }
+    ));
+}
+
+#[test]
+fn a_camera_is_never_made_up() {
+    let root = tempfile::tempdir().unwrap();
+    write_images(root.path(), &["a", "b"]);
+    let text = refusal(root.path());
+    assert!(
+        text.contains("fx, fy, cx, cy") && text.contains("intrinsics.txt"),
+        "{text}"
+    );
+    let options = OpenOptions {
+        intrinsics: Some([36.0, 36.0, 30.5, 8.6]),
+        ..OpenOptions::default()
+    };
+    let given = Dataset::open(root.path(), &options).unwrap();
+    assert_eq!(given[0].intrinsics(0).cx, 30.5);
+    fs::write(
+        root.path().join("dataset.toml"),
+        "intrinsics = [36, 36, 300, 8.6]",
+    )
+    .unwrap();
+    let text = refusal(root.path());
+    assert!(
+        text.contains("dataset.toml: cx is 300.0 in an image of 62 pixels"),
+        "{text}"
+    );
+    let other = OpenOptions {
+        camera: CameraChoice::Right,
+        ..options
+    };
+    let error = Dataset::open(root.path(), &other).unwrap_err();
+    assert!(matches!(error, Error::OneCamera { .. }), "{error}");
+}
+
+#[test]
+fn a_calibration_of_another_size_is_refused() {
+    let root = tempfile::tempdir().unwrap();
+    write_images(root.path(), &["a", "b"]);
+    let yaml = "image_width: 124\nimage_height: 38\ncamera_matrix: {rows: 3, cols: 3, data: [72, 0, 61, 0, 72, 17, 0, 0, 1]}\n";
+    fs::write(root.path().join("calibration.yaml"), yaml).unwrap();
+    let text = refusal(root.path());
+    assert!(
+        text.contains("is 62x19, its calibration says 124x38"),
+        "{text}"
+    );
+    assert!(
+        text.contains("calibration.yaml") && text.contains("resized images"),
+        "{text}"
+    );
+}
+
+#[test]
+fn clocks_without_a_common_time_are_refused_and_can_be_joined() {
+    let root = tempfile::tempdir().unwrap();
+    write_drive(root.path(), 8, 10.0, 0.0);
+    let speeds: String = (0..20)
+        .map(|i| format!("{:.1},10\n", 1e9 + f64::from(i) * 0.1))
+        .collect();
+    fs::write(
+        root.path().join("speed.csv"),
+        format!("time_s,speed_mps\n{speeds}"),
+    )
+    .unwrap();
+    let text = refusal(root.path());
+    assert!(
+        text.contains("none in common") && text.contains("start_s"),
+        "{text}"
+    );
+    fs::write(root.path().join("dataset.toml"), "start_s = 1000000000.2").unwrap();
+    let dataset = open(root.path());
+    assert_eq!(dataset.snippets(&[1], 0.5).unwrap().len(), 7);
+    // Half of the frames beyond the speeds: the rest can be used, and it is said.
+    fs::write(root.path().join("dataset.toml"), "start_s = 1000000001.5").unwrap();
+    let seen = inspect(root.path()).unwrap();
+    assert!(seen.drives[0].usable_pairs > 1 && seen.drives[0].usable_pairs < 7);
+    assert!(
+        seen.to_string().contains("of 8 frames have no speed"),
+        "{seen}"
+    );
+}
+
+#[test]
+fn depth_images_are_ground_truth_in_a_unit_that_is_said() {
+    let root = tempfile::tempdir().unwrap();
+    write_drive(root.path(), 3, 10.0, 0.0);
+    let depth = root.path().join("depth");
+    fs::create_dir(&depth).unwrap();
+    let image: ImageBuffer<Luma<u16>, _> = ImageBuffer::from_fn(62, 19, |x, y| {
+        Luma([if y == 0 { 9999 } else { 100 * x as u16 }])
+    });
+    image.save(depth.join("000001.png")).unwrap();
+    let text = refusal(root.path());
+    assert!(
+        text.contains("unit of the depth images") && text.contains("depth_unit_m"),
+        "{text}"
+    );
+    fs::write(
+        root.path().join("dataset.toml"),
+        "depth_unit_m = 0.001\ndepth_invalid = 9999\n",
+    )
+    .unwrap();
+    let dataset = open(root.path());
+    assert!(dataset.ground_truth(0, GtKind::Z).unwrap().is_none());
+    assert!(dataset.has_ground_truth(1) && !dataset.has_ground_truth(2));
+    let map = dataset.ground_truth(1, GtKind::Z).unwrap().unwrap();
+    assert_eq!(map.data[5], 0.0);
+    assert!((map.data[62 + 30] - 3.0).abs() < 1e-6);
+    let error = dataset.ground_truth(1, GtKind::Velodyne).unwrap_err();
+    assert!(matches!(error, Error::DepthKind { .. }), "{error}");
+    assert_eq!(inspect(root.path()).unwrap().drives[0].scans, 1);
+}
+
+#[test]
+fn distorted_images_are_corrected_when_they_are_loaded() {
+    let root = tempfile::tempdir().unwrap();
+    write_drive(root.path(), 3, 10.0, 0.0);
+    fs::remove_file(root.path().join("intrinsics.txt")).unwrap();
+    let yaml = "%YAML:1.0\n---\nimage_width: 62\nimage_height: 19\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   \
+        dt: d\n   data: [ 36., 0., 30.5, 0., 36., 8.6, 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   \
+        cols: 4\n   dt: d\n   data: [ -0.2, 0.02, 0., 0. ]\n";
+    fs::write(root.path().join("calibration.yaml"), yaml).unwrap();
+    let dataset = open(root.path());
+    let (k, image) = (dataset.intrinsics(0), dataset.load_image(0).unwrap());
+    assert_eq!((k.width, k.height), image.dimensions());
+    // A barrel lens shows the middle larger: seen without it, less than the whole width is left.
+    assert!(k.fx < 36.0 && k.fx > 25.0, "{k:?}");
+    // The red of a pixel is four times its column in the distorted image.
+    let ray = k.back_project(50.0, 9.0, 1.0);
+    let r2 = ray.x * ray.x + ray.y * ray.y;
+    let column = 36.0 * ray.x * (1.0 - 0.2 * r2 + 0.02 * r2 * r2) + 30.5;
+    let red = f64::from(image.get_pixel(50, 9).0[0]);
+    assert!((red - 4.0 * column).abs() <= 0.51, "{red} {column}");
+}
+
+#[test]
+fn a_split_selects_by_the_folders_name() {
+    let root = tempfile::tempdir().unwrap();
+    let drive = root.path().join("monday");
+    write_drive(&drive, 8, 10.0, 0.0);
+    let file = root.path().join("split.txt");
+    fs::write(&file, "monday 3 l\nmonday 5\n").unwrap();
+    let options = OpenOptions {
+        split: Some(deepfusion_data::Split::read(&file).unwrap()),
+        ..OpenOptions::default()
+    };
+    assert_eq!(
+        Dataset::open(&drive, &options).unwrap()[0].selected(),
+        [3, 5]
+    );
+    fs::write(&file, "tuesday 3\n").unwrap();
+    let options = OpenOptions {
+        split: Some(deepfusion_data::Split::read(&file).unwrap()),
+        ..OpenOptions::default()
+    };
+    let error = Dataset::open(&drive, &options).unwrap_err();
+    assert!(
+        matches!(error, Error::SplitSelectsNothing { .. }),
+        "{error}"
+    );
+}

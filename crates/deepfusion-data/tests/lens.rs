@@ -1,0 +1,57 @@
+//! Correction of a lens against OpenCV and SciPy, by `reference/lens_opencv.py`.
+
+use deepfusion_data::{Lens, load_rgb};
+use deepfusion_geometry::{Distortion, Intrinsics};
+use std::path::Path;
+
+fn intrinsics(numbers: &[f64]) -> Intrinsics {
+    Intrinsics {
+        fx: numbers[0],
+        fy: numbers[1],
+        cx: numbers[2],
+        cy: numbers[3],
+        width: 96,
+        height: 64,
+    }
+}
+
+#[test]
+fn corrected_images_equal_opencvs() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference");
+    let text = std::fs::read_to_string(folder.join("lens_opencv.txt")).unwrap();
+    let source = load_rgb(&folder.join("lens_source.png")).unwrap();
+    let numbers = |line: &str, skip| -> Vec<f64> {
+        let words = line.split_whitespace().skip(skip);
+        words.map(|w| w.parse().unwrap()).collect()
+    };
+    let lines: Vec<&str> = text.lines().collect();
+    let camera = intrinsics(&numbers(lines[0], 1));
+    for block in lines[1..].chunks(3) {
+        let name = block[0].split_whitespace().nth(1).unwrap();
+        let bent = Distortion::from_opencv(&numbers(block[0], 2)).unwrap();
+        let lens = Lens::new(camera, &bent).unwrap();
+        let k = lens.intrinsics();
+        let found = [k.fx, k.fy, k.cx, k.cy];
+        // The same rule over the same points: only the iterations' ends differ.
+        for (a, b) in found.iter().zip(numbers(block[1], 1)) {
+            assert!((a - b).abs() < 1e-5, "{name}: {found:?} {b}");
+        }
+        // OpenCV's own looks at fewer points of the border, which bends between them.
+        for (a, b) in found.iter().zip(numbers(block[2], 1)) {
+            assert!((a - b).abs() < 0.05, "{name}: {found:?} {b}");
+        }
+        let corrected = lens.correct(source.clone()).unwrap();
+        let expected = load_rgb(&folder.join(format!("lens_{name}.png"))).unwrap();
+        let differences = corrected
+            .iter()
+            .zip(expected.iter())
+            .map(|(a, b)| a.abs_diff(*b));
+        // Coordinates of single precision may round a value that lies between two the other way.
+        assert!(differences.clone().max().unwrap() <= 1, "{name}");
+        let other = differences.filter(|d| *d > 0).count();
+        assert!(
+            other < corrected.len() / 200,
+            "{name}: {other} values differ"
+        );
+    }
+}

@@ -1,0 +1,116 @@
+//! Videos, read by the machine's ffmpeg where it has one.
+
+mod common;
+#[path = "common/folder.rs"]
+mod folder;
+
+use deepfusion_data::{Dataset, DatasetKind, FrameImage, OpenOptions, RgbImage, inspect};
+use image::Rgb;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Ten frames of a flat colour each, 64x48 at 10 Hz, as a video with few key frames; `None` without ffmpeg.
+fn write_video(folder: &Path, name: &str) -> Option<PathBuf> {
+    for n in 0..10_u8 {
+        let image = RgbImage::from_pixel(64, 48, Rgb([20 * n, 120, 200 - 20 * n]));
+        image.save(folder.join(format!("source{n}.png"))).unwrap();
+    }
+    let video = folder.join(name);
+    let made = Command::new("ffmpeg")
+        .current_dir(folder)
+        .args(["-v", "error", "-framerate", "10", "-i", "source%d.png"])
+        .args(["-c:v", "mpeg4", "-q:v", "1", "-g", "5", "-bf", "2"])
+        .arg(name)
+        .status();
+    for n in 0..10 {
+        fs::remove_file(folder.join(format!("source{n}.png"))).unwrap();
+    }
+    match made {
+        Ok(status) if status.success() => Some(video),
+        _ => {
+            eprintln!("skipped: there is no ffmpeg that can write a video");
+            None
+        }
+    }
+}
+
+fn write_tables(folder: &Path) {
+    let speeds: String = (0..30)
+        .map(|i| format!("{},{}\n", f64::from(i) * 0.05, 36))
+        .collect();
+    fs::write(
+        folder.join("speed.csv"),
+        format!("time_s,speed_kmh\n{speeds}"),
+    )
+    .unwrap();
+    fs::write(folder.join("intrinsics.txt"), "50,50,31.5,23.5").unwrap();
+}
+
+#[test]
+fn a_video_gives_its_frames_in_any_order() {
+    let root = tempfile::tempdir().unwrap();
+    // A `%` in a path is no place for a number.
+    let folder = root.path().join("100% drive");
+    fs::create_dir(&folder).unwrap();
+    let Some(video) = write_video(&folder, "drive.mp4") else {
+        return;
+    };
+    write_tables(&folder);
+    for path in [&video, &folder] {
+        let mut datasets = Dataset::open(path, &OpenOptions::default()).unwrap();
+        let dataset = datasets.remove(0);
+        assert_eq!(
+            (dataset.kind(), dataset.name()),
+            (DatasetKind::Video, "drive")
+        );
+        assert_eq!(dataset.frames().len(), 10);
+        assert!((dataset.frames()[7].time_s.unwrap() - 0.7).abs() < 1e-6);
+        let image = &dataset.frames()[7].image;
+        assert!(matches!(image, FrameImage::Within { index: 7, .. }) && image.file().is_none());
+        for n in [7, 0, 9, 3] {
+            let image = dataset.load_image(n).unwrap();
+            // Colours pass through two codecs of 4:2:0: a few levels.
+            let [r, _, b] = image.get_pixel(32, 24).0.map(i32::from);
+            let n = n as i32;
+            assert!(
+                (r - 20 * n).abs() < 9 && (b - 200 + 20 * n).abs() < 9,
+                "{n}: {r} {b}"
+            );
+        }
+        let snippets = dataset.snippets(&[1], 0.5).unwrap();
+        assert_eq!(snippets.len(), 9);
+    }
+    // Decoded once, beside the video; another video under its name is decoded anew.
+    let cache = folder.join("drive.mp4.frames");
+    assert_eq!(fs::read_dir(&cache).unwrap().count(), 11);
+    fs::write(cache.join("0000000000.jpg"), "broken").unwrap();
+    let dataset = Dataset::open(&video, &OpenOptions::default())
+        .unwrap()
+        .remove(0);
+    assert!(dataset.load_image(0).is_err());
+    fs::remove_file(cache.join("origin.json")).unwrap();
+    fs::remove_dir_all(&cache).unwrap();
+    let dataset = Dataset::open(&video, &OpenOptions::default())
+        .unwrap()
+        .remove(0);
+    assert!(dataset.load_image(0).is_ok());
+    let seen = inspect(&folder).unwrap();
+    assert_eq!((seen.frames, seen.size), (10, Some([64, 48])));
+    assert!((seen.streams[0].rate_hz.unwrap() - 10.0).abs() < 1e-3);
+    assert!(seen.to_string().contains("time 0 of the tables"), "{seen}");
+}
+
+#[test]
+fn what_is_no_video_is_told() {
+    let root = tempfile::tempdir().unwrap();
+    let video = root.path().join("x.mp4");
+    fs::write(&video, "no video").unwrap();
+    let error = Dataset::open(&video, &OpenOptions::default()).unwrap_err();
+    // Without ffprobe, that it is needed; with it, what it says.
+    assert!(error.to_string().contains("x.mp4: ffprobe"), "{error}");
+    assert!(error.hint().is_some());
+    fs::write(root.path().join("y.mkv"), "another").unwrap();
+    let error = Dataset::open(root.path(), &OpenOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("2 videos are there"), "{error}");
+}

@@ -1,0 +1,185 @@
+use nalgebra::{Matrix2, Vector2};
+use serde::{Deserialize, Serialize};
+
+/// Steps of Newton's method before giving up; from inside a usual lens' image it takes 4 to 6.
+const MAX_STEPS: usize = 30;
+/// Where the distorted point is met to this, in units of the focal length: a millionth of a pixel.
+const TOLERANCE: f64 = 1e-10;
+
+/// What a lens does to a pinhole's image: radial and tangential distortion after Brown and Conrady, in
+/// the form of OpenCV's first eight coefficients and ROS's `plumb_bob` and `rational_polynomial`.
+///
+/// With x = X/Z, y = Y/Z, r² = x² + y² of a point in the camera frame, it is seen at
+///
+/// - g = (1 + k₁r² + k₂r⁴ + k₃r⁶) / (1 + k₄r² + k₅r⁴ + k₆r⁶)
+/// - x' = g·x + 2p₁xy + p₂(r² + 2x²)
+/// - y' = g·y + p₁(r² + 2y²) + 2p₂xy
+///
+/// and its pixel is (fx·x' + cx, fy·y' + cy).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Distortion {
+    /// Radial, of r², r⁴ and r⁶ above the fraction bar: k₁, k₂, k₃.
+    pub radial: [f64; 3],
+    /// Tangential: p₁, p₂.
+    pub tangential: [f64; 2],
+    /// Radial, below the fraction bar: k₄, k₅, k₆.
+    pub rational: [f64; 3],
+}
+
+impl Distortion {
+    /// From coefficients in OpenCV's order k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆; 0, 4, 5 or 8 of them. More
+    /// (thin prism, tilt) only where all further ones are zero.
+    ///
+    /// # Errors
+    /// A sentence that says what is wrong with them.
+    pub fn from_opencv(coefficients: &[f64]) -> Result<Self, String> {
+        if let Some(bad) = coefficients.iter().find(|c| !c.is_finite()) {
+            return Err(format!("a coefficient is {bad}"));
+        }
+        let used = match coefficients.len() {
+            0 | 4 | 5 | 8 => coefficients,
+            12 | 14 if coefficients[8..].iter().all(|c| *c == 0.0) => &coefficients[..8],
+            12 | 14 => return Err("thin prism or tilt coefficients are not supported".into()),
+            n => {
+                return Err(format!(
+                    "{n} coefficients, expected k1, k2, p1, p2[, k3[, k4, k5, k6]]"
+                ));
+            }
+        };
+        let at = |i: usize| used.get(i).copied().unwrap_or(0.0);
+        Ok(Self {
+            radial: [at(0), at(1), at(4)],
+            tangential: [at(2), at(3)],
+            rational: [at(5), at(6), at(7)],
+        })
+    }
+
+    /// Whether it leaves every point where it is.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Where the lens shows an ideal point; both at a distance of 1 from the camera (x = X/Z).
+    #[must_use]
+    pub fn distort(&self, ideal: &Vector2<f64>) -> Vector2<f64> {
+        self.with_slope(ideal).0
+    }
+
+    /// The ideal point that the lens shows at `seen`; `None` where there is none near it: the polynomial
+    /// turns back outside the image that it was fitted to.
+    #[must_use]
+    pub fn undistort(&self, seen: &Vector2<f64>) -> Option<Vector2<f64>> {
+        let mut ideal = *seen;
+        for _ in 0..MAX_STEPS {
+            let (shown, slope) = self.with_slope(&ideal);
+            // Beyond the fold, neighbouring points change places.
+            if slope.determinant() <= 0.0 {
+                return None;
+            }
+            let off = shown - seen;
+            if off.norm() < TOLERANCE {
+                return Some(ideal);
+            }
+            ideal -= slope.try_inverse()? * off;
+        }
+        None
+    }
+
+    /// Where the point is shown, and the derivatives of that: ∂(x', y') / ∂(x, y).
+    fn with_slope(&self, p: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+        let (x, y, r2) = (p.x, p.y, p.norm_squared());
+        let [p1, p2] = self.tangential;
+        let polynomial = |k: &[f64; 3]| 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[2]));
+        let derivative = |k: &[f64; 3]| k[0] + r2 * (2.0 * k[1] + r2 * 3.0 * k[2]);
+        let (above, below) = (polynomial(&self.radial), polynomial(&self.rational));
+        let g = above / below;
+        // dg / dr²
+        let dg = (derivative(&self.radial) - g * derivative(&self.rational)) / below;
+        let shown = Vector2::new(
+            g * x + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+            g * y + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+        );
+        let across = 2.0 * (dg * x * y + p1 * x + p2 * y);
+        let slope = Matrix2::new(
+            g + 2.0 * (dg * x * x + p1 * y + 3.0 * p2 * x),
+            across,
+            across,
+            g + 2.0 * (dg * y * y + 3.0 * p1 * y + p2 * x),
+        );
+        (shown, slope)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// EuRoC's cam0, a wide lens.
+    fn euroc() -> Distortion {
+        Distortion::from_opencv(&[-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]).unwrap()
+    }
+
+    #[test]
+    fn coefficients_are_counted() {
+        assert!(Distortion::from_opencv(&[]).unwrap().is_none());
+        let five = Distortion::from_opencv(&[0.1, 0.2, 0.3, 0.4, 0.5]).unwrap();
+        assert_eq!(
+            (five.radial, five.tangential),
+            ([0.1, 0.2, 0.5], [0.3, 0.4])
+        );
+        let mut twelve = [0.1; 12];
+        assert!(Distortion::from_opencv(&twelve).is_err());
+        twelve[8..].fill(0.0);
+        assert_eq!(Distortion::from_opencv(&twelve).unwrap().rational, [0.1; 3]);
+        assert!(
+            Distortion::from_opencv(&[0.1; 3])
+                .unwrap_err()
+                .contains("3 coefficients")
+        );
+        assert!(Distortion::from_opencv(&[f64::NAN; 4]).is_err());
+    }
+
+    #[test]
+    fn behind_the_fold_there_is_no_point() {
+        // x(1 - x²) is 0.385 at most, at x = 0.577.
+        let fold = Distortion::from_opencv(&[-1.0, 0.0, 0.0, 0.0]).unwrap();
+        assert!(fold.undistort(&Vector2::new(0.3, 0.0)).is_some());
+        assert_eq!(fold.undistort(&Vector2::new(0.5, 0.0)), None);
+    }
+
+    proptest! {
+        #[test]
+        fn undistortion_inverts_distortion(x in -0.8..0.8f64, y in -0.5..0.5f64) {
+            let ideal = Vector2::new(x, y);
+            let back = euroc().undistort(&euroc().distort(&ideal)).unwrap();
+            prop_assert!((back - ideal).norm() < 1e-9, "{back}");
+        }
+
+        /// The slope is that of the function, by central differences. Their error is h² times the third
+        /// derivative (some tens at most here), 1e-9, and that of rounding, 1e-16 / h.
+        #[test]
+        fn the_slope_is_the_derivative(
+            x in -0.5..0.5f64, y in -0.5..0.5f64, k in proptest::collection::vec(-0.2..0.2f64, 8),
+        ) {
+            let lens = Distortion::from_opencv(&k).unwrap();
+            let p = Vector2::new(x, y);
+            let h = 1e-5;
+            for (column, step) in [Vector2::new(h, 0.0), Vector2::new(0.0, h)].into_iter().enumerate() {
+                let measured = (lens.distort(&(p + step)) - lens.distort(&(p - step))) / (2.0 * h);
+                let slope = lens.with_slope(&p).1.column(column).into_owned();
+                prop_assert!((measured - slope).norm() < 1e-7, "{measured} {slope}");
+            }
+        }
+
+        #[test]
+        fn any_numbers_end(k in proptest::collection::vec(-10.0..10.0f64, 8), x in -5.0..5.0f64, y in -5.0..5.0f64) {
+            let lens = Distortion::from_opencv(&k).unwrap();
+            let seen = Vector2::new(x, y);
+            if let Some(ideal) = lens.undistort(&seen) {
+                prop_assert!((lens.distort(&ideal) - seen).norm() < 1e-9);
+            }
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! The lens model against OpenCV's, by `reference/distortion_opencv.py`.
+
+use deepfusion_geometry::Distortion;
+use nalgebra::Vector2;
+
+/// OpenCV computes in double precision as we do: points differ by the order of operations, 1e-15, and
+/// undistorted ones by where either iteration stops, 1e-10.
+#[test]
+fn distorted_points_equal_opencvs() {
+    let text = include_str!("reference/distortion_opencv.txt");
+    let (mut lens, mut points) = (Distortion::default(), 0);
+    for line in text.lines() {
+        if let Some(rest) = line.strip_prefix("lens ") {
+            let words = rest.split_whitespace().skip(1);
+            let coefficients: Vec<f64> = words.map(|w| w.parse().unwrap()).collect();
+            lens = Distortion::from_opencv(&coefficients).unwrap();
+            continue;
+        }
+        let v: Vec<f64> = line
+            .split_whitespace()
+            .map(|w| w.parse().unwrap())
+            .collect();
+        let (ideal, seen) = (Vector2::new(v[0], v[1]), Vector2::new(v[2], v[3]));
+        assert!((lens.distort(&ideal) - seen).norm() < 1e-13, "{line}");
+        let back = lens.undistort(&seen).expect("OpenCV finds it too");
+        assert!((back - ideal).norm() < 1e-9, "{line}");
+        points += 1;
+    }
+    assert!(points > 60, "{points}");
+}
