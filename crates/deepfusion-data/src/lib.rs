@@ -6,7 +6,6 @@
 
 mod dataset;
 mod depth_png;
-mod ego_motion;
 mod error;
 mod export;
 mod inspect;
@@ -23,8 +22,8 @@ mod split;
 mod write;
 
 pub use dataset::{Camera, CameraChoice, Dataset, DatasetKind, Frame, OpenOptions};
+pub use deepfusion_motion::{VehicleMotion, VehicleTrack};
 pub use depth_png::{read_depth_png, write_depth_png};
-pub use ego_motion::{VehicleMotion, VehicleTrack};
 pub use error::{Error, Result};
 pub use export::{export_gt, ground_truth_names};
 pub use image::RgbImage;
