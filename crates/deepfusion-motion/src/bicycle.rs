@@ -1,0 +1,202 @@
+//! How a vehicle turns when its front wheels do (Eq. 26–27).
+
+use crate::{Error, Result, Signal};
+use serde::{Deserialize, Serialize};
+
+/// The kinematic bicycle model: both wheels of an axle are one, and none slips.
+///
+/// θ̇ = v / L · tan δ (Eq. 27), where v is the forward speed of the **rear axle's** middle, which is
+/// the vehicle's origin; L the wheelbase; δ the road wheels' angle. A steering wheel's angle s gives
+/// δ = (s − offset) / ratio; a signal that already is the road wheels' angle has ratio 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bicycle {
+    /// Distance between the axles, in metres.
+    pub wheelbase_m: f64,
+    /// Steering wheel's angle over road wheels' angle; 1 where the signal is the road wheels' angle.
+    #[serde(default = "one")]
+    pub steering_ratio: f64,
+    /// What the steering signal reads when the car drives straight, in radians.
+    #[serde(default)]
+    pub steering_offset_rad: f64,
+    /// Understeer K, in s²/m²: tyres slip in fast bends, θ̇ = v tan δ / (L (1 + K v²)). 0, the
+    /// default, is Eq. 27; cars have 0.001 to 0.003.
+    #[serde(default)]
+    pub understeer_s2_per_m2: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Bicycle {
+    /// A vehicle whose steering signal is the road wheels' angle.
+    #[must_use]
+    pub fn new(wheelbase_m: f64) -> Self {
+        Self {
+            wheelbase_m,
+            steering_ratio: 1.0,
+            steering_offset_rad: 0.0,
+            understeer_s2_per_m2: 0.0,
+        }
+    }
+
+    /// The same with the angle of a steering wheel, `steering_ratio` times that of the road wheels.
+    #[must_use]
+    pub fn with_steering_wheel(self, steering_ratio: f64) -> Self {
+        Self {
+            steering_ratio,
+            ..self
+        }
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::Config`] names the first field that no vehicle has.
+    pub fn validate(&self) -> Result<()> {
+        let check = |ok: bool, field, value: f64, expected| {
+            ok.then_some(()).ok_or(Error::Config {
+                field,
+                value,
+                expected,
+            })
+        };
+        check(
+            (0.3..=20.0).contains(&self.wheelbase_m),
+            "wheelbase_m",
+            self.wheelbase_m,
+            "0.3 to 20 m",
+        )?;
+        // Some makers count to the right: a negative ratio says so.
+        check(
+            (0.5..=60.0).contains(&self.steering_ratio.abs()),
+            "steering_ratio",
+            self.steering_ratio,
+            "0.5 to 60, negative where the signal grows to the right",
+        )?;
+        check(
+            self.steering_offset_rad.abs() < 3.2,
+            "steering_offset_rad",
+            self.steering_offset_rad,
+            "an angle in radians",
+        )?;
+        check(
+            (0.0..=0.02).contains(&self.understeer_s2_per_m2),
+            "understeer_s2_per_m2",
+            self.understeer_s2_per_m2,
+            "0 to 0.02 s²/m²",
+        )
+    }
+
+    /// Yaw rate in rad/s, positive to the left, at a speed in m/s and a reading of the steering signal
+    /// in radians. A road wheel turns no further than 1.2 rad here: beyond, the reading is wrong, and
+    /// a tangent near its pole would turn the car on the spot.
+    #[must_use]
+    pub fn yaw_rate(&self, speed_mps: f64, steering_rad: f64) -> f64 {
+        let delta = (steering_rad - self.steering_offset_rad) / self.steering_ratio;
+        let slip = 1.0 + self.understeer_s2_per_m2 * speed_mps * speed_mps;
+        speed_mps * delta.clamp(-1.2, 1.2).tan() / (self.wheelbase_m * slip)
+    }
+
+    /// θ̇_V over time: at every sample of the steering signal for which there is a speed, and at every
+    /// sample of the speed for which there is a steering angle. Its integral is θ_V (Eq. 27).
+    #[must_use]
+    pub fn yaw_rate_signal(&self, speed: &Signal, steering: &Signal) -> Signal {
+        let mut times: Vec<f64> = [speed.times_s(), steering.times_s()].concat();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let samples = times.iter().filter_map(|t| {
+            let (v, s) = (speed.at(*t)?, steering.at(*t)?);
+            Some((*t, self.yaw_rate(v, s)))
+        });
+        // A gap of either is a gap of the product: its samples are missing there. Elsewhere its samples
+        // are at least as close as those of the closer one.
+        Signal::with_max_gap(samples, speed.max_gap_s().min(steering.max_gap_s()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn constant(value: f64) -> Signal {
+        Signal::new((0..=100).map(|i| (f64::from(i) * 0.02, value)))
+    }
+
+    #[test]
+    fn a_circle_has_the_radius_of_the_geometry() {
+        // R = L / tan δ: with δ = atan(2.7 / 10) the rear axle drives a circle of 10 m.
+        let bicycle = Bicycle::new(2.7).with_steering_wheel(15.0);
+        let steering = constant(15.0 * (0.27_f64).atan());
+        let yaw = bicycle.yaw_rate_signal(&constant(5.0), &steering);
+        let turned = yaw.integral(0.0, 2.0).unwrap();
+        assert!((turned - 1.0).abs() < 1e-12, "{turned}");
+    }
+
+    #[test]
+    fn the_offset_is_straight_ahead_and_the_sign_can_be_turned() {
+        let mut bicycle = Bicycle::new(2.7).with_steering_wheel(-15.0);
+        bicycle.steering_offset_rad = 0.1;
+        assert!(bicycle.yaw_rate(20.0, 0.1).abs() < 1e-15);
+        assert!(bicycle.yaw_rate(20.0, 0.3) < 0.0);
+    }
+
+    #[test]
+    fn understeer_turns_less_the_faster_it_goes() {
+        let mut bicycle = Bicycle::new(2.5);
+        let plain = bicycle.yaw_rate(20.0, 0.02);
+        bicycle.understeer_s2_per_m2 = 0.0025;
+        assert!((bicycle.yaw_rate(20.0, 0.02) - plain / 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_gap_of_either_is_a_gap() {
+        let gappy = Signal::new(
+            (0..=100)
+                .filter(|i| !(40..60).contains(i))
+                .map(|i| (f64::from(i) * 0.02, 1.0)),
+        );
+        for (speed, steering) in [(constant(1.0), gappy.clone()), (gappy, constant(1.0))] {
+            let yaw = Bicycle::new(2.7).yaw_rate_signal(&speed, &steering);
+            assert!(yaw.integral(0.1, 0.5).is_some());
+            assert!(yaw.integral(0.5, 1.5).is_none());
+        }
+        assert!(
+            Bicycle::new(2.7)
+                .yaw_rate_signal(&Signal::default(), &constant(1.0))
+                .is_empty()
+        );
+    }
+
+    #[test]
+    fn impossible_vehicles_are_named() {
+        let bad = [
+            (Bicycle::new(f64::NAN), "wheelbase_m"),
+            (Bicycle::new(0.0), "wheelbase_m"),
+            (Bicycle::new(2.7).with_steering_wheel(0.0), "steering_ratio"),
+            (
+                Bicycle {
+                    steering_offset_rad: 40.0,
+                    ..Bicycle::new(2.7)
+                },
+                "steering_offset_rad",
+            ),
+            (
+                Bicycle {
+                    understeer_s2_per_m2: -1.0,
+                    ..Bicycle::new(2.7)
+                },
+                "understeer_s2_per_m2",
+            ),
+        ];
+        for (bicycle, field) in bad {
+            let error = bicycle.validate().unwrap_err();
+            assert!(error.to_string().contains(field), "{error}");
+            assert!(error.hint().is_some());
+        }
+        assert!(Bicycle::new(2.7).validate().is_ok());
+        // A reading far off stays finite.
+        assert!(Bicycle::new(2.7).yaw_rate(10.0, 1e9).is_finite());
+    }
+}

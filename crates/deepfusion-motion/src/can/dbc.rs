@@ -1,0 +1,188 @@
+use super::{BitLayout, ByteOrder, CanId, CanSignal, MultiplexCondition, Number};
+use crate::{Error, Result};
+use can_dbc::{MessageId, MultiplexIndicator, SignalExtendedValueType};
+use std::path::Path;
+
+/// How many names an error lists.
+const NAMES_SHOWN: usize = 12;
+
+/// A DBC file: which signals lie where in which frames.
+#[derive(Debug, Clone)]
+pub struct Dbc(can_dbc::Dbc);
+
+impl Dbc {
+    /// Reads a file. It may be in UTF-8 or Latin-1 (units such as "°" are not always in UTF-8).
+    ///
+    /// # Errors
+    /// [`Error::File`]; [`Error::Dbc`] with the line that cannot be read.
+    pub fn open(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+        let text = String::from_utf8(bytes)
+            .unwrap_or_else(|e| e.as_bytes().iter().map(|b| char::from(*b)).collect());
+        Self::parse(&text).map_err(|error| match error {
+            Error::Dbc { problem } => Error::Dbc {
+                problem: format!("{}: {problem}", path.display()),
+            },
+            other => other,
+        })
+    }
+
+    /// Reads a file's text.
+    ///
+    /// # Errors
+    /// [`Error::Dbc`] with the line that cannot be read.
+    pub fn parse(text: &str) -> Result<Self> {
+        can_dbc::Dbc::try_from(text)
+            .map(Self)
+            .map_err(|e| Error::Dbc {
+                problem: e.to_string(),
+            })
+    }
+
+    /// All signals' names, "Message.Signal", in the file's order.
+    pub fn names(&self) -> impl Iterator<Item = String> {
+        self.0.messages.iter().flat_map(|message| {
+            let signals = message.signals.iter();
+            signals.map(|signal| format!("{}.{}", message.name, signal.name))
+        })
+    }
+
+    /// The unit of a signal, as the file writes it; `None` where there is no such signal.
+    #[must_use]
+    pub fn unit(&self, name: &str) -> Option<&str> {
+        self.find(name).ok().map(|(_, signal)| signal.unit.as_str())
+    }
+
+    /// A signal by its name, "Message.Signal".
+    ///
+    /// # Errors
+    /// [`Error::NoSignal`] lists what there is; [`Error::Layout`] for a signal that fits into no frame.
+    pub fn signal(&self, name: &str) -> Result<CanSignal> {
+        let (message, signal) = self.find(name)?;
+        let layout = self.layout(message, signal);
+        layout.validate(name)?;
+        let mut multiplexed = Vec::new();
+        self.conditions(message, signal, &mut multiplexed);
+        for condition in &multiplexed {
+            condition.switch.validate(name)?;
+        }
+        Ok(CanSignal {
+            id: id(message.id),
+            layout,
+            multiplexed,
+        })
+    }
+
+    fn find(&self, name: &str) -> Result<(&can_dbc::Message, &can_dbc::Signal)> {
+        let missing = |problem: String| Error::NoSignal {
+            name: name.to_owned(),
+            problem,
+        };
+        let Some((message_name, signal_name)) = name.split_once('.') else {
+            return Err(missing("expected \"Message.Signal\"".into()));
+        };
+        let messages = &self.0.messages;
+        let Some(message) = messages.iter().find(|m| m.name == message_name) else {
+            let names = some_names(messages.iter().map(|m| m.name.as_str()));
+            return Err(missing(format!(
+                "no message `{message_name}`; there are {names}"
+            )));
+        };
+        let signals = &message.signals;
+        let Some(signal) = signals.iter().find(|s| s.name == signal_name) else {
+            let names = some_names(signals.iter().map(|s| s.name.as_str()));
+            return Err(missing(format!("`{message_name}` has {names}")));
+        };
+        Ok((message, signal))
+    }
+
+    fn layout(&self, message: &can_dbc::Message, signal: &can_dbc::Signal) -> BitLayout {
+        let mut float_types = self.0.signal_extended_value_type_list.iter();
+        let float_type = float_types
+            .find(|e| e.message_id == message.id && e.signal_name == signal.name)
+            .map(|e| e.signal_extended_value_type);
+        let number = match (float_type, signal.value_type) {
+            (Some(SignalExtendedValueType::IEEEfloat32Bit), _) => Number::Float32,
+            (Some(SignalExtendedValueType::IEEEdouble64bit), _) => Number::Float64,
+            (_, can_dbc::ValueType::Signed) => Number::Signed,
+            (_, can_dbc::ValueType::Unsigned) => Number::Unsigned,
+        };
+        // Beyond 16 bits is beyond any frame: refused when the layout is checked.
+        let bits = |value: u64| u16::try_from(value).unwrap_or(u16::MAX);
+        BitLayout {
+            start_bit: bits(signal.start_bit),
+            length: bits(signal.size),
+            byte_order: match signal.byte_order {
+                can_dbc::ByteOrder::LittleEndian => ByteOrder::Intel,
+                can_dbc::ByteOrder::BigEndian => ByteOrder::Motorola,
+            },
+            number,
+            scale: signal.factor,
+            offset: signal.offset,
+        }
+    }
+
+    /// What must hold for a signal to be in its frame: its own multiplexor's value, and what must hold
+    /// for that multiplexor to be there itself.
+    fn conditions(
+        &self,
+        message: &can_dbc::Message,
+        signal: &can_dbc::Signal,
+        found: &mut Vec<MultiplexCondition>,
+    ) {
+        let (MultiplexIndicator::MultiplexedSignal(value)
+        | MultiplexIndicator::MultiplexorAndMultiplexedSignal(value)) =
+            signal.multiplexer_indicator
+        else {
+            return;
+        };
+        // `SG_MUL_VAL_` names the multiplexor and ranges; without it, there is one multiplexor and
+        // one value.
+        let mut extended = self.0.extended_multiplex.iter();
+        let extended =
+            extended.find(|e| e.message_id == message.id && e.signal_name == signal.name);
+        let is_switch = |s: &&can_dbc::Signal| match extended {
+            Some(extended) => s.name == extended.multiplexor_signal_name,
+            None => s.multiplexer_indicator == MultiplexIndicator::Multiplexor,
+        };
+        let Some(switch) = message.signals.iter().find(is_switch) else {
+            // Nothing selects it: it can never be told to be there.
+            return found.push(MultiplexCondition {
+                switch: self.layout(message, signal),
+                ranges: Vec::new(),
+            });
+        };
+        let ranges = match extended {
+            Some(extended) => {
+                let mappings = extended.mappings.iter();
+                mappings.map(|m| (m.min_value, m.max_value)).collect()
+            }
+            None => vec![(value, value)],
+        };
+        found.push(MultiplexCondition {
+            switch: self.layout(message, switch),
+            ranges,
+        });
+        // A file could name multiplexors in a circle; a real chain is no longer than its message.
+        if found.len() <= message.signals.len() && switch.name != signal.name {
+            self.conditions(message, switch, found);
+        }
+    }
+}
+
+fn id(id: MessageId) -> CanId {
+    match id {
+        MessageId::Standard(id) => CanId::Standard(id),
+        MessageId::Extended(id) => CanId::Extended { extended: id },
+    }
+}
+
+fn some_names<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> String {
+    let count = names.len();
+    let shown: Vec<&str> = names.take(NAMES_SHOWN).collect();
+    match count.checked_sub(shown.len()) {
+        _ if count == 0 => "none".into(),
+        Some(0) | None => shown.join(", "),
+        Some(more) => format!("{} and {more} more", shown.join(", ")),
+    }
+}

@@ -1,0 +1,120 @@
+use super::BitLayout;
+use crate::Signal;
+use serde::{Deserialize, Serialize};
+
+/// What a frame is known by on the bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum CanId {
+    /// 11 bits.
+    Standard(u16),
+    /// 29 bits.
+    Extended {
+        /// The identifier, without a flag for its kind.
+        extended: u32,
+    },
+}
+
+/// A frame off the bus.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CanFrame<'a> {
+    /// When it was received, in seconds.
+    pub time_s: f64,
+    /// Its identifier.
+    pub id: CanId,
+    /// Its data: up to 8 bytes, up to 64 for CAN FD.
+    pub data: &'a [u8],
+}
+
+/// A signal that is in a frame only when another number of the frame says so.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MultiplexCondition {
+    /// Where the multiplexor (the number that selects) lies.
+    pub switch: BitLayout,
+    /// Its raw values, first and last of each range, for which the signal is there.
+    pub ranges: Vec<(u64, u64)>,
+}
+
+/// One signal of one frame: what a DBC file's `SG_` line says, or a configuration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CanSignal {
+    /// The frame's identifier.
+    pub id: CanId,
+    /// Where the number lies, and its scale and offset.
+    pub layout: BitLayout,
+    /// All must hold for the signal to be there.
+    #[serde(default)]
+    pub multiplexed: Vec<MultiplexCondition>,
+}
+
+impl CanSignal {
+    /// The physical value in the data of a frame with this signal's identifier; `None` where the frame
+    /// does not carry it, or is too short.
+    #[must_use]
+    pub fn decode(&self, data: &[u8]) -> Option<f64> {
+        let selected = |condition: &MultiplexCondition| {
+            let raw = condition.switch.raw(data);
+            raw.is_some_and(|raw| {
+                condition
+                    .ranges
+                    .iter()
+                    .any(|(a, b)| (*a..=*b).contains(&raw))
+            })
+        };
+        let there = self.multiplexed.iter().all(selected);
+        there.then(|| self.layout.decode(data)).flatten()
+    }
+
+    /// The signal over a recording, in its physical unit.
+    #[must_use]
+    pub fn over_time<'a>(&self, frames: impl IntoIterator<Item = CanFrame<'a>>) -> Signal {
+        let own = frames.into_iter().filter(|frame| frame.id == self.id);
+        Signal::new(own.filter_map(|frame| Some((frame.time_s, self.decode(frame.data)?))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What somebody without a DBC file writes.
+    const CONFIG: &str = r#"
+        id = 0x158
+        layout = { start_bit = 7, length = 16, byte_order = "motorola", scale = 0.0027777778 }
+    "#;
+
+    #[test]
+    fn a_signal_from_a_configuration_over_time() {
+        let speed: CanSignal = toml::from_str(CONFIG).unwrap();
+        let frame = |time_s, id, data| CanFrame { time_s, id, data };
+        let own = CanId::Standard(0x158);
+        let frames = [
+            frame(0.0, own, &[0x0e, 0x10, 0][..]),
+            frame(0.005, CanId::Standard(0x159), &[0xff, 0xff, 0]),
+            frame(0.006, CanId::Extended { extended: 0x158 }, &[0xff, 0xff, 0]),
+            frame(0.01, own, &[0x1c, 0x20, 0]),
+            frame(0.015, own, &[0x1c]),
+        ];
+        let signal = speed.over_time(frames);
+        assert_eq!(signal.times_s(), [0.0, 0.01]);
+        assert!((signal.values()[0] - 10.0).abs() < 1e-6, "{signal:?}");
+        assert!((signal.values()[1] - 20.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_configuration_survives_its_file() {
+        let mut signal: CanSignal = toml::from_str(CONFIG).unwrap();
+        signal.id = CanId::Extended {
+            extended: 0x18fe_f100,
+        };
+        let switch = signal.layout;
+        signal.multiplexed = vec![MultiplexCondition {
+            switch,
+            ranges: vec![(0, 2)],
+        }];
+        let text = toml::to_string(&signal).unwrap();
+        assert_eq!(toml::from_str::<CanSignal>(&text).unwrap(), signal);
+    }
+}

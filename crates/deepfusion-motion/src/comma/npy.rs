@@ -1,0 +1,130 @@
+//! A NumPy array file of numbers in rows.
+
+use crate::{Error, Result};
+use ndarray::ArrayD;
+use ndarray_npy::ReadNpyExt;
+use std::path::Path;
+
+/// Rows of `columns` numbers.
+#[derive(Debug)]
+pub(super) struct Table {
+    pub values: Vec<f64>,
+    pub columns: usize,
+}
+
+impl Table {
+    /// Reads an array of `float64` or `float32` with so many columns; one column may be flat.
+    pub fn read(path: &Path, columns: usize) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+        Self::parse(&bytes, columns).map_err(|problem| Error::Array {
+            path: path.to_owned(),
+            problem,
+        })
+    }
+
+    fn parse(bytes: &[u8], columns: usize) -> std::result::Result<Self, String> {
+        check_header(bytes)?;
+        let array = ArrayD::<f64>::read_npy(bytes)
+            .or_else(|_| ArrayD::<f32>::read_npy(bytes).map(|a| a.mapv(f64::from)))
+            .map_err(|e| format!("no array of float64 or float32: {e}"))?;
+        let fits = match array.shape() {
+            [_] => columns == 1,
+            [_, c] => *c == columns,
+            _ => false,
+        };
+        if !fits {
+            let shape: Vec<String> = array.shape().iter().map(usize::to_string).collect();
+            return Err(format!("is {}, expected N×{columns}", shape.join("×")));
+        }
+        Ok(Self {
+            // In logical order, whichever way the file stores it.
+            values: array.iter().copied().collect(),
+            columns,
+        })
+    }
+}
+
+/// Checks what a reader would allocate before it reads: the header's length against the file's.
+fn check_header(bytes: &[u8]) -> std::result::Result<(), String> {
+    let two = |at: usize| {
+        bytes
+            .get(at..at + 2)
+            .map(|b| usize::from(b[0]) | usize::from(b[1]) << 8)
+    };
+    let (Some(b"\x93NUMPY"), Some(version)) = (bytes.get(..6), bytes.get(6)) else {
+        return Err("is no NumPy array".into());
+    };
+    let header = match version {
+        1 => two(8).map(|length| 10 + length),
+        _ => two(8)
+            .zip(two(10))
+            .map(|(low, high)| 12 + (low | high << 16)),
+    };
+    match header {
+        Some(length) if length <= bytes.len() => Ok(()),
+        _ => Err("ends within its header".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array1, Array2, ShapeBuilder};
+    use ndarray_npy::WriteNpyExt;
+    use proptest::prelude::*;
+
+    fn bytes(array: &Array2<f64>) -> Vec<u8> {
+        let mut out = Vec::new();
+        array.write_npy(&mut out).unwrap();
+        out
+    }
+
+    #[test]
+    fn rows_are_rows_in_either_order_of_storage() {
+        let rows = Array2::from_shape_fn((4, 3), |(r, c)| (10 * r + c) as f64);
+        let mut columns = Array2::zeros((4, 3).f());
+        columns.assign(&rows);
+        for array in [rows, columns] {
+            let table = Table::parse(&bytes(&array), 3).unwrap();
+            assert_eq!(table.values[..4], [0.0, 1.0, 2.0, 10.0]);
+        }
+    }
+
+    #[test]
+    fn float32_and_flat_arrays_are_read() {
+        let mut out = Vec::new();
+        let flat: Array1<f32> = Array1::from(vec![0.5, 1.5]);
+        flat.write_npy(&mut out).unwrap();
+        assert_eq!(Table::parse(&out, 1).unwrap().values, [0.5, 1.5]);
+        assert!(Table::parse(&out, 3).unwrap_err().contains("expected N×3"));
+    }
+
+    #[test]
+    fn a_header_that_lies_about_lengths_allocates_nothing() {
+        let mut file = b"\x93NUMPY\x02\x00".to_vec();
+        file.extend([0xff, 0xff, 0xff, 0x7f]);
+        assert!(Table::parse(&file, 1).unwrap_err().contains("header"));
+        // A shape of 2^40 rows with 16 bytes behind it.
+        let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1099511627776, ), }";
+        let mut file = b"\x93NUMPY\x01\x00".to_vec();
+        file.extend((header.len() as u16).to_le_bytes());
+        file.extend(header.as_bytes());
+        file.extend([0; 16]);
+        assert!(Table::parse(&file, 1).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_never_panics(mut tail in proptest::collection::vec(any::<u8>(), 0..200), real in any::<bool>()) {
+            let mut file = if real { b"\x93NUMPY\x01\x00".to_vec() } else { Vec::new() };
+            file.append(&mut tail);
+            let _ = Table::parse(&file, 1);
+        }
+
+        #[test]
+        fn a_cut_file_is_an_error(cut in 0usize..224) {
+            let whole = bytes(&Array2::zeros((4, 3)));
+            prop_assert!(Table::parse(&whole[..cut.min(whole.len() - 1)], 3).is_err());
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! A vehicle's wheelbase and steering ratio from its own speed, steering and yaw rate.
+//!
+//! The bicycle model (Eq. 27) with a gyro's bias b, s the steering signal and s₀ its zero:
+//!
+//! ω = v · tan((s − s₀) / ρ) / L + b
+//!
+//! # What a drive shows, and what it does not
+//! With x = (s − s₀) / ρ, the logarithm of the turning changes with those of the parameters as
+//!
+//! ∂ ln ω / ∂ ln L = −1, ∂ ln ω / ∂ ln ρ = −2x / sin 2x = −(1 + 2x²/3 + …)
+//!
+//! At small angles both are −1: only the **product** L·ρ shows, and a longer car with a quicker
+//! steering turns the same. They part by 2x²/3: 0.7 % at a road wheel's 0.1 rad (any drive on roads),
+//! 17 % at 0.5 rad (parking). So both together need manoeuvres near the lock, or one must be known. The
+//! zero s₀ adds a turning that grows with the speed, the bias b one that does not: they part only where
+//! the speed changes. A straight drive shows neither L nor ρ.
+//!
+//! Standard errors are those of the fit, widened for residuals that come in runs. They do not know of
+//! tyres that slip: identify at low speed, or give [`IdentifyConfig::understeer_s2_per_m2`].
+
+mod fit;
+
+use crate::{Bicycle, Signal};
+use fit::Fit;
+
+/// What is known of the vehicle already, and what counts as enough.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct IdentifyConfig {
+    /// The wheelbase in metres, where it is known.
+    pub wheelbase_m: Option<f64>,
+    /// The steering ratio, where it is known (1 for a road wheel's angle).
+    pub steering_ratio: Option<f64>,
+    /// Understeer of the vehicle, in s²/m² ([`Bicycle::understeer_s2_per_m2`]); not identified.
+    pub understeer_s2_per_m2: f64,
+    /// Largest standard error of wheelbase and ratio, over their value, that counts as identified.
+    pub largest_relative_error: f64,
+    /// Least turning in seconds at 0.03 rad/s or more.
+    pub least_turning_s: f64,
+}
+
+impl Default for IdentifyConfig {
+    fn default() -> Self {
+        Self {
+            wheelbase_m: None,
+            steering_ratio: None,
+            understeer_s2_per_m2: 0.0,
+            largest_relative_error: 0.03,
+            least_turning_s: 5.0,
+        }
+    }
+}
+
+/// A number with its standard error (0 where it was given).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The number.
+    pub value: f64,
+    /// Its standard error.
+    pub std_error: f64,
+}
+
+impl Estimate {
+    /// The standard error over the value.
+    #[must_use]
+    pub fn relative_error(&self) -> f64 {
+        self.std_error / self.value.abs()
+    }
+}
+
+/// A vehicle's steering, as its drive shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Identified {
+    /// L, in metres.
+    pub wheelbase_m: Estimate,
+    /// ρ; negative where the signal grows to the right.
+    pub steering_ratio: Estimate,
+    /// L·ρ in metres, which is known better than either.
+    pub product_m: Estimate,
+    /// s₀, in radians of the steering signal.
+    pub steering_offset_rad: Estimate,
+    /// b, in rad/s.
+    pub yaw_rate_bias_radps: Estimate,
+    /// Root mean square of what the model leaves of the yaw rate, in rad/s, robust.
+    pub residual_radps: f64,
+    /// How long the vehicle turned, in seconds.
+    pub turning_s: f64,
+}
+
+impl Identified {
+    /// The model that the parameters make.
+    #[must_use]
+    pub fn bicycle(&self, understeer_s2_per_m2: f64) -> Bicycle {
+        Bicycle {
+            wheelbase_m: self.wheelbase_m.value,
+            steering_ratio: self.steering_ratio.value,
+            steering_offset_rad: self.steering_offset_rad.value,
+            understeer_s2_per_m2,
+        }
+    }
+}
+
+/// Why a drive does not show the parameters.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("not identifiable: {why} ({figure:.3}, needed {needed:.3})")]
+pub struct Unidentifiable {
+    /// The reason.
+    pub why: Why,
+    /// The figure that is not good enough: seconds of turning, or a relative standard error.
+    pub figure: f64,
+    /// What it would have to be.
+    pub needed: f64,
+    /// L·ρ in metres, where at least that is known well enough.
+    pub product_m: Option<Estimate>,
+}
+
+/// A reason of [`Unidentifiable`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Why {
+    /// The drive is too straight: the figure is the seconds of turning.
+    Straight,
+    /// Wheelbase and ratio cannot be told apart: no large steering angles. The figure is the larger of
+    /// their relative standard errors.
+    OnlyTheProduct,
+    /// The measurements are too noisy, or contradict the model. The figure is a relative standard error.
+    TooUncertain,
+}
+
+impl std::fmt::Display for Why {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Straight => "the drive is too straight, seconds of turning",
+            Self::OnlyTheProduct => {
+                "wheelbase and steering ratio only as their product, without large steering angles; relative standard error"
+            }
+            Self::TooUncertain => "the turning does not follow the steering well enough; relative standard error",
+        })
+    }
+}
+
+impl Unidentifiable {
+    /// What to do about it, in one line.
+    #[must_use]
+    pub fn hint(&self) -> String {
+        match self.why {
+            Why::Straight => "use a drive with bends, or give wheelbase and steering ratio",
+            Why::OnlyTheProduct => "give one of the two, or add a parking manoeuvre to the drive",
+            Why::TooUncertain => "check the streams' clocks and units, or use a longer drive",
+        }
+        .to_owned()
+    }
+}
+
+/// Fits wheelbase, steering ratio, the steering's zero and the gyro's bias to a drive, robustly
+/// (iteratively reweighted least squares, Huber's weights). `speed` in m/s, `steering` in radians,
+/// `yaw_rate` in rad/s and positive to the left, all on one clock.
+///
+/// # Errors
+/// [`Unidentifiable`] where the drive is too straight, or a standard error is above the limit.
+pub fn identify(
+    speed: &Signal,
+    steering: &Signal,
+    yaw_rate: &Signal,
+    config: &IdentifyConfig,
+) -> Result<Identified, Unidentifiable> {
+    let observations = fit::observations(speed, steering, yaw_rate);
+    let turning_s = fit::turning_s(&observations);
+    let straight = |turning_s: f64| Unidentifiable {
+        why: Why::Straight,
+        figure: turning_s,
+        needed: config.least_turning_s,
+        product_m: None,
+    };
+    // Also true where the limit is no number.
+    if observations.len() < 20 || !(turning_s >= config.least_turning_s) {
+        return Err(straight(turning_s));
+    }
+    let Some(fit) = Fit::best(&observations, config) else {
+        return Err(Unidentifiable {
+            why: Why::TooUncertain,
+            figure: f64::INFINITY,
+            needed: config.largest_relative_error,
+            product_m: None,
+        });
+    };
+    judge(&fit, config, turning_s)
+}
+
+fn judge(fit: &Fit, config: &IdentifyConfig, turning_s: f64) -> Result<Identified, Unidentifiable> {
+    let found = Identified {
+        wheelbase_m: fit.wheelbase_m(),
+        steering_ratio: fit.steering_ratio(),
+        product_m: fit.product_m(),
+        steering_offset_rad: fit.steering_offset_rad(),
+        yaw_rate_bias_radps: fit.yaw_rate_bias(),
+        residual_radps: fit.sigma,
+        turning_s,
+    };
+    let limit = config.largest_relative_error;
+    let fail = |why, figure, product_m| {
+        Err(Unidentifiable {
+            why,
+            figure,
+            needed: limit,
+            product_m,
+        })
+    };
+    let product = found.product_m.relative_error();
+    if !(product <= limit) {
+        return fail(Why::TooUncertain, product, None);
+    }
+    let worst = found
+        .wheelbase_m
+        .relative_error()
+        .max(found.steering_ratio.relative_error());
+    // A ratio at the edge of what steerings have was not found but stopped.
+    if !(worst <= limit) || fit.at_the_edge {
+        let figure = if fit.at_the_edge {
+            f64::INFINITY
+        } else {
+            worst
+        };
+        return fail(Why::OnlyTheProduct, figure, Some(found.product_m));
+    }
+    Ok(found)
+}

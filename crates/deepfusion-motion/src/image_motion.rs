@@ -1,0 +1,153 @@
+//! How the picture moves from one frame to the next: sideways as the camera turns, outward as it
+//! drives.
+//!
+//! The upper part of a road picture is far away: there, turning moves everything by the same amount
+//! and driving lets it grow. Both at once are fitted to a pair of small grey pictures, coarse to fine,
+//! by gradients (Lucas and Kanade 1981; Bergen et al. 1992):
+//!
+//! I₁(x + s + e·(x − c), y + p + e·(y − c')) = I₀(x, y) + β
+//!
+//! with the shift s to the right and p downward (pixels), the growth e, and a change of brightness β.
+
+mod align;
+
+use crate::{Error, Result};
+use align::Plane;
+
+/// Smallest picture that can be aligned, in pixels.
+const LEAST: (usize, usize) = (32, 16);
+
+/// A small grey picture (some 160×48 pixels are enough), prepared for [`ImageMotion::between`].
+#[derive(Debug, Clone)]
+pub struct GreyFrame {
+    time_s: f64,
+    /// Full size first, then halves.
+    pyramid: Vec<Plane>,
+}
+
+impl GreyFrame {
+    /// A picture of `width * height` values, row by row, in any unit, taken at `time_s` of the camera's
+    /// clock.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where the number of values is not `width * height`, or the picture is smaller
+    /// than 32×16.
+    pub fn new(time_s: f64, width: usize, height: usize, values: &[f32]) -> Result<Self> {
+        if width < LEAST.0 || height < LEAST.1 {
+            return Err(Error::Config {
+                field: "picture size",
+                value: width.min(height) as f64,
+                expected: "at least 32×16 pixels",
+            });
+        }
+        if width.checked_mul(height) != Some(values.len()) {
+            return Err(Error::Config {
+                field: "number of pixels",
+                value: values.len() as f64,
+                expected: "width × height",
+            });
+        }
+        let mut pyramid = vec![Plane::new(width, height, values)];
+        while let Some(half) = pyramid.last().and_then(Plane::half) {
+            pyramid.push(half);
+        }
+        Ok(Self { time_s, pyramid })
+    }
+
+    /// The same of bytes.
+    ///
+    /// # Errors
+    /// As [`GreyFrame::new`].
+    pub fn from_bytes(time_s: f64, width: usize, height: usize, bytes: &[u8]) -> Result<Self> {
+        let values: Vec<f32> = bytes.iter().map(|b| f32::from(*b)).collect();
+        Self::new(time_s, width, height, &values)
+    }
+
+    /// When it was taken, in seconds of the camera's clock.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+}
+
+/// How the picture moved between two frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImageMotion {
+    /// Time of the frame before, in seconds of the camera's clock.
+    pub from_s: f64,
+    /// Time of the frame after.
+    pub to_s: f64,
+    /// How far the far scene moved to the right, in pixels (or any unit): f·Δθ for a camera of focal
+    /// length f that turned left by Δθ.
+    pub shift: f64,
+    /// By which share the picture grew: about the distance driven over the depth of what is seen.
+    pub growth: f64,
+}
+
+impl ImageMotion {
+    /// The motion from one frame to the next; `None` where the pictures differ in size, have nothing to
+    /// hold on to (a wall, a tunnel, night), or moved by more than a quarter of their width.
+    #[must_use]
+    pub fn between(before: &GreyFrame, after: &GreyFrame) -> Option<Self> {
+        let warp = align::align(&before.pyramid, &after.pyramid)?;
+        Some(Self {
+            from_s: before.time_s,
+            to_s: after.time_s,
+            shift: warp.right,
+            growth: warp.growth,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const SIZE: (usize, usize) = (160, 48);
+
+    /// A scene of waves, moved to the right and grown about the middle of the aligned rows.
+    fn picture(right: f64, growth: f64, brightness: f64) -> GreyFrame {
+        let centre = align::centre(SIZE.0, SIZE.1);
+        let mut values = Vec::new();
+        for y in 0..SIZE.1 {
+            for x in 0..SIZE.0 {
+                let u = (x as f64 - centre.0 - right) / (1.0 + growth);
+                let v = (y as f64 - centre.1) / (1.0 + growth);
+                let wave =
+                    (0.35 * u).sin() + (0.21 * u + 0.4 * v).cos() + (0.11 * u - 0.3 * v).sin();
+                values.push((128.0 + 30.0 * wave + brightness) as f32);
+            }
+        }
+        GreyFrame::new(0.0, SIZE.0, SIZE.1, &values).unwrap()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+        #[test]
+        fn a_moved_scene_shows_how_it_moved(right in -7.0..7.0f64, growth in -0.02..0.05f64, brightness in -20.0..20.0f64) {
+            let motion = ImageMotion::between(&picture(0.0, 0.0, 0.0), &picture(right, growth, brightness)).unwrap();
+            // Bilinear sampling of waves of 16 pixels costs some hundredths of a pixel.
+            prop_assert!((motion.shift - right).abs() < 0.06, "{} {right}", motion.shift);
+            prop_assert!((motion.growth - growth).abs() < 2e-3, "{} {growth}", motion.growth);
+        }
+    }
+
+    #[test]
+    fn a_wall_shows_nothing() {
+        let wall = GreyFrame::from_bytes(0.0, 160, 48, &[90; 160 * 48]).unwrap();
+        assert_eq!(ImageMotion::between(&wall, &wall), None);
+        assert_eq!(ImageMotion::between(&wall, &picture(0.0, 0.0, 0.0)), None);
+    }
+
+    #[test]
+    fn pictures_that_do_not_fit_are_refused() {
+        assert!(GreyFrame::from_bytes(0.0, 160, 48, &[0; 100]).is_err());
+        assert!(GreyFrame::from_bytes(0.0, 8, 8, &[0; 64]).is_err());
+        assert!(GreyFrame::from_bytes(0.0, usize::MAX, 48, &[0; 64]).is_err());
+        let small = GreyFrame::from_bytes(0.0, 64, 32, &[7; 64 * 32]).unwrap();
+        assert_eq!(ImageMotion::between(&small, &picture(0.0, 0.0, 0.0)), None);
+        let bad = GreyFrame::new(0.0, 64, 32, &[f32::NAN; 64 * 32]).unwrap();
+        assert_eq!(ImageMotion::between(&bad, &bad), None);
+    }
+}

@@ -1,0 +1,78 @@
+//! Which way is up: a complementary filter. The gyro carries the direction over short times, the
+//! accelerometer holds it over long ones.
+
+use super::ImuSample;
+use crate::Signal;
+use nalgebra::Vector3;
+
+/// Half the time over which the vehicle's acceleration is taken from its speed, in seconds: a wheel's
+/// pulses make shorter slopes rough.
+const SLOPE_S: f64 = 0.25;
+/// Without a speed, the accelerometer counts where it reads gravity's length to within this, in m/s².
+const CLOSE_TO_GRAVITY: f64 = 0.3;
+
+/// The direction of up in the vehicle's axes, over time.
+pub(super) struct Attitude<'a> {
+    speed: &'a Signal,
+    time_constant_s: f64,
+    up: Vector3<f64>,
+    last_s: f64,
+}
+
+impl<'a> Attitude<'a> {
+    /// Starts at the mean of what the first samples (one time constant long) say.
+    pub(super) fn level(stretch: &[ImuSample], speed: &'a Signal, time_constant_s: f64) -> Self {
+        let begin = stretch[0].time_s;
+        let first = stretch
+            .iter()
+            .take_while(|s| s.time_s <= begin + time_constant_s);
+        let sum: Vector3<f64> = first
+            .map(|s| gravity_reaction(s, speed).unwrap_or(s.acceleration_mps2))
+            .sum();
+        Self {
+            speed,
+            time_constant_s,
+            up: sum.try_normalize(1e-6).unwrap_or_else(Vector3::z),
+            last_s: begin,
+        }
+    }
+
+    /// Up at the next sample: turned back by what the vehicle turned, then drawn towards what the
+    /// accelerometer says.
+    pub(super) fn advance(&mut self, sample: &ImuSample) -> Vector3<f64> {
+        let dt = sample.time_s - self.last_s;
+        self.last_s = sample.time_s;
+        // A direction fixed to the world, seen from a body that turns at ω, changes by −ω × it.
+        let mut up = self.up - sample.angular_rate_radps.cross(&self.up) * dt;
+        if let Some(measured) =
+            gravity_reaction(sample, self.speed).and_then(|g| g.try_normalize(1e-6))
+        {
+            up += (measured - up) * (dt / (self.time_constant_s + dt));
+        }
+        self.up = up.try_normalize(1e-6).unwrap_or(self.up);
+        self.up
+    }
+}
+
+/// The specific force without the vehicle's own acceleration: (v̇, v ω_z, 0) for wheels that do not
+/// slip. Without a speed the force itself, where it is as long as gravity.
+fn gravity_reaction(sample: &ImuSample, speed: &Signal) -> Option<Vector3<f64>> {
+    let force = sample.acceleration_mps2;
+    if let Some((v, slope)) = speed_and_slope(speed, sample.time_s) {
+        return Some(force - Vector3::new(slope, v * sample.angular_rate_radps.z, 0.0));
+    }
+    ((force.norm() - super::GRAVITY).abs() < CLOSE_TO_GRAVITY).then_some(force)
+}
+
+fn speed_and_slope(speed: &Signal, time_s: f64) -> Option<(f64, f64)> {
+    let v = speed.at(time_s)?;
+    let (first, last) = (speed.times_s().first()?, speed.times_s().last()?);
+    let (from, to) = (
+        (time_s - SLOPE_S).max(*first),
+        (time_s + SLOPE_S).min(*last),
+    );
+    if to - from < SLOPE_S || !speed.covers(from, to) {
+        return None;
+    }
+    Some((v, (speed.at(to)? - speed.at(from)?) / (to - from)))
+}

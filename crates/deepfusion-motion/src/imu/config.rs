@@ -1,0 +1,148 @@
+use crate::{Error, Result};
+use deepfusion_geometry::Se3;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Where an inertial unit sits on the vehicle, `vehicle_from_imu`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ImuMount {
+    /// Axis-angle of the rotation that takes the unit's axes to the vehicle's (x forward, y left, z
+    /// up), in radians. A unit with x forward, y right, z down has (π, 0, 0).
+    pub rotation_rad: [f64; 3],
+    /// The unit's place in the vehicle's frame (origin: middle of the rear axle), in metres.
+    pub translation_m: [f64; 3],
+}
+
+impl ImuMount {
+    /// A unit with its x forward, y right and z down, at the vehicle's origin.
+    #[must_use]
+    pub fn forward_right_down() -> Self {
+        Self {
+            rotation_rad: [std::f64::consts::PI, 0.0, 0.0],
+            ..Self::default()
+        }
+    }
+
+    /// As a rigid motion.
+    #[must_use]
+    pub fn se3(&self) -> Se3 {
+        Se3::from_axis_angle(
+            Vector3::from(self.rotation_rad),
+            Vector3::from(self.translation_m),
+        )
+    }
+}
+
+/// How an inertial unit's recording is processed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ImuConfig {
+    /// Where the unit sits.
+    pub vehicle_from_imu: ImuMount,
+    /// Time constant of the attitude's complementary filter, in seconds: slower changes of up follow
+    /// the accelerometer, faster ones the gyro. The filter takes the vehicle's own acceleration out
+    /// with the speed, so that it need not be long; a long one lets the gyro's drift tilt the horizon.
+    pub attitude_time_s: f64,
+    /// The gyro's bias where the recording has no standstill, in rad/s about the vehicle's axes.
+    pub gyro_bias_radps: [f64; 3],
+    /// When the vehicle counts as standing still.
+    pub standstill: StandstillConfig,
+}
+
+impl Default for ImuConfig {
+    fn default() -> Self {
+        Self {
+            vehicle_from_imu: ImuMount::default(),
+            attitude_time_s: 2.0,
+            gyro_bias_radps: [0.0; 3],
+            standstill: StandstillConfig::default(),
+        }
+    }
+}
+
+/// When a vehicle counts as standing still: its speed says so, and the unit is quiet. Wheel sensors
+/// read 0 below walking speed, so the speed alone would take creeping for standing.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StandstillConfig {
+    /// Highest speed, in m/s.
+    pub speed_mps: f64,
+    /// Largest standard deviation of the angular rate about any axis over a window, in rad/s.
+    pub gyro_std_radps: f64,
+    /// Largest standard deviation of the acceleration along any axis over a window, in m/s². An engine
+    /// that idles shakes the unit by some tenths.
+    pub acceleration_std_mps2: f64,
+    /// Length of a window, and the shortest standstill, in seconds.
+    pub window_s: f64,
+}
+
+impl Default for StandstillConfig {
+    fn default() -> Self {
+        Self {
+            speed_mps: 0.1,
+            gyro_std_radps: 0.01,
+            acceleration_std_mps2: 0.3,
+            window_s: 1.0,
+        }
+    }
+}
+
+impl ImuConfig {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::Config`] names the first field that is out of range.
+    pub fn validate(&self) -> Result<()> {
+        let check = |ok: bool, field, value: f64, expected| {
+            ok.then_some(()).ok_or(Error::Config {
+                field,
+                value,
+                expected,
+            })
+        };
+        let mount = &self.vehicle_from_imu;
+        for value in mount.rotation_rad {
+            let turn = std::f64::consts::TAU;
+            check(
+                value.abs() <= turn,
+                "vehicle_from_imu.rotation_rad",
+                value,
+                "angles in radians",
+            )?;
+        }
+        for value in mount.translation_m {
+            check(
+                value.abs() <= 50.0,
+                "vehicle_from_imu.translation_m",
+                value,
+                "a place on the vehicle, in metres",
+            )?;
+        }
+        for value in self.gyro_bias_radps {
+            check(
+                value.abs() <= 1.0,
+                "gyro_bias_radps",
+                value,
+                "below 1 rad/s",
+            )?;
+        }
+        let time = self.attitude_time_s;
+        check(
+            (0.05..=600.0).contains(&time),
+            "attitude_time_s",
+            time,
+            "0.05 to 600 s",
+        )?;
+        let still = &self.standstill;
+        let positive =
+            |field, value: f64| check(value > 0.0 && value.is_finite(), field, value, "above 0");
+        positive("standstill.speed_mps", still.speed_mps)?;
+        positive("standstill.gyro_std_radps", still.gyro_std_radps)?;
+        positive(
+            "standstill.acceleration_std_mps2",
+            still.acceleration_std_mps2,
+        )?;
+        positive("standstill.window_s", still.window_s)
+    }
+}

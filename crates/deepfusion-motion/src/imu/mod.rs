@@ -1,0 +1,168 @@
+//! Distance and heading from an inertial unit (Eq. 23–25): turned into the vehicle's axes, freed of
+//! bias and gravity.
+
+mod attitude;
+mod config;
+mod standstill;
+
+pub use config::{ImuConfig, ImuMount, StandstillConfig};
+pub use standstill::{Standstill, standstills};
+
+use crate::{Error, Result, Signal};
+use attitude::Attitude;
+use nalgebra::Vector3;
+
+/// Standard gravity, m/s².
+pub(crate) const GRAVITY: f64 = 9.806_65;
+
+/// The mean specific force of a drive is gravity, give or take a drive that ends faster than it began
+/// and an accelerometer that is off by some percent.
+const GRAVITY_RANGE: std::ops::Range<f64> = 8.3..11.3;
+/// No mount is crooked by more: beyond this angle, in radians, axes are swapped.
+const MOST_TILT_RAD: f64 = std::f64::consts::FRAC_PI_4;
+
+/// One reading of an inertial unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImuSample {
+    /// Time, in seconds.
+    pub time_s: f64,
+    /// Specific force along the unit's axes, in m/s²: gravity included, a unit at rest reads +9.81
+    /// along whichever axis points up.
+    pub acceleration_mps2: Vector3<f64>,
+    /// Angular rate about the unit's axes, in rad/s.
+    pub angular_rate_radps: Vector3<f64>,
+}
+
+impl ImuSample {
+    fn is_finite(&self) -> bool {
+        let all = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
+        self.time_s.is_finite() && all(&self.acceleration_mps2) && all(&self.angular_rate_radps)
+    }
+}
+
+/// What an inertial unit says about the vehicle's motion over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImuTrack {
+    forward_mps2: Signal,
+    yaw_rate_radps: Signal,
+    standstills: Vec<Standstill>,
+}
+
+impl ImuTrack {
+    /// Processes a recording. `speed` is the vehicle's speed in m/s over the same clock: it finds the
+    /// standstills (for the biases) and takes the vehicle's own acceleration out of what tells up from
+    /// down.
+    ///
+    /// # Errors
+    /// [`Error::TooFewSamples`], [`Error::NotGravity`] (units, or gravity already removed),
+    /// [`Error::NotUp`] (a mount that does not fit: upside down, axes swapped), [`Error::Config`].
+    pub fn new(samples: &[ImuSample], speed: &Signal, config: &ImuConfig) -> Result<Self> {
+        config.validate()?;
+        let vehicle_from_imu = config.vehicle_from_imu.se3();
+        let in_vehicle = |s: &ImuSample| ImuSample {
+            time_s: s.time_s,
+            acceleration_mps2: vehicle_from_imu.rotate(&s.acceleration_mps2),
+            angular_rate_radps: vehicle_from_imu.rotate(&s.angular_rate_radps),
+        };
+        let mut clean: Vec<ImuSample> = Vec::with_capacity(samples.len());
+        for sample in samples.iter().filter(|s| s.is_finite()) {
+            if clean.last().is_none_or(|last| sample.time_s > last.time_s) {
+                clean.push(in_vehicle(sample));
+            }
+        }
+        if clean.len() < 2 {
+            return Err(Error::TooFewSamples {
+                stream: "imu",
+                usable: clean.len(),
+                total: samples.len(),
+                needed: 2,
+            });
+        }
+        check_gravity(&clean)?;
+
+        let standstills = standstills(&clean, speed, &config.standstill);
+        for sample in &mut clean {
+            sample.angular_rate_radps -= standstill::gyro_bias(&standstills, sample.time_s)
+                .unwrap_or_else(|| Vector3::from(config.gyro_bias_radps));
+            // The unit is not at the vehicle's origin: in a bend it feels ω × (ω × r) more. (ω̇ × r is
+            // left in: a gyro's derivative is noisier than the term is large.)
+            let omega = sample.angular_rate_radps;
+            sample.acceleration_mps2 -= omega.cross(&omega.cross(&vehicle_from_imu.translation()));
+        }
+
+        // The gaps are the same for all that is derived from the samples.
+        let max_gap_s = Signal::new(clean.iter().map(|s| (s.time_s, 0.0))).max_gap_s();
+        let (mut forward, mut yaw) = (Vec::new(), Vec::new());
+        for stretch in clean.chunk_by(|a, b| b.time_s - a.time_s <= max_gap_s) {
+            let mut attitude = Attitude::level(stretch, speed, config.attitude_time_s);
+            for sample in stretch {
+                let up = attitude.advance(sample);
+                // Ahead, level: what the specific force has along it is the vehicle's acceleration
+                // alone. Standing or climbing, with the unit's nose up or down.
+                let ahead = Vector3::x() - up * up.x;
+                let ahead = ahead / ahead.norm().max(1e-9);
+                forward.push((sample.time_s, sample.acceleration_mps2.dot(&ahead)));
+                yaw.push((sample.time_s, sample.angular_rate_radps.dot(&up)));
+            }
+        }
+        Ok(Self {
+            forward_mps2: Signal::with_max_gap(forward, max_gap_s),
+            yaw_rate_radps: Signal::with_max_gap(yaw, max_gap_s),
+            standstills,
+        })
+    }
+
+    /// Forward acceleration in m/s², without gravity.
+    #[must_use]
+    pub fn forward_acceleration(&self) -> &Signal {
+        &self.forward_mps2
+    }
+
+    /// Yaw rate about the vertical, in rad/s, positive to the left, without the standstills' bias.
+    #[must_use]
+    pub fn yaw_rate(&self) -> &Signal {
+        &self.yaw_rate_radps
+    }
+
+    /// Where the vehicle stood still. Without any, the gyro's bias is that of the configuration.
+    #[must_use]
+    pub fn standstills(&self) -> &[Standstill] {
+        &self.standstills
+    }
+
+    /// d_I in metres (Eq. 23–24): v_I(t) = v₀ + ∫a_x dt from the speed `v0_mps` at `from_s`, and its
+    /// integral. `None` where the recording does not cover the time.
+    #[must_use]
+    pub fn distance(&self, from_s: f64, to_s: f64, v0_mps: f64) -> Option<f64> {
+        Some(v0_mps * (to_s - from_s) + self.forward_mps2.double_integral(from_s, to_s)?)
+    }
+
+    /// θ_I in radians (Eq. 25): ∫ω_z dt. `None` where the recording does not cover the time.
+    #[must_use]
+    pub fn yaw(&self, from_s: f64, to_s: f64) -> Option<f64> {
+        self.yaw_rate_radps.integral(from_s, to_s)
+    }
+}
+
+/// Whether the mean specific force is one g upward. It says before anything is integrated that the
+/// units or the mount are wrong.
+fn check_gravity(samples: &[ImuSample]) -> Result<()> {
+    let sum: Vector3<f64> = samples.iter().map(|s| s.acceleration_mps2).sum();
+    let mean = sum / samples.len() as f64;
+    let norm = mean.norm();
+    // A sum that overflows is no gravity either.
+    if !GRAVITY_RANGE.contains(&norm) {
+        return Err(Error::NotGravity {
+            found: mean.into(),
+            norm,
+        });
+    }
+    let angle = (mean.z / norm).clamp(-1.0, 1.0).acos();
+    if angle > MOST_TILT_RAD {
+        return Err(Error::NotUp {
+            found: mean.into(),
+            angle_deg: angle.to_degrees(),
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,52 @@
+use crate::{FusedTrack, VehicleMotion, VehicleTrack};
+
+/// Whatever says how a vehicle moved: what a recording holds, whichever sensors it has.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MotionModel {
+    /// One unit that gives speed and yaw rate (KITTI's oxts).
+    Track(VehicleTrack),
+    /// Speed, steering and inertial unit, each with its own clock rate.
+    Fused(FusedTrack),
+}
+
+impl MotionModel {
+    /// Times of the speed's samples, in seconds, ascending.
+    #[must_use]
+    pub fn times_s(&self) -> &[f64] {
+        match self {
+            Self::Track(track) => track.times_s(),
+            Self::Fused(track) => track.times_s(),
+        }
+    }
+
+    /// Forward speed at a time, in m/s; `None` where it is not known.
+    #[must_use]
+    pub fn speed_at(&self, time_s: f64) -> Option<f64> {
+        match self {
+            Self::Track(track) => track.speed_at(time_s),
+            Self::Fused(track) => track.speed_at(time_s),
+        }
+    }
+
+    /// What the vehicle did between two times; `None` across gaps, outside the recording, and
+    /// backwards in time.
+    #[must_use]
+    pub fn motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {
+        match self {
+            Self::Track(track) => track.motion(from_s, to_s),
+            Self::Fused(track) => track.motion(from_s, to_s),
+        }
+    }
+}
+
+impl From<VehicleTrack> for MotionModel {
+    fn from(track: VehicleTrack) -> Self {
+        Self::Track(track)
+    }
+}
+
+impl From<FusedTrack> for MotionModel {
+    fn from(track: FusedTrack) -> Self {
+        Self::Fused(track)
+    }
+}

@@ -1,0 +1,132 @@
+//! A vehicle's forward speed and yaw rate over time, as one unit measures both.
+
+use crate::{Signal, VehicleMotion};
+
+/// Longest gap that is bridged, in seconds: five packets of KITTI's oxts.
+const MAX_GAP_S: f64 = 0.5;
+
+/// A car's forward speed and yaw rate over time.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct VehicleTrack {
+    speed_mps: Signal,
+    yaw_rate_radps: Signal,
+}
+
+impl VehicleTrack {
+    /// A track of samples (time in s, forward speed in m/s, yaw rate in rad/s). A sample that is not
+    /// finite, or not later than the one before it, is dropped: recorders repeat packets.
+    #[must_use]
+    pub fn new(samples: &[(f64, f64, f64)]) -> Self {
+        // One bad value drops the sample from both, which keeps their times the same.
+        let good = || {
+            samples
+                .iter()
+                .filter(|(t, v, w)| t.is_finite() && v.is_finite() && w.is_finite())
+        };
+        Self {
+            speed_mps: Signal::with_max_gap(good().map(|s| (s.0, s.1)), MAX_GAP_S),
+            yaw_rate_radps: Signal::with_max_gap(good().map(|s| (s.0, s.2)), MAX_GAP_S),
+        }
+    }
+
+    /// Times of the samples, in seconds.
+    #[must_use]
+    pub fn times_s(&self) -> &[f64] {
+        self.speed_mps.times_s()
+    }
+
+    /// Forward speed, in m/s.
+    #[must_use]
+    pub fn speed(&self) -> &Signal {
+        &self.speed_mps
+    }
+
+    /// Yaw rate, in rad/s, positive to the left.
+    #[must_use]
+    pub fn yaw_rate(&self) -> &Signal {
+        &self.yaw_rate_radps
+    }
+
+    /// Forward speed at a time, in m/s, between its neighbours; `None` where the track does not cover it.
+    #[must_use]
+    pub fn speed_at(&self, time_s: f64) -> Option<f64> {
+        self.speed_mps.at(time_s)
+    }
+
+    /// What the car did from `from_s` to `to_s`: the integrals of speed and yaw rate by the trapezoidal
+    /// rule over the samples between, and interpolated at both ends. `None` where the track does not
+    /// cover the time, or it does not run forward.
+    #[must_use]
+    pub fn motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {
+        if from_s >= to_s {
+            return None;
+        }
+        Some(VehicleMotion {
+            distance_m: self.speed_mps.integral(from_s, to_s)?,
+            yaw_rad: self.yaw_rate_radps.integral(from_s, to_s)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn an_accelerating_car_goes_half_a_t_squared() {
+        // v = 3 t sampled unevenly: the trapezoidal rule is exact for it.
+        let samples: Vec<_> = [0.0, 0.1, 0.25, 0.3, 0.5]
+            .iter()
+            .map(|t| (*t, 3.0 * t, -0.2))
+            .collect();
+        let motion = VehicleTrack::new(&samples).motion(0.05, 0.45).unwrap();
+        assert!((motion.distance_m - 1.5 * (0.45_f64.powi(2) - 0.05_f64.powi(2))).abs() < 1e-12);
+        assert!((motion.yaw_rad + 0.08).abs() < 1e-12);
+    }
+
+    #[test]
+    fn gaps_and_ends_are_not_made_up() {
+        let track = VehicleTrack::new(&[
+            (0.0, 5.0, 0.0),
+            (0.1, 5.0, 0.0),
+            (0.1, 9.0, 0.0),
+            (1.0, 5.0, 0.0),
+        ]);
+        assert_eq!(track.times_s(), [0.0, 0.1, 1.0]);
+        assert!(track.motion(0.0, 0.1).is_some());
+        assert!(track.motion(0.05, 0.5).is_none(), "across a gap of 0.9 s");
+        assert!(
+            track.motion(1.0, 1.1).is_some(),
+            "just beyond the last sample"
+        );
+        assert!(track.motion(1.0, 1.3).is_none());
+        assert!(track.motion(0.1, 0.0).is_none(), "backwards in time");
+        assert!(track.speed_at(-0.1).is_some() && track.speed_at(-0.2).is_none());
+        assert!(VehicleTrack::default().speed_at(0.0).is_none());
+    }
+
+    #[test]
+    fn a_sample_with_a_bad_value_is_none() {
+        let track = VehicleTrack::new(&[
+            (0.0, 5.0, 0.0),
+            (0.1, f64::NAN, 0.0),
+            (0.2, 5.0, f64::INFINITY),
+            (f64::NAN, 5.0, 0.0),
+            (0.3, 5.0, 0.0),
+        ]);
+        assert_eq!(track.times_s(), [0.0, 0.3]);
+        assert!((track.motion(0.0, 0.3).unwrap().distance_m - 1.5).abs() < 1e-12);
+    }
+
+    proptest! {
+        /// Integrals over neighbouring intervals add up.
+        #[test]
+        fn integrals_join(speeds in proptest::collection::vec(0.0..20.0f64, 12), cut in 0.05..1.0f64) {
+            let samples: Vec<_> = speeds.iter().enumerate().map(|(i, v)| (i as f64 * 0.1, *v, v * 0.01)).collect();
+            let track = VehicleTrack::new(&samples);
+            let distance = |a, b| track.motion(a, b).unwrap().distance_m;
+            prop_assert!((distance(0.0, cut) + distance(cut, 1.1) - distance(0.0, 1.1)).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Signals decoded from CAN frames, against cantools (`tests/reference/dbc.py`).
+
+use deepfusion_motion::Error;
+use deepfusion_motion::can::{CanId, Dbc};
+use proptest::prelude::*;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+const DBC: &str = include_str!("reference/vehicle.dbc");
+
+#[derive(Deserialize)]
+struct Frame {
+    message: String,
+    id: u32,
+    extended: bool,
+    data: String,
+    all: Vec<String>,
+    values: BTreeMap<String, f64>,
+}
+
+fn bytes(hex: &str) -> Vec<u8> {
+    let digits = hex.as_bytes().chunks(2);
+    digits
+        .map(|d| u8::from_str_radix(std::str::from_utf8(d).unwrap(), 16).unwrap())
+        .collect()
+}
+
+#[test]
+fn every_signal_is_what_cantools_decodes() {
+    let frames: Vec<Frame> = serde_json::from_str(include_str!("reference/dbc.json")).unwrap();
+    let dbc = Dbc::parse(DBC).unwrap();
+    let (mut there, mut absent) = (0, 0);
+    for frame in &frames {
+        let data = bytes(&frame.data);
+        for name in &frame.all {
+            let signal = dbc.signal(&format!("{}.{name}", frame.message)).unwrap();
+            let id = match signal.id {
+                CanId::Standard(id) => (u32::from(id), false),
+                CanId::Extended { extended } => (extended, true),
+            };
+            assert_eq!(id, (frame.id, frame.extended), "{name}");
+            match (signal.decode(&data), frame.values.get(name)) {
+                // Both compute raw · scale + offset in f64; only the last bit may differ.
+                (Some(ours), Some(theirs)) => {
+                    let tolerance = 1e-12 * theirs.abs().max(1.0);
+                    assert!(
+                        (ours - theirs).abs() <= tolerance,
+                        "{name}: {ours}, {theirs}"
+                    );
+                    there += 1;
+                }
+                (None, None) => absent += 1,
+                (ours, theirs) => panic!("{name} in {}: {ours:?}, {theirs:?}", frame.data),
+            }
+        }
+    }
+    assert!(
+        there > 500 && absent > 40,
+        "{there} values, {absent} absent"
+    );
+}
+
+#[test]
+fn names_units_and_what_is_not_there() {
+    let dbc = Dbc::parse(DBC).unwrap();
+    assert!(dbc.names().any(|n| n == "STEER_ANGLE_SENSOR.STEER_ANGLE"));
+    assert_eq!(dbc.unit("POWERTRAIN_DATA.XMISSION_SPEED"), Some("km/h"));
+    for (name, said) in [
+        ("XMISSION_SPEED", "Message.Signal"),
+        ("POWERTRAIN.XMISSION_SPEED", "there are POWERTRAIN_DATA"),
+        (
+            "POWERTRAIN_DATA.SPEED",
+            "`POWERTRAIN_DATA` has XMISSION_SPEED",
+        ),
+    ] {
+        let error = dbc.signal(name).unwrap_err();
+        assert!(matches!(error, Error::NoSignal { .. }));
+        assert!(error.to_string().contains(said), "{error}");
+    }
+}
+
+#[test]
+fn a_broken_file_names_the_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("broken.dbc");
+    std::fs::write(&path, DBC.replace("0|13@1+", "0|thirteen@1+")).unwrap();
+    let error = Dbc::open(&path).unwrap_err();
+    assert!(error.to_string().contains("broken.dbc"), "{error}");
+    assert!(error.to_string().contains("25"), "the line: {error}");
+    assert!(error.hint().is_some());
+    assert!(Dbc::open(Path::new("/nonexistent.dbc")).is_err());
+}
+
+#[test]
+fn units_in_latin_1_are_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("latin1.dbc");
+    let mut text = DBC.replace("\"deg\"", "\"?\"").into_bytes();
+    for byte in text.iter_mut().filter(|b| **b == b'?') {
+        *byte = 0xb0;
+    }
+    std::fs::write(&path, text).unwrap();
+    let dbc = Dbc::open(&path).unwrap();
+    assert_eq!(dbc.unit("STEER_ANGLE_SENSOR.STEER_ANGLE"), Some("°"));
+}
+
+#[test]
+fn a_signal_beyond_the_longest_frame_is_refused() {
+    let dbc = Dbc::parse(&DBC.replace("501|11@1+", "501|12@1+")).unwrap();
+    let error = dbc.signal("FD_INERTIAL.LAST_BITS").unwrap_err();
+    assert!(matches!(error, Error::Layout { .. }), "{error}");
+}
+
+proptest! {
+    #[test]
+    fn garbage_never_panics(text in "(BO_|SG_| |:|[0-9]|\\||@|[a-zM]|\n|\"|;|,|-){0,200}", cut in 0usize..2500) {
+        let _ = Dbc::parse(&text);
+        // And pieces of a real file.
+        if let Some(piece) = DBC.get(..cut.min(DBC.len())) {
+            if let Ok(dbc) = Dbc::parse(&format!("{piece}{text}")) {
+                for name in dbc.names().collect::<Vec<_>>() {
+                    let _ = dbc.signal(&name).map(|s| s.decode(&[0xa5; 8]));
+                }
+            }
+        }
+    }
+}
