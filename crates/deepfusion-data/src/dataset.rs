@@ -7,8 +7,8 @@ use crate::selection::Selection;
 use crate::snippet::{EgoMotion, NoMotion};
 use crate::split::Split;
 use crate::{
-    Camera, CameraChoice, CameraPath, DatasetKind, Error, Frame, MovingLabels, Result, Stream,
-    VehicleTrack, image_size,
+    Camera, CameraChoice, CameraPath, DatasetKind, Error, Frame, MotionModel, MovingLabels, Result,
+    Stream, image_size,
 };
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use image::RgbImage;
@@ -45,11 +45,13 @@ pub struct DatasetParts {
     /// camera; `None` where the layout has to know it and does not.
     pub cam_from_vehicle: Option<Se3>,
     /// The car's speed and yaw rate, where the drive has them.
-    pub track: Option<VehicleTrack>,
+    pub track: Option<MotionModel>,
     /// Whether the track's yaw rates were measured. Where not, they are 0 and mean nothing.
     pub yaw_known: bool,
     /// Nanoseconds from which seconds are counted, since 1970 or whatever the recording's clock starts at.
     pub origin_ns: Option<i64>,
+    /// The kind of drive, such as `garage`, for a row each in an evaluation.
+    pub scenario: Option<String>,
 }
 
 /// Everything a trainer or an evaluator needs from one camera's recording of one drive.
@@ -144,6 +146,12 @@ impl Dataset {
         self.recording.folder()
     }
 
+    /// The kind of drive, such as `garage`, where the recording says it.
+    #[must_use]
+    pub fn scenario(&self) -> Option<&str> {
+        self.parts.scenario.as_deref()
+    }
+
     /// All frames, by number. Not all need be selected.
     #[must_use]
     pub fn frames(&self) -> &[Frame] {
@@ -164,7 +172,7 @@ impl Dataset {
 
     /// The car's speed and yaw rate, where the drive has them. See [`Self::yaw_known`].
     #[must_use]
-    pub fn track(&self) -> Option<&VehicleTrack> {
+    pub fn track(&self) -> Option<&MotionModel> {
         self.parts.track.as_ref()
     }
 
@@ -321,7 +329,7 @@ impl Dataset {
 
 /// The car's track and the camera's place on the car.
 pub(crate) struct Ego<'a> {
-    track: &'a VehicleTrack,
+    track: &'a MotionModel,
     yaw_known: bool,
     cam_from_vehicle: Se3,
 }

@@ -161,6 +161,27 @@ pub enum Error {
         /// The drive.
         drive: String,
     },
+    /// A ROS bag cannot be read.
+    #[error(transparent)]
+    Bag(#[from] deepfusion_rosbag::Error),
+    /// A bag's topics are not what is needed.
+    #[error("{}: {problem}", path.display())]
+    Topic {
+        /// The bag.
+        path: PathBuf,
+        /// The topic and what is wrong with it.
+        problem: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// A vehicle's sensors make no motion.
+    #[error("{}: {source}", path.display())]
+    Motion {
+        /// The recording.
+        path: PathBuf,
+        /// Why not.
+        source: deepfusion_motion::Error,
+    },
     /// A recording that has streams, but no images.
     #[error("{}: {why}", path.display())]
     NoFrames {
@@ -346,6 +367,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// The layouts that are told apart, in the order in which they are looked for.
 const LOOKED_FOR: &str = "  KITTI raw          image_02/ or image_03/ with data/0000000000.png, here or up to two folders below
   comma2k19 segment  processed_log/CAN/speed/t or global_pose/frame_times
+  ROS 1 bag          a file .bag, given or here
   RGB-D folder       frame-000000.color.png or .jpg with .depth.png, here or in folders seq-01, …
   video              a file .mp4, .mkv, .mov, .avi or .hevc, given or the only one here
   image folder       .png or .jpg files here, in images/, or where dataset.toml says";
@@ -375,12 +397,15 @@ impl Error {
             Self::UnknownLayout { .. } => {
                 "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
             }
+            Self::Bag(error) => return error.hint(),
+            Self::Motion { source, .. } => return source.hint(),
             Self::OneCamera { .. } => "leave --camera out, or give 2",
             Self::CameraFile { remedy, .. }
             | Self::Columns { remedy, .. }
             | Self::NoTrack { remedy, .. }
+            | Self::Topic { remedy, .. }
             | Self::NoFrames { remedy, .. } => remedy,
-            Self::Config { .. } => "docs/reference/dataset-toml.md lists every key",
+            Self::Config { .. } => "docs/reference/ lists every key of dataset.toml and bag.toml",
             Self::Table { .. } => "correct the row or delete it",
             Self::Clocks { .. } => {
                 "both must count from the same moment; start_s in dataset.toml is the first frame's time on the speeds' clock"

@@ -1,7 +1,7 @@
 //! Telling layouts apart, and saying what was looked for where none fits.
 
 use crate::kitti::{self, Drive, find_drives, layout};
-use crate::{Dataset, Error, OpenOptions, Result, comma, folder, rgbd, video};
+use crate::{Dataset, Error, OpenOptions, Result, comma, folder, rgbd, umad, video};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -11,6 +11,7 @@ pub(crate) enum Layout {
     Kitti(Vec<Drive>),
     Comma(PathBuf),
     RgbD(Vec<PathBuf>),
+    Bags(Vec<PathBuf>),
     Folder(PathBuf),
     Video(PathBuf),
 }
@@ -31,6 +32,9 @@ impl Layout {
             path: path.to_owned(),
             found,
         };
+        if umad::is_bag(&real) {
+            return Ok(Self::Bags(vec![real]));
+        }
         if !real.is_dir() {
             return match video::is_video(&real) {
                 true => Ok(Self::Video(real)),
@@ -43,6 +47,10 @@ impl Layout {
         }
         if comma::is_segment(&real) {
             return Ok(Self::Comma(real));
+        }
+        let bags = umad::bags_in(&real)?;
+        if !bags.is_empty() {
+            return Ok(Self::Bags(bags));
         }
         let rgbd = rgbd::find(&real)?;
         if !rgbd.is_empty() {
@@ -64,6 +72,7 @@ impl Layout {
             Self::Kitti(drives) => kitti::open(path, drives, options),
             Self::Comma(folder) => one(comma::open(folder, options)),
             Self::RgbD(folders) => rgbd::open(path, folders, options),
+            Self::Bags(bags) => umad::open(path, bags, options),
             Self::Folder(folder) => one(folder::open(folder, options)),
             Self::Video(place) => one(video::open(place, options)),
         }
@@ -73,7 +82,7 @@ impl Layout {
 fn describe_file(path: &Path) -> String {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     match extension.to_ascii_lowercase().as_str() {
-        "bag" | "mcap" | "db3" => "it is a ROS bag".into(),
+        "mcap" | "db3" => "it is a ROS 2 bag".into(),
         "png" | "jpg" | "jpeg" => "it is a single image".into(),
         "mp4" | "mkv" | "avi" | "mov" | "hevc" => "it is a video".into(),
         "zip" | "tar" | "gz" | "tgz" => "it is an archive that is still packed".into(),

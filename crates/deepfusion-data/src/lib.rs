@@ -37,6 +37,7 @@ mod speed_check;
 mod speed_log;
 mod split;
 mod table;
+mod umad;
 mod video;
 mod write;
 
@@ -65,4 +66,5 @@ pub use speed_check::{
     GreyImage, GroundPair, SpeedWarning, implied_camera_height, speed_unit_warning,
 };
 pub use split::{Split, SplitEntry};
+pub use umad::{DopplerEgo, ego_velocity, ground_radial};
 pub use write::write_atomically;

@@ -1,12 +1,14 @@
 //! Which pixels of a frame's ground truth belong to what moves over the ground.
 
 use crate::kitti::{GtKind, KittiRecording, Tracklet, TrackletPose, velo_point};
+use crate::umad::BagScans;
 use crate::{Dataset, Error, Result};
 use deepfusion_geometry::{DepthMap, Se3};
 use nalgebra::{Matrix3x4, Vector3};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Speed over ground from which a labelled box counts as moving, in m/s. On KITTI's drive 0005 the boxes
 /// of parked cars show at most 0.6 m/s in 19 of 20 frames (the labels' own unrest), a strolling
@@ -28,6 +30,8 @@ pub enum MovingSource {
     Masks,
     /// KITTI's tracklets, moving where their box moves over the ground.
     Tracklets,
+    /// Radial velocities of a frequency-modulated LiDAR.
+    RadialVelocity,
 }
 
 /// What moves in a recording.
@@ -41,6 +45,11 @@ enum Kind {
         pixels_from_velo: Matrix3x4<f64>,
         boxes: BTreeMap<u64, Vec<MovingBox>>,
     },
+    Scans {
+        scans: Arc<BagScans>,
+        /// Of the frames, by number, in seconds.
+        times_s: BTreeMap<u64, f64>,
+    },
 }
 
 /// A box that moves, in one frame's velodyne axes.
@@ -51,6 +60,11 @@ struct MovingBox {
 }
 
 impl MovingLabels {
+    /// Of a bag's scans; `times_s` are those of the frames, by number.
+    pub(crate) fn of_scans(scans: Arc<BagScans>, times_s: BTreeMap<u64, f64>) -> Self {
+        Self(Kind::Scans { scans, times_s })
+    }
+
     /// Of a KITTI raw drive; see [`Dataset::moving_labels`].
     pub(crate) fn of_kitti(recording: &KittiRecording, dataset: &Dataset) -> Result<Option<Self>> {
         let masks = dataset.folder().join(MASKS);
@@ -117,6 +131,7 @@ impl MovingLabels {
         match &self.0 {
             Kind::Masks(_) => MovingSource::Masks,
             Kind::Boxes { .. } => MovingSource::Tracklets,
+            Kind::Scans { .. } => MovingSource::RadialVelocity,
         }
     }
 
@@ -157,6 +172,10 @@ impl MovingLabels {
                 };
                 Ok(Some(truth.data.iter().enumerate().map(moves).collect()))
             }
+            Kind::Scans { scans, times_s } => match times_s.get(&frame) {
+                Some(time_s) => scans.moving(*time_s),
+                None => Ok(None),
+            },
         }
     }
 }

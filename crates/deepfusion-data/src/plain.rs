@@ -123,12 +123,13 @@ impl PlainParts {
             frames,
             intrinsics: lens.intrinsics(),
             cam_from_vehicle: Some(self.cam_from_vehicle),
-            track,
+            track: track.map(Into::into),
             yaw_known: self
                 .speeds
                 .as_ref()
                 .is_some_and(|s| s.yaw_rates_radps.is_some()),
             origin_ns,
+            scenario: None,
         };
         let dataset = Dataset::new(
             parts,

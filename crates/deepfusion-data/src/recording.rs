@@ -22,6 +22,8 @@ pub enum DatasetKind {
     Comma2k19,
     /// A folder of colour, depth and pose files, as 7-Scenes has.
     RgbD,
+    /// A ROS 1 bag.
+    Bag,
 }
 
 impl DatasetKind {
@@ -34,6 +36,7 @@ impl DatasetKind {
             Self::Video => "video",
             Self::Comma2k19 => "comma2k19 segment",
             Self::RgbD => "RGB-D folder",
+            Self::Bag => "ROS bag",
         }
     }
 }

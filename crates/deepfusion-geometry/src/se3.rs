@@ -38,6 +38,13 @@ impl Se3 {
         ))
     }
 
+    /// The rotation as a unit quaternion `[w, x, y, z]`.
+    #[must_use]
+    pub fn quaternion(&self) -> [f64; 4] {
+        let q = self.0.rotation.quaternion();
+        [q.w, q.i, q.j, q.k]
+    }
+
     /// The exponential map: twist (rotational part ω, translational part v) to motion, t = V(ω)·v.
     #[must_use]
     pub fn exp(omega: Vector3<f64>, v: Vector3<f64>) -> Self {

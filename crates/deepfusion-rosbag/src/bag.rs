@@ -64,6 +64,14 @@ pub struct Bag {
     options: BagOptions,
 }
 
+impl std::fmt::Debug for Bag {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Bag")
+            .field("path", &self.path())
+            .finish_non_exhaustive()
+    }
+}
+
 impl Bag {
     /// Opens a bag by its index, without touching its chunks. A bag whose index is missing or damaged is scanned from
     /// the front to its break, and [`Bag::damage`] says so.

@@ -29,6 +29,17 @@ pub enum Error {
         /// Why it failed.
         source: std::io::Error,
     },
+    /// A bag cannot be written.
+    #[error(transparent)]
+    Bag(#[from] deepfusion_rosbag::Error),
+    /// A message cannot be made.
+    #[error("a message of {topic}: {problem}")]
+    Message {
+        /// Its topic.
+        topic: &'static str,
+        /// What does not fit.
+        problem: deepfusion_rosbag::msg::MessageError,
+    },
     /// A picture cannot be encoded.
     #[error("{}: cannot encode the picture: {source}", path.display())]
     Encode {
@@ -63,6 +74,8 @@ impl Error {
                 }
                 .to_owned(),
             ),
+            Self::Bag(error) => error.hint(),
+            Self::Message { problem, .. } => problem.hint(),
             Self::Encode { .. } => None,
         }
     }

@@ -55,7 +55,7 @@ pub fn write_kitti(
 }
 
 /// Makes the output folder; whether it was there before.
-fn prepare(out: &Path) -> Result<bool> {
+pub fn prepare(out: &Path) -> Result<bool> {
     match fs::read_dir(out) {
         Ok(mut entries) => match entries.next() {
             None => Ok(true),
@@ -106,7 +106,7 @@ fn write_all(
                 let path = scans.join(format!("{index:010}.bin"));
                 write_scan(&path, &simulation.velodyne(index))?;
             }
-            Ok(())
+            Ok::<(), Error>(())
         })?;
         progress(last, frames);
     }
@@ -164,47 +164,44 @@ fn write_with(
         })
 }
 
-fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     write_with(path, |w| {
         w.write_all(bytes).map_err(io(path, "write this file"))
     })
 }
 
 fn encode(
+    out: impl Write,
     path: &Path,
     bytes: &[u8],
-    width: u32,
-    height: u32,
+    (width, height): (u32, u32),
     colour: ExtendedColorType,
     filter: FilterType,
 ) -> Result<()> {
-    write_with(path, |writer| {
-        PngEncoder::new_with_quality(writer, CompressionType::Fast, filter)
-            .write_image(bytes, width, height, colour)
-            .map_err(|error| match error {
-                image::ImageError::IoError(source) => io(path, "write this file")(source),
-                source => Error::Encode {
-                    path: path.to_owned(),
-                    source,
-                },
-            })
-    })
+    PngEncoder::new_with_quality(out, CompressionType::Fast, filter)
+        .write_image(bytes, width, height, colour)
+        .map_err(|error| match error {
+            image::ImageError::IoError(source) => io(path, "write this file")(source),
+            source => Error::Encode {
+                path: path.to_owned(),
+                source,
+            },
+        })
+}
+
+/// A PNG of a picture; `path` is named in errors.
+pub fn encode_rgb(out: impl Write, path: &Path, rgb: &image::RgbImage) -> Result<()> {
+    let colour = ExtendedColorType::Rgb8;
+    let size = rgb.dimensions();
+    encode(out, path, rgb.as_raw(), size, colour, FilterType::Sub)
 }
 
 fn write_png(path: &Path, frame: &SimFrame) -> Result<()> {
-    let (width, height) = frame.rgb.dimensions();
-    encode(
-        path,
-        frame.rgb.as_raw(),
-        width,
-        height,
-        ExtendedColorType::Rgb8,
-        FilterType::Sub,
-    )
+    write_with(path, |writer| encode_rgb(writer, path, &frame.rgb))
 }
 
 /// KITTI's 16-bit depth: metres × 256, 0 where there is none.
-fn write_depth(path: &Path, depth: &DepthMap) -> Result<()> {
+pub fn encode_depth(out: impl Write, path: &Path, depth: &DepthMap) -> Result<()> {
     let bytes: Vec<u8> = depth
         .data
         .iter()
@@ -215,15 +212,13 @@ fn write_depth(path: &Path, depth: &DepthMap) -> Result<()> {
             value.to_ne_bytes()
         })
         .collect();
-    let (width, height) = (depth.width as u32, depth.height as u32);
-    encode(
-        path,
-        &bytes,
-        width,
-        height,
-        ExtendedColorType::L16,
-        FilterType::Sub,
-    )
+    let size = (depth.width as u32, depth.height as u32);
+    let colour = ExtendedColorType::L16;
+    encode(out, path, &bytes, size, colour, FilterType::Sub)
+}
+
+fn write_depth(path: &Path, depth: &DepthMap) -> Result<()> {
+    write_with(path, |writer| encode_depth(writer, path, depth))
 }
 
 fn write_mask(path: &Path, frame: &SimFrame) -> Result<()> {
@@ -232,15 +227,11 @@ fn write_mask(path: &Path, frame: &SimFrame) -> Result<()> {
         .iter()
         .map(|m| if *m { 255 } else { 0 })
         .collect();
-    let (width, height) = frame.rgb.dimensions();
-    encode(
-        path,
-        &bytes,
-        width,
-        height,
-        ExtendedColorType::L8,
-        FilterType::NoFilter,
-    )
+    let size = frame.rgb.dimensions();
+    let (colour, filter) = (ExtendedColorType::L8, FilterType::NoFilter);
+    write_with(path, |writer| {
+        encode(writer, path, &bytes, size, colour, filter)
+    })
 }
 
 fn write_scan(path: &Path, cloud: &PointCloud) -> Result<()> {

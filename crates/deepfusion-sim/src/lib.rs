@@ -39,6 +39,7 @@ mod scene;
 mod simulation;
 mod texture;
 mod traffic;
+mod umad;
 mod velodyne;
 
 pub use can::{SpeedReading, SteeringReading, WHEELBASE_M};
@@ -51,3 +52,4 @@ pub use oxts::OxtsReading;
 pub use rig::Rig;
 pub use scene::{ObjectClass, SceneObject};
 pub use simulation::{SimFrame, Simulation};
+pub use umad::{BagSettings, topic, write_bag};

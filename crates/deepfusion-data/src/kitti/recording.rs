@@ -90,9 +90,10 @@ fn open_drive(drive: &Drive, camera: Camera, files: &[(u64, PathBuf)]) -> Result
         frames,
         intrinsics: calibration.intrinsics,
         cam_from_vehicle: calibration.cam_from_imu,
-        track,
+        track: track.map(Into::into),
         yaw_known: true,
         origin_ns,
+        scenario: None,
     };
     let recording = KittiRecording {
         drive: drive.clone(),

@@ -95,7 +95,8 @@ pub struct DemoArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Equal settings give equal drives, byte for byte.\n\n\
     Examples:\n  deepfusion simulate --out street --frames 200 --seed 7\n  \
-    deepfusion simulate --out traffic --frames 100 --moving-cars 6 --size 1242x375")]
+    deepfusion simulate --out traffic --frames 100 --moving-cars 6 --size 1242x375\n  \
+    deepfusion simulate --out garage --format bag --scene garage --frames 250")]
 pub struct SimulateArgs {
     /// Folder to write, new or empty.
     #[arg(long, value_name = "DIR")]
@@ -115,13 +116,27 @@ pub struct SimulateArgs {
     /// Number of cars that move.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub moving_cars: usize,
-    /// Size of the pictures.
-    #[arg(long, value_name = "WxH", default_value = "640x192")]
-    pub size: Size,
-    /// Frames a second.
-    #[arg(long, value_name = "HZ", default_value_t = 10.0)]
-    pub fps: f64,
-    /// A velodyne scan for every N-th frame; 0 writes none.
+    /// Size of the pictures [default: 640x192; UMAD's 640x480 in a bag].
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Frames a second [default: 10; UMAD's 25 in a bag].
+    #[arg(long, value_name = "HZ")]
+    pub fps: Option<f64>,
+    /// Sensors of the car [default: those of the layout's data set].
+    #[arg(long, value_enum)]
+    pub sensors: Option<SensorsChoice>,
+    /// Set the clock of camera and LiDAR so many milliseconds ahead of the vehicle's (bag).
+    #[arg(
+        long,
+        value_name = "MS",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub clock_offset: f64,
+    /// Compression of the bag.
+    #[arg(long, value_enum, default_value_t)]
+    pub compression: CompressionChoice,
+    /// A velodyne scan for every N-th frame (KITTI); 0 writes none.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub scan_every: usize,
     /// Print what was written as JSON on stdout.
@@ -135,6 +150,29 @@ pub enum SimulateFormat {
     /// KITTI raw: images, oxts, velodyne scans, calibration, and exact depth beside them.
     #[default]
     Kitti,
+    /// A ROS 1 bag as UMAD's: camera, FMCW LiDAR, inertial unit, CAN speed and steering, and the truth.
+    Bag,
+}
+
+/// What the simulated car carries.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum SensorsChoice {
+    /// KITTI's, camera and velodyne on the roof.
+    Kitti,
+    /// UMAD's, camera, FMCW LiDAR and inertial unit in one head.
+    Umad,
+}
+
+/// How a bag's chunks are compressed.
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+pub enum CompressionChoice {
+    /// Not at all.
+    None,
+    /// Fast.
+    #[default]
+    Lz4,
+    /// Small and slow.
+    Bz2,
 }
 
 /// Places the simulator knows.
@@ -143,4 +181,12 @@ pub enum SceneChoice {
     /// A street with houses, parked cars, trees.
     #[default]
     Urban,
+    /// A narrow road between lawns and trees.
+    Park,
+    /// Under ground: dark, near walls, pillars, a low ceiling.
+    Garage,
+    /// Large houses, wide pavements, many parked cars.
+    Commercial,
+    /// The urban street by night, under its lamps.
+    Night,
 }

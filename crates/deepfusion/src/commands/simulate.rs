@@ -1,34 +1,35 @@
 use anyhow::Result;
-use deepfusion_sim::{Scene, SimConfig, Simulation, write_kitti};
+use deepfusion_rosbag::Compression;
+use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 
-use crate::cli::{SceneChoice, SimulateArgs, SimulateFormat};
+use crate::cli::{
+    CompressionChoice, SceneChoice, SensorsChoice, SimulateArgs, SimulateFormat, Size,
+};
 use crate::output;
 use crate::progress::{Progress, say};
 
 /// `deepfusion simulate`.
 pub fn run(args: &SimulateArgs) -> Result<()> {
-    let config = SimConfig {
-        seed: args.seed,
-        frames: args.frames,
-        width: args.size.width,
-        height: args.size.height,
-        moving_cars: args.moving_cars,
-        fps: args.fps,
-        scene: match args.scene {
-            SceneChoice::Urban => Scene::Urban,
-        },
-        scan_every: args.scan_every,
-        ..SimConfig::default()
-    };
+    let config = config(args);
     let simulation = Simulation::new(&config)?;
+    let mut progress = Progress::new("simulating");
+    let mut report = |done, total| progress.set(done, total);
     let drive = match args.format {
-        SimulateFormat::Kitti => {
-            let mut progress = Progress::new("simulating");
-            write_kitti(&simulation, &args.out, &mut |done, total| {
-                progress.set(done, total)
-            })?
+        SimulateFormat::Kitti => write_kitti(&simulation, &args.out, &mut report)?,
+        SimulateFormat::Bag => {
+            let settings = BagSettings {
+                compression: match args.compression {
+                    CompressionChoice::None => Compression::None,
+                    CompressionChoice::Lz4 => Compression::Lz4,
+                    CompressionChoice::Bz2 => Compression::Bz2,
+                },
+                clock_offset_s: 1e-3 * args.clock_offset,
+                ..BagSettings::default()
+            };
+            write_bag(&simulation, &args.out, &settings, &mut report)?
         }
     };
+    drop(progress);
     if args.json {
         return output::print_json(&serde_json::json!({
             "drive": drive,
@@ -42,4 +43,37 @@ pub fn run(args: &SimulateArgs) -> Result<()> {
         config.frames, config.width, config.height
     ));
     output::print(&format!("{}\n", drive.display()))
+}
+
+/// What to simulate; what is not said follows the layout's data set.
+fn config(args: &SimulateArgs) -> SimConfig {
+    let (sensors, size, fps) = match args.format {
+        SimulateFormat::Kitti => (Sensors::Kitti, (640, 192), 10.0),
+        SimulateFormat::Bag => (Sensors::Umad, (640, 480), 25.0),
+    };
+    let (width, height) = args
+        .size
+        .map_or(size, |Size { width, height }| (width, height));
+    SimConfig {
+        seed: args.seed,
+        frames: args.frames,
+        width,
+        height,
+        moving_cars: args.moving_cars,
+        fps: args.fps.unwrap_or(fps),
+        scene: match args.scene {
+            SceneChoice::Urban => Scene::Urban,
+            SceneChoice::Park => Scene::Park,
+            SceneChoice::Garage => Scene::Garage,
+            SceneChoice::Commercial => Scene::Commercial,
+            SceneChoice::Night => Scene::Night,
+        },
+        sensors: match args.sensors {
+            None => sensors,
+            Some(SensorsChoice::Kitti) => Sensors::Kitti,
+            Some(SensorsChoice::Umad) => Sensors::Umad,
+        },
+        scan_every: args.scan_every,
+        ..SimConfig::default()
+    }
 }

@@ -1,0 +1,271 @@
+//! The file beside a bag, `<bag>.toml` or `bag.toml` for all bags of a folder: what the bag does not say.
+
+use crate::{Error, Result};
+use deepfusion_geometry::{Intrinsics, Se3};
+use deepfusion_motion::FusionConfig;
+use nalgebra::Vector3;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// The file for every bag of a folder that has none of its own.
+const OF_FOLDER: &str = "bag.toml";
+
+/// Everything that can be said. All of it is optional; docs/reference/bag-toml.md explains each key.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct BagConfig {
+    /// A data set's published numbers, where the bag has none: `umad`.
+    pub(super) profile: Option<String>,
+    /// The kind of drive, for one row each in the evaluation.
+    pub(super) scenario: Option<String>,
+    /// Topics by name, where the type does not tell.
+    pub(super) topics: TopicNames,
+    /// A camera without distortion, where there is no CameraInfo.
+    pub(super) camera: Option<CameraConfig>,
+    /// A point of the LiDAR in the camera.
+    pub(super) cam_from_lidar: Option<Transform>,
+    /// A point of the vehicle (middle of the rear axle; x forward, y left, z up) in the camera.
+    pub(super) cam_from_vehicle: Option<Transform>,
+    /// A point of the inertial unit in the vehicle.
+    pub(super) vehicle_from_imu: Option<Transform>,
+    /// The vehicle's geometry.
+    pub(super) vehicle: VehicleConfig,
+    /// The LiDAR's ways.
+    pub(super) lidar: LidarConfig,
+    /// Clocks and how near in time two sensors must be.
+    pub(super) clock: ClockConfig,
+    /// Signals of CAN frames.
+    pub(super) can: Option<CanConfig>,
+    /// Weights of the sensors in the motion.
+    pub(super) fusion: FusionConfig,
+    /// Where it was read from; the path it would have where there is none.
+    #[serde(skip)]
+    pub(super) path: PathBuf,
+}
+
+/// Topics by name.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct TopicNames {
+    pub(super) image: Option<String>,
+    pub(super) camera_info: Option<String>,
+    pub(super) lidar: Option<String>,
+    pub(super) dynamic: Option<String>,
+    pub(super) imu: Option<String>,
+    pub(super) speed: Option<String>,
+    pub(super) steering: Option<String>,
+    pub(super) can: Option<String>,
+    pub(super) truth: Option<String>,
+}
+
+/// A camera by four numbers and its image's size.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CameraConfig {
+    pub(super) fx: f64,
+    pub(super) fy: f64,
+    pub(super) cx: f64,
+    pub(super) cy: f64,
+    pub(super) width: u32,
+    pub(super) height: u32,
+}
+
+/// A rigid motion: metres, and an axis-angle vector in radians.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Transform {
+    pub(super) translation: [f64; 3],
+    #[serde(default)]
+    pub(super) rotation: [f64; 3],
+}
+
+/// The vehicle's geometry, and the unit of a bare number as its speed.
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct VehicleConfig {
+    pub(super) wheelbase_m: Option<f64>,
+    /// Steering wheel's angle over road wheels'; without it the signal is the road wheels' angle.
+    pub(super) steering_ratio: Option<f64>,
+    pub(super) steering_offset_rad: f64,
+    /// Needed where the speed is a Float32 or Float64.
+    pub(super) speed_unit: Option<SpeedUnit>,
+}
+
+/// Unit of a speed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+pub(super) enum SpeedUnit {
+    #[serde(rename = "m/s")]
+    MetresPerSecond,
+    #[serde(rename = "km/h")]
+    KilometresPerHour,
+    #[serde(rename = "mph")]
+    MilesPerHour,
+}
+
+impl SpeedUnit {
+    pub(super) fn metres_per_second(self) -> f64 {
+        match self {
+            Self::MetresPerSecond => 1.0,
+            Self::KilometresPerHour => 1.0 / 3.6,
+            Self::MilesPerHour => 0.44704,
+        }
+    }
+}
+
+/// The LiDAR's ways.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct LidarConfig {
+    /// The field of the radial velocity; without it the usual names are tried.
+    pub(super) velocity_field: Option<String>,
+    /// The sign of a point that recedes.
+    pub(super) receding: Sign,
+    /// Whether the sensor already took its own velocity out.
+    pub(super) over_ground: bool,
+    /// Speed over ground along the ray from which a point moves, m/s.
+    pub(super) moving_mps: f64,
+}
+
+impl Default for LidarConfig {
+    fn default() -> Self {
+        Self {
+            velocity_field: None,
+            receding: Sign::Positive,
+            over_ground: false,
+            moving_mps: 0.5,
+        }
+    }
+}
+
+/// A sign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Sign {
+    Positive,
+    Negative,
+}
+
+/// Clocks.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct ClockConfig {
+    /// How far the clock of camera and LiDAR is ahead of the vehicle's, in seconds; taken off their stamps.
+    pub(super) camera_ahead_s: f64,
+    /// A scan belongs to a frame if they are no farther apart, in seconds.
+    pub(super) scan_within_s: f64,
+}
+
+impl Default for ClockConfig {
+    fn default() -> Self {
+        Self {
+            camera_ahead_s: 0.0,
+            scan_within_s: 0.025,
+        }
+    }
+}
+
+/// Signals of CAN frames: `Message.Signal` of a DBC file.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CanConfig {
+    /// The DBC file, beside this one.
+    pub(super) dbc: PathBuf,
+    pub(super) speed: Option<String>,
+    pub(super) speed_unit: Option<SpeedUnit>,
+    pub(super) steering: Option<String>,
+    /// Radians for one unit of the steering signal: 0.0174533 where it is in degrees.
+    pub(super) steering_rad: Option<f64>,
+}
+
+impl BagConfig {
+    /// Reads the file beside a bag; where there is none, nothing is said.
+    ///
+    /// # Errors
+    /// [`Error::Config`], [`Error::File`].
+    pub(super) fn beside(bag: &Path) -> Result<Self> {
+        let own = bag.with_extension("toml");
+        let shared = bag.with_file_name(OF_FOLDER);
+        let path = match own.is_file() || !shared.is_file() {
+            true => own,
+            false => shared,
+        };
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(e) => return Err(Error::file(&path, e)),
+        };
+        let mut config: Self = toml::from_str(&text).map_err(|e| Error::Config {
+            path: path.clone(),
+            problem: e.to_string().trim_end().to_owned(),
+        })?;
+        config.path = path;
+        config.validate()?;
+        Ok(config)
+    }
+
+    fn validate(&self) -> Result<()> {
+        let numbers = [
+            ("lidar.moving_mps", self.lidar.moving_mps, true),
+            ("clock.scan_within_s", self.clock.scan_within_s, true),
+            ("clock.camera_ahead_s", self.clock.camera_ahead_s, false),
+        ];
+        for (key, value, positive) in numbers {
+            if !value.is_finite() || (positive && value <= 0.0) {
+                return Err(self.wrong(format!("{key} is {value}")));
+            }
+        }
+        for (key, transform) in [
+            ("cam_from_lidar", self.cam_from_lidar),
+            ("cam_from_vehicle", self.cam_from_vehicle),
+            ("vehicle_from_imu", self.vehicle_from_imu),
+        ] {
+            let Some(t) = transform else { continue };
+            let all = t.translation.iter().chain(&t.rotation);
+            if !all.clone().all(|x| x.is_finite()) {
+                return Err(self.wrong(format!("{key} holds a number that is not finite")));
+            }
+        }
+        let known = self.profile.as_deref().is_none_or(|p| p == "umad");
+        match known {
+            true => Ok(()),
+            false => Err(self.wrong("profile: the only one there is is \"umad\"".into())),
+        }
+    }
+
+    pub(super) fn wrong(&self, problem: String) -> Error {
+        Error::Config {
+            path: self.path.clone(),
+            problem,
+        }
+    }
+}
+
+impl Transform {
+    pub(super) fn se3(&self) -> Se3 {
+        Se3::from_axis_angle(
+            Vector3::from(self.rotation),
+            Vector3::from(self.translation),
+        )
+    }
+}
+
+impl CameraConfig {
+    pub(super) fn intrinsics(&self) -> Intrinsics {
+        let &Self {
+            fx,
+            fy,
+            cx,
+            cy,
+            width,
+            height,
+        } = self;
+        Intrinsics {
+            fx,
+            fy,
+            cx,
+            cy,
+            width,
+            height,
+        }
+    }
+}

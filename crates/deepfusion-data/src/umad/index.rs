@@ -1,0 +1,240 @@
+//! One pass over a bag: when images and scans were taken, and what the vehicle said meanwhile.
+
+use super::config::{BagConfig, SpeedUnit};
+use super::topics::{Role, Topics};
+use crate::{Error, Result};
+use deepfusion_geometry::Se3;
+use deepfusion_motion::ImuSample;
+use deepfusion_motion::can::{CanFrame, CanId, CanSignal, Dbc};
+use deepfusion_rosbag::msg::{
+    AckermannDriveStamped, CameraInfo, Float32, Float64, Frame, Imu, Odometry, TwistStamped,
+};
+use deepfusion_rosbag::{Bag, Message, Selection, Time};
+use nalgebra::Vector3;
+
+/// A message that is read again when it is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    /// When it was recorded, by which it is found again.
+    pub(super) recorded: Time,
+    /// When it was measured, by the sensor's clock, nanoseconds since 1970.
+    pub(super) stamp_ns: i64,
+}
+
+/// What one pass finds. Times of the vehicle's streams are nanoseconds.
+#[derive(Debug, Default)]
+pub(super) struct Index {
+    pub(super) images: Vec<Place>,
+    pub(super) scans: Vec<Place>,
+    pub(super) camera_info: Option<CameraInfo>,
+    pub(super) speed_mps: Vec<(i64, f64)>,
+    pub(super) steering_rad: Vec<(i64, f64)>,
+    pub(super) imu: Vec<(i64, ImuSample)>,
+    /// `world_from_vehicle`, exact.
+    pub(super) truth: Vec<(i64, Se3)>,
+    /// Chunks or messages that could not be read, in sentences.
+    pub(super) lost: Vec<String>,
+}
+
+/// Signals of CAN frames.
+struct Can {
+    speed: Option<(CanSignal, f64)>,
+    steering: Option<(CanSignal, f64)>,
+}
+
+impl Index {
+    /// Reads the topics' stamps and the vehicle's values. Images and clouds are not decoded. What cannot be read is
+    /// counted and left out: a bag with a broken chunk has whole ones too.
+    ///
+    /// # Errors
+    /// [`Error::Bag`] where reading cannot begin; [`Error::Config`] for units or signals that are missing.
+    pub(super) fn read(bag: &Bag, topics: &Topics, config: &BagConfig) -> Result<Self> {
+        let can = Can::of(config)?;
+        let mut index = Self::default();
+        let mut names: Vec<&str> = topics.found.iter().map(|(_, name)| name.as_str()).collect();
+        names.dedup();
+        for message in bag.messages(Selection::topics(names))? {
+            let read = message
+                .map_err(Error::from)
+                .and_then(|message| index.add(&message, topics, config, &can));
+            match read {
+                Ok(()) => {}
+                Err(error @ Error::Config { .. }) => return Err(error),
+                Err(error) => index.lost.push(error.to_string()),
+            }
+        }
+        index.images.sort_by_key(|p| p.stamp_ns);
+        index.scans.sort_by_key(|p| p.stamp_ns);
+        index.truth.sort_by_key(|p| p.0);
+        Ok(index)
+    }
+
+    fn add(
+        &mut self,
+        message: &Message<'_>,
+        topics: &Topics,
+        config: &BagConfig,
+        can: &Can,
+    ) -> Result<()> {
+        for role in topics.roles(message.topic()) {
+            match role {
+                Role::Image | Role::Lidar => {
+                    let place = Place {
+                        recorded: message.time(),
+                        stamp_ns: stamp(message),
+                    };
+                    match role {
+                        Role::Image => self.images.push(place),
+                        _ => self.scans.push(place),
+                    }
+                }
+                Role::CameraInfo if self.camera_info.is_none() => {
+                    self.camera_info = Some(message.decode::<CameraInfo>()?);
+                }
+                Role::CameraInfo => {}
+                Role::Imu => {
+                    let imu: Imu = message.decode()?;
+                    let (a, w) = (imu.linear_acceleration, imu.angular_velocity);
+                    let sample = ImuSample {
+                        time_s: 0.0,
+                        acceleration_mps2: Vector3::new(a.x, a.y, a.z),
+                        angular_rate_radps: Vector3::new(w.x, w.y, w.z),
+                    };
+                    self.imu.push((nanos(imu.header.stamp), sample));
+                }
+                Role::Speed => self.speed_mps.push(speed(message, config)?),
+                Role::Steering => {
+                    let drive: AckermannDriveStamped = message.decode()?;
+                    let angle = f64::from(drive.drive.steering_angle);
+                    self.steering_rad.push((nanos(drive.header.stamp), angle));
+                }
+                Role::Can => {
+                    let frame: Frame = message.decode()?;
+                    self.add_can(&frame, can);
+                }
+                Role::Truth => {
+                    let odometry: Odometry = message.decode()?;
+                    let (p, q) = (odometry.pose.pose.position, odometry.pose.pose.orientation);
+                    let place = Vector3::new(p.x, p.y, p.z);
+                    let pose = Se3::from_quaternion([q.w, q.x, q.y, q.z], place);
+                    self.truth.push((nanos(odometry.header.stamp), pose));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn add_can(&mut self, frame: &Frame, can: &Can) {
+        let id = match frame.is_extended {
+            true => CanId::Extended { extended: frame.id },
+            false => CanId::Standard(frame.id as u16),
+        };
+        let time_ns = nanos(frame.header.stamp);
+        let length = usize::from(frame.dlc).min(frame.data.len());
+        let seen = CanFrame {
+            time_s: 0.0,
+            id,
+            data: &frame.data[..length],
+        };
+        let value = |signal: &Option<(CanSignal, f64)>| {
+            let (signal, factor) = signal.as_ref()?;
+            let value = (signal.id == seen.id).then(|| signal.decode(seen.data))??;
+            Some((time_ns, value * factor))
+        };
+        self.speed_mps.extend(value(&can.speed));
+        self.steering_rad.extend(value(&can.steering));
+    }
+}
+
+impl Can {
+    fn of(config: &BagConfig) -> Result<Self> {
+        let Some(can) = &config.can else {
+            return Ok(Self {
+                speed: None,
+                steering: None,
+            });
+        };
+        let folder = config.path.parent().unwrap_or(&config.path);
+        let path = folder.join(&can.dbc);
+        let wrong = |e: deepfusion_motion::Error| config.wrong(format!("can: {e}"));
+        let dbc = Dbc::open(&path).map_err(wrong)?;
+        let speed = match &can.speed {
+            None => None,
+            Some(name) => {
+                let signal = dbc.signal(name).map_err(wrong)?;
+                let unit = can.speed_unit.or_else(|| unit_of(dbc.unit(name)?));
+                let unit = unit.ok_or_else(|| {
+                    config.wrong(format!(
+                        "can.speed_unit is missing, and the DBC file gives {name} none that is known: \"m/s\", \"km/h\" or \"mph\""
+                    ))
+                })?;
+                Some((signal, unit.metres_per_second()))
+            }
+        };
+        let steering = match &can.steering {
+            None => None,
+            Some(name) => {
+                let factor = can.steering_rad.ok_or_else(|| {
+                    config.wrong(
+                        "can.steering_rad is missing: radians for one unit of the signal, 0.0174533 for degrees".into(),
+                    )
+                })?;
+                Some((dbc.signal(name).map_err(wrong)?, factor))
+            }
+        };
+        Ok(Self { speed, steering })
+    }
+}
+
+fn unit_of(text: &str) -> Option<SpeedUnit> {
+    match text.trim().to_lowercase().as_str() {
+        "m/s" => Some(SpeedUnit::MetresPerSecond),
+        "km/h" | "kph" | "kmh" => Some(SpeedUnit::KilometresPerHour),
+        "mph" => Some(SpeedUnit::MilesPerHour),
+        _ => None,
+    }
+}
+
+/// The vehicle's forward speed by whatever message holds it.
+fn speed(message: &Message<'_>, config: &BagConfig) -> Result<(i64, f64)> {
+    if message.is::<TwistStamped>() {
+        let twist: TwistStamped = message.decode()?;
+        return Ok((nanos(twist.header.stamp), twist.twist.linear.x));
+    }
+    if message.is::<AckermannDriveStamped>() {
+        let drive: AckermannDriveStamped = message.decode()?;
+        return Ok((nanos(drive.header.stamp), f64::from(drive.drive.speed)));
+    }
+    if message.is::<Odometry>() {
+        let odometry: Odometry = message.decode()?;
+        let speed = odometry.twist.twist.linear.x;
+        return Ok((nanos(odometry.header.stamp), speed));
+    }
+    let value = match message.is::<Float32>() {
+        true => f64::from(message.decode::<Float32>()?.data),
+        false => message.decode::<Float64>()?.data,
+    };
+    let unit = config.vehicle.speed_unit.ok_or_else(|| {
+        config.wrong(format!(
+            "vehicle.speed_unit is missing: {} is a bare number, \"m/s\", \"km/h\" or \"mph\"",
+            message.topic()
+        ))
+    })?;
+    Ok((nanos(message.time()), value * unit.metres_per_second()))
+}
+
+/// The stamp of a message that begins with a header; the time of recording where it is not set.
+pub(super) fn stamp(message: &Message<'_>) -> i64 {
+    let word = |at: usize| {
+        let bytes = message.data().get(at..at + 4)?;
+        Some(u32::from_le_bytes(bytes.try_into().ok()?))
+    };
+    match (word(4), word(8)) {
+        (Some(sec), Some(nsec)) if sec != 0 || nsec != 0 => nanos(Time { sec, nsec }),
+        _ => nanos(message.time()),
+    }
+}
+
+pub(super) fn nanos(time: Time) -> i64 {
+    i64::try_from(time.nanos()).unwrap_or(i64::MAX)
+}

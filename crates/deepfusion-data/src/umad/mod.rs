@@ -1,0 +1,18 @@
+//! ROS 1 bags with a camera and a vehicle's sensors, such as UMAD's.
+//!
+//! The way of a bag: `topics` (which is which, by message type) → `sensors` (speed, steering and IMU as a motion) and
+//! `index` (when images and scans were taken) → `recording` (a [`crate::Recording`]), which reads an `image` or a
+//! `scan` when it is asked for. What a bag cannot say (where the sensors are) stands in a file beside it: `config`.
+
+mod config;
+mod doppler;
+mod image;
+mod index;
+mod profile;
+mod recording;
+mod scan;
+mod sensors;
+mod topics;
+
+pub use doppler::{DopplerEgo, ego_velocity, ground_radial};
+pub(crate) use recording::{BagScans, bags_in, is_bag, open};

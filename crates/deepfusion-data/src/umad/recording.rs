@@ -1,0 +1,558 @@
+//! A bag as a [`Recording`].
+
+use super::config::{BagConfig, LidarConfig};
+use super::index::{Index, Place};
+use super::profile;
+use super::scan::{Scan, SeenScan};
+use super::topics::{Role, Topics};
+use super::{image, sensors};
+use crate::kitti::GtKind;
+use crate::recording::{CalibrationPlace, Recording};
+use crate::{
+    Camera, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame, FrameImage, Lens,
+    MotionModel, MovingLabels, OpenOptions, Result, Stream,
+};
+use ::image::RgbImage;
+use deepfusion_geometry::{DepthMap, Distortion, Intrinsics, Se3, StampedPose, Trajectory};
+use deepfusion_rosbag::msg::CameraInfo;
+use deepfusion_rosbag::{Bag, BagOptions};
+use nalgebra::{Matrix3, Vector3};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Half the interval over which a yaw rate is measured, seconds.
+const YAW_RATE_REACH_S: f64 = 0.05;
+
+/// Whether a path is a ROS 1 bag by its name.
+pub(crate) fn is_bag(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str());
+    path.is_file() && extension.is_some_and(|e| e.eq_ignore_ascii_case("bag"))
+}
+
+/// The bags of a folder, by name.
+///
+/// # Errors
+/// [`Error::File`].
+pub(crate) fn bags_in(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut bags = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
+        let path = entry.map_err(|e| Error::file(folder, e))?.path();
+        if is_bag(&path) {
+            bags.push(path);
+        }
+    }
+    bags.sort();
+    Ok(bags)
+}
+
+/// Opens bags, a data set each.
+///
+/// # Errors
+/// As [`Dataset::open`].
+pub(crate) fn open(path: &Path, bags: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
+    let mut datasets = Vec::new();
+    let mut refused = None;
+    for bag in bags {
+        match open_bag(bag, options)?.select(path, options) {
+            Ok(dataset) => datasets.push(dataset),
+            Err(error @ Error::SplitSelectsNothing { .. }) => refused = Some(error),
+            Err(other) => return Err(other),
+        }
+    }
+    match refused {
+        Some(error) if datasets.is_empty() => Err(error),
+        _ => Ok(datasets),
+    }
+}
+
+/// A bag with a camera.
+#[derive(Debug)]
+pub(crate) struct BagRecording {
+    bag: Bag,
+    topics: Topics,
+    images: Vec<Place>,
+    lens: Lens,
+    streams: Vec<Stream>,
+    remarks: Vec<String>,
+    /// Where the vehicle was, exactly, on the vehicle's clock.
+    truth: Trajectory,
+    cam_from_vehicle: Se3,
+    scans: Option<Arc<BagScans>>,
+    calibration: CalibrationPlace,
+}
+
+/// The scans of a bag as its camera sees them.
+#[derive(Debug)]
+pub(crate) struct BagScans {
+    bag: Bag,
+    topic: String,
+    /// Each scan's place and its time on the frames' clock.
+    places: Vec<(Place, f64)>,
+    lidar: LidarConfig,
+    within_s: f64,
+    cam_from_lidar: Se3,
+    cam_from_vehicle: Se3,
+    intrinsics: Intrinsics,
+    track: Option<MotionModel>,
+}
+
+fn open_bag(path: &Path, options: &OpenOptions) -> Result<Dataset> {
+    let config = BagConfig::beside(path)?;
+    let bag = Bag::open(path)?;
+    let topics = Topics::find(&bag, &config)?;
+    let index = Index::read(&bag, &topics, &config)?;
+    let Some(first) = index.images.first().copied() else {
+        let list: Vec<String> = bag.topics()?.into_iter().map(|t| t.name).collect();
+        return Err(Error::NoFrames {
+            path: path.to_owned(),
+            why: format!("none of its topics holds images: {}", list.join(", ")),
+            remedy: "topics.image in the file beside the bag names the camera's topic".into(),
+        });
+    };
+    let mut remarks = Vec::new();
+    remarks.extend(
+        bag.damage()
+            .map(|damage| format!("the bag is damaged: {damage}")),
+    );
+    if let Some(lost) = index.lost.first() {
+        remarks.push(format!(
+            "{} messages or chunks cannot be read; the first: {lost}",
+            index.lost.len()
+        ));
+    }
+    let ahead_ns = (config.clock.camera_ahead_s * 1e9).round() as i64;
+    let origin_ns = first.stamp_ns - ahead_ns;
+    let seconds = |stamp_ns: i64| (stamp_ns - ahead_ns - origin_ns) as f64 * 1e-9;
+
+    let topic = topics.of(Role::Image).unwrap_or_default();
+    let picture = image::decode(&bag, &image::message(&bag, topic, &first)?)?;
+    let rectified = topic.contains("rect");
+    let (lens, calibration) = camera(
+        path,
+        &config,
+        &index,
+        options,
+        picture.dimensions(),
+        rectified,
+    )?;
+    remarks.extend(lens.intrinsics().implausible());
+    let cam_from_vehicle = match config.cam_from_vehicle {
+        Some(transform) => transform.se3(),
+        None => {
+            remarks.push(
+                "nothing says where the camera is on the vehicle: it is taken to look ahead and to move as the rear axle does".into(),
+            );
+            looking_ahead()
+        }
+    };
+    let fused = sensors::fused(path, &index, &config, origin_ns)?;
+    let yaw_known = fused
+        .as_ref()
+        .is_some_and(deepfusion_motion::FusedTrack::knows_yaw);
+    let track = fused.map(MotionModel::from);
+    let name = path
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    let frames = index.images.iter().enumerate().map(|(number, place)| {
+        let time_s = seconds(place.stamp_ns);
+        Frame {
+            drive: name.clone(),
+            number: number as u64,
+            time_s: Some(time_s),
+            image: FrameImage::Within {
+                file: path.to_owned(),
+                index: number as u64,
+            },
+            speed_mps: track.as_ref().and_then(|t| t.speed_at(time_s)),
+        }
+    });
+    let parts = DatasetParts {
+        name: name.clone(),
+        split_name: name.clone(),
+        camera: Camera::Left,
+        frames: frames.collect(),
+        intrinsics: lens.intrinsics(),
+        cam_from_vehicle: Some(cam_from_vehicle),
+        track: track.clone(),
+        yaw_known,
+        origin_ns: Some(origin_ns),
+        scenario: config.scenario.clone(),
+    };
+    let cam_from_lidar = match (&config.cam_from_lidar, config.profile.as_deref()) {
+        (Some(transform), _) => Some(transform.se3()),
+        (None, Some("umad")) => Some(profile::umad_cam_from_lidar().se3()),
+        _ => None,
+    };
+    let scans = match (topics.of(Role::Lidar), cam_from_lidar) {
+        (Some(topic), Some(cam_from_lidar)) => Some(Arc::new(BagScans {
+            bag: Bag::open_with(path, without_threads())?,
+            topic: topic.to_owned(),
+            places: index
+                .scans
+                .iter()
+                .map(|p| (*p, seconds(p.stamp_ns)))
+                .collect(),
+            lidar: config.lidar.clone(),
+            within_s: config.clock.scan_within_s,
+            cam_from_lidar,
+            cam_from_vehicle,
+            intrinsics: lens.intrinsics(),
+            track,
+        })),
+        (Some(_), None) => {
+            remarks.push(
+                "nothing says where the LiDAR is (cam_from_lidar): its scans give no ground truth"
+                    .into(),
+            );
+            None
+        }
+        _ => None,
+    };
+    let truth = index.truth.iter().map(|(ns, pose)| StampedPose {
+        // The truth is on the vehicle's clock.
+        time_s: (ns - origin_ns) as f64 * 1e-9,
+        world_from_body: *pose,
+    });
+    let recording = BagRecording {
+        streams: streams(&bag, &topics, &index)?,
+        bag: Bag::open_with(path, without_threads())?,
+        topics: topics.clone(),
+        truth: Trajectory::new(truth.collect()),
+        images: index.images,
+        lens,
+        remarks,
+        cam_from_vehicle,
+        scans,
+        calibration,
+    };
+    Ok(Dataset::new(parts, Arc::new(recording)))
+}
+
+/// Single messages are decompressed where they are asked for: the loaders have threads of their own.
+fn without_threads() -> BagOptions {
+    BagOptions {
+        threads: 0,
+        ..BagOptions::default()
+    }
+}
+
+/// The camera by what is given, by the file beside the bag, by CameraInfo, or as the profile prints it.
+fn camera(
+    bag: &Path,
+    config: &BagConfig,
+    index: &Index,
+    options: &OpenOptions,
+    (width, height): (u32, u32),
+    rectified: bool,
+) -> Result<(Lens, CalibrationPlace)> {
+    let place = |file: &Path, field| CalibrationPlace {
+        file: file.to_owned(),
+        field,
+    };
+    let pinhole = |intrinsics: Intrinsics| Lens::new(intrinsics, &Distortion::default());
+    let (lens, place) = if let Some([fx, fy, cx, cy]) = options.intrinsics {
+        let given = Intrinsics {
+            fx,
+            fy,
+            cx,
+            cy,
+            width,
+            height,
+        };
+        (pinhole(given), place(bag, "--intrinsics"))
+    } else if let Some(camera) = config.camera {
+        (pinhole(camera.intrinsics()), place(&config.path, "camera"))
+    } else if let Some(info) = index.camera_info.as_ref().filter(|info| info.k[0] > 0.0) {
+        (of_camera_info(info, rectified), place(bag, "CameraInfo"))
+    } else if config.profile.as_deref() == Some("umad") {
+        let printed = profile::UMAD_CAMERA.intrinsics();
+        (pinhole(printed), place(&config.path, "profile"))
+    } else {
+        return Err(Error::CameraFile {
+            path: bag.to_owned(),
+            problem: "nothing says what the camera is: no CameraInfo with a K".into(),
+            remedy: format!(
+                "[camera] fx, fy, cx, cy, width, height in {}, or --intrinsics fx,fy,cx,cy",
+                config.path.display()
+            ),
+        });
+    };
+    let lens = lens.map_err(|problem| Error::CameraFile {
+        path: place.file.clone(),
+        problem,
+        remedy: "calibrate the camera at the size of these images".into(),
+    })?;
+    let found = lens.intrinsics();
+    if (found.width, found.height) != (width, height) {
+        return Err(Error::FrameSize {
+            image: format!("{}, image 0", bag.display()),
+            drive: bag
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+            frame: 0,
+            found: (width, height),
+            expected: (found.width, found.height),
+            field: place.field,
+            calibration: place.file,
+        });
+    }
+    Ok((lens, place))
+}
+
+/// Of rectified images P without distortion, of raw ones K with it.
+fn of_camera_info(info: &CameraInfo, rectified: bool) -> std::result::Result<Lens, String> {
+    let (width, height) = (info.width, info.height);
+    let of = |fx, fy, cx, cy| Intrinsics {
+        fx,
+        fy,
+        cx,
+        cy,
+        width,
+        height,
+    };
+    if rectified && info.p[0] > 0.0 {
+        let p = &info.p;
+        return Lens::new(of(p[0], p[5], p[2], p[6]), &Distortion::default());
+    }
+    let known = ["plumb_bob", "rational_polynomial", ""];
+    if !known.contains(&info.distortion_model.as_str()) && info.d.iter().any(|d| *d != 0.0) {
+        let model = &info.distortion_model;
+        return Err(format!(
+            "distortion_model {model} is not known: plumb_bob and rational_polynomial are"
+        ));
+    }
+    let distortion = match info.d.as_slice() {
+        [] => Distortion::default(),
+        d => Distortion::from_opencv(d)?,
+    };
+    let k = &info.k;
+    Lens::new(of(k[0], k[4], k[2], k[5]), &distortion)
+}
+
+/// A camera at the rear axle that looks ahead.
+fn looking_ahead() -> Se3 {
+    let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+    Se3::from_parts(&axes, Vector3::zeros())
+}
+
+fn streams(bag: &Bag, topics: &Topics, index: &Index) -> Result<Vec<Stream>> {
+    let all = bag.topics()?;
+    let streams = all.iter().map(|topic| {
+        let role = topics.roles(&topic.name).next();
+        let (kind, times): (_, Vec<i64>) = match role {
+            Some(Role::Image) => ("image", index.images.iter().map(|p| p.stamp_ns).collect()),
+            Some(Role::Lidar) => (
+                "point_cloud",
+                index.scans.iter().map(|p| p.stamp_ns).collect(),
+            ),
+            Some(Role::Imu) => ("imu", index.imu.iter().map(|s| s.0).collect()),
+            Some(Role::Speed) => ("speed", index.speed_mps.iter().map(|s| s.0).collect()),
+            Some(Role::Steering) => ("steering", index.steering_rad.iter().map(|s| s.0).collect()),
+            Some(Role::Truth) => ("pose", index.truth.iter().map(|s| s.0).collect()),
+            Some(Role::CameraInfo) => ("camera_info", Vec::new()),
+            Some(Role::Can) => ("can", Vec::new()),
+            None => ("other", Vec::new()),
+        };
+        let origin = times.first().copied().unwrap_or_default();
+        let seconds: Vec<f64> = times.iter().map(|t| (t - origin) as f64 * 1e-9).collect();
+        let mut stream = Stream::new(&topic.name, kind, topic.count as usize, &seconds);
+        stream.rate_hz = stream.rate_hz.or(topic.rate_hz());
+        stream
+    });
+    Ok(streams.collect())
+}
+
+impl BagScans {
+    /// The scan nearest in time to a frame, if it is near enough, as the frame's camera sees it: what stands still is
+    /// brought to the frame's time by the vehicle's motion meanwhile.
+    ///
+    /// # Errors
+    /// As [`Scan::decode`].
+    fn at(&self, frame_s: f64) -> Result<Option<SeenScan>> {
+        let Some(&(place, time_s)) = self.nearest(frame_s) else {
+            return Ok(None);
+        };
+        let message = image::message(&self.bag, &self.topic, &place)?;
+        let scan = Scan::decode(&self.bag, &message, &self.lidar)?;
+        let ground = scan.ground_radial(self.sensor_velocity(time_s), self.lidar.over_ground);
+        let cam_from_lidar = self.frame_from_scan(frame_s, time_s) * self.cam_from_lidar;
+        Ok(Some(scan.seen(
+            &cam_from_lidar,
+            &self.intrinsics,
+            ground.as_deref(),
+        )))
+    }
+
+    fn nearest(&self, frame_s: f64) -> Option<&(Place, f64)> {
+        let after = self.places.partition_point(|p| p.1 < frame_s);
+        let around = self.places[after.saturating_sub(1)..].iter().take(2);
+        let apart = |p: &&(Place, f64)| (p.1 - frame_s).abs();
+        let nearest = around.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        nearest.filter(|p| apart(p) <= self.within_s)
+    }
+
+    /// Camera at the frame's time from camera at the scan's.
+    fn frame_from_scan(&self, frame_s: f64, scan_s: f64) -> Se3 {
+        let (from_s, to_s) = (frame_s.min(scan_s), frame_s.max(scan_s));
+        let motion = self.track.as_ref().and_then(|t| t.motion(from_s, to_s));
+        let Some(motion) = motion else {
+            return Se3::identity();
+        };
+        let earlier_from_later = motion.camera0_from_camera1(&self.cam_from_vehicle);
+        match frame_s <= scan_s {
+            true => earlier_from_later,
+            false => earlier_from_later.inverse(),
+        }
+    }
+
+    /// The LiDAR's velocity over ground at a time, its axes, m/s, by the vehicle: v and ω × r.
+    fn sensor_velocity(&self, time_s: f64) -> Option<Vector3<f64>> {
+        let track = self.track.as_ref()?;
+        let speed = track.speed_at(time_s)?;
+        let turn = track.motion(time_s - YAW_RATE_REACH_S, time_s + YAW_RATE_REACH_S);
+        let yaw_rate = turn.map_or(0.0, |m| m.yaw_rad / (2.0 * YAW_RATE_REACH_S));
+        let vehicle_from_lidar = self.cam_from_vehicle.inverse() * self.cam_from_lidar;
+        let arm = vehicle_from_lidar.translation();
+        let velocity = Vector3::new(speed, 0.0, 0.0) + Vector3::new(0.0, 0.0, yaw_rate).cross(&arm);
+        Some(vehicle_from_lidar.inverse().rotate(&velocity))
+    }
+
+    /// Whether a frame has a scan near enough.
+    pub(crate) fn has(&self, frame_s: f64) -> bool {
+        self.nearest(frame_s).is_some()
+    }
+
+    /// Which pixels of a frame's ground truth move; `None` without a scan or without velocities.
+    ///
+    /// # Errors
+    /// As [`Self::at`].
+    pub(crate) fn moving(&self, frame_s: f64) -> Result<Option<Vec<bool>>> {
+        let limit = self.lidar.moving_mps as f32;
+        let seen = self.at(frame_s)?;
+        let ground = seen.and_then(|seen| seen.ground_mps);
+        Ok(ground.map(|ground| ground.iter().map(|v| v.abs() > limit).collect()))
+    }
+
+    /// Whether its points carry velocities: by the first scan.
+    fn has_velocities(&self) -> Result<bool> {
+        let Some((place, _)) = self.places.first() else {
+            return Ok(false);
+        };
+        let message = image::message(&self.bag, &self.topic, place)?;
+        Ok(Scan::decode(&self.bag, &message, &self.lidar)?
+            .radial
+            .is_some())
+    }
+}
+
+impl Recording for BagRecording {
+    fn kind(&self) -> DatasetKind {
+        DatasetKind::Bag
+    }
+
+    fn folder(&self) -> &Path {
+        self.bag.path().parent().unwrap_or(self.bag.path())
+    }
+
+    fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
+        let topic = self.topics.of(Role::Image).unwrap_or_default();
+        let place = usize::try_from(frame.number)
+            .ok()
+            .and_then(|n| self.images.get(n));
+        let Some(place) = place else {
+            return Err(Error::Image {
+                path: self.bag.path().to_owned(),
+                problem: format!("there is no image {}", frame.number),
+                truncated: false,
+            });
+        };
+        let message = image::message(&self.bag, topic, place)?;
+        self.lens.correct(image::decode(&self.bag, &message)?)
+    }
+
+    fn calibration(&self) -> CalibrationPlace {
+        self.calibration.clone()
+    }
+
+    fn streams(&self) -> Result<Vec<Stream>> {
+        Ok(self.streams.clone())
+    }
+
+    fn no_motion(&self) -> Error {
+        Error::NoTrack {
+            drive: self.bag.path().display().to_string(),
+            why: "the bag has no speed of the vehicle (TwistStamped, Odometry, a CAN signal)".into(),
+            remedy: "topics.speed in the file beside the bag names its topic; [can] reads it from CAN frames".into(),
+        }
+    }
+
+    fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+
+    fn has_ground_truth(&self, frame: &Frame) -> bool {
+        let scans = self.scans.as_ref();
+        scans.is_some_and(|scans| frame.time_s.is_some_and(|t| scans.has(t)))
+    }
+
+    fn ground_truth(&self, frame: &Frame, kind: GtKind) -> Result<Option<DepthMap>> {
+        if kind != GtKind::Z {
+            return Err(Error::DepthKind {
+                drive: frame.drive.clone(),
+            });
+        }
+        let (Some(scans), Some(time_s)) = (&self.scans, frame.time_s) else {
+            return Ok(None);
+        };
+        Ok(scans.at(time_s)?.map(|seen| seen.depth))
+    }
+
+    fn moving_labels(&self, dataset: &Dataset) -> Result<Option<MovingLabels>> {
+        let Some(scans) = &self.scans else {
+            return Ok(None);
+        };
+        if !scans.has_velocities()? {
+            return Ok(None);
+        }
+        let times = dataset
+            .frames()
+            .iter()
+            .filter_map(|f| Some((f.number, f.time_s?)));
+        Ok(Some(MovingLabels::of_scans(
+            Arc::clone(scans),
+            times.collect(),
+        )))
+    }
+
+    fn camera_paths(&self, dataset: &Dataset) -> Result<Vec<CameraPath>> {
+        let vehicle_from_cam = self.cam_from_vehicle.inverse();
+        let mut paths = Vec::new();
+        for stretch in dataset.stretches() {
+            let known: Vec<(usize, f64, Se3)> = stretch
+                .into_iter()
+                .filter_map(|frame| {
+                    let time_s = dataset.frames()[frame].time_s?;
+                    Some((frame, time_s, self.truth.at(time_s)? * vehicle_from_cam))
+                })
+                .collect();
+            if known.len() > 1 {
+                paths.push(CameraPath {
+                    frames: known.iter().map(|k| k.0).collect(),
+                    times_s: known.iter().map(|k| k.1).collect(),
+                    world_from_cam: known.iter().map(|k| k.2).collect(),
+                });
+            }
+        }
+        match paths.is_empty() {
+            true => Err(Error::NoPath {
+                drive: dataset.name().to_owned(),
+                layout: self.kind().label(),
+            }),
+            false => Ok(paths),
+        }
+    }
+}

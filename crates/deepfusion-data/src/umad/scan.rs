@@ -1,0 +1,127 @@
+//! A LiDAR message as points with radial velocities, seen from a frame's camera.
+
+use super::config::{LidarConfig, Sign};
+use super::doppler::{ego_velocity, ground_radial};
+use crate::{Error, Result};
+use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use deepfusion_rosbag::msg::PointCloud2;
+use deepfusion_rosbag::{Bag, Message};
+use nalgebra::Vector3;
+
+/// Names under which drivers publish the radial velocity.
+const VELOCITY_NAMES: [&str; 6] = [
+    "velocity",
+    "radial_velocity",
+    "doppler",
+    "v_radial",
+    "vel",
+    "v",
+];
+/// Of a scan that agrees with one velocity in less than this share, the vehicle's is taken instead.
+const LEAST_STATIC: f64 = 0.4;
+
+/// Points in the LiDAR's axes (x forward, y left, z up), metres.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scan {
+    pub(super) xyz: Vec<[f32; 3]>,
+    /// m/s against the sensor, receding is positive.
+    pub(super) radial: Option<Vec<f32>>,
+}
+
+/// A scan as a frame's camera sees it. H×W, row by row.
+#[derive(Debug, Clone)]
+pub(super) struct SeenScan {
+    /// Camera z in metres, 0 = none.
+    pub(super) depth: DepthMap,
+    /// Speed over ground along the LiDAR's ray, m/s, receding is positive; NaN where there is none.
+    pub(super) ground_mps: Option<Vec<f32>>,
+}
+
+impl Scan {
+    /// # Errors
+    /// [`Error::Bag`] for a message that is no cloud; [`Error::Topic`] without x, y and z, or without the field that
+    /// the settings name.
+    pub(super) fn decode(bag: &Bag, message: &Message<'_>, lidar: &LidarConfig) -> Result<Self> {
+        let cloud: PointCloud2<'_> = message.decode()?;
+        let column = |name: &str| -> Result<Vec<f32>> {
+            let column = cloud.column(name).map_err(|e| Error::Topic {
+                path: bag.path().to_owned(),
+                problem: format!("{}: {e}", message.topic()),
+                remedy: "lidar.velocity_field names the field of the radial velocity; x, y and z must be there"
+                    .into(),
+            })?;
+            Ok(column.f32s().collect())
+        };
+        let (x, y, z) = (column("x")?, column("y")?, column("z")?);
+        let has = |name: &&str| cloud.fields.iter().any(|f| f.name == **name);
+        let named = lidar.velocity_field.as_deref();
+        let usual = || VELOCITY_NAMES.iter().find(|name| has(name)).copied();
+        let radial = match named.or_else(usual) {
+            Some(name) => Some(column(name)?),
+            None => None,
+        };
+        let sign = match lidar.receding {
+            Sign::Positive => 1.0,
+            Sign::Negative => -1.0,
+        };
+        let xyz = x.iter().zip(&y).zip(&z).map(|((x, y), z)| [*x, *y, *z]);
+        Ok(Self {
+            xyz: xyz.collect(),
+            radial: radial.map(|r| r.into_iter().map(|v| sign * v).collect()),
+        })
+    }
+
+    /// Each point's own speed along its ray, m/s; `vehicle` is the sensor's velocity (its axes) by the vehicle, where
+    /// that is known. What stands still in the scan says the same and is freer of the clocks' differences: it is
+    /// taken where enough of the scan agrees.
+    pub(super) fn ground_radial(
+        &self,
+        vehicle: Option<Vector3<f64>>,
+        over_ground: bool,
+    ) -> Option<Vec<f32>> {
+        let radial = self.radial.as_ref()?;
+        if over_ground {
+            return Some(radial.clone());
+        }
+        let by_scan = ego_velocity(&self.xyz, radial, vehicle)
+            .filter(|ego| ego.static_share >= LEAST_STATIC)
+            .map(|ego| ego.velocity);
+        let velocity = by_scan.or(vehicle)?;
+        Some(ground_radial(&self.xyz, radial, &velocity))
+    }
+
+    /// The scan from a camera; the nearest point wins a pixel. `cam_from_lidar` is from the LiDAR at the scan's time
+    /// to the camera at the frame's.
+    pub(super) fn seen(
+        &self,
+        cam_from_lidar: &Se3,
+        k: &Intrinsics,
+        ground: Option<&[f32]>,
+    ) -> SeenScan {
+        let (width, height) = (k.width as usize, k.height as usize);
+        let mut depth = DepthMap::empty(width, height);
+        let mut velocity = ground.map(|_| vec![f32::NAN; width * height]);
+        for (i, point) in self.xyz.iter().enumerate() {
+            let seen = cam_from_lidar.transform(&Vector3::from(point.map(f64::from)));
+            let Some(pixel) = k.project(&seen) else {
+                continue;
+            };
+            let (u, v) = (pixel.x.round_ties_even(), pixel.y.round_ties_even());
+            if !(u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64) {
+                continue;
+            }
+            let at = v as usize * width + u as usize;
+            let old = depth.data[at];
+            if old == 0.0 || seen.z < f64::from(old) {
+                depth.data[at] = seen.z as f32;
+                if let (Some(velocity), Some(ground)) = (&mut velocity, ground) {
+                    velocity[at] = ground[i];
+                }
+            }
+        }
+        SeenScan {
+            depth,
+            ground_mps: velocity,
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! Speed, steering and inertial unit as one motion.
+
+use super::config::BagConfig;
+use super::index::Index;
+use crate::{Error, Result};
+use deepfusion_motion::{
+    Bicycle, FusedTrack, ImuConfig, ImuMount, ImuSample, MotionConfig, Signal, VehicleSensors,
+};
+use std::path::Path;
+
+/// The vehicle's motion by all its sensors, on the vehicle's clock counted from `origin_ns`; `None` without a speed.
+///
+/// # Errors
+/// [`Error::Motion`] where the sensors cannot be read as configured, or contradict each other.
+pub(super) fn fused(
+    bag: &Path,
+    index: &Index,
+    config: &BagConfig,
+    origin_ns: i64,
+) -> Result<Option<FusedTrack>> {
+    if index.speed_mps.is_empty() {
+        return Ok(None);
+    }
+    let seconds = |ns: i64| (ns - origin_ns) as f64 * 1e-9;
+    let signal = |values: &[(i64, f64)]| {
+        let mut values = values.to_vec();
+        values.sort_by_key(|v| v.0);
+        Signal::new(values.into_iter().map(|(ns, v)| (seconds(ns), v)))
+    };
+    let mut imu: Vec<ImuSample> = index
+        .imu
+        .iter()
+        .map(|(ns, sample)| ImuSample {
+            time_s: seconds(*ns),
+            ..*sample
+        })
+        .collect();
+    imu.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    let sensors = VehicleSensors {
+        speed_mps: signal(&index.speed_mps),
+        steering_rad: (!index.steering_rad.is_empty()).then(|| signal(&index.steering_rad)),
+        imu: (!imu.is_empty()).then_some(imu),
+    };
+    let vehicle = &config.vehicle;
+    let mount = config.vehicle_from_imu.map(|t| ImuMount {
+        rotation_rad: t.rotation,
+        translation_m: t.translation,
+    });
+    let motion = MotionConfig {
+        bicycle: vehicle.wheelbase_m.map(|wheelbase_m| Bicycle {
+            steering_ratio: vehicle.steering_ratio.unwrap_or(1.0),
+            steering_offset_rad: vehicle.steering_offset_rad,
+            ..Bicycle::new(wheelbase_m)
+        }),
+        imu: ImuConfig {
+            vehicle_from_imu: mount.unwrap_or_default(),
+            ..ImuConfig::default()
+        },
+        fusion: config.fusion,
+    };
+    let track = FusedTrack::new(&sensors, &motion).map_err(|source| Error::Motion {
+        path: bag.to_owned(),
+        source,
+    })?;
+    Ok(Some(track))
+}

@@ -1,0 +1,94 @@
+//! A drive written as a bag: what is in it, and that it is the drive.
+
+use deepfusion_rosbag::msg::{CameraInfo, CompressedImage, Imu, PointCloud2, TwistStamped};
+use deepfusion_rosbag::{Bag, Selection};
+use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, topic, write_bag};
+
+fn simulation() -> Simulation {
+    let config = SimConfig {
+        seed: 11,
+        frames: 30,
+        width: 96,
+        height: 72,
+        fps: 25.0,
+        moving_cars: 6,
+        scene: Scene::Commercial,
+        sensors: Sensors::Umad,
+        ..SimConfig::default()
+    };
+    Simulation::new(&config).unwrap()
+}
+
+#[test]
+fn the_bag_holds_the_drive() {
+    let simulation = simulation();
+    let folder = tempfile::tempdir().unwrap();
+    let settings = BagSettings {
+        clock_offset_s: 0.25,
+        ..BagSettings::default()
+    };
+    let mut calls = Vec::new();
+    let path = write_bag(&simulation, folder.path(), &settings, &mut |done, of| {
+        calls.push((done, of));
+    })
+    .unwrap();
+    assert_eq!(calls.last(), Some(&(30, 30)));
+    assert_eq!(path.file_name().unwrap(), "commercial_0011.bag");
+    let bag = Bag::open(&path).unwrap();
+    assert!(bag.damage().is_none());
+    let count = |name: &str| {
+        let topics = bag.topics().unwrap();
+        topics.iter().find(|t| t.name == name).unwrap().count
+    };
+    let duration = simulation.time_s(29);
+    assert_eq!((count(topic::IMAGE), count(topic::CAMERA_INFO)), (30, 30));
+    assert_eq!(count(topic::LIDAR), (duration * 10.0) as u64 + 1);
+    assert_eq!(count(topic::IMU), (duration * 100.0).ceil() as u64 + 1);
+
+    let first = |name: &str| {
+        let messages = bag.messages(Selection::topics([name])).unwrap();
+        messages.into_iter().next().unwrap().unwrap()
+    };
+    let speed = first(topic::SPEED);
+    let start = speed.time();
+    let image = first(topic::IMAGE);
+    assert!((image.time().seconds_since(start) - 0.25).abs() < 1e-9);
+    let image: CompressedImage<'_> = image.decode().unwrap();
+    let decoded = image::load_from_memory(&image.data).unwrap().to_rgb8();
+    assert_eq!(decoded, simulation.frame(0).rgb);
+    let info = first(topic::CAMERA_INFO);
+    let info: CameraInfo = info.decode().unwrap();
+    assert_eq!(info.k[0], simulation.intrinsics().fx);
+    let imu: Imu = first(topic::IMU).decode().unwrap();
+    assert_eq!(
+        imu.linear_acceleration.z,
+        simulation.imu_readings()[0].acceleration.z
+    );
+    let twist: TwistStamped = speed.decode().unwrap();
+    assert_eq!(
+        twist.twist.linear.x,
+        simulation.speed_readings()[0].speed_mps
+    );
+    let cloud = first(topic::LIDAR);
+    let cloud: PointCloud2<'_> = cloud.decode().unwrap();
+    let scan = simulation.fmcw(0.0);
+    let velocity: Vec<f32> = cloud.column("velocity").unwrap().f32s().collect();
+    assert_eq!(Some(velocity), scan.cloud.radial_velocity);
+
+    let text = std::fs::read_to_string(path.with_extension("toml")).unwrap();
+    assert!(text.contains("scenario = \"commercial\"") && text.contains("[cam_from_lidar]"));
+}
+
+#[test]
+fn equal_drives_make_equal_bags_and_nothing_is_overwritten() {
+    let simulation = simulation();
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str| {
+        let out = folder.path().join(name);
+        write_bag(&simulation, &out, &BagSettings::default(), &mut |_, _| {})
+    };
+    let [a, b] = ["a", "b"].map(|name| std::fs::read(write(name).unwrap()).unwrap());
+    assert!(a == b, "the bytes differ");
+    let error = write("a").unwrap_err();
+    assert!(error.to_string().contains("not empty"), "{error}");
+}
