@@ -182,6 +182,28 @@ pub enum Error {
         /// Why not.
         source: deepfusion_motion::Error,
     },
+    /// Something is there already where something is to be written.
+    #[error("{}: is there already", path.display())]
+    Exists {
+        /// The file, or the folder that is not empty.
+        path: PathBuf,
+    },
+    /// Recordings of different cameras cannot be drives of one date.
+    #[error("{first} and {other} have different cameras, and a KITTI date has one calibration")]
+    Cameras {
+        /// A recording.
+        first: String,
+        /// One with another camera, or another place of it.
+        other: String,
+    },
+    /// A frame without a time.
+    #[error("{drive}: frame {frame} has no time, and a bag is ordered by time")]
+    NoTimes {
+        /// The drive.
+        drive: String,
+        /// The frame's number.
+        frame: u64,
+    },
     /// A recording that has streams, but no images.
     #[error("{}: {why}", path.display())]
     NoFrames {
@@ -397,6 +419,9 @@ impl Error {
             Self::UnknownLayout { .. } => {
                 "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
             }
+            Self::Exists { .. } => "choose another place, or remove it first",
+            Self::Cameras { .. } => "convert them one by one, each into a folder of its own",
+            Self::NoTimes { .. } => "give the frames times: timestamps.txt, or fps in dataset.toml",
             Self::Bag(error) => return error.hint(),
             Self::Motion { source, .. } => return source.hint(),
             Self::OneCamera { .. } => "leave --camera out, or give 2",

@@ -10,6 +10,7 @@ mod camera;
 mod clock;
 mod comma;
 mod config;
+mod convert;
 mod dataset;
 mod depth_png;
 mod error;
@@ -43,6 +44,7 @@ mod write;
 
 pub use calibration::CameraCalibration;
 pub use camera::{Camera, CameraChoice};
+pub use convert::{convert_to_bag, convert_to_kitti};
 pub use dataset::{Dataset, DatasetParts, OpenOptions};
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
 pub use depth_png::{read_depth_png, write_depth_png};

@@ -1,6 +1,10 @@
 //! A simulated drive read back as a data set: through a bag, KITTI's layout, and a folder with a table.
 
-use deepfusion_data::{Dataset, GtKind, MovingSource, OpenOptions, ego_velocity, ground_radial};
+use deepfusion_data::{
+    Dataset, GtKind, MovingSource, OpenOptions, convert_to_bag, convert_to_kitti, ego_velocity,
+    ground_radial,
+};
+use deepfusion_rosbag::Compression;
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -235,4 +239,50 @@ fn a_clock_that_is_ahead_is_set_back() {
     assert!(straight < 0.1, "{straight}");
     // Where it accelerates, 0.3 s are some decimetres a second.
     assert!(off > 0.25, "{off} {straight}");
+}
+
+/// Bag → KITTI → bag: images, times, motions and depths stay.
+#[test]
+fn a_bag_becomes_a_kitti_drive_and_a_bag_again() {
+    let simulation = simulation(Scene::Urban, 20, 2);
+    let folder = tempfile::tempdir().unwrap();
+    let first = open(&bag(&simulation, folder.path(), &BagSettings::default()));
+    let out = folder.path().join("kitti");
+    let drives = convert_to_kitti(std::slice::from_ref(&first), &out, &mut |_, _| {}).unwrap();
+    let second = open(&drives[0]);
+    let again = folder.path().join("again.bag");
+    convert_to_bag(&second, &again, Compression::Bz2, &mut |_, _| {}).unwrap();
+    let third = open(&again);
+    let snippets = [&first, &second, &third].map(|set| set.snippets(&[1], 0.5).unwrap());
+    for (set, snippets_of) in [(&second, &snippets[1]), (&third, &snippets[2])] {
+        assert_eq!(snippets_of.len(), 19);
+        assert_eq!(set.intrinsics(0), first.intrinsics(0));
+        assert!(set.load_image(7).unwrap() == first.load_image(7).unwrap());
+        for (a, b) in snippets_of.iter().zip(&snippets[0]) {
+            let (a, b) = (&a.sources[0].motion, &b.sources[0].motion);
+            assert!((a.dt_s - b.dt_s).abs() < 1e-6);
+            // Speeds are sampled at the frames now: the noise between them is no longer averaged.
+            assert!((a.distance_m - b.distance_m).abs() < 0.03 * b.distance_m);
+            let (a, b) = (a.source_from_target.unwrap(), b.source_from_target.unwrap());
+            assert!((a * b.inverse()).angle() < 1e-3);
+        }
+        for frame in 0..20 {
+            let depth = |set: &Dataset| set.ground_truth(frame, GtKind::Z).unwrap();
+            let (ours, theirs) = (depth(set), depth(&first));
+            assert_eq!(ours.is_some(), theirs.is_some(), "frame {frame}");
+            let (Some(ours), Some(theirs)) = (ours, theirs) else {
+                continue;
+            };
+            let same = ours.data.iter().zip(&theirs.data);
+            let apart = same.filter(|(a, b)| (*a - *b).abs() > 1e-4 * b.abs());
+            assert_eq!(apart.count(), 0, "frame {frame}");
+        }
+    }
+    let refused = convert_to_kitti(std::slice::from_ref(&first), &out, &mut |_, _| {});
+    assert!(
+        refused
+            .unwrap_err()
+            .to_string()
+            .contains("is there already")
+    );
 }

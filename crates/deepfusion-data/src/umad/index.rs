@@ -28,6 +28,8 @@ pub(super) struct Index {
     pub(super) scans: Vec<Place>,
     pub(super) camera_info: Option<CameraInfo>,
     pub(super) speed_mps: Vec<(i64, f64)>,
+    /// Of the message that holds the speed, rad/s; not every publisher fills it.
+    pub(super) yaw_rate: Vec<(i64, f64)>,
     pub(super) steering_rad: Vec<(i64, f64)>,
     pub(super) imu: Vec<(i64, ImuSample)>,
     /// `world_from_vehicle`, exact.
@@ -102,7 +104,16 @@ impl Index {
                     };
                     self.imu.push((nanos(imu.header.stamp), sample));
                 }
-                Role::Speed => self.speed_mps.push(speed(message, config)?),
+                Role::Speed => {
+                    let Reading {
+                        at_ns,
+                        speed_mps,
+                        yaw_rate,
+                    } = reading(message, config)?;
+                    self.speed_mps.push((at_ns, speed_mps));
+                    self.yaw_rate
+                        .extend(yaw_rate.map(|yaw_rate| (at_ns, yaw_rate)));
+                }
                 Role::Steering => {
                     let drive: AckermannDriveStamped = message.decode()?;
                     let angle = f64::from(drive.drive.steering_angle);
@@ -195,20 +206,39 @@ fn unit_of(text: &str) -> Option<SpeedUnit> {
     }
 }
 
+/// What a message about the speed says.
+struct Reading {
+    at_ns: i64,
+    speed_mps: f64,
+    yaw_rate: Option<f64>,
+}
+
 /// The vehicle's forward speed by whatever message holds it.
-fn speed(message: &Message<'_>, config: &BagConfig) -> Result<(i64, f64)> {
+fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
     if message.is::<TwistStamped>() {
         let twist: TwistStamped = message.decode()?;
-        return Ok((nanos(twist.header.stamp), twist.twist.linear.x));
+        return Ok(Reading {
+            at_ns: nanos(twist.header.stamp),
+            speed_mps: twist.twist.linear.x,
+            yaw_rate: Some(twist.twist.angular.z),
+        });
     }
     if message.is::<AckermannDriveStamped>() {
         let drive: AckermannDriveStamped = message.decode()?;
-        return Ok((nanos(drive.header.stamp), f64::from(drive.drive.speed)));
+        return Ok(Reading {
+            at_ns: nanos(drive.header.stamp),
+            speed_mps: f64::from(drive.drive.speed),
+            yaw_rate: None,
+        });
     }
     if message.is::<Odometry>() {
         let odometry: Odometry = message.decode()?;
-        let speed = odometry.twist.twist.linear.x;
-        return Ok((nanos(odometry.header.stamp), speed));
+        let twist = odometry.twist.twist;
+        return Ok(Reading {
+            at_ns: nanos(odometry.header.stamp),
+            speed_mps: twist.linear.x,
+            yaw_rate: Some(twist.angular.z),
+        });
     }
     let value = match message.is::<Float32>() {
         true => f64::from(message.decode::<Float32>()?.data),
@@ -220,7 +250,11 @@ fn speed(message: &Message<'_>, config: &BagConfig) -> Result<(i64, f64)> {
             message.topic()
         ))
     })?;
-    Ok((nanos(message.time()), value * unit.metres_per_second()))
+    Ok(Reading {
+        at_ns: nanos(message.time()),
+        speed_mps: value * unit.metres_per_second(),
+        yaw_rate: None,
+    })
 }
 
 /// The stamp of a message that begins with a header; the time of recording where it is not set.

@@ -145,11 +145,9 @@ fn open_bag(path: &Path, options: &OpenOptions) -> Result<Dataset> {
             looking_ahead()
         }
     };
-    let fused = sensors::fused(path, &index, &config, origin_ns)?;
-    let yaw_known = fused
-        .as_ref()
-        .is_some_and(deepfusion_motion::FusedTrack::knows_yaw);
-    let track = fused.map(MotionModel::from);
+    let motion = sensors::motion(path, &index, &config, origin_ns)?;
+    let yaw_known = motion.as_ref().is_some_and(|m| m.yaw_known);
+    let track = motion.map(|m| m.track);
     let name = path
         .file_stem()
         .unwrap_or_default()

@@ -4,22 +4,34 @@ use super::config::BagConfig;
 use super::index::Index;
 use crate::{Error, Result};
 use deepfusion_motion::{
-    Bicycle, FusedTrack, ImuConfig, ImuMount, ImuSample, MotionConfig, Signal, VehicleSensors,
+    Bicycle, FusedTrack, ImuConfig, ImuMount, ImuSample, MotionConfig, MotionModel, Signal,
+    VehicleSensors, VehicleTrack,
 };
 use std::path::Path;
+
+/// A vehicle's motion.
+pub(super) struct Motion {
+    pub(super) track: MotionModel,
+    /// Whether anything measured its turns.
+    pub(super) yaw_known: bool,
+}
 
 /// The vehicle's motion by all its sensors, on the vehicle's clock counted from `origin_ns`; `None` without a speed.
 ///
 /// # Errors
 /// [`Error::Motion`] where the sensors cannot be read as configured, or contradict each other.
-pub(super) fn fused(
+pub(super) fn motion(
     bag: &Path,
     index: &Index,
     config: &BagConfig,
     origin_ns: i64,
-) -> Result<Option<FusedTrack>> {
+) -> Result<Option<Motion>> {
     if index.speed_mps.is_empty() {
         return Ok(None);
+    }
+    let turns = index.yaw_rate.iter().any(|(_, yaw_rate)| *yaw_rate != 0.0);
+    if turns && index.imu.is_empty() && index.steering_rad.is_empty() {
+        return Ok(Some(by_twist(index, origin_ns)));
     }
     let seconds = |ns: i64| (ns - origin_ns) as f64 * 1e-9;
     let signal = |values: &[(i64, f64)]| {
@@ -62,5 +74,21 @@ pub(super) fn fused(
         path: bag.to_owned(),
         source,
     })?;
-    Ok(Some(track))
+    Ok(Some(Motion {
+        yaw_known: track.knows_yaw(),
+        track: track.into(),
+    }))
+}
+
+/// A vehicle that says its yaw rate itself, and has no other sensor for it.
+fn by_twist(index: &Index, origin_ns: i64) -> Motion {
+    let readings = index.speed_mps.iter().zip(&index.yaw_rate);
+    let mut samples: Vec<(f64, f64, f64)> = readings
+        .map(|((ns, speed), (_, yaw_rate))| ((ns - origin_ns) as f64 * 1e-9, *speed, *yaw_rate))
+        .collect();
+    samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Motion {
+        track: VehicleTrack::new(&samples).into(),
+        yaw_known: true,
+    }
 }

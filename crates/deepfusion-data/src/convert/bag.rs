@@ -1,0 +1,186 @@
+use super::{cam_from_scanner, points, speed_and_yaw_rate};
+use crate::{Dataset, Error, Result};
+use deepfusion_geometry::Se3;
+use deepfusion_rosbag::msg::{
+    CameraInfo, CompressedImage, Header, PointCloud2, RegionOfInterest, Twist, TwistStamped,
+    Vector3,
+};
+use deepfusion_rosbag::{BagWriter, Compression, Time, WriterOptions};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Frames read and written together.
+const BATCH: usize = 8;
+
+/// Writes a data set as a ROS 1 bag, and beside it the file that says where its sensors are: PNG images, CameraInfo,
+/// speed and yaw rate (TwistStamped) and, where there is depth, point clouds in the camera's place.
+///
+/// # Errors
+/// [`Error::Exists`] where `out` is there already; [`Error::NoTimes`] where a frame has no time; [`Error::Bag`], and
+/// what reading can have wrong.
+pub fn convert_to_bag(
+    dataset: &Dataset,
+    out: &Path,
+    compression: Compression,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<()> {
+    let sidecar = out.with_extension("toml");
+    for path in [out, &sidecar] {
+        if path.exists() {
+            return Err(Error::Exists {
+                path: path.to_owned(),
+            });
+        }
+    }
+    let origin_ns = dataset.origin_ns().unwrap_or_default();
+    let time = |time_s: f64| {
+        let ns = origin_ns + (time_s * 1e9).round() as i64;
+        Time::from_nanos(u64::try_from(ns).unwrap_or_default())
+    };
+    let mut times = Vec::with_capacity(dataset.frames().len());
+    for frame in dataset.frames() {
+        let time_s = frame.time_s.ok_or_else(|| Error::NoTimes {
+            drive: dataset.name().to_owned(),
+            frame: frame.number,
+        })?;
+        times.push(time_s);
+    }
+    let options = WriterOptions {
+        compression,
+        ..WriterOptions::default()
+    };
+    let mut bag = BagWriter::create(out, options)?;
+    let image_topic = bag.add_connection::<CompressedImage<'_>>("/camera/image_rect/compressed")?;
+    let info_topic = bag.add_connection::<CameraInfo>("/camera/camera_info")?;
+    let speed_topic = match dataset.track() {
+        Some(_) => Some(bag.add_connection::<TwistStamped>("/vehicle/speed")?),
+        None => None,
+    };
+    let has_depth = (0..times.len()).any(|frame| dataset.has_ground_truth(frame));
+    let cloud_topic = match has_depth {
+        true => Some(bag.add_connection::<PointCloud2<'_>>("/lidar/points")?),
+        false => None,
+    };
+    if let (Some(topic), Some(track)) = (speed_topic, dataset.track()) {
+        for (seq, &time_s) in track.times_s().iter().enumerate() {
+            let Some((speed, yaw_rate)) = speed_and_yaw_rate(dataset, time_s) else {
+                continue;
+            };
+            let along = |x| Vector3 {
+                x,
+                ..Vector3::default()
+            };
+            let message = TwistStamped {
+                header: header(time(time_s), seq, "vehicle"),
+                twist: Twist {
+                    linear: along(speed),
+                    angular: Vector3 {
+                        z: yaw_rate,
+                        ..Vector3::default()
+                    },
+                },
+            };
+            bag.write(topic, time(time_s), &message)?;
+        }
+    }
+    let frames: Vec<usize> = (0..times.len()).collect();
+    let mut done = 0;
+    for batch in frames.chunks(BATCH) {
+        let read: Vec<(Vec<u8>, Option<Vec<[f32; 3]>>)> = batch
+            .par_iter()
+            .map(|&frame| Ok((png(dataset, frame)?, points(dataset, frame)?)))
+            .collect::<Result<_>>()?;
+        for (&frame, (png, points)) in batch.iter().zip(&read) {
+            let stamp = time(times[frame]);
+            let header = |frame_id| header(stamp, frame, frame_id);
+            let image = CompressedImage {
+                header: header("camera"),
+                format: "png".into(),
+                data: Cow::Borrowed(png),
+            };
+            bag.write(image_topic, stamp, &image)?;
+            bag.write(info_topic, stamp, &camera_info(dataset, header("camera")))?;
+            if let (Some(topic), Some(points)) = (cloud_topic, points) {
+                let column = |axis: usize| -> Vec<f32> { points.iter().map(|p| p[axis]).collect() };
+                let (x, y, z) = (column(0), column(1), column(2));
+                let columns: [(&str, &[f32]); 3] = [("x", &x), ("y", &y), ("z", &z)];
+                let cloud = PointCloud2::from_columns(header("lidar"), &columns);
+                let cloud = cloud.map_err(|e| Error::Topic {
+                    path: out.to_owned(),
+                    problem: e.to_string(),
+                    remedy: "report this with the recording".into(),
+                })?;
+                bag.write(topic, stamp, &cloud)?;
+            }
+        }
+        done += batch.len();
+        progress(done, times.len());
+    }
+    super::write_text(&sidecar, &describe(dataset))?;
+    Ok(bag.finish()?)
+}
+
+fn header(stamp: Time, seq: usize, frame_id: &str) -> Header {
+    Header {
+        seq: seq as u32,
+        stamp,
+        frame_id: frame_id.to_owned(),
+    }
+}
+
+fn png(dataset: &Dataset, frame: usize) -> Result<Vec<u8>> {
+    let image = dataset.load_image(frame)?;
+    let mut bytes = Vec::new();
+    let (width, height) = image.dimensions();
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub);
+    encoder
+        .write_image(image.as_raw(), width, height, ExtendedColorType::Rgb8)
+        .map_err(|e| Error::Image {
+            path: dataset.frames()[frame].image.path().to_owned(),
+            problem: e.to_string(),
+            truncated: false,
+        })?;
+    Ok(bytes)
+}
+
+fn camera_info(dataset: &Dataset, header: Header) -> CameraInfo {
+    let k = dataset.intrinsics(0);
+    CameraInfo {
+        header,
+        height: k.height,
+        width: k.width,
+        distortion_model: "plumb_bob".into(),
+        d: vec![0.0; 5],
+        k: [k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0],
+        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        p: [
+            k.fx, 0.0, k.cx, 0.0, 0.0, k.fy, k.cy, 0.0, 0.0, 0.0, 1.0, 0.0,
+        ],
+        binning_x: 0,
+        binning_y: 0,
+        roi: RegionOfInterest::default(),
+    }
+}
+
+fn describe(dataset: &Dataset) -> String {
+    let mut text = String::from(
+        "# Where the sensors of the bag beside this file are: target_from_source, metres and an axis-angle vector.\n",
+    );
+    if let Some(scenario) = dataset.scenario() {
+        let _ = writeln!(text, "scenario = {scenario:?}");
+    }
+    let mut add = |name: &str, pose: &Se3| {
+        let three = |v: nalgebra::Vector3<f64>| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+        let (t, r) = (three(pose.translation()), three(pose.axis_angle()));
+        let _ = writeln!(text, "\n[{name}]\ntranslation = {t}\nrotation = {r}");
+    };
+    add("cam_from_lidar", &cam_from_scanner());
+    if let Some(pose) = dataset.cam_from_vehicle() {
+        add("cam_from_vehicle", &pose);
+    }
+    text
+}

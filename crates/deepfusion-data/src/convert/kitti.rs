@@ -1,0 +1,175 @@
+use super::calendar::{date, stamp};
+use super::{cam_from_scanner, points, speed_and_yaw_rate};
+use crate::{Dataset, Error, Result, save_png, write_atomically};
+use deepfusion_cloud::PointCloud;
+use deepfusion_geometry::{Intrinsics, Se3};
+use rayon::prelude::*;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Writes data sets as drives of a KITTI date folder below `out`, which must be new or empty, and returns the drives'
+/// folders. All must have one camera: KITTI's calibration is that of a date.
+///
+/// `velodyne_points` holds the measured depth as points in the camera's place (what stands still is where it was at the
+/// frame's time), not the scanner's own; `oxts` holds speed and yaw rate, and zeros for what the recording does not
+/// know: its `navstat` says that there was no fix.
+///
+/// # Errors
+/// [`Error::NotEmpty`], [`Error::Cameras`] where the cameras differ, and what reading or writing can have wrong.
+pub fn convert_to_kitti(
+    datasets: &[Dataset],
+    out: &Path,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Vec<PathBuf>> {
+    let Some(first) = datasets.first() else {
+        return Ok(Vec::new());
+    };
+    let same = |other: &Dataset| {
+        other.intrinsics(0) == first.intrinsics(0)
+            && other.cam_from_vehicle() == first.cam_from_vehicle()
+    };
+    if let Some(other) = datasets.iter().find(|other| !same(other)) {
+        return Err(Error::Cameras {
+            first: first.name().to_owned(),
+            other: other.name().to_owned(),
+        });
+    }
+    super::prepare(out)?;
+    let start_ns = first.origin_ns().unwrap_or_default();
+    let (year, month, day) = date(start_ns.div_euclid(86_400_000_000_000));
+    let date_name = format!("{year:04}_{month:02}_{day:02}");
+    let date_folder = out.join(&date_name);
+    write_calibration(&date_folder, &first.intrinsics(0), first.cam_from_vehicle())?;
+    let total: usize = datasets.iter().map(|d| d.frames().len()).sum();
+    let (mut done, mut folders) = (0, Vec::new());
+    for (number, dataset) in datasets.iter().enumerate() {
+        let folder = date_folder.join(format!("{date_name}_drive_{:04}_sync", number + 1));
+        write_drive(dataset, &folder, &mut |frames| {
+            done += frames;
+            progress(done, total);
+        })?;
+        folders.push(folder);
+    }
+    Ok(folders)
+}
+
+/// Frames read and written together.
+const BATCH: usize = 8;
+
+fn write_drive(dataset: &Dataset, folder: &Path, progress: &mut dyn FnMut(usize)) -> Result<()> {
+    let part = |name: &str| -> Result<PathBuf> {
+        let path = folder.join(name).join("data");
+        std::fs::create_dir_all(&path).map_err(|e| Error::file(&path, e))?;
+        Ok(path)
+    };
+    let images = part("image_02")?;
+    let scans = part("velodyne_points")?;
+    let has_motion = dataset.track().is_some();
+    let oxts = has_motion.then(|| part("oxts")).transpose()?;
+    let frames: Vec<usize> = (0..dataset.frames().len()).collect();
+    for batch in frames.chunks(BATCH) {
+        batch.par_iter().try_for_each(|&index| {
+            let frame = &dataset.frames()[index];
+            let name = format!("{:010}", frame.number);
+            let image = dataset.load_image(index)?;
+            save_png(&image, &images.join(format!("{name}.png")))?;
+            if let Some(xyz) = points(dataset, index)? {
+                let path = scans.join(format!("{name}.bin"));
+                let cloud = PointCloud {
+                    intensity: Some(vec![0.0; xyz.len()]),
+                    xyz,
+                    ..PointCloud::default()
+                };
+                write_atomically(&path, |out| -> Result<()> {
+                    Ok(cloud.write_kitti_bin(out)?)
+                })?;
+            }
+            let known = frame.time_s.and_then(|t| speed_and_yaw_rate(dataset, t));
+            if let (Some(folder), Some((speed, yaw_rate))) = (&oxts, known) {
+                let path = folder.join(format!("{name}.txt"));
+                let line = packet(speed, yaw_rate);
+                super::write_text(&path, &line)?;
+            }
+            Ok::<(), Error>(())
+        })?;
+        progress(batch.len());
+    }
+    // A line for every number, as KITTI has it: numbers without a frame get the time between their neighbours'.
+    let last = dataset.frames().last().map_or(0, |f| f.number);
+    let origin = dataset.origin_ns().unwrap_or_default();
+    let mut text = String::new();
+    for number in 0..=last {
+        let time_s = dataset.time_of(number).or_else(|| between(dataset, number));
+        let ns = origin + (time_s.unwrap_or_default() * 1e9).round() as i64;
+        let _ = writeln!(text, "{}", stamp(ns));
+    }
+    if dataset.frames().iter().any(|f| f.time_s.is_some()) {
+        for name in ["image_02", "velodyne_points", "oxts"] {
+            if name != "oxts" || has_motion {
+                super::write_text(&folder.join(name).join("timestamps.txt"), &text)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The time of a number that has no frame: straight between its neighbours'.
+fn between(dataset: &Dataset, number: u64) -> Option<f64> {
+    let frames = dataset.frames();
+    let after = frames.partition_point(|f| f.number < number);
+    let next = frames.get(after)?;
+    let before = frames.get(after.checked_sub(1)?)?;
+    let share = (number - before.number) as f64 / (next.number - before.number) as f64;
+    Some(before.time_s? + share * (next.time_s? - before.time_s?))
+}
+
+/// An OXTS packet that knows speed and yaw rate alone; at rest an accelerometer reads 9.81 upwards.
+fn packet(speed: f64, yaw_rate: f64) -> String {
+    let mut values = [0.0; 30];
+    values[8] = speed;
+    (values[13], values[16]) = (9.81, 9.81);
+    (values[19], values[22]) = (yaw_rate, yaw_rate);
+    let words: Vec<String> = values[..25].iter().map(|v| format!("{v}")).collect();
+    format!("{} 0 0 0 0 0\n", words.join(" "))
+}
+
+fn numbers(values: impl IntoIterator<Item = f64>) -> String {
+    let words: Vec<String> = values.into_iter().map(|v| format!("{v:.12e}")).collect();
+    words.join(" ")
+}
+
+fn write_calibration(folder: &Path, k: &Intrinsics, cam_from_vehicle: Option<Se3>) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, e))?;
+    let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    let projection = [
+        k.fx, 0.0, k.cx, 0.0, 0.0, k.fy, k.cy, 0.0, 0.0, 0.0, 1.0, 0.0,
+    ];
+    let size = [f64::from(k.width), f64::from(k.height)];
+    let text = format!(
+        "calib_time: converted\nR_rect_00: {}\nS_rect_02: {}\nR_rect_02: {}\nP_rect_02: {}\n",
+        numbers(identity),
+        numbers(size),
+        numbers(identity),
+        numbers(projection)
+    );
+    super::write_text(&folder.join("calib_cam_to_cam.txt"), &text)?;
+    let scanner = cam_from_scanner();
+    super::write_text(&folder.join("calib_velo_to_cam.txt"), &rigid(&scanner))?;
+    if let Some(cam_from_vehicle) = cam_from_vehicle {
+        let scanner_from_vehicle = scanner.inverse() * cam_from_vehicle;
+        let path = folder.join("calib_imu_to_velo.txt");
+        super::write_text(&path, &rigid(&scanner_from_vehicle))?;
+    }
+    Ok(())
+}
+
+fn rigid(pose: &Se3) -> String {
+    let rotation = pose.rotation();
+    let entries = (0..9).map(|i| rotation[(i / 3, i % 3)]);
+    let t = pose.translation();
+    let place = numbers([t.x, t.y, t.z]);
+    format!(
+        "calib_time: converted\nR: {}\nT: {place}\n",
+        numbers(entries)
+    )
+}

@@ -1,0 +1,91 @@
+//! A recording of any layout written as another: KITTI raw, or a ROS 1 bag.
+//!
+//! What is written is what a [`Dataset`](crate::Dataset) gives: images freed of their lens' distortion, their times, the
+//! camera, its place on the vehicle, speeds and yaw rates, and the measured depth as points in the camera's place. The
+//! other layout then gives the same snippets and the same ground truth.
+
+mod bag;
+mod calendar;
+mod kitti;
+
+pub use bag::convert_to_bag;
+pub use kitti::convert_to_kitti;
+
+use crate::{Dataset, Error, GtKind, Result, write_atomically};
+use deepfusion_geometry::Se3;
+use nalgebra::{Matrix3, Vector3};
+use std::io::Write as _;
+use std::path::Path;
+
+/// The axes of a scanner (x forward, y left, z up) at the camera's place, seen from the camera.
+fn cam_from_scanner() -> Se3 {
+    let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+    Se3::from_parts(&axes, Vector3::zeros())
+}
+
+/// A frame's measured depth as points of a scanner at the camera's place, x forward, y left, z up, in metres: each
+/// projects back to the pixel it came from. `None` where the frame has no depth.
+fn points(dataset: &Dataset, frame: usize) -> Result<Option<Vec<[f32; 3]>>> {
+    let Some(depth) = dataset.ground_truth(frame, GtKind::Z)? else {
+        return Ok(None);
+    };
+    let k = dataset.intrinsics(frame);
+    let scanner_from_cam = cam_from_scanner().inverse();
+    let mut points = Vec::new();
+    for (index, z) in depth.data.iter().enumerate().filter(|(_, z)| **z > 0.0) {
+        let (u, v) = (index % depth.width, index / depth.width);
+        let in_cam = k.back_project(u as f64, v as f64, f64::from(*z));
+        let point = scanner_from_cam.transform(&in_cam);
+        points.push([point.x as f32, point.y as f32, point.z as f32]);
+    }
+    Ok(Some(points))
+}
+
+/// Makes the output folder, which must be new or empty.
+fn prepare(out: &Path) -> Result<()> {
+    std::fs::create_dir_all(out).map_err(|e| Error::file(out, e))?;
+    let mut entries = std::fs::read_dir(out).map_err(|e| Error::file(out, e))?;
+    match entries.next() {
+        None => Ok(()),
+        Some(_) => Err(Error::Exists {
+            path: out.to_owned(),
+        }),
+    }
+}
+
+fn write_text(path: &Path, text: &str) -> Result<()> {
+    write_atomically(path, |out| {
+        let written = out.write_all(text.as_bytes());
+        written.map_err(|e| Error::file(path, e))
+    })
+}
+
+/// Half the time over which a yaw rate is taken, in seconds.
+const YAW_REACH_S: f64 = 0.05;
+
+/// Forward speed (m/s) and yaw rate (rad/s) at a time; `None` where the recording does not say.
+fn speed_and_yaw_rate(dataset: &Dataset, time_s: f64) -> Option<(f64, f64)> {
+    let track = dataset.track()?;
+    let speed = track.speed_at(time_s)?;
+    let reaches = [
+        (YAW_REACH_S, YAW_REACH_S),
+        (0.0, YAW_REACH_S),
+        (YAW_REACH_S, 0.0),
+    ];
+    let yaw_rate = reaches.iter().find_map(|(before, after)| {
+        let motion = track.motion(time_s - before, time_s + after)?;
+        Some(motion.yaw_rad / (before + after))
+    });
+    Some((speed, yaw_rate.unwrap_or(0.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ahead_of_the_scanner_is_ahead_of_the_camera() {
+        let seen = cam_from_scanner().transform(&Vector3::new(5.0, 2.0, 1.0));
+        assert!((seen - Vector3::new(-2.0, -1.0, 5.0)).norm() < 1e-12);
+    }
+}
