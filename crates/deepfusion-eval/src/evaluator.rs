@@ -227,6 +227,7 @@ impl Evaluator {
                 .then(|| self.missing as f64 / self.masked.max(1) as f64),
             points: self.point_statistics(),
             trivial: None,
+            scenarios: Vec::new(),
             skipped: self.skipped.clone(),
         })
     }

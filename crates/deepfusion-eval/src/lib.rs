@@ -29,6 +29,8 @@ pub use evaluator::{Evaluator, ImageScore, Sample};
 pub use grid::{Grid, Prediction};
 pub use metrics::Metrics;
 pub use protocol::{Crop, GroundTruth, Holes, Protocol, Scaling};
-pub use report::{FixedScaled, Points, ProtocolSummary, RangeBin, Report, Scale, TrivialRow};
+pub use report::{
+    FixedScaled, Points, ProtocolSummary, RangeBin, Report, Scale, ScenarioRow, TrivialRow,
+};
 pub use statistics::median;
 pub use trivial::TrivialBaseline;

@@ -46,6 +46,9 @@ pub struct Report {
     /// The mean depth of each pixel over the training scans, on the same images: what a useful network must beat.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trivial: Option<TrivialRow>,
+    /// The same of each kind of drive, where the recordings say theirs and there is more than one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub scenarios: Vec<ScenarioRow>,
     /// Names of images without a pixel to compare, if any.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub skipped: Vec<String>,
@@ -65,6 +68,35 @@ impl Report {
             median_scaled: trivial.median_scaled,
         });
         self
+    }
+}
+
+/// One kind of drive, such as `garage`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ScenarioRow {
+    /// Its name.
+    pub name: String,
+    /// How many images were compared.
+    pub n: usize,
+    /// Metrics of the predictions as they are.
+    pub unscaled: Metrics,
+    /// Metrics after median scaling.
+    pub median_scaled: Metrics,
+    /// How metric the predictions are.
+    pub scale: Scale,
+}
+
+impl ScenarioRow {
+    /// The row of a scenario, from the report on its images alone.
+    #[must_use]
+    pub fn new(name: impl Into<String>, report: &Report) -> Self {
+        Self {
+            name: name.into(),
+            n: report.n,
+            unscaled: report.unscaled,
+            median_scaled: report.median_scaled,
+            scale: report.scale,
+        }
     }
 }
 

@@ -77,6 +77,10 @@ impl Report {
             row(f, "trivial", &trivial.unscaled)?;
             row(f, "trivial, median-scaled", &trivial.median_scaled)?;
         }
+        for scenario in &self.scenarios {
+            let label = format!("{}, scale {:.3}", scenario.name, scenario.scale.median);
+            row(f, &label, &scenario.unscaled)?;
+        }
         Ok(())
     }
 

@@ -30,6 +30,14 @@ pub enum CliError {
         /// What was given.
         input: String,
     },
+    /// Several drives where one is needed.
+    #[error("{}: holds {drives} drives, and a bag is one", input.display())]
+    SeveralDrives {
+        /// What was given.
+        input: PathBuf,
+        /// How many it holds.
+        drives: usize,
+    },
     /// Intrinsics that cannot be the image's.
     #[error("the intrinsics do not fit the image: {why}")]
     Camera {
@@ -116,6 +124,7 @@ impl CliError {
                 "build it with `cargo build --release --features {device}`, or use --device cpu"
             )),
             Self::NoImages { .. } => None,
+            Self::SeveralDrives { .. } => Some("convert them one by one: give a drive's own folder".into()),
             Self::Camera { .. } => {
                 Some("give fx,fy,cx,cy in pixels of the input image, at its own size".into())
             }

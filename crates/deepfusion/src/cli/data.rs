@@ -4,7 +4,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use deepfusion_data::{CameraChoice, GtKind};
 use deepfusion_eval::GroundTruth;
 
-use super::CameraIntrinsics;
+use super::{CameraIntrinsics, CompressionChoice};
 
 /// `deepfusion data …`.
 #[derive(Debug, Subcommand)]
@@ -13,6 +13,8 @@ pub enum DataCommand {
     Inspect(InspectArgs),
     /// Write sparse ground-truth depth from the scans as an .npz file.
     ExportGt(ExportGtArgs),
+    /// Write a recording in another layout: a KITTI drive, or a ROS 1 bag.
+    Convert(ConvertArgs),
 }
 
 /// `deepfusion data inspect`.
@@ -35,6 +37,34 @@ pub struct InspectArgs {
     #[arg(long, value_name = "DIR", requires = "overlay")]
     pub out: Option<PathBuf>,
     /// Print as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `deepfusion data convert`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Images are written freed of their lens' distortion, the measured depth as points in the camera's place.\n\n\
+    Examples:\n  deepfusion data convert drive.bag kitti-drive\n  \
+    deepfusion data convert kitti/2011_09_26/2011_09_26_drive_0005_sync drive.bag"
+)]
+pub struct ConvertArgs {
+    /// A recording of any layout.
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+    /// A new folder for a KITTI date, or a new file that ends in .bag.
+    #[arg(value_name = "OUT")]
+    pub out: PathBuf,
+    /// The camera of a recording without a calibration, in pixels of its images.
+    #[arg(long, value_name = "fx,fy,cx,cy")]
+    pub intrinsics: Option<CameraIntrinsics>,
+    /// Which camera.
+    #[arg(long, value_name = "2|3", default_value = "2")]
+    pub camera: CameraChoice,
+    /// Compression of a bag.
+    #[arg(long, value_enum, default_value_t)]
+    pub compression: CompressionChoice,
+    /// Print what was written as JSON.
     #[arg(long)]
     pub json: bool,
 }

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use ablate::AblateArgs;
-pub use data::{DataCommand, ExportGtArgs, GtDepth, InspectArgs};
+pub use data::{ConvertArgs, DataCommand, ExportGtArgs, GtDepth, InspectArgs};
 pub use engine::{EngineArgs, EngineChoice, PrecisionChoice};
 pub use eval::{EvalArgs, PredKind};
 pub use eval_odometry::EvalOdometryArgs;
@@ -173,6 +173,16 @@ pub enum CompressionChoice {
     Lz4,
     /// Small and slow.
     Bz2,
+}
+
+impl From<CompressionChoice> for deepfusion_rosbag::Compression {
+    fn from(choice: CompressionChoice) -> Self {
+        match choice {
+            CompressionChoice::None => Self::None,
+            CompressionChoice::Lz4 => Self::Lz4,
+            CompressionChoice::Bz2 => Self::Bz2,
+        }
+    }
 }
 
 /// Places the simulator knows.

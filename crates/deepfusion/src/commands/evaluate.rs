@@ -1,12 +1,13 @@
 //! Evaluation shared by `eval`, `demo` and training reports.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use deepfusion_data::{CameraChoice, Dataset, GtKind, OpenOptions, Split, ground_truth_names};
 use deepfusion_eval::{
-    ArraySet, Evaluator, Grid, GroundTruth, Prediction, Protocol, Report, Sample, TrivialBaseline,
+    ArraySet, Evaluator, Grid, GroundTruth, Prediction, Protocol, Report, Sample, ScenarioRow,
+    TrivialBaseline,
 };
 use deepfusion_geometry::DepthMap;
 
@@ -75,6 +76,9 @@ pub fn trivial_from_arrays(path: &Path) -> Result<TrivialBaseline> {
 pub struct Comparison {
     method: Evaluator,
     trivial: Option<(Evaluator, TrivialBaseline)>,
+    /// By kind of drive, where the recordings say theirs.
+    scenarios: BTreeMap<String, Evaluator>,
+    protocol: Protocol,
 }
 
 impl Comparison {
@@ -87,6 +91,8 @@ impl Comparison {
                 Some(baseline) => Some((Evaluator::new(protocol.clone())?, baseline)),
                 None => None,
             },
+            scenarios: BTreeMap::new(),
+            protocol: protocol.clone(),
         })
     }
 
@@ -101,9 +107,27 @@ impl Comparison {
         Ok(())
     }
 
-    /// The method's report with the trivial row.
+    /// Counts an image for its kind of drive, too.
+    pub fn add_to_scenario(&mut self, name: &str, image: &Sample<'_>) -> Result<()> {
+        if !self.scenarios.contains_key(name) {
+            let evaluator = Evaluator::new(self.protocol.clone())?;
+            self.scenarios.insert(name.to_owned(), evaluator);
+        }
+        if let Some(evaluator) = self.scenarios.get_mut(name) {
+            evaluator.add_sample(image)?;
+        }
+        Ok(())
+    }
+
+    /// The method's report with the trivial row, and a row for each kind of drive where there are several.
     pub fn report(&self) -> Result<Report> {
-        let report = self.method.report()?;
+        let mut report = self.method.report()?;
+        if self.scenarios.len() > 1 {
+            for (name, evaluator) in &self.scenarios {
+                let row = ScenarioRow::new(name, &evaluator.report()?);
+                report.scenarios.push(row);
+            }
+        }
         Ok(match &self.trivial {
             Some((evaluator, _)) => report.with_trivial(&evaluator.report()?),
             None => report,
@@ -152,13 +176,17 @@ pub fn evaluate_datasets(
                     }
                     _ => None,
                 };
-                comparison.add(&Sample {
+                let sample = Sample {
                     name,
                     prediction: &prediction,
                     ground_truth: &ground_truth,
                     moving: moving.as_deref(),
                     intrinsics: same_size.then_some(&k),
-                })?;
+                };
+                comparison.add(&sample)?;
+                if let Some(scenario) = dataset.scenario() {
+                    comparison.add_to_scenario(scenario, &sample)?;
+                }
             }
             done += 1;
             progress(done, total);

@@ -1,10 +1,7 @@
 use anyhow::Result;
-use deepfusion_rosbag::Compression;
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 
-use crate::cli::{
-    CompressionChoice, SceneChoice, SensorsChoice, SimulateArgs, SimulateFormat, Size,
-};
+use crate::cli::{SceneChoice, SensorsChoice, SimulateArgs, SimulateFormat, Size};
 use crate::output;
 use crate::progress::{Progress, say};
 
@@ -18,11 +15,7 @@ pub fn run(args: &SimulateArgs) -> Result<()> {
         SimulateFormat::Kitti => write_kitti(&simulation, &args.out, &mut report)?,
         SimulateFormat::Bag => {
             let settings = BagSettings {
-                compression: match args.compression {
-                    CompressionChoice::None => Compression::None,
-                    CompressionChoice::Lz4 => Compression::Lz4,
-                    CompressionChoice::Bz2 => Compression::Bz2,
-                },
+                compression: args.compression.into(),
                 clock_offset_s: 1e-3 * args.clock_offset,
                 ..BagSettings::default()
             };
