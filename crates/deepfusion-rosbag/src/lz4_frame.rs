@@ -173,3 +173,82 @@ fn invalid(problem: &str) -> io::Error {
 fn too_long(most: usize) -> io::Error {
     io::Error::other(format!("broken, or more than the {most} bytes expected"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::buffer::Pool;
+    use lz4_flex::frame::{BlockMode, BlockSize, FrameEncoder, FrameInfo};
+    use std::io::Write;
+
+    /// Four blocks and a bit, whose matches reach from each into the one before.
+    fn content() -> Vec<u8> {
+        let tile: Vec<u8> = (0..999_u32).map(|i| (i * i >> 5) as u8).collect();
+        tile.iter()
+            .cycle()
+            .take(4 * 65_536 + 1234)
+            .copied()
+            .collect()
+    }
+
+    fn frame(mode: BlockMode, content: &[u8]) -> Vec<u8> {
+        let info = FrameInfo::new()
+            .block_mode(mode)
+            .block_size(BlockSize::Max64KB)
+            .block_checksums(true)
+            .content_checksum(true)
+            .content_size(Some(content.len() as u64));
+        let mut encoder = FrameEncoder::with_frame_info(info, Vec::new());
+        encoder.write_all(content).unwrap();
+        encoder.finish().unwrap()
+    }
+
+    fn unpack(stored: &[u8], most: usize) -> (Vec<u8>, Option<String>) {
+        let mut out = Pool::new(0).take();
+        let error = decompress(stored, most, &mut out).err();
+        (out.to_vec(), error.map(|error| error.to_string()))
+    }
+
+    #[test]
+    fn blocks_come_back_alone_and_linked_and_frame_after_frame() {
+        let content = content();
+        for mode in [BlockMode::Independent, BlockMode::Linked] {
+            let stored = frame(mode, &content);
+            assert_eq!(unpack(&stored, content.len()), (content.clone(), None));
+            let twice = [&stored[..], &stored].concat();
+            assert_eq!(
+                unpack(&twice, usize::MAX),
+                ([&content[..], &content].concat(), None)
+            );
+        }
+    }
+
+    #[test]
+    fn a_frame_that_is_cut_or_too_long_gives_its_beginning() {
+        let content = content();
+        let stored = frame(BlockMode::Linked, &content);
+        for cut in 1..stored.len() {
+            let (found, error) = unpack(&stored[..cut], content.len());
+            assert!(
+                error.is_some() && content.starts_with(&found),
+                "cut at {cut}"
+            );
+        }
+        for most in [0, 1, 65_535, 65_536, 65_537, content.len() - 1] {
+            let (found, error) = unpack(&stored, most);
+            assert!(found.len() <= most && content.starts_with(&found));
+            assert!(error.unwrap().contains(&most.to_string()));
+        }
+    }
+
+    #[test]
+    fn no_changed_bit_goes_unnoticed() {
+        let content = content();
+        let stored = frame(BlockMode::Independent, &content);
+        for at in 0..stored.len() {
+            let mut changed = stored.clone();
+            changed[at] ^= 1 << (at % 8);
+            assert!(unpack(&changed, content.len()).1.is_some(), "byte {at}");
+        }
+    }
+}
