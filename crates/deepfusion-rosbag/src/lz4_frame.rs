@@ -183,7 +183,7 @@ mod tests {
 
     /// Four blocks and a bit, whose matches reach from each into the one before.
     fn content() -> Vec<u8> {
-        let tile: Vec<u8> = (0..999_u32).map(|i| (i * i >> 5) as u8).collect();
+        let tile: Vec<u8> = (0..999_u32).map(|i| ((i * i) >> 5) as u8).collect();
         tile.iter()
             .cycle()
             .take(4 * 65_536 + 1234)
