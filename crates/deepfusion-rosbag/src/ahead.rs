@@ -1,5 +1,6 @@
 //! Chunks decompressed ahead of need, on threads of their own.
 
+use crate::buffer::Pool;
 use crate::content::{self, Opened};
 use crate::error::Fault;
 use crate::index::ChunkInfo;
@@ -29,6 +30,7 @@ pub(crate) struct Ahead {
     source: Arc<Source>,
     limit: usize,
     threads: usize,
+    pool: Arc<Pool>,
     /// Both ends of the queue: the second is for taking back what nobody needs any more.
     queue: Option<(Sender<Job>, Receiver<Job>)>,
     workers: Vec<JoinHandle<()>>,
@@ -40,6 +42,8 @@ impl Ahead {
             source,
             limit,
             threads,
+            // As many as are open at once in a bag whose chunks follow one another.
+            pool: Pool::new(2 * threads + 2),
             queue: None,
             workers: Vec::new(),
         }
@@ -58,7 +62,7 @@ impl Ahead {
         let (jobs, _) = self.queue.get_or_insert_with(|| {
             let (jobs, queue) = unbounded();
             self.workers = (0..self.threads)
-                .filter_map(|_| worker(&self.source, &queue, self.limit))
+                .filter_map(|_| worker(&self.source, &queue, self.limit, &self.pool))
                 .collect();
             (jobs, queue)
         });
@@ -75,16 +79,23 @@ impl Ahead {
             Ticket::Ahead(ticket) => ticket.recv().ok(),
             Ticket::OnDemand => None,
         };
-        outcome.unwrap_or_else(|| content::open(&self.source, info, self.limit))
+        outcome.unwrap_or_else(|| content::open(&self.source, info, self.limit, &self.pool))
     }
 }
 
-fn worker(source: &Arc<Source>, queue: &Receiver<Job>, limit: usize) -> Option<JoinHandle<()>> {
-    let (source, queue) = (Arc::clone(source), queue.clone());
+fn worker(
+    source: &Arc<Source>,
+    queue: &Receiver<Job>,
+    limit: usize,
+    pool: &Arc<Pool>,
+) -> Option<JoinHandle<()>> {
+    let (source, queue, pool) = (Arc::clone(source), queue.clone(), Arc::clone(pool));
     let work = move || {
         for job in queue {
             // Nobody waits any more where the iterator was dropped.
-            let _ = job.done.send(content::open(&source, &job.info, limit));
+            let _ = job
+                .done
+                .send(content::open(&source, &job.info, limit, &pool));
         }
     };
     thread::Builder::new()

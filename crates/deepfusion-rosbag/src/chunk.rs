@@ -1,5 +1,6 @@
 //! A chunk record: its bytes as they are, or decompressed.
 
+use crate::buffer::Buffer;
 use crate::compression::Compression;
 use crate::error::Fault;
 use crate::record::{Record, op};
@@ -49,7 +50,7 @@ impl<'a> Chunk<'a> {
 
     /// The bytes of a compressed chunk. Memory grows with what comes out, never beyond `limit` or the size that the
     /// header promises; what came out before an error is left in `out`.
-    pub fn decompress(&self, limit: usize, out: &mut Vec<u8>) -> Result<(), String> {
+    pub fn decompress(&self, limit: usize, out: &mut Buffer) -> Result<(), String> {
         if self.size != usize::MAX && self.size > limit {
             return Err(format!(
                 "{} bytes decompressed, the limit is {limit} (max_chunk_bytes)",

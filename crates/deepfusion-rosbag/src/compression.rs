@@ -1,10 +1,12 @@
 //! LZ4 frames and bzip2, both ways.
 
+use crate::buffer::Buffer;
+use crate::lz4_frame;
 use bzip2::bufread::MultiBzDecoder;
 use bzip2::write::BzEncoder;
-use lz4_flex::frame::{BlockMode, BlockSize, FrameDecoder, FrameEncoder, FrameInfo};
+use lz4_flex::frame::{BlockMode, BlockSize, FrameEncoder, FrameInfo};
 use std::borrow::Cow;
-use std::io::{self, BufRead, Read, Write};
+use std::io::{self, Read, Write};
 
 /// How a chunk's bytes are compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -37,19 +39,10 @@ impl Compression {
 
     /// Appends what `stored` holds to `out`, up to `most` bytes: more is an error. Memory grows with what comes out, and
     /// what came out before an error stays.
-    pub(crate) fn decompress(
-        self,
-        stored: &[u8],
-        most: usize,
-        out: &mut Vec<u8>,
-    ) -> io::Result<()> {
+    pub(crate) fn decompress(self, stored: &[u8], most: usize, out: &mut Buffer) -> io::Result<()> {
         match self {
             Compression::None => extend(out, stored, most),
-            Compression::Lz4 => {
-                // LZ4 makes at most 255 bytes of one: a small chunk cannot ask for a large buffer.
-                out.reserve_exact(most.min(stored.len().saturating_mul(255)));
-                drain(FrameDecoder::new(stored), most, out)
-            }
+            Compression::Lz4 => lz4_frame::decompress(stored, most, out),
             Compression::Bz2 => read_all(MultiBzDecoder::new(stored), most, out),
         }
     }
@@ -77,54 +70,32 @@ pub(crate) fn compress(compression: Compression, content: &[u8]) -> io::Result<C
     }
 }
 
-fn extend(out: &mut Vec<u8>, bytes: &[u8], most: usize) -> io::Result<()> {
+fn extend(out: &mut Buffer, bytes: &[u8], most: usize) -> io::Result<()> {
     if bytes.len() > most - out.len() {
         return Err(io::Error::other(format!(
             "more than the {most} bytes expected"
         )));
     }
-    out.extend_from_slice(bytes);
+    out.extend(bytes);
     Ok(())
 }
 
-/// From a decoder that has a buffer of its own: one copy, no zeroing.
-fn drain(mut decoder: impl BufRead, most: usize, out: &mut Vec<u8>) -> io::Result<()> {
+/// Whatever a decoder gives, a mebibyte at a time.
+fn read_all(mut decoder: impl Read, most: usize, out: &mut Buffer) -> io::Result<()> {
+    const STEP: usize = 1 << 20;
     loop {
-        let block = decoder.fill_buf()?;
-        if block.is_empty() {
-            return Ok(());
-        }
-        let length = block.len();
-        extend(out, block, most)?;
-        decoder.consume(length);
-    }
-}
-
-/// From a decoder that writes into ours, which doubles as it fills.
-fn read_all(mut decoder: impl Read, most: usize, out: &mut Vec<u8>) -> io::Result<()> {
-    const FIRST: usize = 1 << 20;
-    let mut filled = 0;
-    loop {
-        if filled == out.len() {
-            // One byte more than promised is asked for, so that a longer stream is noticed.
-            let room = (2 * filled).max(FIRST).min(most.saturating_add(1));
-            out.resize(room.max(filled), 0);
-        }
-        if filled == out.len() {
-            out.truncate(most);
-            return Err(io::Error::other(format!(
-                "more than the {most} bytes expected"
-            )));
-        }
-        match decoder.read(&mut out[filled..]) {
-            Ok(0) => break out.truncate(filled),
-            Ok(n) => filled += n,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => {
-                out.truncate(filled);
-                return Err(error);
+        // One byte more than promised is asked for, so that a longer stream is noticed.
+        let room = STEP.min((most - out.len()).saturating_add(1));
+        match decoder.read(out.split(room).1) {
+            Ok(0) => return Ok(()),
+            Ok(count) if count > most - out.len() => {
+                return Err(io::Error::other(format!(
+                    "more than the {most} bytes expected"
+                )));
             }
+            Ok(count) => out.advance(count),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
         }
     }
-    Ok(())
 }

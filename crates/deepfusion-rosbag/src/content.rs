@@ -1,5 +1,6 @@
 //! A chunk made readable: its bytes in the file, or a buffer that lives as long as somebody holds it.
 
+use crate::buffer::{Buffer, Pool};
 use crate::chunk::Chunk;
 use crate::compression::Compression;
 use crate::error::Fault;
@@ -15,7 +16,7 @@ pub(crate) enum Content {
         from: usize,
         to: usize,
     },
-    Unpacked(Arc<Vec<u8>>),
+    Unpacked(Arc<Buffer>),
 }
 
 impl Content {
@@ -35,8 +36,13 @@ pub(crate) struct Opened {
     pub broken: Option<Fault>,
 }
 
-/// Makes a chunk readable. Chunks of a scanned bag are read as far as they go.
-pub(crate) fn open(source: &Source, info: &ChunkInfo, limit: usize) -> Result<Opened, Fault> {
+/// Makes a chunk readable, in a buffer of `pool` where it is compressed. Chunks of a scanned bag are read as far as they go.
+pub(crate) fn open(
+    source: &Source,
+    info: &ChunkInfo,
+    limit: usize,
+    pool: &Arc<Pool>,
+) -> Result<Opened, Fault> {
     let chunk = if info.scanned {
         Chunk::read_to_break(source, info.position)?
     } else {
@@ -63,7 +69,7 @@ pub(crate) fn open(source: &Source, info: &ChunkInfo, limit: usize) -> Result<Op
             }
         }
         Compression::Lz4 | Compression::Bz2 => {
-            let mut buffer = Vec::new();
+            let mut buffer = pool.take();
             match chunk.decompress(limit, &mut buffer) {
                 Ok(()) => {}
                 Err(problem) if info.scanned => broken = Some(fault(problem)),

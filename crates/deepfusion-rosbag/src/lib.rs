@@ -10,6 +10,7 @@
 mod ahead;
 mod bag;
 mod bag_set;
+mod buffer;
 mod chunk;
 mod compression;
 mod connection;
@@ -18,6 +19,7 @@ mod encode;
 mod entry;
 mod error;
 mod index;
+mod lz4_frame;
 mod message;
 mod messages;
 pub mod msg;

@@ -1,3 +1,4 @@
+use crate::buffer::Buffer;
 use crate::connection::Connection;
 use crate::msg::RosMessage;
 use crate::{Error, Result, Time};
@@ -22,7 +23,7 @@ pub(crate) enum Payload<'bag> {
     /// In the file itself.
     Stored(&'bag [u8]),
     /// In a decompressed chunk.
-    Unpacked(Arc<Vec<u8>>, Range<usize>),
+    Unpacked(Arc<Buffer>, Range<usize>),
 }
 
 impl<'bag> Message<'bag> {

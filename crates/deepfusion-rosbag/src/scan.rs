@@ -1,6 +1,7 @@
 //! A bag without a usable index: every record from the front to the break.
 
 use crate::Time;
+use crate::buffer::Pool;
 use crate::chunk::Chunk;
 use crate::connection::Connection;
 use crate::content::{self, Content};
@@ -11,6 +12,7 @@ use crate::record::{Record, op};
 use crate::source::Source;
 use rayon::prelude::*;
 use std::fmt;
+use std::sync::Arc;
 
 /// What is wrong with a bag that was scanned instead of opened by its index.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -51,10 +53,11 @@ pub(crate) struct Scan {
 /// time range and counts.
 pub(crate) fn scan(source: &Source, start: usize, limit: usize) -> Scan {
     let frames = Frames::find(source, start);
+    let pool = Pool::new(rayon::current_num_threads());
     let chunks: Vec<_> = frames
         .chunks
         .into_par_iter()
-        .map(|position| Found::read(source, position, limit))
+        .map(|position| Found::read(source, position, limit, &pool))
         .collect();
     let mut index = Index::default();
     // Definitions in the chunks first: that is the order in which the recorder met the topics.
@@ -163,7 +166,7 @@ struct Found {
 }
 
 impl Found {
-    fn read(source: &Source, position: u64, limit: usize) -> Self {
+    fn read(source: &Source, position: u64, limit: usize, pool: &Arc<Pool>) -> Self {
         let mut info = ChunkInfo {
             position,
             first: Time::ZERO,
@@ -171,7 +174,7 @@ impl Found {
             counts: Vec::new(),
             scanned: true,
         };
-        let (walk, broken) = match content::open(source, &info, limit) {
+        let (walk, broken) = match content::open(source, &info, limit, pool) {
             Ok(opened) => {
                 let walk = walk(opened.content.bytes(source));
                 let inner = walk.broken.clone().map(|fault| match opened.content {

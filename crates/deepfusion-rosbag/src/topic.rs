@@ -1,4 +1,5 @@
 use crate::bag::Bag;
+use crate::buffer::Pool;
 use crate::chunk::Chunk;
 use crate::connection::Connection;
 use crate::entry;
@@ -113,12 +114,17 @@ fn times(
 ) -> Result<impl Iterator<Item = Time>> {
     let (file, places): (&[u8], _) = (bag.source(), bag.places());
     let entries = if info.scanned {
-        content::open(bag.source(), info, bag.options().chunk_limit())
-            .map(|opened| entry::walk(opened.content.bytes(file)).entries(places))
-            .map(|mut entries| {
-                entries.retain(|e| of_topic(e.connection));
-                entries
-            })
+        content::open(
+            bag.source(),
+            info,
+            bag.options().chunk_limit(),
+            &Pool::new(0),
+        )
+        .map(|opened| entry::walk(opened.content.bytes(file)).entries(places))
+        .map(|mut entries| {
+            entries.retain(|e| of_topic(e.connection));
+            entries
+        })
     } else {
         Chunk::read(file, info.position)
             .and_then(|chunk| entry::indexed(file, chunk.end, info, places, of_topic))

@@ -233,6 +233,28 @@ fn definitions_and_their_md5_are_those_of_rosbags() {
     assert!(types.is_empty());
 }
 
+#[test]
+fn lz4_blocks_may_refer_to_the_one_before() {
+    #[derive(Deserialize)]
+    struct Picture {
+        bytes: usize,
+        sha256: String,
+    }
+    let expected: Picture = read_json("linked_lz4.json");
+    let bag = Bag::open(reference("linked_lz4.bag")).unwrap();
+    let message = bag
+        .messages(Selection::all())
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap();
+    let picture: CompressedImage = message.decode().unwrap();
+    assert_eq!(
+        (picture.data.len(), sha256(&picture.data)),
+        (expected.bytes, expected.sha256)
+    );
+}
+
 #[derive(Deserialize)]
 struct RealBag {
     connections: Vec<Connection>,

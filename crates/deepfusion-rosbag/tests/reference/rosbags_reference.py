@@ -4,7 +4,7 @@ pip install rosbags numpy
 python crates/deepfusion-rosbag/tests/reference/rosbags_reference.py [FOLDER WITH REAL BAGS]
 
 Writes beside itself: every_type_{none,lz4,bz2}.bag (every message type, in many small chunks whose times overlap, two
-publishers of one topic), every_type.json (what rosbags reads from them, all values), and, with the folder of real bags
+publishers of one topic), linked_lz4.bag (a chunk of several LZ4 blocks), every_type.json (what rosbags reads from them, all values), and, with the folder of real bags
 (`../shared/data/rosbag`), real_bags.json (counts, times, first and last values, a digest over all messages).
 
 A value is a line `field = text`; floats are the 16 hexadecimal digits of their f64, bytes and longer arrays of floats
@@ -293,6 +293,16 @@ def every_type():
     save("every_type.json", results[0])
 
 
+def linked_blocks():
+    """A chunk of several LZ4 blocks, each referring to the one before: liblz4's default, and not that of ROS."""
+    tile = RNG.integers(0, 256, 999, dtype=np.uint8)
+    data = np.tile(tile, 400)
+    picture = T["sensor_msgs/msg/CompressedImage"](header(0, "camera"), "none", data)
+    recorded = [("/camera", None, "sensor_msgs/msg/CompressedImage", 5, picture, {})]
+    write(HERE / "linked_lz4.bag", recorded, Writer.CompressionFormat.LZ4)
+    save("linked_lz4.json", {"bytes": len(data), "sha256": sha(data)})
+
+
 def real(folder):
     bags = {}
     for path in sorted(folder.glob("*.bag")):
@@ -322,5 +332,6 @@ def save(name, value):
 
 if __name__ == "__main__":
     every_type()
+    linked_blocks()
     if len(sys.argv) > 1:
         real(Path(sys.argv[1]))
