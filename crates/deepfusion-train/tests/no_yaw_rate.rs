@@ -49,7 +49,7 @@ fn what_reads_turns_is_refused_and_the_rest_trains() {
     };
     let changes: [&dyn Fn(&mut TrainConfig); 2] = [&vehicle, &rotation];
     for change in changes {
-        let error = with(change).err().expect("nobody knows how the car turned");
+        let error = with(change).expect_err("nobody knows how the car turned");
         assert!(matches!(error, Error::NoYawRate { .. }), "{error}");
         assert!(error.hint().unwrap().contains("yaw_rate_radps"));
     }
