@@ -1,11 +1,12 @@
 //! A comma2k19 segment: `processed_log` and `global_pose` as NumPy arrays without an ending, `video.hevc`.
 
+use crate::calibration::find_camera;
 use crate::clock::seconds;
 use crate::config::FolderConfig;
 use crate::folder::{NO_MOUNT, name_of};
 use crate::frame_times::{TimedImage, numbers_by_time};
 use crate::inspect::{DriveInspection, Inspection, SpeedRange, Stream};
-use crate::plain::{PlainParts, find_camera};
+use crate::plain::PlainParts;
 use crate::speed_log::{Samples, SpeedLog};
 use crate::video::VideoFrames;
 use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
@@ -79,6 +80,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         folder: folder.to_owned(),
         name: name_of(folder),
         images: images.map(image).collect(),
+        image_size: video.size(),
         video: Some(video),
         calibration,
         speeds: speeds(folder)?,

@@ -1,10 +1,10 @@
 //! A recording as frames, whatever its layout.
 
+use crate::ego::Ego;
 use crate::kitti::GtKind;
 use crate::layout::Layout;
 use crate::recording::Recording;
 use crate::selection::Selection;
-use crate::snippet::{EgoMotion, NoMotion};
 use crate::split::Split;
 use crate::{
     Camera, CameraChoice, CameraPath, DatasetKind, Error, Frame, MotionModel, MovingLabels, Result,
@@ -24,7 +24,7 @@ pub struct OpenOptions {
     /// Only these frames are selected; their neighbours still serve as sources.
     pub split: Option<Split>,
     /// fx, fy, cx, cy in pixels of an undistorted image, instead of the recording's own. Not for KITTI
-    /// raw, which brings its calibration.
+    /// raw, which brings its calibration and refuses it.
     pub intrinsics: Option<[f64; 4]>,
 }
 
@@ -324,46 +324,5 @@ impl Dataset {
             }),
             _ => Err(self.recording.no_motion()),
         }
-    }
-}
-
-/// The car's track and the camera's place on the car.
-pub(crate) struct Ego<'a> {
-    track: &'a MotionModel,
-    yaw_known: bool,
-    cam_from_vehicle: Se3,
-}
-
-impl Ego<'_> {
-    /// The camera's motion between two frames given by index, in either order of time.
-    pub(crate) fn between(
-        &self,
-        frames: &[Frame],
-        target: usize,
-        source: usize,
-    ) -> std::result::Result<EgoMotion, NoMotion> {
-        let (earlier, later) = (target.min(source), target.max(source));
-        let (Some(from_s), Some(to_s)) = (frames[earlier].time_s, frames[later].time_s) else {
-            return Err(NoMotion::Time);
-        };
-        if to_s <= from_s {
-            return Err(NoMotion::Time);
-        }
-        let vehicle = self.track.motion(from_s, to_s).ok_or(NoMotion::Speed)?;
-        let earlier_from_later = vehicle.camera0_from_camera1(&self.cam_from_vehicle);
-        let dt_s = to_s - from_s;
-        Ok(EgoMotion {
-            dt_s,
-            // Without a yaw rate the track's is 0: this is then the way the vehicle itself went.
-            distance_m: earlier_from_later.translation().norm(),
-            speed_mps: vehicle.distance_m.abs() / dt_s,
-            source_from_target: self.yaw_known.then(|| {
-                if source == earlier {
-                    earlier_from_later
-                } else {
-                    earlier_from_later.inverse()
-                }
-            }),
-        })
     }
 }

@@ -1,8 +1,10 @@
 //! A folder of images with tables and a calibration beside them.
 
+use crate::calibration::find_camera;
 use crate::config::FolderConfig;
+use crate::depth_images::DepthImages;
 use crate::frame_times::timed_images;
-use crate::plain::{DepthImages, PlainParts, find_camera};
+use crate::plain::PlainParts;
 use crate::speed_log::SpeedLog;
 use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, image_size};
 use std::collections::BTreeMap;
@@ -50,6 +52,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         images,
         video: None,
         calibration,
+        image_size: size,
         speeds: SpeedLog::read(folder, &config)?,
         cam_from_vehicle: config.cam_from_vehicle(),
         depth,

@@ -1,5 +1,6 @@
 //! Telling layouts apart, and saying what was looked for where none fits.
 
+use crate::config::FolderConfig;
 use crate::kitti::{self, Drive, find_drives, layout};
 use crate::{Dataset, Error, OpenOptions, Result, comma, folder, rgbd, umad, video};
 use std::collections::BTreeMap;
@@ -56,13 +57,19 @@ impl Layout {
         if !rgbd.is_empty() {
             return Ok(Self::RgbD(rgbd));
         }
-        if video::in_folder(&real)?.is_some() {
-            return Ok(Self::Video(real));
+        let (images, video) = (folder::has_images(&real)?, video::in_folder(&real)?);
+        match (images, video) {
+            (true, Some(video)) if !video.named => Err(Error::Config {
+                path: real.join(FolderConfig::NAME),
+                problem: format!(
+                    "there are images and a video ({}): name one, images = \"…\" or video = \"…\"",
+                    video.file.display()
+                ),
+            }),
+            (_, Some(_)) => Ok(Self::Video(real)),
+            (true, None) => Ok(Self::Folder(real)),
+            (false, None) => Err(unknown(describe_folder(&real)?)),
         }
-        if folder::has_images(&real)? {
-            return Ok(Self::Folder(real));
-        }
-        Err(unknown(describe_folder(&real)?))
     }
 
     /// Opens what was found.

@@ -2,7 +2,7 @@
 //! them, depth images.
 
 use crate::clock::seconds;
-use crate::config::FolderConfig;
+use crate::depth_images::DepthImages;
 use crate::frame_times::TimedImage;
 use crate::kitti::GtKind;
 use crate::recording::{CalibrationPlace, Recording};
@@ -10,10 +10,10 @@ use crate::speed_log::SpeedLog;
 use crate::video::VideoFrames;
 use crate::{
     Camera, CameraCalibration, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame,
-    FrameImage, Lens, OpenOptions, Result, Stream, calibration, load_rgb, picture,
+    FrameImage, Lens, Result, Stream, load_rgb,
 };
 use deepfusion_geometry::{DepthMap, Se3};
-use image::{DynamicImage, RgbImage};
+use image::RgbImage;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -35,16 +35,6 @@ pub(crate) struct PlainRecording {
     no_motion: (String, String),
 }
 
-/// Depth images by frame number, and what their values mean.
-#[derive(Debug, Clone)]
-pub(crate) struct DepthImages {
-    pub(crate) files: BTreeMap<u64, PathBuf>,
-    /// Metres of one step.
-    pub(crate) unit_m: f64,
-    /// A value besides 0 that means none.
-    pub(crate) invalid: Option<u16>,
-}
-
 /// What a layout found, before it is a [`Dataset`].
 pub(crate) struct PlainParts {
     pub(crate) kind: DatasetKind,
@@ -53,6 +43,8 @@ pub(crate) struct PlainParts {
     pub(crate) images: Vec<TimedImage>,
     pub(crate) video: Option<VideoFrames>,
     pub(crate) calibration: CameraCalibration,
+    /// Of the first image.
+    pub(crate) image_size: (u32, u32),
     pub(crate) speeds: Option<SpeedLog>,
     pub(crate) cam_from_vehicle: Se3,
     pub(crate) depth: Option<DepthImages>,
@@ -83,6 +75,7 @@ impl PlainParts {
                 "add frames.csv, timestamps.txt or fps in dataset.toml".to_owned(),
             ),
         };
+        self.check_size()?;
         let lens = self.calibration.lens()?;
         let mut frames = Vec::with_capacity(self.images.len());
         for (i, image) in self.images.iter().enumerate() {
@@ -151,6 +144,25 @@ impl PlainParts {
         Ok(dataset)
     }
 
+    /// The correction is as large as the calibration says: the images must say so too.
+    fn check_size(&self) -> Result<()> {
+        let k = &self.calibration.intrinsics;
+        if self.image_size == (k.width, k.height) {
+            return Ok(());
+        }
+        let first = self.images.first();
+        let place = self.calibration.place();
+        Err(Error::FrameSize {
+            image: first.map_or_else(String::new, |i| i.path.display().to_string()),
+            drive: self.name.clone(),
+            frame: first.map_or(0, |i| i.number),
+            found: self.image_size,
+            expected: (k.width, k.height),
+            field: place.field,
+            calibration: place.file,
+        })
+    }
+
     /// Frames without a speed are told; if none has one, the clocks differ.
     fn check_clocks(&mut self, frames: &[Frame]) -> Result<()> {
         let Some(log) = &self.speeds else {
@@ -201,41 +213,6 @@ impl PlainParts {
     }
 }
 
-/// The camera of images of a size: given on the command line or in `dataset.toml`, or read from a file beside
-/// them, or in the folder above.
-///
-/// # Errors
-/// [`Error::Missing`] where nothing says it, with `remedy`; [`Error::CameraFile`], [`Error::Config`].
-pub(crate) fn find_camera(
-    folder: &Path,
-    config: &FolderConfig,
-    options: &OpenOptions,
-    size: (u32, u32),
-    remedy: &'static str,
-) -> Result<CameraCalibration> {
-    if let Some(given) = options.intrinsics {
-        return CameraCalibration::given(given, size, Path::new("--intrinsics"));
-    }
-    if let Some(given) = config.intrinsics {
-        return CameraCalibration::given(given, size, &config.path);
-    }
-    let named = config.calibration.as_ref();
-    let mut file = config.find(folder, "calibration", named, &calibration::NAMES)?;
-    if file.is_none()
-        && let Some(above) = folder.parent()
-    {
-        file = config.find(above, "calibration", None, &calibration::NAMES)?;
-    }
-    match file {
-        Some(file) => CameraCalibration::read(&file, size),
-        None => Err(Error::Missing {
-            path: folder.join(calibration::NAMES[0]),
-            what: "the camera's fx, fy, cx, cy",
-            remedy,
-        }),
-    }
-}
-
 impl Recording for PlainRecording {
     fn kind(&self) -> DatasetKind {
         self.kind
@@ -259,13 +236,7 @@ impl Recording for PlainRecording {
     }
 
     fn calibration(&self) -> CalibrationPlace {
-        CalibrationPlace {
-            file: self.calibration.path.clone(),
-            field: match self.calibration.size_in_file {
-                true => "the image's size",
-                false => "the first image's size, for",
-            },
-        }
+        self.calibration.place()
     }
 
     fn streams(&self) -> Result<Vec<Stream>> {
@@ -329,27 +300,5 @@ impl Recording for PlainRecording {
             }
         }
         Ok(paths)
-    }
-}
-
-impl DepthImages {
-    /// A 16-bit grey PNG as metres.
-    fn read(&self, path: &Path) -> Result<DepthMap> {
-        let DynamicImage::ImageLuma16(image) = picture::decode(path)? else {
-            return Err(Error::Image {
-                path: path.to_owned(),
-                problem: "not a 16-bit grey PNG, which depth images are".into(),
-                truncated: false,
-            });
-        };
-        let metres = |value: &u16| match Some(*value) == self.invalid {
-            true => 0.0,
-            false => (f64::from(*value) * self.unit_m) as f32,
-        };
-        Ok(DepthMap {
-            width: image.width() as usize,
-            height: image.height() as usize,
-            data: image.as_raw().iter().map(metres).collect(),
-        })
     }
 }

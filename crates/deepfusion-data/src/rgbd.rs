@@ -1,10 +1,12 @@
 //! Folders of colour, depth and pose files, one of each a frame, as the 7-Scenes data set has them.
 
+use crate::calibration::find_camera;
 use crate::config::FolderConfig;
+use crate::depth_images::DepthImages;
 use crate::folder::{images_in, name_of};
 use crate::frame_times::TimedImage;
 use crate::kitti::layout::folders;
-use crate::plain::{DepthImages, PlainParts, find_camera};
+use crate::plain::PlainParts;
 use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, image_size};
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix3, Vector3};
@@ -62,7 +64,8 @@ fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
             remedy: "fetch the sequence's images".into(),
         });
     };
-    let calibration = find_camera(folder, &config, options, image_size(first)?, CAMERA_REMEDY)?;
+    let size = image_size(first)?;
+    let calibration = find_camera(folder, &config, options, size, CAMERA_REMEDY)?;
     let (mut depth, mut world_from_cam) = (BTreeMap::new(), BTreeMap::new());
     for &number in colour.keys() {
         let part = |ending: &str| folder.join(format!("frame-{number:06}.{ending}"));
@@ -90,6 +93,7 @@ fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         images: colour.into_iter().map(image).collect(),
         video: None,
         calibration,
+        image_size: size,
         speeds: None,
         cam_from_vehicle: config.cam_from_vehicle(),
         depth: Some(DepthImages {

@@ -77,6 +77,18 @@ fn either_camera_or_both() {
 }
 
 #[test]
+fn a_camera_given_beside_kittis_is_refused() {
+    let root = tempfile::tempdir().unwrap();
+    let drive = TinyDrive::default().write(root.path());
+    let options = OpenOptions {
+        intrinsics: Some([36.0, 36.0, 30.5, 8.6]),
+        ..OpenOptions::default()
+    };
+    let error = Dataset::open(&drive, &options).unwrap_err();
+    assert!(error.to_string().contains("its own calibration"), "{error}");
+}
+
+#[test]
 fn a_camera_lies_where_p_rect_says() {
     let root = tempfile::tempdir().unwrap();
     let date = TinyDrive::default().write(root.path()).join("..");

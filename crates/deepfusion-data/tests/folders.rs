@@ -85,6 +85,56 @@ fn a_kitti_drive_and_a_folder_of_it_give_the_same_snippets() {
     }
 }
 
+/// KITTI's drive 0005 again as a folder with tables, made from its oxts: every pair's motion is the same.
+#[cfg(unix)]
+#[test]
+fn a_real_drive_and_a_folder_of_it_give_the_same_snippets() {
+    let Some(drive) = common::real_data("kitti_raw/2011_09_26/2011_09_26_drive_0005_sync") else {
+        return;
+    };
+    let drive = drive.canonicalize().unwrap();
+    let kitti = open(&drive);
+    let root = tempfile::tempdir().unwrap();
+    let at = |name: &str| root.path().join(name);
+    std::os::unix::fs::symlink(drive.join("image_02/data"), at("images")).unwrap();
+    let times = |sensor: &str| {
+        let file = drive.join(sensor).join("timestamps.txt");
+        deepfusion_data::kitti::TimeStamps::read(&file).unwrap().ns
+    };
+    let mut frames = "timestamp [ns],file\n".to_owned();
+    for (frame, ns) in kitti.frames().iter().zip(times("image_02")) {
+        let name = frame
+            .image
+            .path()
+            .file_name()
+            .unwrap()
+            .to_string_lossy()
+            .into_owned();
+        frames += &format!("{},{name}\n", ns.unwrap());
+    }
+    let mut speeds = "timestamp [ns],speed_mps,yaw_rate_radps\n".to_owned();
+    for (n, ns) in times("oxts").into_iter().enumerate() {
+        let packet = fs::read_to_string(drive.join(format!("oxts/data/{n:010}.txt"))).unwrap();
+        let words: Vec<&str> = packet.split_whitespace().collect();
+        speeds += &format!("{},{},{}\n", ns.unwrap(), words[8], words[19]);
+    }
+    fs::write(at("frames.csv"), frames).unwrap();
+    fs::write(at("speed.csv"), speeds).unwrap();
+    let k = kitti.intrinsics(0);
+    let intrinsics = format!("{} {} {} {}", k.fx, k.fy, k.cx, k.cy);
+    fs::write(at("intrinsics.txt"), intrinsics).unwrap();
+    fs::write(at("dataset.toml"), mount(&kitti)).unwrap();
+    let own = open(root.path());
+    let (a, b) = (
+        kitti.snippets(&[1], 0.5).unwrap(),
+        own.snippets(&[1], 0.5).unwrap(),
+    );
+    assert_eq!((a.len(), b.len()), (153, 153));
+    a.iter().zip(&b).for_each(|(a, b)| same(a, b));
+    let warning = deepfusion_data::speed_unit_warning(&own).unwrap();
+    assert!(warning.is_none(), "{warning:?}");
+}
+
 fn same(a: &Snippet, b: &Snippet) {
     assert_eq!(a.target, b.target);
     for (a, b) in a.sources.iter().zip(&b.sources) {
@@ -328,6 +378,17 @@ fn distorted_images_are_corrected_when_they_are_loaded() {
     let column = 36.0 * ray.x * (1.0 - 0.2 * r2 + 0.02 * r2 * r2) + 30.5;
     let red = f64::from(image.get_pixel(50, 9).0[0]);
     assert!((red - 4.0 * column).abs() <= 0.51, "{red} {column}");
+}
+
+#[test]
+fn images_and_a_video_together_need_a_word() {
+    let root = tempfile::tempdir().unwrap();
+    write_drive(root.path(), 3, 10.0, 0.0);
+    fs::write(root.path().join("drive.mp4"), "").unwrap();
+    let text = refusal(root.path());
+    assert!(text.contains("there are images and a video"), "{text}");
+    fs::write(root.path().join("dataset.toml"), "images = 'images'").unwrap();
+    assert_eq!(open(root.path()).kind(), DatasetKind::Folder);
 }
 
 #[test]

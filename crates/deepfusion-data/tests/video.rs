@@ -6,12 +6,22 @@ mod folder;
 
 use deepfusion_data::{Dataset, DatasetKind, FrameImage, OpenOptions, RgbImage, inspect};
 use image::Rgb;
+use ndarray::Array1;
+use ndarray_npy::WriteNpyExt;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Ten frames of a flat colour each, 64x48 at 10 Hz, as a video with few key frames; `None` without ffmpeg.
 fn write_video(folder: &Path, name: &str) -> Option<PathBuf> {
+    encode(
+        folder,
+        name,
+        &["-c:v", "mpeg4", "-q:v", "1", "-g", "5", "-bf", "2"],
+    )
+}
+
+fn encode(folder: &Path, name: &str, codec: &[&str]) -> Option<PathBuf> {
     for n in 0..10_u8 {
         let image = RgbImage::from_pixel(64, 48, Rgb([20 * n, 120, 200 - 20 * n]));
         image.save(folder.join(format!("source{n}.png"))).unwrap();
@@ -20,7 +30,7 @@ fn write_video(folder: &Path, name: &str) -> Option<PathBuf> {
     let made = Command::new("ffmpeg")
         .current_dir(folder)
         .args(["-v", "error", "-framerate", "10", "-i", "source%d.png"])
-        .args(["-c:v", "mpeg4", "-q:v", "1", "-g", "5", "-bf", "2"])
+        .args(codec)
         .arg(name)
         .status();
     for n in 0..10 {
@@ -98,7 +108,69 @@ fn a_video_gives_its_frames_in_any_order() {
     let seen = inspect(&folder).unwrap();
     assert_eq!((seen.frames, seen.size), (10, Some([64, 48])));
     assert!((seen.streams[0].rate_hz.unwrap() - 10.0).abs() < 1e-3);
-    assert!(seen.to_string().contains("time 0 of the tables"), "{seen}");
+    assert!(seen.to_string().contains("on the tables' clock"), "{seen}");
+}
+
+/// comma2k19's videos have no time stamps: the times are in an array beside them.
+#[test]
+fn a_comma_segment_takes_its_frames_times_from_the_log() {
+    let root = tempfile::tempdir().unwrap();
+    let codec = [
+        "-c:v",
+        "libx265",
+        "-x265-params",
+        "log-level=error",
+        "-crf",
+        "10",
+        "-f",
+        "hevc",
+    ];
+    if encode(root.path(), "video.hevc", &codec).is_none() {
+        return;
+    }
+    let speed = root.path().join("processed_log/CAN/speed");
+    fs::create_dir_all(&speed).unwrap();
+    fs::create_dir_all(root.path().join("global_pose")).unwrap();
+    let write = |path: PathBuf, values: Vec<f64>| {
+        let file = fs::File::create(path).unwrap();
+        Array1::from_vec(values).write_npy(file).unwrap();
+    };
+    write(
+        speed.join("t"),
+        (0..100).map(|i| 46408.0 + f64::from(i) * 0.012).collect(),
+    );
+    write(speed.join("value"), vec![12.0; 100]);
+    // The log goes on after the video's last frame.
+    let times = (0..12).map(|i| 46408.1 + f64::from(i) * 0.05).collect();
+    write(root.path().join("global_pose/frame_times"), times);
+    let error = Dataset::open(root.path(), &OpenOptions::default()).unwrap_err();
+    assert!(
+        error.hint().unwrap().contains("[910, 910, 582, 437]"),
+        "{error}"
+    );
+    fs::write(
+        root.path().join("dataset.toml"),
+        "intrinsics = [50, 50, 31.5, 23.5]",
+    )
+    .unwrap();
+    let dataset = Dataset::open(root.path(), &OpenOptions::default())
+        .unwrap()
+        .remove(0);
+    assert_eq!(
+        (dataset.kind(), dataset.frames().len()),
+        (DatasetKind::Comma2k19, 10)
+    );
+    let snippets = dataset.snippets(&[1], 0.5).unwrap();
+    assert_eq!(snippets.len(), 9);
+    let motion = snippets[4].sources[0].motion;
+    assert!((motion.distance_m - 0.6).abs() < 1e-6 && motion.source_from_target.is_none());
+    let image = dataset.load_image(6).unwrap();
+    assert!((i32::from(image.get_pixel(32, 24).0[0]) - 120).abs() < 9);
+    let text = inspect(root.path()).unwrap().to_string();
+    assert!(
+        text.contains("has 12 times, video.hevc 10 frames"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -1,23 +1,15 @@
 //! A camera from the file that a calibration tool wrote.
 
+mod find;
 mod numbers;
 mod yaml;
 
+use crate::recording::CalibrationPlace;
 use crate::{Error, Lens, Result};
 use deepfusion_geometry::{Distortion, Intrinsics};
 use std::path::{Path, PathBuf};
 
-/// Names under which a calibration is looked for beside the images, in this order.
-pub(crate) const NAMES: [&str; 8] = [
-    "calibration.yaml",
-    "calibration.yml",
-    "camera.yaml",
-    "camera.yml",
-    "camchain.yaml",
-    "intrinsics.txt",
-    "camera-intrinsics.txt",
-    "calibration.txt",
-];
+pub(crate) use find::find_camera;
 
 /// What a calibration file says of a camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,6 +96,17 @@ impl CameraCalibration {
             size_in_file: numbers.size.is_some(),
             path: path.to_owned(),
         })
+    }
+
+    /// The place that says the image's size, for errors.
+    pub(crate) fn place(&self) -> CalibrationPlace {
+        CalibrationPlace {
+            file: self.path.clone(),
+            field: match self.size_in_file {
+                true => "the image's size",
+                false => "the first image's size, for want of one",
+            },
+        }
     }
 
     /// The correction of its images.

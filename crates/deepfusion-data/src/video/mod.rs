@@ -4,10 +4,11 @@ mod decode;
 mod probe;
 mod program;
 
+use crate::calibration::find_camera;
 use crate::config::FolderConfig;
 use crate::folder::{CAMERA_REMEDY, NO_MOUNT};
 use crate::frame_times::{TimedImage, from_start, numbers_by_time};
-use crate::plain::{PlainParts, find_camera};
+use crate::plain::PlainParts;
 use crate::speed_log::SpeedLog;
 use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, load_rgb};
 use image::RgbImage;
@@ -25,17 +26,28 @@ pub(crate) fn is_video(path: &Path) -> bool {
     ENDINGS.contains(&extension.to_ascii_lowercase().as_str())
 }
 
+/// The video of a folder.
+#[derive(Debug)]
+pub(crate) struct InFolder {
+    pub(crate) file: PathBuf,
+    /// Whether `dataset.toml` names it.
+    pub(crate) named: bool,
+}
+
 /// The video of a folder: that which `dataset.toml` names, or the only one.
 ///
 /// # Errors
 /// [`Error::Config`] where a named one is not there or there are several.
-pub(crate) fn in_folder(folder: &Path) -> Result<Option<PathBuf>> {
+pub(crate) fn in_folder(folder: &Path) -> Result<Option<InFolder>> {
     let config = FolderConfig::read(folder)?;
     if config.images.is_some() {
         return Ok(None);
     }
     if let Some(named) = config.find(folder, "video", config.video.as_ref(), &[])? {
-        return Ok(Some(named));
+        return Ok(Some(InFolder {
+            file: named,
+            named: true,
+        }));
     }
     let mut videos = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
@@ -46,7 +58,7 @@ pub(crate) fn in_folder(folder: &Path) -> Result<Option<PathBuf>> {
     }
     match videos.len() {
         0 => Ok(None),
-        1 => Ok(videos.pop()),
+        1 => Ok(videos.pop().map(|file| InFolder { file, named: false })),
         n => Err(config.error(format!(
             "{n} videos are there: name one, video = \"…\", or give its path"
         ))),
@@ -56,7 +68,7 @@ pub(crate) fn in_folder(folder: &Path) -> Result<Option<PathBuf>> {
 /// Opens a video file, or the video of a folder.
 pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     let file = match place.is_dir() {
-        true => in_folder(place)?.unwrap_or_else(|| place.to_owned()),
+        true => in_folder(place)?.map_or_else(|| place.to_owned(), |found| found.file),
         false => place.to_owned(),
     };
     let folder = file.parent().unwrap_or(Path::new(".")).to_owned();
@@ -83,8 +95,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     };
     if config.start_s.is_none() {
         remarks.push(
-            "the video's first frame is taken to be at time 0 of the tables, or where its time stamps say \
-             (start_s in dataset.toml says otherwise)"
+            "the video's time stamps are taken to be on the tables' clock (start_s in dataset.toml moves them)"
                 .into(),
         );
     }
@@ -102,6 +113,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         name: stem.into_owned(),
         images: numbers.into_iter().zip(times).map(image).collect(),
         calibration,
+        image_size: video.size(),
         speeds: SpeedLog::read(&folder, &config)?,
         cam_from_vehicle: config.cam_from_vehicle(),
         depth: None,

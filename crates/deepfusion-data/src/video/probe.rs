@@ -78,9 +78,9 @@ fn parse(json: &[u8]) -> std::result::Result<Probed, String> {
     let (Some(width), Some(height)) = (stream.width, stream.height) else {
         return Err("does not know the images' size".into());
     };
-    let rotations = stream.side_data_list.iter().filter_map(|s| s.rotation);
+    let mut rotations = stream.side_data_list.iter().filter_map(|s| s.rotation);
     let upright = rotations
-        .last()
+        .next_back()
         .is_none_or(|r| (r / 90.0).round() % 2.0 == 0.0);
     // `D`: cut off by the file's edit list, not shown and not decoded into a frame.
     let shown: Vec<&Packet> = answer

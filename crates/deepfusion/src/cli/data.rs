@@ -25,12 +25,12 @@ pub enum DataCommand {
     deepfusion data inspect drive.mp4   # with speed.csv and calibration.yaml beside it"
 )]
 pub struct InspectArgs {
-    /// A KITTI drive, date or root, a folder of images, a video, a comma2k19 segment, an RGB-D folder.
+    /// A recording: KITTI drive, date or root, image folder, video, comma2k19 or RGB-D folder.
     pub path: PathBuf,
-    /// The camera of a recording without a calibration, in pixels of its images.
+    /// The camera, where the recording has no calibration, in pixels.
     #[arg(long, value_name = "fx,fy,cx,cy")]
     pub intrinsics: Option<CameraIntrinsics>,
-    /// Also draw the measured depth on the images of all frames that have some.
+    /// Also draw the measured depth on the images that have some.
     #[arg(long)]
     pub overlay: bool,
     /// Folder for the pictures of --overlay [default: runs/inspect-TIME].

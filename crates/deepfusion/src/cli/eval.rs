@@ -21,7 +21,7 @@ pub struct EvalArgs {
     /// A run folder or a checkpoint in it.
     #[arg(long, value_name = "RUN", requires = "data")]
     pub model: Option<PathBuf>,
-    /// Recordings to evaluate on: KITTI drives, dates or roots, folders of images, videos, RGB-D folders.
+    /// Recordings to evaluate on: KITTI drives or roots, image folders, videos, RGB-D folders.
     #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pred")]
     pub data: Vec<PathBuf>,
     /// Only the frames of this split file (lines "folder index side").

@@ -16,7 +16,7 @@ use super::Size;
     deepfusion train --out runs/light --resume"
 )]
 pub struct TrainArgs {
-    /// Recordings to train on: KITTI drives, dates or roots, folders of images, videos [default: the config file's].
+    /// Recordings to train on: KITTI drives or roots, image folders, videos [default: the config file's].
     #[arg(long, value_name = "PATH", num_args = 1.., required_unless_present_any = ["resume", "config"])]
     pub data: Vec<PathBuf>,
     /// Settings to start from [default: tiny].

@@ -1,0 +1,105 @@
+use super::*;
+
+fn images(names: &[&str]) -> Vec<PathBuf> {
+    names
+        .iter()
+        .map(|n| PathBuf::from(format!("{n}.png")))
+        .collect()
+}
+
+fn timed(names: &[&str], files: &[(&str, &str)]) -> Result<Vec<(u64, Option<i64>)>> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let config = FolderConfig::read(folder.path())?;
+    let timed = timed_images(folder.path(), images(names), &config, &mut Vec::new())?;
+    Ok(timed.into_iter().map(|t| (t.number, t.ns)).collect())
+}
+
+const MS: i64 = 1_000_000;
+
+#[test]
+fn names_that_are_dates_are_times() {
+    // EuRoC: nanoseconds; one frame is missing before the last.
+    let names = [
+        "1403636579763555584",
+        "1403636579813555456",
+        "1403636579913555456",
+    ];
+    let first = 1_403_636_579_763_555_584;
+    let expected = [
+        (0, Some(first)),
+        (1, Some(first + 49_999_872)),
+        (3, Some(first + 149_999_872)),
+    ];
+    // Two steps, 50 and 100 ms: the median is the longer, so one more of 50 is needed.
+    let names: Vec<&str> = names.into_iter().chain(["1403636579963555456"]).collect();
+    let found = timed(&names, &[]).unwrap();
+    assert_eq!(found[..3], expected);
+    assert_eq!(found[3].0, 4);
+    // TUM: seconds.
+    let found = timed(&["1305031102.175304", "1305031102.211214"], &[]).unwrap();
+    assert_eq!(found[1].1.unwrap() - found[0].1.unwrap(), 35_910_000);
+}
+
+#[test]
+fn numbers_are_kept_and_need_a_rate() {
+    assert_eq!(
+        timed(&["000007", "000005"], &[]).unwrap(),
+        [(5, None), (7, None)]
+    );
+    let found = timed(
+        &["000007", "000005"],
+        &[("dataset.toml", "fps = 25\nstart_s = 3")],
+    );
+    // 5 is the first, at 3 s; 7 comes two intervals later.
+    assert_eq!(found.unwrap(), [(5, Some(3000 * MS)), (7, Some(3080 * MS))]);
+}
+
+#[test]
+fn lists_and_tables_are_read() {
+    let found = timed(&["a", "b"], &[("timestamps.txt", "0.5\n0.6\n")]).unwrap();
+    assert_eq!(found, [(0, Some(500 * MS)), (1, Some(600 * MS))]);
+    let list = "2011-09-26 13:04:32.3\n2011-09-26 13:04:32.4\n";
+    let found = timed(&["a", "b"], &[("timestamps.txt", list)]).unwrap();
+    assert_eq!(found[1].1.unwrap() - found[0].1.unwrap(), 100 * MS);
+    let table = "time_ms,file\n10,images/b.png\n20,a.png\n";
+    let found = timed(&["a", "b", "c"], &[("frames.csv", table)]).unwrap();
+    assert_eq!(found, [(0, Some(10 * MS)), (1, Some(20 * MS))]);
+}
+
+#[test]
+fn what_is_wrong_is_named() {
+    for (file, text, problem) in [
+        ("timestamps.txt", "0.5\n", "1 times, but there are 2 images"),
+        (
+            "timestamps.txt",
+            "0.5\nx\n",
+            "timestamps.txt:2: 'x' is not a time",
+        ),
+        (
+            "timestamps.txt",
+            "0.6\n0.5\n",
+            "timestamps.txt:2: '0.5' is not after",
+        ),
+        (
+            "timestamps.txt",
+            "0\n40\n",
+            "timestamps.txt: nothing says the unit",
+        ),
+        (
+            "frames.csv",
+            "time_s,file\n0,z.png\n",
+            "frames.csv:2: column file: 'z.png' is not the name",
+        ),
+        (
+            "frames.csv",
+            "time_s,picture\n0,a.png\n",
+            "no column 'file'",
+        ),
+    ] {
+        let error = timed(&["a", "b"], &[(file, text)]).unwrap_err().to_string();
+        assert!(error.contains(problem), "{error}");
+    }
+}

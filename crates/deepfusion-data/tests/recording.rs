@@ -1,0 +1,122 @@
+//! A layout of somebody else's: what it takes to be a [`Dataset`].
+
+use deepfusion_data::{
+    CalibrationPlace, Camera, Dataset, DatasetKind, DatasetParts, Error, Frame, FrameImage,
+    Recording, Result, RgbImage, Stream, VehicleTrack, speed_unit_warning,
+};
+use deepfusion_geometry::{Intrinsics, Se3};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Images that are made when they are asked for, as a bag's are decoded.
+#[derive(Debug, Default)]
+struct Messages {
+    decoded: Arc<AtomicUsize>,
+    width: u32,
+}
+
+impl Recording for Messages {
+    fn kind(&self) -> DatasetKind {
+        DatasetKind::Folder
+    }
+
+    fn folder(&self) -> &Path {
+        Path::new("/recordings")
+    }
+
+    fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
+        self.decoded.fetch_add(1, Ordering::Relaxed);
+        let level = frame.number as u8;
+        Ok(RgbImage::from_pixel(self.width, 30, image::Rgb([level; 3])))
+    }
+
+    fn calibration(&self) -> CalibrationPlace {
+        CalibrationPlace {
+            file: PathBuf::from("/recordings/a.bag"),
+            field: "/camera/camera_info",
+        }
+    }
+
+    fn streams(&self) -> Result<Vec<Stream>> {
+        Ok(vec![Stream::new("/camera", "image", 5, &[0.0, 0.1, 0.2])])
+    }
+
+    fn no_motion(&self) -> Error {
+        Error::NoTrack {
+            drive: "a".into(),
+            why: "no topic of speeds".into(),
+            remedy: "record one".into(),
+        }
+    }
+}
+
+fn dataset(recording: Messages, track: Option<VehicleTrack>) -> Dataset {
+    let frame = |n: u64| Frame {
+        drive: "a".into(),
+        number: n,
+        time_s: Some(n as f64 * 0.1),
+        image: FrameImage::Within {
+            file: PathBuf::from("/recordings/a.bag"),
+            index: n,
+        },
+        speed_mps: None,
+    };
+    let parts = DatasetParts {
+        name: "a".into(),
+        split_name: "a".into(),
+        camera: Camera::Left,
+        frames: (0..5).map(frame).collect(),
+        intrinsics: Intrinsics {
+            fx: 40.0,
+            fy: 40.0,
+            cx: 19.5,
+            cy: 14.5,
+            width: 40,
+            height: 30,
+        },
+        cam_from_vehicle: Some(Se3::identity()),
+        track,
+        yaw_known: false,
+        origin_ns: None,
+    };
+    Dataset::new(parts, Arc::new(recording))
+}
+
+#[test]
+fn images_are_decoded_when_they_are_asked_for() {
+    let decoded = Arc::new(AtomicUsize::new(0));
+    let recording = Messages {
+        decoded: Arc::clone(&decoded),
+        width: 40,
+    };
+    let samples: Vec<_> = (0..6).map(|i| (f64::from(i) * 0.1, 5.0, 0.0)).collect();
+    let dataset = dataset(recording, Some(VehicleTrack::new(&samples)));
+    let snippets = dataset.snippets(&[-1, 1], 0.5).unwrap();
+    assert_eq!((snippets.len(), decoded.load(Ordering::Relaxed)), (3, 0));
+    assert_eq!(dataset.load_image(3).unwrap().get_pixel(0, 0).0, [3; 3]);
+    assert_eq!(decoded.load(Ordering::Relaxed), 1);
+    // Without turns the images' motion proves nothing about the speeds' unit: no warning either way.
+    assert!(speed_unit_warning(&dataset).unwrap().is_none());
+}
+
+#[test]
+fn an_image_of_another_size_and_missing_speeds_are_told_by_place() {
+    let recording = Messages {
+        width: 41,
+        ..Messages::default()
+    };
+    let dataset = dataset(recording, None);
+    let error = dataset.load_image(2).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "/recordings/a.bag, image 2: frame 2 of a is 41x30, its calibration says 40x30 \
+         (/camera/camera_info in /recordings/a.bag)"
+    );
+    let error = dataset.snippets(&[1], 0.5).unwrap_err();
+    assert_eq!(error.to_string(), "a: no topic of speeds");
+    assert!(matches!(
+        dataset.camera_paths().unwrap_err(),
+        Error::NoPath { .. }
+    ));
+}
