@@ -1,7 +1,7 @@
 //! What is in a recording.
 
 use crate::layout::Layout;
-use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions, Result, comma};
+use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions, Result, comma, umad};
 use deepfusion_geometry::Intrinsics;
 use serde::Serialize;
 use std::path::Path;
@@ -99,7 +99,7 @@ pub struct SpeedRange {
 }
 
 /// Looks into a recording of any layout that [`Dataset::open`] knows. A comma2k19 segment whose video is
-/// absent is told by its other streams.
+/// absent, and a bag without a camera, are told by their other streams.
 ///
 /// # Errors
 /// As [`Dataset::open`]; times and speeds may be missing and are then told as unknown.
@@ -117,6 +117,12 @@ pub fn inspect_with(path: &Path, intrinsics: Option<[f64; 4]>) -> Result<Inspect
         && !comma::has_video(segment)
     {
         return comma::inspect(segment);
+    }
+    if let Layout::Bags(bags) = &layout
+        && let [bag] = bags.as_slice()
+        && let Some(inspection) = umad::without_images(bag)?
+    {
+        return Ok(inspection);
     }
     let open = |camera| {
         let options = OpenOptions {

@@ -144,7 +144,7 @@ fn what_is_there_instead_is_said() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     for (file, found) in [
-        ("x.bag", "it is a ROS bag"),
+        ("x.mcap", "it is a ROS 2 bag"),
         ("x.PNG", "single image"),
         ("x.zip", "packed"),
     ] {

@@ -76,9 +76,10 @@ fn dataset(recording: Messages, track: Option<VehicleTrack>) -> Dataset {
             height: 30,
         },
         cam_from_vehicle: Some(Se3::identity()),
-        track,
+        track: track.map(Into::into),
         yaw_known: false,
         origin_ns: None,
+        scenario: None,
     };
     Dataset::new(parts, Arc::new(recording))
 }

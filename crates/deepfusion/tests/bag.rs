@@ -141,7 +141,27 @@ fn what_is_wrong_with_a_bag_is_said() {
     let text = ok(at, "data inspect sim").stdout;
     assert!(text.contains("damaged"), "{text}");
     std::fs::write(&bag, b"#ROSBAG V2.0\n").unwrap();
-    let empty = run(at, "data inspect sim");
+    let text = ok(at, "data inspect sim").stdout;
+    assert!(
+        text.contains("without images") && text.contains("damaged"),
+        "{text}"
+    );
+    let empty = run(
+        at,
+        "train --data sim --preset tiny --size 64x64 --steps 1 --out no",
+    );
     assert_eq!(empty.code, 1);
-    assert!(empty.stderr.contains("urban_0001.bag"), "{}", empty.stderr);
+    assert!(
+        empty.stderr.contains("none of its topics holds images"),
+        "{}",
+        empty.stderr
+    );
+    std::fs::write(&bag, b"a letter").unwrap();
+    let letter = run(at, "data inspect sim");
+    assert_eq!(letter.code, 1);
+    assert!(
+        letter.stderr.contains("not a ROS bag") && letter.stderr.contains("hint:"),
+        "{}",
+        letter.stderr
+    );
 }

@@ -8,6 +8,7 @@ mod config;
 mod doppler;
 mod image;
 mod index;
+mod inspect;
 mod profile;
 mod recording;
 mod scan;
@@ -15,4 +16,5 @@ mod sensors;
 mod topics;
 
 pub use doppler::{DopplerEgo, ego_velocity, ground_radial};
+pub(crate) use inspect::without_images;
 pub(crate) use recording::{BagScans, bags_in, is_bag, open};

@@ -109,17 +109,7 @@ fn open_bag(path: &Path, options: &OpenOptions) -> Result<Dataset> {
             remedy: "topics.image in the file beside the bag names the camera's topic".into(),
         });
     };
-    let mut remarks = Vec::new();
-    remarks.extend(
-        bag.damage()
-            .map(|damage| format!("the bag is damaged: {damage}")),
-    );
-    if let Some(lost) = index.lost.first() {
-        remarks.push(format!(
-            "{} messages or chunks cannot be read; the first: {lost}",
-            index.lost.len()
-        ));
-    }
+    let mut remarks = remarks_on(&bag, &index);
     let ahead_ns = (config.clock.camera_ahead_s * 1e9).round() as i64;
     let origin_ns = first.stamp_ns - ahead_ns;
     let seconds = |stamp_ns: i64| (stamp_ns - ahead_ns - origin_ns) as f64 * 1e-9;
@@ -226,6 +216,20 @@ fn open_bag(path: &Path, options: &OpenOptions) -> Result<Dataset> {
         calibration,
     };
     Ok(Dataset::new(parts, Arc::new(recording)))
+}
+
+/// What of a bag cannot be read, in sentences.
+pub(super) fn remarks_on(bag: &Bag, index: &Index) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let damage = bag.damage();
+    remarks.extend(damage.map(|damage| format!("the bag is damaged: {damage}")));
+    if let Some(lost) = index.lost.first() {
+        remarks.push(format!(
+            "{} messages or chunks cannot be read; the first: {lost}",
+            index.lost.len()
+        ));
+    }
+    remarks
 }
 
 /// Single messages are decompressed where they are asked for: the loaders have threads of their own.
@@ -337,7 +341,7 @@ fn looking_ahead() -> Se3 {
     Se3::from_parts(&axes, Vector3::zeros())
 }
 
-fn streams(bag: &Bag, topics: &Topics, index: &Index) -> Result<Vec<Stream>> {
+pub(super) fn streams(bag: &Bag, topics: &Topics, index: &Index) -> Result<Vec<Stream>> {
     let all = bag.topics()?;
     let streams = all.iter().map(|topic| {
         let role = topics.roles(&topic.name).next();
