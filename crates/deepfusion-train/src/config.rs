@@ -1,7 +1,8 @@
 use crate::{DataSetConfig, Error, LossConfig, Preset};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_nn::{
-    AttentionConfig, DepthNetConfig, FlowDecoderConfig, HceConfig, InputSize, PoseNetConfig,
+    AttentionConfig, AttentionForm, DepthNetConfig, FlowDecoderConfig, HceConfig, InputSize,
+    PoseNetConfig,
 };
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -202,7 +203,12 @@ impl TrainConfig {
                 net.hce.get_or_insert_with(HceConfig::default);
             }
             "attention" => {
-                net.attention.get_or_insert_with(AttentionConfig::default);
+                // Not the paper's product, which starts at a quarter of the feature: from scratch it cost 7 to 9 % of
+                // abs_rel at 1,000 steps (docs/BENCHMARKS.md).
+                net.attention.get_or_insert(AttentionConfig {
+                    form: AttentionForm::Residual,
+                    ..AttentionConfig::default()
+                });
             }
             "aggregation" => net.aggregation = true,
             term => self.loss.with(term)?,
