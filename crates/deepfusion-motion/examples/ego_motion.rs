@@ -12,10 +12,10 @@ mod support;
 
 use deepfusion_motion::comma::CommaSegment;
 use deepfusion_motion::{
-    FusedTrack, IdentifyConfig, MotionConfig, MotionModel, OffsetConfig, identify, time_offset,
+    FusedTrack, IdentifyConfig, MotionConfig, OffsetConfig, VehicleRates, identify, time_offset,
 };
 use std::path::Path;
-use support::{kitti, rows, windows};
+use support::{Truth, halves, kitti, rows, speed_scale, windows};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -29,27 +29,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn comma(folder: &Path, vehicle: &Path) -> Result<(), Box<dyn std::error::Error>> {
-    let config: MotionConfig = toml::from_str(&std::fs::read_to_string(vehicle)?)?;
+    let mut config: MotionConfig = toml::from_str(&std::fs::read_to_string(vehicle)?)?;
     let segment = CommaSegment::open(folder)?;
     let track = FusedTrack::new(&segment.sensors, &config)?;
     let truths = windows(&segment.reference, 10.0, 0.1);
-    let mean = truths.iter().map(|t| t.distance_m).sum::<f64>() / truths.len() as f64;
-    println!("{} windows of 10 s, {mean:.1} m each", truths.len());
-    println!("| | distance, mean abs. (m) | (%) | bias (%) | yaw, mean abs. (deg) | bias (deg) |");
-    println!("|---|---|---|---|---|---|");
-    for (name, errors) in rows(&track, &truths) {
-        println!(
-            "| {name} | {:.3} | {:.2} | {:+.2} | {:.3} | {:+.3} |",
-            errors.distance_m,
-            100.0 * errors.distance_m / mean,
-            100.0 * errors.distance_bias,
-            errors.yaw_rad.to_degrees(),
-            errors.yaw_bias_rad.to_degrees(),
-        );
-    }
-    let stops = track.imu().map_or(0, |imu| imu.standstills().len());
-    println!("{stops} standstills");
+    table(&track, &truths);
     if let (Some(steering), Some(imu)) = (&segment.sensors.steering_rad, track.imu()) {
+        println!("{} standstills", imu.standstills().len());
         let known = IdentifyConfig {
             wheelbase_m: config.bicycle.map(|b| b.wheelbase_m),
             ..IdentifyConfig::default()
@@ -59,7 +45,35 @@ fn comma(folder: &Path, vehicle: &Path) -> Result<(), Box<dyn std::error::Error>
             Err(error) => println!("steering ratio: {error}; {}", error.hint()),
         }
     }
+    // The tyres, from the first half's positions; what it is worth, on the second half.
+    let (first, second) = halves(&segment.reference);
+    config.speed_scale = speed_scale(&segment.sensors.speed_mps, &first);
+    println!(
+        "speed scale of the first half {:.4}; second half with it:",
+        config.speed_scale
+    );
+    table(
+        &FusedTrack::new(&segment.sensors, &config)?,
+        &windows(&second, 10.0, 0.1),
+    );
     Ok(())
+}
+
+fn table(track: &FusedTrack, truths: &[Truth]) {
+    let mean = truths.iter().map(|t| t.distance_m).sum::<f64>() / truths.len() as f64;
+    println!("{} windows of 10 s, {mean:.1} m each", truths.len());
+    println!("| | distance, mean abs. (m) | (%) | bias (%) | yaw, mean abs. (deg) | bias (deg) |");
+    println!("|---|---|---|---|---|---|");
+    for (name, errors) in rows(track, truths) {
+        println!(
+            "| {name} | {:.3} | {:.2} | {:+.2} | {:.3} | {:+.3} |",
+            errors.distance_m,
+            100.0 * errors.distance_m / mean,
+            100.0 * errors.distance_bias,
+            errors.yaw_rad.to_degrees(),
+            errors.yaw_bias_rad.to_degrees(),
+        );
+    }
 }
 
 fn kitti_drive(drive: &Path, frames: usize) -> Result<(), Box<dyn std::error::Error>> {
@@ -89,8 +103,12 @@ fn kitti_drive(drive: &Path, frames: usize) -> Result<(), Box<dyn std::error::Er
         );
     }
     let pictures = kitti::image_motion(drive);
-    let vehicle = MotionModel::from(kitti::track(&all));
-    match time_offset(&pictures, &vehicle, &OffsetConfig::default()) {
+    let vehicle = FusedTrack::new(&kitti::sensors(&all), &MotionConfig::default())?;
+    match time_offset(
+        &pictures,
+        &VehicleRates::from(&vehicle),
+        &OffsetConfig::default(),
+    ) {
         Ok(offset) => println!("clock offset {offset:.4?}"),
         Err(error) => println!("{error}; {}", error.hint()),
     }

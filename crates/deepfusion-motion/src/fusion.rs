@@ -43,15 +43,29 @@ impl Default for FusionConfig {
 }
 
 /// How a vehicle's sensors become its motion.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MotionConfig {
+    /// True speed over the vehicle's. Wheels count turns: worn or larger tyres make the speed wrong by
+    /// a constant percent, and every depth with it. A drive with satellite positions shows it.
+    pub speed_scale: f64,
     /// The vehicle's geometry. Without it a steering angle cannot be used.
     pub bicycle: Option<Bicycle>,
     /// The inertial unit's mount and processing.
     pub imu: ImuConfig,
     /// The weights.
     pub fusion: FusionConfig,
+}
+
+impl Default for MotionConfig {
+    fn default() -> Self {
+        Self {
+            speed_scale: 1.0,
+            bicycle: None,
+            imu: ImuConfig::default(),
+            fusion: FusionConfig::default(),
+        }
+    }
 }
 
 /// What each sensor says about one interval; `None` where there is no such sensor, or it has a gap.
@@ -85,7 +99,14 @@ impl FusedTrack {
     /// [`Error::YawSigns`] where gyro and steering turn opposite ways.
     pub fn new(sensors: &VehicleSensors, config: &MotionConfig) -> Result<Self> {
         config.fusion.validate()?;
-        let speed = &sensors.speed_mps;
+        if !(0.5..=2.0).contains(&config.speed_scale) {
+            return Err(Error::Config {
+                field: "speed_scale",
+                value: config.speed_scale,
+                expected: "0.5 to 2 (a unit is converted, not scaled)",
+            });
+        }
+        let speed = &sensors.speed_mps.map(|v| v * config.speed_scale);
         if speed.is_empty() {
             return Err(Error::TooFewSamples {
                 stream: "speed",

@@ -19,6 +19,7 @@
 //! tyres that slip: identify at low speed, or give [`IdentifyConfig::understeer_s2_per_m2`].
 
 mod fit;
+mod problem;
 
 use crate::{Bicycle, Signal};
 use fit::Fit;
@@ -170,8 +171,9 @@ pub fn identify(
         needed: config.least_turning_s,
         product_m: None,
     };
-    // Also true where the limit is no number.
-    if observations.len() < 20 || !(turning_s >= config.least_turning_s) {
+    // A limit that is no number is met by nothing.
+    let turns = turning_s >= config.least_turning_s;
+    if observations.len() < 20 || !turns {
         return Err(straight(turning_s));
     }
     let Some(fit) = Fit::best(&observations, config) else {
@@ -205,7 +207,8 @@ fn judge(fit: &Fit, config: &IdentifyConfig, turning_s: f64) -> Result<Identifie
         })
     };
     let product = found.product_m.relative_error();
-    if !(product <= limit) {
+    let product_is_known = product <= limit;
+    if !product_is_known {
         return fail(Why::TooUncertain, product, None);
     }
     let worst = found
@@ -213,7 +216,8 @@ fn judge(fit: &Fit, config: &IdentifyConfig, turning_s: f64) -> Result<Identifie
         .relative_error()
         .max(found.steering_ratio.relative_error());
     // A ratio at the edge of what steerings have was not found but stopped.
-    if !(worst <= limit) || fit.at_the_edge {
+    let both_are_known = worst <= limit && !fit.at_the_edge;
+    if !both_are_known {
         let figure = if fit.at_the_edge {
             f64::INFINITY
         } else {

@@ -1,13 +1,14 @@
-//! How the picture moves from one frame to the next: sideways as the camera turns, outward as it
-//! drives.
+//! How the picture moves from one frame to the next: sideways, up and about as the camera turns,
+//! outward as it drives.
 //!
-//! The upper part of a road picture is far away: there, turning moves everything by the same amount
-//! and driving lets it grow. Both at once are fitted to a pair of small grey pictures, coarse to fine,
-//! by gradients (Lucas and Kanade 1981; Bergen et al. 1992):
+//! In the upper part of a road picture, turning moves everything by the same amount, and driving
+//! moves everything away from the centre, by more the nearer it is. All at once are fitted to a pair
+//! of small grey pictures, coarse to fine, by gradients (Lucas and Kanade 1981; Bergen et al. 1992):
 //!
-//! I₁(x + s + e·(x − c), y + p + e·(y − c')) = I₀(x, y) + β
+//! I₁(x + s + e·x' − φ·y', y + p + e·y' + φ·x') = I₀(x, y) + β, (x', y') = (x, y) − centre
 //!
-//! with the shift s to the right and p downward (pixels), the growth e, and a change of brightness β.
+//! with the shift s to the right and p downward (pixels), the roll φ (clockwise), a growth e, in the
+//! end one for each block of the picture, and a change of brightness β.
 
 mod align;
 
@@ -80,6 +81,10 @@ pub struct ImageMotion {
     /// How far the far scene moved to the right, in pixels (or any unit): f·Δθ for a camera of focal
     /// length f that turned left by Δθ.
     pub shift: f64,
+    /// How far the far scene moved down, in pixels: −f·Δ for a camera whose nose went down by Δ.
+    pub drop: f64,
+    /// How far the picture turned clockwise about its centre, in radians: minus the camera's roll.
+    pub clockwise_rad: f64,
     /// By which share the picture grew: about the distance driven over the depth of what is seen.
     pub growth: f64,
 }
@@ -94,9 +99,25 @@ impl ImageMotion {
             from_s: before.time_s,
             to_s: after.time_s,
             shift: warp.right,
+            drop: warp.down,
+            clockwise_rad: warp.clockwise,
             growth: warp.growth,
         })
     }
+}
+
+/// The motions of a sequence of frames: from each frame to the first one at least `apart_s` later, as
+/// far as they can be aligned. Some 0.1 s serve well: the picture's errors count less over a longer
+/// time, and over a too long one it has moved out of reach.
+#[must_use]
+pub fn image_motions(frames: &[GreyFrame], apart_s: f64) -> Vec<ImageMotion> {
+    let pair = |(i, before): (usize, &GreyFrame)| {
+        // A frame's time wobbles by a share of an interval.
+        let far = |after: &&GreyFrame| after.time_s - before.time_s >= apart_s - 1e-3;
+        let after = frames[i + 1..].iter().find(far)?;
+        ImageMotion::between(before, after)
+    };
+    frames.iter().enumerate().filter_map(pair).collect()
 }
 
 #[cfg(test)]
@@ -107,13 +128,14 @@ mod tests {
     const SIZE: (usize, usize) = (160, 48);
 
     /// A scene of waves, moved to the right and grown about the middle of the aligned rows.
-    fn picture(right: f64, growth: f64, brightness: f64) -> GreyFrame {
+    fn picture(right: f64, roll: f64, growth: f64, brightness: f64) -> GreyFrame {
         let centre = align::centre(SIZE.0, SIZE.1);
         let mut values = Vec::new();
         for y in 0..SIZE.1 {
             for x in 0..SIZE.0 {
-                let u = (x as f64 - centre.0 - right) / (1.0 + growth);
-                let v = (y as f64 - centre.1) / (1.0 + growth);
+                let (u, v) = (x as f64 - centre.0 - right, y as f64 - centre.1);
+                let (u, v) = (u + roll * v, v - roll * u);
+                let (u, v) = (u / (1.0 + growth), v / (1.0 + growth));
                 let wave =
                     (0.35 * u).sin() + (0.21 * u + 0.4 * v).cos() + (0.11 * u - 0.3 * v).sin();
                 values.push((128.0 + 30.0 * wave + brightness) as f32);
@@ -125,10 +147,11 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
         #[test]
-        fn a_moved_scene_shows_how_it_moved(right in -7.0..7.0f64, growth in -0.02..0.05f64, brightness in -20.0..20.0f64) {
-            let motion = ImageMotion::between(&picture(0.0, 0.0, 0.0), &picture(right, growth, brightness)).unwrap();
+        fn a_moved_scene_shows_how_it_moved(right in -7.0..7.0f64, roll in -0.02..0.02f64, growth in -0.02..0.05f64, brightness in -20.0..20.0f64) {
+            let motion = ImageMotion::between(&picture(0.0, 0.0, 0.0, 0.0), &picture(right, roll, growth, brightness)).unwrap();
             // Bilinear sampling of waves of 16 pixels costs some hundredths of a pixel.
             prop_assert!((motion.shift - right).abs() < 0.06, "{} {right}", motion.shift);
+            prop_assert!((motion.clockwise_rad - roll).abs() < 2e-3, "{} {roll}", motion.clockwise_rad);
             prop_assert!((motion.growth - growth).abs() < 2e-3, "{} {growth}", motion.growth);
         }
     }
@@ -137,7 +160,10 @@ mod tests {
     fn a_wall_shows_nothing() {
         let wall = GreyFrame::from_bytes(0.0, 160, 48, &[90; 160 * 48]).unwrap();
         assert_eq!(ImageMotion::between(&wall, &wall), None);
-        assert_eq!(ImageMotion::between(&wall, &picture(0.0, 0.0, 0.0)), None);
+        assert_eq!(
+            ImageMotion::between(&wall, &picture(0.0, 0.0, 0.0, 0.0)),
+            None
+        );
     }
 
     #[test]
@@ -146,7 +172,10 @@ mod tests {
         assert!(GreyFrame::from_bytes(0.0, 8, 8, &[0; 64]).is_err());
         assert!(GreyFrame::from_bytes(0.0, usize::MAX, 48, &[0; 64]).is_err());
         let small = GreyFrame::from_bytes(0.0, 64, 32, &[7; 64 * 32]).unwrap();
-        assert_eq!(ImageMotion::between(&small, &picture(0.0, 0.0, 0.0)), None);
+        assert_eq!(
+            ImageMotion::between(&small, &picture(0.0, 0.0, 0.0, 0.0)),
+            None
+        );
         let bad = GreyFrame::new(0.0, 64, 32, &[f32::NAN; 64 * 32]).unwrap();
         assert_eq!(ImageMotion::between(&bad, &bad), None);
     }

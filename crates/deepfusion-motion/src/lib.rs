@@ -1,4 +1,41 @@
-//! How a vehicle moved, from its own sensors.
+//! How a vehicle moved, from its own sensors: what gives learned depth its metres.
+//!
+//! [`VehicleSensors`] (speed, steering, inertial unit) → [`FusedTrack`] → [`VehicleMotion`] between any
+//! two times → the camera's motion ([`VehicleMotion::camera0_from_camera1`]). [`MotionModel`] holds
+//! either that or a [`VehicleTrack`], a unit that gives speed and yaw rate at once.
+//!
+//! | Equation | Here |
+//! |---|---|
+//! | 23–25: d_I, θ_I from the inertial unit | [`ImuTrack`] |
+//! | 26–27: d_V, θ_V from speed and steering | [`Signal::integral`], [`Bicycle`] |
+//! | 28–31: fusion | [`FusedTrack`], [`FusionConfig`] |
+//! | 32–36: what the loss compares with | [`VehicleMotion`] |
+//!
+//! Beside it: [`identify`] (wheelbase, steering ratio), [`time_offset`] (the camera's clock against the
+//! vehicle's, from [`ImageMotion`]), [`can`] (signals out of CAN frames), [`comma`] (comma2k19).
+//!
+//! # Conventions
+//! Vehicle frame: x forward, y left, z up, origin in the middle of the rear axle. Seconds, metres,
+//! radians; yaw is positive to the left. Where a sensor has a gap, nothing is made up: answers are
+//! `None`. Samples that are not finite or not later than the one before are dropped.
+//!
+//! ```
+//! use deepfusion_motion::{Bicycle, FusedTrack, MotionConfig, Signal, VehicleSensors};
+//!
+//! // 10 m/s with the road wheels at 0.1 rad, at 50 Hz.
+//! let constant = |value: f64| Signal::new((0..100).map(move |i| (f64::from(i) * 0.02, value)));
+//! let sensors = VehicleSensors {
+//!     speed_mps: constant(10.0),
+//!     steering_rad: Some(constant(0.1)),
+//!     imu: None,
+//! };
+//! let config = MotionConfig { bicycle: Some(Bicycle::new(2.7)), ..MotionConfig::default() };
+//! let track = FusedTrack::new(&sensors, &config)?;
+//! let motion = track.motion(0.5, 0.6).unwrap();
+//! assert!((motion.distance_m - 1.0).abs() < 1e-9);
+//! assert!((motion.yaw_rad - 1.0 * 0.1_f64.tan() / 2.7).abs() < 1e-9);
+//! # Ok::<(), deepfusion_motion::Error>(())
+//! ```
 
 mod bicycle;
 pub mod can;
@@ -18,12 +55,12 @@ pub use bicycle::Bicycle;
 pub use error::{Error, Result};
 pub use fusion::{FusedTrack, FusionConfig, MotionConfig, MotionParts, VehicleSensors};
 pub use identify::{Estimate, Identified, IdentifyConfig, Unidentifiable, Why, identify};
-pub use image_motion::{GreyFrame, ImageMotion};
+pub use image_motion::{GreyFrame, ImageMotion, image_motions};
 pub use imu::{
     ImuConfig, ImuMount, ImuSample, ImuTrack, Standstill, StandstillConfig, standstills,
 };
 pub use motion_model::MotionModel;
 pub use signal::Signal;
-pub use time_offset::{NoTimeOffset, OffsetConfig, TimeOffset, time_offset};
+pub use time_offset::{NoTimeOffset, OffsetConfig, TimeOffset, VehicleRates, time_offset};
 pub use vehicle_motion::VehicleMotion;
 pub use vehicle_track::VehicleTrack;

@@ -6,7 +6,7 @@ pub enum MotionModel {
     /// One unit that gives speed and yaw rate (KITTI's oxts).
     Track(VehicleTrack),
     /// Speed, steering and inertial unit, each with its own clock rate.
-    Fused(FusedTrack),
+    Fused(Box<FusedTrack>),
 }
 
 impl MotionModel {
@@ -47,6 +47,6 @@ impl From<VehicleTrack> for MotionModel {
 
 impl From<FusedTrack> for MotionModel {
     fn from(track: FusedTrack) -> Self {
-        Self::Fused(track)
+        Self::Fused(Box::new(track))
     }
 }

@@ -1,19 +1,60 @@
 //! The camera's clock against the vehicle's.
 //!
-//! When a car turns, the picture moves sideways; when it drives faster, the picture grows faster. The
-//! offset at which the picture's motion follows the vehicle's best is that of the clocks. Shift and
-//! growth per second are compared with the mean yaw rate and speed over the same pair of frames, moved
-//! by the offset, both without their slow trend (near trees on one side move the picture, too, but
-//! slowly). With r(o) their correlation and n the number of independent pairs, the offset is where
-//! Σ −n/2 · ln(1 − r²), the logarithm of the likelihood, is largest; r below 0 counts as 0.
+//! When a car turns, the picture moves sideways; when its nose dips, up; when it rolls, it turns; when
+//! it drives faster, it grows faster. The offset at which the picture's motion follows the vehicle's
+//! best is that of the clocks. Shift, drop, roll and growth per second are compared with the mean yaw,
+//! pitch and roll rate and the speed over the same pair of frames, moved by the offset, both without
+//! their slow trend (trees on one side move the picture, too, but slowly). With r(o) their correlation
+//! and n the number of independent pairs, the offset is where Σ −n/2 · ln(1 − r²), the logarithm of
+//! the likelihood, is largest; r below 0 counts as 0.
 //!
 //! Its standard error comes from resampling blocks of the drive (Künsch 1989): a straight drive at one
-//! speed gives a different offset for every resample, and says so.
+//! speed gives a different offset for every resample, and says so. Bends are slow, and houses that pass
+//! disturb the shift: yaw rate and speed alone give some tens of milliseconds on half a minute. Roll
+//! and pitch change within a second on any road, and driving ahead moves nothing about the centre: with
+//! an inertial unit it is some milliseconds.
 
 mod correlation;
 
-use crate::{ImageMotion, MotionModel};
-use correlation::{Channel, Peak};
+use crate::{FusedTrack, ImageMotion, Signal, VehicleTrack};
+use correlation::Channel;
+
+/// The vehicle's side of the comparison, on the vehicle's clock: whatever of it is measured.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct VehicleRates {
+    /// Forward speed, in m/s.
+    pub speed_mps: Option<Signal>,
+    /// Yaw rate in rad/s, positive to the left.
+    pub yaw_rate_radps: Option<Signal>,
+    /// Pitch rate in rad/s, positive where the nose goes down.
+    pub pitch_rate_radps: Option<Signal>,
+    /// Roll rate in rad/s, positive where the left side rises.
+    pub roll_rate_radps: Option<Signal>,
+}
+
+impl From<&VehicleTrack> for VehicleRates {
+    fn from(track: &VehicleTrack) -> Self {
+        Self {
+            speed_mps: Some(track.speed().clone()),
+            yaw_rate_radps: Some(track.yaw_rate().clone()),
+            ..Self::default()
+        }
+    }
+}
+
+impl From<&FusedTrack> for VehicleRates {
+    /// The inertial unit's rates; without one, the yaw rate of the steering.
+    fn from(track: &FusedTrack) -> Self {
+        let imu = track.imu();
+        let yaw_rate = imu.map(|i| i.yaw_rate()).or(track.steering_yaw_rate());
+        Self {
+            speed_mps: Some(track.speed().clone()),
+            yaw_rate_radps: yaw_rate.cloned(),
+            pitch_rate_radps: imu.map(|i| i.pitch_rate().clone()),
+            roll_rate_radps: imu.map(|i| i.roll_rate().clone()),
+        }
+    }
+}
 
 /// How the offset is searched.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,9 +81,14 @@ pub struct TimeOffset {
     pub vehicle_minus_camera_s: f64,
     /// Its standard error, in seconds.
     pub std_error_s: f64,
-    /// Correlation of the picture's shift with the yaw rate there; `None` where the vehicle does not turn.
+    /// Correlation of the picture's shift with the yaw rate there; `None` where it is not measured or
+    /// does not change.
     pub yaw_correlation: Option<f64>,
-    /// Correlation of the picture's growth with the speed there; `None` where the speed is constant.
+    /// The same of drop and pitch rate.
+    pub pitch_correlation: Option<f64>,
+    /// The same of the picture's and the vehicle's roll rate.
+    pub roll_correlation: Option<f64>,
+    /// The same of growth and speed.
     pub speed_correlation: Option<f64>,
     /// How many pairs of frames were compared.
     pub pairs: usize,
@@ -62,17 +108,11 @@ pub enum NoTimeOffset {
         /// How many are needed.
         needed: usize,
     },
-    /// The vehicle drives straight at one speed: any offset fits.
+    /// Nothing changes: any offset fits.
     #[error(
-        "time offset: the vehicle neither turns nor changes its speed \
-         (yaw rate ±{yaw_rate_std:.4} rad/s, speed ±{speed_std:.2} m/s)"
+        "time offset: nothing measured changes: no turn (0.004 rad/s), no change of speed (0.1 m/s)"
     )]
-    NothingChanges {
-        /// Standard deviation of the yaw rate without its trend, rad/s.
-        yaw_rate_std: f64,
-        /// Standard deviation of the speed without its trend, m/s.
-        speed_std: f64,
-    },
+    NothingChanges,
     /// The picture's motion does not follow the vehicle's at any offset, or best at the end of the
     /// search.
     #[error(
@@ -97,7 +137,7 @@ impl NoTimeOffset {
             Self::TooFewPairs { .. } => {
                 "use a longer drive, and check that both clocks count from the same event"
             }
-            Self::NothingChanges { .. } => "use a part of the drive with bends",
+            Self::NothingChanges => "use a part of the drive with bends",
             Self::NoPeak { .. } => {
                 "the clocks may be further apart: search wider, or check the yaw rate's sign"
             }
@@ -110,7 +150,7 @@ impl NoTimeOffset {
 /// Fewer pairs than this prove nothing.
 const LEAST_PAIRS: usize = 40;
 /// Changes below these are noise: rad/s and m/s.
-const LEAST_YAW_STD: f64 = 0.004;
+const LEAST_TURN_STD: f64 = 0.004;
 const LEAST_SPEED_STD: f64 = 0.1;
 /// Below this the picture does not follow the vehicle.
 const LEAST_CORRELATION: f64 = 0.15;
@@ -121,49 +161,62 @@ const LEAST_CORRELATION: f64 = 0.15;
 /// [`NoTimeOffset`] says why there is none.
 pub fn time_offset(
     pictures: &[ImageMotion],
-    vehicle: &MotionModel,
+    vehicle: &VehicleRates,
     config: &OffsetConfig,
 ) -> Result<TimeOffset, NoTimeOffset> {
     let range = 0.05..60.0;
     if !range.contains(&config.search_s) || !range.contains(&config.trend_s) {
         return Err(NoTimeOffset::Config);
     }
-    let pairs = correlation::pairs(pictures, vehicle, config.search_s);
-    if pairs.len() < LEAST_PAIRS {
+    // What is compared with what; the signs are those of a camera that looks ahead.
+    let channel = |picture: fn(&ImageMotion) -> f64, vehicle: &Option<Signal>, least_std| {
+        let vehicle = vehicle.as_ref()?;
+        Channel::new(pictures, picture, vehicle, least_std, config)
+    };
+    let channels = [
+        channel(|m| m.shift, &vehicle.yaw_rate_radps, LEAST_TURN_STD),
+        channel(|m| -m.drop, &vehicle.pitch_rate_radps, LEAST_TURN_STD),
+        channel(
+            |m| -m.clockwise_rad,
+            &vehicle.roll_rate_radps,
+            LEAST_TURN_STD,
+        ),
+        channel(|m| m.growth, &vehicle.speed_mps, LEAST_SPEED_STD),
+    ];
+    let pairs = channels.iter().flatten().map(Channel::pairs).max();
+    let pairs = pairs.unwrap_or(0);
+    if pairs < LEAST_PAIRS {
         return Err(NoTimeOffset::TooFewPairs {
-            pairs: pairs.len(),
+            pairs,
             needed: LEAST_PAIRS,
         });
     }
-    let of = |picture: fn(&ImageMotion) -> f64, least_std: f64, vehicle_is: usize| {
-        Channel::new(&pairs, picture, vehicle_is, least_std, config)
-    };
-    let yaw = of(|m| m.shift, LEAST_YAW_STD, correlation::YAW);
-    let speed = of(|m| m.growth, LEAST_SPEED_STD, correlation::SPEED);
-    let usable: Vec<&Channel> = [&yaw, &speed].into_iter().filter(|c| c.changes).collect();
-    if usable.is_empty() {
-        return Err(NoTimeOffset::NothingChanges {
-            yaw_rate_std: yaw.vehicle_std,
-            speed_std: speed.vehicle_std,
-        });
+    let usable = |c: &&Channel| c.changes && c.pairs() >= LEAST_PAIRS;
+    let used: Vec<&Channel> = channels.iter().flatten().filter(usable).collect();
+    if used.is_empty() {
+        return Err(NoTimeOffset::NothingChanges);
     }
-    let best = |peak: &Peak| {
-        let of = |c: &&Channel| c.correlation_at(peak.offset_s);
-        usable.iter().map(of).fold(0.0, f64::max)
-    };
     let no_peak = |correlation| NoTimeOffset::NoPeak {
         search_s: config.search_s,
         correlation,
     };
-    let peak = correlation::peak(&usable).ok_or(no_peak(0.0))?;
-    if peak.at_the_end || best(&peak) < LEAST_CORRELATION {
-        return Err(no_peak(best(&peak)));
+    let peak = correlation::peak(&used).ok_or(no_peak(0.0))?;
+    let correlations = used.iter().map(|c| c.correlation_at(peak.offset_s));
+    let best = correlations.fold(0.0, f64::max);
+    if peak.at_the_end || best < LEAST_CORRELATION {
+        return Err(no_peak(best));
     }
+    let correlation = |i: usize| {
+        let channel = channels[i].as_ref().filter(usable);
+        channel.map(|c| c.correlation_at(peak.offset_s))
+    };
     Ok(TimeOffset {
         vehicle_minus_camera_s: peak.offset_s,
-        std_error_s: correlation::std_error(&usable, &peak, config.search_s),
-        yaw_correlation: yaw.changes.then(|| yaw.correlation_at(peak.offset_s)),
-        speed_correlation: speed.changes.then(|| speed.correlation_at(peak.offset_s)),
-        pairs: pairs.len(),
+        std_error_s: correlation::std_error(&used, &peak, config.search_s),
+        yaw_correlation: correlation(0),
+        pitch_correlation: correlation(1),
+        roll_correlation: correlation(2),
+        speed_correlation: correlation(3),
+        pairs,
     })
 }

@@ -84,6 +84,8 @@ pub(super) struct Transform {
 #[serde(deny_unknown_fields, default)]
 pub(super) struct VehicleConfig {
     pub(super) wheelbase_m: Option<f64>,
+    /// True speed over the vehicle's: worn tyres read too fast.
+    pub(super) speed_scale: Option<f64>,
     /// Steering wheel's angle over road wheels'; without it the signal is the road wheels' angle.
     pub(super) steering_ratio: Option<f64>,
     pub(super) steering_offset_rad: f64,

@@ -59,6 +59,7 @@ pub(super) fn motion(
         translation_m: t.translation,
     });
     let motion = MotionConfig {
+        speed_scale: vehicle.speed_scale.unwrap_or(1.0),
         bicycle: vehicle.wheelbase_m.map(|wheelbase_m| Bicycle {
             steering_ratio: vehicle.steering_ratio.unwrap_or(1.0),
             steering_offset_rad: vehicle.steering_offset_rad,

@@ -1,5 +1,7 @@
 //! Fitting shift and growth to a pair of pictures.
 
+mod blocks;
+
 use nalgebra::{SMatrix, SVector};
 
 /// Rows that are aligned, as shares of the height: above the road's surface, below the sky's top.
@@ -25,7 +27,9 @@ pub(super) struct Plane {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Warp {
     pub right: f64,
-    down: f64,
+    pub down: f64,
+    /// Turn about the centre, to the right at the top, in radians.
+    pub clockwise: f64,
     pub growth: f64,
     brightness: f64,
 }
@@ -63,7 +67,8 @@ impl Plane {
         let rows = &self.values[aligned_rows(self.height).start * self.width
             ..aligned_rows(self.height).end * self.width];
         let slopes: f64 = rows.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
-        !(slopes / rows.len() as f64 >= LEAST_SLOPE)
+        let has_structure = slopes / rows.len() as f64 >= LEAST_SLOPE;
+        !has_structure
     }
 
     /// Value and slopes (right, down) at a place, bilinear; `None` outside.
@@ -115,63 +120,90 @@ pub(super) fn align(before: &[Plane], after: &[Plane]) -> Option<Warp> {
             warp.down *= 2.0;
         }
     }
+    let warp = blocks::refine(before.first()?, after.first()?, warp)?;
     let limit = 0.25 * before.first()?.width as f64;
     (warp.right.abs() < limit && warp.growth.abs() < 0.5).then_some(warp)
 }
 
-/// Gauss–Newton on one level.
+/// What one pixel says: I₀ + β − I₁ there, and I₁'s slopes (right, down).
+struct Reading {
+    difference: f64,
+    right: f64,
+    down: f64,
+}
+
+impl Reading {
+    /// At a pixel of `before`, its distance from the centre given, for a growth of its own.
+    fn at(
+        before: &Plane,
+        after: &Plane,
+        warp: &Warp,
+        (x, y): (usize, usize),
+        (dx, dy): (f64, f64),
+        growth: f64,
+    ) -> Option<Self> {
+        let to_x = x as f64 + warp.right + growth * dx - warp.clockwise * dy;
+        let to_y = y as f64 + warp.down + growth * dy + warp.clockwise * dx;
+        let (value, right, down) = after.sample(to_x, to_y)?;
+        Some(Self {
+            difference: before.values[y * before.width + x] + warp.brightness - value,
+            right,
+            down,
+        })
+    }
+
+    /// Huber's weight.
+    fn weight(&self, scale: f64) -> f64 {
+        let ratio = self.difference.abs() / (HUBER * scale);
+        if ratio > 1.0 { 1.0 / ratio } else { 1.0 }
+    }
+}
+
+/// Gauss–Newton on one level, with one growth for all.
 fn refine(before: &Plane, after: &Plane, mut warp: Warp) -> Option<Warp> {
     let mut scale = f64::INFINITY;
     for _ in 0..ITERATIONS {
-        let Step { step, usual } = step(before, after, &warp, scale)?;
+        let (step, usual) = step(before, after, &warp, scale)?;
         scale = usual;
         warp.right += step[0];
         warp.down += step[1];
         warp.growth += step[2];
-        warp.brightness += step[3];
-        if step[0].abs() < 1e-4 && step[1].abs() < 1e-4 && step[2].abs() < 1e-6 {
+        warp.clockwise += step[3];
+        warp.brightness += step[4];
+        if step[0].abs() < 1e-3 && step[1].abs() < 1e-3 && step[2].abs() < 1e-5 {
             break;
         }
     }
     Some(warp)
 }
 
-struct Step {
-    step: SVector<f64, 4>,
-    /// Mean absolute difference.
-    usual: f64,
-}
-
-fn step(before: &Plane, after: &Plane, warp: &Warp, scale: f64) -> Option<Step> {
+/// One step, and the mean absolute difference before it.
+fn step(before: &Plane, after: &Plane, warp: &Warp, scale: f64) -> Option<(SVector<f64, 5>, f64)> {
     let (cx, cy) = centre(before.width, before.height);
-    let rows = aligned_rows(before.height);
-    let (mut normal, mut gradient) = (SMatrix::<f64, 4, 4>::zeros(), SVector::<f64, 4>::zeros());
+    let (mut normal, mut gradient) = (SMatrix::<f64, 5, 5>::zeros(), SVector::<f64, 5>::zeros());
     let (mut count, mut differences) = (0.0, 0.0);
-    for y in rows {
+    for y in aligned_rows(before.height) {
         for x in 0..before.width {
             let (dx, dy) = (x as f64 - cx, y as f64 - cy);
-            let to_x = x as f64 + warp.right + warp.growth * dx;
-            let to_y = y as f64 + warp.down + warp.growth * dy;
-            let Some((value, right, down)) = after.sample(to_x, to_y) else {
+            let Some(reading) = Reading::at(before, after, warp, (x, y), (dx, dy), warp.growth)
+            else {
                 continue;
             };
-            let difference = before.values[y * before.width + x] + warp.brightness - value;
-            let jacobian = SVector::<f64, 4>::new(right, down, right * dx + down * dy, -1.0);
-            let ratio = difference.abs() / (HUBER * scale);
-            let weight = if ratio > 1.0 { 1.0 / ratio } else { 1.0 };
+            let Reading { right, down, .. } = reading;
+            let outward = right * dx + down * dy;
+            let around = down * dx - right * dy;
+            let jacobian = SVector::<f64, 5>::new(right, down, outward, around, -1.0);
+            let weight = reading.weight(scale);
             normal += jacobian * jacobian.transpose() * weight;
-            gradient += jacobian * (difference * weight);
+            gradient += jacobian * (reading.difference * weight);
             count += 1.0;
-            differences += difference.abs();
+            differences += reading.difference.abs();
         }
     }
-    let pixels = (before.width * before.height) as f64;
-    if count < 0.2 * pixels {
+    if count < 0.2 * (before.width * before.height) as f64 {
         return None;
     }
     let step = normal.cholesky()?.solve(&gradient);
-    step.iter().all(|s| s.is_finite()).then(|| Step {
-        step,
-        usual: (differences / count).max(1e-3),
-    })
+    let finite = step.iter().all(|s| s.is_finite());
+    finite.then(|| (step, (differences / count).max(1e-3)))
 }

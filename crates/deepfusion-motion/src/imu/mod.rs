@@ -45,6 +45,8 @@ impl ImuSample {
 pub struct ImuTrack {
     forward_mps2: Signal,
     yaw_rate_radps: Signal,
+    /// About the vehicle's x (roll) and y (pitch).
+    tilt_rates_radps: [Signal; 2],
     standstills: Vec<Standstill>,
 }
 
@@ -108,6 +110,10 @@ impl ImuTrack {
         Ok(Self {
             forward_mps2: Signal::with_max_gap(forward, max_gap_s),
             yaw_rate_radps: Signal::with_max_gap(yaw, max_gap_s),
+            tilt_rates_radps: [0, 1].map(|axis| {
+                let rate = |s: &ImuSample| (s.time_s, s.angular_rate_radps[axis]);
+                Signal::with_max_gap(clean.iter().map(rate), max_gap_s)
+            }),
             standstills,
         })
     }
@@ -122,6 +128,18 @@ impl ImuTrack {
     #[must_use]
     pub fn yaw_rate(&self) -> &Signal {
         &self.yaw_rate_radps
+    }
+
+    /// Roll rate about the vehicle's x in rad/s, positive where the left side rises.
+    #[must_use]
+    pub fn roll_rate(&self) -> &Signal {
+        &self.tilt_rates_radps[0]
+    }
+
+    /// Pitch rate about the vehicle's y in rad/s, positive where the nose goes down.
+    #[must_use]
+    pub fn pitch_rate(&self) -> &Signal {
+        &self.tilt_rates_radps[1]
     }
 
     /// Where the vehicle stood still. Without any, the gyro's bias is that of the configuration.

@@ -1,7 +1,8 @@
 //! Correlation over offsets, its peak, and how sure the peak is.
 
 use super::OffsetConfig;
-use crate::{ImageMotion, MotionModel};
+use crate::{ImageMotion, Signal};
+use std::collections::BTreeMap;
 
 /// Step of the search, in seconds; the peak is interpolated between.
 const STEP_S: f64 = 0.01;
@@ -10,121 +11,109 @@ const BLOCK_S: f64 = 1.5;
 /// How many resamples.
 const RESAMPLES: usize = 200;
 
-pub(super) const YAW: usize = 0;
-pub(super) const SPEED: usize = 1;
-
-/// A pair of frames, and the vehicle's mean [yaw rate, speed] over it at every offset.
-pub(super) struct Pair {
-    picture: ImageMotion,
-    vehicle: Vec<[f64; 2]>,
-}
-
 /// The offsets searched: 2 `half` + 1 of them.
 fn half(search_s: f64) -> usize {
     (search_s / STEP_S).round() as usize
 }
 
-/// The pairs that the vehicle's track covers at every offset, so that all offsets compare the same.
-pub(super) fn pairs(pictures: &[ImageMotion], vehicle: &MotionModel, search_s: f64) -> Vec<Pair> {
-    let half = half(search_s) as i64;
-    let mut last_s = f64::NEG_INFINITY;
-    let mut found = Vec::new();
-    for picture in pictures {
-        let (from, to) = (picture.from_s, picture.to_s);
-        let dt = to - from;
-        let is_pair = dt > 0.0 && picture.shift.is_finite() && picture.growth.is_finite();
-        if !is_pair || from < last_s {
-            continue;
-        }
-        let at = |step: i64| {
-            let offset = step as f64 * STEP_S;
-            let motion = vehicle.motion(from + offset, to + offset)?;
-            Some([motion.yaw_rad / dt, motion.distance_m / dt])
-        };
-        if let Some(vehicle) = (-half..=half).map(at).collect() {
-            found.push(Pair {
-                picture: *picture,
-                vehicle,
-            });
-            last_s = from;
-        }
-    }
-    found
-}
-
 /// Sums over a block of pairs: n, Σx, Σy, Σx², Σy², Σxy.
 type Sums = [f64; 6];
 
-/// One comparison: shift with yaw rate, or growth with speed.
+/// One comparison, such as shift with yaw rate.
 pub(super) struct Channel {
-    /// Per block, per offset.
-    blocks: Vec<Vec<Sums>>,
+    /// Per block (by its number since the first picture), per offset.
+    blocks: BTreeMap<u64, Vec<Sums>>,
     /// Whether the vehicle's side changes enough to compare anything.
     pub changes: bool,
-    /// Standard deviation of the vehicle's side without its trend.
-    pub vehicle_std: f64,
+    pairs: usize,
     /// Share of the pairs that count as independent.
     independent: f64,
     search_s: f64,
 }
 
 impl Channel {
+    /// Compares over the pairs that the vehicle's signal covers at every offset, so that all offsets
+    /// compare the same. `None` without a pair.
     pub fn new(
-        pairs: &[Pair],
+        pictures: &[ImageMotion],
         picture: fn(&ImageMotion) -> f64,
-        vehicle_is: usize,
+        vehicle: &Signal,
         least_std: f64,
         config: &OffsetConfig,
-    ) -> Self {
-        let times: Vec<f64> = pairs.iter().map(|p| p.picture.from_s).collect();
-        let detrended = |values: Vec<f64>| without_trend(&times, &values, config.trend_s);
-        let rate = |p: &Pair| picture(&p.picture) / (p.picture.to_s - p.picture.from_s);
-        let ours = detrended(pairs.iter().map(rate).collect());
-        let begin = times[0];
-        let block = |i: usize| ((times[i] - begin) / BLOCK_S) as u64;
-        let mut block_of = vec![0; pairs.len()];
-        for i in 1..pairs.len() {
-            block_of[i] = block_of[i - 1] + usize::from(block(i) != block(i - 1));
+    ) -> Option<Self> {
+        let half = half(config.search_s) as i64;
+        let offsets: Vec<f64> = (-half..=half).map(|i| i as f64 * STEP_S).collect();
+        let (mut times, mut ours, mut theirs) = (Vec::new(), Vec::new(), Vec::new());
+        for pair in pictures {
+            let (from, to) = (pair.from_s, pair.to_s);
+            let rate = picture(pair) / (to - from);
+            let ordered = times.last().is_none_or(|last| from > *last);
+            if !(ordered && to > from && rate.is_finite()) {
+                continue;
+            }
+            let mean = |offset: &f64| {
+                let integral = vehicle.integral(from + offset, to + offset)?;
+                Some(integral / (to - from))
+            };
+            if let Some(rates) = offsets.iter().map(mean).collect::<Option<Vec<f64>>>() {
+                times.push(from);
+                ours.push(rate);
+                theirs.push(rates);
+            }
         }
-        let offsets = 2 * half(config.search_s) + 1;
-        let mut blocks = vec![vec![[0.0; 6]; offsets]; block_of[pairs.len() - 1] + 1];
-        let mut vehicle_std = 0.0;
-        let mut independent = 1.0;
-        for offset in 0..offsets {
-            let theirs = pairs.iter().map(|p| p.vehicle[offset][vehicle_is]);
-            let theirs = detrended(theirs.collect());
-            for (i, (x, y)) in theirs.iter().zip(&ours).enumerate() {
-                let sums = &mut blocks[block_of[i]][offset];
-                for (sum, term) in sums.iter_mut().zip([1.0, *x, *y, x * x, y * y, x * y]) {
+        let begin = *times.first()?;
+        let ours = without_trend(&times, &ours, config.trend_s);
+        let mut blocks = BTreeMap::new();
+        let mut best = (0.0, Vec::new());
+        let mut changes = false;
+        for offset in 0..offsets.len() {
+            let column: Vec<f64> = theirs.iter().map(|rates| rates[offset]).collect();
+            let column = without_trend(&times, &column, config.trend_s);
+            let mut total = [0.0; 6];
+            for (i, (x, y)) in column.iter().zip(&ours).enumerate() {
+                let block = ((times[i] - begin) / BLOCK_S) as u64;
+                let sums: &mut Vec<Sums> = blocks
+                    .entry(block)
+                    .or_insert_with(|| vec![[0.0; 6]; offsets.len()]);
+                let terms = [1.0, *x, *y, x * x, y * y, x * y];
+                for ((sum, total), term) in sums[offset].iter_mut().zip(&mut total).zip(terms) {
                     *sum += term;
+                    *total += term;
                 }
             }
-            if offset == half(config.search_s) {
-                let square: f64 = theirs.iter().map(|x| x * x).sum();
-                vehicle_std = (square / theirs.len() as f64).sqrt();
-                independent = independent_share(&ours);
+            changes |= (total[3] / total[0]).sqrt() >= least_std;
+            let r = correlation(&total);
+            if r >= best.0 {
+                let slope = total[5] / total[3].max(f64::MIN_POSITIVE);
+                let left = column.iter().zip(&ours).map(|(x, y)| y - slope * x);
+                best = (r, left.collect());
             }
         }
-        Self {
+        Some(Self {
             blocks,
-            changes: vehicle_std >= least_std,
-            vehicle_std,
-            independent,
+            changes,
+            pairs: times.len(),
+            independent: independent_share(&best.1),
             search_s: config.search_s,
-        }
+        })
+    }
+
+    /// How many pairs of frames are compared.
+    pub fn pairs(&self) -> usize {
+        self.pairs
     }
 
     /// The correlation at the step nearest to an offset.
     pub fn correlation_at(&self, offset_s: f64) -> f64 {
         let step = ((offset_s + self.search_s) / STEP_S).round().max(0.0) as usize;
         let step = step.min(2 * half(self.search_s));
-        correlation(&self.sum(step, 0..self.blocks.len()))
+        correlation(&self.sum(step, self.blocks.keys()))
     }
 
-    fn sum(&self, offset: usize, blocks: impl Iterator<Item = usize>) -> Sums {
+    fn sum<'a>(&self, offset: usize, blocks: impl Iterator<Item = &'a u64>) -> Sums {
         let mut total = [0.0; 6];
-        for block in blocks {
-            for (sum, term) in total.iter_mut().zip(self.blocks[block][offset]) {
+        for sums in blocks.filter_map(|block| self.blocks.get(block)) {
+            for (sum, term) in total.iter_mut().zip(sums[offset]) {
                 *sum += term;
             }
         }
@@ -144,16 +133,26 @@ pub(super) struct Peak {
 
 /// The peak over the whole drive.
 pub(super) fn peak(channels: &[&Channel]) -> Option<Peak> {
-    let blocks: Vec<usize> = (0..channels.first()?.blocks.len()).collect();
-    peak_of(channels, &blocks)
+    peak_of(channels, &blocks(channels))
 }
 
-fn peak_of(channels: &[&Channel], blocks: &[usize]) -> Option<Peak> {
+/// The numbers of the blocks that any channel has.
+fn blocks(channels: &[&Channel]) -> Vec<u64> {
+    let mut blocks: Vec<u64> = channels
+        .iter()
+        .flat_map(|c| c.blocks.keys().copied())
+        .collect();
+    blocks.sort_unstable();
+    blocks.dedup();
+    blocks
+}
+
+fn peak_of(channels: &[&Channel], blocks: &[u64]) -> Option<Peak> {
     let search_s = channels.first()?.search_s;
     let offsets = 2 * half(search_s) + 1;
     let likelihood = |offset: usize| -> f64 {
         let of = |c: &&Channel| {
-            let sums = c.sum(offset, blocks.iter().copied());
+            let sums = c.sum(offset, blocks.iter());
             let r = correlation(&sums).clamp(0.0, 0.9999);
             -0.5 * sums[0] * c.independent * (1.0 - r * r).ln()
         };
@@ -162,7 +161,7 @@ fn peak_of(channels: &[&Channel], blocks: &[usize]) -> Option<Peak> {
     let curve: Vec<f64> = (0..offsets).map(likelihood).collect();
     let top = (0..offsets).max_by(|a, b| curve[*a].total_cmp(&curve[*b]))?;
     let at = |step: f64| (step - half(search_s) as f64) * STEP_S;
-    if !(curve[top] > 0.0) {
+    if curve[top] <= 0.0 {
         return None;
     }
     if top == 0 || top == offsets - 1 {
@@ -189,11 +188,11 @@ fn peak_of(channels: &[&Channel], blocks: &[usize]) -> Option<Peak> {
 
 /// The larger of two standard errors: from resampled blocks, and from the likelihood's curvature.
 pub(super) fn std_error(channels: &[&Channel], peak: &Peak, search_s: f64) -> f64 {
-    let count = channels[0].blocks.len();
+    let all = blocks(channels);
     let mut random = SplitMix(0x5eed);
     let mut offsets: Vec<f64> = (0..RESAMPLES)
         .map(|_| {
-            let blocks: Vec<usize> = (0..count).map(|_| random.below(count)).collect();
+            let blocks: Vec<u64> = all.iter().map(|_| all[random.below(all.len())]).collect();
             // No peak at all: anywhere.
             peak_of(channels, &blocks).map_or(search_s, |p| p.offset_s)
         })

@@ -1,6 +1,8 @@
 //! A KITTI raw drive, as far as motion needs it.
 
-use deepfusion_motion::{GreyFrame, ImageMotion, ImuSample, Signal, VehicleSensors, VehicleTrack};
+use deepfusion_motion::{
+    GreyFrame, ImageMotion, ImuSample, Signal, VehicleSensors, VehicleTrack, image_motions,
+};
 use nalgebra::Vector3;
 use std::fs;
 use std::path::Path;
@@ -91,7 +93,7 @@ pub fn path_length_m(packets: &[Packet], step: usize) -> f64 {
         .map(|p| p.place(latitude))
         .collect();
     let last = packets[packets.len() - 1].place(latitude);
-    if (packets.len() - 1) % step != 0 {
+    if !(packets.len() - 1).is_multiple_of(step) {
         places.push(last);
     }
     let step = |w: &[[f64; 2]]| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]);
@@ -101,19 +103,12 @@ pub fn path_length_m(packets: &[Packet], step: usize) -> f64 {
 /// How the pictures of camera 2 move, at 160×48.
 pub fn image_motion(drive: &Path) -> Vec<ImageMotion> {
     let times = times(&drive.join("image_02/timestamps.txt"));
-    let mut motions = Vec::new();
-    let mut before: Option<GreyFrame> = None;
-    for (i, time_s) in times.iter().enumerate() {
+    let frame = |(i, time_s): (usize, &f64)| {
         let path = drive.join(format!("image_02/data/{i:010}.jpg"));
-        let frame = image::open(path).ok().map(|picture| {
-            let small = picture.to_luma8();
-            let small = image::imageops::thumbnail(&small, 160, 48);
-            GreyFrame::from_bytes(*time_s, 160, 48, small.as_raw()).unwrap()
-        });
-        if let (Some(a), Some(b)) = (&before, &frame) {
-            motions.extend(ImageMotion::between(a, b));
-        }
-        before = frame;
-    }
-    motions
+        let grey = image::open(path).ok()?.to_luma8();
+        let small = image::imageops::thumbnail(&grey, 160, 48);
+        Some(GreyFrame::from_bytes(*time_s, 160, 48, small.as_raw()).unwrap())
+    };
+    let frames: Vec<GreyFrame> = times.iter().enumerate().filter_map(frame).collect();
+    image_motions(&frames, 0.1)
 }

@@ -5,7 +5,7 @@
 pub mod kitti;
 
 use deepfusion_geometry::Trajectory;
-use deepfusion_motion::{FusedTrack, MotionParts};
+use deepfusion_motion::{FusedTrack, MotionParts, Signal};
 use std::path::{Path, PathBuf};
 
 /// A folder of real recordings: below `DEEPFUSION_DATA`, or `../shared/data` beside the workspace. Says
@@ -61,6 +61,23 @@ pub fn windows(reference: &Trajectory, length_s: f64, every_s: f64) -> Vec<Truth
         });
     }
     found
+}
+
+/// A path cut in two at half its time.
+pub fn halves(path: &Trajectory) -> (Trajectory, Trajectory) {
+    let poses = path.poses();
+    let (first, second) = poses.split_at(poses.len() / 2);
+    (
+        Trajectory::new(first.to_vec()),
+        Trajectory::new(second.to_vec()),
+    )
+}
+
+/// The path's length over the speed's integral.
+pub fn speed_scale(speed: &Signal, path: &Trajectory) -> f64 {
+    let poses = path.poses();
+    let integral = speed.integral(poses[0].time_s, poses[poses.len() - 1].time_s);
+    path.length_m() / integral.unwrap()
 }
 
 /// Errors over windows.
