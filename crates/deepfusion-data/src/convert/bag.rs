@@ -90,11 +90,14 @@ pub fn convert_to_bag(
     let frames: Vec<usize> = (0..times.len()).collect();
     let mut done = 0;
     for batch in frames.chunks(BATCH) {
-        let read: Vec<(Vec<u8>, Option<Vec<[f32; 3]>>)> = batch
-            .par_iter()
-            .map(|&frame| Ok((png(dataset, frame)?, points(dataset, frame)?)))
-            .collect::<Result<_>>()?;
-        for (&frame, (png, points)) in batch.iter().zip(&read) {
+        let read = batch.par_iter().map(|&frame| {
+            Ok(Picture {
+                png: png(dataset, frame)?,
+                points: points(dataset, frame)?,
+            })
+        });
+        let read: Vec<Picture> = read.collect::<Result<_>>()?;
+        for (&frame, Picture { png, points }) in batch.iter().zip(&read) {
             let stamp = time(times[frame]);
             let header = |frame_id| header(stamp, frame, frame_id);
             let image = CompressedImage {
@@ -122,6 +125,12 @@ pub fn convert_to_bag(
     }
     super::write_text(&sidecar, &describe(dataset))?;
     Ok(bag.finish()?)
+}
+
+/// A frame, read.
+struct Picture {
+    png: Vec<u8>,
+    points: Option<Vec<[f32; 3]>>,
 }
 
 fn header(stamp: Time, seq: usize, frame_id: &str) -> Header {
