@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// know: its `navstat` says that there was no fix.
 ///
 /// # Errors
-/// [`Error::NotEmpty`], [`Error::Cameras`] where the cameras differ, and what reading or writing can have wrong.
+/// [`Error::Exists`], [`Error::Cameras`] where the cameras differ, and what reading or writing can have wrong.
 pub fn convert_to_kitti(
     datasets: &[Dataset],
     out: &Path,
