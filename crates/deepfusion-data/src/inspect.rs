@@ -1,7 +1,7 @@
 //! What is in a recording.
 
 use crate::layout::Layout;
-use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions, Result, comma, umad};
+use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions, Result, bag, comma};
 use deepfusion_geometry::Intrinsics;
 use serde::Serialize;
 use std::path::Path;
@@ -120,7 +120,7 @@ pub fn inspect_with(path: &Path, intrinsics: Option<[f64; 4]>) -> Result<Inspect
     }
     if let Layout::Bags(bags) = &layout
         && let [bag] = bags.as_slice()
-        && let Some(inspection) = umad::without_images(bag)?
+        && let Some(inspection) = bag::without_images(bag)?
     {
         return Ok(inspection);
     }

@@ -2,7 +2,7 @@
 
 use crate::config::FolderConfig;
 use crate::kitti::{self, Drive, find_drives, layout};
-use crate::{Dataset, Error, OpenOptions, Result, comma, folder, rgbd, umad, video};
+use crate::{Dataset, Error, OpenOptions, Result, bag, comma, folder, rgbd, video};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -33,7 +33,7 @@ impl Layout {
             path: path.to_owned(),
             found,
         };
-        if umad::is_bag(&real) {
+        if bag::is_bag(&real) {
             return Ok(Self::Bags(vec![real]));
         }
         if !real.is_dir() {
@@ -49,7 +49,7 @@ impl Layout {
         if comma::is_segment(&real) {
             return Ok(Self::Comma(real));
         }
-        let bags = umad::bags_in(&real)?;
+        let bags = bag::bags_in(&real)?;
         if !bags.is_empty() {
             return Ok(Self::Bags(bags));
         }
@@ -79,7 +79,7 @@ impl Layout {
             Self::Kitti(drives) => kitti::open(path, drives, options),
             Self::Comma(folder) => one(comma::open(folder, options)),
             Self::RgbD(folders) => rgbd::open(path, folders, options),
-            Self::Bags(bags) => umad::open(path, bags, options),
+            Self::Bags(bags) => bag::open(path, bags, options),
             Self::Folder(folder) => one(folder::open(folder, options)),
             Self::Video(place) => one(video::open(place, options)),
         }

@@ -1,10 +1,11 @@
 //! Recordings of vehicles as frames, snippets and ground-truth depth.
 //!
 //! [`Dataset::open`] takes a recording of any layout: KITTI raw, a folder of images or a video with tables
-//! beside it, a comma2k19 segment, an RGB-D folder. [`Dataset::snippets`] gives the training samples with
+//! beside it, a comma2k19 segment, an RGB-D folder, a ROS 1 bag. [`Dataset::snippets`] gives the training samples with
 //! the camera's ego-motion, [`Dataset::ground_truth`] the measured depth. Another layout is another
 //! [`Recording`]. Nothing here knows of tensors.
 
+mod bag;
 mod calibration;
 mod camera;
 mod clock;
@@ -40,10 +41,10 @@ mod speed_check;
 mod speed_log;
 mod split;
 mod table;
-mod umad;
 mod video;
 mod write;
 
+pub use bag::{DopplerEgo, ego_velocity, ground_radial};
 pub use calibration::CameraCalibration;
 pub use camera::{Camera, CameraChoice};
 pub use convert::{convert_to_bag, convert_to_kitti};
@@ -70,5 +71,4 @@ pub use speed_check::{
     GreyImage, GroundPair, SpeedWarning, implied_camera_height, speed_unit_warning,
 };
 pub use split::{Split, SplitEntry};
-pub use umad::{DopplerEgo, ego_velocity, ground_radial};
 pub use write::write_atomically;

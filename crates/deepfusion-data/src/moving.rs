@@ -1,7 +1,7 @@
 //! Which pixels of a frame's ground truth belong to what moves over the ground.
 
+use crate::bag::BagScans;
 use crate::kitti::{GtKind, KittiRecording, Tracklet, TrackletPose, velo_point};
-use crate::umad::BagScans;
 use crate::{Dataset, Error, Result};
 use deepfusion_geometry::{DepthMap, Se3};
 use nalgebra::{Matrix3x4, Vector3};
