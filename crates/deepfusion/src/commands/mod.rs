@@ -4,6 +4,7 @@ mod ablate;
 mod bench;
 mod demo;
 pub mod device;
+mod doctor;
 mod eval;
 mod eval_odometry;
 mod evaluate;
@@ -31,6 +32,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Simulate(args) => simulate::run(&args),
         Command::Data(DataCommand::Inspect(args)) => inspect::run(&args),
         Command::Data(DataCommand::ExportGt(args)) => export_gt::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
         Command::Train(args) => train::run(&args),
         Command::Ablate(args) => ablate::run(&args),
         Command::Eval(args) => eval::run(&args),
