@@ -7,8 +7,8 @@ use crate::recording::Recording;
 use crate::selection::Selection;
 use crate::split::Split;
 use crate::{
-    Camera, CameraChoice, CameraPath, DatasetKind, Error, Frame, MotionModel, MovingLabels, Result,
-    Stream, image_size,
+    Camera, CameraChoice, CameraPath, DatasetKind, Error, Frame, LidarMotion, MotionModel,
+    MovingLabels, Result, Stream, image_size,
 };
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use image::RgbImage;
@@ -297,6 +297,15 @@ impl Dataset {
     /// and cannot be read.
     pub fn camera_paths(&self) -> Result<Vec<CameraPath>> {
         self.recording.camera_paths(self)
+    }
+
+    /// The vehicle's velocity as a LiDAR that measures radial velocities saw it, in at most `most` scans spread over
+    /// the drive, beside what speed and yaw rate say; none where there is no such LiDAR.
+    ///
+    /// # Errors
+    /// Where a scan cannot be read.
+    pub fn lidar_motion(&self, most: usize) -> Result<Vec<LidarMotion>> {
+        self.recording.lidar_motion(most)
     }
 
     /// What was recorded, stream by stream.

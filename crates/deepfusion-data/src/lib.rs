@@ -15,6 +15,7 @@ mod convert;
 mod dataset;
 mod depth_images;
 mod depth_png;
+pub mod doctor;
 mod ego;
 mod error;
 mod export;
@@ -64,7 +65,7 @@ pub use moving::{MovingLabels, MovingSource};
 pub use overlay::overlay;
 pub use path::CameraPath;
 pub use picture::{decode_rgb, image_size, load_rgb, save_png};
-pub use recording::{CalibrationPlace, DatasetKind, Recording};
+pub use recording::{CalibrationPlace, DatasetKind, LidarMotion, Recording};
 pub use resize::{resize_rgb, to_chw, to_network_input};
 pub use snippet::{EgoMotion, Snippet, Source, hold_out};
 pub use speed_check::{

@@ -4,6 +4,7 @@ use crate::kitti::GtKind;
 use crate::{CameraPath, Dataset, Error, Frame, MovingLabels, Result, Stream};
 use deepfusion_geometry::DepthMap;
 use image::RgbImage;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -96,6 +97,15 @@ pub trait Recording: fmt::Debug + Send + Sync {
         Ok(None)
     }
 
+    /// The vehicle's velocity as a LiDAR that measures radial velocities saw it, in at most `most` scans spread over
+    /// the drive; none where there is no such LiDAR.
+    ///
+    /// # Errors
+    /// Where a scan cannot be read.
+    fn lidar_motion(&self, _most: usize) -> Result<Vec<LidarMotion>> {
+        Ok(Vec::new())
+    }
+
     /// The time of a number without an image, in seconds on the frames' clock.
     fn time_of(&self, _number: u64) -> Option<f64> {
         None
@@ -111,6 +121,17 @@ pub trait Recording: fmt::Debug + Send + Sync {
             layout: self.kind().label(),
         })
     }
+}
+
+/// The velocity of a LiDAR over ground, by its scan and by the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LidarMotion {
+    /// When, in seconds on the frames' clock.
+    pub time_s: f64,
+    /// By the scan's static points, in the vehicle's axes (x forward, y left, z up), m/s.
+    pub by_scan_mps: Vector3<f64>,
+    /// By speed and yaw rate, same axes, m/s.
+    pub by_vehicle_mps: Vector3<f64>,
 }
 
 /// The place in a file that says what the camera is.

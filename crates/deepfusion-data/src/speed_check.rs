@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use std::fmt;
 
 /// Heights that a camera on a road vehicle can have, in metres.
-const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.9..=2.6;
+pub(crate) const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.9..=2.6;
 /// Heights tried, in metres, and the ratio of one to the next. Beyond 15 m the road hardly moves.
 const SWEEP_M: (f64, f64) = (0.3, 15.0);
 const SWEEP_RATIO: f64 = 1.06;
@@ -132,6 +132,16 @@ impl fmt::Display for SpeedWarning {
 /// # Errors
 /// As [`Dataset::snippets`] and [`Dataset::load_image`].
 pub fn speed_unit_warning(dataset: &Dataset) -> Result<Option<SpeedWarning>> {
+    let seen = road_camera_height(dataset)?;
+    Ok(seen.and_then(|(height_m, pairs)| SpeedWarning::of_height(height_m, pairs)))
+}
+
+/// How high above the road the camera is by the motion of the road in the images and the drive's speeds, in metres, and
+/// by how many pairs of frames; `None` where the images do not tell.
+///
+/// # Errors
+/// As [`speed_unit_warning`].
+pub(crate) fn road_camera_height(dataset: &Dataset) -> Result<Option<(f64, usize)>> {
     let snippets = sample(dataset.snippets(&[-1], 0.5)?);
     let Some(cam_from_vehicle) = dataset.cam_from_vehicle() else {
         return Ok(None);
@@ -158,7 +168,7 @@ pub fn speed_unit_warning(dataset: &Dataset) -> Result<Option<SpeedWarning>> {
         .into_par_iter()
         .map(load)
         .collect::<Result<Vec<_>>>()?;
-    Ok(implied_camera_height(&pairs).and_then(|h| SpeedWarning::of_height(h, pairs.len())))
+    Ok(implied_camera_height(&pairs).map(|height_m| (height_m, pairs.len())))
 }
 
 /// At most [`MAX_PAIRS`] snippets, evenly over the faster half of the drive, where the road moves most.
@@ -276,7 +286,7 @@ impl GreyImage {
     }
 
     /// Bilinear value at a position, which is moved into the image first.
-    fn sample(&self, x: f64, y: f64) -> f32 {
+    pub(crate) fn sample(&self, x: f64, y: f64) -> f32 {
         let at = |v: f64, size: usize| {
             // NaN becomes 0 here.
             let v = v.max(0.0).min(size as f64 - 1.0);

@@ -16,7 +16,7 @@
 
 mod correlation;
 
-use crate::{FusedTrack, ImageMotion, Signal, VehicleTrack};
+use crate::{FusedTrack, ImageMotion, MotionModel, Signal, VehicleTrack};
 use correlation::Channel;
 
 /// The vehicle's side of the comparison, on the vehicle's clock: whatever of it is measured.
@@ -52,6 +52,15 @@ impl From<&FusedTrack> for VehicleRates {
             yaw_rate_radps: yaw_rate.cloned(),
             pitch_rate_radps: imu.map(|i| i.pitch_rate().clone()),
             roll_rate_radps: imu.map(|i| i.roll_rate().clone()),
+        }
+    }
+}
+
+impl From<&MotionModel> for VehicleRates {
+    fn from(motion: &MotionModel) -> Self {
+        match motion {
+            MotionModel::Track(track) => track.into(),
+            MotionModel::Fused(track) => track.as_ref().into(),
         }
     }
 }

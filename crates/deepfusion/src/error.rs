@@ -91,6 +91,14 @@ pub enum CliError {
         /// The shard.
         shard: Shard,
     },
+    /// A recording that should not be trained on.
+    #[error("{}: {errors} {} would make training fail or give a wrong scale", path.display(), if *errors == 1 { "error" } else { "errors" })]
+    Unfit {
+        /// The recording.
+        path: PathBuf,
+        /// How many errors were found.
+        errors: usize,
+    },
     /// Images that could not be predicted, while others could.
     #[error("{}", some_failed(failures, *total, *interrupted))]
     SomeFailed {
@@ -149,6 +157,7 @@ impl CliError {
                 Some(hint) => format!("{hint}; then run the same again: only what is missing is done"),
                 None => "mend them and run the same again: only what is missing is done".into(),
             }),
+            Self::Unfit { .. } => Some("each finding above has its remedy; --verbose tells every figure".into()),
             Self::Interrupted { .. } => {
                 Some("run the same again: only what is missing is done".into())
             }

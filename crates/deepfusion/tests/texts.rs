@@ -19,6 +19,7 @@ fn help_texts() {
         "data",
         "data inspect",
         "data export-gt",
+        "doctor",
         "train",
         "ablate",
         "eval",

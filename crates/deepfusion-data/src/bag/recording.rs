@@ -1,6 +1,7 @@
 //! A bag as a [`Recording`].
 
 use super::config::{BagConfig, LidarConfig};
+use super::doppler::ego_velocity;
 use super::index::{Index, Place};
 use super::profile;
 use super::scan::{Scan, SeenScan};
@@ -10,7 +11,7 @@ use crate::kitti::GtKind;
 use crate::recording::{CalibrationPlace, Recording};
 use crate::{
     Camera, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame, FrameImage, Lens,
-    MotionModel, MovingLabels, OpenOptions, Result, Stream,
+    LidarMotion, MotionModel, MovingLabels, OpenOptions, Result, Stream,
 };
 use ::image::RgbImage;
 use deepfusion_geometry::{DepthMap, Distortion, Intrinsics, Se3, StampedPose, Trajectory};
@@ -439,6 +440,34 @@ impl BagScans {
         Ok(ground.map(|ground| ground.iter().map(|v| v.abs() > limit).collect()))
     }
 
+    /// As [`Recording::lidar_motion`].
+    fn motion(&self, most: usize) -> Result<Vec<LidarMotion>> {
+        if self.lidar.over_ground || most == 0 {
+            return Ok(Vec::new());
+        }
+        let vehicle_from_lidar = self.cam_from_vehicle.inverse() * self.cam_from_lidar;
+        let step = self.places.len().div_ceil(most).max(1);
+        let mut motions = Vec::new();
+        for (place, time_s) in self.places.iter().step_by(step) {
+            let message = image::message(&self.bag, &self.topic, place)?;
+            let scan = Scan::decode(&self.bag, &message, &self.lidar)?;
+            let (Some(radial), Some(by_vehicle)) = (&scan.radial, self.sensor_velocity(*time_s))
+            else {
+                continue;
+            };
+            // Without a start: what the vehicle says must not colour what the scan says.
+            let ego = ego_velocity(&scan.xyz, radial, None);
+            if let Some(ego) = ego.filter(|ego| ego.static_share >= super::scan::LEAST_STATIC) {
+                motions.push(LidarMotion {
+                    time_s: *time_s,
+                    by_scan_mps: vehicle_from_lidar.rotate(&ego.velocity),
+                    by_vehicle_mps: vehicle_from_lidar.rotate(&by_vehicle),
+                });
+            }
+        }
+        Ok(motions)
+    }
+
     /// Whether its points carry velocities: by the first scan.
     fn has_velocities(&self) -> Result<bool> {
         let Some((place, _)) = self.places.first() else {
@@ -511,6 +540,12 @@ impl Recording for BagRecording {
             return Ok(None);
         };
         Ok(scans.at(time_s)?.map(|seen| seen.depth))
+    }
+
+    fn lidar_motion(&self, most: usize) -> Result<Vec<LidarMotion>> {
+        self.scans
+            .as_ref()
+            .map_or(Ok(Vec::new()), |scans| scans.motion(most))
     }
 
     fn moving_labels(&self, dataset: &Dataset) -> Result<Option<MovingLabels>> {

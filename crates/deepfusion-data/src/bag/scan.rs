@@ -18,7 +18,7 @@ const VELOCITY_NAMES: [&str; 6] = [
     "v",
 ];
 /// Of a scan that agrees with one velocity in less than this share, the vehicle's is taken instead.
-const LEAST_STATIC: f64 = 0.4;
+pub(super) const LEAST_STATIC: f64 = 0.4;
 
 /// Points in the LiDAR's axes (x forward, y left, z up), metres.
 #[derive(Debug, Clone, Default)]

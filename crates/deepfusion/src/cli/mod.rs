@@ -2,6 +2,7 @@
 
 mod ablate;
 mod data;
+mod doctor;
 mod engine;
 mod eval;
 mod eval_odometry;
@@ -16,6 +17,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use ablate::AblateArgs;
 pub use data::{ConvertArgs, DataCommand, ExportGtArgs, GtDepth, InspectArgs};
+pub use doctor::DoctorArgs;
 pub use engine::{EngineArgs, EngineChoice, PrecisionChoice};
 pub use eval::{EvalArgs, PredKind};
 pub use eval_odometry::EvalOdometryArgs;
@@ -51,6 +53,8 @@ pub enum Command {
     /// Look into recordings.
     #[command(subcommand)]
     Data(DataCommand),
+    /// Every reason why training on a recording would fail or give a wrong scale; alone, what this machine has.
+    Doctor(DoctorArgs),
     /// Train on drives, without depth labels.
     Train(Box<TrainArgs>),
     /// Train and measure with parts of the system switched off: the on/off table of the paper.

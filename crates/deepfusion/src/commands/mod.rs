@@ -5,6 +5,7 @@ mod bench;
 mod convert;
 mod demo;
 pub mod device;
+mod doctor;
 mod eval;
 mod eval_odometry;
 mod evaluate;
@@ -33,6 +34,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Data(DataCommand::Inspect(args)) => inspect::run(&args),
         Command::Data(DataCommand::ExportGt(args)) => export_gt::run(&args),
         Command::Data(DataCommand::Convert(args)) => convert::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
         Command::Train(args) => train::run(&args),
         Command::Ablate(args) => ablate::run(&args),
         Command::Eval(args) => eval::run(&args),

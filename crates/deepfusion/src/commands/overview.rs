@@ -10,6 +10,7 @@ Try it, with no data at all (a few minutes):
 
 With recordings (KITTI raw layout):
   deepfusion data inspect DRIVE            what is in it, and whether it can train
+  deepfusion doctor DRIVE                  every reason why that would go wrong
   deepfusion train --data DRIVE            learn from its images and speeds
   deepfusion eval --model RUN --data DRIVE measure against its LiDAR
   deepfusion predict --model RUN IMAGE --out DIR

@@ -1,0 +1,77 @@
+//! The camera's clock against the vehicle's.
+
+use super::epipolar::EpipolarPair;
+use super::finding::{Figure, Limit, Outcome, Severity};
+use super::survey::Survey;
+use super::turn::picture_yaw_rate;
+use deepfusion_motion::{ImageMotion, OffsetConfig, Signal, VehicleRates, time_offset};
+
+/// Offset that matters, in seconds: at 10 m/s² of braking 20 ms are 0.2 m/s.
+const MOST_S: f64 = 0.020;
+/// An estimate counts where it is so many standard errors from 0, and these are below `SURE_S`.
+const SIGMAS: f64 = 4.0;
+const SURE_S: f64 = 0.05;
+
+pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
+    let dataset = survey.dataset;
+    let Some(track) = dataset.track().filter(|_| dataset.yaw_known()) else {
+        return Outcome::skipped("clock", "no speed and yaw rate to compare the picture with");
+    };
+    let pictures = pictures(survey, pairs);
+    let rates = VehicleRates::from(track);
+    let offset = match time_offset(&pictures, &rates, &OffsetConfig::default()) {
+        Ok(offset) => offset,
+        Err(why) => return Outcome::skipped("clock", why.to_string()),
+    };
+    let (value, error) = (offset.vehicle_minus_camera_s, offset.std_error_s);
+    if error.is_nan() || error >= SURE_S {
+        let why = format!("the estimate {value:.2} s has a standard error of {error:.2} s");
+        return Outcome::skipped("clock", why);
+    }
+    let mut outcome = Outcome::new("clock");
+    // What the estimate cannot tell from 0 holds; nor is a stream placed better than its own interval (KITTI's
+    // oxts, at 10 Hz, come out 60 ms late).
+    let interval_s = rates.speed_mps.as_ref().and_then(Signal::interval_s);
+    let limit = MOST_S.max(SIGMAS * error).max(interval_s.unwrap_or(0.0));
+    let figure = Figure::new(
+        "offset, vehicle less camera",
+        value,
+        "s",
+        Limit::Within(-limit, limit),
+    );
+    outcome.judge(Severity::Error, figure, || {
+        let ahead = if value < 0.0 { "ahead of" } else { "behind" };
+        (
+            format!(
+                "the camera's clock is {:.0} ± {:.0} ms {ahead} the vehicle's: every frame gets the speed of another moment",
+                1e3 * value.abs(),
+                1e3 * error
+            ),
+            format!(
+                "clock.camera_ahead_s = {:.3} in the file beside a bag; for other layouts add {value:+.3} s to the \
+                 frames' time stamps. Better: one clock for all (PTP, trigger)",
+                -value
+            ),
+        )
+    });
+    outcome
+}
+
+/// How the pictures moved. The turn by the points that were followed is truer than the shift of the whole picture, which
+/// near things move as well; it is taken where enough pairs have it.
+fn pictures(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Vec<ImageMotion> {
+    let whole: Vec<ImageMotion> = survey.pairs.iter().filter_map(|p| p.image).collect();
+    let turned = |pair: &EpipolarPair| {
+        let from_s = pair.middle_s - 0.5 * pair.dt_s;
+        let same = whole.iter().find(|m| (m.from_s - from_s).abs() < 1e-6)?;
+        Some(ImageMotion {
+            shift: picture_yaw_rate(pair)? * pair.dt_s,
+            ..*same
+        })
+    };
+    let turned: Vec<ImageMotion> = pairs.iter().filter_map(turned).collect();
+    match 2 * turned.len() > whole.len() {
+        true => turned,
+        false => whole,
+    }
+}

@@ -1,0 +1,200 @@
+//! Whether the camera's numbers can be a camera's, and this image's.
+
+use super::finding::{Figure, Limit, Outcome, Severity};
+use deepfusion_geometry::Intrinsics;
+
+/// Widths of view of cameras on cars, degrees. KITTI's is 81, UMAD's 49, the simulator's 81.
+const VIEW_DEG: Limit = Limit::Within(20.0, 140.0);
+/// Distance of the principal point from the middle, percent of the image's size. KITTI's 3.9, UMAD's printed row 25.
+const MOST_OFF: f64 = 12.0;
+/// f_x / f_y of square pixels is 1; resized without keeping the ratio of sides it is not. UMAD's 0.97, and
+/// 640×192 of KITTI's 1.01.
+const RATIO: Limit = Limit::Within(0.8, 1.25);
+/// Sizes that cameras and data sets have.
+const SIZES: [(u32, u32); 25] = [
+    (320, 240),
+    (416, 128),
+    (512, 256),
+    (640, 192),
+    (640, 360),
+    (640, 480),
+    (800, 600),
+    (1024, 320),
+    (1024, 768),
+    (1164, 874),
+    (1224, 370),
+    (1226, 370),
+    (1238, 374),
+    (1242, 375),
+    (1280, 384),
+    (1280, 720),
+    (1280, 800),
+    (1280, 960),
+    (1600, 900),
+    (1920, 1080),
+    (1920, 1200),
+    (1936, 1216),
+    (2048, 1024),
+    (2448, 2048),
+    (3840, 2160),
+];
+/// How near twice the principal point has to be to a size, as a share of it.
+const NEAR: f64 = 0.06;
+
+pub(super) fn check(k: &Intrinsics) -> Outcome {
+    let mut outcome = Outcome::new("intrinsics");
+    let (width, height) = (f64::from(k.width), f64::from(k.height));
+    let view = 2.0 * (0.5 * width / k.fx).atan().to_degrees();
+    outcome.judge(
+        Severity::Error,
+        Figure::new("width of view", view, "degrees", VIEW_DEG),
+        || {
+            (
+                format!("fx {:.1} px sees {view:.0} degrees of {width} pixels, which no camera on a car does: depths would be wrong by the same factor", k.fx),
+                "calibrate at the size of these images; a focal length in millimetres has to be divided by the size of a pixel".into(),
+            )
+        },
+    );
+    let ratio = k.fx / k.fy;
+    outcome.judge(
+        Severity::Warning,
+        Figure::new("fx / fy", ratio, "", RATIO),
+        || {
+            (
+                format!("fx {:.1} and fy {:.1} px differ more than pixels do", k.fx, k.fy),
+                "where the images were resized, scale fx by the new width over the old, fy by the heights".into(),
+            )
+        },
+    );
+    let off = |c: f64, size: f64| 100.0 * (c - 0.5 * (size - 1.0)) / size;
+    let (off_x, off_y) = (off(k.cx, width), off(k.cy, height));
+    let other = other_size(k);
+    let limit = Limit::Within(-MOST_OFF, MOST_OFF);
+    // Far to the right or below in both: a matrix of another size, whose focal length is wrong as well.
+    let severity = match other {
+        Some(_) => Severity::Error,
+        None => Severity::Warning,
+    };
+    let both = [
+        ("cx from the middle", "cx", k.cx, off_x, width),
+        ("cy from the middle", "cy", k.cy, off_y, height),
+    ];
+    for (quantity, name, value, off, size) in both {
+        outcome.judge(severity, Figure::new(quantity, off, "% of the size", limit), || match other {
+            Some((w, h)) => (
+                format!(
+                    "{name} {value:.1} is far from the middle of {size} pixels: these are the numbers of an image of about {w}x{h}, not of {}x{}",
+                    k.width, k.height
+                ),
+                format!("give the matrix of the images' own size: fx and cx times {:.4}, fy and cy times {:.4}", width / f64::from(w), height / f64::from(h)),
+            ),
+            None => (
+                format!("{name} {value:.1} is far from the middle of {size} pixels: only a cut-out image has it there"),
+                "look it up again; where the images were cut, subtract the cut from cx and cy, else calibrate anew".into(),
+            ),
+        });
+    }
+    outcome
+}
+
+/// The size of image that a principal point off the middle in both axes belongs to, if it fits one: a usual size, or
+/// this one times a factor.
+fn other_size(k: &Intrinsics) -> Option<(u32, u32)> {
+    let (w, h) = (2.0 * k.cx + 1.0, 2.0 * k.cy + 1.0);
+    let (rx, ry) = (w / f64::from(k.width), h / f64::from(k.height));
+    let same = |r: f64| (r - 1.0).abs() < 2.0 * MOST_OFF / 100.0;
+    if same(rx) || same(ry) || rx <= 0.0 || ry <= 0.0 {
+        return None;
+    }
+    let miss = |(a, b): &(u32, u32)| {
+        let off = |a: f64, b: f64| (a / b - 1.0).abs();
+        // Principal points lie less exactly in the middle of the height.
+        off(w, f64::from(*a)).max(0.6 * off(h, f64::from(*b)))
+    };
+    let usual = SIZES.iter().min_by(|a, b| miss(a).total_cmp(&miss(b)));
+    let scaled = ((rx / ry - 1.0).abs() < 2.0 * NEAR).then(|| (w.round() as u32, h.round() as u32));
+    usual.copied().filter(|size| miss(size) < NEAR).or(scaled)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KITTI: Intrinsics = Intrinsics {
+        fx: 721.5377,
+        fy: 721.5377,
+        cx: 609.5593,
+        cy: 172.854,
+        width: 1242,
+        height: 375,
+    };
+
+    #[test]
+    fn kitti_s_camera_is_one_at_any_size() {
+        for (w, h) in [(1242, 375), (640, 192), (320, 96), (416, 128)] {
+            assert_eq!(check(&KITTI.resized(w, h)).findings, []);
+        }
+    }
+
+    #[test]
+    fn the_printed_row_of_umad_is_flagged() {
+        let umad = Intrinsics {
+            fx: 703.64,
+            fy: 724.82,
+            cx: 322.55,
+            cy: 117.6,
+            width: 640,
+            height: 480,
+        };
+        let outcome = check(&umad);
+        let [finding] = &outcome.findings[..] else {
+            panic!("{outcome:?}")
+        };
+        assert_eq!(finding.severity, Severity::Warning);
+        let off = finding.figure.as_ref().unwrap().value;
+        assert!((off + 25.4).abs() < 0.1, "{off}");
+        assert!(finding.what.contains("cy 117.6"), "{}", finding.what);
+    }
+
+    #[test]
+    fn a_matrix_of_another_size_is_told_by_name() {
+        let wrong = Intrinsics {
+            width: 640,
+            height: 192,
+            ..KITTI
+        };
+        let finding = &check(&wrong).findings[0];
+        assert_eq!(finding.severity, Severity::Error);
+        assert!(
+            finding.what.contains("about 1242x375")
+                || finding.what.contains("about 1226x370")
+                || finding.what.contains("about 1224x370"),
+            "{}",
+            finding.what
+        );
+        assert!(
+            finding.remedy.contains("0.52") || finding.remedy.contains("0.515"),
+            "{}",
+            finding.remedy
+        );
+        // Half of everything is no usual size; the factor still tells.
+        let half = Intrinsics {
+            width: 640,
+            height: 192,
+            ..KITTI.resized(300, 90)
+        };
+        assert!(
+            check(&half).findings[0].what.contains("about 29"),
+            "{:?}",
+            check(&half).findings
+        );
+    }
+
+    #[test]
+    fn impossible_focal_lengths_are_errors() {
+        for fx in [7.2, 40_000.0, f64::NAN] {
+            let worst = check(&Intrinsics { fx, ..KITTI }).findings;
+            assert!(worst.iter().any(|f| f.severity == Severity::Error), "{fx}");
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! Every reason why training on a recording would fail, or give depths of a wrong scale, before it starts.
+//!
+//! [`doctor`] opens a recording and lets one check after the other look at it. A check measures a figure and compares
+//! it with a limit; what does not keep to it is a [`Finding`] with a remedy. The limits are such that the clean drives
+//! at hand (KITTI 0005 and 0009, the simulator's five places) keep to all of them.
+
+mod blur;
+mod bonnet;
+mod clock;
+mod duplicates;
+mod epipolar;
+mod exposure;
+mod finding;
+mod flow;
+mod ground;
+mod heading;
+mod intrinsics;
+mod lidar_speed;
+mod look;
+mod opening;
+mod parallax;
+mod plots;
+mod speed;
+mod standing;
+mod stereo;
+mod survey;
+mod timing;
+mod turn;
+
+pub use finding::{Figure, Finding, Limit, Outcome, Severity};
+pub use plots::{DrivePlots, Line};
+
+use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions};
+use serde::Serialize;
+use std::path::Path;
+use survey::Survey;
+
+/// What the checks say about a recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// What is wrong with the recording as a whole: it cannot be opened, its cameras are swapped.
+    pub recording: Vec<Outcome>,
+    /// Each drive by itself.
+    pub drives: Vec<DriveDiagnosis>,
+}
+
+/// What the checks say about one drive.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DriveDiagnosis {
+    /// The drive's name.
+    pub name: String,
+    /// The camera looked at: 2 or 3.
+    pub camera: u8,
+    /// The layout.
+    pub kind: DatasetKind,
+    /// Its images.
+    pub frames: usize,
+    /// How many of them were looked at.
+    pub looked_at: usize,
+    /// Check by check.
+    pub outcomes: Vec<Outcome>,
+    /// What was measured over time, to be drawn.
+    #[serde(skip)]
+    pub plots: DrivePlots,
+}
+
+impl Diagnosis {
+    /// All findings with the drive they are about, the worst first.
+    #[must_use]
+    pub fn findings(&self) -> Vec<(Option<&str>, &Finding)> {
+        let whole = self.recording.iter().map(|outcome| (None, outcome));
+        let drives = self.drives.iter().flat_map(|drive| {
+            let named = |outcome| (Some(drive.name.as_str()), outcome);
+            drive.outcomes.iter().map(named)
+        });
+        let mut found: Vec<(Option<&str>, &Finding)> = whole
+            .chain(drives)
+            .flat_map(|(name, outcome)| outcome.findings.iter().map(move |f| (name, f)))
+            .collect();
+        found.sort_by_key(|(_, finding)| std::cmp::Reverse(finding.severity));
+        found
+    }
+
+    /// The worst of the findings.
+    #[must_use]
+    pub fn worst(&self) -> Option<Severity> {
+        self.findings().first().map(|(_, finding)| finding.severity)
+    }
+}
+
+/// Examines a recording of any layout; `intrinsics` as [`OpenOptions::intrinsics`]. A recording that cannot be opened
+/// is a finding, not an error.
+#[must_use]
+pub fn doctor(path: &Path, intrinsics: Option<[f64; 4]>) -> Diagnosis {
+    let open = |camera| {
+        let options = OpenOptions {
+            camera,
+            intrinsics,
+            ..OpenOptions::default()
+        };
+        Dataset::open(path, &options)
+    };
+    let datasets = match open(CameraChoice::Left) {
+        Err(Error::NoImages { .. }) => open(CameraChoice::Right),
+        other => other,
+    };
+    match datasets {
+        Err(error) => Diagnosis {
+            recording: vec![opening::failed(&error)],
+            drives: Vec::new(),
+        },
+        Ok(datasets) => Diagnosis {
+            recording: vec![stereo::check(path)],
+            drives: datasets.iter().map(examine).collect(),
+        },
+    }
+}
+
+/// Examines one drive.
+#[must_use]
+pub fn examine(dataset: &Dataset) -> DriveDiagnosis {
+    let survey = Survey::of(dataset);
+    let pairs = epipolar::pairs(&survey);
+    let outcomes = vec![
+        opening::check(&survey),
+        timing::check(dataset),
+        duplicates::check(&survey),
+        intrinsics::check(&dataset.intrinsics(0)),
+        standing::check(dataset),
+        speed::check(dataset),
+        lidar_speed::check(dataset),
+        clock::check(&survey, &pairs),
+        turn::check(&pairs),
+        heading::check(&survey, &pairs),
+        ground::check(dataset),
+        parallax::check(&survey, &pairs),
+        exposure::check(&survey),
+        blur::check(&survey),
+        bonnet::check(&survey),
+    ];
+    DriveDiagnosis {
+        name: dataset.name().to_owned(),
+        camera: dataset.camera().number(),
+        kind: dataset.kind(),
+        frames: dataset.frames().len(),
+        looked_at: survey.frames.len(),
+        outcomes,
+        plots: DrivePlots::of(&survey, &pairs),
+    }
+}
+
+/// The middle of the values; NaN where there is none.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}

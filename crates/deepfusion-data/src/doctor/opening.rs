@@ -1,0 +1,66 @@
+//! Whether everything can be read: the recording, its images, its motion.
+
+use super::finding::{Outcome, Severity};
+use super::survey::Survey;
+use crate::Error;
+
+const CHECK: &str = "opening";
+/// Pairs slower than this do not train (SPEC 3.5).
+const MIN_SPEED_MPS: f64 = 0.5;
+
+/// Of a recording that cannot be opened.
+pub(super) fn failed(error: &Error) -> Outcome {
+    let mut outcome = Outcome::new(CHECK);
+    let remedy = error
+        .hint()
+        .unwrap_or_else(|| "correct what the message names".into());
+    outcome.find(Severity::Error, None, error.to_string(), remedy);
+    outcome
+}
+
+/// Of one that can: images that cannot be read, no pair to train on, and what was taken for granted.
+pub(super) fn check(survey: &Survey<'_>) -> Outcome {
+    let mut outcome = Outcome::new(CHECK);
+    for (number, problem) in &survey.unreadable {
+        outcome.find(
+            Severity::Error,
+            Some(*number),
+            problem.clone(),
+            "copy the recording again, or leave the frame out",
+        );
+    }
+    if let Err(error) = survey.dataset.snippets(&[1], MIN_SPEED_MPS) {
+        let remedy = error
+            .hint()
+            .unwrap_or_else(|| "training needs pairs of frames with a known motion".into());
+        outcome.find(
+            Severity::Error,
+            None,
+            format!("no pair of frames can train: {error}"),
+            remedy,
+        );
+    }
+    if survey.dataset.track().is_some() && !survey.dataset.yaw_known() {
+        outcome.find(
+            Severity::Note,
+            None,
+            "no yaw rate was recorded: clock, turns and the camera's direction cannot be checked, and only \
+             configurations that do not read turns can train"
+                .into(),
+            "record an inertial unit or the steering angle",
+        );
+    }
+    for remark in survey.dataset.remarks() {
+        let damaged = remark.contains("damaged") || remark.contains("cannot be read");
+        let severity = match damaged {
+            true => Severity::Warning,
+            false => Severity::Note,
+        };
+        let remedy = match damaged {
+            true => "copy the bag again; `rosbag reindex` repairs one whose recording was cut off",
+            false => "see that it is so, or say otherwise in the file beside the recording",
+        };
+        outcome.find(severity, None, remark.clone(), remedy);
+    }
+    outcome
+}

@@ -1,0 +1,64 @@
+//! Rates, gaps and lost frames, by the frames' numbers and time stamps.
+
+use super::finding::{Figure, Limit, Outcome, Severity};
+use super::median;
+use crate::Dataset;
+
+/// Share of frames that may be missing, percent: KITTI's and the simulator's drives miss none.
+const MOST_LOST: f64 = 1.0;
+/// Intervals longer than so many usual ones are gaps.
+const GAP: f64 = 1.5;
+
+pub(super) fn check(dataset: &Dataset) -> Outcome {
+    let mut outcome = Outcome::new("timing");
+    let frames = dataset.frames();
+    let steps: Vec<(u64, f64, u64)> = frames
+        .windows(2)
+        .filter_map(|w| {
+            let apart = w[1].time_s? - w[0].time_s?;
+            Some((w[1].number, apart, w[1].number - w[0].number))
+        })
+        .collect();
+    if steps.is_empty() {
+        return Outcome::skipped("timing", "the frames have no time stamps");
+    }
+    for (number, apart, _) in steps.iter().filter(|(_, apart, _)| *apart <= 0.0) {
+        outcome.find(
+            Severity::Error,
+            Some(*number),
+            format!("its time stamp is {:.3} s before the frame before", -apart),
+            "sort the frames by time, or correct the time stamps",
+        );
+    }
+    let usual = median(
+        steps
+            .iter()
+            .map(|(_, apart, n)| apart / *n as f64)
+            .collect(),
+    );
+    // A number that is missing is a frame that is missing; where numbers go on, the time tells.
+    let lost_in = |apart: f64, numbers: u64| {
+        let by_time = match apart > GAP * usual * numbers as f64 {
+            true => (apart / usual).round() - numbers as f64,
+            false => 0.0,
+        };
+        numbers as f64 - 1.0 + by_time.max(0.0)
+    };
+    let lost: f64 = steps.iter().map(|(_, apart, n)| lost_in(*apart, *n)).sum();
+    let first = steps.iter().find(|(_, apart, n)| lost_in(*apart, *n) > 0.0);
+    let share = 100.0 * lost / (lost + frames.len() as f64);
+    let figure = Figure::new("lost frames", share, "%", Limit::AtMost(MOST_LOST));
+    outcome.judge(Severity::Warning, figure, || {
+        let at = first.map_or(0, |(number, _, _)| *number);
+        (
+            format!(
+                "{lost:.0} frames are missing at {:.1} frames a second, the first before frame {at}: pairs across \
+                 a gap are left out or move further than others",
+                1.0 / usual
+            ),
+            "find out where the recorder drops frames (disk, network, queue length), or cut the recording there"
+                .into(),
+        )
+    });
+    outcome
+}

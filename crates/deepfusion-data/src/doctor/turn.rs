@@ -1,0 +1,88 @@
+//! The camera's turns against the vehicle's: the sign tells mirrored images, the size a wrong focal length.
+//!
+//! A camera that turns by Δθ moves what it sees by f·Δθ, so turns measured in the images with a focal length that is
+//! too large come out too small by the same factor, whatever is seen.
+
+use super::epipolar::{EpipolarPair, YawTrust};
+use super::finding::{Figure, Limit, Outcome, Severity};
+
+/// Least standard deviation of the vehicle's yaw rate that can be compared, rad/s.
+const LEAST_TURN: f64 = 0.015;
+const LEAST_PAIRS: usize = 15;
+/// Correlation from which the slope is taken for the focal length's ratio: below, something else is wrong.
+const SURE: f64 = 0.9;
+
+pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
+    let seen: Vec<(f64, f64)> = pairs.iter().filter_map(turns).collect();
+    if seen.len() < LEAST_PAIRS {
+        let why = format!("{} pairs show a turn, {LEAST_PAIRS} are needed", seen.len());
+        return Outcome::skipped("turn", why);
+    }
+    let n = seen.len() as f64;
+    let mean = |f: fn(&(f64, f64)) -> f64| seen.iter().map(f).sum::<f64>() / n;
+    let (mx, my) = (mean(|s| s.0), mean(|s| s.1));
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for (x, y) in &seen {
+        let (x, y) = (x - mx, y - my);
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+    }
+    let spread = (xx / n).sqrt();
+    if spread < LEAST_TURN {
+        let why = format!(
+            "the vehicle hardly turns (yaw rate ±{spread:.3} rad/s, {LEAST_TURN} are needed)"
+        );
+        return Outcome::skipped("turn", why);
+    }
+    let correlation = xy / (xx * yy).sqrt();
+    let slope = xy / xx;
+    let mut outcome = Outcome::new("turn");
+    let figure = Figure::new(
+        "correlation of the picture's turns with the vehicle's",
+        correlation,
+        "",
+        Limit::AtLeast(0.5),
+    );
+    let mirrored = correlation < -0.5;
+    outcome.judge(if mirrored { Severity::Error } else { Severity::Warning }, figure, || match mirrored {
+        true => (
+            "the picture turns right where the vehicle turns left: the images are mirrored, or the yaw rate has the wrong sign".into(),
+            "mirror the images back, or negate the yaw rate (positive is to the left, z up)".into(),
+        ),
+        false => (
+            "the picture's turns do not follow the vehicle's: clock, yaw rate or camera are not of this drive".into(),
+            "compare the time stamps and the yaw rate's unit (rad/s) and axis (z up)".into(),
+        ),
+    });
+    if correlation >= SURE {
+        let figure = Figure::new(
+            "turns in the picture over the vehicle's",
+            slope,
+            "",
+            Limit::Within(0.85, 1.18),
+        );
+        outcome.judge(Severity::Error, figure, || {
+            (
+                format!(
+                    "turns come out {slope:.2} times the vehicle's with this focal length: it is about {:.2} times the \
+                     true one (or the yaw rate has another unit), and depths would be wrong by as much",
+                    1.0 / slope
+                ),
+                format!("calibrate at the size of these images; fx and fy times {slope:.2} would fit"),
+            )
+        });
+    }
+    outcome
+}
+
+/// The yaw rate by the vehicle and by the picture, rad/s, positive to the left.
+fn turns(pair: &EpipolarPair) -> Option<(f64, f64)> {
+    let turn = pair.turn(&pair.direction()?, YawTrust(f64::INFINITY))?;
+    Some((pair.vehicle_yaw_rate(), -turn.omega.y / pair.dt_s))
+}
+
+/// The picture's yaw rate, rad/s, for plots.
+pub(super) fn picture_yaw_rate(pair: &EpipolarPair) -> Option<f64> {
+    turns(pair).map(|(_, picture)| picture)
+}

@@ -1,0 +1,126 @@
+//! The doctor's page: findings, figures, plots over time, measured depth on images.
+
+use std::path::Path;
+
+use anyhow::Result;
+use deepfusion_data::doctor::{Diagnosis, DriveDiagnosis, Line};
+use deepfusion_data::{Camera, CameraChoice, Dataset, GtKind, OpenOptions, overlay};
+use deepfusion_render::{HtmlReport, LineChart, PictureFormat};
+
+/// Writes the page.
+pub fn write(
+    path: &Path,
+    intrinsics: Option<[f64; 4]>,
+    diagnosis: &Diagnosis,
+    file: &Path,
+) -> Result<()> {
+    let mut report = HtmlReport::new("Doctor", path.display().to_string());
+    let findings = diagnosis.findings();
+    let rows: Vec<Vec<String>> = findings
+        .iter()
+        .map(|(drive, finding)| {
+            let figure = finding.figure.as_ref().map(ToString::to_string);
+            vec![
+                format!("{} [{}] {}", finding.severity, finding.check, finding.what),
+                figure.unwrap_or_default(),
+                finding.remedy.clone(),
+                drive.unwrap_or_default().to_owned(),
+                finding.frame.map(|n| n.to_string()).unwrap_or_default(),
+            ]
+        })
+        .collect();
+    report = report.section("Findings");
+    report = match rows.is_empty() {
+        true => report.paragraph("None: every figure keeps to its limit."),
+        false => report.table(&["finding", "measured", "remedy", "drive", "frame"], &rows),
+    };
+    for drive in &diagnosis.drives {
+        report = plots(report.section(&drive.name), drive);
+        report = pictures(report, path, intrinsics, drive)?;
+        report = figures(report, drive);
+    }
+    report.write(file)?;
+    Ok(())
+}
+
+fn plots(mut report: HtmlReport, drive: &DriveDiagnosis) -> HtmlReport {
+    let charts: [(&str, &[Line]); 4] = [
+        ("speed, m/s", &drive.plots.speeds_mps),
+        (
+            "yaw rate, rad/s, left is positive",
+            &drive.plots.yaw_rates_radps,
+        ),
+        ("brightness, 0 to 255", &drive.plots.brightness),
+        ("sharpness", &drive.plots.sharpness),
+    ];
+    for (title, lines) in charts.into_iter().filter(|(_, lines)| !lines.is_empty()) {
+        let mut chart = LineChart::new(title, "seconds");
+        for line in lines {
+            chart = chart.line(line.name, line.points.clone());
+        }
+        report = report.chart(&chart);
+    }
+    report
+}
+
+/// The measured depth on a few images: near is red, far is blue. Its edges should lie on the image's.
+fn pictures(
+    mut report: HtmlReport,
+    path: &Path,
+    intrinsics: Option<[f64; 4]>,
+    drive: &DriveDiagnosis,
+) -> Result<HtmlReport> {
+    if drive.plots.with_depth.is_empty() {
+        return Ok(report);
+    }
+    let options = OpenOptions {
+        camera: match drive.camera == Camera::Left.number() {
+            true => CameraChoice::Left,
+            false => CameraChoice::Right,
+        },
+        intrinsics,
+        ..OpenOptions::default()
+    };
+    let datasets = Dataset::open(path, &options)?;
+    let Some(dataset) = datasets.iter().find(|d| d.name() == drive.name) else {
+        return Ok(report);
+    };
+    for &frame in &drive.plots.with_depth {
+        // What cannot be read is among the findings.
+        let (Ok(image), Ok(Some(depth))) = (
+            dataset.load_image(frame),
+            dataset.ground_truth(frame, GtKind::Z),
+        ) else {
+            continue;
+        };
+        let caption = format!("frame {}, measured depth", dataset.frames()[frame].number);
+        report = report.picture(&caption, &overlay(&image, &depth)?, PictureFormat::Jpeg)?;
+    }
+    Ok(report)
+}
+
+fn figures(report: HtmlReport, drive: &DriveDiagnosis) -> HtmlReport {
+    let mut rows = Vec::new();
+    for outcome in &drive.outcomes {
+        for figure in &outcome.measured {
+            let holds = if figure.holds() {
+                "holds"
+            } else {
+                "does not hold"
+            };
+            rows.push(vec![
+                outcome.check.to_owned(),
+                figure.to_string(),
+                holds.to_owned(),
+            ]);
+        }
+        if let Some(why) = &outcome.skipped {
+            rows.push(vec![
+                outcome.check.to_owned(),
+                why.clone(),
+                "not checked".to_owned(),
+            ]);
+        }
+    }
+    report.table(&["check", "figure", ""], &rows)
+}
