@@ -1,0 +1,110 @@
+//! One depth image to boxes.
+
+use crate::box_fit::{GroundBox, fit};
+use crate::clusters::clusters;
+use crate::obstacles::Obstacles;
+use crate::silhouette::Silhouette;
+use crate::split::split;
+use crate::{Ground, PerceptionConfig, Rays, Target};
+
+/// Visible height from which on something is a target, metres.
+const MIN_VISIBLE_HEIGHT: f32 = 0.25;
+
+/// A box and what it was made from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detection {
+    /// In the ground's axes.
+    pub place: GroundBox,
+    /// How many pixels see it.
+    pub pixels: usize,
+    /// Left, top, right, bottom of those pixels.
+    pub bounds: [u32; 4],
+    /// 0 to 1.
+    pub confidence: f32,
+}
+
+impl Detection {
+    /// As a target of one image: without velocity.
+    #[must_use]
+    pub fn target(&self, ground: &Ground, id: u64) -> Target {
+        let [right, forward] = self.place.middle;
+        let [low, high] = self.place.heights;
+        let center_m = ground
+            .place([right, forward, 0.5 * (low + high)])
+            .map(f64::from);
+        let (sin, cos) = self.place.angle.sin_cos();
+        let along = |i: usize| f64::from(cos * ground.right[i] + sin * ground.forward[i]);
+        Target {
+            id,
+            center_m,
+            size_m: [self.place.footprint[0], self.place.footprint[1], high - low].map(f64::from),
+            yaw_rad: (-along(2)).atan2(along(0)),
+            distance_m: center_m.iter().map(|x| x * x).sum::<f64>().sqrt(),
+            velocity_mps: None,
+            moving: None,
+            confidence: f64::from(self.confidence),
+            pixels: self.pixels,
+            bounds: Some(self.bounds),
+        }
+    }
+}
+
+/// Boxes of the obstacles of one depth image, row by row at `rays`' size, that have a target's size.
+#[must_use]
+pub fn detect(
+    depth: &[f32],
+    obstacles: &Obstacles,
+    rays: &Rays,
+    ground: &Ground,
+    config: &PerceptionConfig,
+) -> Vec<Detection> {
+    let area = depth.len() as f32 / (640.0 * 192.0);
+    let min_pixels = ((config.min_pixels * area) as usize).max(4);
+    let mut left = clusters(depth, obstacles, rays, min_pixels, config);
+    left.reverse();
+    let mut detections = Vec::new();
+    while let Some(cluster) = left.pop() {
+        if cluster.pixels < min_pixels {
+            continue;
+        }
+        let silhouette = Silhouette::of(&cluster, depth, obstacles, rays, ground, config);
+        let Some(place) = fit(&silhouette, std::f32::consts::FRAC_PI_2) else {
+            continue;
+        };
+        if let Some(halves) = split(&cluster, &silhouette, &place, depth, rays, ground) {
+            left.extend(halves);
+        } else if is_target(&silhouette, &place, config) {
+            detections.push(Detection {
+                place,
+                pixels: cluster.pixels,
+                bounds: cluster.bounds(),
+                confidence: 0.5 * (place.seen[0] + place.seen[1]),
+            });
+        }
+    }
+    without_parts(detections)
+}
+
+/// Drops what lies inside a larger detection: a roof's edge, a mirror, a number plate's frame.
+fn without_parts(mut detections: Vec<Detection>) -> Vec<Detection> {
+    detections.sort_by_key(|d| std::cmp::Reverse(d.pixels));
+    let mut kept: Vec<Detection> = Vec::with_capacity(detections.len());
+    for detection in detections {
+        if !kept.iter().any(|k| k.place.overlap(&detection.place) > 0.4) {
+            kept.push(detection);
+        }
+    }
+    kept
+}
+
+fn is_target(silhouette: &Silhouette, place: &GroundBox, config: &PerceptionConfig) -> bool {
+    let [length, width] = place.footprint;
+    let [most_length, most_width] = config.max_footprint_m;
+    let heights = config.min_target_height_m..=config.max_target_height_m;
+    let rows = silhouette.top - silhouette.bottom;
+    !silhouette.tall
+        && rows > MIN_VISIBLE_HEIGHT
+        && length <= most_length
+        && width <= most_width
+        && heights.contains(&place.heights[1])
+}

@@ -1,0 +1,35 @@
+/// What can go wrong with a depth image.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The depth image is not of the camera's size.
+    #[error(
+        "depth of {}x{} pixels with a camera of {}x{}",
+        found.0, found.1, expected.0, expected.1
+    )]
+    Size {
+        /// Width and height of the depth.
+        found: (usize, usize),
+        /// Width and height that the camera has.
+        expected: (usize, usize),
+    },
+    /// The intrinsics are no camera's.
+    #[error("camera: {0}")]
+    Camera(String),
+}
+
+/// A result with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// What to do about it, in one line.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Size { .. } => Some(
+                "intrinsics belong to one image size: resize them with the image (Intrinsics::resized)".into(),
+            ),
+            Self::Camera(_) => Some("fx, fy, cx, cy are in pixels of the image".into()),
+        }
+    }
+}

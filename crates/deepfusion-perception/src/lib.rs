@@ -1,0 +1,31 @@
+//! What stands on the ground: from a depth image to boxes in metres, followed over time.
+//!
+//! # Conventions
+//! Camera: x right, y down, z forward; depth is camera z in metres, 0 = none. On the ground: right, forward,
+//! height. Metres, seconds, radians.
+
+mod box_fit;
+mod clusters;
+mod config;
+mod detect;
+mod error;
+mod ground;
+mod obstacles;
+mod perception;
+mod rays;
+mod scoring;
+mod silhouette;
+mod split;
+mod target;
+mod tracking;
+
+pub use box_fit::GroundBox;
+pub use config::PerceptionConfig;
+pub use detect::{Detection, detect};
+pub use error::{Error, Result};
+pub use ground::Ground;
+pub use obstacles::Obstacles;
+pub use perception::{Perception, Stamp, Surroundings};
+pub use rays::Rays;
+pub use scoring::{Label, Matched, RangeScore, Scorer, ScoringRules, TargetScore};
+pub use target::Target;

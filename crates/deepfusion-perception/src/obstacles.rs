@@ -1,0 +1,45 @@
+//! Which pixels see something that stands on the ground.
+
+use crate::{Ground, PerceptionConfig, Rays};
+
+/// Heights above the ground, pixel by pixel, where there is an obstacle.
+#[derive(Debug, Clone, Default)]
+pub struct Obstacles {
+    /// H·W heights above the ground in metres, row by row; negative where the pixel has no depth, lies too far
+    /// away, is ground, or hangs too high.
+    pub height: Vec<f32>,
+}
+
+/// Not an obstacle.
+pub const NONE: f32 = -1.0;
+
+impl Obstacles {
+    /// Fills in the heights of a depth image, row by row.
+    pub fn find(&mut self, depth: &[f32], rays: &Rays, ground: &Ground, config: &PerceptionConfig) {
+        let width = rays.x.len();
+        self.height.clear();
+        self.height.resize(depth.len(), NONE);
+        // Per column, what the ray's x adds to the distance along `up` and `forward` at depth 1.
+        let up_x: Vec<f32> = rays.x.iter().map(|x| ground.up[0] * x).collect();
+        for (v, (row, heights)) in depth
+            .chunks_exact(width)
+            .zip(self.height.chunks_exact_mut(width))
+            .enumerate()
+        {
+            let up_y = ground.up[1] * rays.y[v] + ground.up[2];
+            let forward_y = ground.forward[1] * rays.y[v] + ground.forward[2];
+            for ((z, height), up_x) in row.iter().zip(heights).zip(&up_x) {
+                let above = z * (up_x + up_y) + ground.camera_height_m;
+                // `forward` has next to no part along x (the camera's roll): left out here.
+                let above = above - ground.profile_at(forward_y * z);
+                // Far away the ground's own tilt is worth more than a kerb.
+                let lowest = config.min_height_m + 0.004 * z;
+                let is = (*z > 0.0)
+                    & (*z <= config.max_depth_m)
+                    & (above > lowest)
+                    & (above < config.join_height_m);
+                *height = if is { above } else { NONE };
+            }
+        }
+    }
+}

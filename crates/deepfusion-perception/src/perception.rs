@@ -1,0 +1,126 @@
+use crate::detect::detect;
+use crate::tracking::{Now, Tracker};
+use crate::{Detection, Error, Ground, Obstacles, PerceptionConfig, Rays, Result, Target};
+use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+
+/// When a frame was taken and from where.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stamp {
+    /// Seconds, on any clock that goes on from frame to frame.
+    pub time_s: f64,
+    /// Camera to a frame that stays where it is, metres: that of the first camera, say.
+    pub world_from_cam: Se3,
+}
+
+/// What stands before the camera.
+#[derive(Debug, Clone, Default)]
+pub struct Surroundings {
+    /// The road; `None` where none was found, and then there are no targets.
+    pub ground: Option<Ground>,
+    /// The boxes of this image alone.
+    pub detections: Vec<Detection>,
+    /// The targets, in order of distance.
+    pub targets: Vec<Target>,
+}
+
+/// From depth images to targets, one after the other.
+///
+/// Its buffers grow to an image's size once; what it remembers of the past is the tracks.
+#[derive(Debug, Default)]
+pub struct Perception {
+    config: PerceptionConfig,
+    tracker: Tracker,
+    ground: Option<Ground>,
+    rays: Option<(Intrinsics, Rays)>,
+    obstacles: Obstacles,
+}
+
+impl Perception {
+    /// With these settings.
+    #[must_use]
+    pub fn new(config: PerceptionConfig) -> Self {
+        Self {
+            config,
+            ..Self::default()
+        }
+    }
+
+    /// Its settings.
+    #[must_use]
+    pub fn config(&self) -> &PerceptionConfig {
+        &self.config
+    }
+
+    /// The obstacles' heights of the last image.
+    #[must_use]
+    pub fn obstacles(&self) -> &Obstacles {
+        &self.obstacles
+    }
+
+    /// Looks at a depth image of a camera `k` (of the same size). Without a `stamp` it stands for itself: every target
+    /// has a new id and no velocity.
+    ///
+    /// Pixels without depth, with NaN or infinity are none.
+    ///
+    /// # Errors
+    /// [`Error::Size`] where the depth is not of the camera's size, [`Error::Camera`] where `k` is none.
+    pub fn look(
+        &mut self,
+        depth: &DepthMap,
+        k: &Intrinsics,
+        stamp: Option<Stamp>,
+    ) -> Result<Surroundings> {
+        if let Some(problem) = k.implausible() {
+            return Err(Error::Camera(problem));
+        }
+        let size = (k.width as usize, k.height as usize);
+        if (depth.width, depth.height) != size || depth.data.len() != size.0 * size.1 {
+            return Err(Error::Size {
+                found: (depth.width, depth.height),
+                expected: size,
+            });
+        }
+        if self.rays.as_ref().is_none_or(|(before, _)| before != k) {
+            self.rays = Some((*k, Rays::of(k)));
+            self.ground = None;
+        }
+        let Some((_, rays)) = &self.rays else {
+            return Ok(Surroundings::default());
+        };
+        // The last ground is a guess for this one only while the camera goes on.
+        let before = self.ground.take().filter(|_| stamp.is_some());
+        let Some(ground) = Ground::find(&depth.data, rays, before.as_ref(), &self.config) else {
+            self.obstacles.height.clear();
+            return Ok(Surroundings::default());
+        };
+        self.obstacles.find(&depth.data, rays, &ground, &self.config);
+        let detections = detect(&depth.data, &self.obstacles, rays, &ground, &self.config);
+        let mut targets = match stamp {
+            Some(stamp) => self.tracker.step(
+                &detections,
+                &Now {
+                    time_s: stamp.time_s,
+                    world_from_cam: stamp.world_from_cam,
+                    depth: &depth.data,
+                    rays,
+                    ground: &ground,
+                },
+                &self.config,
+            ),
+            None => {
+                let tracker = &mut self.tracker;
+                detections
+                    .iter()
+                    .map(|detection| detection.target(&ground, tracker.new_id()))
+                    .collect()
+            }
+        };
+        targets.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+        self.ground = Some(ground.clone());
+        Ok(Surroundings {
+            ground: Some(ground),
+            detections,
+            targets,
+        })
+    }
+}

@@ -1,0 +1,170 @@
+//! What a cluster looks like from above, and which of its ends are its own.
+
+use crate::clusters::Cluster;
+use crate::obstacles::Obstacles;
+use crate::{Ground, PerceptionConfig, Rays};
+
+/// A cluster laid onto the ground.
+#[derive(Debug, Clone, Default)]
+pub struct Silhouette {
+    /// Of each column the near end: (right, forward) in metres, from left to right.
+    pub contour: Vec<[f32; 2]>,
+    /// A sample of all points, (right, forward, height) in metres.
+    pub points: Vec<[f32; 3]>,
+    /// Height of its top, metres.
+    pub top: f32,
+    /// Whether it goes on above that, beyond the highest target or the image's border.
+    pub tall: bool,
+    /// Height of its lowest point, metres.
+    pub bottom: f32,
+    /// Whether what stands before it, or the image's border, hides its left and its right end.
+    pub hidden: [bool; 2],
+    /// Median depth, metres.
+    pub depth: f32,
+}
+
+/// Points that are kept of a cluster, about.
+const POINTS: usize = 400;
+/// Of a column's depths, sorted, which share lies before its contour: single pixels do not decide.
+const NEAR_SHARE: usize = 8;
+
+impl Silhouette {
+    /// Of a cluster in a depth image.
+    #[must_use]
+    pub fn of(
+        cluster: &Cluster,
+        depth: &[f32],
+        obstacles: &Obstacles,
+        rays: &Rays,
+        ground: &Ground,
+        config: &PerceptionConfig,
+    ) -> Self {
+        let width = rays.x.len();
+        let [left, _, right, _] = cluster.bounds();
+        let mut columns: Vec<Vec<(f32, u32)>> = vec![Vec::new(); (right - left + 1) as usize];
+        let mut silhouette = Self {
+            bottom: f32::INFINITY,
+            ..Self::default()
+        };
+        let stride = (cluster.pixels / POINTS).max(1);
+        let mut place = 0;
+        let mut heights = Vec::with_capacity(cluster.pixels);
+        for run in &cluster.runs {
+            for u in run.from..run.to {
+                let index = run.v as usize * width + u as usize;
+                columns[(u - left) as usize].push((depth[index], run.v));
+                heights.push(obstacles.height[index]);
+                if place % stride == 0 {
+                    let p = rays.point(u as usize, run.v as usize, depth[index]);
+                    silhouette.points.push(ground.locate(p));
+                }
+                place += 1;
+            }
+        }
+        // The topmost and lowest pixels may be strays.
+        heights.sort_unstable_by(f32::total_cmp);
+        let stray = heights.len() / 100;
+        silhouette.top = heights[heights.len() - 1 - stray];
+        silhouette.bottom = heights[stray];
+        let mut depths = Vec::with_capacity(columns.len());
+        let mut above = Above::default();
+        for (column, pixels) in columns.iter_mut().enumerate() {
+            if pixels.is_empty() {
+                continue;
+            }
+            above.look(left as usize + column, pixels[0], depth, rays, ground, config);
+            let nearest = pixels.len() / NEAR_SHARE;
+            let (_, (z, v), _) = pixels.select_nth_unstable_by(nearest, |a, b| a.0.total_cmp(&b.0));
+            let p = ground.locate(rays.point(left as usize + column, *v as usize, *z));
+            silhouette.contour.push([p[0], p[1]]);
+            depths.push(*z);
+        }
+        depths.sort_unstable_by(f32::total_cmp);
+        silhouette.depth = depths[depths.len() / 2];
+        silhouette.tall = above.is_tall();
+        silhouette.top = silhouette.top.max(above.top());
+        silhouette.hidden = hidden_ends(cluster, depth, width, left, right);
+        silhouette
+    }
+}
+
+/// What goes on above a cluster, past the height up to which pixels are joined.
+#[derive(Default)]
+struct Above {
+    columns: usize,
+    tall: usize,
+    tops: Vec<f32>,
+}
+
+impl Above {
+    /// Follows a column upwards from its topmost pixel (depth and row) as long as it stays at its distance.
+    fn look(
+        &mut self,
+        u: usize,
+        (start, v): (f32, u32),
+        depth: &[f32],
+        rays: &Rays,
+        ground: &Ground,
+        config: &PerceptionConfig,
+    ) {
+        self.columns += 1;
+        let width = rays.x.len();
+        let mut row = v as usize;
+        let mut height = ground.locate(rays.point(u, row, start))[2];
+        // Three rows at most are skipped between the last joined pixel and the height of joining.
+        if height + 3.0 * start * rays.step[1] < config.join_height_m {
+            return;
+        }
+        while height <= config.max_target_height_m {
+            let Some(next) = row.checked_sub(1) else {
+                self.tall += 1;
+                return;
+            };
+            let z = depth[next * width + u];
+            if z <= 0.0 || (z - start).abs() > 0.5 + 0.03 * start {
+                break;
+            }
+            row = next;
+            height = ground.locate(rays.point(u, row, z))[2];
+        }
+        self.tall += usize::from(height > config.max_target_height_m);
+        self.tops.push(height);
+    }
+
+    fn is_tall(&self) -> bool {
+        3 * self.tall > self.columns
+    }
+
+    /// Height that a quarter of the columns reach, 0 where most end below the height of joining.
+    fn top(&self) -> f32 {
+        let mut tops = self.tops.clone();
+        tops.sort_unstable_by(f32::total_cmp);
+        let place = self.columns / 4;
+        if tops.len() > place { tops[tops.len() - 1 - place] } else { 0.0 }
+    }
+}
+
+/// An end is hidden where most of the outermost runs end at something nearer, or at the border.
+fn hidden_ends(cluster: &Cluster, depth: &[f32], width: usize, left: u32, right: u32) -> [bool; 2] {
+    let reach = ((right - left) / 6).max(1);
+    let mut votes = [[0u32; 2]; 2];
+    for run in &cluster.runs {
+        let row = run.v as usize * width;
+        let beyond = |u: Option<usize>, edge: u32| -> bool {
+            let Some(u) = u.filter(|u| *u < width) else {
+                return true;
+            };
+            let (there, here) = (depth[row + u], depth[row + edge as usize]);
+            there > 0.0 && there < here - 0.4 - 0.01 * here
+        };
+        if run.from <= left + reach {
+            let hidden = beyond((run.from as usize).checked_sub(1), run.from);
+            votes[0][usize::from(hidden)] += 1;
+        }
+        if run.to > right.saturating_sub(reach) {
+            let hidden = beyond(Some(run.to as usize), run.to - 1);
+            votes[1][usize::from(hidden)] += 1;
+        }
+    }
+    votes.map(|[free, hidden]| hidden > free)
+}

@@ -1,0 +1,117 @@
+//! A row of parked cars seen at a grazing angle comes as one cluster: cut where one ends and the next begins.
+
+use crate::box_fit::GroundBox;
+use crate::clusters::{Cluster, Run};
+use crate::silhouette::Silhouette;
+use crate::{Ground, Rays};
+
+/// Longer than this, and as wide and high as a car, a cluster is taken for several, metres.
+const LONGEST: f32 = 5.7;
+/// Width and height up to which that is so, metres: a lorry is more.
+const WIDEST: f32 = 2.7;
+/// See [`WIDEST`].
+const HIGHEST: f32 = 2.4;
+/// Wider than this and no higher than a car, a cluster is taken for two side by side, metres.
+const TWO_ABREAST: f32 = 2.3;
+/// Length of a piece across, metres.
+const ABREAST_PIECE_M: f32 = 0.2;
+/// Shortest car, metres, and a car with the gap to the next.
+const SHORTEST: f32 = 3.0;
+/// See [`SHORTEST`].
+const PITCH: f32 = 5.4;
+/// Length of a piece of the height profile, metres.
+const PIECE_M: f32 = 0.25;
+
+/// The two sides of the cut through a box's cluster, `None` where it is no row of cars.
+#[must_use]
+pub fn split(
+    cluster: &Cluster,
+    silhouette: &Silhouette,
+    place: &GroundBox,
+    depth: &[f32],
+    rays: &Rays,
+    ground: &Ground,
+) -> Option<[Cluster; 2]> {
+    let [length, width] = [0, 1].map(|i| place.footprint[i] * place.seen[i]);
+    if silhouette.top > HIGHEST {
+        return None;
+    }
+    let (sin, cos) = place.angle.sin_cos();
+    let (axis, cut) = if width > TWO_ABREAST {
+        let across = [-sin, cos];
+        (across, emptiest(silhouette, across)?)
+    } else if length > LONGEST && width < WIDEST {
+        let along = [cos, sin];
+        (along, best_cut(silhouette, |p| dot(along, p))?)
+    } else {
+        return None;
+    };
+    let along = |p: [f32; 3]| dot(axis, p);
+    let image_width = rays.x.len();
+    let mut halves = [Cluster::default(), Cluster::default()];
+    for run in &cluster.runs {
+        let side = |u: u32| {
+            let z = depth[run.v as usize * image_width + u as usize];
+            usize::from(along(ground.locate(rays.point(u as usize, run.v as usize, z))) > cut)
+        };
+        let mut from = run.from;
+        for u in run.from + 1..=run.to {
+            if u == run.to || side(u) != side(from) {
+                let half = &mut halves[side(from)];
+                half.pixels += (u - from) as usize;
+                half.runs.push(Run {
+                    v: run.v,
+                    from,
+                    to: u,
+                });
+                from = u;
+            }
+        }
+    }
+    halves.iter().all(|half| half.pixels > 0).then_some(halves)
+}
+
+fn dot(axis: [f32; 2], p: [f32; 3]) -> f32 {
+    axis[0] * p[0] + axis[1] * p[1]
+}
+
+/// Where the fewest points are across two that stand side by side.
+fn emptiest(silhouette: &Silhouette, axis: [f32; 2]) -> Option<f32> {
+    let places: Vec<f32> = silhouette.points.iter().map(|p| dot(axis, *p)).collect();
+    let from = places.iter().copied().fold(f32::INFINITY, f32::min);
+    let to = places.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let mut counts = vec![0usize; ((to - from) / ABREAST_PIECE_M) as usize + 1];
+    for x in &places {
+        counts[((x - from) / ABREAST_PIECE_M) as usize] += 1;
+    }
+    let margin = (0.5 / ABREAST_PIECE_M) as usize;
+    (margin..counts.len().saturating_sub(margin))
+        .min_by_key(|i| counts[*i])
+        .map(|i| from + (i as f32 + 0.5) * ABREAST_PIECE_M)
+}
+
+/// Where the row is lowest, between cars of a usual length.
+fn best_cut(silhouette: &Silhouette, along: impl Fn([f32; 3]) -> f32) -> Option<f32> {
+    let places: Vec<(f32, f32)> = silhouette.points.iter().map(|p| (along(*p), p[2])).collect();
+    let from = places.iter().map(|p| p.0).fold(f32::INFINITY, f32::min);
+    let to = places.iter().map(|p| p.0).fold(f32::NEG_INFINITY, f32::max);
+    let length = to - from;
+    let cars = (length / PITCH).round().max(2.0);
+    let mut tops = vec![0.0f32; (length / PIECE_M) as usize + 1];
+    for (x, height) in &places {
+        let top = &mut tops[((x - from) / PIECE_M) as usize];
+        *top = top.max(*height);
+    }
+    let piece = |x: f32| (x / PIECE_M) as usize;
+    (piece(SHORTEST)..tops.len().saturating_sub(piece(SHORTEST)))
+        .map(|i| {
+            let x = (i as f32 + 0.5) * PIECE_M;
+            let low = tops[i] / silhouette.top;
+            // Distance from the nearest even division.
+            let share = x / length * cars;
+            let uneven = (share - share.round()).abs() * length / cars;
+            (low + 0.15 * uneven, from + x)
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, cut)| cut)
+}

@@ -1,0 +1,46 @@
+use serde::{Deserialize, Serialize};
+
+/// Something that stands on the ground: a box in the camera's frame (x right, y down, z forward).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Target {
+    /// The track it belongs to; the same from frame to frame.
+    pub id: u64,
+    /// Centre of the box, metres.
+    pub center_m: [f64; 3],
+    /// Length, width and height, metres.
+    pub size_m: [f64; 3],
+    /// KITTI's rotation_y: the length points along (cos, 0, −sin) of it. Without a velocity it is known up to half a
+    /// turn.
+    pub yaw_rad: f64,
+    /// From the camera to the centre, metres.
+    pub distance_m: f64,
+    /// Over ground, in the camera's axes, m/s; `None` before it could be measured.
+    pub velocity_mps: Option<[f64; 3]>,
+    /// Whether it moves over ground; `None` before that could be told.
+    pub moving: Option<bool>,
+    /// How sure it is that something of this kind is there, 0 to 1.
+    pub confidence: f64,
+    /// How many pixels see it; 0 where the track goes on without being seen.
+    pub pixels: usize,
+    /// Left, top, right, bottom of those pixels.
+    pub bounds: Option<[u32; 4]>,
+}
+
+impl Target {
+    /// The eight corners in the camera's frame, metres: the lower four first.
+    #[must_use]
+    pub fn corners(&self) -> [[f64; 3]; 8] {
+        let (sin, cos) = self.yaw_rad.sin_cos();
+        let [length, width, height] = self.size_m;
+        std::array::from_fn(|i| {
+            let along = if matches!(i % 4, 0 | 3) { 0.5 } else { -0.5 } * length;
+            let across = if matches!(i % 4, 0 | 1) { 0.5 } else { -0.5 } * width;
+            let up = if i < 4 { 0.5 } else { -0.5 } * height;
+            [
+                self.center_m[0] + cos * along + sin * across,
+                self.center_m[1] + up,
+                self.center_m[2] - sin * along + cos * across,
+            ]
+        })
+    }
+}

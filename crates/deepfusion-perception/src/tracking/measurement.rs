@@ -1,0 +1,61 @@
+use crate::{Detection, Ground, PerceptionConfig};
+use deepfusion_geometry::Se3;
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+/// A detection, seen from the world.
+pub struct Measurement<'a> {
+    /// What was detected.
+    pub detection: &'a Detection,
+    /// Angle of its length in the world's horizontal axes, x to z, radians.
+    pub heading: f64,
+    /// How well its heading is known: metres of it that were seen.
+    pub heading_weight: f64,
+    ground: &'a Ground,
+    world_from_cam: &'a Se3,
+}
+
+impl<'a> Measurement<'a> {
+    /// Of a detection on `ground`, by a camera at `world_from_cam`.
+    pub fn new(detection: &'a Detection, ground: &'a Ground, world_from_cam: &'a Se3) -> Self {
+        let (sin, cos) = detection.place.angle.sin_cos();
+        let along = |i: usize| f64::from(cos * ground.right[i] + sin * ground.forward[i]);
+        let along = world_from_cam.rotate(&Vector3::new(along(0), along(1), along(2)));
+        let [length, width] = [0, 1].map(|i| detection.place.footprint[i] * detection.place.seen[i]);
+        Self {
+            detection,
+            heading: along.z.atan2(along.x),
+            heading_weight: f64::from(length.max(width)),
+            ground,
+            world_from_cam,
+        }
+    }
+
+    /// Centre of the box in the world if its length and width were these, metres.
+    pub fn centre_with(&self, extents: [f64; 2]) -> Vector3<f64> {
+        let [right, forward] = self.detection.place.middle_with(extents.map(|e| e as f32));
+        let [low, high] = self.detection.place.heights;
+        let p = self.ground.place([right, forward, 0.5 * (low + high)]);
+        self.world_from_cam
+            .transform(&Vector3::from(p.map(f64::from)))
+    }
+
+    /// How far the centre may be off, as a covariance in the world's horizontal axes: along the ray by the depth's own
+    /// error, and by what had to be completed.
+    pub fn noise(&self, config: &PerceptionConfig) -> Matrix2<f64> {
+        let place = &self.detection.place;
+        let ray = self.world_from_cam.rotate(&Vector3::from(std::array::from_fn(|i| {
+            f64::from(place.middle[0] * self.ground.right[i] + place.middle[1] * self.ground.forward[i])
+        })));
+        let ray = Vector2::new(ray.x, ray.z);
+        let distance = ray.norm().max(1.0);
+        let ray = ray / distance;
+        let unseen: f64 = (0..2)
+            .map(|i| f64::from(place.footprint[i] * (1.0 - place.seen[i])))
+            .sum();
+        let across = 0.1 + 0.004 * distance + 0.1 * unseen;
+        // Neighbouring pixels err together: an object's mean is hardly better than a fifth of one of its pixels.
+        let along = across.hypot(0.2 * f64::from(config.relative_error) * distance);
+        Matrix2::identity() * across.powi(2)
+            + ray * ray.transpose() * (along.powi(2) - across.powi(2))
+    }
+}

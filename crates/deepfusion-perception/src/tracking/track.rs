@@ -1,0 +1,221 @@
+use super::kalman::Kalman;
+use super::measurement::Measurement;
+use crate::{PerceptionConfig, Target};
+use deepfusion_geometry::Se3;
+use nalgebra::{Matrix2, Vector2, Vector3};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Speed over ground from which on, and below which, something is said to move, m/s.
+const MOVING_MPS: [f64; 2] = [1.0, 0.5];
+/// Standard deviation of the speed below which that is said at all, m/s.
+const TOLD_MPS: f64 = 0.7;
+/// Weight of what was not measured but completed.
+const GUESS: f64 = 0.05;
+/// Most weight that a size or a heading gathers, so that it stays able to change.
+const MOST_WEIGHT: f64 = 40.0;
+
+/// A mean that remembers how much it is worth.
+#[derive(Debug, Clone, Copy)]
+struct Mean {
+    value: f64,
+    weight: f64,
+}
+
+impl Mean {
+    fn add(&mut self, value: f64, weight: f64) {
+        self.weight += weight;
+        self.value += (value - self.value) * weight / self.weight;
+        self.weight = self.weight.min(MOST_WEIGHT);
+    }
+}
+
+/// A target that is followed.
+#[derive(Debug, Clone)]
+pub struct Track {
+    pub id: u64,
+    filter: Kalman,
+    /// Height of the centre: the world's y, down.
+    y: Mean,
+    /// Length, width, height.
+    size: [Mean; 3],
+    /// Twice the heading as a vector: a box looks the same after half a turn.
+    heading: Vector2<f64>,
+    /// Frames in which it was seen.
+    pub hits: u32,
+    /// Time since it was last seen, seconds.
+    pub unseen_s: f64,
+    /// Whether it is said to move.
+    moving: Option<bool>,
+    /// Confidence of the last detection.
+    confidence: f64,
+    /// Pixels and their bounds in the last frame, where it was seen there.
+    pub seen: Option<(usize, [u32; 4])>,
+}
+
+impl Track {
+    pub fn new(id: u64, measurement: &Measurement, config: &PerceptionConfig) -> Self {
+        let place = &measurement.detection.place;
+        let centre = measurement.centre_with(place.footprint.map(f64::from));
+        let (sin, cos) = (2.0 * measurement.heading).sin_cos();
+        let mean = |value: f32, seen: f32| Mean {
+            value: f64::from(value),
+            weight: weight_of(seen),
+        };
+        Self {
+            id,
+            filter: Kalman::new(Vector2::new(centre.x, centre.z), &measurement.noise(config)),
+            y: mean(centre.y as f32, 1.0),
+            size: [
+                mean(place.footprint[0], place.seen[0]),
+                mean(place.footprint[1], place.seen[1]),
+                mean(place.heights[1] - place.heights[0], 1.0),
+            ],
+            heading: Vector2::new(cos, sin) * measurement.heading_weight,
+            hits: 1,
+            unseen_s: 0.0,
+            moving: None,
+            confidence: f64::from(measurement.detection.confidence),
+            seen: Some((measurement.detection.pixels, measurement.detection.bounds)),
+        }
+    }
+
+    pub fn predict(&mut self, dt: f64) {
+        self.filter.predict(dt);
+        self.unseen_s += dt;
+        self.seen = None;
+    }
+
+    /// Angle of the length in the world's horizontal axes, up to half a turn.
+    fn axis(&self) -> f64 {
+        0.5 * self.heading.y.atan2(self.heading.x)
+    }
+
+    /// The measured centre, given what this track knows of its size and heading, and whether the measurement's length
+    /// is this track's width.
+    fn centre_of(&self, measurement: &Measurement) -> (Vector3<f64>, bool) {
+        let off = (measurement.heading - self.axis()).rem_euclid(PI);
+        let crossed = (off - FRAC_PI_2).abs() < 0.25 * PI;
+        let place = &measurement.detection.place;
+        // An extent that was measured now counts as much as all that was known before.
+        let extent = |i: usize, k: usize| {
+            let mut mean = self.size[k];
+            mean.add(f64::from(place.footprint[i]), weight_of(place.seen[i]) * 4.0);
+            mean.value
+        };
+        let extents = if crossed {
+            [extent(0, 1), extent(1, 0)]
+        } else {
+            [extent(0, 0), extent(1, 1)]
+        };
+        (measurement.centre_with(extents), crossed)
+    }
+
+    /// Squared distance of a measurement in standard deviations and in metres.
+    pub fn distance2(&self, measurement: &Measurement, noise: &Matrix2<f64>) -> (f64, f64) {
+        let (centre, _) = self.centre_of(measurement);
+        let place = Vector2::new(centre.x, centre.z);
+        (
+            self.filter.distance2(place, noise),
+            (place - self.filter.place()).norm_squared(),
+        )
+    }
+
+    pub fn update(&mut self, measurement: &Measurement, noise: &Matrix2<f64>) {
+        let (centre, crossed) = self.centre_of(measurement);
+        self.filter.update(Vector2::new(centre.x, centre.z), noise);
+        let place = &measurement.detection.place;
+        self.y.add(centre.y, 4.0);
+        for i in 0..2 {
+            let k = if crossed { 1 - i } else { i };
+            self.size[k].add(f64::from(place.footprint[i]), weight_of(place.seen[i]));
+        }
+        self.size[2].add(f64::from(place.heights[1] - place.heights[0]), 1.0);
+        let turn = if crossed { FRAC_PI_2 } else { 0.0 };
+        let (sin, cos) = (2.0 * (measurement.heading + turn)).sin_cos();
+        // Taken for its own side, a box is a poor witness of the heading.
+        let weight = measurement.heading_weight * if crossed { 0.2 } else { 1.0 };
+        self.heading += Vector2::new(cos, sin) * weight;
+        let norm = self.heading.norm();
+        if norm > MOST_WEIGHT {
+            self.heading *= MOST_WEIGHT / norm;
+        }
+        self.hits += 1;
+        self.unseen_s = 0.0;
+        self.confidence += 0.3 * (f64::from(measurement.detection.confidence) - self.confidence);
+        self.seen = Some((measurement.detection.pixels, measurement.detection.bounds));
+        self.tell_motion();
+    }
+
+    fn tell_motion(&mut self) {
+        let doubt = self.filter.speed_deviation();
+        if doubt > TOLD_MPS {
+            return;
+        }
+        let speed = self.filter.velocity().norm();
+        let limit = MOVING_MPS[usize::from(self.moving == Some(true))];
+        self.moving = Some(speed > limit.max(2.0 * doubt));
+    }
+
+    /// Centre in the world, metres.
+    pub fn centre(&self) -> Vector3<f64> {
+        let place = self.filter.place();
+        Vector3::new(place.x, self.y.value, place.y)
+    }
+
+    /// Half its diagonal on the ground, metres.
+    pub fn reach(&self) -> f64 {
+        0.5 * self.size[0].value.hypot(self.size[1].value)
+    }
+
+    /// Corners of its footprint in the world, at the height of its centre, metres.
+    pub fn corners(&self) -> [Vector3<f64>; 4] {
+        let (sin, cos) = self.axis().sin_cos();
+        let half = [0, 1].map(|i| 0.5 * self.size[i].value);
+        [[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]].map(|[a, b]| {
+            let (along, across) = (a * half[0], b * half[1]);
+            self.centre() + Vector3::new(cos * along - sin * across, 0.0, sin * along + cos * across)
+        })
+    }
+
+    pub fn target(&self, cam_from_world: &Se3) -> Target {
+        let centre = cam_from_world.transform(&self.centre());
+        let velocity = self.filter.velocity();
+        let velocity = match self.moving {
+            None => None,
+            // What stands has no speed; the filter's is what its box was off from frame to frame.
+            Some(false) => Some(Vector3::zeros()),
+            Some(true) => Some(cam_from_world.rotate(&Vector3::new(velocity.x, 0.0, velocity.y))),
+        };
+        let axis = self.axis();
+        let mut along = cam_from_world.rotate(&Vector3::new(axis.cos(), 0.0, axis.sin()));
+        // What moves, moves forward.
+        if velocity.is_some_and(|v| v.dot(&along) < 0.0) {
+            along = -along;
+        }
+        let [mut length, mut width, height] = self.size.map(|s| s.value);
+        let mut yaw_rad = (-along.z).atan2(along.x);
+        if width > length {
+            std::mem::swap(&mut width, &mut length);
+            yaw_rad += FRAC_PI_2;
+        }
+        let fading = (-self.unseen_s / 0.7).exp();
+        let proven = 1.0 - 0.5 * 0.5f64.powi(self.hits.min(10) as i32 - 1);
+        Target {
+            id: self.id,
+            center_m: centre.into(),
+            size_m: [length, width, height],
+            yaw_rad: (yaw_rad + PI).rem_euclid(2.0 * PI) - PI,
+            distance_m: centre.norm(),
+            velocity_mps: velocity.map(Into::into),
+            moving: self.moving,
+            confidence: (self.confidence * proven * fading).clamp(0.0, 1.0),
+            pixels: self.seen.map_or(0, |(pixels, _)| pixels),
+            bounds: self.seen.map(|(_, bounds)| bounds),
+        }
+    }
+}
+
+/// What is seen to nine tenths is measured, what is seen to a half is a guess.
+fn weight_of(seen: f32) -> f64 {
+    GUESS + (1.0 - GUESS) * f64::from(seen).powi(6)
+}

@@ -1,0 +1,152 @@
+use super::measurement::Measurement;
+use super::track::Track;
+use crate::{Detection, Ground, PerceptionConfig, Rays, Target};
+use deepfusion_geometry::Se3;
+use nalgebra::Vector3;
+
+/// Squared standard deviations, and metres, within which a detection may be a track's.
+const GATE: (f64, f64) = (16.0, 3.5);
+/// How long a track goes on unseen, seconds: while it is hidden, and where it should be seen and is not.
+const HIDDEN_S: f64 = 1.5;
+/// See [`HIDDEN_S`].
+const MISSED_S: f64 = 0.35;
+/// Frames in which a track must have been seen before it is told without being seen.
+const CONFIRMED: u32 = 3;
+/// A longer pause than this, in seconds, and everything starts anew.
+const LONGEST_PAUSE_S: f64 = 2.0;
+
+/// When and from where a frame was taken, and what it shows.
+pub struct Now<'a> {
+    pub time_s: f64,
+    pub world_from_cam: Se3,
+    pub depth: &'a [f32],
+    pub rays: &'a Rays,
+    pub ground: &'a Ground,
+}
+
+/// Follows targets from frame to frame.
+#[derive(Debug, Default)]
+pub struct Tracker {
+    tracks: Vec<Track>,
+    next_id: u64,
+    time_s: Option<f64>,
+}
+
+impl Tracker {
+    /// An id that no target has had.
+    pub fn new_id(&mut self) -> u64 {
+        self.next_id += 1;
+        self.next_id
+    }
+
+    /// Takes a frame's detections in and tells the targets that are there.
+    pub fn step(
+        &mut self,
+        detections: &[Detection],
+        now: &Now,
+        config: &PerceptionConfig,
+    ) -> Vec<Target> {
+        let dt = self.time_s.map_or(0.0, |before| now.time_s - before);
+        if !(0.0..=LONGEST_PAUSE_S).contains(&dt) {
+            self.tracks.clear();
+        }
+        self.time_s = Some(now.time_s);
+        for track in &mut self.tracks {
+            track.predict(dt.max(0.0));
+        }
+        self.associate(detections, now, config);
+        let cam_from_world = now.world_from_cam.inverse();
+        let whereabouts = |track: &Track| Whereabouts::of(track, &cam_from_world, now);
+        self.tracks.retain(|track| {
+            let limit = match whereabouts(track) {
+                Whereabouts::InSight => MISSED_S,
+                Whereabouts::Hidden | Whereabouts::OutOfView => HIDDEN_S,
+            };
+            track.unseen_s == 0.0 || (track.hits >= CONFIRMED && track.unseen_s <= limit)
+        });
+        self.tracks
+            .iter()
+            .filter(|track| track.seen.is_some() || whereabouts(track) != Whereabouts::OutOfView)
+            .map(|track| track.target(&cam_from_world))
+            .filter(|target| target.center_m[2] > 0.0 && target.confidence >= config.min_confidence)
+            .collect()
+    }
+
+    /// The nearest pairs first; what is left over begins a track.
+    fn associate(&mut self, detections: &[Detection], now: &Now, config: &PerceptionConfig) {
+        let measurements: Vec<Measurement> = detections
+            .iter()
+            .map(|d| Measurement::new(d, now.ground, &now.world_from_cam))
+            .collect();
+        let noises: Vec<_> = measurements.iter().map(|m| m.noise(config)).collect();
+        let mut pairs = Vec::new();
+        for (i, track) in self.tracks.iter().enumerate() {
+            for (j, measurement) in measurements.iter().enumerate() {
+                let (deviations2, metres2) = track.distance2(measurement, &noises[j]);
+                if deviations2 < GATE.0 && metres2 < GATE.1 * GATE.1 {
+                    // Old tracks first where two are about as near: they know more.
+                    let cost = deviations2 + metres2 + if track.hits < CONFIRMED { 2.0 } else { 0.0 };
+                    pairs.push((cost, i, j));
+                }
+            }
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut free_track = vec![true; self.tracks.len()];
+        let mut free_detection = vec![true; detections.len()];
+        for (_, i, j) in pairs {
+            if free_track[i] && free_detection[j] {
+                self.tracks[i].update(&measurements[j], &noises[j]);
+                free_track[i] = false;
+                free_detection[j] = false;
+            }
+        }
+        for (j, measurement) in measurements.iter().enumerate() {
+            if free_detection[j] {
+                let id = self.new_id();
+                self.tracks.push(Track::new(id, measurement, config));
+            }
+        }
+    }
+}
+
+/// What the image says of the place where a track should be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Whereabouts {
+    /// Nothing stands before it.
+    InSight,
+    /// Something nearer does, or the image ends before its middle.
+    Hidden,
+    /// It is beside the image or behind the camera.
+    OutOfView,
+}
+
+impl Whereabouts {
+    fn of(track: &Track, cam_from_world: &Se3, now: &Now) -> Self {
+        let centre = cam_from_world.transform(&track.centre());
+        if centre.z < 0.5 {
+            return Self::OutOfView;
+        }
+        let (width, height) = (now.rays.x.len(), now.rays.y.len());
+        let column = |p: &Vector3<f64>| {
+            let x = (p.x / p.z) as f32;
+            now.rays.x.partition_point(|ray| *ray < x)
+        };
+        let y = (centre.y / centre.z) as f32;
+        let v = now.rays.y.partition_point(|ray| *ray < y);
+        let u = column(&centre);
+        if u == 0 || u >= width || v == 0 || v >= height {
+            let corners = track.corners();
+            let partly = corners.iter().any(|corner| {
+                let corner = cam_from_world.transform(corner);
+                corner.z > 0.5 && (1..width).contains(&column(&corner))
+            });
+            return if partly { Self::Hidden } else { Self::OutOfView };
+        }
+        let z = f64::from(now.depth[v * width + u]);
+        if z > 0.0 && z < centre.z - track.reach() {
+            Self::Hidden
+        } else {
+            Self::InSight
+        }
+    }
+}
