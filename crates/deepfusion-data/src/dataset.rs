@@ -322,6 +322,17 @@ impl Dataset {
         self.recording.remarks()
     }
 
+    /// The camera of frame `to` in the camera of frame `from` (`from_from_to`, metres), from the vehicle's speed and yaw
+    /// rate; `None` where either was not recorded, or the frames have no times.
+    ///
+    /// # Panics
+    /// If there is no frame of such an index.
+    #[must_use]
+    pub fn camera_motion(&self, from: usize, to: usize) -> Option<Se3> {
+        let motion = self.ego().ok()?.between(self.frames(), to, from).ok()?;
+        motion.source_from_target
+    }
+
     /// What ego-motion is made from, or what is missing for it.
     pub(crate) fn ego(&self) -> Result<Ego<'_>> {
         let timed = self.frames().iter().any(|f| f.time_s.is_some());

@@ -117,19 +117,19 @@ pub fn fit(silhouette: &Silhouette, along: f32) -> Option<GroundBox> {
     let axes = axes(angle);
     let span = axes.map(|axis| extent(&silhouette.points, axis));
     let size = span.map(|[from, to]| to - from);
-    let open = [0, 1].map(|i| open_ends(silhouette, axes[i], span[i]));
-    let whole = completed(size, open, angle, along, silhouette)?;
+    let room = [0, 1].map(|i| room(silhouette, axes[i], span[i]));
+    let whole = completed(size, room, angle, along, silhouette)?;
     let (mut middle, mut fixed) = ([0.0; 2], [0.0; 2]);
     for i in 0..2 {
         let [from, to] = span[i];
         let missing = (whole[i] - size[i]).max(0.0);
-        let far_is_high = from + to >= 0.0;
-        let shift = match (open[i], far_is_high) {
-            ([true, false], _) => -0.5,
-            ([false, true], _) => 0.5,
-            // Hidden at both ends, or at none and yet too short: more of it lies behind what is seen.
-            (_, true) => 0.25,
-            (_, false) => -0.25,
+        let [low, high] = room[i];
+        let away = if from + to >= 0.0 { 0.5 } else { -0.5 };
+        // What is missing lies where it may; where it may lie at both ends, behind what is seen.
+        let shift = match (low > 0.0, high > 0.0) {
+            (true, false) => -0.5,
+            (false, true) => 0.5,
+            _ => 0.5 * away,
         };
         middle[i] = 0.5 * (from + to) + shift * missing;
         // The end that was not moved; the middle of a side that was seen whole.
@@ -221,36 +221,43 @@ fn extent(points: &[[f32; 3]], axis: [f32; 2]) -> [f32; 2] {
     [low, high]
 }
 
-/// Whether the low and the high end of an axis may go on beyond what is seen: because an end of the contour that is
-/// hidden lies there, or because it is the far end and no free end of the contour shows it.
-fn open_ends(silhouette: &Silhouette, axis: [f32; 2], [from, to]: [f32; 2]) -> [bool; 2] {
+/// How far an axis may go on beyond its low and its high end, in metres: 0 where a free end of the contour shows that
+/// it does not. Behind what hides an end it may go on as far as it likes, towards the camera only up to it.
+fn room(silhouette: &Silhouette, axis: [f32; 2], [from, to]: [f32; 2]) -> [f32; 2] {
     let contour = &silhouette.contour;
     let reach = 0.2 * (to - from) + 0.05;
     let ends = [contour[0], contour[contour.len() - 1]].map(|p| p[0] * axis[0] + p[1] * axis[1]);
     let far_is_high = from + to >= 0.0;
     [false, true].map(|high| {
         let at = |x: f32| if high { x > to - reach } else { x < from + reach };
-        let (mut hidden, mut shown) = (false, false);
-        for (x, is_hidden) in ends.into_iter().zip(silhouette.hidden) {
-            hidden |= at(x) && is_hidden;
-            shown |= at(x) && !is_hidden;
+        let nearer = if high { -axis[1] } else { axis[1] };
+        let (mut room, mut shown) = (0.0f32, false);
+        for (x, step) in ends.into_iter().zip(silhouette.hidden) {
+            if at(x) && step > 0.0 {
+                room = room.max(if nearer > 0.05 { step / nearer } else { f32::INFINITY });
+            }
+            shown |= at(x) && step == 0.0;
         }
         let far = high == far_is_high;
-        hidden || (far && (!shown || to - from < MEASURED))
+        if far && (!shown || to - from < MEASURED) {
+            f32::INFINITY
+        } else {
+            room
+        }
     })
 }
 
 /// Whole extents along the two axes, from those seen.
 fn completed(
     size: [f32; 2],
-    open: [[bool; 2]; 2],
+    room: [[f32; 2]; 2],
     angle: f32,
     along: f32,
     silhouette: &Silhouette,
 ) -> Option<[f32; 2]> {
     // Where its lower half is hidden, what is seen is a roof, which is shorter than the whole.
     let roof_only = silhouette.bottom > 0.55 * silhouette.top && silhouette.top > 1.0;
-    let hidden = silhouette.hidden[0] || silhouette.hidden[1] || roof_only;
+    let hidden = silhouette.hidden.iter().any(|step| *step > 0.0) || roof_only;
     let largest = size[0].max(size[1]);
     if largest < SLIVER && hidden {
         return None;
@@ -260,19 +267,19 @@ fn completed(
     if largest < small || silhouette.top < 0.9 {
         return Some(size.map(|s| s.max(THIN)));
     }
-    let is_open = open.map(|[low, high]| low || high);
+    let room = room.map(|[low, high]| low + high);
+    let usual = |i: usize, length_on: usize| CAR[usize::from(i != length_on)];
     // As a car with its length along the first or the second axis: the way that explains more of what was seen.
     let as_car = |length_on: usize| {
         let mut cost = 0.0;
         for i in 0..2 {
-            let usual = if i == length_on { CAR[0] } else { CAR[1] };
-            let more = size[i] - usual;
-            cost += match (more > 0.0, is_open[i]) {
+            let more = size[i] - usual(i, length_on);
+            cost += if more > 0.0 {
                 // A car may be longer than usual, hardly wider.
-                (true, _) => if i == length_on { more } else { 3.0 * more },
-                // Hidden, or the far side of what is seen: no witness.
-                (false, true) => 0.0,
-                (false, false) => -0.5 * more,
+                if i == length_on { more } else { 3.0 * more }
+            } else {
+                // Too short, and no room to go on.
+                0.5 * (-more - room[i]).max(0.0)
             };
         }
         let turned = angle + length_on as f32 * std::f32::consts::FRAC_PI_2 - along;
@@ -280,16 +287,13 @@ fn completed(
     };
     let length_on = usize::from(as_car(1) < as_car(0));
     Some([0, 1].map(|i| {
-        let (usual, least) = if i == length_on {
-            (CAR[0], SHORTEST[0])
-        } else {
-            (CAR[1], SHORTEST[1])
-        };
-        // Both ends are seen, but of less than any car: its far end was not, after all.
-        if is_open[i] || size[i] < least {
+        let usual = usual(i, length_on);
+        let least = SHORTEST[usize::from(i != length_on)];
+        if size[i] + room[i] < least {
+            // Both ends are seen, but of less than any car: its far end was not, after all.
             size[i].max(usual)
         } else {
-            size[i]
+            size[i].max(usual.min(size[i] + room[i]))
         }
     }))
 }

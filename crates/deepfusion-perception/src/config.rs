@@ -24,6 +24,11 @@ pub struct PerceptionConfig {
     /// Standard deviation of a disparity over itself: 0.01 says that a depth of 30 m is good to 30 cm for each
     /// of its pixels. Exact depth: 0. It widens the gaps that a cluster may bridge.
     pub relative_error: f32,
+    /// Jump of depth, as a share of it, from which on a pixel that hangs between a near and a far surface is left out
+    /// ([`crate::flying_pixels`]); 0 keeps all.
+    pub edge_jump: f32,
+    /// How far such a pixel may lie from both, in pixels of an image 640 wide.
+    pub edge_radius: f32,
     /// Steepest ground, rise over run, in the direction of sight.
     pub max_slope: f32,
     /// Lowest and highest place of a camera above the ground, in metres.
@@ -32,6 +37,19 @@ pub struct PerceptionConfig {
     pub max_tilt_deg: f32,
 }
 
+impl PerceptionConfig {
+    /// For depth that a network predicted: its edges bleed, and its error grows with depth.
+    #[must_use]
+    pub fn predicted() -> Self {
+        Self {
+            relative_error: 0.01,
+            edge_jump: 0.04,
+            ..Self::default()
+        }
+    }
+}
+
+/// For exact depth.
 impl Default for PerceptionConfig {
     fn default() -> Self {
         Self {
@@ -44,6 +62,8 @@ impl Default for PerceptionConfig {
             min_pixels: 30.0,
             min_confidence: 0.2,
             relative_error: 0.0,
+            edge_jump: 0.0,
+            edge_radius: 3.0,
             max_slope: 0.2,
             camera_height_m: [0.3, 4.0],
             max_tilt_deg: 20.0,

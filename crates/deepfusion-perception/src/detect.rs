@@ -1,11 +1,12 @@
 //! One depth image to boxes.
 
 use crate::box_fit::{GroundBox, fit};
-use crate::clusters::clusters;
+use crate::clusters::{Cluster, Run, clusters};
 use crate::obstacles::Obstacles;
 use crate::silhouette::Silhouette;
 use crate::split::split;
 use crate::{Ground, PerceptionConfig, Rays, Target};
+use rayon::prelude::*;
 
 /// Visible height from which on something is a target, metres.
 const MIN_VISIBLE_HEIGHT: f32 = 0.25;
@@ -19,14 +20,16 @@ pub struct Detection {
     pub pixels: usize,
     /// Left, top, right, bottom of those pixels.
     pub bounds: [u32; 4],
+    /// Those pixels.
+    pub runs: Vec<Run>,
     /// 0 to 1.
     pub confidence: f32,
 }
 
 impl Detection {
-    /// As a target of one image: without velocity.
+    /// As a target of one image, without velocity; `index` is its own among the image's detections.
     #[must_use]
-    pub fn target(&self, ground: &Ground, id: u64) -> Target {
+    pub fn target(&self, ground: &Ground, id: u64, index: usize) -> Target {
         let [right, forward] = self.place.middle;
         let [low, high] = self.place.heights;
         let center_m = ground
@@ -45,6 +48,7 @@ impl Detection {
             confidence: f64::from(self.confidence),
             pixels: self.pixels,
             bounds: Some(self.bounds),
+            detection: Some(index),
         }
     }
 }
@@ -61,25 +65,21 @@ pub fn detect(
     let area = depth.len() as f32 / (640.0 * 192.0);
     let min_pixels = ((config.min_pixels * area) as usize).max(4);
     let mut left = clusters(depth, obstacles, rays, min_pixels, config);
-    left.reverse();
     let mut detections = Vec::new();
-    while let Some(cluster) = left.pop() {
-        if cluster.pixels < min_pixels {
-            continue;
-        }
-        let silhouette = Silhouette::of(&cluster, depth, obstacles, rays, ground, config);
-        let Some(place) = fit(&silhouette, std::f32::consts::FRAC_PI_2) else {
-            continue;
-        };
-        if let Some(halves) = split(&cluster, &silhouette, &place, depth, rays, ground) {
-            left.extend(halves);
-        } else if is_target(&silhouette, &place, config) {
-            detections.push(Detection {
-                place,
-                pixels: cluster.pixels,
-                bounds: cluster.bounds(),
-                confidence: 0.5 * (place.seen[0] + place.seen[1]),
-            });
+    // What is cut in two is looked at again.
+    while !left.is_empty() {
+        let looked_at: Vec<Looked> = left
+            .par_iter()
+            .filter(|cluster| cluster.pixels >= min_pixels)
+            .map(|cluster| look(cluster, depth, obstacles, rays, ground, config))
+            .collect();
+        left.clear();
+        for looked in looked_at {
+            match looked {
+                Looked::Several(halves) => left.extend(halves),
+                Looked::Target(detection) => detections.push(detection),
+                Looked::Nothing => {}
+            }
         }
     }
     without_parts(detections)
@@ -95,6 +95,40 @@ fn without_parts(mut detections: Vec<Detection>) -> Vec<Detection> {
         }
     }
     kept
+}
+
+/// What a cluster turned out to be.
+enum Looked {
+    Several([Cluster; 2]),
+    Target(Detection),
+    Nothing,
+}
+
+fn look(
+    cluster: &Cluster,
+    depth: &[f32],
+    obstacles: &Obstacles,
+    rays: &Rays,
+    ground: &Ground,
+    config: &PerceptionConfig,
+) -> Looked {
+    let silhouette = Silhouette::of(cluster, depth, obstacles, rays, ground, config);
+    let Some(place) = fit(&silhouette, std::f32::consts::FRAC_PI_2) else {
+        return Looked::Nothing;
+    };
+    if let Some(halves) = split(cluster, &silhouette, &place, depth, rays, ground) {
+        Looked::Several(halves)
+    } else if is_target(&silhouette, &place, config) {
+        Looked::Target(Detection {
+            place,
+            pixels: cluster.pixels,
+            bounds: cluster.bounds(),
+            runs: cluster.runs.clone(),
+            confidence: 0.5 * (place.seen[0] + place.seen[1]),
+        })
+    } else {
+        Looked::Nothing
+    }
 }
 
 fn is_target(silhouette: &Silhouette, place: &GroundBox, config: &PerceptionConfig) -> bool {

@@ -6,9 +6,12 @@
 
 mod box_fit;
 mod clusters;
+mod collision;
 mod config;
 mod detect;
+mod edges;
 mod error;
+mod free_space;
 mod ground;
 mod obstacles;
 mod perception;
@@ -20,9 +23,13 @@ mod target;
 mod tracking;
 
 pub use box_fit::GroundBox;
+pub use clusters::Run;
+pub use collision::{Collision, VehicleShape, time_to_collision};
 pub use config::PerceptionConfig;
 pub use detect::{Detection, detect};
+pub use edges::flying_pixels;
 pub use error::{Error, Result};
+pub use free_space::{Cell, FreeSpace};
 pub use ground::Ground;
 pub use obstacles::Obstacles;
 pub use perception::{Perception, Stamp, Surroundings};

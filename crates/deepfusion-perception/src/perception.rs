@@ -1,4 +1,5 @@
 use crate::detect::detect;
+use crate::edges::flying_pixels;
 use crate::tracking::{Now, Tracker};
 use crate::{Detection, Error, Ground, Obstacles, PerceptionConfig, Rays, Result, Target};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
@@ -57,6 +58,12 @@ impl Perception {
         &self.obstacles
     }
 
+    /// Forgets the past: what comes next does not go on from what was.
+    pub fn forget(&mut self) {
+        self.tracker.forget();
+        self.ground = None;
+    }
+
     /// Looks at a depth image of a camera `k` (of the same size). Without a `stamp` it stands for itself: every target
     /// has a new id and no velocity.
     ///
@@ -87,6 +94,13 @@ impl Perception {
         let Some((_, rays)) = &self.rays else {
             return Ok(Surroundings::default());
         };
+        let cleaned;
+        let depth = if self.config.edge_jump > 0.0 {
+            cleaned = without_edges(depth, &self.config);
+            &cleaned
+        } else {
+            depth
+        };
         // The last ground is a guess for this one only while the camera goes on.
         let before = self.ground.take().filter(|_| stamp.is_some());
         let Some(ground) = Ground::find(&depth.data, rays, before.as_ref(), &self.config) else {
@@ -111,7 +125,8 @@ impl Perception {
                 let tracker = &mut self.tracker;
                 detections
                     .iter()
-                    .map(|detection| detection.target(&ground, tracker.new_id()))
+                    .enumerate()
+                    .map(|(i, detection)| detection.target(&ground, tracker.new_id(), i))
                     .collect()
             }
         };
@@ -122,5 +137,17 @@ impl Perception {
             detections,
             targets,
         })
+    }
+}
+
+/// The depth image without the pixels that hang between two surfaces.
+fn without_edges(depth: &DepthMap, config: &PerceptionConfig) -> DepthMap {
+    let radius = (config.edge_radius * depth.width as f32 / 640.0).round() as usize;
+    let flying = flying_pixels(&depth.data, depth.width, radius, config.edge_jump);
+    let keep = |(z, flies): (&f32, bool)| if flies { 0.0 } else { *z };
+    DepthMap {
+        width: depth.width,
+        height: depth.height,
+        data: depth.data.iter().zip(flying).map(keep).collect(),
     }
 }

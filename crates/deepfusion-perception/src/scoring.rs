@@ -283,6 +283,7 @@ mod tests {
             confidence: 1.0,
             pixels: 100,
             bounds: None,
+            detection: None,
         }
     }
 

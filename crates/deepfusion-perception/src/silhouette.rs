@@ -17,8 +17,9 @@ pub struct Silhouette {
     pub tall: bool,
     /// Height of its lowest point, metres.
     pub bottom: f32,
-    /// Whether what stands before it, or the image's border, hides its left and its right end.
-    pub hidden: [bool; 2],
+    /// How far before its left and its right end stands what hides that end, in metres of depth; infinite where the
+    /// image ends there, 0 where nothing hides it.
+    pub hidden: [f32; 2],
     /// Median depth, metres.
     pub depth: f32,
 }
@@ -145,26 +146,31 @@ impl Above {
 }
 
 /// An end is hidden where most of the outermost runs end at something nearer, or at the border.
-fn hidden_ends(cluster: &Cluster, depth: &[f32], width: usize, left: u32, right: u32) -> [bool; 2] {
+fn hidden_ends(cluster: &Cluster, depth: &[f32], width: usize, left: u32, right: u32) -> [f32; 2] {
     let reach = ((right - left) / 6).max(1);
-    let mut votes = [[0u32; 2]; 2];
+    let mut steps: [Vec<f32>; 2] = [Vec::new(), Vec::new()];
     for run in &cluster.runs {
         let row = run.v as usize * width;
-        let beyond = |u: Option<usize>, edge: u32| -> bool {
+        let step = |u: Option<usize>, edge: u32| -> f32 {
             let Some(u) = u.filter(|u| *u < width) else {
-                return true;
+                return f32::INFINITY;
             };
             let (there, here) = (depth[row + u], depth[row + edge as usize]);
-            there > 0.0 && there < here - 0.4 - 0.01 * here
+            let step = here - there;
+            if there > 0.0 && step > 0.4 + 0.01 * here { step } else { 0.0 }
         };
         if run.from <= left + reach {
-            let hidden = beyond((run.from as usize).checked_sub(1), run.from);
-            votes[0][usize::from(hidden)] += 1;
+            steps[0].push(step((run.from as usize).checked_sub(1), run.from));
         }
         if run.to > right.saturating_sub(reach) {
-            let hidden = beyond(Some(run.to as usize), run.to - 1);
-            votes[1][usize::from(hidden)] += 1;
+            steps[1].push(step(Some(run.to as usize), run.to - 1));
         }
     }
-    votes.map(|[free, hidden]| hidden > free)
+    steps.map(|mut steps| {
+        let middle = steps.len() / 2;
+        if steps.is_empty() {
+            return 0.0;
+        }
+        *steps.select_nth_unstable_by(middle, f32::total_cmp).1
+    })
 }

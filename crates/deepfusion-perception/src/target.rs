@@ -24,6 +24,9 @@ pub struct Target {
     pub pixels: usize,
     /// Left, top, right, bottom of those pixels.
     pub bounds: Option<[u32; 4]>,
+    /// Which of the image's detections it is.
+    #[serde(skip)]
+    pub detection: Option<usize>,
 }
 
 impl Target {

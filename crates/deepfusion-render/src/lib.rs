@@ -14,6 +14,7 @@ mod feature_picture;
 mod flow_picture;
 mod html;
 mod panel;
+mod targets;
 mod text;
 mod top_view;
 
@@ -28,5 +29,6 @@ pub use feature_picture::{feature_picture, feature_range};
 pub use flow_picture::flow_picture;
 pub use html::{HtmlReport, PictureFormat};
 pub use panel::{SamplePanel, sample_panel};
+pub use targets::{birds_eye, box_overlay, target_segments};
 pub use text::{TextSize, draw_text, text_width};
 pub use top_view::TopView;

@@ -2,7 +2,7 @@
 
 use crate::oxts::DATA_FORMAT;
 use crate::rig::CAM2_FROM_CAM0_X;
-use crate::{Error, Result, SimFrame, Simulation};
+use crate::{Error, Result, SimFrame, Simulation, tracklets};
 use deepfusion_cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Se3};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -23,7 +23,8 @@ const BATCH: usize = 8;
 /// Below `out/2026_01_01`: the three calibration files and `2026_01_01_drive_<seed>_sync` with
 /// `image_02` (PNG), `oxts`, `velodyne_points` (every [`crate::SimConfig::scan_every`]-th frame),
 /// `proj_depth/groundtruth/image_02` (dense exact camera z, 16-bit PNG, metres × 256, 0 beyond
-/// 255 m), `moving_02` (255 on things that move), and `poses.txt` (`world_from_cam`, the upper three
+/// 255 m), `moving_02` (255 on things that move), `tracklet_labels.xml` (exact boxes of everything in reach, in
+/// the velodyne's axes; objects are `Car`, `Pole`, `Tree`, `Building`, `Fence`), and `poses.txt` (`world_from_cam`, the upper three
 /// rows of the matrix in 12 numbers a line).
 ///
 /// `progress` is called with the frames done and their number. Everything is written to a folder
@@ -132,6 +133,8 @@ fn write_all(
         .map(|i| pose_line(&simulation.world_from_cam(i)))
         .collect();
     write_file(&drive.join("poses.txt"), poses.as_bytes())?;
+    let tracklets = tracklets::to_xml(simulation);
+    write_file(&drive.join("tracklet_labels.xml"), tracklets.as_bytes())?;
     Ok(name)
 }
 

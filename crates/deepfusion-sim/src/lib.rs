@@ -38,6 +38,7 @@ mod scanner;
 mod scene;
 mod simulation;
 mod texture;
+mod tracklets;
 mod traffic;
 mod umad;
 mod velodyne;

@@ -84,8 +84,8 @@ impl Traffic {
         &'a self,
         road: &'a Road,
         time_s: f64,
-    ) -> impl Iterator<Item = (&'a MovingCar, [f64; 3], f64)> {
-        self.cars.iter().filter_map(move |car| {
+    ) -> impl Iterator<Item = (usize, &'a MovingCar, [f64; 3], f64)> {
+        self.cars.iter().enumerate().filter_map(move |(index, car)| {
             let s = car.s + car.speed * time_s;
             if s < road.start + 5.0 || s > road.end() - 5.0 {
                 return None;
@@ -96,14 +96,14 @@ impl Traffic {
             } else {
                 std::f64::consts::PI
             };
-            Some((car, [x, y, 0.0], heading + turn))
+            Some((index, car, [x, y, 0.0], heading + turn))
         })
     }
 
     /// Their solids at a time.
     pub fn solids(&self, world: &World, time_s: f64) -> Vec<Primitive> {
         self.present(&world.road, time_s)
-            .flat_map(|(car, base, heading)| {
+            .flat_map(|(_, car, base, heading)| {
                 world.models[car.model].solids(base, heading, car.seed, true)
             })
             .collect()
@@ -112,13 +112,15 @@ impl Traffic {
     /// Their boxes and velocities at a time.
     pub fn objects(&self, world: &World, time_s: f64) -> Vec<SceneObject> {
         self.present(&world.road, time_s)
-            .map(|(car, base, heading)| {
+            .map(|(index, car, base, heading)| {
                 let size = world.models[car.model].size.map(f64::from);
                 // Constant speed along the centreline, so faster on the outside of a bend.
                 let s = car.s + car.speed * time_s;
                 let curvature = world.road.centre(s).3;
                 let speed = car.speed.abs() * (1.0 - curvature * car.lateral);
                 SceneObject {
+                    // After everything that stands.
+                    id: (world.objects.len() + index) as u64,
                     class: ObjectClass::Car,
                     world_from_object: upright(base, heading, size[2]),
                     size,

@@ -119,6 +119,12 @@ pub enum CliError {
         /// Images in all.
         total: usize,
     },
+    /// No frame of a recording has both labels and the depth asked for.
+    #[error("{}: no frame has the depth that was asked for", path.display())]
+    NothingToMeasure {
+        /// The recording.
+        path: PathBuf,
+    },
     /// A cloud without a camera.
     #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
     NoCamera,
@@ -161,6 +167,9 @@ impl CliError {
             Self::Interrupted { .. } => {
                 Some("run the same again: only what is missing is done".into())
             }
+            Self::NothingToMeasure { .. } => Some(
+                "exact depth is the simulator's (proj_depth), scans are in velodyne_points; without either nothing says which boxes are seen".into(),
+            ),
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
         }
     }
@@ -233,6 +242,7 @@ pub fn hint_of(problem: &anyhow::Error) -> Option<String> {
             deepfusion_train::Error,
             deepfusion_nn::Error,
             deepfusion_onnx::Error,
+            deepfusion_perception::Error,
             deepfusion_render::Error,
             deepfusion_sim::Error,
         );

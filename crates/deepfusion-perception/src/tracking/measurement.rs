@@ -4,6 +4,8 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 /// A detection, seen from the world.
 pub struct Measurement<'a> {
+    /// Which of the image's detections it is.
+    pub index: usize,
     /// What was detected.
     pub detection: &'a Detection,
     /// Angle of its length in the world's horizontal axes, x to z, radians.
@@ -15,13 +17,18 @@ pub struct Measurement<'a> {
 }
 
 impl<'a> Measurement<'a> {
-    /// Of a detection on `ground`, by a camera at `world_from_cam`.
-    pub fn new(detection: &'a Detection, ground: &'a Ground, world_from_cam: &'a Se3) -> Self {
+    /// Of the image's detection `index` on `ground`, by a camera at `world_from_cam`.
+    pub fn new(
+        (index, detection): (usize, &'a Detection),
+        ground: &'a Ground,
+        world_from_cam: &'a Se3,
+    ) -> Self {
         let (sin, cos) = detection.place.angle.sin_cos();
         let along = |i: usize| f64::from(cos * ground.right[i] + sin * ground.forward[i]);
         let along = world_from_cam.rotate(&Vector3::new(along(0), along(1), along(2)));
         let [length, width] = [0, 1].map(|i| detection.place.footprint[i] * detection.place.seen[i]);
         Self {
+            index,
             detection,
             heading: along.z.atan2(along.x),
             heading_weight: f64::from(length.max(width)),

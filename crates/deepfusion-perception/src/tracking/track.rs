@@ -29,6 +29,24 @@ impl Mean {
     }
 }
 
+/// How a track was seen.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen {
+    pixels: usize,
+    bounds: [u32; 4],
+    detection: usize,
+}
+
+impl Seen {
+    fn of(measurement: &Measurement) -> Self {
+        Self {
+            pixels: measurement.detection.pixels,
+            bounds: measurement.detection.bounds,
+            detection: measurement.index,
+        }
+    }
+}
+
 /// A target that is followed.
 #[derive(Debug, Clone)]
 pub struct Track {
@@ -48,8 +66,8 @@ pub struct Track {
     moving: Option<bool>,
     /// Confidence of the last detection.
     confidence: f64,
-    /// Pixels and their bounds in the last frame, where it was seen there.
-    pub seen: Option<(usize, [u32; 4])>,
+    /// How it was seen in the last frame, if it was.
+    pub seen: Option<Seen>,
 }
 
 impl Track {
@@ -75,7 +93,7 @@ impl Track {
             unseen_s: 0.0,
             moving: None,
             confidence: f64::from(measurement.detection.confidence),
-            seen: Some((measurement.detection.pixels, measurement.detection.bounds)),
+            seen: Some(Seen::of(measurement)),
         }
     }
 
@@ -142,7 +160,7 @@ impl Track {
         self.hits += 1;
         self.unseen_s = 0.0;
         self.confidence += 0.3 * (f64::from(measurement.detection.confidence) - self.confidence);
-        self.seen = Some((measurement.detection.pixels, measurement.detection.bounds));
+        self.seen = Some(Seen::of(measurement));
         self.tell_motion();
     }
 
@@ -209,8 +227,9 @@ impl Track {
             velocity_mps: velocity.map(Into::into),
             moving: self.moving,
             confidence: (self.confidence * proven * fading).clamp(0.0, 1.0),
-            pixels: self.seen.map_or(0, |(pixels, _)| pixels),
-            bounds: self.seen.map(|(_, bounds)| bounds),
+            pixels: self.seen.map_or(0, |seen| seen.pixels),
+            bounds: self.seen.map(|seen| seen.bounds),
+            detection: self.seen.map(|seen| seen.detection),
         }
     }
 }

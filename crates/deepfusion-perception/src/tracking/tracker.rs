@@ -39,6 +39,12 @@ impl Tracker {
         self.next_id
     }
 
+    /// Gives all tracks up; their ids are not used again.
+    pub fn forget(&mut self) {
+        self.tracks.clear();
+        self.time_s = None;
+    }
+
     /// Takes a frame's detections in and tells the targets that are there.
     pub fn step(
         &mut self,
@@ -76,6 +82,7 @@ impl Tracker {
     fn associate(&mut self, detections: &[Detection], now: &Now, config: &PerceptionConfig) {
         let measurements: Vec<Measurement> = detections
             .iter()
+            .enumerate()
             .map(|d| Measurement::new(d, now.ground, &now.world_from_cam))
             .collect();
         let noises: Vec<_> = measurements.iter().map(|m| m.noise(config)).collect();

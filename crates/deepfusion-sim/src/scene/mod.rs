@@ -42,6 +42,8 @@ pub enum ObjectClass {
 /// Something on the street, with its exact box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneObject {
+    /// The same from frame to frame.
+    pub id: u64,
     /// What it is.
     pub class: ObjectClass,
     /// Centre of its box and its axes (x forward, y left, z up) in the world, metres.
@@ -86,6 +88,20 @@ pub struct World {
     pub scene: Scene,
     /// The drive's seed, folded.
     pub seed: u32,
+}
+
+impl ObjectClass {
+    /// Its name in a file of tracklets: KITTI's for cars, capitalised like it for the others.
+    #[must_use]
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Car => "Car",
+            Self::Pole => "Pole",
+            Self::Tree => "Tree",
+            Self::Building => "Building",
+            Self::Fence => "Fence",
+        }
+    }
 }
 
 impl World {
@@ -198,6 +214,7 @@ impl World {
     /// Lists an object that stands still; `base` is the middle of its underside.
     fn object(&mut self, class: ObjectClass, base: [f64; 3], heading: f64, size: [f64; 3]) {
         self.objects.push(SceneObject {
+            id: self.objects.len() as u64,
             class,
             world_from_object: upright(base, heading, size[2]),
             size,

@@ -6,7 +6,9 @@ mod doctor;
 mod engine;
 mod eval;
 mod eval_odometry;
+mod eval_targets;
 mod export;
+mod perceive;
 mod predict;
 mod train;
 mod values;
@@ -21,7 +23,9 @@ pub use doctor::DoctorArgs;
 pub use engine::{EngineArgs, EngineChoice, PrecisionChoice};
 pub use eval::{EvalArgs, PredKind};
 pub use eval_odometry::EvalOdometryArgs;
+pub use eval_targets::{EvalTargetsArgs, TargetDepth};
 pub use export::ExportArgs;
+pub use perceive::{PerceiveArgs, PerceiveSave};
 pub use predict::{BenchArgs, PredictArgs, Save, WeightsCommand};
 pub use train::{DeviceChoice, PresetChoice, TrainArgs, ViewMotionChoice};
 pub use values::{CameraIntrinsics, Shard, Size};
@@ -63,8 +67,12 @@ pub enum Command {
     Eval(Box<EvalArgs>),
     /// Measure the camera's path: drift, five-frame error, scale.
     EvalOdometry(EvalOdometryArgs),
+    /// Measure 3D targets against labelled boxes: recall, precision, errors, identities.
+    EvalTargets(Box<EvalTargetsArgs>),
     /// Metric depth of images.
     Predict(Box<PredictArgs>),
+    /// 3D targets: boxes, distance, size, track, velocity.
+    Perceive(Box<PerceiveArgs>),
     /// A trained network as an ONNX file, checked before it is kept.
     Export(ExportArgs),
     /// Bring in weights of other programs.

@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, Subcommand, ValueEnum};
 
+use deepfusion_data::OpenOptions;
+
 use super::values::positive;
 use super::{CameraIntrinsics, EngineArgs, PresetChoice, Shard, Size};
 
@@ -14,13 +16,15 @@ use super::{CameraIntrinsics, EngineArgs, PresetChoice, Shard, Size};
     named at the end; the others are done.\n\n\
     Examples:\n  deepfusion predict --model runs/train-1 street.jpg --out depth\n  \
     deepfusion predict --model runs/train-1 'drive/*.png' --save npy,ply --out depth\n  \
+    deepfusion predict --model runs/train-1 drive.bag --out depth\n  \
     deepfusion predict --model runs/train-1 drive --out depth --shard 1/2   # and 2/2 elsewhere"
 )]
 pub struct PredictArgs {
     /// A run folder or a checkpoint in it.
     #[arg(long, value_name = "RUN")]
     pub model: PathBuf,
-    /// Images, folders of images, or globs.
+    /// Images, folders of images, globs, or recordings: a KITTI drive, a bag, a video, a folder with dataset.toml. Of
+    /// recordings the camera is known, and lenses are undone.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<String>,
     /// The camera, in pixels of the input images.
@@ -62,6 +66,16 @@ pub struct PredictArgs {
     /// Print the sidecars as a JSON array on stdout.
     #[arg(long)]
     pub json: bool,
+}
+
+impl PredictArgs {
+    /// How recordings among the inputs are opened.
+    pub fn open_options(&self) -> OpenOptions {
+        OpenOptions {
+            intrinsics: self.intrinsics.map(|k| [k.fx, k.fy, k.cx, k.cy]),
+            ..OpenOptions::default()
+        }
+    }
 }
 
 /// What `predict` writes for an image, beside the JSON sidecar.

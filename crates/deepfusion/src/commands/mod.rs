@@ -8,11 +8,13 @@ pub mod device;
 mod doctor;
 mod eval;
 mod eval_odometry;
+mod eval_targets;
 mod evaluate;
 mod export;
 mod export_gt;
 mod inspect;
 mod overview;
+mod perceive;
 mod predict;
 mod recorder;
 mod simulate;
@@ -39,7 +41,9 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Ablate(args) => ablate::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::EvalOdometry(args) => eval_odometry::run(&args),
+        Command::EvalTargets(args) => eval_targets::run(&args),
         Command::Predict(args) => predict::run(&args),
+        Command::Perceive(args) => perceive::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Weights(WeightsCommand::Import { files, out }) => weights::import(&files, &out),
         Command::Weights(WeightsCommand::List { json }) => weights::list(json),

@@ -2,8 +2,10 @@
 
 use std::collections::HashSet;
 use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::Result;
+use deepfusion_data::{Dataset, OpenOptions};
 
 use crate::error::CliError;
 
@@ -11,25 +13,48 @@ use crate::error::CliError;
 const IMAGES: [&str; 3] = ["png", "jpg", "jpeg"];
 
 /// An image, and what its outputs are called.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct Input {
-    /// The image.
+    /// The image, or the file it is in.
     pub path: PathBuf,
     /// What the names of its outputs begin with.
     pub name: String,
+    /// The recording it is a frame of, and which.
+    pub frame: Option<(Arc<Dataset>, usize)>,
 }
 
-/// The images that files, folders and patterns mean: in the order of their paths, each once. Neither order nor
-/// names depend on the order of the arguments, so that shards started apart agree on both.
-pub fn find(arguments: &[String]) -> Result<Vec<Input>> {
+impl PartialEq for Input {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.path, &self.name) == (&other.path, &other.name)
+    }
+}
+
+/// Endings of files that hold many images.
+const RECORDINGS: [&str; 8] = ["bag", "mcap", "db3", "mp4", "mkv", "mov", "avi", "hevc"];
+
+/// The images that files, folders, patterns and recordings mean: in the order of their paths, each once, then the frames of
+/// recordings in their order. Neither order nor names depend on the order of the arguments, so that shards started
+/// apart agree on both.
+///
+/// A folder with images in it (and no `dataset.toml`) is a folder of images; any other that [`Dataset::open`] takes is
+/// a recording, whose cameras are `options`' and its own.
+pub fn find(arguments: &[String], options: &OpenOptions) -> Result<Vec<Input>> {
     let mut found = Vec::new();
+    let mut recordings = Vec::new();
     for argument in arguments {
         let path = PathBuf::from(argument);
         if path.is_dir() {
             let entries =
                 std::fs::read_dir(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
             let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-            found.extend(images_among(paths, argument)?);
+            let images: Vec<_> = paths.filter(|p| is_image(p)).collect();
+            if images.is_empty() || path.join("dataset.toml").exists() {
+                recordings.extend(open(&path, argument, options)?);
+            } else {
+                found.extend(images);
+            }
+        } else if path.exists() && has_ending(&path, &RECORDINGS) {
+            recordings.extend(open(&path, argument, options)?);
         } else if path.exists() || !argument.contains(['*', '?', '[']) {
             // A file that is not there is told by whoever opens it.
             found.push(path);
@@ -38,7 +63,45 @@ pub fn find(arguments: &[String]) -> Result<Vec<Input>> {
             found.extend(images_among(paths, argument)?);
         }
     }
-    Ok(named(found))
+    let mut inputs = named(found);
+    let used: HashSet<String> = inputs.iter().map(|i| i.name.to_lowercase()).collect();
+    inputs.extend(frames_of(recordings, &used));
+    Ok(inputs)
+}
+
+/// Opens a recording; that it is none is an error that names the argument.
+fn open(path: &Path, argument: &str, options: &OpenOptions) -> Result<Vec<Dataset>> {
+    match Dataset::open(path, options) {
+        Ok(datasets) => Ok(datasets),
+        Err(deepfusion_data::Error::UnknownLayout { .. }) if path.is_dir() => {
+            let input = argument.to_owned();
+            Err(CliError::NoImages { input }.into())
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The selected frames of recordings. They are named by their numbers, after the recording's name where there are others.
+fn frames_of(mut recordings: Vec<Dataset>, used: &HashSet<String>) -> Vec<Input> {
+    recordings.sort_by(|a, b| a.folder().cmp(b.folder()).then(a.name().cmp(b.name())));
+    let alone = recordings.len() == 1 && used.is_empty();
+    let mut inputs = Vec::new();
+    for dataset in recordings {
+        let dataset = Arc::new(dataset);
+        for index in dataset.selected() {
+            let frame = &dataset.frames()[*index];
+            let name = match alone {
+                true => format!("{:010}", frame.number),
+                false => format!("{}-{:010}", dataset.name(), frame.number),
+            };
+            inputs.push(Input {
+                path: frame.image.path().to_owned(),
+                name,
+                frame: Some((dataset.clone(), *index)),
+            });
+        }
+    }
+    inputs
 }
 
 /// The images among the paths; that there is none is an error that names the argument.
@@ -52,9 +115,13 @@ fn images_among(paths: impl Iterator<Item = PathBuf>, argument: &str) -> Result<
 }
 
 fn is_image(path: &Path) -> bool {
+    has_ending(path, &IMAGES)
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
     path.extension()
         .and_then(|e| e.to_str())
-        .is_some_and(|e| IMAGES.contains(&e.to_ascii_lowercase().as_str()))
+        .is_some_and(|e| endings.contains(&e.to_ascii_lowercase().as_str()))
 }
 
 /// Sorts the paths, drops those given twice, and names each after its file, numbered where two files share a name.
@@ -79,7 +146,12 @@ fn named(paths: Vec<PathBuf>) -> Vec<Input> {
     };
     let names: Vec<String> = paths.iter().map(name).collect();
     let both = paths.into_iter().zip(names);
-    both.map(|(path, name)| Input { path, name }).collect()
+    both.map(|(path, name)| Input {
+        path,
+        name,
+        frame: None,
+    })
+    .collect()
 }
 
 /// `./a/./b` is `a/b`.
@@ -118,7 +190,7 @@ mod tests {
 
     #[test]
     fn a_pattern_without_images_is_an_error() {
-        let error = find(&["/nowhere/*.png".into()]).unwrap_err();
+        let error = find(&["/nowhere/*.png".into()], &OpenOptions::default()).unwrap_err();
         assert!(error.to_string().contains("/nowhere/*.png"), "{error}");
     }
 

@@ -1,13 +1,13 @@
 //! `deepfusion predict`: images to metric depth, in bulk.
 
-mod camera;
+pub(super) mod camera;
 mod features;
-mod inputs;
+pub(super) mod inputs;
 mod ledger;
 mod manifest;
 mod outputs;
 mod resume;
-mod sidecar;
+pub(super) mod sidecar;
 
 use anyhow::{Context, Result};
 use deepfusion_data::{RgbImage, load_rgb};
@@ -28,7 +28,7 @@ use crate::progress::say;
 use crate::{interrupt, output};
 
 /// What is the same for all images of a run.
-struct Job<'a> {
+pub(super) struct Job<'a> {
     args: &'a PredictArgs,
     camera: CameraSource,
     preparer: Preparer,
@@ -41,51 +41,38 @@ struct Job<'a> {
 }
 
 /// An image on its way through the network.
-struct Loaded {
+pub(super) struct Loaded {
     mark: FileMark,
-    image: RgbImage,
-    camera: Option<Intrinsics>,
+    pub image: RgbImage,
+    pub camera: Option<Intrinsics>,
 }
 
 /// What the network says about an image.
-struct Seen {
-    prediction: Prediction,
+pub(super) struct Seen {
+    pub prediction: Prediction,
     /// Empty where nobody asked for features.
-    layers: Vec<LayerMaps>,
+    pub layers: Vec<LayerMaps>,
 }
 
 /// `deepfusion predict`.
 pub fn run(args: &PredictArgs) -> Result<()> {
-    let all = inputs::find(&args.inputs)?;
+    let all = inputs::find(&args.inputs, &args.open_options())?;
     let mine: Vec<&Input> = args.shard.part_of(&all).collect();
     let predictor = engine::load(&args.model, &args.engine)?;
-    let camera = CameraSource::new(args, predictor.training_camera())?;
-    if args.save.contains(&Save::Ply) && matches!(camera, CameraSource::Unknown) {
+    let job = Job::new(args, &predictor)?;
+    let camera_known = !matches!(job.camera, CameraSource::Unknown);
+    if args.save.contains(&Save::Ply)
+        && !(camera_known || all.iter().all(|input| input.frame.is_some()))
+    {
         return Err(CliError::NoCamera.into());
     }
-    let job = Job {
-        args,
-        camera,
-        preparer: predictor.preparer(),
-        made_with: MadeWith::new(args, &predictor, &camera)?,
-        step: predictor.step,
-        metric: predictor.training_camera().is_some() && predictor.config().loss.speed > 0.0,
-        inspector: match args.save.contains(&Save::Features) {
-            true => Some(Inspector::load(
-                &args.model,
-                args.engine.set.as_deref(),
-                &device::open(args.engine.device)?,
-            )?),
-            false => None,
-        },
-    };
     std::fs::create_dir_all(&args.out).map_err(|e| deepfusion_data::Error::file(&args.out, e))?;
     interrupt::catch("stopping after the images at work; the same command goes on from there");
     let _lock = Lock::take(&args.out, args.shard)?;
     let (ledger, todo) = begin(&job, &all, &mine)?;
     predict(&job, &predictor, &mine, &todo, &ledger);
     let summary = ledger.finish()?;
-    if job.camera.word() == "assumed" {
+    if job.camera.word() == "assumed" && mine.iter().any(|input| input.frame.is_none()) {
         tracing::warn!(
             "no intrinsics given: the training camera's field of view is assumed, so the metres are \
              only as right as that is (scale_trusted: false; give --intrinsics or --calib)"
@@ -174,14 +161,42 @@ fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], le
     pipeline::run(todo.len(), threads, &stop, &load, infer, &write);
 }
 
-impl Job<'_> {
+impl<'a> Job<'a> {
+    /// The work that the arguments ask of a network.
+    pub fn new(args: &'a PredictArgs, predictor: &Predictor) -> Result<Self> {
+        let camera = CameraSource::new(args, predictor.training_camera())?;
+        Ok(Self {
+            args,
+            camera,
+            preparer: predictor.preparer(),
+            made_with: MadeWith::new(args, predictor, &camera)?,
+            step: predictor.step,
+            metric: predictor.training_camera().is_some() && predictor.config().loss.speed > 0.0,
+            inspector: match args.save.contains(&Save::Features) {
+                true => Some(Inspector::load(
+                    &args.model,
+                    args.engine.set.as_deref(),
+                    &device::open(args.engine.device)?,
+                )?),
+                false => None,
+            },
+        })
+    }
+
     /// Reads an image and makes it the network's input.
-    fn load(&self, input: &Input) -> Result<(Loaded, PreparedImage)> {
+    pub fn load(&self, input: &Input) -> Result<(Loaded, PreparedImage)> {
         // Before it is read: a change in between is then noticed by the next run.
         let mark = FileMark::of(&input.path)?;
-        let image = load_rgb(&input.path)?;
-        let camera = self.camera.of(image.width(), image.height());
-        let camera = camera.with_context(|| input.path.display().to_string())?;
+        let (image, camera) = match &input.frame {
+            Some((dataset, index)) => {
+                (dataset.load_image(*index)?, Some(dataset.intrinsics(*index)))
+            }
+            None => {
+                let image = load_rgb(&input.path)?;
+                let camera = self.camera.of(image.width(), image.height());
+                (image, camera.with_context(|| input.path.display().to_string())?)
+            }
+        };
         let (correct, crop) = (!self.args.no_focal_correction, !self.args.stretch);
         let prepared = self
             .preparer
@@ -195,7 +210,7 @@ impl Job<'_> {
     }
 
     /// Writes an image's outputs, then its sidecar.
-    fn write(&self, input: &Input, loaded: &Loaded, seen: &Seen) -> Result<Sidecar> {
+    pub fn write(&self, input: &Input, loaded: &Loaded, seen: &Seen) -> Result<Sidecar> {
         let (args, image, prediction) = (self.args, &loaded.image, &seen.prediction);
         let depth = prediction.depth();
         let (mut files, mut file_bytes) = (Vec::new(), Vec::new());
@@ -209,6 +224,10 @@ impl Job<'_> {
         }
         let known = depth.data.iter().copied().filter(|d| *d > 0.0);
         let ends = |[low, high]: [f32; 2], d: f32| [low.min(d), high.max(d)];
+        let camera_word = match input.frame {
+            Some(_) => "recording",
+            None => self.camera.word(),
+        };
         let sidecar = Sidecar {
             image: input.path.clone(),
             image_file: loaded.mark,
@@ -217,8 +236,8 @@ impl Job<'_> {
             model: args.model.clone(),
             checkpoint_step: self.step,
             intrinsics: loaded.camera.map(|k| [k.fx, k.fy, k.cx, k.cy]),
-            intrinsics_from: self.camera.word().into(),
-            scale_trusted: self.metric && self.camera.word() == "given",
+            intrinsics_from: camera_word.into(),
+            scale_trusted: self.metric && matches!(camera_word, "given" | "recording"),
             focal_factor: prediction.focal_factor,
             window: prediction.window,
             depth_m: known

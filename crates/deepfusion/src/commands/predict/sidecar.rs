@@ -31,7 +31,7 @@ pub struct Sidecar {
     pub checkpoint_step: usize,
     /// fx, fy, cx, cy in pixels of the input.
     pub intrinsics: Option<[f64; 4]>,
-    /// `given`, `assumed` or `unknown`.
+    /// `given`, `recording` (its own calibration), `assumed` or `unknown`.
     pub intrinsics_from: String,
     /// Whether the metres can be trusted: the run learned them, and the camera is known.
     pub scale_trusted: bool,

@@ -1,0 +1,176 @@
+//! When the vehicle would meet a target if both went on as they do.
+
+use crate::Target;
+use serde::{Deserialize, Serialize};
+
+/// The vehicle around its camera, metres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct VehicleShape {
+    /// Width.
+    pub width_m: f64,
+    /// From the camera forward to the bumper.
+    pub front_m: f64,
+    /// From the camera back to the rear axle, about which the vehicle turns.
+    pub axle_m: f64,
+    /// Kept free on each side.
+    pub margin_m: f64,
+}
+
+impl Default for VehicleShape {
+    fn default() -> Self {
+        Self {
+            width_m: 1.8,
+            front_m: 1.7,
+            axle_m: 1.7,
+            margin_m: 0.2,
+        }
+    }
+}
+
+/// A meeting that is to come.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Collision {
+    /// The target's id.
+    pub id: u64,
+    /// Seconds from now.
+    pub time_s: f64,
+}
+
+/// How far ahead is looked, and in which steps, seconds.
+const HORIZON_S: f64 = 10.0;
+/// See [`HORIZON_S`].
+const STEP_S: f64 = 0.05;
+
+/// The first target that the vehicle's front would touch, at its present speed (m/s) and yaw rate (rad/s, positive to the
+/// left), every target going on at its own velocity; one whose velocity is not known yet is taken to stand.
+#[must_use]
+pub fn time_to_collision(
+    targets: &[Target],
+    speed_mps: f64,
+    yaw_rate: f64,
+    vehicle: &VehicleShape,
+) -> Option<Collision> {
+    let steps = (HORIZON_S / STEP_S) as usize;
+    (0..=steps).find_map(|step| {
+        let time_s = step as f64 * STEP_S;
+        let pose = Pose::after(time_s, speed_mps, yaw_rate, vehicle);
+        targets
+            .iter()
+            .find(|target| pose.touches(target, time_s, vehicle))
+            .map(|target| Collision {
+                id: target.id,
+                time_s,
+            })
+    })
+}
+
+/// Where the camera is after a while: x right, z forward, and how far it has turned to the left.
+struct Pose {
+    x: f64,
+    z: f64,
+    turn: f64,
+}
+
+impl Pose {
+    /// Along the arc that the rear axle drives.
+    fn after(time_s: f64, speed: f64, yaw_rate: f64, vehicle: &VehicleShape) -> Self {
+        let (way, turn) = (speed * time_s, yaw_rate * time_s);
+        let chord = if turn.abs() < 1e-6 {
+            way
+        } else {
+            way * (0.5 * turn).sin() / (0.5 * turn)
+        };
+        // The axle moves along the chord; the camera sits ahead of it.
+        let axle = (-chord * (0.5 * turn).sin(), chord * (0.5 * turn).cos());
+        Self {
+            x: axle.0 - vehicle.axle_m * turn.sin(),
+            z: axle.1 + vehicle.axle_m * (turn.cos() - 1.0),
+            turn,
+        }
+    }
+
+    fn touches(&self, target: &Target, time_s: f64, vehicle: &VehicleShape) -> bool {
+        let velocity = target.velocity_mps.unwrap_or_default();
+        let half = 0.5 * vehicle.width_m + vehicle.margin_m;
+        let (sin, cos) = self.turn.sin_cos();
+        let corners = target.corners();
+        // The footprint's outline, in the vehicle's axes then.
+        let points: Vec<(f64, f64)> = corners[..4]
+            .iter()
+            .map(|c| {
+                let x = c[0] + velocity[0] * time_s - self.x;
+                let z = c[2] + velocity[2] * time_s - self.z;
+                (cos * x + sin * z, -sin * x + cos * z)
+            })
+            .collect();
+        // Behind the bumper, and not behind the camera: what is beside the car is not run into by its front.
+        let inside = |(x, z): (f64, f64)| x.abs() <= half && (0.0..=vehicle.front_m).contains(&z);
+        (0..4).any(|i| {
+            let (a, b) = (points[i], points[(i + 1) % 4]);
+            // Sides are shorter than 13 m: a point every quarter of a metre does not miss the car's front.
+            let steps = (((b.0 - a.0).hypot(b.1 - a.1) / 0.25).ceil() as usize).max(1);
+            (0..=steps).any(|k| {
+                let share = k as f64 / steps as f64;
+                inside((a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1)))
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn target(id: u64, x: f64, z: f64, velocity: [f64; 3]) -> Target {
+        Target {
+            id,
+            center_m: [x, 1.0, z],
+            size_m: [4.0, 1.8, 1.5],
+            yaw_rad: std::f64::consts::FRAC_PI_2,
+            distance_m: x.hypot(z),
+            velocity_mps: Some(velocity),
+            moving: None,
+            confidence: 1.0,
+            pixels: 1,
+            bounds: None,
+            detection: None,
+        }
+    }
+
+    #[test]
+    fn the_gap_over_the_closing_speed() {
+        let vehicle = VehicleShape::default();
+        // The rear is 2 m before the centre, the bumper 1.7 m before the camera: 20 - 2 - 1.7 = 16.3 m.
+        let standing = [target(1, 0.0, 20.0, [0.0; 3])];
+        let met = time_to_collision(&standing, 10.0, 0.0, &vehicle).unwrap();
+        assert!((met.time_s - 1.63).abs() < STEP_S, "{met:?}");
+        let fleeing = [target(1, 0.0, 20.0, [0.0, 0.0, 6.0])];
+        let met = time_to_collision(&fleeing, 10.0, 0.0, &vehicle).unwrap();
+        assert!((met.time_s - 16.3 / 4.0).abs() < STEP_S, "{met:?}");
+        let faster = [target(1, 0.0, 20.0, [0.0, 0.0, 12.0])];
+        assert_eq!(time_to_collision(&faster, 10.0, 0.0, &vehicle), None);
+    }
+
+    #[test]
+    fn the_next_lane_is_met_only_in_a_bend() {
+        let vehicle = VehicleShape::default();
+        let left = [target(4, -3.5, 25.0, [0.0; 3])];
+        assert_eq!(time_to_collision(&left, 10.0, 0.0, &vehicle), None);
+        // Left with a radius of about 89 m: 25² / 178 = 3.5 m to the side at 25 m.
+        let met = time_to_collision(&left, 10.0, 0.112, &vehicle).unwrap();
+        assert_eq!(met.id, 4);
+        assert_eq!(time_to_collision(&left, 10.0, -0.112, &vehicle), None);
+    }
+
+    #[test]
+    fn the_nearest_is_told_and_a_standing_car_meets_what_comes() {
+        let vehicle = VehicleShape::default();
+        let two = [target(1, 0.0, 30.0, [0.0; 3]), target(2, 0.2, 18.0, [0.0; 3])];
+        assert_eq!(time_to_collision(&two, 8.0, 0.0, &vehicle).unwrap().id, 2);
+        let coming = [target(3, 0.0, 30.0, [0.0, 0.0, -10.0])];
+        let met = time_to_collision(&coming, 0.0, 0.0, &vehicle).unwrap();
+        assert!((met.time_s - 2.63).abs() < STEP_S);
+        assert_eq!(time_to_collision(&[], 30.0, 0.0, &vehicle), None);
+    }
+}

@@ -1,0 +1,44 @@
+use std::path::PathBuf;
+
+use clap::{ArgGroup, Args, ValueEnum};
+
+use super::EngineArgs;
+
+/// `deepfusion eval-targets`.
+#[derive(Debug, Args)]
+#[command(
+    group(ArgGroup::new("source").args(["model", "depth"]).required(true)),
+    after_help = "Boxes come from a drive's tracklet_labels.xml: KITTI raw's, or the simulator's. A box counts where enough of it is seen; \
+    trees, poles, buildings and fences count as neither.\n\n\
+    Examples:\n  deepfusion eval-targets --data street --depth truth\n  \
+    deepfusion eval-targets --data kitti/2011_09_26/2011_09_26_drive_0005_sync --model runs/train-1"
+)]
+pub struct EvalTargetsArgs {
+    /// Drives with labelled boxes.
+    #[arg(long, required = true, num_args = 1.., value_name = "PATH")]
+    pub data: Vec<PathBuf>,
+    /// Depth predicted by a run: its folder or a checkpoint in it.
+    #[arg(long, value_name = "RUN")]
+    pub model: Option<PathBuf>,
+    /// Depth that was measured.
+    #[arg(long, value_enum)]
+    pub depth: Option<TargetDepth>,
+    /// Settings of the perception (TOML).
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// What runs the network.
+    #[command(flatten)]
+    pub engine: EngineArgs,
+    /// Print as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Where measured depth comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TargetDepth {
+    /// The simulator's exact depth of every pixel.
+    Truth,
+    /// The drive's scans, gathered to as coarse an image as they fill.
+    Lidar,
+}

@@ -1,0 +1,98 @@
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::values::positive;
+use super::{CameraIntrinsics, EngineArgs, PredictArgs, Save, Shard};
+
+/// `deepfusion perceive`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Targets are followed from frame to frame of a recording that brings times, speed and yaw rate: they then keep \
+    their id and have a velocity over ground. Single images stand for themselves.\n\n\
+    For every frame NAME_targets.json is written, and all of them as lines of targets.jsonl.\n\n\
+    Examples:\n  deepfusion perceive --model runs/train-1 kitti/2011_09_26/2011_09_26_drive_0005_sync --out targets\n  \
+    deepfusion perceive --model runs/train-1 drive.bag --out targets --save overlay,birds-eye\n  \
+    deepfusion perceive --model runs/train-1 street.jpg --intrinsics 721.5,721.5,609.6,172.9 --out targets"
+)]
+pub struct PerceiveArgs {
+    /// A run folder or a checkpoint in it.
+    #[arg(long, value_name = "RUN")]
+    pub model: PathBuf,
+    /// Recordings (a KITTI drive, a bag, a video, a folder with dataset.toml), images, folders of images, or globs.
+    #[arg(required = true, value_name = "INPUT")]
+    pub inputs: Vec<String>,
+    /// The camera, in pixels of the input images.
+    #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "calib")]
+    pub intrinsics: Option<CameraIntrinsics>,
+    /// A calibration file (KITTI's calib_cam_to_cam.txt).
+    #[arg(long, value_name = "FILE")]
+    pub calib: Option<PathBuf>,
+    /// What to write for every frame, beside its targets.
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["depth-png", "overlay"])]
+    pub save: Vec<PerceiveSave>,
+    /// Farthest depth that is looked at, in metres.
+    #[arg(long, value_name = "M", default_value_t = 60.0, value_parser = positive)]
+    pub max_depth: f64,
+    /// Settings of the perception (TOML); what is not in it keeps its default.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Do not correct depth for another focal length than the one trained on.
+    #[arg(long)]
+    pub no_focal_correction: bool,
+    /// Stretch images of another aspect ratio instead of cropping them about the principal row.
+    #[arg(long)]
+    pub stretch: bool,
+    /// Folder to write.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Replace what is there.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// What runs the network.
+    #[command(flatten)]
+    pub engine: EngineArgs,
+    /// Print one JSON object a frame on stdout, as it comes.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What `perceive` writes for a frame, beside its targets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PerceiveSave {
+    /// Depth as 16-bit PNG, metres × 256: what `view` shows.
+    DepthPng,
+    /// The image with boxes.
+    Overlay,
+    /// The road from above: free space, boxes, velocities.
+    BirdsEye,
+    /// Disparity with each target in its colour.
+    Segments,
+    /// Coloured point cloud in the camera's axes, without the points that hang between near and far.
+    Ply,
+}
+
+impl PerceiveArgs {
+    /// The prediction that this stands on.
+    pub fn as_predict(&self) -> PredictArgs {
+        let mut save = Vec::new();
+        if self.save.contains(&PerceiveSave::DepthPng) {
+            save.push(Save::DepthPng);
+        }
+        PredictArgs {
+            model: self.model.clone(),
+            inputs: self.inputs.clone(),
+            intrinsics: self.intrinsics,
+            calib: self.calib.clone(),
+            save,
+            max_depth: self.max_depth,
+            no_focal_correction: self.no_focal_correction,
+            stretch: self.stretch,
+            out: self.out.clone(),
+            shard: Shard::WHOLE,
+            overwrite: self.overwrite,
+            engine: self.engine.clone(),
+            json: false,
+        }
+    }
+}

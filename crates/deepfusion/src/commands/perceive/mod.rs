@@ -1,0 +1,261 @@
+//! `deepfusion perceive`: images to 3D targets, followed over time.
+
+mod pictures;
+mod record;
+pub mod scene;
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use deepfusion_perception::{Perception, PerceptionConfig, VehicleShape, time_to_collision};
+use deepfusion_train::{PreparedImage, Predictor};
+
+use self::pictures::Picture;
+use self::record::{FrameRecord, Lines};
+use self::scene::{MotionTracker, working_depth};
+use super::predict::inputs::{self, Input};
+use super::predict::{Job, Loaded, Seen};
+use crate::cli::{PerceiveArgs, PerceiveSave};
+use crate::error::{CliError, hint_of, told};
+use crate::pipeline::{self, Threads};
+use crate::progress::say;
+use crate::{engine, interrupt, output};
+
+/// A frame that is loaded, and when that began.
+struct Begun {
+    index: usize,
+    loaded: Loaded,
+    prepared: PreparedImage,
+    start: Instant,
+}
+
+/// A frame with all that was found in it.
+struct Found {
+    index: usize,
+    loaded: Loaded,
+    seen: Seen,
+    record: FrameRecord,
+    pictures: Vec<(PerceiveSave, Picture)>,
+}
+
+/// `deepfusion perceive`.
+pub fn run(args: &PerceiveArgs) -> Result<()> {
+    let predict = args.as_predict();
+    let all = inputs::find(&args.inputs, &predict.open_options())?;
+    let config = read_config(args.config.as_deref(), PerceptionConfig::predicted())?;
+    let config = PerceptionConfig {
+        max_depth_m: args.max_depth as f32,
+        ..config
+    };
+    let predictor = engine::load(&args.model, &args.engine)?;
+    let job = Job::new(&predict, &predictor)?;
+    std::fs::create_dir_all(&args.out).map_err(|e| deepfusion_data::Error::file(&args.out, e))?;
+    refuse_what_is_there(args, &all)?;
+    interrupt::catch("stopping after the frames at work");
+    let work = Work {
+        args,
+        job: &job,
+        all: &all,
+        lines: Mutex::new(Lines::begin(&args.out.join("targets.jsonl"))?),
+        outcome: Mutex::new(Outcome::default()),
+    };
+    work.go(&predictor, config)
+}
+
+/// Settings from a file over `base`.
+pub fn read_config(path: Option<&Path>, base: PerceptionConfig) -> Result<PerceptionConfig> {
+    let Some(path) = path else { return Ok(base) };
+    let text =
+        std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
+    let named = || path.display().to_string();
+    let mut table = toml::Table::try_from(&base).with_context(named)?;
+    table.extend(text.parse::<toml::Table>().with_context(named)?);
+    table.try_into().with_context(named)
+}
+
+/// Nothing is overwritten unless asked.
+fn refuse_what_is_there(args: &PerceiveArgs, all: &[Input]) -> Result<()> {
+    let first = all.iter().map(|input| record_path(&args.out, &input.name));
+    let mut paths = first.chain([args.out.join("targets.jsonl")]);
+    match paths.find(|path| !args.overwrite && path.exists()) {
+        Some(path) => Err(CliError::Exists {
+            path,
+            remedy: "allow it with --overwrite, or choose another folder",
+        }
+        .into()),
+        None => Ok(()),
+    }
+}
+
+fn record_path(out: &Path, name: &str) -> PathBuf {
+    out.join(format!("{name}_targets.json"))
+}
+
+/// What became of the frames.
+#[derive(Default)]
+struct Outcome {
+    done: usize,
+    targets: usize,
+    latency_ms: Vec<f64>,
+    unreadable: Vec<anyhow::Error>,
+    fatal: Option<anyhow::Error>,
+}
+
+struct Work<'a> {
+    args: &'a PerceiveArgs,
+    job: &'a Job<'a>,
+    all: &'a [Input],
+    lines: Mutex<Lines>,
+    outcome: Mutex<Outcome>,
+}
+
+impl Work<'_> {
+    fn go(self, predictor: &Predictor, config: PerceptionConfig) -> Result<()> {
+        let mut perception = Perception::new(config);
+        let mut motions = MotionTracker::default();
+        let load = |index: usize| {
+            let start = Instant::now();
+            match self.job.load(&self.all[index]) {
+                Ok((loaded, prepared)) => Some(Begun {
+                    index,
+                    loaded,
+                    prepared,
+                    start,
+                }),
+                Err(error) => {
+                    self.outcome().unreadable.push(error);
+                    None
+                }
+            }
+        };
+        let look = |begun: Begun| self.look(begun, predictor, &mut perception, &mut motions);
+        let write = |_: usize, found: Result<Found>| {
+            if let Err(error) = found.and_then(|found| self.write(&found)) {
+                self.outcome().fatal.get_or_insert(error);
+            }
+        };
+        let stop = || interrupt::asked() || self.outcome().fatal.is_some();
+        // One thread reads and one writes: frames stay in their order.
+        let threads = Threads {
+            before: 1,
+            after: 1,
+        };
+        pipeline::run(self.all.len(), threads, &stop, &load, look, &write);
+        self.finish()
+    }
+
+    fn outcome(&self) -> std::sync::MutexGuard<'_, Outcome> {
+        // A thread that panicked ends the program with its own message.
+        self.outcome.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    fn look(
+        &self,
+        begun: Begun,
+        predictor: &Predictor,
+        perception: &mut Perception,
+        motions: &mut MotionTracker,
+    ) -> Result<Found> {
+        let Begun {
+            index,
+            loaded,
+            prepared,
+            start,
+        } = begun;
+        let input = &self.all[index];
+        let prediction = predictor.infer(&prepared)?;
+        let camera = loaded.camera.ok_or(CliError::NoCamera)?;
+        let (depth, k) = working_depth(&prediction.depth(), &camera);
+        let motion = motions.next(input, perception);
+        let surroundings = perception.look(&depth, &k, motion.stamp)?;
+        let collision = motion.speed_mps.and_then(|speed| {
+            let vehicle = VehicleShape::default();
+            time_to_collision(&surroundings.targets, speed, motion.yaw_rate, &vehicle)
+        });
+        let latency_ms = start.elapsed().as_secs_f64() * 1e3;
+        let record = FrameRecord::new(&input.name, &surroundings, &motion, collision, latency_ms);
+        let pictures = pictures::draw(
+            &self.args.save,
+            &loaded.image,
+            &camera,
+            (&depth, &k),
+            &surroundings,
+            perception,
+        );
+        Ok(Found {
+            index,
+            loaded,
+            seen: Seen {
+                prediction,
+                layers: Vec::new(),
+            },
+            record,
+            pictures,
+        })
+    }
+
+    fn write(&self, found: &Found) -> Result<()> {
+        let (out, input) = (&self.args.out, &self.all[found.index]);
+        for (save, picture) in &found.pictures {
+            picture.save(&pictures::path(out, &input.name, *save))?;
+        }
+        if input.frame.as_ref().is_some_and(|(dataset, index)| {
+            dataset.frames()[*index].image.file().is_none()
+        }) {
+            pictures::save_jpeg(&found.loaded.image, &out.join(format!("{}_image.jpg", input.name)))?;
+        }
+        self.job.write(input, &found.loaded, &found.seen)?;
+        found.record.write(&record_path(out, &input.name))?;
+        let line = found.record.line()?;
+        self.lines.lock().unwrap_or_else(|e| e.into_inner()).add(&line)?;
+        if self.args.json {
+            output::print(&line)?;
+        }
+        let mut outcome = self.outcome();
+        outcome.done += 1;
+        outcome.targets += found.record.targets.len();
+        outcome.latency_ms.push(found.record.latency_ms);
+        Ok(())
+    }
+
+    fn finish(self) -> Result<()> {
+        // What is there stays: a stopped run's lines are of its frames.
+        self.lines
+            .into_inner()
+            .unwrap_or_else(|e| e.into_inner())
+            .finish()?;
+        let mut outcome = self.outcome.into_inner().unwrap_or_else(|e| e.into_inner());
+        if let Some(error) = outcome.fatal {
+            return Err(error);
+        }
+        outcome.latency_ms.sort_by(f64::total_cmp);
+        let median = outcome.latency_ms.get(outcome.done / 2).copied();
+        say(&format!(
+            "{} frames, {} targets written to {}{}",
+            outcome.done,
+            outcome.targets,
+            self.args.out.display(),
+            median.map_or(String::new(), |ms| format!(
+                ", {ms:.0} ms from file to targets (median)"
+            ))
+        ));
+        let total = self.all.len();
+        if !outcome.unreadable.is_empty() {
+            return Err(CliError::SomeFailed {
+                hint: outcome.unreadable.iter().find_map(hint_of),
+                failures: outcome.unreadable.iter().map(told).collect(),
+                total,
+                interrupted: interrupt::asked(),
+            }
+            .into());
+        }
+        if outcome.done < total {
+            let done = outcome.done;
+            return Err(CliError::Interrupted { done, total }.into());
+        }
+        Ok(())
+    }
+}
+
