@@ -229,12 +229,22 @@ fn room(silhouette: &Silhouette, axis: [f32; 2], [from, to]: [f32; 2]) -> [f32; 
     let ends = [contour[0], contour[contour.len() - 1]].map(|p| p[0] * axis[0] + p[1] * axis[1]);
     let far_is_high = from + to >= 0.0;
     [false, true].map(|high| {
-        let at = |x: f32| if high { x > to - reach } else { x < from + reach };
+        let at = |x: f32| {
+            if high {
+                x > to - reach
+            } else {
+                x < from + reach
+            }
+        };
         let nearer = if high { -axis[1] } else { axis[1] };
         let (mut room, mut shown) = (0.0f32, false);
         for (x, step) in ends.into_iter().zip(silhouette.hidden) {
             if at(x) && step > 0.0 {
-                room = room.max(if nearer > 0.05 { step / nearer } else { f32::INFINITY });
+                room = room.max(if nearer > 0.05 {
+                    step / nearer
+                } else {
+                    f32::INFINITY
+                });
             }
             shown |= at(x) && step == 0.0;
         }
@@ -262,8 +272,12 @@ fn completed(
     if largest < SLIVER && hidden {
         return None;
     }
-    // A car from behind is as wide as a container; it is higher.
-    let small = if hidden || silhouette.top > 1.35 { SMALL } else { SHORTEST[1] };
+    // A car from behind is as wide as a container; it is higher. Of what is hidden there is more.
+    let small = match (hidden, silhouette.top > 1.35) {
+        (true, _) => SLIVER,
+        (false, true) => SMALL,
+        (false, false) => SHORTEST[1],
+    };
     if largest < small || silhouette.top < 0.9 {
         return Some(size.map(|s| s.max(THIN)));
     }

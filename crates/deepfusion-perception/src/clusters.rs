@@ -62,7 +62,11 @@ impl Gaps {
     }
 
     fn limit(&self, side: f32, z: f32, step: f32) -> f32 {
-        let grazing = if side > EDGE_ON { z * z * step / side } else { 0.0 };
+        let grazing = if side > EDGE_ON {
+            z * z * step / side
+        } else {
+            0.0
+        };
         (1.3 * grazing).min(1.2) + 2.0 * self.error * z
     }
 }
@@ -90,8 +94,23 @@ pub fn clusters(
     for v in 0..rays.y.len() {
         let first = runs.len();
         let row = v * width..(v + 1) * width;
-        find_runs(v, &depth[row.clone()], &obstacles.height[row], rays, &gaps, &mut runs);
+        find_runs(
+            v,
+            &depth[row.clone()],
+            &obstacles.height[row],
+            rays,
+            &gaps,
+            &mut runs,
+        );
         parent.extend(first as u32..runs.len() as u32);
+        join_behind(
+            &depth[v * width..(v + 1) * width],
+            rays,
+            &gaps,
+            &runs[first..],
+            first,
+            &mut parent,
+        );
         join_rows(depth, width, rays, &gaps, &runs, above, first, &mut parent);
         above = first..runs.len();
     }
@@ -132,6 +151,44 @@ fn find_runs(
             from,
             to: depth.len() as u32,
         });
+    }
+}
+
+/// Widest thing before a surface that does not cut it in two, metres: a lamp post, a sign.
+const POST_M: f32 = 0.7;
+
+/// Joins the runs of a row that go on, at the same depth, behind a narrow thing that stands nearer.
+fn join_behind(
+    depth: &[f32],
+    rays: &Rays,
+    gaps: &Gaps,
+    runs: &[Run],
+    first: usize,
+    parent: &mut [u32],
+) {
+    for (i, run) in runs.iter().enumerate() {
+        let end = run.to as usize;
+        let z = depth[end - 1];
+        for (j, next) in runs.iter().enumerate().skip(i + 1) {
+            let start = next.from as usize;
+            if (rays.x[start] - rays.x[end - 1]) * z > POST_M {
+                break;
+            }
+            let beyond = depth[start];
+            let limit = 0.15 + 2.0 * gaps.across(rays.x[end] * z, z.min(beyond));
+            let hidden = || {
+                depth[end..start]
+                    .iter()
+                    .all(|d| *d > 0.0 && *d < z.min(beyond) - 0.4)
+            };
+            if start > end && (beyond - z).abs() < limit && hidden() {
+                let (a, b) = (
+                    root(parent, (first + i) as u32),
+                    root(parent, (first + j) as u32),
+                );
+                parent[a.max(b) as usize] = a.min(b);
+            }
+        }
     }
 }
 

@@ -166,7 +166,10 @@ mod tests {
     #[test]
     fn the_nearest_is_told_and_a_standing_car_meets_what_comes() {
         let vehicle = VehicleShape::default();
-        let two = [target(1, 0.0, 30.0, [0.0; 3]), target(2, 0.2, 18.0, [0.0; 3])];
+        let two = [
+            target(1, 0.0, 30.0, [0.0; 3]),
+            target(2, 0.2, 18.0, [0.0; 3]),
+        ];
         assert_eq!(time_to_collision(&two, 8.0, 0.0, &vehicle).unwrap().id, 2);
         let coming = [target(3, 0.0, 30.0, [0.0, 0.0, -10.0])];
         let met = time_to_collision(&coming, 0.0, 0.0, &vehicle).unwrap();

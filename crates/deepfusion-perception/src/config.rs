@@ -21,6 +21,8 @@ pub struct PerceptionConfig {
     pub min_pixels: f32,
     /// Least confidence of a target that is told; tracks below it go on in silence.
     pub min_confidence: f64,
+    /// Frames in which a target must have been seen before it is told.
+    pub confirm_frames: u32,
     /// Standard deviation of a disparity over itself: 0.01 says that a depth of 30 m is good to 30 cm for each
     /// of its pixels. Exact depth: 0. It widens the gaps that a cluster may bridge.
     pub relative_error: f32,
@@ -42,8 +44,11 @@ impl PerceptionConfig {
     #[must_use]
     pub fn predicted() -> Self {
         Self {
-            relative_error: 0.01,
-            edge_jump: 0.04,
+            min_pixels: 100.0,
+            min_confidence: 0.4,
+            confirm_frames: 2,
+            relative_error: 0.03,
+            edge_jump: 0.025,
             ..Self::default()
         }
     }
@@ -61,6 +66,7 @@ impl Default for PerceptionConfig {
             max_footprint_m: [13.0, 3.5],
             min_pixels: 30.0,
             min_confidence: 0.2,
+            confirm_frames: 1,
             relative_error: 0.0,
             edge_jump: 0.0,
             edge_radius: 3.0,

@@ -22,9 +22,8 @@ pub fn flying_pixels(depth: &[f32], width: usize, radius: usize, jump: f32) -> V
             if z <= 0.0 {
                 continue;
             }
-            let across = u >= radius
-                && u + radius < width
-                && between(row[u - radius], z, row[u + radius]);
+            let across =
+                u >= radius && u + radius < width && between(row[u - radius], z, row[u + radius]);
             let down = v >= radius
                 && v + radius < height
                 && between(

@@ -53,8 +53,8 @@ impl FreeSpace {
     fn index(&self, right_m: f32, forward_m: f32) -> Option<usize> {
         let column = (right_m / self.cell_m + 0.5 * self.width as f32).floor();
         let row = (forward_m / self.cell_m).floor();
-        let inside = (0.0..self.width as f32).contains(&column)
-            && (0.0..self.length as f32).contains(&row);
+        let inside =
+            (0.0..self.width as f32).contains(&column) && (0.0..self.length as f32).contains(&row);
         inside.then(|| row as usize * self.width + column as usize)
     }
 

@@ -67,7 +67,11 @@ impl Ground {
         config: &PerceptionConfig,
     ) -> Option<Self> {
         let samples = Sample::take(depth, rays, config);
-        let level: Vec<Sample> = samples.iter().filter(|s| s.is_level(config)).copied().collect();
+        let level: Vec<Sample> = samples
+            .iter()
+            .filter(|s| s.is_level(config))
+            .copied()
+            .collect();
         let best = consensus(&samples, &level, before, config)?;
         let plane = refine(&level, best);
         let (up, height) = plane_of(&plane)?;
@@ -174,17 +178,28 @@ impl Sample {
         let mut samples = Vec::with_capacity(2 * SAMPLES);
         // Some rows apart, so that the depth's rounding does not drown the gain.
         let apart = (height / 60).max(1);
-        for (row, v) in (first..height.saturating_sub(apart)).step_by(step).enumerate() {
+        for (row, v) in (first..height.saturating_sub(apart))
+            .step_by(step)
+            .enumerate()
+        {
             // Every row starts elsewhere, so that a pattern in the image does not meet the grid.
             for u in ((row * 7) % step..width).step_by(step) {
-                let (z, below) = (depth[v * width + u], depth[(v + apart) * width + u]);
+                let at = |v: usize| depth[v * width + u];
+                let z = at(v);
                 if z > 0.0 && z <= config.max_depth_m {
-                    let gain = (1.0 / below - 1.0 / z) / (rays.y[v + apart] - rays.y[v]);
+                    let gain = |upper: usize, lower: usize| {
+                        let (a, b) = (at(upper), at(lower));
+                        let known = a > 0.0 && b > 0.0;
+                        known.then(|| (1.0 / b - 1.0 / a) / (rays.y[lower] - rays.y[upper]))
+                    };
+                    // Level above and below: the foot of a wall is not ground.
+                    let below = gain(v, v + apart).unwrap_or(0.0);
+                    let above = v.checked_sub(apart).and_then(|upper| gain(upper, v));
                     samples.push(Self {
                         ray: [rays.x[u], rays.y[v]],
                         disparity: 1.0 / z,
                         depth: z,
-                        gain: if below > 0.0 { gain } else { 0.0 },
+                        gain: above.map_or(below, |above| above.min(below)),
                     });
                 }
             }
@@ -219,8 +234,12 @@ type DisparityPlane = Vector3<f32>;
 fn plane_of(plane: &DisparityPlane) -> Option<([f32; 3], f32)> {
     let norm = plane.norm();
     // plane·p = 1 on the plane, and the camera (p = 0) is above it: up = −plane / |plane|.
-    (norm > 1e-3 && norm.is_finite())
-        .then(|| ([-plane.x / norm, -plane.y / norm, -plane.z / norm], 1.0 / norm))
+    (norm > 1e-3 && norm.is_finite()).then(|| {
+        (
+            [-plane.x / norm, -plane.y / norm, -plane.z / norm],
+            1.0 / norm,
+        )
+    })
 }
 
 fn consensus(
@@ -291,8 +310,8 @@ fn refine(level: &[Sample], mut plane: DisparityPlane) -> DisparityPlane {
             }
             let aside = sample.ray[0] * sample.depth / 3.0;
             // Residuals in metres: disparity residual × depth × camera height.
-            let weight = (1.0 - x * x).powi(2) * (sample.depth / tolerance).powi(2)
-                / (1.0 + aside.powi(4));
+            let weight =
+                (1.0 - x * x).powi(2) * (sample.depth / tolerance).powi(2) / (1.0 + aside.powi(4));
             let ray = Vector3::new(sample.ray[0], sample.ray[1], 1.0);
             normal += weight * ray * ray.transpose();
             right += weight * sample.disparity * ray;

@@ -107,7 +107,8 @@ impl Perception {
             self.obstacles.height.clear();
             return Ok(Surroundings::default());
         };
-        self.obstacles.find(&depth.data, rays, &ground, &self.config);
+        self.obstacles
+            .find(&depth.data, rays, &ground, &self.config);
         let detections = detect(&depth.data, &self.obstacles, rays, &ground, &self.config);
         let mut targets = match stamp {
             Some(stamp) => self.tracker.step(

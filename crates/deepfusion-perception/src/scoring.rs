@@ -188,7 +188,9 @@ impl Scorer {
         }
         let neither = |target: &Target| {
             target.distance_m > self.rules.max_distance_m
-                || labels.iter().any(|l| !counts(l) && l.covers(target.center_m))
+                || labels
+                    .iter()
+                    .any(|l| !counts(l) && l.covers(target.center_m))
         };
         let false_targets: Vec<usize> = (0..targets.len())
             .filter(|j| !used[*j] && !neither(&targets[*j]))

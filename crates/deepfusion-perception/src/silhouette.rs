@@ -9,6 +9,8 @@ use crate::{Ground, PerceptionConfig, Rays};
 pub struct Silhouette {
     /// Of each column the near end: (right, forward) in metres, from left to right.
     pub contour: Vec<[f32; 2]>,
+    /// Of each of those columns the highest point's height, metres.
+    pub tops: Vec<f32>,
     /// A sample of all points, (right, forward, height) in metres.
     pub points: Vec<[f32; 3]>,
     /// Height of its top, metres.
@@ -55,7 +57,8 @@ impl Silhouette {
                 let index = run.v as usize * width + u as usize;
                 columns[(u - left) as usize].push((depth[index], run.v));
                 heights.push(obstacles.height[index]);
-                if place % stride == 0 {
+                // Scattered: an even stride would meet the same columns in every row.
+                if scatter(place) % stride == 0 {
                     let p = rays.point(u as usize, run.v as usize, depth[index]);
                     silhouette.points.push(ground.locate(p));
                 }
@@ -73,11 +76,14 @@ impl Silhouette {
             if pixels.is_empty() {
                 continue;
             }
-            above.look(left as usize + column, pixels[0], depth, rays, ground, config);
+            let u = left as usize + column;
+            let top = obstacles.height[pixels[0].1 as usize * width + u];
+            above.look(u, pixels[0], depth, rays, ground, config);
             let nearest = pixels.len() / NEAR_SHARE;
             let (_, (z, v), _) = pixels.select_nth_unstable_by(nearest, |a, b| a.0.total_cmp(&b.0));
             let p = ground.locate(rays.point(left as usize + column, *v as usize, *z));
             silhouette.contour.push([p[0], p[1]]);
+            silhouette.tops.push(top);
             depths.push(*z);
         }
         depths.sort_unstable_by(f32::total_cmp);
@@ -87,6 +93,11 @@ impl Silhouette {
         silhouette.hidden = hidden_ends(cluster, depth, width, left, right);
         silhouette
     }
+}
+
+/// A number that looks like chance, the same for the same place.
+fn scatter(place: usize) -> usize {
+    ((place as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as usize
 }
 
 /// What goes on above a cluster, past the height up to which pixels are joined.
@@ -141,7 +152,11 @@ impl Above {
         let mut tops = self.tops.clone();
         tops.sort_unstable_by(f32::total_cmp);
         let place = self.columns / 4;
-        if tops.len() > place { tops[tops.len() - 1 - place] } else { 0.0 }
+        if tops.len() > place {
+            tops[tops.len() - 1 - place]
+        } else {
+            0.0
+        }
     }
 }
 
@@ -157,7 +172,11 @@ fn hidden_ends(cluster: &Cluster, depth: &[f32], width: usize, left: u32, right:
             };
             let (there, here) = (depth[row + u], depth[row + edge as usize]);
             let step = here - there;
-            if there > 0.0 && step > 0.4 + 0.01 * here { step } else { 0.0 }
+            if there > 0.0 && step > 0.4 + 0.01 * here {
+                step
+            } else {
+                0.0
+            }
         };
         if run.from <= left + reach {
             steps[0].push(step((run.from as usize).checked_sub(1), run.from));

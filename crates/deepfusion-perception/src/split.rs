@@ -19,6 +19,8 @@ const ABREAST_PIECE_M: f32 = 0.2;
 const SHORTEST: f32 = 3.0;
 /// See [`SHORTEST`].
 const PITCH: f32 = 5.4;
+/// Share of the height from which on there is no gap.
+const LEVEL: f32 = 0.85;
 /// Length of a piece of the height profile, metres.
 const PIECE_M: f32 = 0.25;
 
@@ -33,7 +35,7 @@ pub fn split(
     ground: &Ground,
 ) -> Option<[Cluster; 2]> {
     let [length, width] = [0, 1].map(|i| place.footprint[i] * place.seen[i]);
-    if silhouette.top > HIGHEST {
+    if is_high_throughout(silhouette, place) {
         return None;
     }
     let (sin, cos) = place.angle.sin_cos();
@@ -42,7 +44,7 @@ pub fn split(
         (across, emptiest(silhouette, across)?)
     } else if length > LONGEST && width < WIDEST {
         let along = [cos, sin];
-        (along, best_cut(silhouette, |p| dot(along, p))?)
+        (along, best_cut(silhouette, along)?)
     } else {
         return None;
     };
@@ -71,6 +73,22 @@ pub fn split(
     halves.iter().all(|half| half.pixels > 0).then_some(halves)
 }
 
+/// Whether hardly any of it is as low as a car: a lorry, a wall.
+fn is_high_throughout(silhouette: &Silhouette, place: &GroundBox) -> bool {
+    if silhouette.top <= HIGHEST {
+        return false;
+    }
+    let (sin, cos) = place.angle.sin_cos();
+    let mut tops = std::collections::BTreeMap::new();
+    for (p, height) in silhouette.contour.iter().zip(&silhouette.tops) {
+        let piece = ((cos * p[0] + sin * p[1]) / PIECE_M).floor() as i32;
+        let top = tops.entry(piece).or_insert(0.0f32);
+        *top = top.max(*height);
+    }
+    let high = tops.values().filter(|top| **top > 0.85 * HIGHEST).count();
+    4 * high > 3 * tops.len()
+}
+
 fn dot(axis: [f32; 2], p: [f32; 3]) -> f32 {
     axis[0] * p[0] + axis[1] * p[1]
 }
@@ -91,8 +109,10 @@ fn emptiest(silhouette: &Silhouette, axis: [f32; 2]) -> Option<f32> {
 }
 
 /// Where the row is lowest, between cars of a usual length.
-fn best_cut(silhouette: &Silhouette, along: impl Fn([f32; 3]) -> f32) -> Option<f32> {
-    let places: Vec<(f32, f32)> = silhouette.points.iter().map(|p| (along(*p), p[2])).collect();
+fn best_cut(silhouette: &Silhouette, axis: [f32; 2]) -> Option<f32> {
+    let along = |p: &[f32; 2]| p[0] * axis[0] + p[1] * axis[1];
+    let columns = silhouette.contour.iter().map(along);
+    let places: Vec<(f32, f32)> = columns.zip(silhouette.tops.iter().copied()).collect();
     let from = places.iter().map(|p| p.0).fold(f32::INFINITY, f32::min);
     let to = places.iter().map(|p| p.0).fold(f32::NEG_INFINITY, f32::max);
     let length = to - from;
@@ -106,12 +126,14 @@ fn best_cut(silhouette: &Silhouette, along: impl Fn([f32; 3]) -> f32) -> Option<
     (piece(SHORTEST)..tops.len().saturating_sub(piece(SHORTEST)))
         .map(|i| {
             let x = (i as f32 + 0.5) * PIECE_M;
-            let low = tops[i] / silhouette.top;
+            let low = tops[i] / silhouette.top.min(HIGHEST);
             // Distance from the nearest even division.
             let share = x / length * cars;
             let uneven = (share - share.round()).abs() * length / cars;
-            (low + 0.15 * uneven, from + x)
+            (low + 0.15 * uneven, low, from + x)
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, cut)| cut)
+        // A wall or a hedge is as high there as anywhere.
+        .filter(|(_, low, _)| *low < LEVEL)
+        .map(|(_, _, cut)| cut)
 }

@@ -85,19 +85,22 @@ impl Traffic {
         road: &'a Road,
         time_s: f64,
     ) -> impl Iterator<Item = (usize, &'a MovingCar, [f64; 3], f64)> {
-        self.cars.iter().enumerate().filter_map(move |(index, car)| {
-            let s = car.s + car.speed * time_s;
-            if s < road.start + 5.0 || s > road.end() - 5.0 {
-                return None;
-            }
-            let (x, y, heading) = road.world(s, car.lateral);
-            let turn = if car.speed > 0.0 {
-                0.0
-            } else {
-                std::f64::consts::PI
-            };
-            Some((index, car, [x, y, 0.0], heading + turn))
-        })
+        self.cars
+            .iter()
+            .enumerate()
+            .filter_map(move |(index, car)| {
+                let s = car.s + car.speed * time_s;
+                if s < road.start + 5.0 || s > road.end() - 5.0 {
+                    return None;
+                }
+                let (x, y, heading) = road.world(s, car.lateral);
+                let turn = if car.speed > 0.0 {
+                    0.0
+                } else {
+                    std::f64::consts::PI
+                };
+                Some((index, car, [x, y, 0.0], heading + turn))
+            })
     }
 
     /// Their solids at a time.

@@ -59,7 +59,9 @@ impl Kalman {
         let off = place - self.place();
         self.innovation(noise)
             .try_inverse()
-            .map_or(f64::INFINITY, |inverse| (off.transpose() * inverse * off)[0])
+            .map_or(f64::INFINITY, |inverse| {
+                (off.transpose() * inverse * off)[0]
+            })
     }
 
     fn innovation(&self, noise: &Matrix2<f64>) -> Matrix2<f64> {
@@ -81,7 +83,9 @@ impl Kalman {
         let v = self.velocity();
         let direction = v.try_normalize(1e-9).unwrap_or_else(Vector2::x);
         let part = self.covariance.fixed_view::<2, 2>(2, 2);
-        (direction.transpose() * part * direction)[0].max(0.0).sqrt()
+        (direction.transpose() * part * direction)[0]
+            .max(0.0)
+            .sqrt()
     }
 }
 
@@ -95,7 +99,8 @@ mod tests {
         let truth = Vector2::new(-3.0, 9.0);
         let at = |i: i32| Vector2::new(2.0, 20.0) + truth * 0.1 * f64::from(i);
         // A fixed pattern of errors about as large as the noise says.
-        let error = |i: i32| Vector2::new((f64::from(i) * 2.1).sin(), (f64::from(i) * 1.3).cos()) * 0.2;
+        let error =
+            |i: i32| Vector2::new((f64::from(i) * 2.1).sin(), (f64::from(i) * 1.3).cos()) * 0.2;
         let mut filter = Kalman::new(at(0) + error(0), &noise);
         for i in 1..=10 {
             filter.predict(0.1);
@@ -103,7 +108,11 @@ mod tests {
         }
         let off = (filter.velocity() - truth).norm();
         assert!(off < 0.6, "{off}");
-        assert!(off < 3.0 * filter.speed_deviation(), "{}", filter.speed_deviation());
+        assert!(
+            off < 3.0 * filter.speed_deviation(),
+            "{}",
+            filter.speed_deviation()
+        );
         assert!((filter.place() - at(10)).norm() < 0.2);
     }
 

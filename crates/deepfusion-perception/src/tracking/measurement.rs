@@ -26,7 +26,8 @@ impl<'a> Measurement<'a> {
         let (sin, cos) = detection.place.angle.sin_cos();
         let along = |i: usize| f64::from(cos * ground.right[i] + sin * ground.forward[i]);
         let along = world_from_cam.rotate(&Vector3::new(along(0), along(1), along(2)));
-        let [length, width] = [0, 1].map(|i| detection.place.footprint[i] * detection.place.seen[i]);
+        let [length, width] =
+            [0, 1].map(|i| detection.place.footprint[i] * detection.place.seen[i]);
         Self {
             index,
             detection,
@@ -50,9 +51,14 @@ impl<'a> Measurement<'a> {
     /// error, and by what had to be completed.
     pub fn noise(&self, config: &PerceptionConfig) -> Matrix2<f64> {
         let place = &self.detection.place;
-        let ray = self.world_from_cam.rotate(&Vector3::from(std::array::from_fn(|i| {
-            f64::from(place.middle[0] * self.ground.right[i] + place.middle[1] * self.ground.forward[i])
-        })));
+        let ray = self
+            .world_from_cam
+            .rotate(&Vector3::from(std::array::from_fn(|i| {
+                f64::from(
+                    place.middle[0] * self.ground.right[i]
+                        + place.middle[1] * self.ground.forward[i],
+                )
+            })));
         let ray = Vector2::new(ray.x, ray.z);
         let distance = ray.norm().max(1.0);
         let ray = ray / distance;
@@ -60,8 +66,8 @@ impl<'a> Measurement<'a> {
             .map(|i| f64::from(place.footprint[i] * (1.0 - place.seen[i])))
             .sum();
         let across = 0.1 + 0.004 * distance + 0.1 * unseen;
-        // Neighbouring pixels err together: an object's mean is hardly better than a fifth of one of its pixels.
-        let along = across.hypot(0.2 * f64::from(config.relative_error) * distance);
+        // An object's pixels err together: their mean is no better than one of them.
+        let along = across.hypot(f64::from(config.relative_error) * distance);
         Matrix2::identity() * across.powi(2)
             + ray * ray.transpose() * (along.powi(2) - across.powi(2))
     }

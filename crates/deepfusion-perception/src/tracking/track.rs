@@ -117,7 +117,10 @@ impl Track {
         // An extent that was measured now counts as much as all that was known before.
         let extent = |i: usize, k: usize| {
             let mut mean = self.size[k];
-            mean.add(f64::from(place.footprint[i]), weight_of(place.seen[i]) * 4.0);
+            mean.add(
+                f64::from(place.footprint[i]),
+                weight_of(place.seen[i]) * 4.0,
+            );
             mean.value
         };
         let extents = if crossed {
@@ -191,7 +194,8 @@ impl Track {
         let half = [0, 1].map(|i| 0.5 * self.size[i].value);
         [[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]].map(|[a, b]| {
             let (along, across) = (a * half[0], b * half[1]);
-            self.centre() + Vector3::new(cos * along - sin * across, 0.0, sin * along + cos * across)
+            self.centre()
+                + Vector3::new(cos * along - sin * across, 0.0, sin * along + cos * across)
         })
     }
 

@@ -72,6 +72,7 @@ impl Tracker {
         });
         self.tracks
             .iter()
+            .filter(|track| track.hits >= config.confirm_frames)
             .filter(|track| track.seen.is_some() || whereabouts(track) != Whereabouts::OutOfView)
             .map(|track| track.target(&cam_from_world))
             .filter(|target| target.center_m[2] > 0.0 && target.confidence >= config.min_confidence)
@@ -92,7 +93,8 @@ impl Tracker {
                 let (deviations2, metres2) = track.distance2(measurement, &noises[j]);
                 if deviations2 < GATE.0 && metres2 < GATE.1 * GATE.1 {
                     // Old tracks first where two are about as near: they know more.
-                    let cost = deviations2 + metres2 + if track.hits < CONFIRMED { 2.0 } else { 0.0 };
+                    let cost =
+                        deviations2 + metres2 + if track.hits < CONFIRMED { 2.0 } else { 0.0 };
                     pairs.push((cost, i, j));
                 }
             }
@@ -147,7 +149,11 @@ impl Whereabouts {
                 let corner = cam_from_world.transform(corner);
                 corner.z > 0.5 && (1..width).contains(&column(&corner))
             });
-            return if partly { Self::Hidden } else { Self::OutOfView };
+            return if partly {
+                Self::Hidden
+            } else {
+                Self::OutOfView
+            };
         }
         let z = f64::from(now.depth[v * width + u]);
         if z > 0.0 && z < centre.z - track.reach() {

@@ -28,7 +28,8 @@ pub fn birds_eye(
     let mut picture = RgbImage::from_pixel(width, height, PAPER);
     let scale = f64::from(height) / ahead_m;
     let middle = 0.5 * f64::from(width);
-    let pixel = |right: f64, forward: f64| [middle + right * scale, f64::from(height) - forward * scale];
+    let pixel =
+        |right: f64, forward: f64| [middle + right * scale, f64::from(height) - forward * scale];
     if let Some(space) = free_space {
         for (x, y, p) in picture.enumerate_pixels_mut() {
             let right = (f64::from(x) - middle) / scale;
@@ -45,7 +46,13 @@ pub fn birds_eye(
         let [_, y] = pixel(0.0, forward);
         line(&mut picture, [0.0, y], [f64::from(width), y], 1, GRID);
         let at = (2, y as i32 + 2);
-        draw_text(&mut picture, &format!("{forward} m"), at, TextSize::Small, INK);
+        draw_text(
+            &mut picture,
+            &format!("{forward} m"),
+            at,
+            TextSize::Small,
+            INK,
+        );
     }
     let on_ground = |p: [f64; 3]| {
         let [right, forward, _] = ground.locate(p.map(|x| x as f32));
@@ -63,12 +70,24 @@ pub fn birds_eye(
             line(&mut picture, centre, on_ground(there), 2, colour);
         }
         let at = (centre[0] as i32 + 4, centre[1] as i32 - 5);
-        draw_text(&mut picture, &target.id.to_string(), at, TextSize::Small, INK);
+        draw_text(
+            &mut picture,
+            &target.id.to_string(),
+            at,
+            TextSize::Small,
+            INK,
+        );
     }
     // The camera's own place, a wedge that looks up.
     let foot = pixel(0.0, 0.0);
     for side in [-1.0, 1.0] {
-        line(&mut picture, [foot[0], foot[1] - 12.0], [foot[0] + side * 6.0, foot[1]], 2, INK);
+        line(
+            &mut picture,
+            [foot[0], foot[1] - 12.0],
+            [foot[0] + side * 6.0, foot[1]],
+            2,
+            INK,
+        );
     }
     picture
 }

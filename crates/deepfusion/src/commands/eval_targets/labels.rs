@@ -64,7 +64,11 @@ impl Labels {
             label.counts = counts(&label, &tracklet.object, seen, least);
             Some(label)
         };
-        self.tracklets.iter().enumerate().filter_map(of_tracklet).collect()
+        self.tracklets
+            .iter()
+            .enumerate()
+            .filter_map(of_tracklet)
+            .collect()
     }
 
     /// Centre of a tracklet's box in a frame's camera, and its rotation_y.

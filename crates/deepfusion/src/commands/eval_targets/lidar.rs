@@ -50,9 +50,16 @@ mod tests {
             height: 100,
         };
         let (coarse, k) = gathered(&scan, &k);
-        assert_eq!((k.width as usize, k.height as usize), (coarse.width, coarse.height));
+        assert_eq!(
+            (k.width as usize, k.height as usize),
+            (coarse.width, coarse.height)
+        );
         let lower = &coarse.data[coarse.data.len() / 2 + coarse.width..];
         let full = lower.iter().filter(|d| **d > 0.0).count();
-        assert!(full as f64 > 0.9 * lower.len() as f64, "{full} of {}", lower.len());
+        assert!(
+            full as f64 > 0.9 * lower.len() as f64,
+            "{full} of {}",
+            lower.len()
+        );
     }
 }

@@ -18,8 +18,8 @@ use deepfusion_train::Predictor;
 use serde::Serialize;
 
 use self::labels::Labels;
-use super::perceive::scene::{MotionTracker, working_depth};
 use super::perceive::read_config;
+use super::perceive::scene::{MotionTracker, working_depth};
 use crate::cli::{EvalTargetsArgs, TargetDepth};
 use crate::error::CliError;
 use crate::progress::Progress;

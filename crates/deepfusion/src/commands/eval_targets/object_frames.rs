@@ -86,11 +86,16 @@ fn frame(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
     };
     let text = std::fs::read_to_string(labels).map_err(|e| Error::file(labels, e))?;
     let mut found = Vec::new();
-    for (number, line) in text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty()) {
-        let (class, mut label) = parse(line, number as u64, &offset).ok_or_else(|| Error::Config {
-            path: labels.to_owned(),
-            problem: format!("line {}: not a label of 15 fields", number + 1),
-        })?;
+    for (number, line) in text
+        .lines()
+        .enumerate()
+        .filter(|(_, l)| !l.trim().is_empty())
+    {
+        let (class, mut label) =
+            parse(line, number as u64, &offset).ok_or_else(|| Error::Config {
+                path: labels.to_owned(),
+                problem: format!("line {}: not a label of 15 fields", number + 1),
+            })?;
         if class == "DontCare" {
             continue;
         }
@@ -166,7 +171,8 @@ mod tests {
 
     #[test]
     fn a_label_is_read_and_a_short_one_is_not() {
-        let line = "Car 0.00 1 -1.57 599.41 156.40 629.75 189.25 2.85 2.63 12.34 0.47 1.49 69.44 -1.56";
+        let line =
+            "Car 0.00 1 -1.57 599.41 156.40 629.75 189.25 2.85 2.63 12.34 0.47 1.49 69.44 -1.56";
         let (class, label) = parse(line, 3, &Vector3::new(0.06, 0.0, 0.0)).unwrap();
         assert_eq!((class, label.object), ("Car", 3));
         assert_eq!(label.size_m, [12.34, 2.63, 2.85]);

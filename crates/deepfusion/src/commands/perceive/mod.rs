@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use deepfusion_perception::{Perception, PerceptionConfig, VehicleShape, time_to_collision};
-use deepfusion_train::{PreparedImage, Predictor};
+use deepfusion_train::{Predictor, PreparedImage};
 
 use self::pictures::Picture;
 use self::record::{FrameRecord, Lines};
@@ -67,8 +67,7 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
 /// Settings from a file over `base`.
 pub fn read_config(path: Option<&Path>, base: PerceptionConfig) -> Result<PerceptionConfig> {
     let Some(path) = path else { return Ok(base) };
-    let text =
-        std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
+    let text = std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
     let named = || path.display().to_string();
     let mut table = toml::Table::try_from(&base).with_context(named)?;
     table.extend(text.parse::<toml::Table>().with_context(named)?);
@@ -201,15 +200,23 @@ impl Work<'_> {
         for (save, picture) in &found.pictures {
             picture.save(&pictures::path(out, &input.name, *save))?;
         }
-        if input.frame.as_ref().is_some_and(|(dataset, index)| {
-            dataset.frames()[*index].image.file().is_none()
-        }) {
-            pictures::save_jpeg(&found.loaded.image, &out.join(format!("{}_image.jpg", input.name)))?;
+        if input
+            .frame
+            .as_ref()
+            .is_some_and(|(dataset, index)| dataset.frames()[*index].image.file().is_none())
+        {
+            pictures::save_jpeg(
+                &found.loaded.image,
+                &out.join(format!("{}_image.jpg", input.name)),
+            )?;
         }
         self.job.write(input, &found.loaded, &found.seen)?;
         found.record.write(&record_path(out, &input.name))?;
         let line = found.record.line()?;
-        self.lines.lock().unwrap_or_else(|e| e.into_inner()).add(&line)?;
+        self.lines
+            .lock()
+            .unwrap_or_else(|e| e.into_inner())
+            .add(&line)?;
         if self.args.json {
             output::print(&line)?;
         }
@@ -258,4 +265,3 @@ impl Work<'_> {
         Ok(())
     }
 }
-

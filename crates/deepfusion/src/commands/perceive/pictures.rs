@@ -40,7 +40,13 @@ pub fn draw(
         PerceiveSave::BirdsEye => surroundings.ground.as_ref().map(|ground| {
             let mut space = FreeSpace::new(GRID.0, GRID.1);
             let rays = Rays::of(k);
-            space.fill(&depth.data, perception.obstacles(), &rays, ground, perception.config());
+            space.fill(
+                &depth.data,
+                perception.obstacles(),
+                &rays,
+                ground,
+                perception.config(),
+            );
             let ahead_m = f64::from(GRID.1);
             Picture::Image(birds_eye(ground, Some(&space), targets, ahead_m, BIRDS_EYE))
         }),

@@ -81,10 +81,12 @@ impl MotionTracker {
         // The first frame of a recording whose motion is known begins a way.
         let known = dataset.track().is_some() && dataset.yaw_known();
         let world_from_cam = step.map(|(pose, ..)| pose).or(known.then(Se3::identity));
-        let stamp = world_from_cam.zip(frame.time_s).map(|(world_from_cam, time_s)| Stamp {
-            time_s,
-            world_from_cam,
-        });
+        let stamp = world_from_cam
+            .zip(frame.time_s)
+            .map(|(world_from_cam, time_s)| Stamp {
+                time_s,
+                world_from_cam,
+            });
         if let Some(stamp) = stamp {
             self.last = Some((dataset.clone(), index, stamp.world_from_cam));
         }

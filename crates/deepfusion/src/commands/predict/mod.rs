@@ -188,13 +188,17 @@ impl<'a> Job<'a> {
         // Before it is read: a change in between is then noticed by the next run.
         let mark = FileMark::of(&input.path)?;
         let (image, camera) = match &input.frame {
-            Some((dataset, index)) => {
-                (dataset.load_image(*index)?, Some(dataset.intrinsics(*index)))
-            }
+            Some((dataset, index)) => (
+                dataset.load_image(*index)?,
+                Some(dataset.intrinsics(*index)),
+            ),
             None => {
                 let image = load_rgb(&input.path)?;
                 let camera = self.camera.of(image.width(), image.height());
-                (image, camera.with_context(|| input.path.display().to_string())?)
+                (
+                    image,
+                    camera.with_context(|| input.path.display().to_string())?,
+                )
             }
         };
         let (correct, crop) = (!self.args.no_focal_correction, !self.args.stretch);

@@ -1,0 +1,36 @@
+//! Simulated drives, whose boxes are known exactly: the bounds that the project holds itself to.
+
+mod common;
+
+use deepfusion_sim::{Scene, SimConfig};
+
+fn drive(scene: Scene, seed: u64) -> SimConfig {
+    SimConfig {
+        scene,
+        seed,
+        frames: 30,
+        moving_cars: 6,
+        ..SimConfig::default()
+    }
+}
+
+/// On many streets (`deepfusion eval-targets --depth truth`, docs/BENCHMARKS.md) both are above 0.9; these few are a sample.
+#[test]
+fn targets_of_true_depth_are_where_the_simulator_put_them() {
+    let drives = [
+        drive(Scene::Urban, 6),
+        drive(Scene::Urban, 24),
+        drive(Scene::Park, 31),
+        drive(Scene::Commercial, 32),
+    ];
+    let score = common::score(&drives);
+    assert!(score.labels > 500, "{score:?}");
+    assert!(score.recall.unwrap() >= 0.9, "{score:?}");
+    assert!(score.precision.unwrap() >= 0.9, "{score:?}");
+    assert!(score.center_error_m.unwrap() <= 0.5, "{score:?}");
+    assert!(score.yaw_error_deg.unwrap() <= 10.0, "{score:?}");
+    assert!(score.velocities > 100, "{score:?}");
+    assert!(score.velocity_error_mps.unwrap() <= 0.5, "{score:?}");
+    assert!(score.motion_accuracy.unwrap() >= 0.95, "{score:?}");
+    assert!(score.identity_switches <= 6, "{score:?}");
+}
