@@ -42,6 +42,25 @@ impl DepthMap {
         }
     }
 
+    /// The map at another size: of each new pixel the old one at its middle. Nothing is averaged, which would put depths
+    /// between what is near and what is far.
+    #[must_use]
+    pub fn nearest(&self, width: usize, height: usize) -> Self {
+        let mut map = Self::empty(width, height);
+        if self.width == 0 || self.height == 0 {
+            return map;
+        }
+        let pick = |i: usize, to: usize, from: usize| ((2 * i + 1) * from / (2 * to)).min(from - 1);
+        let columns: Vec<usize> = (0..width).map(|x| pick(x, width, self.width)).collect();
+        for (y, row) in map.data.chunks_exact_mut(width.max(1)).enumerate() {
+            let from = pick(y, height, self.height) * self.width;
+            for (depth, x) in row.iter_mut().zip(&columns) {
+                *depth = self.data[from + x];
+            }
+        }
+        map
+    }
+
     /// How many pixels have a depth.
     #[must_use]
     pub fn count(&self) -> usize {
@@ -52,6 +71,23 @@ impl DepthMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn another_size_has_the_depths_of_the_pixels_at_its_middles() {
+        let map = DepthMap {
+            width: 4,
+            height: 2,
+            data: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0],
+        };
+        assert_eq!(map.nearest(4, 2), map);
+        assert_eq!(map.nearest(2, 1).data, [6.0, 8.0]);
+        assert_eq!(
+            map.nearest(8, 2).data[..8],
+            [1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 4.0, 4.0]
+        );
+        assert_eq!(DepthMap::empty(0, 0).nearest(2, 2).count(), 0);
+        assert_eq!(map.nearest(0, 0).data, []);
+    }
 
     #[test]
     fn the_nearest_depth_wins_in_any_order() {

@@ -10,8 +10,9 @@ use anyhow::Result;
 use burn::tensor::Device;
 use deepfusion_cloud::PointCloud;
 use deepfusion_data::{RgbImage, decode_rgb, resize_rgb, to_network_input};
-use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use deepfusion_nn::weights::collect;
+use deepfusion_perception::{Perception, PerceptionConfig, Stamp};
 use deepfusion_render::{DepthScale, depth_picture};
 use deepfusion_sim::{SimConfig, Simulation};
 use deepfusion_train::{DepthRunner, TrainConfig};
@@ -62,6 +63,7 @@ struct Stages {
     network: f64,
     depth: f64,
     cloud: f64,
+    targets: f64,
     colour: f64,
 }
 
@@ -108,6 +110,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
          network {:8.2}\n\
          depth   {:8.2}   disparity to metres\n\
          cloud   {:8.2}   coloured points\n\
+         targets {:8.2}   boxes and tracks from the picture's true depth\n\
          colour  {:8.2}   depth as a picture\n\
          all     {:8.2}   one after another: what an image waits\n\
          {:.1} frames a second, the stages of {} images overlapped; peak memory {memory}\n",
@@ -126,6 +129,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         s.network,
         s.depth,
         s.cloud,
+        s.targets,
         s.colour,
         report.latency_ms,
         report.fps,
@@ -164,7 +168,13 @@ fn network(args: &BenchArgs) -> Result<(String, TrainConfig, Arc<dyn DepthRunner
 
 impl Stages {
     fn sum(&self) -> f64 {
-        self.decode + self.resize + self.network + self.depth + self.cloud + self.colour
+        self.decode
+            + self.resize
+            + self.network
+            + self.depth
+            + self.cloud
+            + self.targets
+            + self.colour
     }
 }
 
@@ -173,6 +183,8 @@ struct Bench<'a> {
     runner: &'a dyn DepthRunner,
     jpeg: Vec<u8>,
     k: Intrinsics,
+    /// The picture's true depth at the network's size: a network with random weights sees no targets.
+    truth: DepthMap,
 }
 
 impl<'a> Bench<'a> {
@@ -183,13 +195,15 @@ impl<'a> Bench<'a> {
             height: PICTURE.1,
             ..SimConfig::default()
         })?;
+        let frame = street.frame(0);
         let mut jpeg = Vec::new();
-        JpegEncoder::new_with_quality(&mut jpeg, 92).encode_image(&street.frame(0).rgb)?;
+        JpegEncoder::new_with_quality(&mut jpeg, 92).encode_image(&frame.rgb)?;
         let (width, height) = (config.size.width as u32, config.size.height as u32);
         Ok(Self {
             runner,
             jpeg,
             k: street.intrinsics().resized(width, height),
+            truth: frame.depth.nearest(width as usize, height as usize),
         })
     }
 
@@ -232,9 +246,24 @@ impl<'a> Bench<'a> {
             network: median(repeats, || self.network(&input))?,
             depth: median(repeats, || Ok(self.depth(&disparity)))?,
             cloud: median(repeats, || self.cloud(&depth, &small))?,
+            targets: self.targets(repeats)?,
             colour: median(repeats, || {
                 Ok(depth_picture(&depth, &DepthScale::default()))
             })?,
+        })
+    }
+
+    /// Ground, boxes and tracks of a picture that is seen again and again.
+    fn targets(&self, repeats: usize) -> Result<f64> {
+        let mut perception = Perception::new(PerceptionConfig::default());
+        let mut time_s = 0.0;
+        median(repeats, || {
+            time_s += 0.1;
+            let stamp = Stamp {
+                time_s,
+                world_from_cam: Se3::identity(),
+            };
+            Ok(perception.look(&self.truth, &self.k, Some(stamp))?)
         })
     }
 

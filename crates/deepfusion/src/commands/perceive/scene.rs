@@ -18,19 +18,8 @@ pub fn working_depth(depth: &DepthMap, k: &Intrinsics) -> (DepthMap, Intrinsics)
         return (depth.clone(), *k);
     }
     let height = (depth.height * WIDTH).div_ceil(depth.width).max(1);
-    let pick = |i: usize, from: usize, to: usize| ((2 * i + 1) * from / (2 * to)).min(from - 1);
-    let columns: Vec<usize> = (0..WIDTH).map(|u| pick(u, depth.width, WIDTH)).collect();
-    let mut data = Vec::with_capacity(WIDTH * height);
-    for v in 0..height {
-        let row = pick(v, depth.height, height) * depth.width;
-        data.extend(columns.iter().map(|u| depth.data[row + u]));
-    }
-    let small = DepthMap {
-        width: WIDTH,
-        height,
-        data,
-    };
-    (small, k.resized(WIDTH as u32, height as u32))
+    let k = k.resized(WIDTH as u32, height as u32);
+    (depth.nearest(WIDTH, height), k)
 }
 
 /// When and from where a frame was taken, and how the vehicle went then.
