@@ -68,8 +68,6 @@ pub use picture::{decode_rgb, image_size, load_rgb, save_png};
 pub use recording::{CalibrationPlace, DatasetKind, LidarMotion, Recording};
 pub use resize::{resize_rgb, to_chw, to_network_input};
 pub use snippet::{EgoMotion, Snippet, Source, hold_out};
-pub use speed_check::{
-    GreyImage, GroundPair, SpeedWarning, implied_camera_height, speed_unit_warning,
-};
+pub use speed_check::{SpeedWarning, grey_image, speed_unit_warning};
 pub use split::{Split, SplitEntry};
 pub use write::write_atomically;

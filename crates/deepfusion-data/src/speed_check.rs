@@ -8,33 +8,18 @@
 
 use crate::snippet::Snippet;
 use crate::{Dataset, Result, resize_rgb};
-use deepfusion_geometry::{Intrinsics, Se3};
+use deepfusion_geometry::Se3;
+use deepfusion_motion::{GreyImage, GroundPair, SWEEP_M, SWEEP_RATIO, implied_camera_height};
 use image::RgbImage;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::fmt;
 
 /// Heights that a camera on a road vehicle can have, in metres.
 pub(crate) const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.9..=2.6;
-/// Heights tried, in metres, and the ratio of one to the next. Beyond 15 m the road hardly moves.
-const SWEEP_M: (f64, f64) = (0.3, 15.0);
-const SWEEP_RATIO: f64 = 1.06;
-/// The best height's cost over the median's, above which the images say nothing. On KITTI it is 0.71 to
-/// 0.73 with true speeds, 0.57 to 0.82 with speeds 3.6 times too large or too small; 0.99 on unrelated images.
-const CONCLUSIVE: f64 = 0.92;
 /// Width of the images compared, in pixels, and how many pairs.
 const WIDTH: u32 = 240;
 const MAX_PAIRS: usize = 24;
-/// Fewer pairs than this prove nothing: a car ahead may fill the view.
-const MIN_PAIRS: usize = 4;
-/// The road is looked for in the middle columns, and in rows whose rays point at least this share as
-/// steeply down as the bottom row's.
-const COLUMNS: (f64, f64) = (0.2, 0.8);
-const STEEPNESS: f64 = 0.35;
-/// Half the window whose mean is taken off, so that shade and exposure do not count, in pixels.
-const HIGH_PASS: usize = 4;
-/// Largest difference of one pixel that counts, in grey levels of 255: cars and kerbs are not the plane.
-const CLIP: f64 = 20.0;
 /// Camera height of a usual car, to name the factor of a wrong unit.
 const USUAL_HEIGHT_M: f64 = 1.65;
 
@@ -45,32 +30,6 @@ pub struct SpeedWarning {
     pub implied_height_m: f64,
     /// How many pairs of frames were compared.
     pub pairs: usize,
-}
-
-/// A small grey image, values 0 to 255, row by row.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GreyImage {
-    /// Width, in pixels.
-    pub width: usize,
-    /// Height, in pixels.
-    pub height: usize,
-    /// `width * height` values.
-    pub data: Vec<f32>,
-}
-
-/// Two frames of a drive, and how the camera is said to have moved between them.
-#[derive(Debug, Clone)]
-pub struct GroundPair {
-    /// The frame before.
-    pub earlier: GreyImage,
-    /// The frame after.
-    pub later: GreyImage,
-    /// Of these small images.
-    pub intrinsics: Intrinsics,
-    /// A point of the later camera in the earlier one; its translation is what is tested.
-    pub earlier_from_later: Se3,
-    /// The direction to the ground in the camera's frame, of length 1.
-    pub down_in_cam: Vector3<f64>,
 }
 
 impl SpeedWarning {
@@ -154,8 +113,8 @@ pub(crate) fn road_camera_height(dataset: &Dataset) -> Result<Option<(f64, usize
         let source = &snippet.sources[0];
         let earlier = dataset.load_image(source.frame)?;
         Ok(GroundPair {
-            earlier: GreyImage::from_rgb(&earlier, WIDTH, height),
-            later: GreyImage::from_rgb(&later, WIDTH, height),
+            earlier: grey_image(&earlier, WIDTH, height),
+            later: grey_image(&later, WIDTH, height),
             intrinsics: k.resized(WIDTH, height),
             earlier_from_later,
             down_in_cam,
@@ -171,6 +130,21 @@ pub(crate) fn road_camera_height(dataset: &Dataset) -> Result<Option<(f64, usize
     Ok(implied_camera_height(&pairs).map(|height_m| (height_m, pairs.len())))
 }
 
+/// The luma (ITU-R BT.601) of an image resized to `width` × `height`.
+#[must_use]
+pub fn grey_image(image: &RgbImage, width: u32, height: u32) -> GreyImage {
+    let small = resize_rgb(image, width, height);
+    let luma = |p: &image::Rgb<u8>| {
+        let [r, g, b] = p.0.map(f32::from);
+        0.299 * r + 0.587 * g + 0.114 * b
+    };
+    GreyImage {
+        width: width as usize,
+        height: height as usize,
+        data: small.pixels().map(luma).collect(),
+    }
+}
+
 /// At most [`MAX_PAIRS`] snippets, evenly over the faster half of the drive, where the road moves most.
 fn sample(mut snippets: Vec<Snippet>) -> Vec<Snippet> {
     let distance = |s: &Snippet| s.sources[0].motion.distance_m;
@@ -180,129 +154,4 @@ fn sample(mut snippets: Vec<Snippet>) -> Vec<Snippet> {
     snippets.retain(|s| distance(s) >= median);
     let step = snippets.len().div_ceil(MAX_PAIRS).max(1);
     snippets.into_iter().step_by(step).collect()
-}
-
-/// The height above the road, in metres, at which the pairs' motion explains their images best; `None`
-/// where no height does clearly better than others, or there are fewer than four pairs that show road.
-#[must_use]
-pub fn implied_camera_height(pairs: &[GroundPair]) -> Option<f64> {
-    let count = ((SWEEP_M.1 / SWEEP_M.0).ln() / SWEEP_RATIO.ln()).ceil() as i32;
-    let heights: Vec<f64> = (0..=count)
-        .map(|i| SWEEP_M.0 * SWEEP_RATIO.powi(i))
-        .collect();
-    let costs: Vec<Vec<f64>> = pairs
-        .par_iter()
-        .filter_map(|pair| pair.costs(&heights))
-        .collect();
-    if costs.len() < MIN_PAIRS {
-        return None;
-    }
-    let pooled: Vec<f64> = (0..heights.len())
-        .map(|i| costs.iter().map(|c| c[i]).sum::<f64>() / costs.len() as f64)
-        .collect();
-    let best = (0..pooled.len()).min_by(|a, b| pooled[*a].total_cmp(&pooled[*b]))?;
-    (pooled[best] <= CONCLUSIVE * median(&pooled)).then(|| heights[best])
-}
-
-impl GroundPair {
-    /// Mean difference of the two images over the road for each height, over the median of them; `None`
-    /// where the road is not in view or has no texture.
-    fn costs(&self, heights: &[f64]) -> Option<Vec<f64>> {
-        let (earlier, later) = (self.earlier.high_pass(), self.later.high_pass());
-        let k_inverse = self.intrinsics.inverse_matrix();
-        let (width, height) = (later.width, later.height);
-        let steepness = |x: usize, y: usize| {
-            let ray = k_inverse * Vector3::new(x as f64, y as f64, 1.0);
-            self.down_in_cam.dot(&ray)
-        };
-        let bottom = steepness(width / 2, height.checked_sub(1)?);
-        if bottom < 0.05 {
-            return None;
-        }
-        let columns = (width as f64 * COLUMNS.0) as usize..(width as f64 * COLUMNS.1) as usize;
-        let road: Vec<(usize, usize)> = (0..height)
-            .flat_map(|y| columns.clone().map(move |x| (x, y)))
-            .filter(|(x, y)| steepness(*x, *y) >= STEEPNESS * bottom)
-            .collect();
-        let cost = |h: &f64| {
-            let earlier_from_later = self.homography(*h, &k_inverse);
-            let difference = |(x, y): &(usize, usize)| {
-                let q = earlier_from_later * Vector3::new(*x as f64, *y as f64, 1.0);
-                let seen = earlier.sample(q.x / q.z, q.y / q.z);
-                f64::from((seen - later.data[y * width + x]).abs()).min(CLIP)
-            };
-            road.iter().map(difference).sum::<f64>() / road.len() as f64
-        };
-        let mut costs: Vec<f64> = heights.iter().map(cost).collect();
-        let scale = median(&costs);
-        if !(scale > 0.0 && scale.is_finite()) {
-            return None;
-        }
-        costs.iter_mut().for_each(|c| *c /= scale);
-        Some(costs)
-    }
-
-    /// Pixels of the later image to pixels of the earlier, for points on the plane at height `h`.
-    fn homography(&self, h: f64, k_inverse: &Matrix3<f64>) -> Matrix3<f64> {
-        let motion = &self.earlier_from_later;
-        let plane = motion.rotation() + motion.translation() * self.down_in_cam.transpose() / h;
-        self.intrinsics.matrix() * plane * k_inverse
-    }
-}
-
-impl GreyImage {
-    /// The luma (ITU-R BT.601) of an image resized to `width` × `height`.
-    #[must_use]
-    pub fn from_rgb(image: &RgbImage, width: u32, height: u32) -> Self {
-        let small = resize_rgb(image, width, height);
-        let luma = |p: &image::Rgb<u8>| {
-            let [r, g, b] = p.0.map(f32::from);
-            0.299 * r + 0.587 * g + 0.114 * b
-        };
-        Self {
-            width: width as usize,
-            height: height as usize,
-            data: small.pixels().map(luma).collect(),
-        }
-    }
-
-    /// The image less its mean over a square window about each pixel.
-    fn high_pass(&self) -> Self {
-        let mut data = self.data.clone();
-        for y in 0..self.height {
-            let rows = y.saturating_sub(HIGH_PASS)..(y + HIGH_PASS + 1).min(self.height);
-            for x in 0..self.width {
-                let columns = x.saturating_sub(HIGH_PASS)..(x + HIGH_PASS + 1).min(self.width);
-                let mut sum = 0.0;
-                for row in rows.clone() {
-                    let start = row * self.width;
-                    let window = &self.data[start + columns.start..start + columns.end];
-                    sum += window.iter().sum::<f32>();
-                }
-                data[y * self.width + x] -= sum / (rows.len() * columns.len()) as f32;
-            }
-        }
-        Self { data, ..*self }
-    }
-
-    /// Bilinear value at a position, which is moved into the image first.
-    pub(crate) fn sample(&self, x: f64, y: f64) -> f32 {
-        let at = |v: f64, size: usize| {
-            // NaN becomes 0 here.
-            let v = v.max(0.0).min(size as f64 - 1.0);
-            let low = (v as usize).min(size.saturating_sub(2));
-            (low, (low + 1).min(size - 1), (v - low as f64) as f32)
-        };
-        let ((x0, x1, fx), (y0, y1, fy)) = (at(x, self.width), at(y, self.height));
-        let value = |x: usize, y: usize| self.data[y * self.width + x];
-        let top = value(x0, y0) * (1.0 - fx) + value(x1, y0) * fx;
-        let bottom = value(x0, y1) * (1.0 - fx) + value(x1, y1) * fx;
-        top * (1.0 - fy) + bottom * fy
-    }
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }

@@ -2,11 +2,9 @@
 
 mod common;
 
-use deepfusion_data::{
-    Dataset, GreyImage, GroundPair, OpenOptions, SpeedWarning, implied_camera_height,
-    speed_unit_warning,
-};
+use deepfusion_data::{Dataset, OpenOptions, SpeedWarning, speed_unit_warning};
 use deepfusion_geometry::{Intrinsics, Se3};
+use deepfusion_motion::{GreyImage, GroundPair, implied_camera_height};
 use nalgebra::Vector3;
 
 const HEIGHT_M: f64 = 1.65;

@@ -46,6 +46,8 @@ mod identify;
 mod image_motion;
 mod imu;
 mod motion_model;
+mod road_height;
+mod scale_monitor;
 mod signal;
 mod time_offset;
 mod vehicle_motion;
@@ -60,6 +62,8 @@ pub use imu::{
     ImuConfig, ImuMount, ImuSample, ImuTrack, Standstill, StandstillConfig, standstills,
 };
 pub use motion_model::MotionModel;
+pub use road_height::{GreyImage, GroundPair, SWEEP_M, SWEEP_RATIO, implied_camera_height};
+pub use scale_monitor::{ScaleMonitor, ScaleMonitorConfig, ScaleReading, ScaleState};
 pub use signal::Signal;
 pub use time_offset::{NoTimeOffset, OffsetConfig, TimeOffset, VehicleRates, time_offset};
 pub use vehicle_motion::VehicleMotion;

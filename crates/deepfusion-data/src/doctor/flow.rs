@@ -1,7 +1,7 @@
 //! Points followed from one small picture to the next (Lucas and Kanade 1981, coarse to fine as
 //! Bouguet 2000; corners after Shi and Tomasi 1994).
 
-use crate::GreyImage;
+use deepfusion_motion::GreyImage;
 use nalgebra::{Matrix2, Vector2};
 
 /// One corner is taken from each square of this many pixels.

@@ -3,7 +3,8 @@
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::flow::flow;
 use super::median;
-use crate::{Camera, CameraChoice, Dataset, GreyImage, OpenOptions, Result};
+use crate::{Camera, CameraChoice, Dataset, OpenOptions, Result, grey_image};
+use deepfusion_motion::GreyImage;
 use std::path::Path;
 
 /// Frames compared.
@@ -75,7 +76,7 @@ fn disparities(left: &Dataset, right: &Dataset) -> Result<Vec<f64>> {
         let height = (k.height * WIDTH).div_ceil(k.width).max(1);
         let grey = |dataset: &Dataset, frame: usize| -> Result<GreyImage> {
             let image = dataset.load_image(frame)?;
-            Ok(GreyImage::from_rgb(&image, WIDTH, height))
+            Ok(grey_image(&image, WIDTH, height))
         };
         let points = flow(&grey(left, a)?, &grey(right, b)?);
         // What lies too far off tells no side.

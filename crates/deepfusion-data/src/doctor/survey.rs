@@ -2,8 +2,9 @@
 
 use super::flow::{Flow, flow};
 use super::look::Look;
-use crate::{Dataset, EgoMotion, GreyImage};
+use crate::{Dataset, EgoMotion, grey_image};
 use deepfusion_geometry::Intrinsics;
+use deepfusion_motion::GreyImage;
 use deepfusion_motion::{GreyFrame, ImageMotion};
 use rayon::prelude::*;
 
@@ -148,11 +149,11 @@ impl SeenFrame {
         let image = dataset
             .load_image(index)
             .map_err(|e| (frame.number, e.to_string()))?;
-        let small = GreyImage::from_rgb(&image, width, height);
+        let small = grey_image(&image, width, height);
         let coarse = frame.time_s.and_then(|time_s| {
             let width = COARSE_WIDTH.min(width);
             let height = (image.height() * width).div_ceil(image.width()).max(1);
-            let grey = GreyImage::from_rgb(&image, width, height);
+            let grey = grey_image(&image, width, height);
             GreyFrame::new(time_s, grey.width, grey.height, &grey.data).ok()
         });
         Ok(Self {

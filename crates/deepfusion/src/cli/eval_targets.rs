@@ -26,6 +26,9 @@ pub struct EvalTargetsArgs {
     /// Settings of the perception (TOML).
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// Write each frame's picture with the targets' boxes into this folder, to see what was found.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
     /// What runs the network.
     #[command(flatten)]
     pub engine: EngineArgs,

@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use deepfusion_motion::ScaleMonitorConfig;
 
 use super::values::positive;
 use super::{CameraIntrinsics, EngineArgs, PredictArgs, Save, Shard};
@@ -37,6 +38,9 @@ pub struct PerceiveArgs {
     /// Settings of the perception (TOML); what is not in it keeps its default.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// The camera's height over the road in metres, where it was measured: the scale monitor then has nothing to learn.
+    #[arg(long, value_name = "M", value_parser = positive)]
+    pub camera_height: Option<f64>,
     /// Do not correct depth for another focal length than the one trained on.
     #[arg(long)]
     pub no_focal_correction: bool,
@@ -73,6 +77,14 @@ pub enum PerceiveSave {
 }
 
 impl PerceiveArgs {
+    /// How the scale is watched.
+    pub fn scale_config(&self) -> ScaleMonitorConfig {
+        ScaleMonitorConfig {
+            height_m: self.camera_height,
+            ..ScaleMonitorConfig::default()
+        }
+    }
+
     /// The prediction that this stands on.
     pub fn as_predict(&self) -> PredictArgs {
         let mut save = Vec::new();

@@ -5,15 +5,16 @@ mod lidar;
 mod object_frames;
 mod table;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Result;
-use deepfusion_data::{Dataset, OpenOptions, kitti::GtKind, read_depth_png};
+use deepfusion_data::{Dataset, OpenOptions, kitti::GtKind, read_depth_png, save_png};
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::{
     Label, Perception, PerceptionConfig, Scorer, ScoringRules, TargetScore,
 };
+use deepfusion_render::box_overlay;
 use deepfusion_train::Predictor;
 use serde::Serialize;
 
@@ -50,7 +51,12 @@ pub fn run(args: &EvalTargetsArgs) -> Result<()> {
         Some(model) => Some(engine::load(model, &args.engine)?),
         None => None,
     };
+    let out = match &args.out {
+        Some(out) => Some(output::run_folder(Some(out), "eval-targets")?),
+        None => None,
+    };
     let mut work = Work {
+        out,
         depth: args.depth,
         predictor,
         perception: Perception::new(read_config(args.config.as_deref(), base)?),
@@ -79,6 +85,7 @@ pub fn run(args: &EvalTargetsArgs) -> Result<()> {
 }
 
 struct Work {
+    out: Option<PathBuf>,
     depth: Option<TargetDepth>,
     predictor: Option<Predictor>,
     perception: Perception,
@@ -114,6 +121,15 @@ impl Work {
             let surroundings = self.perception.look(&depth, &k, motion.stamp)?;
             let time_s = motion.stamp.map_or(0.0, |stamp| stamp.time_s);
             self.scorer.add(time_s, &surroundings.targets, &labels);
+            if let Some(out) = &self.out {
+                let image = dataset.load_image(*index)?;
+                let picture = box_overlay(&image, &camera, &surroundings.targets);
+                let number = dataset.frames()[*index].number;
+                save_png(
+                    &picture,
+                    &out.join(format!("{}-{number:010}.png", dataset.name())),
+                )?;
+            }
         }
         self.some_frames(dataset.folder())
     }

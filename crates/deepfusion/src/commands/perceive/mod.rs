@@ -9,12 +9,13 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
+use deepfusion_motion::{ScaleMonitor, ScaleReading, ScaleState};
 use deepfusion_perception::{Perception, PerceptionConfig, VehicleShape, time_to_collision};
 use deepfusion_train::{Predictor, PreparedImage};
 
 use self::pictures::Picture;
 use self::record::{FrameRecord, Lines};
-use self::scene::{MotionTracker, working_depth};
+use self::scene::{MotionTracker, ScaleWatch, working_depth};
 use super::predict::inputs::{self, Input};
 use super::predict::{Job, Loaded, Seen};
 use crate::cli::{PerceiveArgs, PerceiveSave};
@@ -100,6 +101,7 @@ struct Outcome {
     latency_ms: Vec<f64>,
     unreadable: Vec<anyhow::Error>,
     fatal: Option<anyhow::Error>,
+    drift_told: bool,
 }
 
 struct Work<'a> {
@@ -114,6 +116,7 @@ impl Work<'_> {
     fn go(self, predictor: &Predictor, config: PerceptionConfig) -> Result<()> {
         let mut perception = Perception::new(config);
         let mut motions = MotionTracker::default();
+        let mut watch = ScaleWatch::new(ScaleMonitor::new(self.args.scale_config()));
         let load = |index: usize| {
             let start = Instant::now();
             match self.job.load(&self.all[index]) {
@@ -129,7 +132,8 @@ impl Work<'_> {
                 }
             }
         };
-        let look = |begun: Begun| self.look(begun, predictor, &mut perception, &mut motions);
+        let look =
+            |begun: Begun| self.look(begun, predictor, &mut perception, &mut motions, &mut watch);
         let write = |_: usize, found: Result<Found>| {
             if let Err(error) = found.and_then(|found| self.write(&found)) {
                 self.outcome().fatal.get_or_insert(error);
@@ -156,6 +160,7 @@ impl Work<'_> {
         predictor: &Predictor,
         perception: &mut Perception,
         motions: &mut MotionTracker,
+        watch: &mut ScaleWatch,
     ) -> Result<Found> {
         let Begun {
             index,
@@ -169,12 +174,18 @@ impl Work<'_> {
         let (depth, k) = working_depth(&prediction.depth(), &camera);
         let motion = motions.next(input, perception);
         let surroundings = perception.look(&depth, &k, motion.stamp)?;
+        let ground = surroundings.ground.as_ref();
+        let scale = watch.add(&loaded.image, &camera, &motion, ground);
+        self.tell_drift(&input.name, scale.as_ref());
         let collision = motion.speed_mps.and_then(|speed| {
             let vehicle = VehicleShape::default();
             time_to_collision(&surroundings.targets, speed, motion.yaw_rate, &vehicle)
         });
         let latency_ms = start.elapsed().as_secs_f64() * 1e3;
-        let record = FrameRecord::new(&input.name, &surroundings, &motion, collision, latency_ms);
+        let record = FrameRecord {
+            scale_monitor: scale,
+            ..FrameRecord::new(&input.name, &surroundings, &motion, collision, latency_ms)
+        };
         let pictures = pictures::draw(
             &self.args.save,
             &loaded.image,
@@ -193,6 +204,19 @@ impl Work<'_> {
             record,
             pictures,
         })
+    }
+
+    /// Says once that the metres have changed.
+    fn tell_drift(&self, frame: &str, scale: Option<&ScaleReading>) {
+        let drift = scale.filter(|s| s.state == ScaleState::Drift);
+        if let Some(ratio) = drift.and_then(|s| s.ratio)
+            && !std::mem::replace(&mut self.outcome().drift_told, true)
+        {
+            tracing::warn!(
+                "{frame}: the road says that metres are {ratio:.2} times what they were: were the images zoomed, the camera \
+                 moved, or is the speed wrong? (scale_monitor in each frame's JSON)"
+            );
+        }
     }
 
     fn write(&self, found: &Found) -> Result<()> {

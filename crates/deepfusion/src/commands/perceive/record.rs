@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use deepfusion_data::write_atomically;
+use deepfusion_motion::ScaleReading;
 use deepfusion_perception::{Collision, Surroundings, Target};
 use serde::Serialize;
 
@@ -29,6 +30,8 @@ pub struct FrameRecord {
     pub time_to_collision_s: Option<f64>,
     /// That target.
     pub collision_with: Option<u64>,
+    /// Whether metres still are what they were, where that is watched.
+    pub scale_monitor: Option<ScaleReading>,
     /// From opening the file to having the targets.
     pub latency_ms: f64,
 }
@@ -66,6 +69,7 @@ impl FrameRecord {
             speed_mps: motion.speed_mps,
             time_to_collision_s: collision.map(|c| c.time_s),
             collision_with: collision.map(|c| c.id),
+            scale_monitor: None,
             latency_ms,
         }
     }

@@ -2,9 +2,11 @@
 
 use std::sync::Arc;
 
-use deepfusion_data::Dataset;
+use deepfusion_data::{Dataset, RgbImage, grey_image};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
-use deepfusion_perception::{Perception, Stamp};
+use deepfusion_motion::{GreyImage, GroundPair, ScaleMonitor, ScaleReading};
+use deepfusion_perception::{Ground, Perception, Stamp};
+use nalgebra::Vector3;
 
 use super::super::predict::inputs::Input;
 
@@ -31,6 +33,8 @@ pub struct Motion {
     pub speed_mps: Option<f64>,
     /// rad/s, positive to the left.
     pub yaw_rate: f64,
+    /// The camera in the last frame's camera, where this frame goes on from it.
+    pub last_from_this: Option<Se3>,
 }
 
 /// Adds up the camera's way over the frames of a recording.
@@ -84,7 +88,57 @@ impl MotionTracker {
             speed_mps: frame.speed_mps,
             // The camera's y points down: a turn to the left is a negative one about it.
             yaw_rate: step.map_or(0.0, |(_, motion, dt)| -motion.axis_angle().y / dt),
+            last_from_this: step.map(|(_, motion, _)| motion),
         }
+    }
+}
+
+/// Width of the images that the scale is watched in.
+const WATCHED_WIDTH: u32 = 320;
+
+/// Watches the metres of a recording: [`ScaleMonitor`] over its frames.
+pub struct ScaleWatch {
+    monitor: ScaleMonitor,
+    last: Option<GreyImage>,
+}
+
+impl ScaleWatch {
+    /// From the first frame on.
+    pub fn new(monitor: ScaleMonitor) -> Self {
+        Self {
+            monitor,
+            last: None,
+        }
+    }
+
+    /// Takes the next frame in; `None` where it does not go on from the last one, or no road was found.
+    pub fn add(
+        &mut self,
+        image: &RgbImage,
+        camera: &Intrinsics,
+        motion: &Motion,
+        ground: Option<&Ground>,
+    ) -> Option<ScaleReading> {
+        let (width, height) = (
+            WATCHED_WIDTH.min(camera.width),
+            (WATCHED_WIDTH.min(camera.width) * camera.height)
+                .div_ceil(camera.width)
+                .max(1),
+        );
+        let later = grey_image(image, width, height);
+        let earlier = self.last.replace(later.clone());
+        let (earlier, ground) = (earlier?, ground?);
+        let pair = GroundPair {
+            earlier,
+            later,
+            intrinsics: camera.resized(width, height),
+            earlier_from_later: motion.last_from_this?,
+            down_in_cam: -Vector3::from(ground.up.map(f64::from)),
+        };
+        Some(
+            self.monitor
+                .add(&pair, Some(f64::from(ground.camera_height_m))),
+        )
     }
 }
 

@@ -1,0 +1,259 @@
+//! Whether metres still are what they were: the camera's height over the road, as the vehicle's metres measure it from
+//! the road's motion, must not change while driving.
+//!
+//! It changes where images are zoomed (a lens touched, a resolution switched), where the camera comes loose, and where the
+//! speed goes wrong (other tyres, another unit). The network's depth takes no part, so that a street on which it errs is no
+//! alarm; beside it stands how high the network's own road lies below the camera: their ratio is the depth's scale.
+
+use crate::road_height::{CONCLUSIVE, GroundPair};
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// How the monitor judges.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ScaleMonitorConfig {
+    /// Pairs of frames that the reference is learned from.
+    pub learn_pairs: usize,
+    /// Pairs that a reading is made from, the latest.
+    pub window_pairs: usize,
+    /// Shortest way of the camera between two frames that is looked at, metres.
+    pub min_distance_m: f64,
+    /// Smallest change that is an alarm, as a share.
+    pub min_change: f64,
+    /// The camera's height over the road in metres, where it was measured: nothing has to be learned then.
+    pub height_m: Option<f64>,
+}
+
+impl Default for ScaleMonitorConfig {
+    fn default() -> Self {
+        Self {
+            learn_pairs: 90,
+            window_pairs: 60,
+            min_distance_m: 0.25,
+            min_change: 0.05,
+            height_m: None,
+        }
+    }
+}
+
+/// What the monitor makes of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ScaleState {
+    /// The reference is being learned.
+    Learning,
+    /// As it was.
+    Steady,
+    /// It has changed.
+    Drift,
+}
+
+/// A reading.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ScaleReading {
+    /// Height now over the reference: 1.1 where images are zoomed by 10 %, or the speed is told 10 % too high. `None` while
+    /// learning.
+    pub ratio: Option<f64>,
+    /// Its 95 % interval.
+    pub ci95: Option<[f64; 2]>,
+    /// The camera's height by the road's motion, metres.
+    pub height_m: Option<f64>,
+    /// The network's metres over the vehicle's, by the height of its road: what depth would have to be divided by.
+    pub depth_ratio: Option<f64>,
+    /// What is made of it.
+    pub state: ScaleState,
+}
+
+/// Heights over the guess that are tried: 35 % to both sides in steps of 1 %.
+const REACH: f64 = 0.35;
+/// See [`REACH`].
+const STEP: f64 = 0.01;
+/// Pairs whose costs make one estimate: single pairs say little.
+const BLOCK: usize = 10;
+/// Heights tried first, metres: those of anything that drives, in steps of 6 %.
+const FIRST_M: (f64, f64) = (0.3, 4.5);
+/// Standard errors from which on a change is no chance.
+const SIGMAS: f64 = 3.0;
+/// Standard error that is assumed at least: blocks on one street agree better than streets do.
+const LEAST_ERROR: f64 = 0.012;
+
+/// Watches the metres of a drive.
+#[derive(Debug, Clone)]
+pub struct ScaleMonitor {
+    config: ScaleMonitorConfig,
+    /// Middle of the heights that are tried, metres, once one is known.
+    guess_m: Option<f64>,
+    first: Vec<Vec<f64>>,
+    /// Costs of the pairs of the block that is being filled.
+    block: Vec<Vec<f64>>,
+    /// ln of the height of each whole block, the latest last.
+    heights: VecDeque<f64>,
+    learned: Vec<f64>,
+    /// ln of the height of the network's road, the latest last.
+    depth_heights: VecDeque<f64>,
+    drifting: bool,
+}
+
+impl ScaleMonitor {
+    /// Without any pair yet.
+    #[must_use]
+    pub fn new(config: ScaleMonitorConfig) -> Self {
+        Self {
+            config,
+            guess_m: None,
+            first: Vec::new(),
+            block: Vec::new(),
+            heights: VecDeque::new(),
+            learned: Vec::new(),
+            depth_heights: VecDeque::new(),
+            drifting: false,
+        }
+    }
+
+    /// Its settings.
+    #[must_use]
+    pub fn config(&self) -> &ScaleMonitorConfig {
+        &self.config
+    }
+
+    /// Takes a pair of frames in. `depth_height_m` is the camera's height over the network's road in the later frame,
+    /// metres, where there is a network and it sees one.
+    pub fn add(&mut self, pair: &GroundPair, depth_height_m: Option<f64>) -> ScaleReading {
+        if let Some(height) = depth_height_m.filter(|h| h.is_finite() && *h > 0.0) {
+            self.depth_heights.push_back(height.ln());
+            if self.depth_heights.len() > self.config.window_pairs {
+                self.depth_heights.pop_front();
+            }
+        }
+        let way = pair.earlier_from_later.translation().norm();
+        if way >= self.config.min_distance_m && way.is_finite() {
+            match self.guess_m {
+                None => self.look_around(pair),
+                Some(guess) => self.look(pair, guess),
+            }
+        }
+        self.reading()
+    }
+
+    /// Before anything is known: a coarse sweep over all heights that can be.
+    fn look_around(&mut self, pair: &GroundPair) {
+        let count = ((FIRST_M.1 / FIRST_M.0).ln() / 0.06).ceil() as usize;
+        let heights: Vec<f64> = (0..=count)
+            .map(|i| FIRST_M.0 * (0.06 * i as f64).exp())
+            .collect();
+        self.first.extend(pair.costs(&heights));
+        if self.first.len() >= BLOCK {
+            // Where the images say nothing it is tried again.
+            self.guess_m = best(&self.first).map(|place| FIRST_M.0 * (0.06 * place).exp());
+            self.first.clear();
+        }
+    }
+
+    fn look(&mut self, pair: &GroundPair, guess: f64) {
+        let count = (2.0 * REACH / STEP).round() as usize;
+        let heights: Vec<f64> = (0..=count)
+            .map(|i| guess * (STEP * i as f64 - REACH).exp())
+            .collect();
+        self.block.extend(pair.costs(&heights));
+        if self.block.len() < BLOCK {
+            return;
+        }
+        let place = best(&self.block);
+        self.block.clear();
+        let Some(place) = place else { return };
+        let height = guess.ln() + STEP * place - REACH;
+        if self.learned.len() * BLOCK < self.config.learn_pairs && self.config.height_m.is_none() {
+            self.learned.push(height);
+            return;
+        }
+        self.heights.push_back(height);
+        if self.heights.len() * BLOCK > self.config.window_pairs {
+            self.heights.pop_front();
+        }
+    }
+
+    fn reading(&mut self) -> ScaleReading {
+        let reference = match self.config.height_m {
+            Some(height) => Some((height.ln(), 0.0)),
+            None if self.learned.len() * BLOCK < self.config.learn_pairs => None,
+            None => mean_and_error(&self.learned),
+        };
+        let recent: Vec<f64> = self.heights.iter().copied().collect();
+        let now = mean_and_error(&recent)
+            .filter(|_| 2 * recent.len() * BLOCK >= self.config.window_pairs);
+        let latest = now.or_else(|| mean_and_error(&self.learned));
+        let height_m = latest.map(|(height, _)| height.exp());
+        let mut reading = ScaleReading {
+            ratio: None,
+            ci95: None,
+            height_m,
+            depth_ratio: latest.and_then(|(height, _)| {
+                let mut depths: Vec<f64> = self.depth_heights.iter().copied().collect();
+                depths.sort_by(f64::total_cmp);
+                depths.get(depths.len() / 2).map(|d| (d - height).exp())
+            }),
+            state: ScaleState::Learning,
+        };
+        if let (Some((reference, reference_error)), Some((now, error))) = (reference, now) {
+            let change = now - reference;
+            let error = reference_error.hypot(error).max(LEAST_ERROR);
+            reading.ratio = Some(change.exp());
+            reading.ci95 = Some([-1.96, 1.96].map(|z| (change + z * error).exp()));
+            // An alarm ends where half of what began it is left: it does not flicker.
+            let limit = (1.0 + self.config.min_change).ln().max(SIGMAS * error);
+            let limit = if self.drifting { 0.5 * limit } else { limit };
+            self.drifting = change.abs() > limit;
+            reading.state = if self.drifting {
+                ScaleState::Drift
+            } else {
+                ScaleState::Steady
+            };
+        }
+        reading
+    }
+}
+
+/// Place of the least pooled cost, between the steps by a parabola; `None` where no height does clearly better, or the
+/// best is the last that was tried.
+fn best(costs: &[Vec<f64>]) -> Option<f64> {
+    let count = costs.first()?.len();
+    let pooled: Vec<f64> = (0..count)
+        .map(|i| costs.iter().map(|c| c[i]).sum::<f64>())
+        .collect();
+    let least = (0..count).min_by(|a, b| pooled[*a].total_cmp(&pooled[*b]))?;
+    let mut sorted = pooled.clone();
+    sorted.sort_by(f64::total_cmp);
+    let conclusive = pooled[least] <= CONCLUSIVE * sorted[sorted.len() / 2];
+    if !conclusive || least == 0 || least + 1 == count {
+        return None;
+    }
+    let (a, b, c) = (pooled[least - 1], pooled[least], pooled[least + 1]);
+    let bend = a - 2.0 * b + c;
+    let shift = if bend > 0.0 {
+        0.5 * (a - c) / bend
+    } else {
+        0.0
+    };
+    Some(least as f64 + shift.clamp(-0.5, 0.5))
+}
+
+/// Mean and standard error of independent values; the middle half of them, so that a car ahead in one block does not count.
+fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
+    if values.is_empty() {
+        return None;
+    }
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let cut = sorted.len() / 4;
+    let kept = &sorted[cut..sorted.len() - cut];
+    let n = kept.len() as f64;
+    let mean = kept.iter().sum::<f64>() / n;
+    // Of all, by their median distance: 1.48 of it is a standard deviation.
+    let mut off: Vec<f64> = values.iter().map(|v| (v - mean).abs()).collect();
+    off.sort_by(f64::total_cmp);
+    Some((
+        mean,
+        1.48 * off[off.len() / 2] / (values.len() as f64).sqrt(),
+    ))
+}
