@@ -35,6 +35,8 @@ pub struct Motion {
     pub yaw_rate: f64,
     /// The camera in the last frame's camera, where this frame goes on from it.
     pub last_from_this: Option<Se3>,
+    /// Which way is down in the camera, where its mount is known.
+    pub down_in_cam: Option<Vector3<f64>>,
 }
 
 /// Adds up the camera's way over the frames of a recording.
@@ -89,6 +91,9 @@ impl MotionTracker {
             // The camera's y points down: a turn to the left is a negative one about it.
             yaw_rate: step.map_or(0.0, |(_, motion, dt)| -motion.axis_angle().y / dt),
             last_from_this: step.map(|(_, motion, _)| motion),
+            down_in_cam: dataset
+                .cam_from_vehicle()
+                .map(|cam| -cam.rotate(&Vector3::z())),
         }
     }
 }
@@ -111,7 +116,7 @@ impl ScaleWatch {
         }
     }
 
-    /// Takes the next frame in; `None` where it does not go on from the last one, or no road was found.
+    /// Takes the next frame in; `None` where it does not go on from the last one.
     pub fn add(
         &mut self,
         image: &RgbImage,
@@ -127,7 +132,9 @@ impl ScaleWatch {
         );
         let later = grey_image(image, width, height);
         let earlier = self.last.replace(later.clone());
-        let (earlier, ground) = (earlier?, ground?);
+        let earlier = earlier?;
+        // The mount knows better than a single image's ground where down is.
+        let seen = || ground.map(|ground| -Vector3::from(ground.up.map(f64::from)));
         let pair = GroundPair {
             earlier,
             later,
