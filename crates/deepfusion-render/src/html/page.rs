@@ -7,8 +7,9 @@ use base64::engine::general_purpose::STANDARD;
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 
+use super::tables::Cell;
 use super::{escape, tables};
-use crate::{LineChart, Result};
+use crate::{Result, Svg};
 
 /// How a picture is stored in a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -37,7 +38,11 @@ pub struct HtmlReport {
     title: String,
     subtitle: String,
     body: String,
+    sections: Vec<String>,
 }
+
+/// A page with more sections than this has a table of contents.
+const SECTIONS_WITHOUT_CONTENTS: usize = 3;
 
 impl HtmlReport {
     /// An empty report.
@@ -47,6 +52,7 @@ impl HtmlReport {
             title: title.into(),
             subtitle: subtitle.into(),
             body: String::new(),
+            sections: Vec::new(),
         }
     }
 
@@ -70,7 +76,41 @@ impl HtmlReport {
     /// Begins a section.
     #[must_use]
     pub fn section(mut self, title: &str) -> Self {
-        let _ = write!(self.body, "<h2>{}</h2>", escape(title));
+        self.sections.push(title.to_owned());
+        let number = self.sections.len();
+        let _ = write!(self.body, r#"<h2 id="s{number}">{}</h2>"#, escape(title));
+        self
+    }
+
+    /// A heading inside a section.
+    #[must_use]
+    pub fn heading(mut self, title: &str) -> Self {
+        let _ = write!(self.body, "<h3>{}</h3>", escape(title));
+        self
+    }
+
+    /// Small print.
+    #[must_use]
+    pub fn note(mut self, text: &str) -> Self {
+        let _ = write!(self.body, r#"<p class="note">{}</p>"#, escape(text));
+        self
+    }
+
+    /// Small print, one point a line.
+    #[must_use]
+    pub fn list(mut self, items: &[String]) -> Self {
+        self.body.push_str(r#"<ul class="note">"#);
+        for item in items {
+            let _ = write!(self.body, "<li>{}</li>", escape(item));
+        }
+        self.body.push_str("</ul>");
+        self
+    }
+
+    /// A table whose cells carry marks: the best bold, the second underlined, the doubtful struck with a sign.
+    #[must_use]
+    pub fn marked_table(mut self, header: &[&str], rows: &[Vec<Cell>]) -> Self {
+        self.body.push_str(&tables::marked(header, rows));
         self
     }
 
@@ -97,7 +137,7 @@ impl HtmlReport {
 
     /// A chart. Charts that follow each other stand side by side where there is room.
     #[must_use]
-    pub fn chart(mut self, chart: &LineChart) -> Self {
+    pub fn chart(mut self, chart: &impl Svg) -> Self {
         let _ = write!(
             self.body,
             r#"<figure class="half">{}</figure>"#,
@@ -110,8 +150,26 @@ impl HtmlReport {
     ///
     /// # Errors
     /// [`crate::Error::Encode`] where it cannot be encoded (it has no pixels).
-    pub fn picture(
+    pub fn picture(self, caption: &str, picture: &RgbImage, format: PictureFormat) -> Result<Self> {
+        self.figure("", caption, picture, format)
+    }
+
+    /// A picture of half the page's width: two that follow each other stand side by side where there is room.
+    ///
+    /// # Errors
+    /// As [`HtmlReport::picture`].
+    pub fn half_picture(
+        self,
+        caption: &str,
+        picture: &RgbImage,
+        format: PictureFormat,
+    ) -> Result<Self> {
+        self.figure(r#" class="half""#, caption, picture, format)
+    }
+
+    fn figure(
         mut self,
+        class: &str,
         caption: &str,
         picture: &RgbImage,
         format: PictureFormat,
@@ -129,7 +187,7 @@ impl HtmlReport {
         };
         let _ = write!(
             self.body,
-            r#"<figure><img alt="{0}" width="{1}" height="{2}" src="data:image/{kind};base64,{3}"><figcaption>{0}</figcaption></figure>"#,
+            r#"<figure{class}><img alt="{0}" width="{1}" height="{2}" src="data:image/{kind};base64,{3}"><figcaption>{0}</figcaption></figure>"#,
             escape(caption),
             picture.width(),
             picture.height(),
@@ -164,12 +222,24 @@ impl HtmlReport {
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n<main>\n\
-             <header><h1>{title}</h1><p>{subtitle}</p></header>\n{body}\n</main>\n</body>\n</html>\n",
+             <header><h1>{title}</h1><p>{subtitle}</p></header>\n{contents}{body}\n</main>\n</body>\n</html>\n",
             title = escape(&self.title),
             subtitle = escape(&self.subtitle),
             style = include_str!("style.css"),
+            contents = self.contents(),
             body = self.body,
         )
+    }
+
+    fn contents(&self) -> String {
+        if self.sections.len() <= SECTIONS_WITHOUT_CONTENTS {
+            return String::new();
+        }
+        let link = |(i, title): (usize, &String)| {
+            format!(r##"<a href="#s{}">{}</a>"##, i + 1, escape(title))
+        };
+        let links: Vec<_> = self.sections.iter().enumerate().map(link).collect();
+        format!("<nav>{}</nav>\n", links.join(""))
     }
 
     /// Writes the page, whole or not at all.
@@ -187,6 +257,7 @@ impl HtmlReport {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::LineChart;
 
     #[test]
     fn the_page_needs_nothing_from_outside() {

@@ -9,6 +9,65 @@ pub(super) fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     table_of_class("plain", header, rows)
 }
 
+/// What a cell of a table stands out by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mark {
+    /// Nothing.
+    #[default]
+    None,
+    /// The best of its column: bold.
+    Best,
+    /// The second best: underlined.
+    Second,
+    /// Cannot be right, or hardly: grey, with a sign in its row.
+    Doubtful,
+}
+
+/// A cell of a table.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Cell {
+    /// What it says.
+    pub text: String,
+    /// What it stands out by.
+    pub mark: Mark,
+}
+
+impl Cell {
+    /// A cell without a mark.
+    #[must_use]
+    pub fn plain(text: impl Into<String>) -> Self {
+        Self {
+            text: text.into(),
+            mark: Mark::None,
+        }
+    }
+}
+
+/// A table with marks.
+pub(super) fn marked(header: &[&str], rows: &[Vec<Cell>]) -> String {
+    let mut out = String::from(r#"<div class="scroll"><table class="plain"><thead><tr>"#);
+    for cell in header {
+        // Writing to a String cannot fail, here and below.
+        let _ = write!(out, "<th>{}</th>", escape(cell));
+    }
+    out.push_str("</tr></thead><tbody>");
+    for row in rows {
+        out.push_str("<tr>");
+        for cell in row {
+            let class = match cell.mark {
+                Mark::None => "",
+                Mark::Best => r#" class="best""#,
+                Mark::Second => r#" class="second""#,
+                Mark::Doubtful => r#" class="doubtful""#,
+            };
+            let _ = write!(out, "<td{class}>{}</td>", escape(&cell.text));
+        }
+        out.push_str("</tr>");
+    }
+    out.push_str("</tbody></table></div>");
+    out
+}
+
 fn table_of_class(class: &str, header: &[&str], rows: &[Vec<String>]) -> String {
     let mut out = format!(r#"<div class="scroll"><table class="{class}"><thead><tr>"#);
     for cell in header {
@@ -117,6 +176,10 @@ fn metric_rows(report: &Report) -> Vec<Vec<String>> {
         rows.push(row("trivial", &trivial.unscaled));
         rows.push(row("trivial, median-scaled", &trivial.median_scaled));
     }
+    for scenario in &report.scenarios {
+        let label = format!("{}, scale {:.3}", scenario.name, scenario.scale.median);
+        rows.push(row(&label, &scenario.unscaled));
+    }
     rows
 }
 
@@ -157,13 +220,6 @@ fn scale_table(report: &Report) -> String {
         rows.push(vec![
             "ground truth without prediction".into(),
             format!("{:.2} %", 100.0 * rate),
-        ]);
-    }
-    if let Some(points) = &report.points {
-        let text = format!("{:.3} m", points.mean_m);
-        rows.push(vec![
-            format!("mean distance of {} drawn points", points.n),
-            text,
         ]);
     }
     table(&["scale", ""], &rows)

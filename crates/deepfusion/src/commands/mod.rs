@@ -2,6 +2,7 @@
 
 mod ablate;
 mod bench;
+mod compare;
 mod convert;
 mod demo;
 pub mod device;
@@ -15,6 +16,7 @@ mod inspect;
 mod overview;
 mod predict;
 mod recorder;
+mod run_report;
 mod simulate;
 mod train;
 mod weights;
@@ -38,6 +40,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Train(args) => train::run(&args),
         Command::Ablate(args) => ablate::run(&args),
         Command::Eval(args) => eval::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::EvalOdometry(args) => eval_odometry::run(&args),
         Command::Predict(args) => predict::run(&args),
         Command::Export(args) => export::run(&args),
