@@ -127,14 +127,25 @@ impl Published {
         ];
         columns.extend(Column::metrics());
         let twins = identical(&figures);
+        let kind = commonest(&rows);
+        let mut notes = vec![group.note.clone()];
+        if let Some((supervision, scaling)) = kind {
+            notes.push(format!(
+                "Best and second are marked among rows of one kind: trained with {supervision}, scaling {scaling}."
+            ));
+        }
+        let ranked = |r: &PublishedRow| kind == Some((r.supervision.as_str(), r.scaling.as_str()));
         Table {
             title: format!("Published: {}", group.title),
-            notes: vec![group.note.clone()],
+            notes,
             columns,
             rows: rows
                 .iter()
                 .zip(twins)
-                .map(|(r, twin)| self.row(r, twin))
+                .map(|(r, twin)| Row {
+                    ranked: ranked(r),
+                    ..self.row(r, twin)
+                })
                 .collect(),
         }
     }
@@ -165,10 +176,25 @@ impl Published {
         Row {
             cells,
             flags,
-            ranked: true,
+            ranked: false,
             source: source.map(|s| format!("{}{place}{also}", s.text)),
         }
     }
+}
+
+/// Training and scaling that most rows share, where at least two do: only such rows can be ranked. How a row whose scaling is
+/// not stated was measured is not known.
+fn commonest<'a>(rows: &[&'a PublishedRow]) -> Option<(&'a str, &'a str)> {
+    let kind = |r: &&'a PublishedRow| (r.supervision.as_str(), r.scaling.as_str());
+    let count = |wanted: (&str, &str)| rows.iter().filter(|r| kind(r) == wanted).count();
+    let stated = rows.iter().filter(|r| r.scaling != "not stated").map(kind);
+    let kinds = stated.map(|kind| (count(kind), kind));
+    // The first of equals, as the table has them.
+    let most = kinds.fold(None, |most: Option<(usize, _)>, next| match most {
+        Some(most) if most.0 >= next.0 => Some(most),
+        _ => Some(next),
+    });
+    most.filter(|(count, _)| *count > 1).map(|(_, kind)| kind)
 }
 
 /// The field's tables that come with the program.

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use deepfusion_eval::{Crop, GroundTruth, Metrics, PointErrors, Report};
+use deepfusion_eval::{Crop, GroundTruth, Metrics, PointErrors, RangeBin, Report};
 
 use crate::evaluation::{Evaluation, Origin};
 use crate::plausibility::{Flag, Severity, check, identical};
@@ -28,9 +28,10 @@ pub fn run_tables(evaluations: &[Evaluation]) -> Tables {
     }
     let mut tables = Vec::new();
     for (number, (_, members)) in grounds.iter().enumerate() {
-        let ground = match grounds.len() {
-            1 => String::new(),
-            _ => format!("Ground {}: ", number + 1),
+        let ground = match (grounds.len(), recordings(members).join("; ")) {
+            (1, _) => String::new(),
+            (_, names) if names.is_empty() => format!("Ground {}: ", number + 1),
+            (_, names) => format!("Ground {} ({names}): ", number + 1),
         };
         tables.extend(ground_tables(&ground, members));
     }
@@ -38,15 +39,17 @@ pub fn run_tables(evaluations: &[Evaluation]) -> Tables {
 }
 
 fn ground_tables(ground: &str, members: &[&Evaluation]) -> Vec<Table> {
-    let notes = about(members);
     let trivial = trivial_rows(members);
     let mut unscaled = metric_table(members, &trivial, false);
-    unscaled.title = format!("{ground}Unscaled: metres as predicted");
-    unscaled.notes.extend(notes.clone());
+    unscaled.title = format!("{ground}Unscaled");
+    unscaled.notes.splice(0..0, about(members));
     let mut scaled = metric_table(members, &trivial, true);
-    scaled.title = format!("{ground}Median-scaled: each image by median(gt) / median(prediction)");
+    scaled.title = format!("{ground}Median-scaled");
+    scaled
+        .notes
+        .push("Each image multiplied by median(gt) / median(prediction).".into());
     let mut tables = vec![unscaled, scaled];
-    tables.push(range_table(ground, members));
+    tables.extend(range_tables(ground, members));
     tables.extend(point_table(ground, members));
     tables
 }
@@ -65,19 +68,10 @@ fn about(members: &[&Evaluation]) -> Vec<String> {
     };
     let plural = if report.n == 1 { "" } else { "s" };
     let mut notes = vec![format!(
-        "{} image{plural}, {crop}, {} to {} m, ground truth: {gt}.",
+        "Metres as predicted. {} image{plural}, {crop}, {} to {} m, ground truth: {gt}.",
         report.n, p.min_m, p.cap_m
     )];
-    let mut data: Vec<String> = Vec::new();
-    for member in members {
-        if let Origin::Saved { measured, .. } = &member.origin {
-            let names = measured.data.iter().map(|p| file_name(p));
-            let text = names.collect::<Vec<_>>().join(", ");
-            if !data.contains(&text) {
-                data.push(text);
-            }
-        }
-    }
+    let data = recordings(members);
     if !data.is_empty() {
         notes.push(format!("Recordings: {}.", data.join("; ")));
     }
@@ -99,6 +93,21 @@ fn about(members: &[&Evaluation]) -> Vec<String> {
         ),
     });
     notes
+}
+
+/// Names of the recordings, as far as the evaluations say; each once.
+fn recordings(members: &[&Evaluation]) -> Vec<String> {
+    let mut data: Vec<String> = Vec::new();
+    for member in members {
+        if let Origin::Saved { measured, .. } = &member.origin {
+            let names = measured.data.iter().map(|p| file_name(p));
+            let text = names.collect::<Vec<_>>().join(", ");
+            if !text.is_empty() && !data.contains(&text) {
+                data.push(text);
+            }
+        }
+    }
+    data
 }
 
 fn file_name(path: &Path) -> String {
@@ -240,53 +249,51 @@ fn remarks(member: &Evaluation) -> Vec<Flag> {
     flags
 }
 
-fn range_table(ground: &str, members: &[&Evaluation]) -> Table {
+/// A metric of a range.
+type OfRange = fn(&RangeBin) -> Option<f64>;
+
+fn range_tables(ground: &str, members: &[&Evaluation]) -> [Table; 2] {
     let mut bins = BTreeMap::new();
     for range in members.iter().flat_map(|m| &m.report.ranges) {
         bins.insert((range.from_m, range.to_m), range.n);
     }
-    let mut columns = vec![Column::words("run", "Run")];
-    for (key, title) in [("abs_rel", "Abs Rel"), ("rmse", "RMSE")] {
-        for (from, to) in bins.keys() {
-            columns.push(Column::numbers(
-                &format!("{key}_{from}_{to}m"),
-                &format!("{title} {from}–{to} m"),
-                Some(Better::Lower),
-            ));
-        }
-    }
-    let row = |member: &&Evaluation| {
-        let bin = |edges: &(u32, u32)| {
-            let ranges = member.report.ranges.iter();
-            ranges.clone().find(|r| (r.from_m, r.to_m) == *edges)
+    let table = |key: &str, title: &str, metric: OfRange| {
+        let mut columns = vec![Column::words("run", "Run")];
+        columns.extend(bins.keys().map(|(from, to)| {
+            let key = format!("{key}_{from}_{to}m");
+            Column::numbers(&key, &format!("{from}–{to} m"), Some(Better::Lower))
+        }));
+        let row = |member: &&Evaluation| {
+            let bin = |(from, to): &(u32, u32)| {
+                let mut ranges = member.report.ranges.iter();
+                ranges.find(|r| (r.from_m, r.to_m) == (*from, *to))
+            };
+            let mut cells = vec![Value::from(member.name.as_str())];
+            cells.extend(bins.keys().map(|e| Value::from(bin(e).and_then(metric))));
+            Row {
+                cells,
+                ranked: true,
+                ..Row::default()
+            }
         };
-        let mut cells = vec![Value::from(member.name.as_str())];
-        cells.extend(
-            bins.keys()
-                .map(|e| Value::from(bin(e).and_then(|r| r.abs_rel))),
-        );
-        cells.extend(
-            bins.keys()
-                .map(|e| Value::from(bin(e).and_then(|r| r.rmse))),
-        );
-        Row {
-            cells,
-            ranked: true,
-            ..Row::default()
+        Table {
+            title: format!("{ground}{title} by range, unscaled"),
+            notes: Vec::new(),
+            columns,
+            rows: members.iter().map(row).collect(),
         }
     };
+    let mut tables = [
+        table("abs_rel", "Abs Rel", |r| r.abs_rel),
+        table("rmse", "RMSE", |r| r.rmse),
+    ];
     let pixels = bins
         .iter()
         .map(|((from, to), n)| format!("{from}–{to} m: {n}"));
-    Table {
-        title: format!("{ground}By range, unscaled"),
-        notes: vec![format!(
-            "Pooled over pixels ({}).",
-            pixels.collect::<Vec<_>>().join(", ")
-        )],
-        columns,
-        rows: members.iter().map(row).collect(),
-    }
+    let pixels: Vec<_> = pixels.collect();
+    let note = format!("Pooled over pixels ({}).", pixels.join(", "));
+    tables[0].notes.push(note);
+    tables
 }
 
 fn point_table(ground: &str, members: &[&Evaluation]) -> Option<Table> {

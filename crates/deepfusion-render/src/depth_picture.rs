@@ -65,8 +65,13 @@ pub(crate) fn with_legend(
     for (place, label) in ticks {
         let x = margin + (place * (length - 1) as f32).round() as u32;
         let half = text_width(label, size) / 2;
-        // Labels at the ends are pushed inside, those that would touch their neighbour are left out.
-        let left = x.saturating_sub(half).min(width.saturating_sub(2 * half));
+        // Labels at the ends are pushed inside (pages round a picture's corners), those that would touch their neighbour
+        // are left out.
+        let inset = size.height() / 2;
+        let left = x
+            .saturating_sub(half)
+            .max(inset)
+            .min(width.saturating_sub(2 * half + inset));
         if left < free_from {
             continue;
         }

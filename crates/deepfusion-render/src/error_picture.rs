@@ -1,7 +1,7 @@
 use deepfusion_geometry::DepthMap;
 use image::{Rgb, RgbImage};
 
-use crate::depth_picture::{with_depth_legend, with_legend};
+use crate::depth_picture::with_legend;
 use crate::error::require_size;
 use crate::{ColourMap, DepthScale, Result};
 
@@ -41,7 +41,7 @@ pub fn error_picture(
     Ok(with_legend(&out, &colour, &ticks))
 }
 
-/// Sparse depth in colours on the darkened image, with a legend in metres; dots as in [`error_picture`].
+/// Sparse depth in colours on the darkened image, without a legend; dots as in [`error_picture`].
 ///
 /// # Errors
 /// [`crate::Error::Size`] where the map has another size than the image.
@@ -51,8 +51,7 @@ pub fn sparse_depth_picture(
     scale: &DepthScale,
 ) -> Result<RgbImage> {
     require_size("depth map", depth.data.len(), image.dimensions())?;
-    let out = dots(image, depth, |_, metres| Some(scale.colour(metres)));
-    Ok(with_depth_legend(&out, scale))
+    Ok(dots(image, depth, |_, metres| Some(scale.colour(metres))))
 }
 
 /// The darkened image with a dot wherever there is ground truth and `colour` (of its index and depth) gives one.
@@ -70,7 +69,7 @@ fn dots(
     }
     // A dense truth needs no dots larger than a pixel.
     let dense = ground_truth.count() * 2 > ground_truth.data.len();
-    let dot = if dense { 1 } else { (width / 400).max(1) };
+    let dot = if dense { 1 } else { (width / 400).max(2) };
     for (i, &truth) in ground_truth.data.iter().enumerate() {
         if truth > 0.0
             && let Some(colour) = colour(i, truth)

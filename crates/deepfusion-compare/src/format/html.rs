@@ -30,6 +30,7 @@ fn add_table(page: HtmlReport, table: &Table) -> HtmlReport {
         let mut cells: Vec<Cell> = cells
             .map(|((value, column), rank)| Cell {
                 text: value.print(column.decimals),
+                words: column.decimals == 0,
                 mark: match rank {
                     Rank::Best => Mark::Best,
                     Rank::Second => Mark::Second,
@@ -41,18 +42,19 @@ fn add_table(page: HtmlReport, table: &Table) -> HtmlReport {
         if !footnotes.is_empty() {
             let numbers: Vec<_> = numbers.iter().map(ToString::to_string).collect();
             let sign = if doubtful { "⚠ " } else { "" };
-            cells.push(Cell::plain(format!("{sign}{}", numbers.join(", "))));
+            cells.push(Cell {
+                words: true,
+                ..Cell::plain(format!("{sign}{}", numbers.join(", ")))
+            });
         }
         rows.push(cells);
     }
     let mut page = page.section(&table.title).marked_table(&header, &rows);
-    for note in &table.notes {
-        page = page.note(note);
+    if !table.notes.is_empty() {
+        page = page.note(&table.notes.join(" "));
     }
-    if footnotes.is_empty() {
-        return page;
+    match footnotes.is_empty() {
+        true => page,
+        false => page.list(&footnotes),
     }
-    let items = footnotes.iter().enumerate();
-    let items: Vec<_> = items.map(|(i, n)| format!("{}: {n}", i + 1)).collect();
-    page.list(&items)
 }

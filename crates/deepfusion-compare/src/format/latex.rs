@@ -29,7 +29,7 @@ fn table_latex(out: &mut String, table: &Table) {
         .collect();
     let _ = write!(
         out,
-        "\n\\begin{{table}}\n\\centering\n\\caption{{{}}}\n\\begin{{tabular}}{{{layout}}}\n\\toprule\n",
+        "\n\\begin{{table}}\n\\centering\n\\small\n\\caption{{{}}}\n\\begin{{tabular}}{{{layout}}}\n\\toprule\n",
         escaped(&table.title)
     );
     let header: Vec<String> = table.columns.iter().map(|c| escaped(&c.title)).collect();

@@ -65,16 +65,16 @@ impl HtmlReport {
         if frame.image.is_some() {
             page = page.half_picture("Image", &image, PictureFormat::Jpeg)?;
         }
-        page.half_picture("Predicted depth", &depth, PictureFormat::Png)?
+        page.half_picture("Predicted depth", &depth, PictureFormat::Jpeg)?
             .half_picture(
                 "Ground truth",
-                &sparse_depth_picture(&image, &truth, &scale)?,
-                PictureFormat::Png,
+                &with_depth_legend(&sparse_depth_picture(&image, &truth, &scale)?, &scale),
+                PictureFormat::Jpeg,
             )?
             .half_picture(
                 "Relative error of the prediction",
                 &error_picture(&image, &prediction, &truth)?,
-                PictureFormat::Png,
+                PictureFormat::Jpeg,
             )
     }
 

@@ -96,14 +96,27 @@ impl HtmlReport {
         self
     }
 
-    /// Small print, one point a line.
+    /// Small print, numbered from 1.
     #[must_use]
     pub fn list(mut self, items: &[String]) -> Self {
-        self.body.push_str(r#"<ul class="note">"#);
+        self.body.push_str(r#"<ol class="note">"#);
         for item in items {
             let _ = write!(self.body, "<li>{}</li>", escape(item));
         }
-        self.body.push_str("</ul>");
+        self.body.push_str("</ol>");
+        self
+    }
+
+    /// What is known of something, a line each: name and value.
+    #[must_use]
+    pub fn properties(mut self, rows: &[(String, String)]) -> Self {
+        self.body
+            .push_str(r#"<div class="scroll"><table class="properties"><tbody>"#);
+        for (name, value) in rows {
+            let (name, value) = (escape(name), escape(value));
+            let _ = write!(self.body, "<tr><td>{name}</td><td>{value}</td></tr>");
+        }
+        self.body.push_str("</tbody></table></div>");
         self
     }
 

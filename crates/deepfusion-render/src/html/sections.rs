@@ -7,7 +7,7 @@ use crate::learning::smoothed;
 use crate::{BarChart, LearningLog, LineChart, ScatterChart, histogram};
 
 /// Points of a training curve: more would show the noise of single batches.
-const CURVE_POINTS: usize = 150;
+const CURVE_POINTS: usize = 80;
 
 /// What is written above a curve, per column of `log.csv`; other columns go by their own name.
 const TITLES: [(&str, &str); 12] = [

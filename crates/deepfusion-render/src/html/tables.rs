@@ -30,6 +30,8 @@ pub struct Cell {
     pub text: String,
     /// What it stands out by.
     pub mark: Mark,
+    /// Whether it is words, aligned on the left, and no number.
+    pub words: bool,
 }
 
 impl Cell {
@@ -38,27 +40,34 @@ impl Cell {
     pub fn plain(text: impl Into<String>) -> Self {
         Self {
             text: text.into(),
-            mark: Mark::None,
+            ..Self::default()
         }
     }
 }
 
 /// A table with marks.
 pub(super) fn marked(header: &[&str], rows: &[Vec<Cell>]) -> String {
-    let mut out = String::from(r#"<div class="scroll"><table class="plain"><thead><tr>"#);
-    for cell in header {
+    let mut out = String::from(r#"<div class="scroll"><table class="dense"><thead><tr>"#);
+    for (c, cell) in header.iter().enumerate() {
+        let words = rows.iter().all(|r| r.get(c).is_some_and(|cell| cell.words));
+        let class = if words { r#" class="words""# } else { "" };
         // Writing to a String cannot fail, here and below.
-        let _ = write!(out, "<th>{}</th>", escape(cell));
+        let _ = write!(out, "<th{class}>{}</th>", escape(cell));
     }
     out.push_str("</tr></thead><tbody>");
     for row in rows {
         out.push_str("<tr>");
         for cell in row {
-            let class = match cell.mark {
+            let mark = match cell.mark {
                 Mark::None => "",
-                Mark::Best => r#" class="best""#,
-                Mark::Second => r#" class="second""#,
-                Mark::Doubtful => r#" class="doubtful""#,
+                Mark::Best => "best",
+                Mark::Second => "second",
+                Mark::Doubtful => "doubtful",
+            };
+            let words = if cell.words { "words" } else { "" };
+            let class = match format!("{words} {mark}").trim() {
+                "" => String::new(),
+                classes => format!(r#" class="{classes}""#),
             };
             let _ = write!(out, "<td{class}>{}</td>", escape(&cell.text));
         }

@@ -248,13 +248,9 @@ fn page(
         .section("Accuracy");
     let page = run_report::accuracy(page, evaluated);
     let page = run_report::frames(page, shown)?;
-    let rows: Vec<Vec<String>> = how
-        .iter()
-        .map(|(what, value)| vec![what.clone(), value.clone()])
-        .collect();
     Ok(page
         .section("How it was measured")
-        .table(&["", ""], &rows)
+        .properties(how)
         .command(&run_report::command()))
 }
 
