@@ -28,7 +28,7 @@ pub enum Origin {
     /// A file of a run's folder.
     Saved {
         /// What was measured on.
-        measured: Measured,
+        measured: Box<Measured>,
         /// With which weights.
         model: ModelFile,
         /// Whether the run's checkpoint is another one by now.
@@ -115,7 +115,7 @@ impl Evaluation {
             path: path.to_owned(),
             origin: Origin::Saved {
                 outdated: now.is_some_and(|now| now != saved.model.sha256),
-                measured: saved.measured,
+                measured: Box::new(saved.measured),
                 model: saved.model,
             },
         })

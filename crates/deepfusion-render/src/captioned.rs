@@ -133,6 +133,7 @@ mod tests {
         assert_eq!(out.get_pixel(10, 6 + row + 16 + 5), &Rgb([0, 0, 255]));
         assert_eq!(out.get_pixel(80, 6 + row + 16 + 5), &Rgb([255, 0, 0]));
         assert_eq!(cut("abcdef", 4), "ab..");
-        model_sheet(&[], &DepthScale::default());
+        let none = model_sheet(&[], &DepthScale::default());
+        assert_eq!(none.width(), 12);
     }
 }

@@ -42,6 +42,12 @@ pub fn with_depth_legend(picture: &RgbImage, scale: &DepthScale) -> RgbImage {
     with_legend(picture, &colour, &ticks)
 }
 
+/// The scale's bar of colours alone, with depths in metres.
+#[must_use]
+pub fn depth_legend(width: u32, scale: &DepthScale) -> RgbImage {
+    with_depth_legend(&RgbImage::new(width, 0), scale)
+}
+
 /// A colour bar under a picture. `colour` maps [0, 1] to the bar's colours, `ticks` are places in [0, 1] and labels.
 pub(crate) fn with_legend(
     picture: &RgbImage,

@@ -23,7 +23,9 @@ pub use captioned::{Tile, model_sheet, sheet};
 pub use charts::{BarChart, LineChart, ScatterChart, Series, Svg, histogram};
 pub use cloud_view::{CloudView, render_cloud};
 pub use colour::{ColourMap, DepthScale};
-pub use depth_picture::{depth_picture, disparity_picture, side_by_side, with_depth_legend};
+pub use depth_picture::{
+    depth_legend, depth_picture, disparity_picture, side_by_side, with_depth_legend,
+};
 pub use error::{Error, Result};
 pub use error_picture::{error_picture, sparse_depth_picture};
 pub use feature_picture::{feature_picture, feature_range};

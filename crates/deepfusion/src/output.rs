@@ -74,6 +74,17 @@ fn unused(path: &Path) -> PathBuf {
         .unwrap_or_else(|| path.to_owned())
 }
 
+/// Fails where a file could not be written for want of its folder: told before long work, not after it.
+pub fn require_folder_of(file: &Path) -> Result<()> {
+    match file.parent() {
+        Some(folder) if folder != Path::new("") && !folder.is_dir() => {
+            let missing = std::io::Error::from(ErrorKind::NotFound);
+            Err(deepfusion_data::Error::file(folder, missing).into())
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The last part of a path, for people: a folder given as `.` by its own name.
 pub fn name_of(path: &Path) -> String {
     let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());

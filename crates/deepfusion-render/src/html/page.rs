@@ -9,7 +9,7 @@ use image::codecs::jpeg::JpegEncoder;
 
 use super::tables::Cell;
 use super::{escape, tables};
-use crate::{Result, Svg};
+use crate::{Result, Svg, Tile};
 
 /// How a picture is stored in a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -39,6 +39,7 @@ pub struct HtmlReport {
     subtitle: String,
     body: String,
     sections: Vec<String>,
+    wide: bool,
 }
 
 /// A page with more sections than this has a table of contents.
@@ -53,7 +54,15 @@ impl HtmlReport {
             subtitle: subtitle.into(),
             body: String::new(),
             sections: Vec::new(),
+            wide: false,
         }
+    }
+
+    /// For wide tables: as wide as the window, up to 1,400 units.
+    #[must_use]
+    pub fn wide(mut self) -> Self {
+        self.wide = true;
+        self
     }
 
     /// The few numbers that matter, in large: name and value.
@@ -187,25 +196,37 @@ impl HtmlReport {
         picture: &RgbImage,
         format: PictureFormat,
     ) -> Result<Self> {
-        let mut bytes = Cursor::new(Vec::new());
-        let kind = match format {
-            PictureFormat::Jpeg => {
-                picture.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, 88))?;
-                "jpeg"
-            }
-            PictureFormat::Png => {
-                picture.write_to(&mut bytes, image::ImageFormat::Png)?;
-                "png"
-            }
-        };
+        let (tag, caption) = (img(caption, picture, format)?, escape(caption));
         let _ = write!(
             self.body,
-            r#"<figure{class}><img alt="{0}" width="{1}" height="{2}" src="data:image/{kind};base64,{3}"><figcaption>{0}</figcaption></figure>"#,
-            escape(caption),
-            picture.width(),
-            picture.height(),
-            STANDARD.encode(bytes.get_ref())
+            "<figure{class}>{tag}<figcaption>{caption}</figcaption></figure>"
         );
+        Ok(self)
+    }
+
+    /// Pictures in rows, the columns of all rows alike: each with its caption, stored as JPEG. Short rows leave gaps.
+    ///
+    /// # Errors
+    /// As [`HtmlReport::picture`].
+    pub fn picture_grid(mut self, rows: &[Vec<Tile>]) -> Result<Self> {
+        let columns = rows.iter().map(Vec::len).max().unwrap_or(0).max(1);
+        let _ = write!(
+            self.body,
+            r#"<div class="grid" style="grid-template-columns: repeat({columns}, 1fr)">"#
+        );
+        for row in rows {
+            for tile in row {
+                let tag = img(&tile.caption, &tile.picture, PictureFormat::Jpeg)?;
+                let caption = escape(&tile.caption);
+                let _ = write!(
+                    self.body,
+                    "<figure>{tag}<figcaption>{caption}</figcaption></figure>"
+                );
+            }
+            self.body
+                .push_str(&"<div></div>".repeat(columns - row.len()));
+        }
+        self.body.push_str("</div>");
         Ok(self)
     }
 
@@ -234,11 +255,12 @@ impl HtmlReport {
         format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n<main>\n\
+             <title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n<main{wide}>\n\
              <header><h1>{title}</h1><p>{subtitle}</p></header>\n{contents}{body}\n</main>\n</body>\n</html>\n",
             title = escape(&self.title),
             subtitle = escape(&self.subtitle),
             style = include_str!("style.css"),
+            wide = if self.wide { r#" class="wide""# } else { "" },
             contents = self.contents(),
             body = self.body,
         )
@@ -267,6 +289,28 @@ impl HtmlReport {
     }
 }
 
+/// A picture inside the page.
+fn img(alt: &str, picture: &RgbImage, format: PictureFormat) -> Result<String> {
+    let mut bytes = Cursor::new(Vec::new());
+    let kind = match format {
+        PictureFormat::Jpeg => {
+            picture.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, 88))?;
+            "jpeg"
+        }
+        PictureFormat::Png => {
+            picture.write_to(&mut bytes, image::ImageFormat::Png)?;
+            "png"
+        }
+    };
+    Ok(format!(
+        r#"<img alt="{}" width="{}" height="{}" src="data:image/{kind};base64,{}">"#,
+        escape(alt),
+        picture.width(),
+        picture.height(),
+        STANDARD.encode(bytes.get_ref())
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -291,6 +335,18 @@ mod tests {
         for outside in ["http://", "https://", "@import", "<script", "<link"] {
             assert!(!html.contains(outside), "{outside}");
         }
+    }
+
+    #[test]
+    fn a_grid_has_as_many_places_in_every_row() {
+        let tile = |caption: &str| Tile::new(caption, RgbImage::new(8, 4));
+        let rows = [vec![tile("a"), tile("b"), tile("c")], vec![tile("<d>")]];
+        let page = HtmlReport::new("t", "s").wide().picture_grid(&rows);
+        let html = page.unwrap().to_html();
+        assert_eq!(html.matches("<figure>").count(), 4);
+        assert_eq!(html.matches("<div></div>").count(), 2);
+        assert!(html.contains("repeat(3, 1fr)") && html.contains("&lt;d&gt;"));
+        assert!(html.contains(r#"<main class="wide">"#));
     }
 
     #[test]

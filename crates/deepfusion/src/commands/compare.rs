@@ -7,8 +7,8 @@ use anyhow::Result;
 use deepfusion_compare::{Evaluation, Tables, published_tables, run_tables};
 use deepfusion_data::{CameraChoice, Dataset, GtKind, RgbImage, save_png};
 use deepfusion_render::{
-    DepthScale, HtmlReport, PictureFormat, Tile, depth_picture, model_sheet, shrink_depth,
-    shrink_picture, sparse_depth_picture,
+    DepthScale, HtmlReport, PictureFormat, Tile, depth_legend, depth_picture, model_sheet,
+    shrink_depth, shrink_picture, sparse_depth_picture,
 };
 
 use super::evaluate::open_datasets;
@@ -19,30 +19,34 @@ use crate::error::CliError;
 use crate::output;
 use crate::progress::{Progress, say};
 
-/// Width of each picture of the sheet.
+/// Width of each picture, and of the legend in the page.
 const TILE_WIDTH: u32 = 420;
+const LEGEND_WIDTH: u32 = 700;
 
 /// `deepfusion compare`.
 pub fn run(args: &CompareArgs) -> Result<()> {
+    if let Some(file) = &args.out {
+        output::require_folder_of(file)?;
+    }
     let mut tables = run_tables(&Evaluation::collect(&args.runs)?);
     if args.published {
         tables = tables.and(published_tables()?);
     }
-    let sheet = match (&args.pictures, &args.out) {
+    let rows = match (&args.pictures, &args.out) {
         (Some(recording), Some(out)) => {
-            let sheet = sheet(args, recording)?;
+            let rows = pictures(args, recording)?;
             let path = out.with_extension("png");
-            save_png(&sheet, &path)?;
+            save_png(&model_sheet(&rows, &DepthScale::default()), &path)?;
             say(&format!("pictures  {}", path.display()));
-            Some(sheet)
+            rows
         }
-        _ => None,
+        _ => Vec::new(),
     };
     let text = match args.format {
         TableFormat::Text => tables.to_text(),
         TableFormat::Csv => tables.to_csv()?,
         TableFormat::Latex => tables.to_latex(),
-        TableFormat::Html => html(args, &tables, sheet.as_ref())?,
+        TableFormat::Html => html(args, &tables, &rows)?,
     };
     match &args.out {
         Some(path) => Ok(deepfusion_data::write_atomically::<deepfusion_data::Error>(
@@ -56,16 +60,19 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
 }
 
-fn html(args: &CompareArgs, tables: &Tables, sheet: Option<&RgbImage>) -> Result<String> {
+fn html(args: &CompareArgs, tables: &Tables, rows: &[Vec<Tile>]) -> Result<String> {
     let names: Vec<_> = args.runs.iter().map(|p| output::name_of(p)).collect();
-    let mut page = HtmlReport::new("Depth, side by side", names.join(", "));
+    let mut page = HtmlReport::new("Depth, side by side", names.join(", ")).wide();
     page = tables.add_to(page);
-    if let (Some(sheet), Some(recording)) = (sheet, &args.pictures) {
-        page = page.section("Pictures").picture(
-            &format!("Images of {}, model by model", output::name_of(recording)),
-            sheet,
-            PictureFormat::Jpeg,
-        )?;
+    if let (false, Some(recording)) = (rows.is_empty(), &args.pictures) {
+        page = page
+            .section(&format!("Pictures of {}", output::name_of(recording)))
+            .picture_grid(rows)?
+            .picture(
+                "Depth in metres, the same colours in all pictures",
+                &depth_legend(LEGEND_WIDTH, &DepthScale::default()),
+                PictureFormat::Png,
+            )?;
     }
     Ok(page
         .section("Again")
@@ -74,7 +81,7 @@ fn html(args: &CompareArgs, tables: &Tables, sheet: Option<&RgbImage>) -> Result
 }
 
 /// The same images by each model: a row an image, a column a model, with the scans where there are any.
-fn sheet(args: &CompareArgs, recording: &Path) -> Result<RgbImage> {
+fn pictures(args: &CompareArgs, recording: &Path) -> Result<Vec<Vec<Tile>>> {
     if let Some(file) = args.runs.iter().find(|p| !p.is_dir()) {
         return Err(CliError::NoModel { path: file.clone() }.into());
     }
@@ -129,7 +136,7 @@ fn sheet(args: &CompareArgs, recording: &Path) -> Result<RgbImage> {
             row.push(Tile::new("ground truth", truth.unwrap_or_else(none)));
         }
     }
-    Ok(model_sheet(&rows, &scale))
+    Ok(rows)
 }
 
 /// Frames that are evenly spread over all recordings, those with ground truth first of all where there are enough.

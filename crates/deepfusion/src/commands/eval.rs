@@ -24,6 +24,9 @@ use crate::progress::{Progress, say};
 
 /// `deepfusion eval`.
 pub fn run(args: &EvalArgs) -> Result<()> {
+    if let Some(file) = &args.report {
+        output::require_folder_of(file)?;
+    }
     let report = match (&args.pred, args.pred_kind, &args.gt) {
         (Some(predictions), Some(kind), Some(truth)) => {
             from_arrays(args, predictions, kind, truth)?
