@@ -1,9 +1,11 @@
 use deepfusion_geometry::Intrinsics;
+use sha2::{Digest, Sha256};
 
 use crate::error::first_names;
 use crate::holes;
 use crate::metrics::{Metrics, Sums};
-use crate::report::{FixedScaled, Points, ProtocolSummary, RangeBin, Report, Scale};
+use crate::points::{DrawnPoint, Points};
+use crate::report::{FixedScaled, ProtocolSummary, RangeBin, Report, Scale};
 use crate::resample::{Axis, sample};
 use crate::statistics::{Reservoir, bootstrap_mean_ci95, mean, median, standard_deviation};
 use crate::{Error, Grid, Holes, Prediction, Protocol, Result, Scaling};
@@ -64,7 +66,11 @@ pub struct Evaluator {
     images: Vec<ImageScore>,
     skipped: Vec<String>,
     bins: [Sums; RANGES_M.len() - 1],
-    points: Reservoir,
+    points: Reservoir<DrawnPoint>,
+    /// Whether every image came with its camera.
+    in_space: bool,
+    /// Of the ground truth that counts, in the order in which it came.
+    truth: Sha256,
     /// Pixels with ground truth inside the mask, and those of them without prediction.
     masked: usize,
     missing: usize,
@@ -84,7 +90,9 @@ impl Evaluator {
             images: Vec::new(),
             skipped: Vec::new(),
             bins: Default::default(),
-            points: Reservoir::new(protocol.points, protocol.seed),
+            points: Reservoir::new(protocol.points, protocol.points_seed),
+            in_space: true,
+            truth: Sha256::new(),
             masked: 0,
             missing: 0,
             hole_rates: Vec::new(),
@@ -171,12 +179,17 @@ impl Evaluator {
             self.bins[bin].add(&sums);
         }
         if self.protocol.points > 0 {
+            self.in_space &= image.intrinsics.is_some();
+            let (number, width) = (self.images.len(), truth.width());
             for pixel in &pixels {
-                let length = image
-                    .intrinsics
-                    .map_or(1.0, |k| ray_length(k, pixel.index, truth.width()));
+                let depths = [
+                    pixel.gt,
+                    self.clamp(pixel.pred),
+                    self.clamp(pixel.pred * ratio),
+                ];
+                let place = (pixel.index % width, pixel.index / width);
                 self.points
-                    .push((self.clamp(pixel.pred) - pixel.gt).abs() * length);
+                    .push(|| DrawnPoint::new(number, image.intrinsics, place, depths));
             }
         }
         self.images.push(score);
@@ -187,6 +200,12 @@ impl Evaluator {
     #[must_use]
     pub fn images(&self) -> &[ImageScore] {
         &self.images
+    }
+
+    /// The points drawn so far: at most as many as the protocol asks for.
+    #[must_use]
+    pub fn drawn_points(&self) -> &[DrawnPoint] {
+        &self.points.items
     }
 
     /// Sums up.
@@ -229,6 +248,7 @@ impl Evaluator {
             trivial: None,
             scenarios: Vec::new(),
             skipped: self.skipped.clone(),
+            truth_sha256: Some(hex(&self.truth.clone().finalize())),
         })
     }
 
@@ -263,15 +283,12 @@ impl Evaluator {
     }
 
     fn point_statistics(&self) -> Option<Points> {
-        let distances = &self.points.items;
-        let mean_m = mean(distances)?;
-        let std_m = standard_deviation(distances, 1);
-        Some(Points {
-            n: distances.len(),
-            mean_m,
-            std_m,
-            sem_m: std_m.map(|s| s / (distances.len() as f64).sqrt()),
-        })
+        Points::of(
+            &self.points.items,
+            &RANGES_M,
+            self.in_space,
+            self.protocol.points_seed,
+        )
     }
 
     fn clamp(&self, depth_m: f64) -> f64 {
@@ -316,6 +333,7 @@ impl Evaluator {
             self.protocol.crop.window(truth.width(), truth.height());
         let (mut near, mut near_moving) = (holes::Holes::default(), holes::Holes::default());
         let mut pixels = Vec::new();
+        let mut counted = Vec::new();
         for y in window_rows {
             for x in window_columns.clone() {
                 let index = y * truth.width() + x;
@@ -324,6 +342,8 @@ impl Evaluator {
                     continue;
                 }
                 self.masked += 1;
+                counted.extend_from_slice(&(index as u64).to_le_bytes());
+                counted.extend_from_slice(&gt.to_le_bytes());
                 let pred = sample(disparities, grid.width(), &columns, &rows, x, y)
                     .map(|disparity| 1.0 / disparity);
                 near.push(gt, pred, self.protocol.cap_m);
@@ -336,6 +356,10 @@ impl Evaluator {
                 }
             }
         }
+        for size in [truth.width(), truth.height()] {
+            self.truth.update((size as u64).to_le_bytes());
+        }
+        self.truth.update(&counted);
         self.hole_rates.extend(near.rate());
         self.moving_hole_rates.extend(near_moving.rate());
         pixels
@@ -355,8 +379,6 @@ fn median_of(pixels: &[Pixel], value: fn(&Pixel) -> f64) -> Option<f64> {
     median(&pixels.iter().map(value).collect::<Vec<_>>())
 }
 
-/// Length of the viewing ray to z = 1 through a pixel.
-fn ray_length(k: &Intrinsics, index: usize, width: usize) -> f64 {
-    k.back_project((index % width) as f64, (index / width) as f64, 1.0)
-        .norm()
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }

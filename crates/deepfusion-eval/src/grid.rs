@@ -1,5 +1,6 @@
 use deepfusion_geometry::DepthMap;
 
+use crate::resample::{Axis, sample};
 use crate::{Error, Result};
 
 /// H×W numbers, row by row: depth in metres or disparity in 1/m, as the place it stands in says.
@@ -90,6 +91,21 @@ impl Prediction {
         }
     }
 
+    /// Depth at another size, in metres: resized as disparity, as the protocol does; 0 where there is none.
+    #[must_use]
+    pub fn depth_at(&self, width: usize, height: usize) -> DepthMap {
+        let mut map = DepthMap::empty(width, height);
+        let (grid, disparities) = (self.grid(), self.disparities());
+        let (columns, rows) = (Axis::new(grid.width, width), Axis::new(grid.height, height));
+        for (i, depth) in map.data.iter_mut().enumerate() {
+            let (x, y) = (i % width, i / width);
+            if let Some(disparity) = sample(&disparities, grid.width, &columns, &rows, x, y) {
+                *depth = (1.0 / disparity) as f32;
+            }
+        }
+        map
+    }
+
     /// "depth" or "disparity".
     pub(crate) fn kind(&self) -> &'static str {
         match self {
@@ -107,5 +123,24 @@ impl Prediction {
             .iter()
             .map(|&v| usable(v).then(|| if invert { 1.0 / v } else { v }))
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_is_enlarged_as_disparity_and_holes_are_zero() {
+        let disparity = Prediction::Disparity(Grid::new(2, 1, vec![0.1, 0.2]).unwrap());
+        let depth = disparity.depth_at(4, 2);
+        assert_eq!((depth.width, depth.height), (4, 2));
+        let expected = [10.0, 8.0, 1.0 / 0.175, 5.0].map(|d: f64| d as f32);
+        for (d, e) in depth.data.iter().zip(expected.iter().cycle()) {
+            assert!((d - e).abs() < 1e-5, "{d} {e}");
+        }
+        let holes = Prediction::Depth(Grid::new(2, 1, vec![4.0, f64::NAN]).unwrap());
+        assert_eq!(holes.depth_at(2, 1).data, [4.0, 0.0]);
+        assert!(holes.depth_at(0, 3).data.is_empty());
     }
 }

@@ -16,6 +16,7 @@ mod grid;
 mod holes;
 mod metrics;
 pub mod odometry;
+mod points;
 mod protocol;
 mod report;
 mod resample;
@@ -28,9 +29,8 @@ pub use error::{Error, Result};
 pub use evaluator::{Evaluator, ImageScore, Sample};
 pub use grid::{Grid, Prediction};
 pub use metrics::Metrics;
+pub use points::{DrawnPoint, PointErrors, PointRange, Points};
 pub use protocol::{Crop, GroundTruth, Holes, Protocol, Scaling};
-pub use report::{
-    FixedScaled, Points, ProtocolSummary, RangeBin, Report, Scale, ScenarioRow, TrivialRow,
-};
+pub use report::{FixedScaled, ProtocolSummary, RangeBin, Report, Scale, ScenarioRow, TrivialRow};
 pub use statistics::median;
 pub use trivial::TrivialBaseline;

@@ -85,7 +85,9 @@ pub struct Protocol {
     pub holes: Holes,
     /// How many pixels to draw for the point statistics (the paper's Fig. 11); 0 = none.
     pub points: usize,
-    /// Seed of the bootstrap and of the drawn points.
+    /// Seed of the drawn points.
+    pub points_seed: u64,
+    /// Seed of the bootstrap.
     pub seed: u64,
 }
 
@@ -100,6 +102,7 @@ impl Default for Protocol {
             scaling: Scaling::None,
             holes: Holes::Refuse,
             points: 0,
+            points_seed: 0,
             seed: 0,
         }
     }

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use crate::{Crop, GroundTruth, Metrics, Protocol};
+use crate::{Crop, GroundTruth, Metrics, Points, Protocol};
 
 /// What an evaluation says. Serialises to the JSON that scripts rely on: field names are fixed, parts that do not apply
 /// are absent, and a number that does not exist is `null`, never NaN.
@@ -52,6 +52,10 @@ pub struct Report {
     /// Names of images without a pixel to compare, if any.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub skipped: Vec<String>,
+    /// SHA-256 of the ground truth that counts: two evaluations with the same one compared the same pixels of the same
+    /// images with the same depths, in the same order.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth_sha256: Option<String>,
 }
 
 /// Whether a count is not worth a field.
@@ -160,19 +164,6 @@ pub struct RangeBin {
     pub abs_rel: Option<f64>,
     /// √mean (gt − pred)², in metres; `None` without pixels.
     pub rmse: Option<f64>,
-}
-
-/// Distances in metres between randomly drawn predicted points and their true places (the paper's Fig. 11).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Points {
-    /// How many points.
-    pub n: usize,
-    /// Mean distance.
-    pub mean_m: f64,
-    /// Standard deviation (n − 1); `None` for one point.
-    pub std_m: Option<f64>,
-    /// Standard error of the mean; `None` for one point.
-    pub sem_m: Option<f64>,
 }
 
 /// The trivial baseline's scores on the same images.

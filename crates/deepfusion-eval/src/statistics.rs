@@ -71,14 +71,14 @@ impl SplitMix64 {
 
 /// A uniform sample of at most `capacity` items of a stream of unknown length (Vitter's algorithm R).
 #[derive(Debug, Clone)]
-pub(crate) struct Reservoir {
+pub(crate) struct Reservoir<T> {
     capacity: usize,
     seen: usize,
     random: SplitMix64,
-    pub(crate) items: Vec<f64>,
+    pub(crate) items: Vec<T>,
 }
 
-impl Reservoir {
+impl<T> Reservoir<T> {
     pub(crate) fn new(capacity: usize, seed: u64) -> Self {
         Self {
             capacity,
@@ -88,14 +88,15 @@ impl Reservoir {
         }
     }
 
-    pub(crate) fn push(&mut self, item: f64) {
+    /// One more item of the stream; it is only made where it is kept.
+    pub(crate) fn push(&mut self, item: impl FnOnce() -> T) {
         self.seen += 1;
         if self.items.len() < self.capacity {
-            self.items.push(item);
+            self.items.push(item());
         } else if self.capacity > 0 {
             let slot = self.random.below(self.seen);
             if slot < self.capacity {
-                self.items[slot] = item;
+                self.items[slot] = item();
             }
         }
     }
@@ -137,7 +138,7 @@ mod tests {
         let mut hits = [0usize; 20];
         for seed in 0..2000 {
             let mut reservoir = Reservoir::new(5, seed);
-            (0..20).for_each(|i| reservoir.push(f64::from(i)));
+            (0..20).for_each(|i| reservoir.push(|| f64::from(i)));
             assert_eq!(reservoir.items.len(), 5);
             reservoir.items.iter().for_each(|i| hits[*i as usize] += 1);
         }

@@ -1,6 +1,6 @@
 use std::fmt;
 
-use crate::{Crop, GroundTruth, Metrics, Report};
+use crate::{Crop, GroundTruth, Metrics, PointErrors, Points, Report};
 
 const LABEL: usize = 22;
 
@@ -41,6 +41,10 @@ impl fmt::Display for Report {
             let label = format!("{} to {} m", bin.from_m, bin.to_m);
             write!(f, "{label:LABEL$}{:>9}", bin.n)?;
             writeln!(f, "{}{}", number(bin.abs_rel), number(bin.rmse))?;
+        }
+        if let Some(points) = &self.points {
+            writeln!(f)?;
+            point_table(f, points)?;
         }
         if !self.skipped.is_empty() {
             writeln!(f)?;
@@ -119,18 +123,46 @@ impl Report {
                 100.0 * rate
             )?;
         }
-        if let Some(points) = &self.points {
-            writeln!(
-                f,
-                "points  {} drawn: mean distance {:.3} m, standard deviation {} m, standard error {} m",
-                points.n,
-                points.mean_m,
-                number(points.std_m).trim_start(),
-                number(points.sem_m).trim_start()
-            )?;
-        }
         Ok(())
     }
+}
+
+/// Distances of drawn points: all, then by range.
+fn point_table(f: &mut fmt::Formatter<'_>, points: &Points) -> fmt::Result {
+    let kind = if points.in_space {
+        "Euclidean distance, m"
+    } else {
+        "distance along z, m (no camera)"
+    };
+    writeln!(
+        f,
+        "{} points drawn with seed {}: {kind}",
+        points.unscaled.n, points.seed
+    )?;
+    writeln!(
+        f,
+        "{:LABEL$}{:>9}{:>9}{:>9}{:>9}{:>15}{:>14}",
+        "", "points", "mean", "std", "sem", "sem by image", "median-scaled"
+    )?;
+    let row =
+        |f: &mut fmt::Formatter<'_>, label: &str, errors: &PointErrors, scaled: &PointErrors| {
+            writeln!(
+                f,
+                "{label:LABEL$}{:>9}{}{}{}{:>15}{:>14}",
+                errors.n,
+                number(errors.mean_m),
+                number(errors.std_m),
+                number(errors.sem_m),
+                number(errors.sem_images_m).trim_start(),
+                number(scaled.mean_m).trim_start()
+            )
+        };
+    row(f, "all", &points.unscaled, &points.median_scaled)?;
+    for range in &points.ranges {
+        let label = format!("{} to {} m", range.from_m, range.to_m);
+        row(f, &label, &range.unscaled, &range.median_scaled)?;
+    }
+    Ok(())
 }
 
 fn row(f: &mut fmt::Formatter<'_>, label: &str, metrics: &Metrics) -> fmt::Result {

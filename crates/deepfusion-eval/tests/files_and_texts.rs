@@ -49,7 +49,7 @@ fn json_has_the_promised_fields_and_survives_a_round_trip() {
     };
     assert_eq!(
         keys(&json),
-        "hole_rate median_scaled n protocol ranges scale trivial unscaled"
+        "hole_rate median_scaled n protocol ranges scale trivial truth_sha256 unscaled"
     );
     assert_eq!(keys(&json["protocol"]), "cap_m crop gt min_m");
     assert_eq!(
@@ -177,4 +177,19 @@ fn axes_of_length_one_are_dropped() {
             .contains("`b` has shape [2, 3, 4]")
     );
     assert!(set.read(2).is_err());
+}
+
+#[test]
+fn the_table_with_drawn_points() {
+    let truth = Grid::new(4, 1, vec![5.0, 15.0, 30.0, 0.0]).unwrap();
+    let mut evaluator = Evaluator::new(Protocol {
+        points: 100,
+        ..Protocol::default()
+    })
+    .unwrap();
+    let pred = Prediction::Depth(Grid::new(4, 1, vec![6.0, 12.0, 30.0, 50.0]).unwrap());
+    evaluator.add("a", &pred, &truth).unwrap();
+    let text = evaluator.report().unwrap().to_string();
+    let table = text.find("3 points drawn").unwrap();
+    insta::assert_snapshot!(&text[table..]);
 }

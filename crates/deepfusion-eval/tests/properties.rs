@@ -172,8 +172,10 @@ fn drawn_points_measure_distances_in_space() {
     .unwrap();
     evaluator.add("image", &prediction, &truth).unwrap();
     let along_z = evaluator.report().unwrap().points.unwrap();
+    assert!(!along_z.in_space);
+    let along_z = along_z.unscaled;
     assert_eq!(along_z.n, 30);
-    assert!((along_z.mean_m - 1.0).abs() < 1e-12 && along_z.std_m.unwrap() < 1e-12);
+    assert!((along_z.mean_m.unwrap() - 1.0).abs() < 1e-12 && along_z.std_m.unwrap() < 1e-12);
 
     // A camera so wide that a ray at the border is √2 long or more.
     let k = deepfusion_geometry::Intrinsics {
@@ -197,5 +199,10 @@ fn drawn_points_measure_distances_in_space() {
         intrinsics: Some(&k),
     };
     evaluator.add_sample(&sample).unwrap();
-    assert!(evaluator.report().unwrap().points.unwrap().mean_m > 1.05);
+    let in_space = evaluator.report().unwrap().points.unwrap();
+    assert!(in_space.in_space && in_space.unscaled.mean_m.unwrap() > 1.05);
+    assert!(in_space.median_scaled.mean_m.unwrap() < 1e-12);
+    assert_eq!(evaluator.drawn_points().len(), 30);
+    let in_ranges: usize = in_space.ranges.iter().map(|r| r.unscaled.n).sum();
+    assert_eq!(in_ranges, 30);
 }

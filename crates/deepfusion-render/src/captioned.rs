@@ -1,6 +1,8 @@
 use image::{Rgb, RgbImage, imageops};
 
-use crate::text::{TextSize, draw_text};
+use crate::DepthScale;
+use crate::depth_picture::with_depth_legend;
+use crate::text::{TextSize, draw_text, text_width};
 
 pub(crate) const PAPER: Rgb<u8> = Rgb([24, 24, 27]);
 pub(crate) const INK: Rgb<u8> = Rgb([228, 228, 231]);
@@ -57,6 +59,37 @@ pub fn sheet(tiles: &[Tile], columns: usize) -> RgbImage {
     out
 }
 
+/// Pictures of several models: a row an image, a column a model, the columns of all rows alike, with the depth scale's legend
+/// below. Captions are cut to their column.
+#[must_use]
+pub fn model_sheet(rows: &[Vec<Tile>], scale: &DepthScale) -> RgbImage {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |t: &Tile| t.picture.width();
+    let widest = rows.iter().flatten().map(width).max().unwrap_or(0);
+    let letter = text_width("m", TextSize::for_width(widest)).max(1);
+    let most = (widest / letter) as usize;
+    let mut tiles: Vec<Tile> = Vec::new();
+    for row in rows {
+        let cut = |t: &Tile| Tile::new(cut(&t.caption, most), t.picture.clone());
+        tiles.extend(row.iter().map(cut));
+        // A row that ends early must not pull up the next.
+        tiles.resize(
+            tiles.len().next_multiple_of(columns.max(1)),
+            Tile::new("", RgbImage::new(0, 0)),
+        );
+    }
+    with_depth_legend(&sheet(&tiles, columns), scale)
+}
+
+/// At most `most` letters, the last of them dots where there were more.
+fn cut(text: &str, most: usize) -> String {
+    if text.chars().count() <= most {
+        return text.to_owned();
+    }
+    let kept: String = text.chars().take(most.saturating_sub(2)).collect();
+    format!("{kept}..")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -79,5 +112,28 @@ mod tests {
         assert_eq!(out.get_pixel(8, 57), &Rgb([255, 0, 0]));
         assert_eq!(out.get_pixel(44, 57), &PAPER);
         assert_eq!(sheet(&[], 3).dimensions(), (12, 6));
+    }
+
+    #[test]
+    fn models_stand_in_columns_even_where_a_row_is_short() {
+        let of = |colour| RgbImage::from_pixel(60, 20, Rgb(colour));
+        let (red, blue) = (of([255, 0, 0]), of([0, 0, 255]));
+        let rows = [
+            vec![Tile::new("a", red.clone())],
+            vec![
+                Tile::new("b", blue.clone()),
+                Tile::new("a very long name of a model", red),
+            ],
+        ];
+        let out = model_sheet(&rows, &DepthScale::default());
+        let row = 20 + 16 + 6;
+        assert_eq!(out.width(), 6 + 2 * 66);
+        assert!(out.height() > 6 + 2 * row, "the legend is below");
+        assert_eq!(out.get_pixel(10, 6 + 16 + 5), &Rgb([255, 0, 0]));
+        assert_eq!(out.get_pixel(10, 6 + row + 16 + 5), &Rgb([0, 0, 255]));
+        assert_eq!(out.get_pixel(80, 6 + row + 16 + 5), &Rgb([255, 0, 0]));
+        assert_eq!(cut("abcdef", 4), "ab..");
+        let none = model_sheet(&[], &DepthScale::default());
+        assert_eq!(none.width(), 12);
     }
 }

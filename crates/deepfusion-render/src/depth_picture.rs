@@ -42,6 +42,12 @@ pub fn with_depth_legend(picture: &RgbImage, scale: &DepthScale) -> RgbImage {
     with_legend(picture, &colour, &ticks)
 }
 
+/// The scale's bar of colours alone, with depths in metres.
+#[must_use]
+pub fn depth_legend(width: u32, scale: &DepthScale) -> RgbImage {
+    with_depth_legend(&RgbImage::new(width, 0), scale)
+}
+
 /// A colour bar under a picture. `colour` maps [0, 1] to the bar's colours, `ticks` are places in [0, 1] and labels.
 pub(crate) fn with_legend(
     picture: &RgbImage,
@@ -65,8 +71,13 @@ pub(crate) fn with_legend(
     for (place, label) in ticks {
         let x = margin + (place * (length - 1) as f32).round() as u32;
         let half = text_width(label, size) / 2;
-        // Labels at the ends are pushed inside, those that would touch their neighbour are left out.
-        let left = x.saturating_sub(half).min(width.saturating_sub(2 * half));
+        // Labels at the ends are pushed inside (pages round a picture's corners), those that would touch their neighbour
+        // are left out.
+        let inset = size.height() / 2;
+        let left = x
+            .saturating_sub(half)
+            .max(inset)
+            .min(width.saturating_sub(2 * half + inset));
         if left < free_from {
             continue;
         }

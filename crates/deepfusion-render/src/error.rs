@@ -15,7 +15,15 @@ pub enum Error {
     /// A picture cannot be encoded.
     #[error("a picture of the report cannot be encoded")]
     Encode(#[from] image::ImageError),
-    /// A file cannot be written.
+    /// A run's log that cannot be shown.
+    #[error("{}: {what}", path.display())]
+    Log {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A file cannot be read or written.
     #[error(transparent)]
     Data(#[from] deepfusion_data::Error),
 }
@@ -29,6 +37,9 @@ impl Error {
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Data(inner) => inner.hint(),
+            Self::Log { .. } => {
+                Some("it should be the log.csv that `train` wrote into the run's folder".into())
+            }
             Self::Size { .. } | Self::Encode(_) => None,
         }
     }

@@ -1,10 +1,9 @@
 use deepfusion_geometry::DepthMap;
 use image::{Rgb, RgbImage};
 
-use crate::ColourMap;
-use crate::Result;
 use crate::depth_picture::with_legend;
 use crate::error::require_size;
+use crate::{ColourMap, DepthScale, Result};
 
 /// Relative error at the ends of the colours.
 const END: f32 = 0.3;
@@ -23,26 +22,10 @@ pub fn error_picture(
     let (width, height) = image.dimensions();
     require_size("prediction", prediction.data.len(), (width, height))?;
     require_size("ground truth", ground_truth.data.len(), (width, height))?;
-    let mut out = image.clone();
-    for pixel in out.pixels_mut() {
-        let [r, g, b] = pixel.0.map(u32::from);
-        let grey = ((r * 77 + g * 150 + b * 29) >> 8) as u8 / 3;
-        *pixel = Rgb([grey; 3]);
-    }
-    // A dense truth needs no dots larger than a pixel.
-    let dense = ground_truth.count() * 2 > ground_truth.data.len();
-    let dot = if dense { 1 } else { (width / 400).max(1) };
-    for (i, (&pred, &truth)) in prediction.data.iter().zip(&ground_truth.data).enumerate() {
-        if pred > 0.0 && truth > 0.0 {
-            let colour = colour((pred - truth) / truth / END / 2.0 + 0.5);
-            let (x, y) = ((i % width as usize) as u32, (i / width as usize) as u32);
-            for (dx, dy) in (0..dot).flat_map(|dx| (0..dot).map(move |dy| (dx, dy))) {
-                if let Some(pixel) = out.get_pixel_mut_checked(x + dx, y + dy) {
-                    *pixel = colour;
-                }
-            }
-        }
-    }
+    let out = dots(image, ground_truth, |i, truth| {
+        let pred = prediction.data[i];
+        (pred > 0.0).then(|| colour((pred - truth) / truth / END / 2.0 + 0.5))
+    });
     let ticks: Vec<(f32, String)> = [-END, -END / 2.0, 0.0, END / 2.0, END]
         .iter()
         .map(|e| {
@@ -56,6 +39,50 @@ pub fn error_picture(
         })
         .collect();
     Ok(with_legend(&out, &colour, &ticks))
+}
+
+/// Sparse depth in colours on the darkened image, without a legend; dots as in [`error_picture`].
+///
+/// # Errors
+/// [`crate::Error::Size`] where the map has another size than the image.
+pub fn sparse_depth_picture(
+    image: &RgbImage,
+    depth: &DepthMap,
+    scale: &DepthScale,
+) -> Result<RgbImage> {
+    require_size("depth map", depth.data.len(), image.dimensions())?;
+    Ok(dots(image, depth, |_, metres| Some(scale.colour(metres))))
+}
+
+/// The darkened image with a dot wherever there is ground truth and `colour` (of its index and depth) gives one.
+fn dots(
+    image: &RgbImage,
+    ground_truth: &DepthMap,
+    colour: impl Fn(usize, f32) -> Option<Rgb<u8>>,
+) -> RgbImage {
+    let width = image.width();
+    let mut out = image.clone();
+    for pixel in out.pixels_mut() {
+        let [r, g, b] = pixel.0.map(u32::from);
+        let grey = ((r * 77 + g * 150 + b * 29) >> 8) as u8 / 3;
+        *pixel = Rgb([grey; 3]);
+    }
+    // A dense truth needs no dots larger than a pixel.
+    let dense = ground_truth.count() * 2 > ground_truth.data.len();
+    let dot = if dense { 1 } else { (width / 400).max(2) };
+    for (i, &truth) in ground_truth.data.iter().enumerate() {
+        if truth > 0.0
+            && let Some(colour) = colour(i, truth)
+        {
+            let (x, y) = ((i % width as usize) as u32, (i / width as usize) as u32);
+            for (dx, dy) in (0..dot).flat_map(|dx| (0..dot).map(move |dy| (dx, dy))) {
+                if let Some(pixel) = out.get_pixel_mut_checked(x + dx, y + dy) {
+                    *pixel = colour;
+                }
+            }
+        }
+    }
+    out
 }
 
 fn colour(t: f32) -> Rgb<u8> {

@@ -30,6 +30,12 @@ pub enum CliError {
         /// What was given.
         input: String,
     },
+    /// A file where a run's folder is needed.
+    #[error("{}: pictures need a run's folder, and this is a file", path.display())]
+    NoModel {
+        /// The file.
+        path: PathBuf,
+    },
     /// Several drives where one is needed.
     #[error("{}: holds {drives} drives, and a bag is one", input.display())]
     SeveralDrives {
@@ -138,6 +144,7 @@ impl CliError {
                 "build it with `cargo build --release --features {device}`, or use --device cpu"
             )),
             Self::NoImages { .. } => None,
+            Self::NoModel { .. } => Some("give run folders alone, or leave out --pictures".into()),
             Self::SeveralDrives { .. } => Some("convert them one by one: give a drive's own folder".into()),
             Self::Camera { .. } => {
                 Some("give fx,fy,cx,cy in pixels of the input image, at its own size".into())
@@ -235,6 +242,7 @@ pub fn hint_of(problem: &anyhow::Error) -> Option<String> {
         hint_from!(
             CliError,
             deepfusion_cloud::Error,
+            deepfusion_compare::Error,
             deepfusion_data::Error,
             deepfusion_eval::Error,
             deepfusion_eval::odometry::PoseFileError,

@@ -74,8 +74,26 @@ fn unused(path: &Path) -> PathBuf {
         .unwrap_or_else(|| path.to_owned())
 }
 
+/// Fails where a file could not be written for want of its folder: told before long work, not after it.
+pub fn require_folder_of(file: &Path) -> Result<()> {
+    match file.parent() {
+        Some(folder) if folder != Path::new("") && !folder.is_dir() => {
+            let missing = std::io::Error::from(ErrorKind::NotFound);
+            Err(deepfusion_data::Error::file(folder, missing).into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The last part of a path, for people: a folder given as `.` by its own name.
+pub fn name_of(path: &Path) -> String {
+    let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let name = whole.file_name().unwrap_or(whole.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
 /// The time now (UTC), such as `20260131-235959`.
-fn now() -> String {
+pub fn now() -> String {
     let seconds = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .map_or(0, |d| d.as_secs());

@@ -22,6 +22,7 @@ fn help_texts() {
         "doctor",
         "train",
         "ablate",
+        "compare",
         "eval",
         "eval-odometry",
         "predict",

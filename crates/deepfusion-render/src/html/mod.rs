@@ -1,9 +1,14 @@
 //! A report as one HTML file that works offline: styles, pictures and charts are inside.
 
+mod frames;
 mod page;
+mod sections;
 mod tables;
 
+pub use frames::ShownFrame;
 pub use page::{HtmlReport, PictureFormat};
+pub use sections::ReliabilityBin;
+pub use tables::{Cell, Mark};
 
 /// Text as HTML text or attribute value.
 pub(crate) fn escape(text: &str) -> String {

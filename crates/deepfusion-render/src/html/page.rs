@@ -7,8 +7,9 @@ use base64::engine::general_purpose::STANDARD;
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 
+use super::tables::Cell;
 use super::{escape, tables};
-use crate::{LineChart, Result};
+use crate::{Result, Svg, Tile};
 
 /// How a picture is stored in a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -37,7 +38,12 @@ pub struct HtmlReport {
     title: String,
     subtitle: String,
     body: String,
+    sections: Vec<String>,
+    wide: bool,
 }
+
+/// A page with more sections than this has a table of contents.
+const SECTIONS_WITHOUT_CONTENTS: usize = 3;
 
 impl HtmlReport {
     /// An empty report.
@@ -47,7 +53,16 @@ impl HtmlReport {
             title: title.into(),
             subtitle: subtitle.into(),
             body: String::new(),
+            sections: Vec::new(),
+            wide: false,
         }
+    }
+
+    /// For wide tables: as wide as the window, up to 1,400 units.
+    #[must_use]
+    pub fn wide(mut self) -> Self {
+        self.wide = true;
+        self
     }
 
     /// The few numbers that matter, in large: name and value.
@@ -70,7 +85,54 @@ impl HtmlReport {
     /// Begins a section.
     #[must_use]
     pub fn section(mut self, title: &str) -> Self {
-        let _ = write!(self.body, "<h2>{}</h2>", escape(title));
+        self.sections.push(title.to_owned());
+        let number = self.sections.len();
+        let _ = write!(self.body, r#"<h2 id="s{number}">{}</h2>"#, escape(title));
+        self
+    }
+
+    /// A heading inside a section.
+    #[must_use]
+    pub fn heading(mut self, title: &str) -> Self {
+        let _ = write!(self.body, "<h3>{}</h3>", escape(title));
+        self
+    }
+
+    /// Small print.
+    #[must_use]
+    pub fn note(mut self, text: &str) -> Self {
+        let _ = write!(self.body, r#"<p class="note">{}</p>"#, escape(text));
+        self
+    }
+
+    /// Small print, numbered from 1.
+    #[must_use]
+    pub fn list(mut self, items: &[String]) -> Self {
+        self.body.push_str(r#"<ol class="note">"#);
+        for item in items {
+            let _ = write!(self.body, "<li>{}</li>", escape(item));
+        }
+        self.body.push_str("</ol>");
+        self
+    }
+
+    /// What is known of something, a line each: name and value.
+    #[must_use]
+    pub fn properties(mut self, rows: &[(String, String)]) -> Self {
+        self.body
+            .push_str(r#"<div class="scroll"><table class="properties"><tbody>"#);
+        for (name, value) in rows {
+            let (name, value) = (escape(name), escape(value));
+            let _ = write!(self.body, "<tr><td>{name}</td><td>{value}</td></tr>");
+        }
+        self.body.push_str("</tbody></table></div>");
+        self
+    }
+
+    /// A table whose cells carry marks: the best bold, the second underlined, the doubtful struck with a sign.
+    #[must_use]
+    pub fn marked_table(mut self, header: &[&str], rows: &[Vec<Cell>]) -> Self {
+        self.body.push_str(&tables::marked(header, rows));
         self
     }
 
@@ -97,7 +159,7 @@ impl HtmlReport {
 
     /// A chart. Charts that follow each other stand side by side where there is room.
     #[must_use]
-    pub fn chart(mut self, chart: &LineChart) -> Self {
+    pub fn chart(mut self, chart: &impl Svg) -> Self {
         let _ = write!(
             self.body,
             r#"<figure class="half">{}</figure>"#,
@@ -110,31 +172,61 @@ impl HtmlReport {
     ///
     /// # Errors
     /// [`crate::Error::Encode`] where it cannot be encoded (it has no pixels).
-    pub fn picture(
-        mut self,
+    pub fn picture(self, caption: &str, picture: &RgbImage, format: PictureFormat) -> Result<Self> {
+        self.figure("", caption, picture, format)
+    }
+
+    /// A picture of half the page's width: two that follow each other stand side by side where there is room.
+    ///
+    /// # Errors
+    /// As [`HtmlReport::picture`].
+    pub fn half_picture(
+        self,
         caption: &str,
         picture: &RgbImage,
         format: PictureFormat,
     ) -> Result<Self> {
-        let mut bytes = Cursor::new(Vec::new());
-        let kind = match format {
-            PictureFormat::Jpeg => {
-                picture.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, 88))?;
-                "jpeg"
-            }
-            PictureFormat::Png => {
-                picture.write_to(&mut bytes, image::ImageFormat::Png)?;
-                "png"
-            }
-        };
+        self.figure(r#" class="half""#, caption, picture, format)
+    }
+
+    fn figure(
+        mut self,
+        class: &str,
+        caption: &str,
+        picture: &RgbImage,
+        format: PictureFormat,
+    ) -> Result<Self> {
+        let (tag, caption) = (img(caption, picture, format)?, escape(caption));
         let _ = write!(
             self.body,
-            r#"<figure><img alt="{0}" width="{1}" height="{2}" src="data:image/{kind};base64,{3}"><figcaption>{0}</figcaption></figure>"#,
-            escape(caption),
-            picture.width(),
-            picture.height(),
-            STANDARD.encode(bytes.get_ref())
+            "<figure{class}>{tag}<figcaption>{caption}</figcaption></figure>"
         );
+        Ok(self)
+    }
+
+    /// Pictures in rows, the columns of all rows alike: each with its caption, stored as JPEG. Short rows leave gaps.
+    ///
+    /// # Errors
+    /// As [`HtmlReport::picture`].
+    pub fn picture_grid(mut self, rows: &[Vec<Tile>]) -> Result<Self> {
+        let columns = rows.iter().map(Vec::len).max().unwrap_or(0).max(1);
+        let _ = write!(
+            self.body,
+            r#"<div class="grid" style="grid-template-columns: repeat({columns}, 1fr)">"#
+        );
+        for row in rows {
+            for tile in row {
+                let tag = img(&tile.caption, &tile.picture, PictureFormat::Jpeg)?;
+                let caption = escape(&tile.caption);
+                let _ = write!(
+                    self.body,
+                    "<figure>{tag}<figcaption>{caption}</figcaption></figure>"
+                );
+            }
+            self.body
+                .push_str(&"<div></div>".repeat(columns - row.len()));
+        }
+        self.body.push_str("</div>");
         Ok(self)
     }
 
@@ -163,13 +255,26 @@ impl HtmlReport {
         format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n<main>\n\
-             <header><h1>{title}</h1><p>{subtitle}</p></header>\n{body}\n</main>\n</body>\n</html>\n",
+             <title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n<main{wide}>\n\
+             <header><h1>{title}</h1><p>{subtitle}</p></header>\n{contents}{body}\n</main>\n</body>\n</html>\n",
             title = escape(&self.title),
             subtitle = escape(&self.subtitle),
             style = include_str!("style.css"),
+            wide = if self.wide { r#" class="wide""# } else { "" },
+            contents = self.contents(),
             body = self.body,
         )
+    }
+
+    fn contents(&self) -> String {
+        if self.sections.len() <= SECTIONS_WITHOUT_CONTENTS {
+            return String::new();
+        }
+        let link = |(i, title): (usize, &String)| {
+            format!(r##"<a href="#s{}">{}</a>"##, i + 1, escape(title))
+        };
+        let links: Vec<_> = self.sections.iter().enumerate().map(link).collect();
+        format!("<nav>{}</nav>\n", links.join(""))
     }
 
     /// Writes the page, whole or not at all.
@@ -184,9 +289,32 @@ impl HtmlReport {
     }
 }
 
+/// A picture inside the page.
+fn img(alt: &str, picture: &RgbImage, format: PictureFormat) -> Result<String> {
+    let mut bytes = Cursor::new(Vec::new());
+    let kind = match format {
+        PictureFormat::Jpeg => {
+            picture.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, 88))?;
+            "jpeg"
+        }
+        PictureFormat::Png => {
+            picture.write_to(&mut bytes, image::ImageFormat::Png)?;
+            "png"
+        }
+    };
+    Ok(format!(
+        r#"<img alt="{}" width="{}" height="{}" src="data:image/{kind};base64,{}">"#,
+        escape(alt),
+        picture.width(),
+        picture.height(),
+        STANDARD.encode(bytes.get_ref())
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::LineChart;
 
     #[test]
     fn the_page_needs_nothing_from_outside() {
@@ -207,6 +335,18 @@ mod tests {
         for outside in ["http://", "https://", "@import", "<script", "<link"] {
             assert!(!html.contains(outside), "{outside}");
         }
+    }
+
+    #[test]
+    fn a_grid_has_as_many_places_in_every_row() {
+        let tile = |caption: &str| Tile::new(caption, RgbImage::new(8, 4));
+        let rows = [vec![tile("a"), tile("b"), tile("c")], vec![tile("<d>")]];
+        let page = HtmlReport::new("t", "s").wide().picture_grid(&rows);
+        let html = page.unwrap().to_html();
+        assert_eq!(html.matches("<figure>").count(), 4);
+        assert_eq!(html.matches("<div></div>").count(), 2);
+        assert!(html.contains("repeat(3, 1fr)") && html.contains("&lt;d&gt;"));
+        assert!(html.contains(r#"<main class="wide">"#));
     }
 
     #[test]

@@ -9,6 +9,74 @@ pub(super) fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     table_of_class("plain", header, rows)
 }
 
+/// What a cell of a table stands out by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mark {
+    /// Nothing.
+    #[default]
+    None,
+    /// The best of its column: bold.
+    Best,
+    /// The second best: underlined.
+    Second,
+    /// Cannot be right, or hardly: grey, with a sign in its row.
+    Doubtful,
+}
+
+/// A cell of a table.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Cell {
+    /// What it says.
+    pub text: String,
+    /// What it stands out by.
+    pub mark: Mark,
+    /// Whether it is words, aligned on the left, and no number.
+    pub words: bool,
+}
+
+impl Cell {
+    /// A cell without a mark.
+    #[must_use]
+    pub fn plain(text: impl Into<String>) -> Self {
+        Self {
+            text: text.into(),
+            ..Self::default()
+        }
+    }
+}
+
+/// A table with marks.
+pub(super) fn marked(header: &[&str], rows: &[Vec<Cell>]) -> String {
+    let mut out = String::from(r#"<div class="scroll"><table class="dense"><thead><tr>"#);
+    for (c, cell) in header.iter().enumerate() {
+        let words = rows.iter().all(|r| r.get(c).is_some_and(|cell| cell.words));
+        let class = if words { r#" class="words""# } else { "" };
+        // Writing to a String cannot fail, here and below.
+        let _ = write!(out, "<th{class}>{}</th>", escape(cell));
+    }
+    out.push_str("</tr></thead><tbody>");
+    for row in rows {
+        out.push_str("<tr>");
+        for cell in row {
+            let mark = match cell.mark {
+                Mark::None => "",
+                Mark::Best => "best",
+                Mark::Second => "second",
+                Mark::Doubtful => "doubtful",
+            };
+            let words = if cell.words { "words" } else { "" };
+            let class = match format!("{words} {mark}").trim() {
+                "" => String::new(),
+                classes => format!(r#" class="{classes}""#),
+            };
+            let _ = write!(out, "<td{class}>{}</td>", escape(&cell.text));
+        }
+        out.push_str("</tr>");
+    }
+    out.push_str("</tbody></table></div>");
+    out
+}
+
 fn table_of_class(class: &str, header: &[&str], rows: &[Vec<String>]) -> String {
     let mut out = format!(r#"<div class="scroll"><table class="{class}"><thead><tr>"#);
     for cell in header {
@@ -117,6 +185,10 @@ fn metric_rows(report: &Report) -> Vec<Vec<String>> {
         rows.push(row("trivial", &trivial.unscaled));
         rows.push(row("trivial, median-scaled", &trivial.median_scaled));
     }
+    for scenario in &report.scenarios {
+        let label = format!("{}, scale {:.3}", scenario.name, scenario.scale.median);
+        rows.push(row(&label, &scenario.unscaled));
+    }
     rows
 }
 
@@ -157,13 +229,6 @@ fn scale_table(report: &Report) -> String {
         rows.push(vec![
             "ground truth without prediction".into(),
             format!("{:.2} %", 100.0 * rate),
-        ]);
-    }
-    if let Some(points) = &report.points {
-        let text = format!("{:.3} m", points.mean_m);
-        rows.push(vec![
-            format!("mean distance of {} drawn points", points.n),
-            text,
         ]);
     }
     table(&["scale", ""], &rows)

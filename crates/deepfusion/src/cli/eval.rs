@@ -13,9 +13,11 @@ use super::{CameraIntrinsics, EngineArgs, GtDepth};
     group(ArgGroup::new("what").required(true).args(["model", "pred"])),
     after_help = "Metrics are means over images, unscaled and median-scaled, both always; static and moving pixels apart where \
     the simulator's masks or KITTI's tracklets tell. Array files: .npz (matched by \
-    name) or N×H×W .npy (in split order), float32 or float64, any size: predictions are resized as disparity.\n\n\
+    name) or N×H×W .npy (in split order), float32 or float64, any size: predictions are resized as disparity. With --model, the result \
+    is kept in RUN/eval, where `compare` finds it.\n\n\
     Examples:\n  deepfusion eval --model runs/train-1 --data kitti --split eigen/test_files.txt\n  \
-    deepfusion eval --pred depth.npz --pred-kind depth --gt gt.npz --crop garg --json"
+    deepfusion eval --pred depth.npz --pred-kind depth --gt gt.npz --crop garg --json\n  \
+    deepfusion eval --model runs/train-1 --data street --points 10000 --report street.html"
 )]
 pub struct EvalArgs {
     /// A run folder or a checkpoint in it.
@@ -62,9 +64,15 @@ pub struct EvalArgs {
     /// An extra row with a fixed factor (fixed=F); none and median are always reported.
     #[arg(long, value_name = "none|median|fixed=F", default_value = "none", value_parser = scaling)]
     pub scale: Scaling,
-    /// Also draw N points at random and report their distances from the truth.
+    /// Also draw N of the compared pixels at random and report how far their points are from the LiDAR's in space.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub points: usize,
+    /// Which points are drawn.
+    #[arg(long, value_name = "S", default_value_t = 0, requires = "points")]
+    pub points_seed: u64,
+    /// Also write a page that opens offline: tables, charts, best and worst frames, learning curves, settings.
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
     /// Predicted values that are NaN, infinite or not above 0 mean "none here": leave them out and count them.
     #[arg(long)]
     pub allow_holes: bool,
@@ -97,6 +105,7 @@ impl EvalArgs {
                 Holes::Refuse
             },
             points: self.points,
+            points_seed: self.points_seed,
             ..Protocol::default()
         }
     }

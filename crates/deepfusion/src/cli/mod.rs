@@ -1,6 +1,7 @@
 //! The command line's shape: what can be said, not what it does.
 
 mod ablate;
+mod compare;
 mod data;
 mod doctor;
 mod engine;
@@ -18,6 +19,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use ablate::AblateArgs;
+pub use compare::{CompareArgs, TableFormat};
 pub use data::{ConvertArgs, DataCommand, ExportGtArgs, GtDepth, InspectArgs};
 pub use doctor::DoctorArgs;
 pub use engine::{EngineArgs, EngineChoice, PrecisionChoice};
@@ -65,6 +67,8 @@ pub enum Command {
     Ablate(Box<AblateArgs>),
     /// Measure depth: the field's seven metrics, unscaled and median-scaled.
     Eval(Box<EvalArgs>),
+    /// Evaluations side by side, and beside the field's published tables.
+    Compare(Box<CompareArgs>),
     /// Measure the camera's path: drift, five-frame error, scale.
     EvalOdometry(EvalOdometryArgs),
     /// Measure 3D targets against labelled boxes: recall, precision, errors, identities.

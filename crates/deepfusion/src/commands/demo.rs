@@ -10,12 +10,12 @@ use deepfusion_cloud::PointCloud;
 use deepfusion_data::{
     CameraChoice, Dataset, GtKind, OpenOptions, save_png, write_atomically, write_depth_png,
 };
-use deepfusion_eval::{Crop, GroundTruth, Protocol, Report};
+use deepfusion_eval::{Crop, GroundTruth, Protocol};
 use deepfusion_geometry::DepthMap;
 use deepfusion_nn::InputSize;
 use deepfusion_render::{
-    CloudView, DepthScale, HtmlReport, LineChart, PictureFormat, depth_picture, error_picture,
-    render_cloud, side_by_side, with_depth_legend,
+    CloudView, DepthScale, HtmlReport, PictureFormat, depth_picture, error_picture, render_cloud,
+    side_by_side, with_depth_legend,
 };
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{
@@ -23,9 +23,9 @@ use deepfusion_train::{
 };
 
 use super::eval::predict;
-use super::evaluate::{Truth, evaluate_datasets, open_datasets, trivial_from_datasets};
-use super::recorder::{Curves, clock};
-use super::{device, train};
+use super::evaluate::{Evaluated, Truth, evaluate_datasets, open_datasets, trivial_from_datasets};
+use super::recorder::clock;
+use super::{device, run_report, train};
 use crate::cli::{DemoArgs, EngineArgs};
 use crate::engine;
 use crate::output;
@@ -95,14 +95,14 @@ pub fn run(args: &DemoArgs) -> Result<()> {
         ..preset
     };
     let model = out.join("model");
-    let (config, curves) = learn(config, &train_drives, &model, &device)?;
+    learn(config, &train_drives, &model, &device)?;
 
     say("3/4 measuring on the street never seen");
     let checkpoint = model.join("last.safetensors");
     let predictor = engine::load(&checkpoint, &EngineArgs::on(args.device))?;
     let train_sets = open_datasets(&train_drives, None, CameraChoice::default())?;
     let test_sets = Dataset::open(&test_drive, &OpenOptions::default())?;
-    let report = measure(&predictor, &train_sets, &test_sets)?;
+    let evaluated = measure(&predictor, &train_sets, &test_sets)?;
 
     say("4/4 pictures, a point cloud and the report");
     let html = out.join("report.html");
@@ -111,11 +111,11 @@ pub fn run(args: &DemoArgs) -> Result<()> {
         &html,
         &predictor,
         &test_sets[0],
-        &report,
-        &config,
-        &curves,
+        &evaluated,
+        &model,
         start,
     )?;
+    let report = &evaluated.report;
     say(&format!(
         "{report}\ndone in {}\nreport  {}\nmodel   {}\ncloud   {}",
         clock(start.elapsed().as_secs_f64()),
@@ -124,7 +124,7 @@ pub fn run(args: &DemoArgs) -> Result<()> {
         out.join("cloud.ply").display(),
     ));
     if args.json {
-        output::print_json(&report)
+        output::print_json(report)
     } else {
         output::print(&format!("{}\n", html.display()))
     }
@@ -138,21 +138,15 @@ fn simulate(out: &Path, config: &SimConfig) -> Result<PathBuf> {
     })?)
 }
 
-fn learn(
-    mut config: TrainConfig,
-    drives: &[PathBuf],
-    out: &Path,
-    device: &Device,
-) -> Result<(TrainConfig, Curves)> {
+fn learn(mut config: TrainConfig, drives: &[PathBuf], out: &Path, device: &Device) -> Result<()> {
     config.data.paths = drives.to_vec();
     let sets = train::open_samples(&config)?;
     let folder = RunFolder::create(out)?;
     let mut trainer = Trainer::create(config, folder, sets, device, Ok)?;
-    let curves = train::train(&mut trainer)?;
-    Ok((trainer.config().clone(), curves))
+    train::train(&mut trainer)
 }
 
-fn measure(predictor: &Predictor, train: &[Dataset], test: &[Dataset]) -> Result<Report> {
+fn measure(predictor: &Predictor, train: &[Dataset], test: &[Dataset]) -> Result<Evaluated> {
     let protocol = Protocol {
         crop: Crop::Garg,
         gt: GroundTruth::Z,
@@ -161,7 +155,7 @@ fn measure(predictor: &Predictor, train: &[Dataset], test: &[Dataset]) -> Result
     let mut progress = Progress::new("evaluating");
     evaluate_datasets(
         test,
-        Truth::Scans(GtKind::Z),
+        &mut Truth::Scans(GtKind::Z),
         &protocol,
         Some(trivial_from_datasets(train, GtKind::Z)?),
         &mut |dataset, frame| {
@@ -184,11 +178,11 @@ fn write_report(
     html: &Path,
     predictor: &Predictor,
     dataset: &Dataset,
-    report: &Report,
-    config: &TrainConfig,
-    curves: &Curves,
+    evaluated: &Evaluated,
+    model: &Path,
     start: Instant,
 ) -> Result<()> {
+    let report = &evaluated.report;
     let scale = DepthScale::default();
     let number = |v: f64| format!("{v:.3}");
     let trivial = report.trivial.as_ref().map(|t| t.unscaled.abs_rel);
@@ -208,10 +202,9 @@ fn write_report(
         "Scans of the simulated LiDAR, Garg's crop, 80 m. Unscaled: the prediction as it is, in \
          metres. Median-scaled: each image multiplied by median(truth) / median(prediction), as \
          methods without a metric scale need. The trivial row predicts each pixel's mean depth over \
-         the training streetss.",
-    )
-    .evaluation(report)
-    .section("What it sees");
+         the training streets.",
+    );
+    page = run_report::accuracy(page, evaluated).section("What it sees");
     let pictures = out.join("pictures");
     std::fs::create_dir_all(&pictures).map_err(|e| deepfusion_data::Error::file(&pictures, e))?;
     let frames = dataset.frames().len();
@@ -273,21 +266,9 @@ fn write_report(
             }
         }
     }
-    page = page
-        .section("How it learned")
-        .chart(
-            &LineChart::new("Photometric reprojection loss", "step")
-                .line("training", curves.train.clone())
-                .line("held out", curves.validation.clone()),
-        )
-        .chart(
-            &LineChart::new("Displacement by the vehicle's speed / by PoseNet", "step")
-                .line("scale ratio", curves.scale.clone())
-                .reference(1.0, "metric"),
-        )
+    run_report::training(page, model)?
         .section("Again")
         .command("deepfusion demo")
-        .settings("Settings of the training (config.toml)", &config.to_toml()?);
-    page.write(html)?;
+        .write(html)?;
     Ok(())
 }

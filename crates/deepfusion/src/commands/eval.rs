@@ -1,24 +1,32 @@
 use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_data::{Dataset, DatasetKind, GtKind, RgbImage};
+use deepfusion_compare::{
+    FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation, sha256_of_file,
+};
+use deepfusion_data::{CameraChoice, Dataset, DatasetKind, GtKind, RgbImage};
 use deepfusion_eval::{
-    ArraySet, Crop, Grid, Prediction, Report, Sample, TrivialBaseline, match_names,
+    ArraySet, Crop, Grid, Prediction, Protocol, Report, Sample, TrivialBaseline, match_names,
 };
 use deepfusion_geometry::Intrinsics;
-use deepfusion_train::Predictor;
+use deepfusion_render::{HtmlReport, ShownFrame};
+use deepfusion_train::{Predictor, RunFolder};
 
 use super::evaluate::{
-    Comparison, Truth, evaluate_datasets, open_with_camera, trivial_from_arrays,
-    trivial_from_datasets,
+    Comparison, Evaluated, Place, Truth, array_places, depth_map, evaluate_datasets,
+    open_with_camera, trivial_from_arrays, trivial_from_datasets,
 };
-use crate::cli::{EvalArgs, PredKind};
+use super::run_report::{self, Choice};
+use crate::cli::{EvalArgs, PrecisionChoice, PredKind};
 use crate::engine;
 use crate::output;
-use crate::progress::Progress;
+use crate::progress::{Progress, say};
 
 /// `deepfusion eval`.
 pub fn run(args: &EvalArgs) -> Result<()> {
+    if let Some(file) = &args.report {
+        output::require_folder_of(file)?;
+    }
     let report = match (&args.pred, args.pred_kind, &args.gt) {
         (Some(predictions), Some(kind), Some(truth)) => {
             from_arrays(args, predictions, kind, truth)?
@@ -45,7 +53,7 @@ fn from_model(args: &EvalArgs) -> Result<Report> {
         false => Crop::None,
     };
     let kind = args.gt_depth.kind();
-    let truth = match &args.gt {
+    let mut truth = match &args.gt {
         Some(path) => Truth::Arrays(Box::new(ArraySet::open(path)?)),
         None => Truth::Scans(kind),
     };
@@ -53,23 +61,56 @@ fn from_model(args: &EvalArgs) -> Result<Report> {
         Some(path) => Some(trivial_from_arrays(path)?),
         None => training_scans(&predictor, kind),
     };
+    let protocol = args.protocol(crop);
     let mut progress = Progress::new("evaluating");
-    evaluate_datasets(
+    let see = |dataset: &Dataset, frame: usize| {
+        let image = dataset.load_image(frame)?;
+        let camera = dataset.intrinsics(frame);
+        let prediction = predict(&predictor, &image, &camera, !args.no_focal_correction)?;
+        Ok((image, prediction))
+    };
+    let evaluated = evaluate_datasets(
         &datasets,
-        truth,
-        &args.protocol(crop),
+        &mut truth,
+        &protocol,
         baseline,
-        &mut |dataset, frame| {
-            let image = dataset.load_image(frame)?;
-            predict(
-                &predictor,
-                &image,
-                &dataset.intrinsics(frame),
-                !args.no_focal_correction,
-            )
-        },
+        &mut |dataset, frame| see(dataset, frame).map(|(_, prediction)| prediction),
         &mut |done, total| progress.set(done, total),
-    )
+    )?;
+    let (folder, _) = RunFolder::open(model)?;
+    let saved = saved(args, &predictor, &folder, &evaluated)?;
+    match saved.write(folder.path()) {
+        Ok(path) => say(&format!("kept as {}", path.display())),
+        // A run on a disk that cannot be written is measured all the same.
+        Err(error) => tracing::warn!("the result is not kept beside the run: {error}"),
+    }
+    if let Some(path) = &args.report {
+        let names = deepfusion_data::ground_truth_names(&datasets);
+        let arrays = match &truth {
+            Truth::Scans(_) => Default::default(),
+            Truth::Arrays(arrays) => array_places(arrays, &names),
+        };
+        let shown = shown(&evaluated, |Place(number, frame)| {
+            let dataset = &datasets[number];
+            let place = dataset.selected().iter().position(|f| *f == frame);
+            let name = place.and_then(|p| names[number].get(p));
+            let array = name.and_then(|n| arrays.get(n)).copied();
+            let (image, prediction) = see(dataset, frame)?;
+            let depth = truth.of(dataset, frame, array)?;
+            Ok(depth.map(|depth| Seen {
+                image: Some(image),
+                prediction,
+                truth: depth,
+                camera: Some(dataset.intrinsics(frame)),
+            }))
+        })?;
+        let how = how_a_model_was_measured(args, &protocol, &saved);
+        let name = output::name_of(folder.path());
+        let page = page(args, &name, &evaluated, &shown, &how)?;
+        run_report::training(page, folder.path())?.write(path)?;
+        say(&format!("report  {}", path.display()));
+    }
+    Ok(evaluated.report)
 }
 
 /// The disparity of an image, as the protocol wants it.
@@ -98,30 +139,211 @@ fn from_arrays(
     kind: PredKind,
     truth: &Path,
 ) -> Result<Report> {
-    let mut predictions = ArraySet::open(predictions)?;
-    let mut truth = ArraySet::open(truth)?;
+    let mut predicted = ArraySet::open(predictions)?;
+    let mut known = ArraySet::open(truth)?;
     let baseline = args
         .trivial
         .as_deref()
         .map(trivial_from_arrays)
         .transpose()?;
-    let mut comparison = Comparison::new(&args.protocol(Crop::None), baseline)?;
-    let matched = match_names(&predictions, &truth)?;
+    let protocol = args.protocol(Crop::None);
+    let mut comparison = Comparison::new(&protocol, baseline)?;
+    let matched = match_names(&predicted, &known)?;
     let mut progress = Progress::new("evaluating");
-    for (i, (name, predicted, known)) in matched.iter().enumerate() {
-        let grid = predictions.read(*predicted)?;
-        let prediction = match kind {
-            PredKind::Depth => Prediction::Depth(grid),
-            PredKind::Disparity => Prediction::Disparity(grid),
-        };
-        comparison.add(&Sample {
+    let of_kind = |grid| match kind {
+        PredKind::Depth => Prediction::Depth(grid),
+        PredKind::Disparity => Prediction::Disparity(grid),
+    };
+    let mut places = Vec::new();
+    for (i, (name, prediction, depth)) in matched.iter().enumerate() {
+        let counted = comparison.add(&Sample {
             name,
-            prediction: &prediction,
-            ground_truth: &truth.read(*known)?,
+            prediction: &of_kind(predicted.read(*prediction)?),
+            ground_truth: &known.read(*depth)?,
             moving: None,
             intrinsics: None,
         })?;
+        if counted {
+            places.push(Place(*prediction, *depth));
+        }
         progress.set(i + 1, matched.len());
     }
-    comparison.report()
+    let evaluated = comparison.evaluated(places)?;
+    if let Some(path) = &args.report {
+        let shown = shown(&evaluated, |Place(prediction, depth)| {
+            Ok(Some(Seen {
+                image: None,
+                prediction: of_kind(predicted.read(prediction)?),
+                truth: known.read(depth)?,
+                camera: None,
+            }))
+        })?;
+        let how = [
+            ("predictions", predictions.display().to_string()),
+            ("ground truth", truth.display().to_string()),
+        ];
+        let mut how: Vec<_> = how.map(|(a, b)| (a.to_owned(), b)).into();
+        how.extend(protocol_rows(&protocol));
+        let name = output::name_of(predictions);
+        page(args, &name, &evaluated, &shown, &how)?.write(path)?;
+        say(&format!("report  {}", path.display()));
+    }
+    Ok(evaluated.report)
+}
+
+/// What there is to show of an image.
+struct Seen {
+    image: Option<RgbImage>,
+    prediction: Prediction,
+    truth: Grid,
+    camera: Option<Intrinsics>,
+}
+
+/// The frames worth showing, looked at again.
+fn shown(
+    evaluated: &Evaluated,
+    mut see: impl FnMut(Place) -> Result<Option<Seen>>,
+) -> Result<Vec<(Choice, ShownFrame)>> {
+    let mut frames = Vec::new();
+    for choice in run_report::choose(evaluated) {
+        if let Some(seen) = see(evaluated.places[choice.image])? {
+            let truth = depth_map(&seen.truth);
+            let frame = ShownFrame {
+                title: choice.title.clone(),
+                image: seen.image,
+                prediction: seen.prediction.depth_at(truth.width, truth.height),
+                truth,
+                camera: seen.camera,
+            };
+            frames.push((choice, frame));
+        }
+    }
+    Ok(frames)
+}
+
+/// The page but for the training of the model.
+fn page(
+    args: &EvalArgs,
+    name: &str,
+    evaluated: &Evaluated,
+    shown: &[(Choice, ShownFrame)],
+    how: &[(String, String)],
+) -> Result<HtmlReport> {
+    let report = &evaluated.report;
+    let number = |v: f64| format!("{v:.3}");
+    let trivial = report.trivial.as_ref().map(|t| t.unscaled.abs_rel);
+    let names: Vec<_> = args.data.iter().map(|p| output::name_of(p)).collect();
+    let on = match names.is_empty() {
+        true => String::new(),
+        false => format!(" on {}", names.join(", ")),
+    };
+    let page = HtmlReport::new(name, format!("Depth measured{on}"))
+        .facts(&[
+            ("Abs Rel, unscaled", &number(report.unscaled.abs_rel)),
+            ("Abs Rel, trivial row", &trivial.map_or("–".into(), number)),
+            ("scale (1 is metric)", &number(report.scale.median)),
+            (
+                "within 25 %",
+                &format!("{:.1} %", 100.0 * report.unscaled.a1),
+            ),
+            ("images", &report.n.to_string()),
+        ])
+        .section("Accuracy");
+    let page = run_report::accuracy(page, evaluated);
+    let page = run_report::frames(page, shown)?;
+    Ok(page
+        .section("How it was measured")
+        .properties(how)
+        .command(&run_report::command()))
+}
+
+/// The evaluation as it is kept beside the run.
+fn saved(
+    args: &EvalArgs,
+    predictor: &Predictor,
+    folder: &RunFolder,
+    evaluated: &Evaluated,
+) -> Result<SavedEvaluation> {
+    let file = folder.checkpoint_path(predictor.checkpoint);
+    let absolute = |p: &std::path::PathBuf| std::path::absolute(p).unwrap_or_else(|_| p.clone());
+    let precision = match args.engine.precision {
+        PrecisionChoice::F32 => "f32",
+        PrecisionChoice::Bf16 => "bf16",
+    };
+    Ok(SavedEvaluation {
+        format_version: SAVED_VERSION,
+        measured: Measured {
+            data: args.data.iter().map(absolute).collect(),
+            split: args.split.as_ref().map(absolute),
+            gt: args.gt.as_ref().map(absolute),
+            camera: match args.camera {
+                CameraChoice::Left => "2",
+                CameraChoice::Right => "3",
+                CameraChoice::Both => "both",
+            }
+            .into(),
+            engine: format!("{} {precision}", predictor.runner().name()),
+            set: args.engine.set.clone(),
+            focal_correction: !args.no_focal_correction,
+            program: format!("deepfusion {}", env!("CARGO_PKG_VERSION")),
+            command: run_report::command(),
+            time: output::now(),
+        },
+        model: ModelFile {
+            sha256: sha256_of_file(&file)?,
+            checkpoint: output::name_of(&file),
+        },
+        report: evaluated.report.clone(),
+        images: evaluated.images.iter().map(FrameScore::from).collect(),
+    })
+}
+
+fn how_a_model_was_measured(
+    args: &EvalArgs,
+    protocol: &Protocol,
+    saved: &SavedEvaluation,
+) -> Vec<(String, String)> {
+    let m = &saved.measured;
+    let data = args.data.iter().map(|p| p.display().to_string());
+    let truth = match &args.gt {
+        Some(path) => path.display().to_string(),
+        None => "the recordings' scans".into(),
+    };
+    let mut rows = vec![
+        ("recordings", data.collect::<Vec<_>>().join(", ")),
+        ("ground truth", truth),
+        ("camera", m.camera.clone()),
+        ("checkpoint", saved.model.checkpoint.clone()),
+        ("its SHA-256", saved.model.sha256.clone()),
+        ("engine", m.engine.clone()),
+        (
+            "correction for the focal length",
+            if m.focal_correction { "on" } else { "off" }.into(),
+        ),
+        ("program", m.program.clone()),
+        ("time (UTC)", m.time.clone()),
+    ];
+    if let Some(split) = &args.split {
+        rows.insert(1, ("split", split.display().to_string()));
+    }
+    let mut rows: Vec<_> = rows.into_iter().map(|(a, b)| (a.to_owned(), b)).collect();
+    rows.extend(protocol_rows(protocol));
+    if let Some(digest) = &saved.report.truth_sha256 {
+        rows.push(("SHA-256 of the ground truth".to_owned(), digest.clone()));
+    }
+    rows
+}
+
+fn protocol_rows(protocol: &Protocol) -> [(String, String); 2] {
+    let crop = match protocol.crop {
+        Crop::None => "the whole image",
+        Crop::Garg => "Garg's crop",
+    };
+    [
+        ("compared".to_owned(), crop.to_owned()),
+        (
+            "range".to_owned(),
+            format!("{} to {} m", protocol.min_m, protocol.cap_m),
+        ),
+    ]
 }

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use deepfusion_data::{CameraChoice, Dataset, GtKind, OpenOptions, Split, ground_truth_names};
 use deepfusion_eval::{
-    ArraySet, Evaluator, Grid, GroundTruth, Prediction, Protocol, Report, Sample, ScenarioRow,
-    TrivialBaseline,
+    ArraySet, DrawnPoint, Evaluator, Grid, GroundTruth, ImageScore, Prediction, Protocol, Report,
+    Sample, ScenarioRow, TrivialBaseline,
 };
 use deepfusion_geometry::DepthMap;
 
@@ -49,6 +49,24 @@ pub enum Truth {
     Arrays(Box<ArraySet>),
 }
 
+impl Truth {
+    /// Of a frame; `place` is where an array file has it.
+    pub fn of(
+        &mut self,
+        dataset: &Dataset,
+        frame: usize,
+        place: Option<usize>,
+    ) -> Result<Option<Grid>> {
+        Ok(match self {
+            Self::Scans(kind) => {
+                let depth = dataset.ground_truth(frame, *kind)?;
+                depth.map(|depth| Grid::from(&depth))
+            }
+            Self::Arrays(arrays) => place.map(|place| arrays.read(place)).transpose()?,
+        })
+    }
+}
+
 /// The trivial row's scans: all of the given (training) recordings'.
 pub fn trivial_from_datasets(datasets: &[Dataset], kind: GtKind) -> Result<TrivialBaseline> {
     let mut baseline = TrivialBaseline::new();
@@ -70,6 +88,22 @@ pub fn trivial_from_arrays(path: &Path) -> Result<TrivialBaseline> {
         baseline.add_scan(&scans.read(index)?);
     }
     Ok(baseline)
+}
+
+/// Where an evaluated image is: the data set and its frame, or the place of its prediction and truth in array files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place(pub usize, pub usize);
+
+/// What an evaluation found.
+pub struct Evaluated {
+    /// The result.
+    pub report: Report,
+    /// Each image's scores.
+    pub images: Vec<ImageScore>,
+    /// The points that were drawn.
+    pub points: Vec<DrawnPoint>,
+    /// Where each image is.
+    pub places: Vec<Place>,
 }
 
 /// Evaluates a method and, beside it, the trivial baseline on the same images.
@@ -96,15 +130,15 @@ impl Comparison {
         })
     }
 
-    /// Compares one image.
-    pub fn add(&mut self, image: &Sample<'_>) -> Result<()> {
-        self.method.add_sample(image)?;
+    /// Compares one image; whether it had a pixel to compare.
+    pub fn add(&mut self, image: &Sample<'_>) -> Result<bool> {
+        let counted = self.method.add_sample(image)?.is_some();
         if let Some((evaluator, baseline)) = &mut self.trivial {
             // A baseline of this one scan alone has nothing else to say than "80 m": that is its score.
             let depth = baseline.depth_for(Some(image.ground_truth))?;
             evaluator.add(image.name, &Prediction::Depth(depth), image.ground_truth)?;
         }
-        Ok(())
+        Ok(counted)
     }
 
     /// Counts an image for its kind of drive, too.
@@ -119,8 +153,18 @@ impl Comparison {
         Ok(())
     }
 
+    /// All that was found; `places` says where the images that counted are.
+    pub fn evaluated(&self, places: Vec<Place>) -> Result<Evaluated> {
+        Ok(Evaluated {
+            report: self.report()?,
+            images: self.method.images().to_vec(),
+            points: self.method.drawn_points().to_vec(),
+            places,
+        })
+    }
+
     /// The method's report with the trivial row, and a row for each kind of drive where there are several.
-    pub fn report(&self) -> Result<Report> {
+    fn report(&self) -> Result<Report> {
         let mut report = self.method.report()?;
         if self.scenarios.len() > 1 {
             for (name, evaluator) in &self.scenarios {
@@ -138,32 +182,24 @@ impl Comparison {
 /// Evaluates `predict` (data set, frame, its image's prediction) on every selected frame that has ground truth.
 pub fn evaluate_datasets(
     datasets: &[Dataset],
-    mut truth: Truth,
+    truth: &mut Truth,
     protocol: &Protocol,
     baseline: Option<TrivialBaseline>,
     predict: &mut dyn FnMut(&Dataset, usize) -> Result<Prediction>,
     progress: &mut dyn FnMut(usize, usize),
-) -> Result<Report> {
+) -> Result<Evaluated> {
     let mut comparison = Comparison::new(protocol, baseline)?;
     let names = ground_truth_names(datasets);
     let total = names.iter().map(Vec::len).sum();
-    let places = match &truth {
+    let arrays = match truth {
         Truth::Scans(_) => HashMap::new(),
         Truth::Arrays(arrays) => array_places(arrays, &names),
     };
-    let mut done = 0;
-    for (dataset, names) in datasets.iter().zip(&names) {
+    let (mut done, mut places) = (0, Vec::new());
+    for (number, (dataset, names)) in datasets.iter().zip(&names).enumerate() {
         let labels = dataset.moving_labels()?;
         for (&frame, name) in dataset.selected().iter().zip(names) {
-            let known = match &mut truth {
-                Truth::Scans(kind) => dataset
-                    .ground_truth(frame, *kind)?
-                    .map(|depth| Grid::from(&depth)),
-                Truth::Arrays(arrays) => places
-                    .get(name)
-                    .map(|place| arrays.read(*place))
-                    .transpose()?,
-            };
+            let known = truth.of(dataset, frame, arrays.get(name).copied())?;
             if let Some(ground_truth) = known {
                 let prediction = predict(dataset, frame)?;
                 let k = dataset.intrinsics(frame);
@@ -171,8 +207,8 @@ pub fn evaluate_datasets(
                     == (ground_truth.width(), ground_truth.height());
                 let moving = match &labels {
                     Some(labels) if same_size => {
-                        let number = dataset.frames()[frame].number;
-                        labels.pixels(number, &depth_map(&ground_truth), gt_kind(protocol))?
+                        let of = dataset.frames()[frame].number;
+                        labels.pixels(of, &depth_map(&ground_truth), gt_kind(protocol))?
                     }
                     _ => None,
                 };
@@ -183,7 +219,9 @@ pub fn evaluate_datasets(
                     moving: moving.as_deref(),
                     intrinsics: same_size.then_some(&k),
                 };
-                comparison.add(&sample)?;
+                if comparison.add(&sample)? {
+                    places.push(Place(number, frame));
+                }
                 if let Some(scenario) = dataset.scenario() {
                     comparison.add_to_scenario(scenario, &sample)?;
                 }
@@ -192,7 +230,7 @@ pub fn evaluate_datasets(
             progress(done, total);
         }
     }
-    comparison.report()
+    comparison.evaluated(places)
 }
 
 /// Which depth the ground truth holds, in the recordings' words.
@@ -204,7 +242,7 @@ fn gt_kind(protocol: &Protocol) -> GtKind {
 }
 
 /// Ground truth as the recordings take it.
-fn depth_map(truth: &Grid) -> DepthMap {
+pub fn depth_map(truth: &Grid) -> DepthMap {
     DepthMap {
         width: truth.width(),
         height: truth.height(),
@@ -213,7 +251,7 @@ fn depth_map(truth: &Grid) -> DepthMap {
 }
 
 /// Frame names to places in the file: by name, or, for a stack without names, in the frames' order.
-fn array_places(arrays: &ArraySet, frames: &[Vec<String>]) -> HashMap<String, usize> {
+pub fn array_places(arrays: &ArraySet, frames: &[Vec<String>]) -> HashMap<String, usize> {
     match arrays.names() {
         Some(names) => names.iter().cloned().zip(0..).collect(),
         None => frames

@@ -2,6 +2,7 @@
 
 mod ablate;
 mod bench;
+mod compare;
 mod convert;
 mod demo;
 pub mod device;
@@ -17,6 +18,7 @@ mod overview;
 mod perceive;
 mod predict;
 mod recorder;
+mod run_report;
 mod simulate;
 mod train;
 mod weights;
@@ -40,6 +42,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Train(args) => train::run(&args),
         Command::Ablate(args) => ablate::run(&args),
         Command::Eval(args) => eval::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::EvalOdometry(args) => eval_odometry::run(&args),
         Command::EvalTargets(args) => eval_targets::run(&args),
         Command::Predict(args) => predict::run(&args),

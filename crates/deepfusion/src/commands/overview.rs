@@ -23,8 +23,9 @@ Numbers of any method, from arrays:
   deepfusion data export-gt DRIVE --out gt.npz
   deepfusion eval --pred depth.npz --pred-kind depth --gt gt.npz
 
-Also: ablate (the system's parts on and off), eval-odometry (the camera's path), export (ONNX),
-weights import, weights list, bench. Every command explains itself: deepfusion train --help
+Also: compare (runs side by side, published tables), ablate (the system's parts on and off),
+eval-odometry (the camera's path), export (ONNX), weights import, weights list, bench.
+Every command explains itself: deepfusion train --help
 ";
 
 /// `deepfusion` alone: what it can do, with examples to copy.

@@ -21,26 +21,9 @@ pub struct Recorder {
     panels: PathBuf,
     progress: Progress,
     last_line: Instant,
-    /// Step and photometric loss, training and validation.
-    pub curves: Curves,
     /// The first failure to write a log: training goes on, the command ends with it.
     failure: Option<anyhow::Error>,
 }
-
-/// Points of the report's charts.
-#[derive(Debug, Clone, Default)]
-pub struct Curves {
-    /// Reprojection loss of the batches, averaged over a few steps.
-    pub train: Vec<(f64, f64)>,
-    /// Reprojection loss of the held-out samples.
-    pub validation: Vec<(f64, f64)>,
-    /// Displacement by speed over displacement by PoseNet.
-    pub scale: Vec<(f64, f64)>,
-    sum: (f64, f64),
-}
-
-/// Steps that a point of the training curve averages.
-const STEPS_A_POINT: f64 = 10.0;
 
 impl Recorder {
     /// For the run in `folder`, going on after `step`.
@@ -54,7 +37,6 @@ impl Recorder {
             panels,
             progress: Progress::new("training"),
             last_line: Instant::now(),
-            curves: Curves::default(),
             failure: None,
         })
     }
@@ -73,11 +55,11 @@ impl Recorder {
         }
     }
 
-    /// The curves, or the first failure to write.
-    pub fn finish(self) -> Result<Curves> {
+    /// The first failure to write, if any.
+    pub fn finish(self) -> Result<()> {
         match self.failure {
             Some(error) => Err(error),
-            None => Ok(self.curves),
+            None => Ok(()),
         }
     }
 
@@ -128,7 +110,6 @@ impl Recorder {
                     .collect();
                 let tagged: Vec<_> = tagged.iter().map(|(n, v)| (n.as_str(), *v)).collect();
                 self.events.scalars(step, &tagged)?;
-                self.curves.add(step, losses.reprojection, scale_ratio);
                 let flow = if losses.flow > 0.0 {
                     let moving = 100.0 * losses.moving_share;
                     format!(", flow {:.4}, moving {moving:.1} %", losses.flow)
@@ -168,9 +149,6 @@ impl Recorder {
                     .collect();
                 let tagged: Vec<_> = tagged.iter().map(|(n, v)| (n.as_str(), *v)).collect();
                 self.events.scalars(step, &tagged)?;
-                self.curves
-                    .validation
-                    .push((step as f64, losses.reprojection));
                 say(&format!(
                     "step {step}: held-out loss {:.4} (reprojection {:.4}, speed {:.3} m), scale ratio {scale_ratio:.3}{}",
                     losses.total,
@@ -199,18 +177,6 @@ impl Recorder {
             }
         }
         Ok(())
-    }
-}
-
-impl Curves {
-    fn add(&mut self, step: usize, reprojection: f64, scale_ratio: f64) {
-        self.sum.0 += reprojection;
-        self.sum.1 += 1.0;
-        if self.sum.1 >= STEPS_A_POINT {
-            self.train.push((step as f64, self.sum.0 / self.sum.1));
-            self.scale.push((step as f64, scale_ratio));
-            self.sum = (0.0, 0.0);
-        }
     }
 }
 

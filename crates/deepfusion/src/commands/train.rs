@@ -58,13 +58,13 @@ pub fn run(args: &TrainArgs) -> Result<()> {
     output::print(&format!("{}\n", trainer.folder().display()))
 }
 
-/// Runs a trainer with its logs, and gives the curves for a report.
-pub fn train(trainer: &mut Trainer) -> Result<super::recorder::Curves> {
+/// Runs a trainer with its logs.
+pub fn train(trainer: &mut Trainer) -> Result<()> {
     allocator::keep_memory();
     interrupt::catch("stopping after this step; the run is saved");
     let mut recorder = Recorder::open(trainer.folder(), trainer.step())?;
     let summary = trainer.run(&mut |event| recorder.handle(event))?;
-    let curves = recorder.finish()?;
+    recorder.finish()?;
     say(&format!(
         "{} {} of {} steps in {}{}",
         if summary.stopped {
@@ -84,7 +84,7 @@ pub fn train(trainer: &mut Trainer) -> Result<super::recorder::Curves> {
             String::new()
         }
     ));
-    Ok(curves)
+    Ok(())
 }
 
 fn start_config(args: &TrainArgs) -> Result<TrainConfig> {

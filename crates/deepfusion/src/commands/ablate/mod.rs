@@ -243,9 +243,9 @@ fn measure(run: &Path, plan: &Plan, device: DeviceChoice) -> Result<Report> {
         ..Protocol::default()
     };
     let mut progress = Progress::new("evaluating");
-    evaluate_datasets(
+    let evaluated = evaluate_datasets(
         &eval_sets,
-        Truth::Scans(GtKind::Z),
+        &mut Truth::Scans(GtKind::Z),
         &protocol,
         Some(trivial_from_datasets(&train_sets, GtKind::Z)?),
         &mut |dataset, frame| {
@@ -253,7 +253,8 @@ fn measure(run: &Path, plan: &Plan, device: DeviceChoice) -> Result<Report> {
             predict(&predictor, &image, &dataset.intrinsics(frame), true)
         },
         &mut |done, total| progress.set(done, total),
-    )
+    )?;
+    Ok(evaluated.report)
 }
 
 type Datasets = Vec<deepfusion_data::Dataset>;

@@ -140,12 +140,10 @@ impl ScaleWatch {
             later,
             intrinsics: camera.resized(width, height),
             earlier_from_later: motion.last_from_this?,
-            down_in_cam: -Vector3::from(ground.up.map(f64::from)),
+            down_in_cam: motion.down_in_cam.or_else(seen)?,
         };
-        Some(
-            self.monitor
-                .add(&pair, Some(f64::from(ground.camera_height_m))),
-        )
+        let depth_height_m = ground.map(|ground| f64::from(ground.camera_height_m));
+        Some(self.monitor.add(&pair, depth_height_m))
     }
 }
 

@@ -1,0 +1,177 @@
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use deepfusion_eval::Report;
+use serde_json::Value;
+
+use crate::saved::{Measured, ModelFile, SavedEvaluation, sha256_of_file};
+use crate::{Error, Result, SAVED_VERSION};
+
+/// An evaluation to be compared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evaluation {
+    /// What its rows are called.
+    pub name: String,
+    /// What it found.
+    pub report: Report,
+    /// Where the file is.
+    pub path: PathBuf,
+    /// What the file says beyond the result.
+    pub origin: Origin,
+}
+
+/// What is known of where an evaluation comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Origin {
+    /// Nothing: plain `eval --json`.
+    Plain,
+    /// A file of a run's folder.
+    Saved {
+        /// What was measured on.
+        measured: Box<Measured>,
+        /// With which weights.
+        model: ModelFile,
+        /// Whether the run's checkpoint is another one by now.
+        outdated: bool,
+    },
+}
+
+impl Evaluation {
+    /// Reads what was given: run folders (all their evaluations), saved evaluations, and files that `eval --json` printed.
+    /// Rows of the same name are told apart by their paths and checkpoints.
+    ///
+    /// # Errors
+    /// [`Error::NotEvaluated`], [`Error::NotAnEvaluation`], [`Error::Version`], [`Error::Data`].
+    pub fn collect(paths: &[PathBuf]) -> Result<Vec<Self>> {
+        let mut all = Vec::new();
+        let mut digests = HashMap::new();
+        for path in paths {
+            if path.is_dir() {
+                let files = SavedEvaluation::files(path);
+                if files.is_empty() {
+                    return Err(Error::NotEvaluated { path: path.clone() });
+                }
+                for file in files {
+                    all.push(Self::read(&file, Some(path), &mut digests)?);
+                }
+            } else {
+                all.push(Self::read(path, None, &mut digests)?);
+            }
+        }
+        tell_apart(&mut all);
+        Ok(all)
+    }
+
+    fn read(
+        path: &Path,
+        run: Option<&Path>,
+        digests: &mut HashMap<PathBuf, Option<String>>,
+    ) -> Result<Self> {
+        let text =
+            std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
+        let not = |what: String| Error::NotAnEvaluation {
+            path: path.to_owned(),
+            what,
+        };
+        let value: Value = serde_json::from_str(&text).map_err(|e| not(e.to_string()))?;
+        let Some(version) = value.get("format_version") else {
+            let report = serde_json::from_value(value).map_err(|e| not(e.to_string()))?;
+            let stem = path.file_stem().unwrap_or(path.as_os_str());
+            return Ok(Self {
+                name: stem.to_string_lossy().into_owned(),
+                report,
+                path: path.to_owned(),
+                origin: Origin::Plain,
+            });
+        };
+        let version = version.as_u64().and_then(|v| u32::try_from(v).ok());
+        match version {
+            Some(found) if found > SAVED_VERSION => {
+                let path = path.to_owned();
+                return Err(Error::Version { path, found });
+            }
+            Some(_) => {}
+            None => return Err(not("format_version is no number".into())),
+        }
+        let saved: SavedEvaluation =
+            serde_json::from_value(value).map_err(|e| not(e.to_string()))?;
+        // A saved file lies in RUN/eval.
+        let run = run.or_else(|| path.parent().and_then(Path::parent));
+        let now = run.and_then(|run| {
+            let checkpoint = run.join(&saved.model.checkpoint);
+            let digest = digests.entry(checkpoint);
+            digest
+                .or_insert_with_key(|file| sha256_of_file(file).ok())
+                .clone()
+        });
+        let folder = run.map(|run| run.canonicalize().unwrap_or_else(|_| run.to_owned()));
+        let name = folder.as_deref().and_then(Path::file_name);
+        Ok(Self {
+            name: name
+                .unwrap_or(path.as_os_str())
+                .to_string_lossy()
+                .into_owned(),
+            report: saved.report,
+            path: path.to_owned(),
+            origin: Origin::Saved {
+                outdated: now.is_some_and(|now| now != saved.model.sha256),
+                measured: Box::new(saved.measured),
+                model: saved.model,
+            },
+        })
+    }
+
+    fn checkpoint(&self) -> Option<&str> {
+        match &self.origin {
+            Origin::Plain => None,
+            Origin::Saved { model, .. } => Some(model.checkpoint.trim_end_matches(".safetensors")),
+        }
+    }
+
+    fn engine(&self) -> Option<&str> {
+        match &self.origin {
+            Origin::Plain => None,
+            Origin::Saved { measured, .. } => Some(&measured.engine),
+        }
+    }
+
+    /// What must agree for two rows to stand in one table: the protocol, and the ground truth to the last depth. Files that
+    /// do not say the latter share a table with none that does.
+    pub(crate) fn ground(&self) -> String {
+        let report = &self.report;
+        let p = &report.protocol;
+        let truth = match &report.truth_sha256 {
+            Some(digest) => format!("truth {digest}"),
+            None => format!("unknown truth, {} images", report.n),
+        };
+        format!("{:?} {} {} {:?} {truth}", p.crop, p.cap_m, p.min_m, p.gt)
+    }
+}
+
+/// Adds what tells rows of one name in one table apart: the checkpoint, then the engine, then the path.
+fn tell_apart(all: &mut [Evaluation]) {
+    type Part = fn(&Evaluation) -> Option<String>;
+    let parts: [Part; 3] = [
+        |e| e.checkpoint().map(str::to_owned),
+        |e| e.engine().map(str::to_owned),
+        |e| Some(e.path.display().to_string()),
+    ];
+    for part in parts {
+        let mut groups = HashMap::<(String, String), Vec<usize>>::new();
+        for (i, evaluation) in all.iter().enumerate() {
+            let key = (evaluation.name.clone(), evaluation.ground());
+            groups.entry(key).or_default().push(i);
+        }
+        for members in groups.into_values().filter(|m| m.len() > 1) {
+            let words: Vec<_> = members.iter().map(|i| part(&all[*i])).collect();
+            if words.iter().all(|w| *w == words[0]) {
+                continue;
+            }
+            for (i, word) in members.into_iter().zip(words) {
+                if let Some(word) = word {
+                    all[i].name = format!("{} ({word})", all[i].name);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! The forms in which tables are printed.
+
+mod csv;
+mod html;
+mod latex;
+mod text;

@@ -1,0 +1,23 @@
+//! Evaluations side by side, the field's published tables, and which rows cannot be right.
+//!
+//! A [`SavedEvaluation`] is what `eval` leaves in a run's folder; [`Evaluation::collect`] reads such files, whole run folders
+//! and the plain output of `eval --json`. [`run_tables`] sorts them by what they were measured on, so that no table mixes
+//! protocols or images; [`published_tables`] are the field's, quoted with their places. Every row goes through
+//! [`plausibility::check`]. The tables come as [text](Tables::to_text), [CSV](Tables::to_csv), [LaTeX](Tables::to_latex) and
+//! [HTML](Tables::add_to).
+
+mod error;
+mod evaluation;
+mod format;
+pub mod plausibility;
+mod published;
+mod runs;
+mod saved;
+mod table;
+
+pub use error::{Error, Result};
+pub use evaluation::{Evaluation, Origin};
+pub use published::{Published, published_tables};
+pub use runs::run_tables;
+pub use saved::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation, sha256_of_file};
+pub use table::{Better, Column, Row, Table, Tables, Value};

@@ -1,0 +1,289 @@
+//! Run folders and files of evaluations, as tables in every form.
+
+use std::path::{Path, PathBuf};
+
+use deepfusion_compare::{
+    Error, Evaluation, FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation,
+    published_tables, run_tables, sha256_of_file,
+};
+use deepfusion_eval::{Crop, Evaluator, Grid, Prediction, Protocol, Report};
+use deepfusion_render::HtmlReport;
+
+/// An evaluation of four pixels of two images; `factor` is how wrong the method is, `shift` makes another ground truth.
+fn report(factor: f64, shift: f64, protocol: Protocol) -> (Report, Vec<FrameScore>) {
+    let mut evaluator = Evaluator::new(protocol).unwrap();
+    for (name, more) in [("a", 1.0), ("b", 1.1)] {
+        let truth = [5.0, 15.0, 30.0, 60.0].map(|d| d + shift);
+        let pred = truth.iter().map(|d| d * factor * more).collect();
+        let prediction = Prediction::Depth(Grid::new(2, 2, pred).unwrap());
+        let truth = Grid::new(2, 2, truth.to_vec()).unwrap();
+        evaluator.add(name, &prediction, &truth).unwrap();
+    }
+    let mut report = evaluator.report().unwrap();
+    let flat = Prediction::Depth(Grid::new(1, 1, vec![20.0]).unwrap());
+    let mut trivial = Evaluator::new(Protocol::default()).unwrap();
+    let truth = Grid::new(2, 2, vec![5.0, 15.0, 30.0, 60.0]).unwrap();
+    trivial.add("a", &flat, &truth).unwrap();
+    report = report.with_trivial(&trivial.report().unwrap());
+    (
+        report,
+        evaluator.images().iter().map(FrameScore::from).collect(),
+    )
+}
+
+/// A run's folder with an evaluation.
+fn run(at: &Path, name: &str, data: &str, (report, images): (Report, Vec<FrameScore>)) -> PathBuf {
+    let folder = at.join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    let checkpoint = folder.join("best.safetensors");
+    std::fs::write(&checkpoint, name).unwrap();
+    let saved = SavedEvaluation {
+        format_version: SAVED_VERSION,
+        measured: Measured {
+            data: vec![PathBuf::from(data)],
+            camera: "2".into(),
+            engine: "fused f32".into(),
+            focal_correction: true,
+            ..Measured::default()
+        },
+        model: ModelFile {
+            checkpoint: "best.safetensors".into(),
+            sha256: sha256_of_file(&checkpoint).unwrap(),
+        },
+        report,
+        images,
+    };
+    saved.write(&folder).unwrap();
+    folder
+}
+
+fn points() -> Protocol {
+    Protocol {
+        points: 100,
+        ..Protocol::default()
+    }
+}
+
+fn collect(paths: &[PathBuf]) -> Vec<Evaluation> {
+    Evaluation::collect(paths).unwrap()
+}
+
+#[test]
+fn two_runs_on_one_ground_in_every_form() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let runs = [
+        run(at, "base", "street", report(1.1, 0.0, points())),
+        run(at, "better_one", "street", report(0.98, 0.0, points())),
+    ];
+    let tables = run_tables(&collect(&runs));
+    insta::assert_snapshot!("text", tables.to_text());
+    insta::assert_snapshot!("csv", tables.to_csv().unwrap());
+    insta::assert_snapshot!("latex", tables.to_latex());
+    let html = tables.add_to(HtmlReport::new("t", "s")).to_html();
+    check_page(&html);
+    assert!(html.contains(r#"<td class="best">"#) && html.contains(r#"<td class="second">"#));
+}
+
+#[test]
+fn published_rows_in_every_form() {
+    let tables = published_tables().unwrap();
+    insta::assert_snapshot!("published_text", tables.to_text());
+    let latex = tables.to_latex();
+    assert_eq!(latex.matches("\\begin{table}").count(), tables.tables.len());
+    assert_eq!(
+        latex.matches("\\toprule").count(),
+        latex.matches("\\bottomrule").count()
+    );
+    let csv = tables.to_csv().unwrap();
+    let rows: usize = tables.tables.iter().map(|t| t.rows.len()).sum();
+    let mut reader = csv::Reader::from_reader(csv.as_bytes());
+    let header = reader.headers().unwrap().clone();
+    let of = |name: &str| header.iter().position(|h| h == name).unwrap();
+    let records: Vec<_> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(records.len(), rows);
+    let impossible = records
+        .iter()
+        .filter(|r| r[of("flags")].starts_with("impossible: δ₁ = 0.977"));
+    assert_eq!(impossible.count(), 1);
+    let html = tables.add_to(HtmlReport::new("t", "s")).to_html();
+    check_page(&html);
+    assert!(html.contains("⚠"));
+}
+
+/// Rows of other protocols or other ground truth never share a table.
+#[test]
+fn grounds_are_kept_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let cap = Protocol {
+        cap_m: 50.0,
+        ..Protocol::default()
+    };
+    let garg = Protocol {
+        crop: Crop::Garg,
+        ..Protocol::default()
+    };
+    let default = Protocol::default;
+    let runs = [
+        run(at, "a", "street", report(1.1, 0.0, default())),
+        run(at, "b", "street", report(1.2, 0.0, default())),
+        run(at, "other_truth", "street", report(1.1, 0.5, default())),
+        run(at, "other_cap", "street", report(1.1, 0.0, cap)),
+        run(at, "other_crop", "street", report(1.1, 0.0, garg)),
+    ];
+    let tables = run_tables(&collect(&runs));
+    assert!(
+        tables.notes[0].contains("4 different grounds"),
+        "{:?}",
+        tables.notes
+    );
+    let names = |prefix: &str| -> Vec<Vec<String>> {
+        let of = tables.tables.iter().filter(|t| t.title.contains(prefix));
+        of.map(|t| {
+            let ranked = t.rows.iter().filter(|r| r.ranked);
+            ranked.map(|r| r.cells[0].print(0)).collect()
+        })
+        .collect()
+    };
+    for kind in ["Unscaled", "Median-scaled", "Abs Rel by range"] {
+        assert_eq!(
+            names(kind),
+            [
+                vec!["a", "b"],
+                vec!["other_truth"],
+                vec!["other_cap"],
+                vec!["other_crop"]
+            ],
+            "{kind}"
+        );
+    }
+}
+
+#[test]
+fn plain_files_are_read_and_said_to_be_plain() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (mut report, images) = report(1.1, 0.0, Protocol::default());
+    let run = run(at, "run", "street", (report.clone(), images));
+    let plain = at.join("printed.json");
+    std::fs::write(&plain, serde_json::to_string(&report).unwrap()).unwrap();
+    report.truth_sha256 = None;
+    let old = at.join("old.json");
+    std::fs::write(&old, serde_json::to_string(&report).unwrap()).unwrap();
+    let evaluations = collect(&[run.clone(), plain, old]);
+    let names: Vec<_> = evaluations.iter().map(|e| e.name.as_str()).collect();
+    assert_eq!(names, ["run", "printed", "old"]);
+    let text = run_tables(&evaluations).to_text();
+    // The same ground truth, so one table; the file that does not say is apart.
+    assert!(text.contains("2 different grounds"), "{text}");
+    assert!(text.contains("do not say which ground truth"), "{text}");
+    // Two names for one result.
+    assert!(
+        text.contains("every figure equals those of `printed`"),
+        "{text}"
+    );
+
+    // Two evaluations of one run, or the same name twice, are told apart.
+    let again = collect(&[run.clone(), run]);
+    assert_ne!(again[0].name, "");
+    assert_eq!(again.len(), 2);
+}
+
+#[test]
+fn an_evaluation_of_other_weights_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = run(
+        folder.path(),
+        "run",
+        "street",
+        report(1.1, 0.0, Protocol::default()),
+    );
+    let text = |run: &PathBuf| run_tables(&collect(std::slice::from_ref(run))).to_text();
+    assert!(!text(&run).contains("another file by now"));
+    std::fs::write(run.join("best.safetensors"), "trained on").unwrap();
+    assert!(text(&run).contains("best.safetensors is another file by now"));
+    // A run whose weights were removed still has its figures.
+    std::fs::remove_file(run.join("best.safetensors")).unwrap();
+    assert!(!text(&run).contains("another file by now"));
+}
+
+#[test]
+fn measuring_again_replaces_and_measuring_otherwise_adds() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let files = || std::fs::read_dir(at.join("run/eval")).unwrap().count();
+    run(at, "run", "street", report(1.1, 0.0, Protocol::default()));
+    run(at, "run", "street", report(1.2, 0.0, Protocol::default()));
+    assert_eq!(files(), 1);
+    let cap = Protocol {
+        cap_m: 50.0,
+        ..Protocol::default()
+    };
+    run(at, "run", "street", report(1.2, 0.0, cap));
+    run(at, "run", "other", report(1.2, 0.0, Protocol::default()));
+    assert_eq!(files(), 3);
+}
+
+#[test]
+fn what_is_no_evaluation_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let fails = |path: PathBuf| Evaluation::collect(&[path]).unwrap_err();
+    let write = |name: &str, text: &str| {
+        let path = at.join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    for (name, text, expected) in [
+        ("broken.json", "{\"n\": 3", "EOF"),
+        ("list.json", "[1, 2]", "invalid"),
+        ("other.json", "{\"n\": 3}", "missing field"),
+        ("negative.json", "{\"n\": -3}", "invalid value"),
+        (
+            "word.json",
+            "{\"format_version\": \"new\"}",
+            "format_version",
+        ),
+        ("half.json", "{\"format_version\": 1}", "missing field"),
+    ] {
+        let error = fails(write(name, text));
+        assert!(matches!(error, Error::NotAnEvaluation { .. }), "{error}");
+        let message = error.to_string();
+        assert!(
+            message.contains(name) && message.contains(expected),
+            "{message}"
+        );
+        assert!(error.hint().is_some());
+    }
+    let error = fails(write("new.json", "{\"format_version\": 99}"));
+    assert!(error.to_string().contains("99"), "{error}");
+    let error = fails(at.join("none.json"));
+    assert!(error.to_string().contains("none.json"), "{error}");
+    std::fs::create_dir(at.join("run")).unwrap();
+    let error = fails(at.join("run"));
+    assert!(
+        error.hint().unwrap().contains("deepfusion eval --model"),
+        "{error}"
+    );
+}
+
+/// Nothing from outside, and every element that is opened is closed.
+fn check_page(html: &str) {
+    for outside in [
+        "http://", "https://", "src=\"/", "@import", "<script", "<link",
+    ] {
+        assert!(!html.contains(outside), "{outside}");
+    }
+    for element in [
+        "table", "tr", "td", "th", "ol", "li", "h2", "p", "main", "body", "html",
+    ] {
+        let opened = html.matches(&format!("<{element}>")).count()
+            + html.matches(&format!("<{element} ")).count();
+        assert_eq!(
+            opened,
+            html.matches(&format!("</{element}>")).count(),
+            "{element}"
+        );
+    }
+}

@@ -1,0 +1,161 @@
+//! A run's report, its kept evaluations and their comparison, through the program alone.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use support::{Run, in_folder};
+
+fn run(folder: &Path, args: &str) -> Run {
+    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
+}
+
+fn ok(folder: &Path, args: &str) -> String {
+    let run = run(folder, args);
+    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
+    run.stdout
+}
+
+fn fails(folder: &Path, args: &str, expected: &str) {
+    let run = run(folder, args);
+    assert_eq!(run.code, 1, "{args}: {}", run.stdout);
+    assert!(run.stderr.contains(expected), "{args}: {}", run.stderr);
+    assert!(run.stderr.contains("hint: "), "{args}: {}", run.stderr);
+}
+
+fn page(path: &Path) -> String {
+    let html = fs::read_to_string(path).unwrap();
+    for outside in ["http://", "https://", "@import", "<script", "<link"] {
+        assert!(!html.contains(outside), "{outside}");
+    }
+    assert!(html.starts_with("<!doctype html>") && html.ends_with("</html>\n"));
+    html
+}
+
+fn kept(run: &Path) -> Vec<Value> {
+    let files = fs::read_dir(run.join("eval")).unwrap();
+    let read = |f: fs::DirEntry| serde_json::from_slice(&fs::read(f.path()).unwrap()).unwrap();
+    files.map(|f| read(f.unwrap())).collect()
+}
+
+#[test]
+fn runs_are_reported_kept_and_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out sim --frames 24 --seed 3 --scan-every 4 --size 320x96",
+    );
+    for (name, steps) in [("a", 2), ("b", 3)] {
+        ok(
+            at,
+            &format!("train --data sim --size 96x64 --batch 2 --steps {steps} --out {name}"),
+        );
+    }
+
+    // Points in space, and the page.
+    let printed = ok(
+        at,
+        "eval --model a --data sim --points 500 --points-seed 9 --report a.html --json",
+    );
+    let report: Value = serde_json::from_str(&printed).unwrap();
+    let points = &report["points"];
+    assert_eq!((&points["n"], &points["seed"]), (&500.into(), &9.into()));
+    assert_eq!(points["in_space"], true);
+    for field in ["mean_m", "std_m", "sem_m", "sem_images_m"] {
+        assert!(points[field].as_f64().unwrap() > 0.0, "{points}");
+    }
+    let in_ranges: u64 = points["ranges"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|r| r["n"].as_u64().unwrap())
+        .sum();
+    assert_eq!(in_ranges, 500);
+    let html = page(&at.join("a.html"));
+    for part in [
+        "Accuracy",
+        "Points in space",
+        "Best and worst frames",
+        "How it learned",
+        "config.toml",
+        "SHA-256",
+    ] {
+        assert!(html.contains(part), "{part}");
+    }
+    // Six images were measured: two best, the median, two worst, four pictures each, and four of the clouds.
+    assert_eq!(report["n"], 6);
+    assert_eq!(html.matches("data:image/jpeg").count(), 5 * 4 + 4);
+
+    // What was kept is what was printed.
+    let saved = kept(&at.join("a"));
+    assert_eq!(saved.len(), 1);
+    assert_eq!(saved[0]["report"], report);
+    assert_eq!(saved[0]["images"].as_array().unwrap().len(), 6);
+    assert_eq!(saved[0]["model"]["sha256"].as_str().unwrap().len(), 64);
+    ok(at, "eval --model a --data sim --points 500");
+    assert_eq!(
+        kept(&at.join("a")).len(),
+        1,
+        "the same again replaces its file"
+    );
+
+    // Side by side.
+    fails(at, "compare a b", "b: has no evaluation");
+    ok(at, "eval --model b --data sim");
+    fs::write(at.join("printed.json"), &printed).unwrap();
+    let text = ok(at, "compare a b printed.json");
+    assert!(
+        text.contains("6 images, Garg's crop") && !text.contains("different grounds"),
+        "{text}"
+    );
+    assert!(
+        text.contains("every figure equals those of `printed`"),
+        "{text}"
+    );
+    ok(at, "eval --model b --data sim --crop none");
+    assert!(ok(at, "compare a b").contains("2 different grounds"));
+    assert!(ok(at, "compare a --format latex").contains("\\toprule"));
+    let csv = ok(at, "compare a b --published --format csv");
+    assert!(csv.starts_with("table,run,abs_rel") && csv.contains("Monodepth2"));
+    ok(
+        at,
+        "compare a b --format html --pictures sim --picture-count 2 --out c.html",
+    );
+    assert!(page(&at.join("c.html")).contains("<div class=\"grid\""));
+    let sheet = fs::read(at.join("c.png")).unwrap();
+    assert!(sheet.starts_with(b"\x89PNG"));
+
+    // Training on makes other weights of the same name.
+    fs::write(at.join("a/best.safetensors"), "other").unwrap();
+    assert!(ok(at, "compare a").contains("another file by now"));
+
+    fails(
+        at,
+        "compare a printed.json --pictures sim --out d.html",
+        "pictures need a run's folder",
+    );
+    fs::write(at.join("broken.json"), &printed[..printed.len() / 2]).unwrap();
+    fails(at, "compare broken.json", "no evaluation");
+    fails(at, "compare nowhere.json", "nowhere.json");
+    let bad = run(at, "compare");
+    assert_eq!(bad.code, 2, "{}", bad.stderr);
+}
+
+#[test]
+fn arrays_have_a_report_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let truth =
+        ndarray::Array3::<f32>::from_shape_fn((3, 12, 20), |(i, y, x)| (5 + i + y + x) as f32);
+    ndarray_npy::write_npy(at.join("gt.npy"), &truth).unwrap();
+    ndarray_npy::write_npy(at.join("pred.npy"), &truth.mapv(|d| 1.1 * d)).unwrap();
+    let args = "eval --pred pred.npy --pred-kind depth --gt gt.npy --points 50 --report r.html";
+    let text = ok(at, args);
+    assert!(text.contains("distance along z, m (no camera)"), "{text}");
+    let html = page(&at.join("r.html"));
+    assert!(html.contains("Best and worst frames") && !html.contains("How it learned"));
+    fails(at, &args.replace("r.html", "no/such/r.html"), "no/such");
+}
