@@ -1,0 +1,193 @@
+//! Targets through the program alone.
+
+mod support;
+
+use std::path::Path;
+
+use serde_json::Value;
+use support::{Run, in_folder};
+
+fn run(folder: &Path, args: &str) -> Run {
+    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
+}
+
+fn ok(folder: &Path, args: &str) -> Run {
+    let run = run(folder, args);
+    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
+    run
+}
+
+const DRIVE: &str = "street/2026_01_01/2026_01_01_drive_0005_sync";
+
+/// A street with traffic, as a drive and as a bag, and a network that has seen a few steps of it.
+fn street(folder: &Path) {
+    ok(
+        folder,
+        "simulate --out street --frames 12 --seed 5 --moving-cars 6 --size 320x96",
+    );
+    ok(
+        folder,
+        "train --data street --preset tiny --size 64x32 --batch 2 --steps 3 --out run",
+    );
+}
+
+#[test]
+fn a_drive_becomes_targets_frame_by_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    street(at);
+    let args = format!(
+        "perceive --model run {DRIVE} --out targets --save depth-png,overlay,birds-eye,segments,ply --json"
+    );
+    let told = ok(at, &args);
+    let lines: Vec<Value> = told
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(lines.len(), 12);
+    let file = std::fs::read_to_string(at.join("targets/targets.jsonl")).unwrap();
+    assert_eq!(file, told.stdout);
+    for (i, line) in lines.iter().enumerate() {
+        let name = format!("{i:010}");
+        assert_eq!(line["frame"], name.as_str());
+        assert!(line["targets"].is_array());
+        assert!(line["time_s"].as_f64().unwrap() >= 0.0);
+        assert!(line["speed_mps"].as_f64().unwrap() > 1.0);
+        assert_eq!(line["camera_motion"].as_array().unwrap().len(), 12);
+        assert!(line["latency_ms"].as_f64().unwrap() > 0.0);
+        for ending in [
+            "_targets.json",
+            "_depth.png",
+            "_overlay.png",
+            "_segments.png",
+            ".ply",
+            ".json",
+        ] {
+            let path = at.join(format!("targets/{name}{ending}"));
+            assert!(path.is_file(), "{}", path.display());
+        }
+        let own: Value = serde_json::from_str(
+            &std::fs::read_to_string(at.join(format!("targets/{name}_targets.json"))).unwrap(),
+        )
+        .unwrap();
+        assert_eq!(&own, line);
+    }
+    // The first camera is the world; the last has driven on.
+    let place = |line: &Value, k: usize| line["camera_motion"][4 * k + 3].as_f64().unwrap();
+    assert_eq!(place(&lines[0], 2), 0.0);
+    assert!(place(&lines[11], 2) > 3.0);
+    // Nothing is overwritten unless asked.
+    let again = run(at, &args);
+    assert_eq!(again.code, 1);
+    assert!(again.stderr.contains("is there already") && again.stderr.contains("--overwrite"));
+    ok(at, &format!("{args} --overwrite"));
+}
+
+#[test]
+fn images_stand_for_themselves_and_bags_bring_their_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    street(at);
+    let image = format!("{DRIVE}/image_02/data/0000000003.png");
+    let line = ok(
+        at,
+        &format!("perceive --model run {image} --intrinsics 186,186,157,44 --out one --json"),
+    );
+    let record: Value = serde_json::from_str(line.stdout.trim()).unwrap();
+    assert!(record["camera_motion"].is_null() && record["scale_monitor"].is_null());
+    ok(
+        at,
+        "simulate --out bag --format bag --frames 4 --size 96x64 --moving-cars 2",
+    );
+    let told = ok(
+        at,
+        "perceive --model run bag/urban_0001.bag --out seen --json",
+    );
+    assert_eq!(told.stdout.lines().count(), 4);
+    assert!(at.join("seen/0000000002_image.jpg").is_file());
+    // `predict` takes recordings too, with their cameras.
+    ok(at, "predict --model run bag/urban_0001.bag --out depth");
+    let sidecar: Value =
+        serde_json::from_str(&std::fs::read_to_string(at.join("depth/0000000002.json")).unwrap())
+            .unwrap();
+    assert_eq!(sidecar["intrinsics_from"], "recording");
+    assert_eq!(sidecar["scale_trusted"], true);
+}
+
+#[test]
+fn exact_depth_finds_the_simulators_boxes() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out street --frames 14 --seed 6 --moving-cars 6",
+    );
+    let told = ok(
+        at,
+        "eval-targets --data street --depth truth --json --out pictures",
+    );
+    let score: Value = serde_json::from_str(&told.stdout).unwrap();
+    assert_eq!(
+        (&score["depth"], &score["frames"]),
+        (&"truth".into(), &14.into())
+    );
+    assert!(score["labels"].as_u64().unwrap() > 30, "{score}");
+    assert!(score["recall"].as_f64().unwrap() > 0.8, "{score}");
+    assert!(score["precision"].as_f64().unwrap() > 0.8, "{score}");
+    assert!(score["center_error_m"].as_f64().unwrap() < 0.5, "{score}");
+    assert_eq!(std::fs::read_dir(at.join("pictures")).unwrap().count(), 14);
+    let lidar = ok(at, "eval-targets --data street --depth lidar").stdout;
+    assert!(lidar.contains("targets from lidar depth"), "{lidar}");
+}
+
+#[test]
+fn what_is_wrong_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    street(at);
+    let cases = [
+        ("perceive --model run nowhere.png --out a", "nowhere.png"),
+        ("perceive --model run street.mp4x --out b", "street.mp4x"),
+        ("eval-targets --data street --model nowhere", "nowhere"),
+    ];
+    for (args, named) in cases {
+        let run = run(at, args);
+        assert_eq!(run.code, 1, "{args}");
+        assert!(run.stderr.contains(named), "{args}: {}", run.stderr);
+        assert!(run.stderr.contains("hint:"), "{args}: {}", run.stderr);
+    }
+    std::fs::write(at.join("wrong.toml"), "min_pixel = 3\n").unwrap();
+    let args = format!("perceive --model run {DRIVE} --out c --config wrong.toml");
+    let run_ = run(at, &args);
+    assert_eq!(run_.code, 1);
+    assert!(
+        run_.stderr.contains("wrong.toml") && run_.stderr.contains("min_pixel"),
+        "{}",
+        run_.stderr
+    );
+    // A drive without labelled boxes.
+    std::fs::remove_file(at.join(DRIVE).join("tracklet_labels.xml")).unwrap();
+    let run_ = run(at, "eval-targets --data street --depth truth");
+    assert_eq!(run_.code, 1);
+    assert!(
+        run_.stderr.contains("tracklet_labels.xml"),
+        "{}",
+        run_.stderr
+    );
+    // A broken image among good ones is left out and named.
+    std::fs::write(
+        at.join(DRIVE).join("image_02/data/0000000004.png"),
+        b"no picture",
+    )
+    .unwrap();
+    let images = format!("{DRIVE}/image_02/data");
+    let run_ = run(
+        at,
+        &format!("perceive --model run {images} --intrinsics 186,186,157,44 --out d"),
+    );
+    assert_eq!(run_.code, 1);
+    assert!(run_.stderr.contains("0000000004.png"), "{}", run_.stderr);
+    let lines = std::fs::read_to_string(at.join("d/targets.jsonl")).unwrap();
+    assert_eq!(lines.lines().count(), 11);
+}
