@@ -235,6 +235,7 @@ pub fn hint_of(problem: &anyhow::Error) -> Option<String> {
             deepfusion_onnx::Error,
             deepfusion_render::Error,
             deepfusion_sim::Error,
+            deepfusion_view::Error,
         );
         None
     })

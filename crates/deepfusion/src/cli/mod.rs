@@ -10,6 +10,7 @@ mod export;
 mod predict;
 mod train;
 mod values;
+mod view;
 
 use std::path::PathBuf;
 
@@ -25,6 +26,7 @@ pub use export::ExportArgs;
 pub use predict::{BenchArgs, PredictArgs, Save, WeightsCommand};
 pub use train::{DeviceChoice, PresetChoice, TrainArgs, ViewMotionChoice};
 pub use values::{CameraIntrinsics, Shard, Size};
+pub use view::ViewArgs;
 
 /// Metric depth from one camera and a speed signal.
 #[derive(Debug, Parser)]
@@ -65,6 +67,8 @@ pub enum Command {
     EvalOdometry(EvalOdometryArgs),
     /// Metric depth of images.
     Predict(Box<PredictArgs>),
+    /// Look at results in the browser: picture, depth in metres, cloud, boxes and tracks, over time.
+    View(ViewArgs),
     /// A trained network as an ONNX file, checked before it is kept.
     Export(ExportArgs),
     /// Bring in weights of other programs.

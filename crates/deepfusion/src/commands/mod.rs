@@ -17,6 +17,7 @@ mod predict;
 mod recorder;
 mod simulate;
 mod train;
+mod view;
 mod weights;
 
 use anyhow::Result;
@@ -40,6 +41,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Eval(args) => eval::run(&args),
         Command::EvalOdometry(args) => eval_odometry::run(&args),
         Command::Predict(args) => predict::run(&args),
+        Command::View(args) => view::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Weights(WeightsCommand::Import { files, out }) => weights::import(&files, &out),
         Command::Weights(WeightsCommand::List { json }) => weights::list(json),
