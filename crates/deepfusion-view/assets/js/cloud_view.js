@@ -14,8 +14,8 @@ const COARSE_POINTS = 60_000;
 const MODES = { picture: 0, depth: 1, height: 2 };
 const VIEW_NAMES = { chase: 'Chase', top: 'Top', side: 'Side', eye: 'Camera' };
 
-/** Whether there is no graphics card behind WebGL: edges are then not smoothed, which takes most of the time. */
-function drawnBySoftware() {
+/** Whether there is no graphics card behind WebGL: edges are then not smoothed, and what moves is drawn coarsely. */
+export function drawnBySoftware() {
   const gl = document.createElement('canvas').getContext('webgl2');
   const info = gl?.getExtension('WEBGL_debug_renderer_info');
   const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : '';
@@ -66,7 +66,7 @@ export class CloudView {
   }
 
   open() {
-    const gl = this.canvas.getContext('webgl2', { antialias: !drawnBySoftware(), alpha: false, powerPreference: 'high-performance' });
+    const gl = this.canvas.getContext('webgl2', { antialias: !this.app.software, alpha: false, powerPreference: 'high-performance' });
     this.gl = gl;
     this.uploaded = null;
     if (!gl) return;

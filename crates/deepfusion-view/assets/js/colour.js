@@ -61,6 +61,16 @@ function rgbOfHsl(hue, saturation, lightness) {
 
 /** A custom property of the page as r, g, b. */
 export function themeColour(name) {
+  const theme = document.documentElement.dataset.theme;
+  if (known.theme !== theme) Object.assign(known, { theme, colours: new Map() });
+  let colour = known.colours.get(name);
+  if (!colour) known.colours.set(name, colour = lookUp(name));
+  return colour;
+}
+
+const known = { theme: null, colours: new Map() };
+
+function lookUp(name) {
   const text = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const hex = /^#(..)(..)(..)$/.exec(text);
   return hex ? hex.slice(1).map(h => parseInt(h, 16)) : [128, 128, 128];

@@ -1,7 +1,7 @@
 // The page: what is shown, and who draws it.
 
 import * as api from './api.js';
-import { CloudView } from './cloud_view.js';
+import { CloudView, drawnBySoftware } from './cloud_view.js';
 import { Colours } from './colour.js';
 import * as geometry from './geometry.js';
 import { help, onKey } from './help.js';
@@ -39,6 +39,7 @@ class App {
     this.player = new Player(this);
     this.timeline = new Timeline(this, $('lanes'));
     this.shownFrames = this.runs.map(() => null);
+    this.software = drawnBySoftware();
     this.theme();
   }
 
@@ -313,8 +314,9 @@ class App {
     const gap = now - (this.drawnAt ?? -Infinity);
     this.drawnAt = now;
     clearTimeout(this.resting);
-    if (gap > 350) this.gaps = [];
+    if (gap > (this.player.playing ? 3000 : 350)) this.gaps = [];
     else {
+      if (this.software) this.coarse = true;
       // A frame of the recording comes when it is due: only what is later than that is slow.
       const due = this.player.playing ? 1000 / (this.player.fps * this.player.rate) : 0;
       this.gaps = [...this.gaps, gap - due].slice(-5);
@@ -431,6 +433,8 @@ class App {
       if (typing || (e.key === ' ' && e.target.closest?.('button'))) return;
       if (onKey(this, e)) e.preventDefault();
     });
+    // A button that was clicked keeps no key for itself.
+    addEventListener('click', e => { if (e.detail > 0) e.target.closest?.('button')?.blur(); });
     this.build();
     let wasNarrow = narrow();
     new ResizeObserver(() => {

@@ -41,12 +41,14 @@ export class Run {
     const index = await api.index(this.number, this.version);
     this.failure = index.failure;
     if (index.unchanged) return false;
-    const before = this.key(this.length - 1);
+    const changed = index.names.findIndex((name, i) => name !== this.names[i] || index.revisions[i] !== this.revisions[i]);
+    // Tracks from the first changed frame on are asked for again; till then the old ones are shown.
+    const first = changed >= 0 ? changed : Math.min(this.length, index.names.length);
+    if (first < Math.max(this.length, index.names.length)) for (const [key, { value }] of this.chunks.entries) if (Number(key) >= Math.floor(first / TRACK_CHUNK)) value.stale = true;
     Object.assign(this, { version: index.version, names: index.names, revisions: index.revisions, series: index.series });
     this.pending = index.pending;
     this.hasDepth = index.has_depth;
     this.places = new Map(this.names.map((name, i) => [name, i]));
-    if (this.key(this.length - 1) !== before) this.chunks = new Cache(TRACK_CHUNKS);
     return true;
   }
 
@@ -66,7 +68,7 @@ export class Run {
     if (there) return Promise.resolve(there);
     let coming = this.coming.get(key);
     if (!coming) {
-      coming = this.fetch(this.names[i]).then(frame => {
+      coming = this.fetch(this.names[i], this.hasDepth[i]).then(frame => {
         frame.key = key;
         // A server that does not answer is asked again, not remembered.
         if (!frame.lost) this.frames.set(key, frame, frame.bytes);
@@ -77,7 +79,7 @@ export class Run {
     return coming;
   }
 
-  async fetch(name) {
+  async fetch(name, hasDepth) {
     const frame = { name, problems: [], targets: [], depth: null, bitmap: null, camera: null, bytes: 4096, lost: false };
     const failed = error => {
       if (error instanceof api.Problem) return error;
@@ -86,7 +88,7 @@ export class Run {
     };
     const attempt = promise => promise.catch(error => failed(error));
     const [meta, depth, blob] = await Promise.all([
-      attempt(api.frame(this.number, name)), attempt(api.depth(this.number, name)), attempt(api.image(this.number, name)),
+      attempt(api.frame(this.number, name)), hasDepth ? attempt(api.depth(this.number, name)) : null, attempt(api.image(this.number, name)),
     ]);
     if (meta instanceof api.Problem) frame.problems.push(meta.message);
     else {
@@ -100,7 +102,7 @@ export class Run {
     if (depth instanceof api.Problem) {
       // What is merely absent is among the frame's problems already.
       if (depth.status !== 404) frame.depthProblem = depth.message;
-    } else {
+    } else if (depth) {
       try {
         frame.depth = new Depth(depth);
         frame.bytes += frame.depth.bytes;
@@ -123,7 +125,7 @@ export class Run {
       const chunk = Math.floor(j / TRACK_CHUNK), key = String(chunk);
       const there = this.chunks.get(key);
       if (there) found.push(there[j - chunk * TRACK_CHUNK] ?? null);
-      else this.fetchChunk(chunk, arrived);
+      if (!there || there.stale) this.fetchChunk(chunk, arrived);
     }
     return found.filter(Boolean);
   }

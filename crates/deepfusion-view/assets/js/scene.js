@@ -102,6 +102,8 @@ export function addTargets(lines, frame, { byTrack, light, isChosen }) {
     const velocity = target.velocity_mps;
     if (Array.isArray(velocity) && target.moving !== false && Math.hypot(...velocity) > 0.3) {
       const bottom = [0, 1, 2].map(i => (corners[0][i] + corners[2][i]) / 2);
+      // Above the ground's points, which would cover it.
+      bottom[1] -= 0.25;
       addArrow(lines, bottom, velocity, colour);
     }
   }
