@@ -258,9 +258,9 @@ class App {
       this.panes.push(...left);
       if (left.length) columns.push(column(left));
       if (!two && options.cloud) { columns.push(column([kinds.cloud])); this.panes.push(kinds.cloud); }
-      // The last picture takes what is left where nothing else does.
-      const greedy = !showList && !(cloudBelow && options.cloud && two);
-      left.forEach((pane, i) => pane.element.classList.toggle('rest', greedy && i === left.length - 1 && pane.kind !== undefined));
+      // The pictures share what is left where nothing else takes it.
+      const greedy = !showList && !(cloudBelow && options.cloud);
+      left.forEach(pane => pane.element.classList.toggle('rest', greedy && pane.kind !== undefined));
     });
     stage.className = two ? 'two' : columns.length === 1 ? `one ${options.cloud && !flat.length && !showList ? 'deep' : 'flat'}` : 'one';
     stage.replaceChildren(...columns);
