@@ -95,10 +95,11 @@ impl Error {
             Self::NoSuchFolder { .. } => {
                 Some("give the folder that `predict --out` or `perceive --out` wrote".into())
             }
-            Self::NotAFolder { path } => path
-                .parent()
-                .filter(|p| !p.as_os_str().is_empty())
-                .map(|p| format!("give its folder: {}", p.display())),
+            Self::NotAFolder { path } => {
+                let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+                let folder = folder.unwrap_or(std::path::Path::new("."));
+                Some(format!("give its folder: {}", folder.display()))
+            }
             Self::NothingToShow { path } => Some(format!(
                 "make something to look at first: deepfusion predict --model RUN IMAGES --out {}",
                 path.display()
