@@ -253,6 +253,7 @@ pub fn hint_of(problem: &anyhow::Error) -> Option<String> {
             deepfusion_perception::Error,
             deepfusion_render::Error,
             deepfusion_sim::Error,
+            deepfusion_view::Error,
         );
         None
     })

@@ -26,6 +26,7 @@ fn help_texts() {
         "eval",
         "eval-odometry",
         "predict",
+        "view",
         "export",
         "weights",
         "weights import",
@@ -160,6 +161,9 @@ fn failures_say_what_where_and_what_to_do() {
         "data export-gt nowhere --out gt.npz",
         "eval --pred nowhere.npz --pred-kind depth --gt text.npz",
         "eval --pred text.npz --pred-kind depth --gt text.npz",
+        "view nowhere",
+        "view empty",
+        "view text.npz",
         "simulate --out . --frames 1",
         "simulate --out new --frames 0",
     ] {

@@ -13,6 +13,7 @@ mod perceive;
 mod predict;
 mod train;
 mod values;
+mod view;
 
 use std::path::PathBuf;
 
@@ -31,6 +32,7 @@ pub use perceive::{PerceiveArgs, PerceiveSave};
 pub use predict::{BenchArgs, PredictArgs, Save, WeightsCommand};
 pub use train::{DeviceChoice, PresetChoice, TrainArgs, ViewMotionChoice};
 pub use values::{CameraIntrinsics, Shard, Size};
+pub use view::ViewArgs;
 
 /// Metric depth from one camera and a speed signal.
 #[derive(Debug, Parser)]
@@ -77,6 +79,8 @@ pub enum Command {
     Predict(Box<PredictArgs>),
     /// 3D targets: boxes, distance, size, track, velocity.
     Perceive(Box<PerceiveArgs>),
+    /// Look at results in the browser: picture, depth in metres, cloud, boxes and tracks, over time.
+    View(ViewArgs),
     /// A trained network as an ONNX file, checked before it is kept.
     Export(ExportArgs),
     /// Bring in weights of other programs.

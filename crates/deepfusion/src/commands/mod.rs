@@ -21,6 +21,7 @@ mod recorder;
 mod run_report;
 mod simulate;
 mod train;
+mod view;
 mod weights;
 
 use anyhow::Result;
@@ -47,6 +48,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::EvalTargets(args) => eval_targets::run(&args),
         Command::Predict(args) => predict::run(&args),
         Command::Perceive(args) => perceive::run(&args),
+        Command::View(args) => view::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Weights(WeightsCommand::Import { files, out }) => weights::import(&files, &out),
         Command::Weights(WeightsCommand::List { json }) => weights::list(json),

@@ -15,6 +15,7 @@ With recordings (KITTI raw layout):
   deepfusion eval --model RUN --data DRIVE measure against its LiDAR
   deepfusion predict --model RUN IMAGE --out DIR
                                            depth pictures, arrays, point clouds
+  deepfusion view DIR                      look at them in the browser
 
 Without:
   deepfusion simulate --out DIR            a drive with exact ground truth

@@ -1,0 +1,39 @@
+// A cache that holds so many bytes and no more; what was used last stays.
+
+export class Cache {
+  constructor(mostBytes, dropped = () => {}) {
+    this.most = mostBytes;
+    this.bytes = 0;
+    this.entries = new Map();
+    this.dropped = dropped;
+  }
+
+  get(key) {
+    const entry = this.entries.get(key);
+    if (!entry) return undefined;
+    // A map gives its entries in the order in which they came: the last used goes to the end.
+    this.entries.delete(key);
+    this.entries.set(key, entry);
+    return entry.value;
+  }
+
+  has(key) { return this.entries.has(key); }
+
+  set(key, value, bytes) {
+    this.delete(key);
+    this.entries.set(key, { value, bytes });
+    this.bytes += bytes;
+    for (const [oldest] of this.entries) {
+      if (this.bytes <= this.most || oldest === key) break;
+      this.delete(oldest);
+    }
+  }
+
+  delete(key) {
+    const entry = this.entries.get(key);
+    if (!entry) return;
+    this.entries.delete(key);
+    this.bytes -= entry.bytes;
+    this.dropped(entry.value);
+  }
+}

@@ -1,0 +1,61 @@
+// A frame's depth: the file's own numbers.
+
+/** Depth as it was sent: "DFD1", width, height, code (0: u16 steps of 1/256 m; 1: f32 metres), values row by row. */
+export class Depth {
+  constructor(buffer) {
+    const head = new DataView(buffer);
+    if (buffer.byteLength < 16 || head.getUint32(0) !== 0x44464431) throw new Error('no depth was sent');
+    this.width = head.getUint32(4, true);
+    this.height = head.getUint32(8, true);
+    const steps = head.getUint32(12, true) === 0;
+    this.values = steps ? new Uint16Array(buffer, 16) : new Float32Array(buffer, 16);
+    this.perMetre = steps ? 256 : 1;
+    if (this.values.length !== this.width * this.height) throw new Error('the depth that was sent is not whole');
+    this.bytes = buffer.byteLength;
+  }
+
+  /** Metres at a pixel; 0 where there is none. */
+  at(x, y) {
+    if (!(x >= 0 && y >= 0 && x < this.width && y < this.height)) return 0;
+    const value = this.values[Math.floor(y) * this.width + Math.floor(x)] / this.perMetre;
+    return value > 0 && Number.isFinite(value) ? value : 0;
+  }
+
+  /** All metres, into a buffer that is used again. */
+  metres() {
+    if (this.perMetre === 1) return this.values;
+    const out = scratchFloats(this.values.length);
+    for (let i = 0; i < out.length; i++) out[i] = this.values[i] / 256;
+    return out;
+  }
+
+  /** Colours of all pixels. */
+  paint(pixels, table) {
+    const values = this.values;
+    if (this.perMetre === 256) {
+      for (let i = 0; i < values.length; i++) pixels[i] = table[values[i]];
+      return;
+    }
+    for (let i = 0; i < values.length; i++) {
+      const step = values[i] * 256;
+      // NaN and what is not above 0 are none; what is there at all is at least one step.
+      pixels[i] = table[step > 0 ? Math.min(65535, Math.max(1, Math.round(step))) : 0];
+    }
+  }
+
+  /** Colours of ln(this / other): `table`'s middle where they are equal, its ends from a factor of `most` on. */
+  paintAgainst(other, pixels, table, most = 1.5) {
+    const a = this.values, b = other.values, factor = 127.5 / Math.log(most), rescale = other.perMetre / this.perMetre;
+    for (let i = 0; i < a.length; i++) {
+      const ratio = a[i] / b[i] * rescale;
+      const place = 127.5 + factor * Math.log(ratio);
+      pixels[i] = table[a[i] > 0 && b[i] > 0 && Number.isFinite(ratio) ? Math.min(255, Math.max(0, Math.round(place))) : 256];
+    }
+  }
+}
+
+let floats = new Float32Array(0);
+function scratchFloats(length) {
+  if (floats.length !== length) floats = new Float32Array(length);
+  return floats;
+}

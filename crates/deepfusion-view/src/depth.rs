@@ -1,0 +1,298 @@
+//! A frame's depth as the page gets it: the file's own numbers, without a step in between.
+
+use std::io::Read;
+use std::path::Path;
+
+use deepfusion_data::{image_size, read_depth_png};
+
+use crate::{Error, Result};
+
+/// More pixels than any camera's image; a file that says more is refused before anything is set aside for it.
+const MOST_PIXELS: u64 = 64 << 20;
+
+/// What the numbers of a [`DepthFile`] are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DepthCode {
+    /// `u16` in steps of 1/256 m, 0 = none: a depth PNG.
+    Steps256 = 0,
+    /// `f32` metres, 0, negative and NaN = none: an NPY array.
+    Metres = 1,
+}
+
+/// Depth along the camera's axis, row by row, in the numbers of its file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DepthFile {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// What the numbers are.
+    pub code: DepthCode,
+    /// The numbers, little endian.
+    pub values: Vec<u8>,
+}
+
+impl DepthFile {
+    /// Marks the begin of [`DepthFile::into_bytes`].
+    pub const MAGIC: &[u8; 4] = b"DFD1";
+
+    /// Reads `NAME_depth.png` or `NAME_depth.npy`.
+    ///
+    /// # Errors
+    /// [`Error::Picture`] for a PNG that is cut off or not 16-bit grey, [`Error::Content`] for an array that is cut off, of another type
+    /// than `f32` or `f64` or not two-dimensional, [`Error::File`] where reading fails.
+    pub fn read(path: &Path) -> Result<Self> {
+        if path.extension().is_some_and(|e| e == "npy") {
+            return read_npy(path);
+        }
+        let (width, height) = image_size(path)?;
+        if u64::from(width) * u64::from(height) > MOST_PIXELS {
+            return Err(too_large(path, u64::from(width), u64::from(height)));
+        }
+        let map = read_depth_png(path)?;
+        // v/256 is exact in f32 for every 16-bit v, so that v comes back.
+        let steps = map.data.iter().map(|m| (m * 256.0) as u16);
+        Ok(Self {
+            width,
+            height,
+            code: DepthCode::Steps256,
+            values: steps.flat_map(u16::to_le_bytes).collect(),
+        })
+    }
+
+    /// As it is sent: magic, width, height and code as 32-bit little endian numbers, then the values.
+    #[must_use]
+    pub fn into_bytes(self) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(16 + self.values.len());
+        bytes.extend(Self::MAGIC);
+        for number in [self.width, self.height, self.code as u32] {
+            bytes.extend(number.to_le_bytes());
+        }
+        bytes.extend(self.values);
+        bytes
+    }
+}
+
+fn too_large(path: &Path, width: u64, height: u64) -> Error {
+    Error::content(
+        path,
+        format!("{width}x{height} pixels are more than any camera's image has"),
+    )
+}
+
+/// An array of NumPy's format 1 to 3 (numpy.lib.format), as far as depth needs it.
+fn read_npy(path: &Path) -> Result<DepthFile> {
+    let failed = |e| Error::file(path, e);
+    let mut file = std::fs::File::open(path).map_err(failed)?;
+    let length = file.metadata().map_err(failed)?.len();
+    // A header of more is none that NumPy writes for a plain array.
+    let mut begin = Vec::new();
+    file.by_ref()
+        .take(4096)
+        .read_to_end(&mut begin)
+        .map_err(failed)?;
+    let header = NpyHeader::parse(&begin).map_err(|problem| Error::content(path, problem))?;
+    let (width, height) = (header.width, header.height);
+    if width.checked_mul(height).is_none_or(|n| n > MOST_PIXELS) || width == 0 || height == 0 {
+        return Err(too_large(path, width, height));
+    }
+    let expected = header.begin as u64 + width * height * header.item_bytes;
+    if length < expected {
+        let problem =
+            format!("ends early: {length} bytes of {expected} (a {width}x{height} array)");
+        return Err(Error::content(path, problem));
+    }
+    let mut values = begin.split_off(header.begin.min(begin.len()));
+    file.take(expected - begin.len() as u64 - values.len() as u64)
+        .read_to_end(&mut values)
+        .map_err(failed)?;
+    values.truncate((width * height * header.item_bytes) as usize);
+    if header.item_bytes == 8 {
+        values = values
+            .chunks_exact(8)
+            .flat_map(|b| {
+                (f64::from_le_bytes(b.try_into().unwrap_or_default()) as f32).to_le_bytes()
+            })
+            .collect();
+    }
+    Ok(DepthFile {
+        width: width as u32,
+        height: height as u32,
+        code: DepthCode::Metres,
+        values,
+    })
+}
+
+struct NpyHeader {
+    width: u64,
+    height: u64,
+    item_bytes: u64,
+    /// Where the numbers begin.
+    begin: usize,
+}
+
+impl NpyHeader {
+    fn parse(bytes: &[u8]) -> Result<Self, String> {
+        let early = || "ends early: the NPY header is cut off".to_owned();
+        if !bytes.starts_with(b"\x93NUMPY") {
+            return Err(if bytes.len() < 6 {
+                early()
+            } else {
+                "no NPY array".into()
+            });
+        }
+        let (text_at, text_bytes) = match bytes.get(6).ok_or_else(early)? {
+            1 => (10, usize::from(number16(bytes, 8).ok_or_else(early)?)),
+            _ => {
+                let low = number16(bytes, 8).ok_or_else(early)?;
+                let high = number16(bytes, 10).ok_or_else(early)?;
+                (12, usize::from(low) | usize::from(high) << 16)
+            }
+        };
+        let text = bytes.get(text_at..text_at + text_bytes).ok_or_else(early)?;
+        let text = String::from_utf8_lossy(text);
+        let item_bytes = match field(&text, "descr").map(|d| d.trim_matches(['\'', '"'])) {
+            Some("<f4") => 4,
+            Some("<f8") => 8,
+            other => {
+                return Err(format!(
+                    "depth is `<f4` or `<f8`, not {}",
+                    other.unwrap_or("without a type")
+                ));
+            }
+        };
+        if field(&text, "fortran_order").is_none_or(|f| f != "False") {
+            return Err("depth is stored row by row (fortran_order False)".into());
+        }
+        let after = text.split_once("'shape':").map(|(_, rest)| rest);
+        let inside = after.and_then(|rest| rest.split_once('(')?.1.split_once(')'));
+        let sides: Vec<u64> = inside
+            .map(|(sides, _)| {
+                sides
+                    .split(',')
+                    .filter_map(|s| s.trim().parse().ok())
+                    .collect()
+            })
+            .unwrap_or_default();
+        let &[height, width] = sides.as_slice() else {
+            return Err(format!(
+                "depth has two dimensions, this array {}",
+                sides.len()
+            ));
+        };
+        Ok(Self {
+            width,
+            height,
+            item_bytes,
+            begin: text_at + text_bytes,
+        })
+    }
+}
+
+fn number16(bytes: &[u8], at: usize) -> Option<u16> {
+    Some(u16::from_le_bytes([*bytes.get(at)?, *bytes.get(at + 1)?]))
+}
+
+/// The value of a key in the header's Python dictionary, up to the next comma.
+fn field<'a>(text: &'a str, key: &str) -> Option<&'a str> {
+    let (_, after) = text.split_once(&format!("'{key}':"))?;
+    Some(after.split([',', '}']).next()?.trim())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_geometry::DepthMap;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        /// Every step of a depth PNG arrives.
+        #[test]
+        fn png_steps_arrive_exactly(steps in proptest::collection::vec(0u16.., 15)) {
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("a_depth.png");
+            image::ImageBuffer::<image::Luma<u16>, _>::from_raw(5, 3, steps.clone()).unwrap().save(&path).unwrap();
+            let read = DepthFile::read(&path).unwrap();
+            prop_assert_eq!((read.width, read.height, read.code), (5, 3, DepthCode::Steps256));
+            let sent: Vec<u16> = read.values.chunks(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
+            prop_assert_eq!(sent, steps);
+        }
+
+        /// Every bit of an f32 array arrives; f64 is rounded once.
+        #[test]
+        fn npy_metres_arrive_exactly(metres in proptest::collection::vec(any::<f32>(), 6)) {
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("a_depth.npy");
+            let array = ndarray::Array2::from_shape_vec((2, 3), metres.clone()).unwrap();
+            ndarray_npy::write_npy(&path, &array).unwrap();
+            let read = DepthFile::read(&path).unwrap();
+            prop_assert_eq!((read.width, read.height, read.code), (3, 2, DepthCode::Metres));
+            let expected: Vec<u8> = metres.iter().flat_map(|m| m.to_le_bytes()).collect();
+            prop_assert_eq!(&read.values, &expected);
+            ndarray_npy::write_npy(&path, &array.mapv(f64::from)).unwrap();
+            let doubles = DepthFile::read(&path).unwrap();
+            for (a, b) in doubles.values.chunks(4).zip(&metres) {
+                let a = f32::from_le_bytes(a.try_into().unwrap());
+                prop_assert!(a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan());
+            }
+        }
+
+        /// Whatever a file holds, reading it ends in an answer.
+        #[test]
+        fn foreign_bytes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300), npy in any::<bool>()) {
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join(if npy { "a_depth.npy" } else { "a_depth.png" });
+            let mut content = if npy { b"\x93NUMPY\x01\x00".to_vec() } else { b"\x89PNG\r\n\x1a\n".to_vec() };
+            content.extend(bytes);
+            std::fs::write(&path, content).unwrap();
+            prop_assert!(DepthFile::read(&path).is_err());
+        }
+    }
+
+    #[test]
+    fn cut_files_say_so() {
+        let dir = tempfile::tempdir().unwrap();
+        let map = DepthMap {
+            width: 64,
+            height: 32,
+            data: (0..2048).map(|i| 1.0 + (i % 97) as f32).collect(),
+        };
+        let png = dir.path().join("a_depth.png");
+        deepfusion_data::write_depth_png(&map, &png).unwrap();
+        let npy = dir.path().join("a_depth.npy");
+        ndarray_npy::write_npy(&npy, &ndarray::Array2::<f32>::ones((32, 64))).unwrap();
+        for path in [png, npy] {
+            let whole = std::fs::read(&path).unwrap();
+            for keep in [0, 5, 9, 40, whole.len() / 2, whole.len() - 40] {
+                std::fs::write(&path, &whole[..keep]).unwrap();
+                let problem = DepthFile::read(&path).unwrap_err().to_string();
+                assert!(problem.contains("a_depth"), "{keep}: {problem}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_array_that_claims_too_much_takes_no_memory() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a_depth.npy");
+        for shape in [
+            "(99999999, 99999999)",
+            "(18446744073709551615, 2)",
+            "(4000, 4000)",
+            "(0, 5)",
+            "(7,)",
+            "(1, 2, 3)",
+        ] {
+            let text = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}\n");
+            let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+            bytes.extend((text.len() as u16).to_le_bytes());
+            bytes.extend(text.bytes());
+            std::fs::write(&path, bytes).unwrap();
+            assert!(
+                matches!(DepthFile::read(&path), Err(Error::Content { .. })),
+                "{shape}"
+            );
+        }
+    }
+}

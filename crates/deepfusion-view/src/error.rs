@@ -1,0 +1,123 @@
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+/// A result of this crate.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// What can go wrong with showing results.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// There is nothing at the path.
+    #[error("{}: no such folder", path.display())]
+    NoSuchFolder {
+        /// The path given.
+        path: PathBuf,
+    },
+    /// The path is a file.
+    #[error("{}: not a folder", path.display())]
+    NotAFolder {
+        /// The path given.
+        path: PathBuf,
+    },
+    /// The folder holds nothing that can be shown.
+    #[error("{}: nothing to show there: no NAME.json, NAME_depth.png, NAME_depth.npy or NAME_targets.json, and no training log", path.display())]
+    NothingToShow {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A run and predictions, where two of a kind are needed to be compared.
+    #[error("{}: holds {found}, which cannot stand beside {expected}", path.display())]
+    OtherKind {
+        /// The second folder.
+        path: PathBuf,
+        /// What it holds.
+        found: &'static str,
+        /// What the first holds.
+        expected: &'static str,
+    },
+    /// A file or folder cannot be read.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file is not what its name says.
+    #[error("{}: {problem}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A picture or a depth PNG cannot be read.
+    #[error(transparent)]
+    Picture(#[from] deepfusion_data::Error),
+    /// Another program listens there.
+    #[error("{address}: the port is in use")]
+    PortInUse {
+        /// Where the server was to listen.
+        address: SocketAddr,
+    },
+    /// The server cannot listen there.
+    #[error("{address}: cannot listen there: {source}")]
+    Listen {
+        /// Where the server was to listen.
+        address: SocketAddr,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+impl Error {
+    /// An error of the system, named by file.
+    pub(crate) fn file(path: &std::path::Path, source: std::io::Error) -> Self {
+        Self::File {
+            path: path.to_owned(),
+            source,
+        }
+    }
+
+    /// A file that is not what it should be.
+    pub(crate) fn content(path: &std::path::Path, problem: impl Into<String>) -> Self {
+        Self::Content {
+            path: path.to_owned(),
+            problem: problem.into(),
+        }
+    }
+
+    /// What to do about it, if that is known.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::NoSuchFolder { .. } => {
+                Some("give the folder that `predict --out` or `perceive --out` wrote".into())
+            }
+            Self::NotAFolder { path } => {
+                let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+                let folder = folder.unwrap_or(std::path::Path::new("."));
+                Some(format!("give its folder: {}", folder.display()))
+            }
+            Self::NothingToShow { path } => Some(format!(
+                "make something to look at first: deepfusion predict --model RUN IMAGES --out {}",
+                path.display()
+            )),
+            Self::OtherKind { .. } => {
+                Some("give two folders of predictions, or two of training runs".into())
+            }
+            Self::File { .. } | Self::Content { .. } => None,
+            Self::Picture(error) => error.hint(),
+            Self::PortInUse { .. } => {
+                Some("give another --port, or --port 0 for any that is free".into())
+            }
+            Self::Listen { source, .. } => Some(match source.kind() {
+                std::io::ErrorKind::PermissionDenied => {
+                    "ports below 1024 belong to the system: give --port 8765".into()
+                }
+                _ => "give --host an address of this machine, such as 127.0.0.1 or 0.0.0.0".into(),
+            }),
+        }
+    }
+}

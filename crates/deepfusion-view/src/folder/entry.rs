@@ -1,0 +1,137 @@
+//! The files of one frame.
+
+use std::collections::hash_map::DefaultHasher;
+use std::fs::Metadata;
+use std::hash::{Hash, Hasher};
+
+use super::summary::Summary;
+
+/// What a file is to its frame, by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Part {
+    /// `NAME.json`.
+    Sidecar,
+    /// `NAME_depth.png` or `.npy`.
+    Depth,
+    /// `NAME_image.jpg` or `.png`.
+    Image,
+    /// `NAME_targets.json`.
+    Targets,
+}
+
+/// The parts' names: endings, and what they mean. The plain `.json` is last: it ends others, too.
+const ENDINGS: [(&str, Part); 7] = [
+    ("_depth.png", Part::Depth),
+    ("_depth.npy", Part::Depth),
+    ("_image.jpg", Part::Image),
+    ("_image.jpeg", Part::Image),
+    ("_image.png", Part::Image),
+    ("_targets.json", Part::Targets),
+    (".json", Part::Sidecar),
+];
+
+/// The frame and part that a file's name stands for.
+pub(super) fn part_of(file: &str) -> Option<(&str, Part)> {
+    // Temporary files begin with a dot; a shard's manifest is no sidecar.
+    if file.starts_with('.') || file.ends_with(".manifest.json") {
+        return None;
+    }
+    let (name, part) = ENDINGS
+        .iter()
+        .find_map(|(ending, part)| Some((file.strip_suffix(ending)?, *part)))?;
+    (!name.is_empty()).then_some((name, part))
+}
+
+/// A file of a frame: its name, and what tells that it changed.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct PartFile {
+    /// Its name in the folder.
+    pub file: String,
+    /// Bytes and time of change.
+    mark: (u64, u128),
+}
+
+impl PartFile {
+    pub fn new(file: String, meta: &Metadata) -> Self {
+        let since = meta
+            .modified()
+            .ok()
+            .map(|t| t.duration_since(std::time::UNIX_EPOCH));
+        let changed = since.and_then(Result::ok).map_or(0, |d| d.as_nanos());
+        Self {
+            file,
+            mark: (meta.len(), changed),
+        }
+    }
+}
+
+/// A frame: which of its files are there, and what was learnt from the small ones.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Entry {
+    /// What its files' names begin with.
+    pub name: String,
+    pub sidecar: Option<PartFile>,
+    pub depth: Option<PartFile>,
+    pub image: Option<PartFile>,
+    pub targets: Option<PartFile>,
+    /// `None` until its small files were read.
+    pub summary: Option<Summary>,
+}
+
+impl Entry {
+    pub fn new(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// Takes in a file. Of two of a kind the first in the order of names stays (`.npy`, whose metres are exact, before `.png`).
+    pub fn add(&mut self, part: Part, file: PartFile) {
+        let place = match part {
+            Part::Sidecar => &mut self.sidecar,
+            Part::Depth => &mut self.depth,
+            Part::Image => &mut self.image,
+            Part::Targets => &mut self.targets,
+        };
+        if place.as_ref().is_none_or(|there| file.file < there.file) {
+            *place = Some(file);
+        }
+    }
+
+    /// A number that is another one when one of the files has changed.
+    pub fn revision(&self) -> u64 {
+        let mut hash = DefaultHasher::new();
+        (&self.sidecar, &self.depth, &self.image, &self.targets).hash(&mut hash);
+        // As many bits as a JavaScript number holds.
+        hash.finish() >> 12
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_told_apart() {
+        for (file, expected) in [
+            ("0000000005.json", Some(("0000000005", Part::Sidecar))),
+            (
+                "0000000005_targets.json",
+                Some(("0000000005", Part::Targets)),
+            ),
+            ("a_b_depth.npy", Some(("a_b", Part::Depth))),
+            ("a_depth.png", Some(("a", Part::Depth))),
+            ("a_image.jpeg", Some(("a", Part::Image))),
+            ("predict-1-of-1.manifest.json", None),
+            (".a.json.12-0.partial", None),
+            (".a.json", None),
+            ("_depth.png", None),
+            (".json", None),
+            ("a_color.png", None),
+            ("a.ply", None),
+        ] {
+            assert_eq!(part_of(file), expected, "{file}");
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! The list of frames, kept in step with the folder.
+
+use std::collections::{HashMap, hash_map};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+
+use serde_json::{Value, json};
+
+use super::entry::{Entry, PartFile, part_of};
+use super::order::natural;
+use super::summary::Summary;
+
+/// Files that are written in place change without the folder noticing; so often they are looked at all the same.
+const LOOK_AGAIN: Duration = Duration::from_secs(5);
+/// How long an answer may be held up by reading small files; the rest is read for the next one.
+const READING_TIME: Duration = Duration::from_millis(150);
+
+/// The frames of a folder.
+#[derive(Debug)]
+pub(super) struct Listing {
+    folder: PathBuf,
+    entries: Vec<Entry>,
+    places: HashMap<String, usize>,
+    /// Counts the changes, from 1.
+    version: u64,
+    /// When the folder was listed, and the time of change that it had.
+    looked: Option<(Instant, SystemTime)>,
+}
+
+impl Listing {
+    pub fn new(folder: &Path) -> Self {
+        Self {
+            folder: folder.to_owned(),
+            entries: Vec::new(),
+            places: HashMap::new(),
+            version: 1,
+            looked: None,
+        }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    pub fn entry(&self, name: &str) -> Option<&Entry> {
+        self.places.get(name).map(|i| &self.entries[*i])
+    }
+
+    pub fn range(&self, from: usize, count: usize) -> Vec<Entry> {
+        self.entries
+            .iter()
+            .skip(from)
+            .take(count)
+            .cloned()
+            .collect()
+    }
+
+    /// Lists the folder again if it may have changed.
+    pub fn refresh(&mut self) -> io::Result<()> {
+        let changed = std::fs::metadata(&self.folder)?
+            .modified()
+            .unwrap_or(SystemTime::UNIX_EPOCH);
+        if let Some((when, at_change)) = self.looked
+            && at_change == changed
+            && when.elapsed() < LOOK_AGAIN
+        {
+            return Ok(());
+        }
+        let mut found: HashMap<String, Entry> = HashMap::new();
+        for file in std::fs::read_dir(&self.folder)? {
+            let file = file?;
+            let Ok(file_name) = file.file_name().into_string() else {
+                continue;
+            };
+            let Some((name, part)) = part_of(&file_name) else {
+                continue;
+            };
+            // A file that went between the two calls is none.
+            let Ok(meta) = std::fs::metadata(file.path()) else {
+                continue;
+            };
+            if meta.is_file() {
+                let entry = match found.entry(name.to_owned()) {
+                    hash_map::Entry::Occupied(there) => there.into_mut(),
+                    hash_map::Entry::Vacant(free) => free.insert(Entry::new(name)),
+                };
+                entry.add(part, PartFile::new(file_name, &meta));
+            }
+        }
+        self.replace(found);
+        self.looked = Some((Instant::now(), changed));
+        Ok(())
+    }
+
+    /// Takes over what was found; what was learnt of frames that did not change stays.
+    fn replace(&mut self, found: HashMap<String, Entry>) {
+        let mut entries: Vec<Entry> = found.into_values().collect();
+        for entry in &mut entries {
+            let known = self
+                .entry(&entry.name)
+                .filter(|known| known.revision() == entry.revision());
+            entry.summary = known.and_then(|known| known.summary.clone());
+            // A frame has depth or targets, or a sidecar that says so: other JSON files may lie there, too.
+            if entry.depth.is_none() && entry.targets.is_none() && entry.summary.is_none() {
+                entry.summary = Some(Summary::read(&self.folder, entry));
+            }
+        }
+        entries.retain(|e| e.summary.as_ref().is_none_or(|s| s.is_frame));
+        entries.sort_by(|a, b| natural(&a.name, &b.name));
+        let key = |e: &Entry| (e.name.clone(), e.revision());
+        if !entries.iter().map(key).eq(self.entries.iter().map(key)) {
+            self.version += 1;
+        }
+        self.places = entries
+            .iter()
+            .enumerate()
+            .map(|(i, e)| (e.name.clone(), i))
+            .collect();
+        self.entries = entries;
+    }
+
+    /// Reads the small files of frames that are not known yet, for a while.
+    pub fn summarise(&mut self) {
+        let begin = Instant::now();
+        for entry in self.entries.iter_mut().filter(|e| e.summary.is_none()) {
+            if begin.elapsed() > READING_TIME {
+                break;
+            }
+            entry.summary = Some(Summary::read(&self.folder, entry));
+            self.version += 1;
+        }
+    }
+
+    /// As the page gets it: columns, a place a frame.
+    pub fn json(&self, known: Option<u64>, failure: Option<String>) -> Value {
+        let version = self.version;
+        if known == Some(version) && failure.is_none() {
+            return json!({ "version": version, "unchanged": true });
+        }
+        let column = |of: fn(&Summary) -> Value| -> Vec<Value> {
+            let values = self
+                .entries
+                .iter()
+                .map(|e| e.summary.as_ref().map_or(Value::Null, of));
+            values.collect()
+        };
+        json!({
+            "version": version,
+            "failure": failure,
+            "pending": self.entries.iter().filter(|e| e.summary.is_none()).count(),
+            "names": self.entries.iter().map(|e| e.name.as_str()).collect::<Vec<_>>(),
+            "revisions": self.entries.iter().map(Entry::revision).collect::<Vec<_>>(),
+            "has_depth": self.entries.iter().map(|e| u8::from(e.depth.is_some())).collect::<Vec<_>>(),
+            "series": {
+                "problem": column(|s| json!(s.problem)),
+                "time_s": column(|s| json!(s.time_s)),
+                "near_m": column(|s| json!(s.depth_m.map(|d| d[0]))),
+                "far_m": column(|s| json!(s.depth_m.map(|d| d[1]))),
+                "targets": column(|s| json!(s.targets)),
+                "nearest_m": column(|s| json!(s.nearest_m)),
+                "speed_mps": column(|s| json!(s.speed_mps)),
+                "time_to_collision_s": column(|s| json!(s.time_to_collision_s)),
+                "scale_ratio": column(|s| json!(s.scale_ratio)),
+                "scale_state": column(|s| json!(s.scale_state)),
+                "latency_ms": column(|s| json!(s.latency_ms)),
+            },
+        })
+    }
+}

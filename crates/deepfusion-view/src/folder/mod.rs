@@ -1,0 +1,137 @@
+//! A folder of results, read anew as it grows.
+
+mod entry;
+mod frame;
+mod listing;
+mod order;
+mod summary;
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+pub(crate) use frame::{frame_json, picture_of, targets_of};
+
+use self::entry::Entry;
+use self::listing::Listing;
+use crate::training;
+use crate::{Error, Result};
+
+/// What a folder holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// What `predict` or `perceive` wrote.
+    Predictions,
+    /// A training run without predictions: its learning curve and panels.
+    Training,
+}
+
+impl Kind {
+    /// In words.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Predictions => "predictions",
+            Self::Training => "a training run",
+        }
+    }
+}
+
+/// A folder whose results are shown.
+#[derive(Debug)]
+pub struct Folder {
+    path: PathBuf,
+    kind: Kind,
+    listing: Mutex<Listing>,
+}
+
+impl Folder {
+    /// Looks into a folder that `predict` or `perceive` wrote (or still writes), or a run of `train`.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchFolder`], [`Error::NotAFolder`], [`Error::File`] where it cannot be listed, [`Error::NothingToShow`].
+    pub fn open(path: &Path) -> Result<Self> {
+        match std::fs::metadata(path) {
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+                return Err(Error::NoSuchFolder {
+                    path: path.to_owned(),
+                });
+            }
+            Err(e) => return Err(Error::file(path, e)),
+            Ok(meta) if !meta.is_dir() => {
+                return Err(Error::NotAFolder {
+                    path: path.to_owned(),
+                });
+            }
+            Ok(_) => {}
+        }
+        let mut listing = Listing::new(path);
+        listing.refresh().map_err(|e| Error::file(path, e))?;
+        let kind = if !listing.is_empty() {
+            Kind::Predictions
+        } else if training::is_run(path) {
+            Kind::Training
+        } else {
+            return Err(Error::NothingToShow {
+                path: path.to_owned(),
+            });
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            kind,
+            listing: Mutex::new(listing),
+        })
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// How many frames it held when it was last looked at; 0 for a training run.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.listing().len()
+    }
+
+    /// Whether it is a training run without predictions.
+    #[must_use]
+    pub fn is_training_run(&self) -> bool {
+        self.kind == Kind::Training
+    }
+
+    pub(crate) fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// What a person calls it: the last part of its path.
+    pub(crate) fn name(&self) -> String {
+        let full = std::fs::canonicalize(&self.path).unwrap_or_else(|_| self.path.clone());
+        full.file_name().map_or_else(
+            || full.display().to_string(),
+            |n| n.to_string_lossy().into_owned(),
+        )
+    }
+
+    /// The list of frames as JSON, looked at anew; only that nothing changed where the client's `known` version is the present one.
+    pub(crate) fn index_json(&self, known: Option<u64>) -> serde_json::Value {
+        let mut listing = self.listing();
+        let failure = listing.refresh().err().map(|e| e.to_string());
+        listing.summarise();
+        listing.json(known, failure)
+    }
+
+    /// A frame that the listing holds.
+    pub(crate) fn entry(&self, name: &str) -> Option<Entry> {
+        self.listing().entry(name).cloned()
+    }
+
+    /// Frames in order, from the given place.
+    pub(crate) fn entries(&self, from: usize, count: usize) -> Vec<Entry> {
+        self.listing().range(from, count)
+    }
+
+    fn listing(&self) -> MutexGuard<'_, Listing> {
+        // A listing is whole between its methods: a panic elsewhere leaves nothing half done.
+        self.listing.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,164 @@
+//! What is answered to which path.
+//!
+//! | Path | Answer |
+//! |---|---|
+//! | `/`, `/app/FILE` | the page and its files |
+//! | `/api/session` | the folders, colour maps, the depth scale |
+//! | `/api/runs/R/index?known=V` | the frames of folder R and the numbers of the time line |
+//! | `/api/runs/R/frame/NAME` | a frame: camera, targets, problems |
+//! | `/api/runs/R/depth/NAME` | [`DepthFile::into_bytes`] |
+//! | `/api/runs/R/image/NAME` | the picture's own bytes |
+//! | `/api/runs/R/tracks?from=I&count=N` | centres of the targets of consecutive frames |
+//! | `/api/runs/R/training`, `/api/runs/R/panel/FILE` | a training run's curve and panels |
+
+use std::path::Path;
+
+use deepfusion_render::{ColourMap, DepthScale};
+use serde_json::{Value, json};
+
+use crate::folder::{Kind, frame_json, picture_of, targets_of};
+use crate::http::{Request, Response};
+use crate::{DepthFile, Error, Folder, assets, training};
+
+/// Frames that one answer of tracks may hold.
+const MOST_TRACK_FRAMES: u64 = 256;
+
+/// The folders that are served, and for whom.
+#[derive(Debug)]
+pub(crate) struct Routes {
+    folders: Vec<Folder>,
+    /// Whether only this machine is served.
+    local: bool,
+}
+
+impl Routes {
+    pub fn new(folders: Vec<Folder>, local: bool) -> Self {
+        Self { folders, local }
+    }
+
+    /// The answer to a request.
+    pub fn answer(&self, request: &Request) -> Response {
+        // A page elsewhere may give its own name this machine's address, and then read what is served here as its own.
+        if self.local && !request.host.as_deref().is_none_or(is_this_machine) {
+            return Response::problem(
+                403,
+                "this server answers to 127.0.0.1 and localhost alone",
+                None,
+            );
+        }
+        let parts: Vec<&str> = request.path.iter().map(String::as_str).collect();
+        match parts.as_slice() {
+            [] => Response::ok("text/html; charset=utf-8", assets::PAGE.as_bytes()),
+            ["app", name] => match assets::find(name) {
+                Some((content_type, content)) => Response::ok(content_type, content),
+                None => nothing(),
+            },
+            ["api", "session"] => Response::json(&self.session()),
+            ["api", "runs", run, rest @ ..] => {
+                match run.parse().ok().and_then(|i: usize| self.folders.get(i)) {
+                    Some(folder) => of_folder(folder, rest, request),
+                    None => nothing(),
+                }
+            }
+            _ => nothing(),
+        }
+    }
+
+    fn session(&self) -> Value {
+        let runs = self.folders.iter().map(|folder| {
+            json!({
+                "name": folder.name(),
+                "path": folder.path().display().to_string(),
+                "kind": match folder.kind() { Kind::Predictions => "predictions", Kind::Training => "training" },
+            })
+        });
+        let table = |map: ColourMap| -> Vec<[u8; 3]> {
+            (0..=255u8)
+                .map(|i| map.colour(f32::from(i) / 255.0).0)
+                .collect()
+        };
+        let scale = DepthScale::default();
+        json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "runs": runs.collect::<Vec<_>>(),
+            "colours": {
+                "turbo": table(ColourMap::Turbo),
+                "magma": table(ColourMap::Magma),
+                "diverging": table(ColourMap::Diverging),
+            },
+            // From near to far by the logarithm of metres, as the pictures that `predict` writes.
+            "depth_scale": { "near_m": scale.near_m, "far_m": scale.far_m, "colours": depth_colours(&scale) },
+        })
+    }
+}
+
+/// The depth scale's colours at 256 places evenly from near to far.
+fn depth_colours(scale: &DepthScale) -> Vec<[u8; 3]> {
+    let ratio = scale.far_m / scale.near_m;
+    (0..=255u8)
+        .map(|i| {
+            scale
+                .colour(scale.near_m * ratio.powf(f32::from(i) / 255.0))
+                .0
+        })
+        .collect()
+}
+
+fn of_folder(folder: &Folder, rest: &[&str], request: &Request) -> Response {
+    let (path, training) = (folder.path(), folder.kind() == Kind::Training);
+    match rest {
+        ["index"] if !training => Response::json(&folder.index_json(request.number("known"))),
+        ["tracks"] if !training => {
+            let from = request.number("from").unwrap_or(0) as usize;
+            let count = request.number("count").unwrap_or(1).min(MOST_TRACK_FRAMES) as usize;
+            let entries = folder.entries(from, count);
+            let tracks: Vec<_> = entries.iter().map(|e| targets_of(path, e)).collect();
+            Response::json(&json!({ "from": from, "tracks": tracks }))
+        }
+        [what @ ("frame" | "depth" | "image"), name] if !training => match folder.entry(name) {
+            None => Response::problem(404, &format!("there is no frame {name}"), None),
+            Some(entry) => match *what {
+                "frame" => Response::json(&frame_json(path, &entry)),
+                "depth" => match &entry.depth {
+                    Some(depth) => {
+                        sent(DepthFile::read(&path.join(&depth.file)).map(|depth| {
+                            Response::ok("application/octet-stream", depth.into_bytes())
+                        }))
+                    }
+                    None => Response::problem(404, "no depth was saved for this frame", None),
+                },
+                _ => match picture_of(path, &entry) {
+                    Ok(picture) => file(&picture.path, picture.content_type),
+                    Err(problem) => Response::problem(422, &problem, None),
+                },
+            },
+        },
+        ["training"] if training => sent(training::run_json(path).map(|v| Response::json(&v))),
+        ["panel", name] if training => match training::panel(path, name) {
+            Some(panel) => file(&panel, "image/png"),
+            None => nothing(),
+        },
+        _ => nothing(),
+    }
+}
+
+fn file(path: &Path, content_type: &'static str) -> Response {
+    let read = std::fs::read(path).map_err(|e| Error::file(path, e));
+    sent(read.map(|bytes| Response::ok(content_type, bytes)))
+}
+
+fn sent(outcome: Result<Response, Error>) -> Response {
+    outcome.unwrap_or_else(|e| Response::problem(422, &e.to_string(), e.hint().as_deref()))
+}
+
+fn nothing() -> Response {
+    Response::problem(404, "nothing is served there", None)
+}
+
+fn is_this_machine(host: &str) -> bool {
+    let bare = host.trim_start_matches('[').trim_end_matches(']');
+    host.eq_ignore_ascii_case("localhost")
+        || bare
+            .parse()
+            .is_ok_and(|ip: std::net::IpAddr| ip.is_loopback())
+}

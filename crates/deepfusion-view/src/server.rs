@@ -1,0 +1,170 @@
+//! Where the page is served.
+
+use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use crate::http::{self, Response};
+use crate::routes::Routes;
+use crate::{Error, Folder, Result};
+
+/// A browser opens six connections; this is for some tabs and phones.
+const MOST_CONNECTIONS: usize = 64;
+
+/// Where to listen.
+#[derive(Debug, Clone, Copy)]
+pub struct Settings {
+    /// The address; an unspecified one is every network's.
+    pub host: IpAddr,
+    /// The port; 0 takes any that is free.
+    pub port: u16,
+}
+
+/// A listening server of one page.
+#[derive(Debug)]
+pub struct Server {
+    listener: TcpListener,
+    address: SocketAddr,
+    routes: Arc<Routes>,
+}
+
+impl Server {
+    /// Listens, for one folder or two side by side; nothing is answered before [`Server::run_until`].
+    ///
+    /// # Errors
+    /// [`Error::PortInUse`], [`Error::Listen`]; [`Error::OtherKind`] where one folder is a run and the other is not.
+    pub fn bind(settings: Settings, folder: Folder, other: Option<Folder>) -> Result<Self> {
+        if let Some(other) = &other
+            && other.kind() != folder.kind()
+        {
+            return Err(Error::OtherKind {
+                path: other.path().to_owned(),
+                found: other.kind().describe(),
+                expected: folder.kind().describe(),
+            });
+        }
+        let asked = SocketAddr::new(settings.host, settings.port);
+        let failed = |source: std::io::Error| match source.kind() {
+            std::io::ErrorKind::AddrInUse => Error::PortInUse { address: asked },
+            _ => Error::Listen {
+                address: asked,
+                source,
+            },
+        };
+        let listener = TcpListener::bind(asked).map_err(failed)?;
+        let address = listener.local_addr().map_err(failed)?;
+        let folders = std::iter::once(folder).chain(other).collect();
+        Ok(Self {
+            listener,
+            address,
+            routes: Arc::new(Routes::new(folders, address.ip().is_loopback())),
+        })
+    }
+
+    /// Where it listens, with the port that was found.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// The page's address on this machine.
+    #[must_use]
+    pub fn url(&self) -> String {
+        let here = self.url_address();
+        format!("http://{here}/")
+    }
+
+    /// The page's address for other machines; `None` where only this one is served, or there is no network.
+    #[must_use]
+    pub fn url_for_others(&self) -> Option<String> {
+        if !self.address.ip().is_unspecified() {
+            return None;
+        }
+        // A datagram socket that is "connected" sends nothing; it only learns which of the machine's addresses leads outside.
+        // 192.0.2.1 belongs to nobody (RFC 5737).
+        let probe = std::net::UdpSocket::bind(("0.0.0.0", 0)).ok()?;
+        probe.connect(("192.0.2.1", 9)).ok()?;
+        let ip = probe.local_addr().ok()?.ip();
+        (!ip.is_loopback()).then(|| format!("http://{}/", SocketAddr::new(ip, self.address.port())))
+    }
+
+    /// Answers until `stop` says so, asked ten times a second.
+    pub fn run_until(self, stop: impl Fn() -> bool) {
+        let ended = Arc::new(AtomicBool::new(false));
+        let (acceptor_ended, address) = (ended.clone(), self.url_address());
+        let acceptor = std::thread::spawn(move || self.accept(&acceptor_ended));
+        while !stop() && !acceptor.is_finished() {
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        ended.store(true, Ordering::SeqCst);
+        // Wakes the acceptor.
+        let _ = TcpStream::connect_timeout(&address, Duration::from_secs(1));
+        let _ = acceptor.join();
+    }
+
+    fn url_address(&self) -> SocketAddr {
+        let mut address = self.address;
+        if address.ip().is_unspecified() {
+            address.set_ip(match address.ip() {
+                IpAddr::V4(_) => IpAddr::from([127, 0, 0, 1]),
+                IpAddr::V6(_) => IpAddr::V6(std::net::Ipv6Addr::LOCALHOST),
+            });
+        }
+        address
+    }
+
+    fn accept(&self, ended: &AtomicBool) {
+        let open = Arc::new(AtomicUsize::new(0));
+        loop {
+            let accepted = self.listener.accept();
+            if ended.load(Ordering::SeqCst) {
+                return;
+            }
+            let mut stream = match accepted {
+                Ok((stream, _)) => stream,
+                Err(error) => {
+                    // Out of file handles, most likely: others will close theirs.
+                    tracing::warn!("a connection could not be taken: {error}");
+                    std::thread::sleep(Duration::from_millis(100));
+                    continue;
+                }
+            };
+            if open.load(Ordering::SeqCst) >= MOST_CONNECTIONS {
+                let busy =
+                    Response::problem(503, "too many connections", Some("close a tab or two"));
+                let _ = stream.set_write_timeout(Some(Duration::from_secs(1)));
+                let _ = busy.write(&mut stream, false, false);
+                continue;
+            }
+            let one = Counted::new(&open);
+            let routes = self.routes.clone();
+            let spawned = std::thread::Builder::new()
+                .name("view".into())
+                .spawn(move || {
+                    let _one = one;
+                    // A client that has gone is no failure of ours.
+                    let _ = http::serve(stream, &|request| routes.answer(request));
+                });
+            if let Err(error) = spawned {
+                tracing::warn!("a connection could not be served: {error}");
+            }
+        }
+    }
+}
+
+/// An open connection, counted while it lives.
+struct Counted(Arc<AtomicUsize>);
+
+impl Counted {
+    fn new(count: &Arc<AtomicUsize>) -> Self {
+        count.fetch_add(1, Ordering::SeqCst);
+        Self(count.clone())
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
+    }
+}

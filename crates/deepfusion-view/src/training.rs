@@ -1,0 +1,102 @@
+//! A training run: its learning curve and its panels.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::{Error, Result};
+
+/// More rows than the page has columns for are thinned to this many.
+const MOST_ROWS: usize = 2000;
+
+/// Whether a folder is a run: it has a log.
+pub(crate) fn is_run(folder: &Path) -> bool {
+    folder.join("log.csv").is_file()
+}
+
+/// The log as columns, and the panels' names. A long log is thinned evenly for the steps; validations all stay.
+pub(crate) fn run_json(folder: &Path) -> Result<Value> {
+    let path = folder.join("log.csv");
+    let failed = |e: csv::Error| Error::content(&path, e.to_string());
+    // A last line that is being written has too few fields: it is left out.
+    let mut reader = csv::ReaderBuilder::new()
+        .flexible(true)
+        .from_path(&path)
+        .map_err(failed)?;
+    let header: Vec<String> = reader
+        .headers()
+        .map_err(failed)?
+        .iter()
+        .map(str::to_owned)
+        .collect();
+    let (Some(step), Some(split)) = (
+        header.iter().position(|h| h == "step"),
+        header.iter().position(|h| h == "split"),
+    ) else {
+        return Err(Error::content(
+            &path,
+            "no columns `step` and `split`: not a training log",
+        ));
+    };
+    let (mut train, mut validation) = (Vec::new(), Vec::new());
+    for row in reader.records() {
+        let row = row.map_err(failed)?;
+        if row.len() != header.len() {
+            continue;
+        }
+        let numbers: Vec<Option<f64>> = row
+            .iter()
+            .map(|f| f.parse().ok().filter(|n: &f64| n.is_finite()))
+            .collect();
+        match row.get(split) {
+            Some("train") => train.push(numbers),
+            _ => validation.push(numbers),
+        }
+    }
+    let stride = train.len().div_ceil(MOST_ROWS).max(1);
+    let last = train.len().saturating_sub(1);
+    let kept = train
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| i % stride == 0 || *i == last);
+    let train: Vec<&Vec<Option<f64>>> = kept.map(|(_, row)| row).collect();
+    let table = |rows: &[&Vec<Option<f64>>]| -> Value {
+        let columns = header.iter().enumerate().filter(|(i, _)| *i != split);
+        columns
+            .map(|(i, name)| {
+                (
+                    name.clone(),
+                    json!(rows.iter().map(|r| r[i]).collect::<Vec<_>>()),
+                )
+            })
+            .collect::<serde_json::Map<_, _>>()
+            .into()
+    };
+    Ok(json!({
+        "step_column": header[step],
+        "columns": header.iter().enumerate().filter(|(i, _)| *i != split).map(|(_, name)| name).collect::<Vec<_>>(),
+        "train": table(&train),
+        "validation": table(&validation.iter().collect::<Vec<_>>()),
+        "panels": panels(folder),
+    }))
+}
+
+/// The panels' file names, in order.
+fn panels(folder: &Path) -> Vec<String> {
+    let files = std::fs::read_dir(folder.join("panels"))
+        .into_iter()
+        .flatten()
+        .flatten();
+    let mut names: Vec<String> = files
+        .filter_map(|f| f.file_name().into_string().ok())
+        .filter(|n| n.ends_with(".png") && !n.starts_with('.'))
+        .collect();
+    names.sort();
+    names
+}
+
+/// A panel that the folder holds.
+pub(crate) fn panel(folder: &Path, name: &str) -> Option<PathBuf> {
+    let found = panels(folder).into_iter().find(|n| n == name)?;
+    Some(folder.join("panels").join(found))
+}

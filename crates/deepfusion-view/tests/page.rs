@@ -1,0 +1,285 @@
+//! The page in a real browser: what it shows is what the files hold. Without a Chromium this says so and passes.
+#![cfg(unix)]
+
+#[path = "support/browser.rs"]
+mod browser;
+mod support;
+
+use std::time::{Duration, Instant};
+
+use browser::Browser;
+use deepfusion_geometry::Intrinsics;
+use nalgebra::{Rotation3, Vector3};
+use serde_json::{Value, json};
+use support::{CAMERA, Running, SIZE, results, steps, target, write_frame};
+
+const FRAMES: usize = 12;
+
+fn opened(server: &Running) -> Option<Browser> {
+    let mut browser = Browser::start(1200, 800)?;
+    browser.open(&server.url);
+    browser.wait_for("window.deepfusion?.ready || window.deepfusion?.failure");
+    assert_eq!(browser.value("deepfusion.failure ?? null"), Value::Null);
+    Some(browser)
+}
+
+/// Moves the mouse onto a pixel of the depth pane, and gives what the page then says.
+fn told_at(browser: &mut Browser, pane: &str, x: u32, y: u32) -> (f64, String) {
+    let place = format!(
+        "(() => {{ const pane = deepfusion.app.kinds[0].{pane}, at = pane.layout(), box = pane.canvas.getBoundingClientRect(); \
+         return [box.left + at.left + ({x} + 0.5) / {} * at.width, box.top + at.top + ({y} + 0.5) / {} * at.height]; }})()",
+        SIZE.0, SIZE.1
+    );
+    let told =
+        format!("(document.getElementById('tip').innerText + '\\n').includes('pixel {x}, {y}\\n')");
+    // The panes take their shapes from the first pictures: a place may move once.
+    let begin = Instant::now();
+    loop {
+        let at = browser.value(&place);
+        browser.mouse(at[0].as_f64().unwrap(), at[1].as_f64().unwrap());
+        std::thread::sleep(Duration::from_millis(50));
+        if browser.value(&told) == json!(true) {
+            break;
+        }
+        assert!(
+            begin.elapsed() < Duration::from_secs(60),
+            "{pane} {x}, {y}: {at}, {}",
+            browser.value("document.getElementById('tip').innerText")
+        );
+    }
+    let metres = browser.value("Number(document.querySelector('#tip b').dataset.metres)");
+    let text = browser.value("document.querySelector('#tip b').innerText");
+    (metres.as_f64().unwrap(), text.as_str().unwrap().to_owned())
+}
+
+#[test]
+fn the_page_shows_what_the_files_hold() {
+    let folder = results(FRAMES);
+    let server = Running::start(folder.path(), None);
+    let Some(mut browser) = opened(&server) else {
+        return;
+    };
+    assert_eq!(browser.complaints, Vec::<String>::new());
+
+    // The cloud: points in the pictures' colour, which nothing else has.
+    let seen = browser.value(
+        "(() => { const view = deepfusion.app.kinds[0].cloud; view.draw(true); const { gl, canvas } = view; \
+         const pixels = new Uint8Array(4 * canvas.width * canvas.height); \
+         gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels); \
+         let seen = 0; for (let i = 0; i < pixels.length; i += 4) if (pixels[i] > 200 && pixels[i + 1] < 30 && pixels[i + 2] > 190) seen++; \
+         return seen; })()",
+    );
+    assert!(seen.as_u64().unwrap() > 2000, "{seen} pixels of the cloud");
+
+    // Metres under the pointer: the file's, to the last digit, on either picture.
+    for (x, y) in [(10, 5), (0, 47), (95, 0), (48, 24), (71, 33)] {
+        for pane in ["depth", "picture"] {
+            let (metres, text) = told_at(&mut browser, pane, x, y);
+            let expected = f64::from(steps(0, x, y)) / 256.0;
+            assert_eq!(metres, expected, "{pane} {x}, {y}");
+            assert_eq!(text, format!("{expected:.2} m"));
+        }
+    }
+    assert_eq!(
+        told_at(&mut browser, "depth", 2, 2),
+        (0.0, "no depth".into())
+    );
+
+    boxes_are_where_they_belong(&mut browser);
+
+    // Playing and stepping.
+    browser.key(" ");
+    browser.wait_for("deepfusion.app.drawnFrame >= '000003'");
+    browser.key(" ");
+    browser.wait_for("!deepfusion.app.player.playing");
+    let there = browser.value("deepfusion.app.frame").as_u64().unwrap();
+    browser.key("ArrowLeft");
+    browser.wait_for(&format!("deepfusion.app.drawnFrame === '{:06}'", there - 1));
+    browser.key("End");
+    browser.wait_for(&format!(
+        "deepfusion.app.drawnFrame === '{:06}'",
+        FRAMES - 1
+    ));
+    let (metres, _) = told_at(&mut browser, "depth", 48, 24);
+    assert_eq!(
+        metres,
+        f64::from(steps(FRAMES - 1, 48, 24)) / 256.0,
+        "the last frame's own depth"
+    );
+
+    // Where the target was: half a metre nearer a frame, while the camera drove 0.2 m.
+    browser.wait_for("deepfusion.app.runs[0].history(11, 4, () => {}).length === 4");
+    let track = browser
+        .value("deepfusion.app.runs[0].history(11, 4, () => {}).map(f => f.targets[0][1][2])");
+    let track: Vec<f64> = serde_json::from_value(track).unwrap();
+    assert_eq!(track, [10.0, 9.5, 9.0, 8.5]);
+
+    // What is held stays within its bounds.
+    let held = browser.value(
+        "(async () => { const { runs: [run] } = deepfusion.app; for (const key of [...run.frames.entries.keys()]) run.frames.delete(key); \
+         await deepfusion.app.seek(0); run.frames.most = 3 * run.at(0).bytes; \
+         for (let i = 0; i < run.length; i++) await deepfusion.app.seek(i); \
+         return [run.frames.bytes <= run.frames.most, run.frames.entries.size, deepfusion.app.shown(0).name, deepfusion.app.shown(0).bitmap.width]; })()",
+    );
+    assert_eq!(held[0], json!(true), "{held}");
+    assert!((1..=3).contains(&held[1].as_u64().unwrap()), "{held}");
+    assert_eq!(
+        (&held[2], &held[3]),
+        (&json!("000011"), &json!(96)),
+        "what is on show is kept"
+    );
+
+    browser.key("?");
+    browser.wait_for("document.getElementById('help').open");
+    assert_eq!(browser.complaints, Vec::<String>::new());
+}
+
+/// The eight corners of a box in the picture against nalgebra's rotation and the crate's own camera; then that its lines are painted there.
+fn boxes_are_where_they_belong(browser: &mut Browser) {
+    let [fx, fy, cx, cy] = CAMERA;
+    let camera = Intrinsics {
+        fx,
+        fy,
+        cx,
+        cy,
+        width: SIZE.0,
+        height: SIZE.1,
+    };
+    let target = target(0);
+    let numbers = |key: &str| {
+        Vector3::from_iterator(
+            target[key]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|v| v.as_f64().unwrap()),
+        )
+    };
+    let (centre, size) = (numbers("center_m"), numbers("size_m"));
+    let cam_from_box =
+        Rotation3::from_axis_angle(&Vector3::y_axis(), target["yaw_rad"].as_f64().unwrap());
+    // In the box's axes: length x, height y, width z.
+    let mut expected = Vec::new();
+    for i in 0..8 {
+        let side = |bit: usize| if i >> bit & 1 == 0 { -0.5 } else { 0.5 };
+        let corner = Vector3::new(side(0) * size.x, side(1) * size.z, side(2) * size.y);
+        expected.push(camera.project(&(centre + cam_from_box * corner)).unwrap());
+    }
+    let pixels = browser.value(
+        "(() => { const { app, geometry } = deepfusion, frame = app.shown(0); \
+         return geometry.boxCorners(frame.targets[0]).map(c => geometry.project(frame.camera, c)); })()",
+    );
+    let pixels: Vec<[f64; 2]> = serde_json::from_value(pixels).unwrap();
+    assert_eq!(pixels.len(), 8);
+    for corner in &expected {
+        let off = pixels
+            .iter()
+            .map(|p| (p[0] - corner.x).hypot(p[1] - corner.y))
+            .fold(f64::INFINITY, f64::min);
+        assert!(
+            off < 1e-9,
+            "{corner} is {off} pixels from the nearest of {pixels:?}"
+        );
+    }
+    // An upright edge's middle has the colour of what moves.
+    let colour = browser.value(&format!(
+        "(() => {{ const {{ app }} = deepfusion, pane = app.kinds[0].picture, at = pane.layout(), {{ canvas }} = pane; \
+         app.point(null); pane.draw(); \
+         const [a, b] = [[{}, {}], [{}, {}]], x = ((a[0] + b[0]) / 2 + 0.5) / {} * at.width + at.left, y = ((a[1] + b[1]) / 2 + 0.5) / {} * at.height + at.top; \
+         const near = canvas.getContext('2d').getImageData(x * canvas.ratio - 2, y * canvas.ratio - 1, 5, 3).data; \
+         const style = getComputedStyle(document.documentElement).getPropertyValue('--moving').trim(); \
+         const wanted = style.match(/[0-9a-f]{{2}}/gi).map(h => parseInt(h, 16)); \
+         let best = 1e9; for (let i = 0; i < near.length; i += 4) best = Math.min(best, Math.max(...wanted.map((w, c) => Math.abs(near[i + c] - w)))); \
+         return best; }})()",
+        pixels[0][0], pixels[0][1], pixels[4][0], pixels[4][1], SIZE.0, SIZE.1
+    ));
+    assert!(
+        colour.as_f64().unwrap() < 40.0,
+        "the edge's colour is off by {colour}"
+    );
+}
+
+#[test]
+fn a_broken_frame_says_so_and_a_new_one_comes() {
+    let folder = results(3);
+    let depth = folder.path().join("000001_depth.png");
+    let whole = std::fs::read(&depth).unwrap();
+    std::fs::write(&depth, &whole[..whole.len() / 2]).unwrap();
+    std::fs::write(folder.path().join("000002.json"), "{\"image\": ").unwrap();
+    let server = Running::start(folder.path(), None);
+    let Some(mut browser) = opened(&server) else {
+        return;
+    };
+    let problem = |pane: &str| format!("deepfusion.app.kinds[0].{pane}.problem");
+    browser.key("ArrowRight");
+    browser.wait_for(&format!(
+        "{}.innerText.includes('truncated')",
+        problem("depth")
+    ));
+    browser.key("ArrowRight");
+    browser.wait_for(&format!(
+        "{}.innerText.includes('half-written')",
+        problem("picture")
+    ));
+    browser.key("Home");
+    browser.wait_for(&format!(
+        "{}.hidden && deepfusion.app.drawnFrame === '000000'",
+        problem("depth")
+    ));
+    // Mended, and one more.
+    std::fs::write(&depth, &whole).unwrap();
+    write_frame(folder.path(), 3);
+    browser.wait_for("deepfusion.app.runs[0].length === 4");
+    browser.key("ArrowRight");
+    browser.wait_for(&format!(
+        "{}.hidden && deepfusion.app.drawnFrame === '000001'",
+        problem("depth")
+    ));
+    let (metres, _) = told_at(&mut browser, "depth", 48, 24);
+    assert_eq!(metres, f64::from(steps(1, 48, 24)) / 256.0);
+}
+
+#[test]
+fn two_runs_stand_side_by_side() {
+    let (first, second) = (results(4), tempfile::tempdir().unwrap());
+    // The second lacks frame 0, and all it has is a metre farther.
+    for i in 1..4 {
+        write_frame(second.path(), i);
+        let map = deepfusion_data::read_depth_png(&second.path().join(format!("{i:06}_depth.png")))
+            .unwrap();
+        let farther = deepfusion_geometry::DepthMap {
+            data: map
+                .data
+                .iter()
+                .map(|d| if *d > 0.0 { d + 1.0 } else { 0.0 })
+                .collect(),
+            ..map
+        };
+        deepfusion_data::write_depth_png(
+            &farther,
+            &second.path().join(format!("{i:06}_depth.png")),
+        )
+        .unwrap();
+    }
+    let server = Running::start(first.path(), Some(second.path()));
+    let Some(mut browser) = opened(&server) else {
+        return;
+    };
+    browser.wait_for(
+        "deepfusion.app.kinds[1].picture.problem.innerText.includes('no frame of this name')",
+    );
+    browser.key("ArrowRight");
+    browser.wait_for(
+        "deepfusion.app.shown(0)?.name === '000001' && deepfusion.app.shown(1)?.name === '000001'",
+    );
+    let (metres, _) = told_at(&mut browser, "depth", 30, 30);
+    let expected = f64::from(steps(1, 30, 30)) / 256.0;
+    assert_eq!(metres, expected);
+    let versus = browser.value("document.querySelector('#tip .versus').innerText");
+    let change = 100.0 / expected;
+    assert_eq!(
+        versus,
+        json!(format!("B: {:.2} m (+{change:.1} %)", expected + 1.0))
+    );
+    assert_eq!(browser.complaints, Vec::<String>::new());
+}

@@ -1,0 +1,68 @@
+use std::io::IsTerminal;
+use std::process::{Command, Stdio};
+
+use anyhow::Result;
+use deepfusion_view::{Folder, Server, Settings};
+
+use crate::cli::ViewArgs;
+use crate::progress::say;
+use crate::{interrupt, output};
+
+/// `deepfusion view`.
+pub fn run(args: &ViewArgs) -> Result<()> {
+    let folder = Folder::open(&args.folder)?;
+    let other = args.other.as_deref().map(Folder::open).transpose()?;
+    let holds = if folder.is_training_run() {
+        "no predictions in this run: its learning curve and panels are shown".to_owned()
+    } else {
+        match folder.frames() {
+            1 => format!("1 frame in {}", args.folder.display()),
+            n => format!("{n} frames in {}", args.folder.display()),
+        }
+    };
+    let settings = Settings {
+        host: args.host,
+        port: args.port,
+    };
+    let server = Server::bind(settings, folder, other)?;
+    interrupt::catch("ending");
+    output::print(&format!("{}\n", server.url()))?;
+    if let Some(url) = server.url_for_others() {
+        say(&format!("for other machines: {url}"));
+    }
+    say(&format!("{holds}; Ctrl-C ends"));
+    // A script that reads the address does not want a window.
+    if !args.no_open && std::io::stdout().is_terminal() {
+        open_browser(&server.url());
+    }
+    server.run_until(interrupt::asked);
+    Ok(())
+}
+
+/// Opens the page where there is a screen; that it cannot is no failure, the address was told.
+fn open_browser(url: &str) {
+    let mut command = if cfg!(target_os = "macos") {
+        Command::new("open")
+    } else if cfg!(windows) {
+        let mut command = Command::new("cmd");
+        command.args(["/C", "start", ""]);
+        command
+    } else if ["DISPLAY", "WAYLAND_DISPLAY"]
+        .iter()
+        .any(|v| std::env::var_os(v).is_some())
+    {
+        Command::new("xdg-open")
+    } else {
+        return;
+    };
+    let started = command
+        .arg(url)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn();
+    if let Ok(mut opener) = started {
+        // It ends at once, and is waited for lest it stays a zombie while the server runs.
+        std::thread::spawn(move || opener.wait());
+    }
+}

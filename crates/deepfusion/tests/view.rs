@@ -1,0 +1,67 @@
+//! `deepfusion view`, from its first line to Ctrl-C.
+#![cfg(unix)]
+
+mod support;
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Command, Stdio};
+
+use deepfusion_geometry::DepthMap;
+use support::in_folder;
+
+#[test]
+fn it_tells_its_address_answers_and_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = DepthMap {
+        width: 4,
+        height: 2,
+        data: vec![1.5; 8],
+    };
+    deepfusion_data::write_depth_png(&map, &folder.path().join("a_depth.png")).unwrap();
+    let mut process = Command::new(env!("CARGO_BIN_EXE_deepfusion"))
+        .args(["view", ".", "--port", "0", "--no-open"])
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut url = String::new();
+    BufReader::new(process.stdout.take().unwrap())
+        .read_line(&mut url)
+        .unwrap();
+    let address = url.trim().strip_prefix("http://").unwrap();
+    let address = address.strip_suffix('/').unwrap();
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream
+        .write_all(b"GET /api/runs/0/depth/a HTTP/1.1\r\nConnection: close\r\n\r\n")
+        .unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    let steps: Vec<u8> = [384u16; 8].iter().flat_map(|s| s.to_le_bytes()).collect();
+    assert!(answer.ends_with(&steps));
+
+    let port = address.rsplit_once(':').unwrap().1;
+    let second = in_folder(folder.path(), &["view", ".", "--no-open", "--port", port]);
+    assert_eq!((second.code, second.stdout.as_str()), (1, ""));
+    assert_eq!(
+        second.stderr,
+        format!(
+            "error: 127.0.0.1:{port}: the port is in use\n\
+             hint: give another --port, or --port 0 for any that is free\n"
+        )
+    );
+
+    let pid = process.id().to_string();
+    let told = Command::new("kill").args(["-INT", &pid]).status().unwrap();
+    assert!(told.success());
+    assert_eq!(process.wait().unwrap().code(), Some(0));
+    let mut said = String::new();
+    process
+        .stderr
+        .take()
+        .unwrap()
+        .read_to_string(&mut said)
+        .unwrap();
+    assert!(said.starts_with("1 frame in .; Ctrl-C ends\n"), "{said}");
+}
