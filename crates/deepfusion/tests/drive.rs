@@ -108,7 +108,7 @@ fn a_simulated_drive_is_inspected_exported_and_scored() {
         "median-scaled",
         "scaled by 0.9",
         "trivial",
-        "points  50 drawn",
+        "50 points drawn",
     ] {
         assert!(table.stdout.contains(row), "{row}: {}", table.stdout);
     }
