@@ -1,5 +1,7 @@
 //! The targets of one depth image of a street, and of a drive with tracking.
 
+#![allow(missing_docs)]
+
 use criterion::{Criterion, criterion_group, criterion_main};
 use deepfusion_perception::{Perception, PerceptionConfig, Stamp};
 use deepfusion_sim::{SimConfig, Simulation};

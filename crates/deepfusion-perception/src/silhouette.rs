@@ -58,7 +58,7 @@ impl Silhouette {
                 columns[(u - left) as usize].push((depth[index], run.v));
                 heights.push(obstacles.height[index]);
                 // Scattered: an even stride would meet the same columns in every row.
-                if scatter(place) % stride == 0 {
+                if scatter(place).is_multiple_of(stride) {
                     let p = rays.point(u as usize, run.v as usize, depth[index]);
                     silhouette.points.push(ground.locate(p));
                 }
