@@ -7,6 +7,7 @@
 mod box_fit;
 mod clusters;
 mod collision;
+mod confidence;
 mod config;
 mod detect;
 mod edges;
@@ -25,6 +26,7 @@ mod tracking;
 pub use box_fit::GroundBox;
 pub use clusters::Run;
 pub use collision::{Collision, VehicleShape, time_to_collision};
+pub use confidence::{ConfidenceModel, Evidence, MOST_ERROR, Reliability};
 pub use config::PerceptionConfig;
 pub use detect::{Detection, detect};
 pub use edges::flying_pixels;

@@ -116,6 +116,51 @@ fn images_stand_for_themselves_and_bags_bring_their_pictures() {
 }
 
 #[test]
+fn a_calibrated_run_gives_its_clouds_a_confidence() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    street(at);
+    let image = format!("{DRIVE}/image_02/data/0000000003.png");
+    let cloud = |out: &str| {
+        ok(
+            at,
+            &format!(
+                "perceive --model run {image} --intrinsics 186,186,157,44 --save ply --out {out}"
+            ),
+        );
+        let bytes = std::fs::read(at.join(out).join("0000000003.ply")).unwrap();
+        String::from_utf8_lossy(&bytes[..400]).into_owned()
+    };
+    assert!(!cloud("before").contains("confidence"));
+    ok(
+        at,
+        "eval --model run --data street --crop none --calibrate-confidence --report page.html",
+    );
+    let file = std::fs::read_to_string(at.join("run/confidence.toml")).unwrap();
+    let file: toml::Table = file.parse().unwrap();
+    for look in ["single", "mirrored"] {
+        let weight = |name: &str| file[look][name].as_float().unwrap();
+        assert!(
+            ["constant", "gradient", "flip"]
+                .iter()
+                .all(|n| weight(n) >= 0.0),
+            "{file}"
+        );
+    }
+    let page = std::fs::read_to_string(at.join("page.html")).unwrap();
+    assert!(page.contains("How far to trust a pixel"));
+    assert!(cloud("after").contains("property float confidence"));
+    // A file that is none is told, not passed over.
+    std::fs::write(at.join("run/confidence.toml"), "single = 3").unwrap();
+    let run_ = run(
+        at,
+        &format!("perceive --model run {image} --intrinsics 186,186,157,44 --out wrong"),
+    );
+    assert_eq!(run_.code, 1);
+    assert!(run_.stderr.contains("confidence.toml"), "{}", run_.stderr);
+}
+
+#[test]
 fn exact_depth_finds_the_simulators_boxes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

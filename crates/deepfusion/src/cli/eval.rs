@@ -82,6 +82,10 @@ pub struct EvalArgs {
     /// Do not correct depth for another focal length than the one trained on.
     #[arg(long, conflicts_with = "pred")]
     pub no_focal_correction: bool,
+    /// Learn from every second frame how far a pixel's depth can be trusted, and keep that beside the run: `perceive` then
+    /// gives its clouds a confidence, and --report shows whether it holds on the other frames.
+    #[arg(long, requires = "model", conflicts_with = "gt")]
+    pub calibrate_confidence: bool,
     /// What runs the network.
     #[command(flatten)]
     pub engine: EngineArgs,

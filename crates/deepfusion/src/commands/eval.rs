@@ -12,6 +12,7 @@ use deepfusion_geometry::Intrinsics;
 use deepfusion_render::{HtmlReport, ShownFrame};
 use deepfusion_train::{Predictor, RunFolder};
 
+use super::confidence;
 use super::evaluate::{
     Comparison, Evaluated, Place, Truth, array_places, depth_map, evaluate_datasets,
     open_with_camera, trivial_from_arrays, trivial_from_datasets,
@@ -84,6 +85,12 @@ fn from_model(args: &EvalArgs) -> Result<Report> {
         // A run on a disk that cannot be written is measured all the same.
         Err(error) => tracing::warn!("the result is not kept beside the run: {error}"),
     }
+    let reliability = match args.calibrate_confidence {
+        true => {
+            confidence::calibrate(&predictor, &datasets, &mut truth, &evaluated, folder.path())?
+        }
+        false => None,
+    };
     if let Some(path) = &args.report {
         let names = deepfusion_data::ground_truth_names(&datasets);
         let arrays = match &truth {
@@ -106,7 +113,10 @@ fn from_model(args: &EvalArgs) -> Result<Report> {
         })?;
         let how = how_a_model_was_measured(args, &protocol, &saved);
         let name = output::name_of(folder.path());
-        let page = page(args, &name, &evaluated, &shown, &how)?;
+        let mut page = page(args, &name, &evaluated, &shown, &how)?;
+        if let Some(bins) = reliability {
+            page = run_report::reliability(page, &bins);
+        }
         run_report::training(page, folder.path())?.write(path)?;
         say(&format!("report  {}", path.display()));
     }

@@ -3,6 +3,7 @@
 mod ablate;
 mod bench;
 mod compare;
+mod confidence;
 mod convert;
 mod demo;
 pub mod device;

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_render::{HtmlReport, LearningLog, ShownFrame};
+use deepfusion_perception::Reliability;
+use deepfusion_render::{HtmlReport, LearningLog, ReliabilityBin, ShownFrame};
 use serde::Deserialize;
 
 use super::evaluate::Evaluated;
@@ -47,6 +48,20 @@ pub fn choose(evaluated: &Evaluated) -> Vec<Choice> {
             }
         })
         .collect()
+}
+
+/// Whether the depth's confidence keeps its promise, on frames that it was not learned from.
+pub fn reliability(page: HtmlReport, bins: &[Reliability]) -> HtmlReport {
+    let bins: Vec<ReliabilityBin> = bins
+        .iter()
+        .map(|bin| ReliabilityBin {
+            confidence: bin.confidence,
+            expected: bin.expected,
+            observed: bin.observed,
+            n: bin.n,
+        })
+        .collect();
+    page.section("How far to trust a pixel").reliability(&bins)
 }
 
 /// Tables and charts of an evaluation.

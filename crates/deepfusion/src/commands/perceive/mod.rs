@@ -10,12 +10,15 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use deepfusion_motion::{ScaleMonitor, ScaleReading, ScaleState};
-use deepfusion_perception::{Perception, PerceptionConfig, VehicleShape, time_to_collision};
-use deepfusion_train::{Predictor, PreparedImage};
+use deepfusion_perception::{
+    ConfidenceModel, Perception, PerceptionConfig, VehicleShape, time_to_collision,
+};
+use deepfusion_train::{Predictor, PreparedImage, RunFolder};
 
 use self::pictures::Picture;
 use self::record::{FrameRecord, Lines};
 use self::scene::{MotionTracker, ScaleWatch, working_depth};
+use super::confidence::Confidence;
 use super::predict::inputs::{self, Input};
 use super::predict::{Job, Loaded, Seen};
 use crate::cli::{PerceiveArgs, PerceiveSave};
@@ -59,6 +62,7 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
         args,
         job: &job,
         all: &all,
+        confidence: Confidence::read(RunFolder::open(&args.model)?.0.path())?.map(|c| c.single),
         lines: Mutex::new(Lines::begin(&args.out.join("targets.jsonl"))?),
         outcome: Mutex::new(Outcome::default()),
     };
@@ -108,6 +112,8 @@ struct Work<'a> {
     args: &'a PerceiveArgs,
     job: &'a Job<'a>,
     all: &'a [Input],
+    /// What a pixel's depth is worth, where the run was calibrated.
+    confidence: Option<ConfidenceModel>,
     lines: Mutex<Lines>,
     outcome: Mutex<Outcome>,
 }
@@ -193,6 +199,7 @@ impl Work<'_> {
             (&depth, &k),
             &surroundings,
             perception,
+            self.confidence.as_ref().map(|model| (model, &prediction)),
         );
         Ok(Found {
             index,

@@ -6,8 +6,11 @@ use anyhow::Result;
 use deepfusion_cloud::PointCloud;
 use deepfusion_data::{RgbImage, save_png, write_atomically};
 use deepfusion_geometry::{DepthMap, Intrinsics};
-use deepfusion_perception::{FreeSpace, Perception, Rays, Surroundings, flying_pixels};
+use deepfusion_perception::{
+    ConfidenceModel, Evidence, FreeSpace, Perception, Rays, Surroundings, flying_pixels,
+};
 use deepfusion_render::{birds_eye, box_overlay, target_segments};
+use deepfusion_train::Prediction;
 
 use crate::cli::PerceiveSave;
 
@@ -32,6 +35,7 @@ pub fn draw(
     (depth, k): (&DepthMap, &Intrinsics),
     surroundings: &Surroundings,
     perception: &Perception,
+    confidence: Option<(&ConfidenceModel, &Prediction)>,
 ) -> Vec<(PerceiveSave, Picture)> {
     let targets = &surroundings.targets;
     let picture = |save: PerceiveSave| match save {
@@ -55,7 +59,7 @@ pub fn draw(
             targets,
             &surroundings.detections,
         ))),
-        PerceiveSave::Ply => cloud(image, depth, k, perception).map(Picture::Cloud),
+        PerceiveSave::Ply => cloud(image, depth, k, perception, confidence).map(Picture::Cloud),
     };
     save.iter()
         .filter_map(|save| Some((*save, picture(*save)?)))
@@ -68,6 +72,7 @@ fn cloud(
     depth: &DepthMap,
     k: &Intrinsics,
     perception: &Perception,
+    confidence: Option<(&ConfidenceModel, &Prediction)>,
 ) -> Option<PointCloud> {
     let config = perception.config();
     let rgb = deepfusion_data::resize_rgb(image, depth.width as u32, depth.height as u32);
@@ -80,7 +85,47 @@ fn cloud(
         height: depth.height,
         data: depth.data.iter().zip(flying).map(keep).collect(),
     };
-    PointCloud::from_depth(&clean, k, Some(rgb.as_raw()), config.max_depth_m).ok()
+    let far = config.max_depth_m;
+    let mut cloud = PointCloud::from_depth(&clean, k, Some(rgb.as_raw()), far).ok()?;
+    cloud.confidence = confidence.map(|(model, prediction)| {
+        let trust = confidences(model, prediction, depth.width, depth.height);
+        let kept = clean.data.iter().zip(trust);
+        kept.filter(|(z, _)| **z > 0.0 && **z <= far)
+            .map(|(_, trust)| trust)
+            .collect()
+    });
+    // One a point: the same pixels were kept.
+    cloud.check().is_ok().then_some(cloud)
+}
+
+/// The confidence of each pixel of a `width` × `height` image: that of the network's pixel there, for a gradient means
+/// what it meant when it was learned only at the network's own size.
+fn confidences(
+    model: &ConfidenceModel,
+    prediction: &Prediction,
+    width: usize,
+    height: usize,
+) -> Vec<f32> {
+    let evidence = Evidence::of(&prediction.disparity, None, prediction.width);
+    let place = |i: usize, size: usize, whole: u32, from: u32, part: u32, cells: usize| {
+        let pixel = (2 * i + 1) * whole as usize / (2 * size);
+        let inside = pixel
+            .saturating_sub(from as usize)
+            .min(part.max(1) as usize - 1);
+        inside * cells / part.max(1) as usize
+    };
+    let [x, y, w, h] = prediction.window;
+    let [all_w, all_h] = prediction.image_size;
+    let columns: Vec<usize> = (0..width)
+        .map(|u| place(u, width, all_w, x, w, prediction.width))
+        .collect();
+    (0..height)
+        .flat_map(|v| {
+            let row = place(v, height, all_h, y, h, prediction.height) * prediction.width;
+            columns.iter().map(move |u| row + u)
+        })
+        .map(|i| model.confidence(&evidence[i]) as f32)
+        .collect()
 }
 
 /// Where a frame's picture goes.

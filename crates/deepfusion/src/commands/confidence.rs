@@ -1,0 +1,153 @@
+//! What a run's depth is worth, pixel by pixel: learned from frames with ground truth, kept beside the run.
+
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::Result;
+use deepfusion_data::{Dataset, write_atomically};
+use deepfusion_perception::{ConfidenceModel, Evidence, Reliability};
+use deepfusion_train::Predictor;
+use image::imageops::flip_horizontal;
+use serde::{Deserialize, Serialize};
+
+use super::evaluate::{Evaluated, Place, Truth};
+
+/// The file in a run's folder.
+const FILE: &str = "confidence.toml";
+/// Pixels taken of each frame, at most.
+const PIXELS: usize = 4_000;
+/// Depths that are compared, metres.
+const RANGE_M: std::ops::Range<f64> = 1e-3..80.0;
+/// Dots of the reliability plot.
+const BINS: usize = 10;
+
+/// What is kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Confidence {
+    /// From a single look at an image.
+    pub single: ConfidenceModel,
+    /// From the image and its mirror image.
+    pub mirrored: ConfidenceModel,
+    /// Frames it was learned from.
+    pub frames: usize,
+    /// Pixels of them.
+    pub pixels: usize,
+}
+
+impl Confidence {
+    /// A run's, where it was calibrated; a file that is none is an error.
+    pub fn read(run: &Path) -> Result<Option<Self>> {
+        let path = run.join(FILE);
+        match std::fs::read_to_string(&path) {
+            Ok(text) => Ok(Some(toml::from_str(&text).map_err(|e| {
+                anyhow::Error::new(e).context(path.display().to_string())
+            })?)),
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(e) => Err(deepfusion_data::Error::file(&path, e).into()),
+        }
+    }
+
+    fn write(&self, run: &Path) -> Result<std::path::PathBuf> {
+        let path = run.join(FILE);
+        let text = format!(
+            "# Expected relative error of a depth = constant + gradient * (local gradient of disparity) + flip * (disagreement\n\
+             # with the mirrored image); confidence = exp(-error). Written by `eval --calibrate-confidence`.\n{}",
+            toml::to_string(self)?
+        );
+        write_atomically::<deepfusion_data::Error>(&path, |out| {
+            out.write_all(text.as_bytes())
+                .map_err(|e| deepfusion_data::Error::file(&path, e))
+        })?;
+        Ok(path)
+    }
+}
+
+/// Learns from every second evaluated frame, keeps the result beside the run, and tells how it holds on the others.
+pub fn calibrate(
+    predictor: &Predictor,
+    datasets: &[Dataset],
+    truth: &mut Truth,
+    evaluated: &Evaluated,
+    run: &Path,
+) -> Result<Option<Vec<Reliability>>> {
+    let mut samples: [Vec<Sampled>; 2] = [Vec::new(), Vec::new()];
+    for (number, Place(set, frame)) in evaluated.places.iter().enumerate() {
+        let half = number % 2;
+        samples[half].extend(of_frame(predictor, &datasets[*set], *frame, truth)?);
+    }
+    let [learned, held_out] = &samples;
+    let fit = |flip: bool| ConfidenceModel::fit(&told(learned, flip));
+    let (Some(single), Some(mirrored)) = (fit(false), fit(true)) else {
+        return Ok(None);
+    };
+    let confidence = Confidence {
+        single,
+        mirrored,
+        frames: evaluated.places.len().div_ceil(2),
+        pixels: learned.len(),
+    };
+    let path = confidence.write(run)?;
+    crate::progress::say(&format!("confidence learned, kept as {}", path.display()));
+    // One frame has no other half: it is told of itself.
+    let judged = if held_out.is_empty() {
+        learned
+    } else {
+        held_out
+    };
+    Ok(Some(mirrored.reliability(&told(judged, true), BINS)))
+}
+
+/// A pixel's evidence, and its relative error.
+type Sampled = (Evidence, f64);
+
+fn told(samples: &[Sampled], flip: bool) -> Vec<Sampled> {
+    let without = |e: Evidence| Evidence { flip: 0.0, ..e };
+    samples
+        .iter()
+        .map(|(e, error)| (if flip { *e } else { without(*e) }, *error))
+        .collect()
+}
+
+fn of_frame(
+    predictor: &Predictor,
+    dataset: &Dataset,
+    frame: usize,
+    truth: &mut Truth,
+) -> Result<Vec<Sampled>> {
+    let Some(depth) = truth.of(dataset, frame, None)? else {
+        return Ok(Vec::new());
+    };
+    let image = dataset.load_image(frame)?;
+    let camera = dataset.intrinsics(frame);
+    let seen = predictor.predict(&image, Some(&camera), true, false)?;
+    let mirror = flip_horizontal(&image);
+    let mut mirrored = predictor
+        .predict(&mirror, Some(&camera.flipped()), true, false)?
+        .disparity;
+    for row in mirrored.chunks_exact_mut(seen.width.max(1)) {
+        row.reverse();
+    }
+    let evidence = Evidence::of(&seen.disparity, Some(&mirrored), seen.width);
+    let known: Vec<(usize, f64)> = depth
+        .values()
+        .iter()
+        .enumerate()
+        .filter(|(_, z)| RANGE_M.contains(*z))
+        .map(|(i, z)| (i, *z))
+        .collect();
+    let step = known.len().div_ceil(PIXELS).max(1);
+    let (width, height) = (depth.width(), depth.height());
+    Ok(known
+        .into_iter()
+        .step_by(step)
+        .map(|(i, z)| {
+            // The network's pixel at the truth's.
+            let u = (2 * (i % width) + 1) * seen.width / (2 * width);
+            let v = (2 * (i / width) + 1) * seen.height / (2 * height);
+            let at = v * seen.width + u;
+            let predicted = 1.0 / f64::from(seen.disparity[at]);
+            (evidence[at], (predicted - z).abs() / z)
+        })
+        .collect())
+}
