@@ -42,6 +42,7 @@ mod speed_check;
 mod speed_log;
 mod split;
 mod table;
+mod vehicle_log;
 mod video;
 mod write;
 
