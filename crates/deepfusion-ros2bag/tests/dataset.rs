@@ -1,6 +1,6 @@
 //! A simulated drive as a bag of ROS 1 and, by `reference/drive_to_ros2.py`, as bags of ROS 2: the same data set.
 
-use deepfusion_data::{Dataset, DatasetKind, GtKind, OpenOptions};
+use deepfusion_data::{Dataset, DatasetKind, Error, GtKind, OpenOptions, Split};
 use deepfusion_ros2bag::Ros2Bag;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -60,4 +60,26 @@ fn the_data_set_is_that_of_the_ros1_bag() {
         let paths = |dataset: &Dataset| dataset.camera_paths().unwrap().len();
         assert_eq!(paths(&found), paths(&expected));
     }
+}
+
+#[test]
+fn a_split_selects_drives_by_scenario() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let open = |text: &str| {
+        std::fs::write(file.path(), text).unwrap();
+        let options = OpenOptions {
+            split: Some(Split::read(file.path()).unwrap()),
+            ..OpenOptions::default()
+        };
+        Dataset::open(&drive("drive.bag"), &options)
+    };
+    assert_eq!(open("scenario = urban\n").unwrap()[0].selected().len(), 10);
+    let both = open("drive 3 l\nscenario = garage\n").unwrap();
+    assert_eq!(both[0].selected(), [3]);
+    let error = open("scenario = garage\n").unwrap_err();
+    assert!(
+        matches!(error, Error::SplitSelectsNothing { .. }),
+        "{error}"
+    );
+    assert!(error.to_string().contains("scenario = garage"), "{error}");
 }
