@@ -145,6 +145,7 @@ pub(crate) fn inspect(folder: &Path) -> Result<Inspection> {
             distance_m,
             turn_rad,
             duration_s,
+            time_offset: None,
             remarks: Vec::new(),
         }],
     })

@@ -58,7 +58,7 @@ pub use export::{export_gt, ground_truth_names};
 pub use frame::{Frame, FrameImage};
 pub use image::RgbImage;
 pub use inspect::{
-    DriveInspection, Inspection, IntrinsicsSummary, SpeedRange, Stream, inspect,
+    ClockOffset, DriveInspection, Inspection, IntrinsicsSummary, SpeedRange, Stream, inspect,
     inspect_with,
 };
 pub use kitti::GtKind;

@@ -49,6 +49,7 @@ pub(crate) fn without_images(path: &Path) -> Result<Option<Inspection>> {
         distance_m,
         turn_rad: None,
         duration_s,
+        time_offset: None,
         remarks: remarks_on(bag.as_ref(), &index),
     };
     Ok(Some(Inspection {
