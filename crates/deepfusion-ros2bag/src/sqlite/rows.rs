@@ -41,8 +41,11 @@ pub(super) fn is_indexed(database: &Connection) -> bool {
     count.is_ok_and(|count| count > 0)
 }
 
-/// Topic, number of messages, first and last time.
-pub(super) fn counts(database: &Connection) -> rusqlite::Result<Vec<(i64, u64, (Time, Time))>> {
+/// A topic's number, how many messages it has, its first and last time.
+pub(super) type Count = (i64, u64, (Time, Time));
+
+/// What each topic has.
+pub(super) fn counts(database: &Connection) -> rusqlite::Result<Vec<Count>> {
     let mut rows = database.prepare(
         "SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY topic_id",
     )?;
