@@ -8,8 +8,10 @@ use crate::frame_times::{TimedImage, numbers_by_time};
 use crate::inspect::{DriveInspection, Inspection, SpeedRange, Stream};
 use crate::plain::PlainParts;
 use crate::speed_log::{Samples, SpeedLog};
+use crate::vehicle_log::VehicleLog;
 use crate::video::VideoFrames;
 use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
+use deepfusion_motion::{ImuMount, comma};
 use ndarray::{ArrayViewD, IxDyn};
 use ndarray_npy::ViewNpyExt;
 use std::collections::BTreeMap;
@@ -83,7 +85,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         image_size: video.size(),
         video: Some(video),
         calibration,
-        speeds: speeds(folder)?,
+        speeds: speeds(folder, &config)?,
         cam_from_vehicle: config.cam_from_vehicle(),
         depth: None,
         world_from_cam: BTreeMap::new(),
@@ -97,17 +99,24 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
 /// A segment without its video.
 pub(crate) fn inspect(folder: &Path) -> Result<Inspection> {
     let times = frame_times(folder)?;
-    let speeds = speeds(folder)?;
+    let speeds = speeds(folder, &FolderConfig::read(folder)?)?;
     let origin = times.first().copied().unwrap_or_default();
-    let track = speeds.as_ref().map(|log| log.track(origin));
+    let motion = speeds.as_ref().map(|log| log.motion(origin));
+    let (track, yaw_known) = match motion.transpose()? {
+        Some((track, yaw_known)) => (Some(track), yaw_known),
+        None => (None, false),
+    };
     let at: Vec<f64> = times.iter().map(|t| seconds(*t, origin)).collect();
     let at_frames = at.iter().filter_map(|t| track.as_ref()?.speed_at(*t));
     let speed_mps = SpeedRange::of(at_frames);
     let ends = at.first().zip(at.last());
-    let mut distance_m = None;
+    let (mut distance_m, mut turn_rad) = (None, None);
     for pair in at.windows(2) {
         if let Some(motion) = track.as_ref().and_then(|t| t.motion(pair[0], pair[1])) {
             *distance_m.get_or_insert(0.0) += motion.distance_m.abs();
+            if yaw_known {
+                *turn_rad.get_or_insert(0.0) += motion.yaw_rad;
+            }
         }
     }
     let duration_s = ends.map(|(first, last)| last - first);
@@ -134,8 +143,9 @@ pub(crate) fn inspect(folder: &Path) -> Result<Inspection> {
             scans: 0,
             speed_mps,
             distance_m,
-            turn_rad: None,
+            turn_rad,
             duration_s,
+            time_offset: None,
             remarks: Vec::new(),
         }],
     })
@@ -153,7 +163,7 @@ fn frame_times(folder: &Path) -> Result<Vec<i64>> {
     }
 }
 
-fn speeds(folder: &Path) -> Result<Option<SpeedLog>> {
+fn speeds(folder: &Path, config: &FolderConfig) -> Result<Option<SpeedLog>> {
     let place = folder.join(SPEED);
     if !place.join("t").is_file() {
         return Ok(None);
@@ -175,12 +185,45 @@ fn speeds(folder: &Path) -> Result<Option<SpeedLog>> {
     }
     let origin = ns.first().copied().unwrap_or_default();
     let at: Vec<f64> = ns.iter().map(|t| seconds(*t, origin)).collect();
+    let vehicle = vehicle(folder, config)?;
+    let remarks = match &vehicle {
+        Some(_) => Vec::new(),
+        None => vec![
+            "the segment has neither gyroscope and accelerometer nor a steering angle of a known vehicle: how the car \
+             turned is unknown"
+                .into(),
+        ],
+    };
     Ok(Some(SpeedLog {
+        vehicle,
         path,
         streams: vec![Stream::new(SPEED, "speed", at.len(), &at)],
         speeds_mps: Samples { ns, values },
         yaw_rates_radps: None,
-        remarks: vec!["the yaw rate is not read from the segment's gyroscope yet".into()],
+        remarks,
+    }))
+}
+
+/// The segment's inertial unit, and its steering angle where `dataset.toml` says the vehicle's wheelbase.
+fn vehicle(folder: &Path, config: &FolderConfig) -> Result<Option<VehicleLog>> {
+    let sensors = comma::sensors(folder).map_err(|source| Error::Motion {
+        path: folder.to_owned(),
+        source,
+    })?;
+    let config = config.motion(ImuMount::forward_right_down());
+    let ns = |time_s: f64| (time_s * 1e9).round() as i64;
+    let imu = sensors.imu.unwrap_or_default().into_iter();
+    let imu: Vec<_> = imu.map(|sample| (ns(sample.time_s), sample)).collect();
+    let steering = sensors.steering_rad.filter(|_| config.bicycle.is_some());
+    let steering_rad = steering.map(|signal| Samples {
+        ns: signal.times_s().iter().map(|t| ns(*t)).collect(),
+        values: signal.values().to_vec(),
+    });
+    let known = !imu.is_empty() || steering_rad.is_some();
+    Ok(known.then_some(VehicleLog {
+        imu,
+        steering_rad,
+        config,
     }))
 }
 

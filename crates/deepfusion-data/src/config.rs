@@ -2,6 +2,7 @@
 
 use crate::{Error, Result};
 use deepfusion_geometry::Se3;
+use deepfusion_motion::{Bicycle, ImuConfig, ImuMount, MotionConfig};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -42,6 +43,11 @@ pub(crate) struct FolderConfig {
     pub(crate) depth_invalid: Option<u16>,
     /// Where the camera is on the vehicle.
     pub(crate) mount: Option<Mount>,
+    /// A point of the inertial unit in the vehicle.
+    pub(crate) vehicle_from_imu: Option<ImuPlace>,
+    /// The vehicle's geometry.
+    #[serde(default)]
+    pub(crate) vehicle: Vehicle,
     /// Where the file is.
     #[serde(skip)]
     pub(crate) path: PathBuf,
@@ -61,6 +67,24 @@ pub(crate) struct Mount {
     pitch_deg: f64,
     /// To the right: clockwise as the camera looks.
     roll_deg: f64,
+}
+
+/// The inertial unit's place on the vehicle (x forward, y left, z up): metres, and an axis-angle vector in radians.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct ImuPlace {
+    translation: [f64; 3],
+    rotation: [f64; 3],
+}
+
+/// What of a vehicle its steering angle needs to tell a turn.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Vehicle {
+    wheelbase_m: Option<f64>,
+    /// Steering wheel's angle over road wheels'.
+    steering_ratio: Option<f64>,
+    steering_offset_rad: f64,
 }
 
 impl FolderConfig {
@@ -88,10 +112,36 @@ impl FolderConfig {
                 return Err(config.error(format!("{key} is {bad}, it must be above 0")));
             }
         }
+        let place = config.vehicle_from_imu.unwrap_or_default();
+        let mut numbers = place.translation.iter().chain(&place.rotation);
+        if !numbers.all(|x| x.is_finite()) {
+            return Err(config.error("vehicle_from_imu holds a number that is not finite".into()));
+        }
         if let Some(bad) = config.start_s.filter(|v| v.is_nan() || v.abs() > 9e9) {
             return Err(config.error(format!("start_s is {bad}, it is a time in seconds")));
         }
         Ok(config)
+    }
+
+    /// How the vehicle's sensors become its motion; `imu` is where the inertial unit is taken to be where nothing says it.
+    pub(crate) fn motion(&self, imu: ImuMount) -> MotionConfig {
+        let vehicle = &self.vehicle;
+        let place = self.vehicle_from_imu.map(|place| ImuMount {
+            rotation_rad: place.rotation,
+            translation_m: place.translation,
+        });
+        MotionConfig {
+            bicycle: vehicle.wheelbase_m.map(|wheelbase_m| Bicycle {
+                steering_ratio: vehicle.steering_ratio.unwrap_or(1.0),
+                steering_offset_rad: vehicle.steering_offset_rad,
+                ..Bicycle::new(wheelbase_m)
+            }),
+            imu: ImuConfig {
+                vehicle_from_imu: place.unwrap_or(imu),
+                ..ImuConfig::default()
+            },
+            ..MotionConfig::default()
+        }
     }
 
     /// An error about this file.

@@ -8,9 +8,10 @@ use crate::selection::Selection;
 use crate::split::Split;
 use crate::{
     Camera, CameraChoice, CameraPath, DatasetKind, Error, Frame, LidarMotion, MotionModel,
-    MovingLabels, Result, Stream, image_size,
+    MovingLabels, Result, Stream, bag, image_size,
 };
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use deepfusion_rosbag::MessageSource;
 use image::RgbImage;
 use rayon::prelude::*;
 use std::path::Path;
@@ -81,6 +82,16 @@ impl Dataset {
         Layout::of(path)?.open(path, options)
     }
 
+    /// A recording of messages, such as an open bag of another format, as [`Self::open`] opens a bag: topics are found
+    /// by type, and the file beside [`MessageSource::path`] says what they do not.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn from_messages(source: Arc<dyn MessageSource>, options: &OpenOptions) -> Result<Self> {
+        let path = source.path().to_owned();
+        bag::open_bag(source, options)?.select(&path, options)
+    }
+
     /// A data set of all its frames.
     #[must_use]
     pub fn new(parts: DatasetParts, recording: Arc<dyn Recording>) -> Self {
@@ -109,7 +120,7 @@ impl Dataset {
         }
         let selection = Selection::new(options);
         let numbers = self.frames().iter().map(|f| f.number);
-        let selected = selection.of(self.split_name(), self.camera(), numbers);
+        let selected = selection.of(self.split_name(), self.scenario(), self.camera(), numbers);
         match selection.nothing(path) {
             Some(error) if selected.is_empty() => Err(error),
             _ => Ok(self.with_selected(selected)),

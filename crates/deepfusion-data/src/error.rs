@@ -464,7 +464,9 @@ impl Error {
             Self::Tracklets { .. } => {
                 "fetch the drive's tracklets again, or move the file away to evaluate without them"
             }
-            Self::Split { .. } => "lines look like: 2011_09_26/2011_09_26_drive_0009_sync 16 l",
+            Self::Split { .. } => {
+                "lines look like: 2011_09_26/2011_09_26_drive_0009_sync 16 l, or: scenario = garage"
+            }
             Self::SplitSelectsNothing { .. } => {
                 "give the folder that holds the dates named in the split, and the camera its sides ask for"
             }

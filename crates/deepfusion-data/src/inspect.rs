@@ -1,7 +1,7 @@
 //! What is in a recording.
 
 use crate::layout::Layout;
-use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions, Result, bag, comma};
+use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions, Result, bag, comma, doctor};
 use deepfusion_geometry::Intrinsics;
 use serde::Serialize;
 use std::path::Path;
@@ -54,8 +54,20 @@ pub struct DriveInspection {
     pub turn_rad: Option<f64>,
     /// Time from the first to the last frame, in seconds.
     pub duration_s: Option<f64>,
+    /// How far the vehicle's clock is ahead of the camera's, by how the pictures moved. Estimated where one drive is
+    /// looked at and shows it; `None` otherwise.
+    pub time_offset: Option<ClockOffset>,
     /// What was taken for granted or looks odd.
     pub remarks: Vec<String>,
+}
+
+/// The vehicle's clock less the camera's.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ClockOffset {
+    /// What to add to the camera's times to have the vehicle's, in seconds.
+    pub vehicle_minus_camera_s: f64,
+    /// Its standard error, in seconds.
+    pub std_error_s: f64,
 }
 
 /// A camera's numbers, in pixels.
@@ -146,6 +158,13 @@ pub fn inspect_with(path: &Path, intrinsics: Option<[f64; 4]>) -> Result<Inspect
             streams.push(stream);
         }
         drives.push(look_at(dataset)?);
+    }
+    // It reads a few hundred pictures: of many drives `doctor` tells it one by one.
+    if let ([dataset], [drive]) = (datasets.as_slice(), drives.as_mut_slice()) {
+        drive.time_offset = doctor::time_offset(dataset).map(|offset| ClockOffset {
+            vehicle_minus_camera_s: offset.vehicle_minus_camera_s,
+            std_error_s: offset.std_error_s,
+        });
     }
     let k = datasets[0].intrinsics(0);
     Ok(Inspection {
@@ -243,6 +262,7 @@ fn look_at(dataset: &Dataset) -> Result<DriveInspection> {
         distance_m,
         turn_rad,
         duration_s: ends.and_then(|(first, last)| Some(last.time_s? - first.time_s?)),
+        time_offset: None,
         remarks: dataset.remarks().to_vec(),
     })
 }

@@ -41,6 +41,15 @@ impl fmt::Display for Inspection {
                 known(drive.turn_rad.map(f64::to_degrees), "degrees")
             )?;
             writeln!(f, "  speed     {}", speed(drive.speed_mps))?;
+            if let Some(offset) = drive.time_offset {
+                let ms = |seconds: f64| 1e3 * seconds;
+                writeln!(
+                    f,
+                    "  clocks    vehicle less camera {:.0} ms, standard error {:.0} ms",
+                    ms(offset.vehicle_minus_camera_s),
+                    ms(offset.std_error_s)
+                )?;
+            }
             writeln!(f, "  pairs     {} usable for training", drive.usable_pairs)?;
             if let Some(why) = &drive.why_no_pairs {
                 writeln!(f, "            {why}")?;

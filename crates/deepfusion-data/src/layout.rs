@@ -86,10 +86,16 @@ impl Layout {
     }
 }
 
+/// Why a ROS 2 bag is no recording here.
+const WITHOUT_ROS2: &str = match cfg!(feature = "ros2") {
+    true => "",
+    false => ", and this program was built without the feature `ros2`",
+};
+
 fn describe_file(path: &Path) -> String {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     match extension.to_ascii_lowercase().as_str() {
-        "mcap" | "db3" => "it is a ROS 2 bag".into(),
+        "mcap" | "db3" => format!("it is a ROS 2 bag{WITHOUT_ROS2}"),
         "png" | "jpg" | "jpeg" => "it is a single image".into(),
         "mp4" | "mkv" | "avi" | "mov" | "hevc" => "it is a video".into(),
         "zip" | "tar" | "gz" | "tgz" => "it is an archive that is still packed".into(),
@@ -113,7 +119,8 @@ fn describe_folder(folder: &Path) -> Result<String> {
             let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
             let kind = match extension.to_ascii_lowercase().as_str() {
                 "png" | "jpg" | "jpeg" => "images",
-                "bag" | "mcap" | "db3" => "ROS bags",
+                "mcap" | "db3" => "ROS 2 bags",
+                "bag" => "ROS bags",
                 "mp4" | "mkv" | "avi" | "mov" | "hevc" => "videos",
                 "zip" | "tar" | "gz" | "tgz" => "packed archives",
                 "bin" => ".bin files",
@@ -127,8 +134,12 @@ fn describe_folder(folder: &Path) -> Result<String> {
     }
     if !kinds.is_empty() {
         let list: Vec<String> = kinds.iter().map(|(k, n)| format!("{n} {k}")).collect();
+        let without = match kinds.contains_key("ROS 2 bags") {
+            true => WITHOUT_ROS2,
+            false => "",
+        };
         return Ok(format!(
-            "it holds {} and nothing that says how to read them",
+            "it holds {} and nothing that says how to read them{without}",
             list.join(", ")
         ));
     }

@@ -1,7 +1,7 @@
 //! Recordings of vehicles as frames, snippets and ground-truth depth.
 //!
 //! [`Dataset::open`] takes a recording of any layout: KITTI raw, a folder of images or a video with tables
-//! beside it, a comma2k19 segment, an RGB-D folder, a ROS 1 bag. [`Dataset::snippets`] gives the training samples with
+//! beside it, a comma2k19 segment, an RGB-D folder, a ROS 1 bag, with the feature `ros2` a ROS 2 bag. [`Dataset::snippets`] gives the training samples with
 //! the camera's ego-motion, [`Dataset::ground_truth`] the measured depth. Another layout is another
 //! [`Recording`]. Nothing here knows of tensors.
 
@@ -42,6 +42,7 @@ mod speed_check;
 mod speed_log;
 mod split;
 mod table;
+mod vehicle_log;
 mod video;
 mod write;
 
@@ -57,7 +58,8 @@ pub use export::{export_gt, ground_truth_names};
 pub use frame::{Frame, FrameImage};
 pub use image::RgbImage;
 pub use inspect::{
-    DriveInspection, Inspection, IntrinsicsSummary, SpeedRange, Stream, inspect, inspect_with,
+    ClockOffset, DriveInspection, Inspection, IntrinsicsSummary, SpeedRange, Stream, inspect,
+    inspect_with,
 };
 pub use kitti::GtKind;
 pub use lens::Lens;

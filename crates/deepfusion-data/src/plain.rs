@@ -61,13 +61,15 @@ impl PlainParts {
     ///
     /// # Errors
     /// [`Error::Clocks`] where frames and speeds have no time in common, [`Error::CameraFile`],
-    /// [`Error::FrameSize`], [`Error::Image`].
+    /// [`Error::FrameSize`], [`Error::Image`], [`Error::Motion`].
     pub(crate) fn into_dataset(mut self) -> Result<Dataset> {
         let origin_ns = self.images.iter().find_map(|i| i.ns);
-        let track = match (&self.speeds, origin_ns) {
-            (Some(log), Some(origin)) => Some(log.track(origin)),
+        let motion = match (&self.speeds, origin_ns) {
+            (Some(log), Some(origin)) => Some(log.motion(origin)?),
             _ => None,
         };
+        let yaw_known = motion.as_ref().is_some_and(|(_, known)| *known);
+        let track = motion.map(|(track, _)| track);
         let no_motion = match (&self.speeds, origin_ns) {
             (None, _) => ("it has no speeds".to_owned(), self.speed_remedy.to_owned()),
             _ => (
@@ -116,11 +118,8 @@ impl PlainParts {
             frames,
             intrinsics: lens.intrinsics(),
             cam_from_vehicle: Some(self.cam_from_vehicle),
-            track: track.map(Into::into),
-            yaw_known: self
-                .speeds
-                .as_ref()
-                .is_some_and(|s| s.yaw_rates_radps.is_some()),
+            track,
+            yaw_known,
             origin_ns,
             scenario: None,
         };

@@ -23,7 +23,7 @@ pub enum DatasetKind {
     Comma2k19,
     /// A folder of colour, depth and pose files, as 7-Scenes has.
     RgbD,
-    /// A ROS 1 bag.
+    /// A ROS bag.
     Bag,
 }
 

@@ -18,20 +18,23 @@ impl<'a> Selection<'a> {
         }
     }
 
-    /// Indices into `numbers` of the frames asked for.
+    /// Indices into `numbers` of the frames asked for, of a drive of a kind.
     pub(crate) fn of(
         &self,
         folder: &str,
+        scenario: Option<&str>,
         camera: Camera,
         numbers: impl Iterator<Item = u64>,
     ) -> Vec<usize> {
         let wanted = |frame: u64| {
-            self.split.as_ref().is_none_or(|(_, wanted)| {
-                wanted.contains(&SplitEntry {
-                    folder: folder.to_owned(),
-                    frame,
-                    camera,
-                })
+            self.split.as_ref().is_none_or(|(split, wanted)| {
+                let of_kind = scenario.is_some_and(|s| split.scenarios.iter().any(|w| w == s));
+                of_kind
+                    || wanted.contains(&SplitEntry {
+                        folder: folder.to_owned(),
+                        frame,
+                        camera,
+                    })
             })
         };
         let numbers = numbers.enumerate();
@@ -41,12 +44,13 @@ impl<'a> Selection<'a> {
     /// The error of a split that selects nothing of `path`; `None` without a split.
     pub(crate) fn nothing(&self, path: &Path) -> Option<Error> {
         let (split, _) = self.split.as_ref()?;
-        let first = split.entries.first();
+        let frame = split.entries.first().map(SplitEntry::to_string);
+        let scenario = split.scenarios.first().map(|s| format!("scenario = {s}"));
         Some(Error::SplitSelectsNothing {
             split: split.path.clone(),
             path: path.to_owned(),
-            entries: split.entries.len(),
-            first: first.map(SplitEntry::to_string).unwrap_or_default(),
+            entries: split.len(),
+            first: frame.or(scenario).unwrap_or_default(),
         })
     }
 }

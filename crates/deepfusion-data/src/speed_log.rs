@@ -1,9 +1,11 @@
-//! `speed.csv`, and the yaw rate from it or from `imu.csv`.
+//! `speed.csv`, and the turns from it or from `imu.csv`: a yaw rate, or a whole inertial unit.
 
 use crate::clock::{TimeUnit, seconds};
 use crate::config::FolderConfig;
 use crate::table::{Column, Table, describe};
-use crate::{Result, Stream, VehicleTrack};
+use crate::vehicle_log::{VehicleLog, imu_readings};
+use crate::{Error, MotionModel, Result, Stream, VehicleTrack};
+use deepfusion_motion::ImuMount;
 use std::path::{Path, PathBuf};
 
 /// Samples farther apart are not bridged, as in [`VehicleTrack`].
@@ -34,6 +36,8 @@ pub(crate) struct SpeedLog {
     pub(crate) path: PathBuf,
     pub(crate) speeds_mps: Samples,
     pub(crate) yaw_rates_radps: Option<Samples>,
+    /// An inertial unit, where all six of its columns are there: then the motion comes from its fusion with the speed.
+    pub(crate) vehicle: Option<VehicleLog>,
     /// What was found, for the inspection.
     pub(crate) streams: Vec<Stream>,
     pub(crate) remarks: Vec<String>,
@@ -59,7 +63,7 @@ impl SpeedLog {
         let values = scaled(table.numbers(column)?, factor);
         let mut streams = vec![stream(&path, "speed", &ns)];
         let speeds_mps = Samples { ns, values };
-        let mut yaw_rates_radps = None;
+        let (mut yaw_rates_radps, mut vehicle) = (None, None);
         let mut yaw_table = None;
         if let Some(column) = table.column(&YAW_RATES) {
             yaw_table = Some((table.numbers(column)?, yaw_factor(&table, column, config)?));
@@ -73,10 +77,19 @@ impl SpeedLog {
             let table = Table::read(&imu)?;
             let ns = times(&table, config, &mut remarks, &name(&imu))?;
             streams.push(stream(&imu, "imu", &ns));
-            let column = table.require(&YAW_RATES, "time_s,gyro_z_radps")?;
-            let factor = yaw_factor(&table, column, config)?;
-            let values = scaled(table.numbers(column)?, factor);
-            yaw_rates_radps = Some(Samples { ns, values });
+            let readings = imu_readings(&table, &ns, |column| yaw_factor(&table, column, config))?;
+            if let Some(imu) = readings {
+                vehicle = Some(VehicleLog {
+                    imu,
+                    steering_rad: None,
+                    config: config.motion(ImuMount::default()),
+                });
+            } else {
+                let column = table.require(&YAW_RATES, "time_s,gyro_z_radps")?;
+                let factor = yaw_factor(&table, column, config)?;
+                let values = scaled(table.numbers(column)?, factor);
+                yaw_rates_radps = Some(Samples { ns, values });
+            }
         } else {
             remarks.push(format!(
                 "{}: no yaw rate, here or in imu.csv: how the car turned is unknown, which \
@@ -96,14 +109,32 @@ impl SpeedLog {
             path,
             speeds_mps,
             yaw_rates_radps,
+            vehicle,
             streams,
             remarks,
         }))
     }
 
-    /// The car's motion on the frames' clock. Where the yaw rate has other times than the speed, the track
+    /// The car's motion on the frames' clock, and whether its turns are known.
+    ///
+    /// # Errors
+    /// [`Error::Motion`] for an inertial unit or a steering angle that cannot be read as configured.
+    pub(crate) fn motion(&self, origin_ns: i64) -> Result<(MotionModel, bool)> {
+        match &self.vehicle {
+            Some(vehicle) => {
+                let motion = vehicle.motion(&self.speeds_mps, origin_ns);
+                motion.map_err(|source| Error::Motion {
+                    path: self.path.clone(),
+                    source,
+                })
+            }
+            None => Ok((self.track(origin_ns).into(), self.yaw_rates_radps.is_some())),
+        }
+    }
+
+    /// The motion by speed and yaw rate alone. Where the yaw rate has other times than the speed, the track
     /// has both: between samples either is straight, so that its integrals stay exact.
-    pub(crate) fn track(&self, origin_ns: i64) -> VehicleTrack {
+    fn track(&self, origin_ns: i64) -> VehicleTrack {
         let Some(yaw) = &self.yaw_rates_radps else {
             let samples = self.speeds_mps.ns.iter().zip(&self.speeds_mps.values);
             let samples: Vec<_> = samples

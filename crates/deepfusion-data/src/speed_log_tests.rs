@@ -155,3 +155,80 @@ fn the_yaw_rate_comes_from_the_imu_on_its_own_clock() {
     );
     assert!((motion.distance_m - 5.0).abs() < 1e-9);
 }
+
+/// 10 m/s and 0.2 rad/s to the left for 5 s, read at 100 Hz by a unit that is turned a quarter to the left: its x looks
+/// to the vehicle's left.
+fn turning_unit(header: &str, rates: f64, accelerations: f64) -> String {
+    let mut table = format!("{header}\n");
+    for i in 0..=500 {
+        // Centripetal: 2 m/s² to the left; gravity holds the unit up.
+        let [ax, ay, az] = [2.0, 0.0, 9.806_65].map(|a| a / accelerations);
+        table += &format!(
+            "{},0,0,{},{ax},{ay},{az}\n",
+            f64::from(i) * 0.01,
+            0.2 / rates
+        );
+    }
+    table
+}
+
+#[test]
+fn a_whole_inertial_unit_is_fused_with_the_speed() {
+    let mut speed = "time_s,speed_mps\n".to_owned();
+    (0..=50).for_each(|i| speed += &format!("{},10\n", f64::from(i) * 0.1));
+    let mount = "[vehicle_from_imu]\nrotation = [0.0, 0.0, 1.5707963]\n";
+    for (header, rates, accelerations) in [
+        (
+            "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2",
+            1.0,
+            1.0,
+        ),
+        (
+            "t_s,wx [deg/s],wy [deg/s],wz [deg/s],ax [g],ay [g],az [g]",
+            1_f64.to_radians(),
+            9.806_65,
+        ),
+    ] {
+        let unit = turning_unit(header, rates, accelerations);
+        let log = read(&[
+            ("speed.csv", &speed),
+            ("imu.csv", &unit),
+            ("dataset.toml", mount),
+        ])
+        .unwrap();
+        let (motion, yaw_known) = log.motion(0).unwrap();
+        assert!(yaw_known && matches!(motion, MotionModel::Fused(_)));
+        let driven = motion.motion(1.0, 3.0).unwrap();
+        assert!((driven.yaw_rad - 0.4).abs() < 0.01, "{driven:?}");
+        assert!((driven.distance_m - 20.0).abs() < 0.2, "{driven:?}");
+    }
+    // One that hangs upside down is told, not believed.
+    let upside_down = "[vehicle_from_imu]\nrotation = [3.14159265, 0.0, 0.0]\n";
+    let header =
+        "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2";
+    let unit = turning_unit(header, 1.0, 1.0);
+    let log = read(&[
+        ("speed.csv", &speed),
+        ("imu.csv", &unit),
+        ("dataset.toml", upside_down),
+    ])
+    .unwrap();
+    let error = log.motion(0).unwrap_err();
+    assert!(matches!(error, Error::Motion { .. }), "{error}");
+    assert!(error.to_string().contains("speed.csv"), "{error}");
+}
+
+#[test]
+fn units_of_an_inertial_unit_are_never_guessed() {
+    let header = "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x,accel_y,accel_z";
+    let unit = turning_unit(header, 1.0, 1.0);
+    let error = refusal(&[
+        ("speed.csv", "time_s,speed_mps\n0,10\n"),
+        ("imu.csv", &unit),
+    ]);
+    assert!(
+        error.to_string().contains("unit of column accel_x"),
+        "{error}"
+    );
+    assert!(error.hint().unwrap().contains("accel_x_mps2"), "{error}");
+}

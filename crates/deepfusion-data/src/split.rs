@@ -1,4 +1,4 @@
-//! The field's split files: lists of frames, one a line.
+//! The field's split files: lists of frames, one a line; or of kinds of drives.
 
 use crate::{Camera, Dataset, Error, Result};
 use std::collections::HashMap;
@@ -9,8 +9,10 @@ use std::path::{Path, PathBuf};
 pub struct Split {
     /// The file it came from.
     pub path: PathBuf,
-    /// Its lines.
+    /// Its lines that name a frame.
     pub entries: Vec<SplitEntry>,
+    /// Its lines that name a kind of drive, such as `garage`: every frame of such drives.
+    pub scenarios: Vec<String>,
 }
 
 /// One line of a split file, `folder index side`.
@@ -26,15 +28,20 @@ pub struct SplitEntry {
 
 impl Split {
     /// Reads lines like `2011_09_26/2011_09_26_drive_0009_sync 0000000016 l`; the index may be padded
-    /// with zeros or not, empty lines are skipped.
+    /// with zeros or not, empty lines are skipped. A line `scenario = garage` stands for every frame of the drives whose
+    /// [`Dataset::scenario`] that is.
     ///
     /// # Errors
     /// [`Error::NoSuchPath`] / [`Error::File`], or [`Error::Split`] with the number of a bad line.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
-        let mut entries = Vec::new();
+        let (mut entries, mut scenarios) = (Vec::new(), Vec::new());
         for (i, line) in String::from_utf8_lossy(&bytes).lines().enumerate() {
             if line.trim().is_empty() {
+                continue;
+            }
+            if let Some(name) = scenario(line) {
+                scenarios.push(name.to_owned());
                 continue;
             }
             entries.push(parse(line).map_err(|problem| Error::Split {
@@ -43,7 +50,7 @@ impl Split {
                 problem,
             })?);
         }
-        if entries.is_empty() {
+        if entries.is_empty() && scenarios.is_empty() {
             return Err(Error::Split {
                 path: path.to_owned(),
                 line: 1,
@@ -53,11 +60,24 @@ impl Split {
         Ok(Self {
             path: path.to_owned(),
             entries,
+            scenarios,
         })
     }
 
+    /// How many lines it has.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.entries.len() + self.scenarios.len()
+    }
+
+    /// Whether it names nothing; one that was read names something.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// Where the split's frames are, in the split's order: index into `datasets` and index of the frame
-    /// in it. Frames that are not there are left out; compare the length with [`Self::entries`].
+    /// in it; then those of its scenarios. Frames that are not there are left out.
     #[must_use]
     pub fn locate(&self, datasets: &[Dataset]) -> Vec<(usize, usize)> {
         let mut places = HashMap::new();
@@ -70,9 +90,16 @@ impl Split {
             }
         }
         let entries = self.entries.iter();
-        entries
+        let mut located: Vec<(usize, usize)> = entries
             .filter_map(|e| places.get(&(e.folder.as_str(), e.frame, e.camera)).copied())
-            .collect()
+            .collect();
+        for scenario in &self.scenarios {
+            let of_kind = |(_, d): &(usize, &Dataset)| d.scenario() == Some(scenario);
+            for (d, dataset) in datasets.iter().enumerate().filter(of_kind) {
+                located.extend((0..dataset.frames().len()).map(|f| (d, f)));
+            }
+        }
+        located
     }
 }
 
@@ -84,6 +111,13 @@ impl std::fmt::Display for SplitEntry {
         };
         write!(f, "{} {} {side}", self.folder, self.frame)
     }
+}
+
+/// The name in `scenario = garage`.
+fn scenario(line: &str) -> Option<&str> {
+    let (key, name) = line.split_once('=')?;
+    let name = name.trim().trim_matches('"');
+    (key.trim() == "scenario" && !name.is_empty()).then_some(name)
 }
 
 fn parse(line: &str) -> std::result::Result<SplitEntry, String> {
@@ -136,6 +170,22 @@ mod tests {
         }
         std::fs::write(file.path(), "\n\n").unwrap();
         assert!(Split::read(file.path()).is_err(), "no frames at all");
+    }
+
+    #[test]
+    fn a_scenario_is_a_line_of_its_own() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(
+            file.path(),
+            "scenario = garage\na/b 1 l\nscenario=\"night\"\n",
+        )
+        .unwrap();
+        let split = Split::read(file.path()).unwrap();
+        assert_eq!(split.scenarios, ["garage", "night"]);
+        assert_eq!((split.entries.len(), split.len()), (1, 3));
+        std::fs::write(file.path(), "scenario =\n").unwrap();
+        let error = Split::read(file.path()).unwrap_err();
+        assert!(matches!(error, Error::Split { line: 1, .. }), "{error}");
     }
 
     proptest! {

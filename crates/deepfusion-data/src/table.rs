@@ -163,9 +163,9 @@ impl Column {
 
 /// A name and the unit behind its last underscore.
 fn with_suffix(text: &str) -> (&str, Option<&str>) {
-    const UNITS: [&str; 20] = [
+    const UNITS: [&str; 21] = [
         "s", "sec", "ms", "us", "ns", "mps", "kmh", "kph", "mph", "radps", "dps", "degps", "mps2",
-        "m", "mm", "rad", "deg", "hz", "m/s", "km/h",
+        "g", "m", "mm", "rad", "deg", "hz", "m/s", "km/h",
     ];
     match text.rsplit_once('_') {
         Some((name, unit)) if UNITS.contains(&unit.to_lowercase().as_str()) => (name, Some(unit)),

@@ -66,6 +66,50 @@ fn without_its_video_a_segment_is_inspected_and_not_opened() {
     assert!(error.hint().unwrap().contains("data inspect"));
 }
 
+/// Ten seconds at 8 m/s and 0.2 rad/s to the left: gyroscope and accelerometer in the device's axes (forward, right,
+/// down), the steering wheel at 0.2 · 2.7 / 8 rad times a ratio of 15.
+#[test]
+fn a_segment_s_gyroscope_and_steering_tell_its_turns() {
+    let root = tempfile::tempdir().unwrap();
+    let log = root.path().join("processed_log");
+    let t = Array1::from_iter((0..1001).map(|i| 100.0 + f64::from(i) * 0.01));
+    let write = |name: &str, columns: &[f64]| {
+        let folder = log.join(name);
+        fs::create_dir_all(&folder).unwrap();
+        let rows = Array2::from_shape_fn((t.len(), columns.len()), |(_, i)| columns[i]);
+        t.write_npy(fs::File::create(folder.join("t")).unwrap())
+            .unwrap();
+        rows.write_npy(fs::File::create(folder.join("value")).unwrap())
+            .unwrap();
+    };
+    write("CAN/speed", &[8.0]);
+    write("IMU/gyro", &[0.0, 0.0, -0.2]);
+    write("IMU/accelerometer", &[0.0, -1.6, -9.81]);
+    fs::create_dir_all(root.path().join("global_pose")).unwrap();
+    let frames = Array1::from_iter((0..21).map(|i| 102.0 + f64::from(i) * 0.2));
+    let times = fs::File::create(root.path().join("global_pose/frame_times")).unwrap();
+    frames.write_npy(times).unwrap();
+    let turned = || {
+        let seen = inspect(root.path()).unwrap();
+        (seen.drives[0].turn_rad, seen.distance_m.unwrap())
+    };
+    // Four seconds.
+    let (by_gyro, distance) = turned();
+    assert!((by_gyro.unwrap() - 0.8).abs() < 0.02, "{by_gyro:?}");
+    assert!((distance - 32.0).abs() < 0.3, "{distance}");
+
+    fs::remove_dir_all(log.join("IMU")).unwrap();
+    write(
+        "CAN/steering_angle",
+        &[(0.2_f64 * 2.7 / 8.0).atan().to_degrees() * 15.0],
+    );
+    assert_eq!(turned().0, None, "nothing says the wheelbase");
+    let vehicle = "[vehicle]\nwheelbase_m = 2.7\nsteering_ratio = 15.0\n";
+    fs::write(root.path().join("dataset.toml"), vehicle).unwrap();
+    let by_steering = turned().0;
+    assert!((by_steering.unwrap() - 0.8).abs() < 0.02, "{by_steering:?}");
+}
+
 #[test]
 fn broken_arrays_are_named() {
     let root = tempfile::tempdir().unwrap();

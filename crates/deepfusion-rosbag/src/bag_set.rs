@@ -133,7 +133,12 @@ impl BagSet {
         let start = |(first, bag): (Time, usize)| Part {
             first,
             bag,
-            messages: Messages::of(&self.bags[bag], of_bag(bag), selection.clone()),
+            messages: Messages::of(
+                &self.bags[bag],
+                of_bag(bag),
+                selection.clone(),
+                self.bags[bag].options().threads,
+            ),
         };
         Ok(SetMessages {
             set: self,

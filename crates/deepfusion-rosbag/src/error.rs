@@ -121,6 +121,16 @@ pub enum Error {
         /// The connection's number.
         connection: u32,
     },
+    /// A recording of another format than ROS 1 bags cannot be read, or not all of it.
+    #[error("{}: {problem}", path.display())]
+    Storage {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+        /// What to do about it, in one line.
+        remedy: Option<&'static str>,
+    },
     /// A set of no bags.
     #[error("a set of bags needs at least one bag")]
     EmptySet,
@@ -138,7 +148,8 @@ fn list(names: &[String]) -> String {
 
 impl Error {
     /// An error of the system's at `path`; a missing file is [`Error::NoSuchPath`].
-    pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
+    #[must_use]
+    pub fn file(path: &Path, source: std::io::Error) -> Self {
         let path = path.to_owned();
         match source.kind() {
             std::io::ErrorKind::NotFound => Self::NoSuchPath { path },
@@ -159,7 +170,7 @@ impl Error {
                 _ => return None,
             },
             Self::NotABag { .. } => {
-                "ROS 2 recordings (.mcap, .db3) are another format; convert them with rosbags-convert"
+                "a ROS 2 recording (.mcap, .db3) keeps its own ending; other files are no recordings of ROS"
             }
             Self::Version { .. } => {
                 "bags from before 2010: `rosbag fix` or `rosbag reindex` of ROS 1 writes them as 2.0"
@@ -178,6 +189,7 @@ impl Error {
             Self::Message { source, .. } => return source.hint(),
             Self::TooLarge { .. } => "split it over several messages",
             Self::NoSuchConnection { .. } => "use what `add_connection` of this writer returned",
+            Self::Storage { remedy, .. } => return remedy.map(str::to_owned),
             Self::EmptySet => return None,
         };
         Some(text.to_owned())

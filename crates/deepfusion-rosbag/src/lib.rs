@@ -6,6 +6,9 @@
 //! The way of a message: `record` (a file's building block) → `index` (where chunks are; `scan` where there is none) →
 //! `chunk` and `content` (its bytes, decompressed `ahead`) → `entry` (where its messages are) → [`Messages`] (in time
 //! order) → [`Message`] → `msg`. The format: <http://wiki.ros.org/Bags/Format/2.0>.
+//!
+//! [`MessageSource`] is what recordings of any format have in common; `deepfusion-ros2bag` reads those of ROS 2 to the
+//! same [`Message`] and the same types.
 
 mod ahead;
 mod bag;
@@ -21,6 +24,7 @@ mod error;
 mod index;
 mod lz4_frame;
 mod message;
+mod message_source;
 mod messages;
 pub mod msg;
 mod record;
@@ -37,7 +41,8 @@ pub use bag_set::{BagSet, SetMessages};
 pub use compression::Compression;
 pub use connection::Connection;
 pub use error::{Error, Result};
-pub use message::Message;
+pub use message::{Message, Serialization};
+pub use message_source::{MessageIter, MessageSource};
 pub use messages::Messages;
 pub use msg::{MessageError, RosMessage};
 pub use scan::Damage;

@@ -1,6 +1,7 @@
 use crate::buffer::Buffer;
 use crate::connection::Connection;
 use crate::msg::RosMessage;
+use crate::msg::wire::{CDR_HEADER, cdr_is_big_endian};
 use crate::{Error, Result, Time};
 use std::ops::Range;
 use std::path::Path;
@@ -16,6 +17,7 @@ pub struct Message<'bag> {
     pub(crate) connection: &'bag Connection,
     pub(crate) time: Time,
     pub(crate) payload: Payload<'bag>,
+    pub(crate) serialization: Serialization,
 }
 
 #[derive(Clone)]
@@ -24,9 +26,65 @@ pub(crate) enum Payload<'bag> {
     Stored(&'bag [u8]),
     /// In a decompressed chunk.
     Unpacked(Arc<Buffer>, Range<usize>),
+    /// In memory that another reader holds.
+    Held(Arc<Vec<u8>>, Range<usize>),
+}
+
+/// How a message's fields became bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Serialization {
+    /// ROS 1: little-endian, without padding.
+    Ros1,
+    /// ROS 2: CDR, which says its byte order itself.
+    Cdr,
 }
 
 impl<'bag> Message<'bag> {
+    /// A message from a recording of another format than [`Bag`](crate::Bag)'s: its bytes are `range` of `held`.
+    /// `connection`'s MD5 is `*` where that format knows none.
+    ///
+    /// # Panics
+    /// If `range` lies outside of `held`.
+    #[must_use]
+    pub fn held(
+        path: &'bag Path,
+        connection: &'bag Connection,
+        time: Time,
+        serialization: Serialization,
+        held: Arc<Vec<u8>>,
+        range: Range<usize>,
+    ) -> Self {
+        assert!(
+            range.start <= range.end && range.end <= held.len(),
+            "a message lies within the bytes that hold it"
+        );
+        Self {
+            path,
+            connection,
+            time,
+            payload: Payload::Held(held, range),
+            serialization,
+        }
+    }
+
+    /// As [`Message::held`], with its bytes in what lives as long as the recording, such as a mapped file.
+    #[must_use]
+    pub fn stored(
+        path: &'bag Path,
+        connection: &'bag Connection,
+        time: Time,
+        serialization: Serialization,
+        bytes: &'bag [u8],
+    ) -> Self {
+        Self {
+            path,
+            connection,
+            time,
+            payload: Payload::Stored(bytes),
+            serialization,
+        }
+    }
+
     /// The connection it came by: topic, type, definition.
     #[must_use]
     pub fn connection(&self) -> &'bag Connection {
@@ -45,13 +103,43 @@ impl<'bag> Message<'bag> {
         self.time
     }
 
-    /// Its bytes as they were sent, little-endian.
+    /// Its bytes as they were sent.
     #[must_use]
     pub fn data(&self) -> &[u8] {
         match &self.payload {
             Payload::Stored(bytes) => bytes,
             Payload::Unpacked(chunk, range) => &chunk[range.clone()],
+            Payload::Held(held, range) => &held[range.clone()],
         }
+    }
+
+    /// How its fields became these bytes.
+    #[must_use]
+    pub fn serialization(&self) -> Serialization {
+        self.serialization
+    }
+
+    /// When it was measured, of a message that begins with a header, without decoding it; `None` where that is not set,
+    /// or the message is too short for it.
+    #[must_use]
+    pub fn header_stamp(&self) -> Option<Time> {
+        let data = self.data();
+        let word = |at: usize, big: bool| {
+            let bytes = *data.get(at..)?.first_chunk()?;
+            Some(match big {
+                true => u32::from_be_bytes(bytes),
+                false => u32::from_le_bytes(bytes),
+            })
+        };
+        let (at, big) = match self.serialization {
+            // Behind the sequence number.
+            Serialization::Ros1 => (size_of::<u32>(), false),
+            Serialization::Cdr => (CDR_HEADER, cdr_is_big_endian(data).ok()?),
+        };
+        let (sec, nsec) = (word(at, big)?, word(at + 4, big)?);
+        let before_1970 = self.serialization == Serialization::Cdr && sec > i32::MAX as u32;
+        let set = !before_1970 && (sec != 0 || nsec != 0);
+        set.then_some(Time { sec, nsec })
     }
 
     /// Whether it is a `T`, by type name and MD5.
@@ -71,7 +159,11 @@ impl<'bag> Message<'bag> {
         if !self.is::<T>() {
             return Err(self.wrong_type::<T>());
         }
-        T::decode(self.data()).map_err(|source| Error::Message {
+        let decoded = match self.serialization {
+            Serialization::Ros1 => T::decode(self.data()),
+            Serialization::Cdr => T::decode_cdr(self.data()),
+        };
+        decoded.map_err(|source| Error::Message {
             path: self.path.to_owned(),
             topic: self.connection.topic.clone(),
             time: self.time,

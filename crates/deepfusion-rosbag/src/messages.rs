@@ -6,7 +6,7 @@ use crate::content::Content;
 use crate::entry::{self, Entry};
 use crate::error::Fault;
 use crate::index::ChunkInfo;
-use crate::message::{Message, Payload};
+use crate::message::{Message, Payload, Serialization};
 use crate::{Error, Result, Selection, Time};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque, binary_heap::PeekMut};
@@ -52,11 +52,22 @@ struct OpenChunk {
 impl<'bag> Messages<'bag> {
     pub(crate) fn new(bag: &'bag Bag, selection: Selection) -> Result<Self> {
         let wanted = selection.wanted(bag.connections(), bag.path())?;
-        Ok(Self::of(bag, wanted, selection))
+        Ok(Self::of(bag, wanted, selection, bag.options().threads))
+    }
+
+    /// As [`Self::new`], without threads of its own.
+    pub(crate) fn on_demand(bag: &'bag Bag, selection: Selection) -> Result<Self> {
+        let wanted = selection.wanted(bag.connections(), bag.path())?;
+        Ok(Self::of(bag, wanted, selection, 0))
     }
 
     /// The messages of the connections `wanted`, by place.
-    pub(crate) fn of(bag: &'bag Bag, wanted: Vec<bool>, selection: Selection) -> Self {
+    pub(crate) fn of(
+        bag: &'bag Bag,
+        wanted: Vec<bool>,
+        selection: Selection,
+        threads: usize,
+    ) -> Self {
         let mut chunks: Vec<_> = bag
             .chunks()
             .iter()
@@ -80,11 +91,7 @@ impl<'bag> Messages<'bag> {
             waiting: waiting.collect(),
             submitted: 0,
             window: 1,
-            ahead: Ahead::new(
-                Arc::clone(bag.source()),
-                options.chunk_limit(),
-                options.threads,
-            ),
+            ahead: Ahead::new(Arc::clone(bag.source()), options.chunk_limit(), threads),
             open: BinaryHeap::new(),
             errors: VecDeque::new(),
         }
@@ -218,6 +225,7 @@ fn read_message<'bag>(
         connection,
         time: entry.time,
         payload,
+        serialization: Serialization::Ros1,
     })
 }
 

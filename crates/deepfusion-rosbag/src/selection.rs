@@ -59,12 +59,14 @@ impl Selection {
     }
 
     /// Whether a message recorded at `time` is wanted.
-    pub(crate) fn holds(&self, time: Time) -> bool {
+    #[must_use]
+    pub fn holds(&self, time: Time) -> bool {
         self.from <= time && self.is_before_end(time)
     }
 
-    /// Whether anything of a chunk from `first` to `last` can be wanted.
-    pub(crate) fn meets(&self, first: Time, last: Time) -> bool {
+    /// Whether anything of a stretch from `first` to `last` can be wanted.
+    #[must_use]
+    pub fn meets(&self, first: Time, last: Time) -> bool {
         self.from <= last && self.is_before_end(first)
     }
 
@@ -76,8 +78,17 @@ impl Selection {
         }
     }
 
-    /// Which connections are wanted, by place; a topic that none of them has is an error.
-    pub(crate) fn wanted(&self, connections: &[Connection], path: &Path) -> Result<Vec<bool>> {
+    /// The time from which messages are wanted.
+    #[must_use]
+    pub fn start(&self) -> Time {
+        self.from
+    }
+
+    /// Which of `connections` are wanted, by place, for readers of other formats.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchTopic`] for a topic that none of them has.
+    pub fn wanted(&self, connections: &[Connection], path: &Path) -> Result<Vec<bool>> {
         let Some(topics) = &self.topics else {
             return Ok(vec![true; connections.len()]);
         };

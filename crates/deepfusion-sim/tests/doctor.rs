@@ -371,7 +371,14 @@ fn a_bag_whose_camera_clock_is_ahead_is_told() {
         clock_offset_s: 0.3,
         ..BagSettings::default()
     };
-    let diagnosis = doctor(&bag(folder.path(), Scene::Urban, settings), None);
+    let path = bag(folder.path(), Scene::Urban, settings);
+    let diagnosis = doctor(&path, None);
     let finding = found(&diagnosis, "clock", "offset");
+    // `data inspect` tells the same, as a figure.
+    let seen = deepfusion_data::inspect(&path).unwrap();
+    let offset = seen.drives[0].time_offset.unwrap();
+    assert_eq!(offset.vehicle_minus_camera_s, value(finding));
+    assert!(offset.std_error_s < 0.05, "{offset:?}");
+    assert!(seen.to_string().contains("vehicle less camera -"), "{seen}");
     assert!((value(finding) + 0.3).abs() < 0.05, "{finding:?}");
 }

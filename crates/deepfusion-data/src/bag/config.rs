@@ -185,12 +185,10 @@ impl BagConfig {
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
     pub(super) fn beside(bag: &Path) -> Result<Self> {
-        let own = bag.with_extension("toml");
-        let shared = bag.with_file_name(OF_FOLDER);
-        let path = match own.is_file() || !shared.is_file() {
-            true => own,
-            false => shared,
-        };
+        let candidates = Self::candidates(bag);
+        let there = candidates.iter().find(|path| path.is_file());
+        // Where there is none, the first is where one would be looked for.
+        let path = there.or(candidates.first()).cloned().unwrap_or_default();
         let text = match std::fs::read_to_string(&path) {
             Ok(text) => text,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
@@ -203,6 +201,18 @@ impl BagConfig {
         config.path = path;
         config.validate()?;
         Ok(config)
+    }
+
+    /// Where a bag's file is looked for, in this order.
+    fn candidates(bag: &Path) -> Vec<PathBuf> {
+        let shared = bag.with_file_name(OF_FOLDER);
+        if !bag.is_dir() {
+            return vec![bag.with_extension("toml"), shared];
+        }
+        // A bag of ROS 2 is a folder: within it, beside it under its whole name, or for all of the folder above.
+        let mut own = bag.as_os_str().to_owned();
+        own.push(".toml");
+        vec![bag.join(OF_FOLDER), PathBuf::from(own), shared]
     }
 
     fn validate(&self) -> Result<()> {

@@ -3,18 +3,22 @@
 use super::index::Place;
 use crate::{Error, Result, decode_rgb};
 use deepfusion_rosbag::msg::{CompressedImage, Image};
-use deepfusion_rosbag::{Bag, Message, Selection, Time};
+use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
 use image::RgbImage;
 
 /// The message of a topic recorded at a place's time.
 ///
 /// # Errors
 /// [`Error::Bag`]; [`Error::Image`] where it is no longer there.
-pub(super) fn message<'bag>(bag: &'bag Bag, topic: &str, place: &Place) -> Result<Message<'bag>> {
+pub(super) fn message<'bag>(
+    bag: &'bag dyn MessageSource,
+    topic: &str,
+    place: &Place,
+) -> Result<Message<'bag>> {
     let after = Time::from_nanos(place.recorded.nanos() + 1);
     let selection = Selection::topics([topic]).from(place.recorded).until(after);
     let mut last = None;
-    for message in bag.messages(selection)? {
+    for message in bag.messages_on_demand(selection)? {
         let message = message?;
         // Two messages can be recorded in one nanosecond: the stamp tells them apart.
         if super::index::stamp(&message) == place.stamp_ns {
@@ -33,7 +37,7 @@ pub(super) fn message<'bag>(bag: &'bag Bag, topic: &str, place: &Place) -> Resul
 ///
 /// # Errors
 /// [`Error::Bag`] for an encoding that is no colour or grey picture; [`Error::Image`].
-pub(super) fn decode(bag: &Bag, message: &Message<'_>) -> Result<RgbImage> {
+pub(super) fn decode(bag: &dyn MessageSource, message: &Message<'_>) -> Result<RgbImage> {
     if message.is::<CompressedImage<'_>>() {
         let image: CompressedImage<'_> = message.decode()?;
         return decode_rgb(&image.data, bag.path());

@@ -9,7 +9,7 @@ use deepfusion_motion::can::{CanFrame, CanId, CanSignal, Dbc};
 use deepfusion_rosbag::msg::{
     AckermannDriveStamped, CameraInfo, Float32, Float64, Frame, Imu, Odometry, TwistStamped,
 };
-use deepfusion_rosbag::{Bag, Message, Selection, Time};
+use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
 use nalgebra::Vector3;
 
 /// A message that is read again when it is asked for.
@@ -50,7 +50,11 @@ impl Index {
     ///
     /// # Errors
     /// [`Error::Bag`] where reading cannot begin; [`Error::Config`] for units or signals that are missing.
-    pub(super) fn read(bag: &Bag, topics: &Topics, config: &BagConfig) -> Result<Self> {
+    pub(super) fn read(
+        bag: &dyn MessageSource,
+        topics: &Topics,
+        config: &BagConfig,
+    ) -> Result<Self> {
         let can = Can::of(config)?;
         let mut index = Self::default();
         let mut names: Vec<&str> = topics.found.iter().map(|(_, name)| name.as_str()).collect();
@@ -259,14 +263,7 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
 
 /// The stamp of a message that begins with a header; the time of recording where it is not set.
 pub(super) fn stamp(message: &Message<'_>) -> i64 {
-    let word = |at: usize| {
-        let bytes = message.data().get(at..at + 4)?;
-        Some(u32::from_le_bytes(bytes.try_into().ok()?))
-    };
-    match (word(4), word(8)) {
-        (Some(sec), Some(nsec)) if sec != 0 || nsec != 0 => nanos(Time { sec, nsec }),
-        _ => nanos(message.time()),
-    }
+    nanos(message.header_stamp().unwrap_or(message.time()))
 }
 
 pub(super) fn nanos(time: Time) -> i64 {

@@ -3,10 +3,10 @@
 use super::config::BagConfig;
 use super::index::Index;
 use super::recording::{remarks_on, streams};
+use super::source;
 use super::topics::{Role, Topics};
 use crate::inspect::{DriveInspection, Inspection, SpeedRange};
 use crate::{DatasetKind, Result};
-use deepfusion_rosbag::Bag;
 use std::path::Path;
 
 /// Speeds farther apart than this are not joined, in seconds.
@@ -18,12 +18,12 @@ const MAX_GAP_S: f64 = 0.5;
 /// As [`crate::Dataset::open`].
 pub(crate) fn without_images(path: &Path) -> Result<Option<Inspection>> {
     let config = BagConfig::beside(path)?;
-    let bag = Bag::open(path)?;
-    let topics = Topics::find(&bag, &config)?;
+    let bag = source::open(path)?;
+    let topics = Topics::find(bag.as_ref(), &config)?;
     if topics.of(Role::Image).is_some() {
         return Ok(None);
     }
-    let index = Index::read(&bag, &topics, &config)?;
+    let index = Index::read(bag.as_ref(), &topics, &config)?;
     let mut speeds = index.speed_mps.clone();
     speeds.sort_by_key(|s| s.0);
     let seconds = |from: i64, to: i64| (to - from) as f64 * 1e-9;
@@ -38,11 +38,7 @@ pub(crate) fn without_images(path: &Path) -> Result<Option<Inspection>> {
     let duration_s = range.map(|(first, last)| last.seconds_since(first));
     let speed_mps = SpeedRange::of(speeds.iter().map(|s| s.1));
     let drive = DriveInspection {
-        name: path
-            .file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned(),
+        name: source::name(path),
         camera: 2,
         frames: 0,
         missing_frames: Vec::new(),
@@ -53,14 +49,15 @@ pub(crate) fn without_images(path: &Path) -> Result<Option<Inspection>> {
         distance_m,
         turn_rad: None,
         duration_s,
-        remarks: remarks_on(&bag, &index),
+        time_offset: None,
+        remarks: remarks_on(bag.as_ref(), &index),
     };
     Ok(Some(Inspection {
         kind: DatasetKind::Bag,
         frames: 0,
         size: None,
         intrinsics: None,
-        streams: streams(&bag, &topics, &index)?,
+        streams: streams(bag.as_ref(), &topics, &index)?,
         speed_mps,
         distance_m,
         duration_s,

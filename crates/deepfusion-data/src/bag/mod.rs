@@ -1,6 +1,6 @@
-//! ROS 1 bags with a camera and a vehicle's sensors, such as UMAD's.
+//! ROS bags with a camera and a vehicle's sensors, such as UMAD's.
 //!
-//! The way of a bag: `topics` (which is which, by message type) → `sensors` (speed, steering and IMU as a motion) and
+//! The way of a bag: `source` (its reader: whatever is a [`deepfusion_rosbag::MessageSource`]) → `topics` (which is which, by message type) → `sensors` (speed, steering and IMU as a motion) and
 //! `index` (when images and scans were taken) → `recording` (a [`crate::Recording`]), which reads an `image` or a
 //! `scan` when it is asked for. What a bag cannot say (where the sensors are) stands in a file beside it: `config`.
 
@@ -13,8 +13,10 @@ mod profile;
 mod recording;
 mod scan;
 mod sensors;
+mod source;
 mod topics;
 
 pub use doppler::{DopplerEgo, ego_velocity, ground_radial};
 pub(crate) use inspect::without_images;
-pub(crate) use recording::{BagScans, bags_in, is_bag, open};
+pub(crate) use recording::{BagScans, open, open_bag};
+pub(crate) use source::{bags_in, is_bag};

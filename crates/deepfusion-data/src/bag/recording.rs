@@ -6,7 +6,7 @@ use super::index::{Index, Place};
 use super::profile;
 use super::scan::{Scan, SeenScan};
 use super::topics::{Role, Topics};
-use super::{image, sensors};
+use super::{image, sensors, source};
 use crate::kitti::GtKind;
 use crate::recording::{CalibrationPlace, Recording};
 use crate::{
@@ -15,36 +15,14 @@ use crate::{
 };
 use ::image::RgbImage;
 use deepfusion_geometry::{DepthMap, Distortion, Intrinsics, Se3, StampedPose, Trajectory};
+use deepfusion_rosbag::MessageSource;
 use deepfusion_rosbag::msg::CameraInfo;
-use deepfusion_rosbag::{Bag, BagOptions};
 use nalgebra::{Matrix3, Vector3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Half the interval over which a yaw rate is measured, seconds.
 const YAW_RATE_REACH_S: f64 = 0.05;
-
-/// Whether a path is a ROS 1 bag by its name.
-pub(crate) fn is_bag(path: &Path) -> bool {
-    let extension = path.extension().and_then(|e| e.to_str());
-    path.is_file() && extension.is_some_and(|e| e.eq_ignore_ascii_case("bag"))
-}
-
-/// The bags of a folder, by name.
-///
-/// # Errors
-/// [`Error::File`].
-pub(crate) fn bags_in(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut bags = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
-        let path = entry.map_err(|e| Error::file(folder, e))?.path();
-        if is_bag(&path) {
-            bags.push(path);
-        }
-    }
-    bags.sort();
-    Ok(bags)
-}
 
 /// Opens bags, a data set each.
 ///
@@ -54,7 +32,7 @@ pub(crate) fn open(path: &Path, bags: &[PathBuf], options: &OpenOptions) -> Resu
     let mut datasets = Vec::new();
     let mut refused = None;
     for bag in bags {
-        match open_bag(bag, options)?.select(path, options) {
+        match open_bag(source::open(bag)?, options)?.select(path, options) {
             Ok(dataset) => datasets.push(dataset),
             Err(error @ Error::SplitSelectsNothing { .. }) => refused = Some(error),
             Err(other) => return Err(other),
@@ -69,7 +47,8 @@ pub(crate) fn open(path: &Path, bags: &[PathBuf], options: &OpenOptions) -> Resu
 /// A bag with a camera.
 #[derive(Debug)]
 pub(crate) struct BagRecording {
-    bag: Bag,
+    folder: PathBuf,
+    bag: Arc<dyn MessageSource>,
     topics: Topics,
     images: Vec<Place>,
     lens: Lens,
@@ -85,7 +64,7 @@ pub(crate) struct BagRecording {
 /// The scans of a bag as its camera sees them.
 #[derive(Debug)]
 pub(crate) struct BagScans {
-    bag: Bag,
+    bag: Arc<dyn MessageSource>,
     topic: String,
     /// Each scan's place and its time on the frames' clock.
     places: Vec<(Place, f64)>,
@@ -97,11 +76,15 @@ pub(crate) struct BagScans {
     track: Option<MotionModel>,
 }
 
-fn open_bag(path: &Path, options: &OpenOptions) -> Result<Dataset> {
+/// A recording of messages as a data set, with what the file beside it says.
+///
+/// # Errors
+/// As [`Dataset::open`].
+pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Result<Dataset> {
+    let path = bag.path();
     let config = BagConfig::beside(path)?;
-    let bag = Bag::open(path)?;
-    let topics = Topics::find(&bag, &config)?;
-    let index = Index::read(&bag, &topics, &config)?;
+    let topics = Topics::find(bag.as_ref(), &config)?;
+    let index = Index::read(bag.as_ref(), &topics, &config)?;
     let Some(first) = index.images.first().copied() else {
         let list: Vec<String> = bag.topics()?.into_iter().map(|t| t.name).collect();
         return Err(Error::NoFrames {
@@ -110,13 +93,13 @@ fn open_bag(path: &Path, options: &OpenOptions) -> Result<Dataset> {
             remedy: "topics.image in the file beside the bag names the camera's topic".into(),
         });
     };
-    let mut remarks = remarks_on(&bag, &index);
+    let mut remarks = remarks_on(bag.as_ref(), &index);
     let ahead_ns = (config.clock.camera_ahead_s * 1e9).round() as i64;
     let origin_ns = first.stamp_ns - ahead_ns;
     let seconds = |stamp_ns: i64| (stamp_ns - ahead_ns - origin_ns) as f64 * 1e-9;
 
     let topic = topics.of(Role::Image).unwrap_or_default();
-    let picture = image::decode(&bag, &image::message(&bag, topic, &first)?)?;
+    let picture = image::decode(bag.as_ref(), &image::message(bag.as_ref(), topic, &first)?)?;
     let rectified = topic.contains("rect");
     let (lens, calibration) = camera(
         path,
@@ -139,11 +122,7 @@ fn open_bag(path: &Path, options: &OpenOptions) -> Result<Dataset> {
     let motion = sensors::motion(path, &index, &config, origin_ns)?;
     let yaw_known = motion.as_ref().is_some_and(|m| m.yaw_known);
     let track = motion.map(|m| m.track);
-    let name = path
-        .file_stem()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
+    let name = source::name(path);
     let frames = index.images.iter().enumerate().map(|(number, place)| {
         let time_s = seconds(place.stamp_ns);
         Frame {
@@ -176,7 +155,7 @@ fn open_bag(path: &Path, options: &OpenOptions) -> Result<Dataset> {
     };
     let scans = match (topics.of(Role::Lidar), cam_from_lidar) {
         (Some(topic), Some(cam_from_lidar)) => Some(Arc::new(BagScans {
-            bag: Bag::open_with(path, without_threads())?,
+            bag: Arc::clone(&bag),
             topic: topic.to_owned(),
             places: index
                 .scans
@@ -205,8 +184,12 @@ fn open_bag(path: &Path, options: &OpenOptions) -> Result<Dataset> {
         world_from_body: *pose,
     });
     let recording = BagRecording {
-        streams: streams(&bag, &topics, &index)?,
-        bag: Bag::open_with(path, without_threads())?,
+        streams: streams(bag.as_ref(), &topics, &index)?,
+        folder: match path.is_dir() {
+            true => path.to_owned(),
+            false => path.parent().unwrap_or(path).to_owned(),
+        },
+        bag: Arc::clone(&bag),
         topics: topics.clone(),
         truth: Trajectory::new(truth.collect()),
         images: index.images,
@@ -220,7 +203,7 @@ fn open_bag(path: &Path, options: &OpenOptions) -> Result<Dataset> {
 }
 
 /// What of a bag cannot be read, in sentences.
-pub(super) fn remarks_on(bag: &Bag, index: &Index) -> Vec<String> {
+pub(super) fn remarks_on(bag: &dyn MessageSource, index: &Index) -> Vec<String> {
     let mut remarks = Vec::new();
     let damage = bag.damage();
     remarks.extend(damage.map(|damage| format!("the bag is damaged: {damage}")));
@@ -231,14 +214,6 @@ pub(super) fn remarks_on(bag: &Bag, index: &Index) -> Vec<String> {
         ));
     }
     remarks
-}
-
-/// Single messages are decompressed where they are asked for: the loaders have threads of their own.
-fn without_threads() -> BagOptions {
-    BagOptions {
-        threads: 0,
-        ..BagOptions::default()
-    }
 }
 
 /// The camera by what is given, by the file beside the bag, by CameraInfo, or as the profile prints it.
@@ -291,11 +266,7 @@ fn camera(
     if (found.width, found.height) != (width, height) {
         return Err(Error::FrameSize {
             image: format!("{}, image 0", bag.display()),
-            drive: bag
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
+            drive: source::name(bag),
             frame: 0,
             found: (width, height),
             expected: (found.width, found.height),
@@ -342,7 +313,11 @@ fn looking_ahead() -> Se3 {
     Se3::from_parts(&axes, Vector3::zeros())
 }
 
-pub(super) fn streams(bag: &Bag, topics: &Topics, index: &Index) -> Result<Vec<Stream>> {
+pub(super) fn streams(
+    bag: &dyn MessageSource,
+    topics: &Topics,
+    index: &Index,
+) -> Result<Vec<Stream>> {
     let all = bag.topics()?;
     let streams = all.iter().map(|topic| {
         let role = topics.roles(&topic.name).next();
@@ -379,8 +354,8 @@ impl BagScans {
         let Some(&(place, time_s)) = self.nearest(frame_s) else {
             return Ok(None);
         };
-        let message = image::message(&self.bag, &self.topic, &place)?;
-        let scan = Scan::decode(&self.bag, &message, &self.lidar)?;
+        let message = image::message(self.bag.as_ref(), &self.topic, &place)?;
+        let scan = Scan::decode(self.bag.as_ref(), &message, &self.lidar)?;
         let ground = scan.ground_radial(self.sensor_velocity(time_s), self.lidar.over_ground);
         let cam_from_lidar = self.frame_from_scan(frame_s, time_s) * self.cam_from_lidar;
         Ok(Some(scan.seen(
@@ -449,8 +424,8 @@ impl BagScans {
         let step = self.places.len().div_ceil(most).max(1);
         let mut motions = Vec::new();
         for (place, time_s) in self.places.iter().step_by(step) {
-            let message = image::message(&self.bag, &self.topic, place)?;
-            let scan = Scan::decode(&self.bag, &message, &self.lidar)?;
+            let message = image::message(self.bag.as_ref(), &self.topic, place)?;
+            let scan = Scan::decode(self.bag.as_ref(), &message, &self.lidar)?;
             let (Some(radial), Some(by_vehicle)) = (&scan.radial, self.sensor_velocity(*time_s))
             else {
                 continue;
@@ -473,8 +448,8 @@ impl BagScans {
         let Some((place, _)) = self.places.first() else {
             return Ok(false);
         };
-        let message = image::message(&self.bag, &self.topic, place)?;
-        Ok(Scan::decode(&self.bag, &message, &self.lidar)?
+        let message = image::message(self.bag.as_ref(), &self.topic, place)?;
+        Ok(Scan::decode(self.bag.as_ref(), &message, &self.lidar)?
             .radial
             .is_some())
     }
@@ -486,7 +461,7 @@ impl Recording for BagRecording {
     }
 
     fn folder(&self) -> &Path {
-        self.bag.path().parent().unwrap_or(self.bag.path())
+        &self.folder
     }
 
     fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
@@ -501,8 +476,9 @@ impl Recording for BagRecording {
                 truncated: false,
             });
         };
-        let message = image::message(&self.bag, topic, place)?;
-        self.lens.correct(image::decode(&self.bag, &message)?)
+        let message = image::message(self.bag.as_ref(), topic, place)?;
+        self.lens
+            .correct(image::decode(self.bag.as_ref(), &message)?)
     }
 
     fn calibration(&self) -> CalibrationPlace {

@@ -5,7 +5,7 @@ use super::doppler::{ego_velocity, ground_radial};
 use crate::{Error, Result};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use deepfusion_rosbag::msg::PointCloud2;
-use deepfusion_rosbag::{Bag, Message};
+use deepfusion_rosbag::{Message, MessageSource};
 use nalgebra::Vector3;
 
 /// Names under which drivers publish the radial velocity.
@@ -41,7 +41,11 @@ impl Scan {
     /// # Errors
     /// [`Error::Bag`] for a message that is no cloud; [`Error::Topic`] without x, y and z, or without the field that
     /// the settings name.
-    pub(super) fn decode(bag: &Bag, message: &Message<'_>, lidar: &LidarConfig) -> Result<Self> {
+    pub(super) fn decode(
+        bag: &dyn MessageSource,
+        message: &Message<'_>,
+        lidar: &LidarConfig,
+    ) -> Result<Self> {
         let cloud: PointCloud2<'_> = message.decode()?;
         let column = |name: &str| -> Result<Vec<f32>> {
             let column = cloud.column(name).map_err(|e| Error::Topic {

@@ -6,7 +6,7 @@ use deepfusion_rosbag::msg::{
     AckermannDriveStamped, CameraInfo, CompressedImage, Float32, Float64, Frame, Image, Imu,
     Odometry, PointCloud2, TwistStamped,
 };
-use deepfusion_rosbag::{Bag, RosMessage, TopicInfo};
+use deepfusion_rosbag::{MessageSource, RosMessage, TopicInfo};
 use std::path::Path;
 
 /// What a topic is for.
@@ -39,7 +39,7 @@ impl Topics {
     /// # Errors
     /// [`Error::Topic`] where the file names a topic that is not there, or several could be meant;
     /// [`Error::Bag`].
-    pub(super) fn find(bag: &Bag, config: &BagConfig) -> Result<Self> {
+    pub(super) fn find(bag: &dyn MessageSource, config: &BagConfig) -> Result<Self> {
         let all = bag.topics()?;
         let search = Search {
             all: &all,

@@ -4,7 +4,7 @@ use super::epipolar::EpipolarPair;
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::survey::Survey;
 use super::turn::picture_yaw_rate;
-use deepfusion_motion::{ImageMotion, OffsetConfig, Signal, VehicleRates, time_offset};
+use deepfusion_motion::{ImageMotion, OffsetConfig, Signal, TimeOffset, VehicleRates, time_offset};
 
 /// Offset that matters, in seconds: at 10 m/s² of braking 20 ms are 0.2 m/s.
 const MOST_S: f64 = 0.020;
@@ -13,21 +13,11 @@ const SIGMAS: f64 = 4.0;
 const SURE_S: f64 = 0.05;
 
 pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
-    let dataset = survey.dataset;
-    let Some(track) = dataset.track().filter(|_| dataset.yaw_known()) else {
-        return Outcome::skipped("clock", "no speed and yaw rate to compare the picture with");
-    };
-    let pictures = pictures(survey, pairs);
-    let rates = VehicleRates::from(track);
-    let offset = match time_offset(&pictures, &rates, &OffsetConfig::default()) {
-        Ok(offset) => offset,
-        Err(why) => return Outcome::skipped("clock", why.to_string()),
+    let Estimate { offset, rates } = match estimate(survey, pairs) {
+        Ok(estimate) => estimate,
+        Err(why) => return Outcome::skipped("clock", why),
     };
     let (value, error) = (offset.vehicle_minus_camera_s, offset.std_error_s);
-    if error.is_nan() || error >= SURE_S {
-        let why = format!("the estimate {value:.2} s has a standard error of {error:.2} s");
-        return Outcome::skipped("clock", why);
-    }
     let mut outcome = Outcome::new("clock");
     // What the estimate cannot tell from 0 holds; nor is a stream placed better than its own interval (KITTI's
     // oxts, at 10 Hz, come out 60 ms late).
@@ -55,6 +45,30 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
         )
     });
     outcome
+}
+
+/// An offset that is sure enough, and what it was measured against.
+pub(super) struct Estimate {
+    pub(super) offset: TimeOffset,
+    rates: VehicleRates,
+}
+
+/// The offset of the clocks; else why there is none.
+pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Estimate, String> {
+    let dataset = survey.dataset;
+    let Some(track) = dataset.track().filter(|_| dataset.yaw_known()) else {
+        return Err("no speed and yaw rate to compare the picture with".into());
+    };
+    let rates = VehicleRates::from(track);
+    let offset = time_offset(&pictures(survey, pairs), &rates, &OffsetConfig::default());
+    let offset = offset.map_err(|why| why.to_string())?;
+    let (value, error) = (offset.vehicle_minus_camera_s, offset.std_error_s);
+    match error.is_nan() || error >= SURE_S {
+        true => Err(format!(
+            "the estimate {value:.2} s has a standard error of {error:.2} s"
+        )),
+        false => Ok(Estimate { offset, rates }),
+    }
 }
 
 /// How the pictures moved. The turn by the points that were followed is truer than the shift of the whole picture, which

@@ -31,6 +31,7 @@ pub use finding::{Figure, Finding, Limit, Outcome, Severity};
 pub use plots::{DrivePlots, Line};
 
 use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions};
+use deepfusion_motion::TimeOffset;
 use serde::Serialize;
 use std::path::Path;
 use survey::Survey;
@@ -147,6 +148,18 @@ pub fn examine(dataset: &Dataset) -> DriveDiagnosis {
         outcomes,
         plots: DrivePlots::of(&survey, &pairs),
     }
+}
+
+/// The offset of the camera's clock to the vehicle's, as the check `clock` measures it: by how a sample of the pictures
+/// moved. `None` without speeds and turns, or where the drive does not show it to 0.05 s.
+#[must_use]
+pub fn time_offset(dataset: &Dataset) -> Option<TimeOffset> {
+    // Without them no picture need be read.
+    dataset.track().filter(|_| dataset.yaw_known())?;
+    let survey = Survey::of(dataset);
+    let pairs = epipolar::pairs(&survey);
+    let estimate = clock::estimate(&survey, &pairs).ok()?;
+    Some(estimate.offset)
 }
 
 /// The middle of the values; NaN where there is none.

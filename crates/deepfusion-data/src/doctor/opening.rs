@@ -57,7 +57,9 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
             false => Severity::Note,
         };
         let remedy = match damaged {
-            true => "copy the bag again; `rosbag reindex` repairs one whose recording was cut off",
+            true => {
+                "copy the bag again; `rosbag reindex` (`ros2 bag reindex`) repairs one whose recording was cut off"
+            }
             false => "see that it is so, or say otherwise in the file beside the recording",
         };
         outcome.find(severity, None, remark.clone(), remedy);

@@ -40,7 +40,7 @@ pub(crate) fn open(path: &Path, drives: &[Drive], options: &OpenOptions) -> Resu
             let files = drive.images(camera.number())?;
             images += files.len();
             let numbers = files.iter().map(|f| f.0);
-            let selected = selection.of(&drive.split_name(), camera, numbers);
+            let selected = selection.of(&drive.split_name(), None, camera, numbers);
             if !selected.is_empty() {
                 datasets.push(open_drive(drive, camera, &files)?.with_selected(selected));
             }

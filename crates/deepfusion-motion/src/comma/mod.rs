@@ -44,37 +44,52 @@ impl CommaSegment {
     /// [`Error::File`] and [`Error::Array`] name the array that is missing or is not what the layout
     /// says.
     pub fn open(folder: &Path) -> Result<Self> {
-        let log = folder.join("processed_log");
-        let wheels = optional(&log.join("CAN/wheel_speed"), 4)?;
-        let wheel_speeds_mps: Vec<Signal> = wheels
-            .iter()
-            .flat_map(|w| (0..4).map(|wheel| column(w, wheel)))
-            .collect();
-        let speed_folder = log.join("CAN/speed");
-        let speed_mps = match wheels {
-            Some(wheels) if !speed_folder.exists() => {
-                let mean = |row: &[f64]| row.iter().sum::<f64>() / row.len() as f64;
-                Signal::new(wheels.rows().map(|(t, row)| (t, mean(row))))
-            }
-            _ => column(&Stream::read(&speed_folder, 1)?, 0),
-        };
-        let steering_rad = optional(&log.join("CAN/steering_angle"), 1)?
-            .map(|s| column(&s, 0).map(f64::to_radians));
-        let accelerometer = optional(&log.join("IMU/accelerometer"), 3)?;
-        let gyro = optional(&log.join("IMU/gyro"), 3)?;
-        let imu = accelerometer.zip(gyro).map(|(a, g)| join_imu(&a, &g));
+        let (sensors, wheel_speeds_mps) = recorded(folder)?;
         let (reference, frame_times_s) = reference::read(&folder.join("global_pose"))?;
         Ok(Self {
-            sensors: VehicleSensors {
-                speed_mps,
-                steering_rad,
-                imu,
-            },
+            sensors,
             wheel_speeds_mps,
             reference,
             frame_times_s,
         })
     }
+}
+
+/// A segment's sensors without its pose: [`CommaSegment::sensors`].
+///
+/// # Errors
+/// As [`CommaSegment::open`].
+pub fn sensors(folder: &Path) -> Result<VehicleSensors> {
+    recorded(folder).map(|(sensors, _)| sensors)
+}
+
+/// The sensors, and each wheel's speed.
+fn recorded(folder: &Path) -> Result<(VehicleSensors, Vec<Signal>)> {
+    let log = folder.join("processed_log");
+    let wheels = optional(&log.join("CAN/wheel_speed"), 4)?;
+    let wheel_speeds_mps: Vec<Signal> = wheels
+        .iter()
+        .flat_map(|w| (0..4).map(|wheel| column(w, wheel)))
+        .collect();
+    let speed_folder = log.join("CAN/speed");
+    let speed_mps = match wheels {
+        Some(wheels) if !speed_folder.exists() => {
+            let mean = |row: &[f64]| row.iter().sum::<f64>() / row.len() as f64;
+            Signal::new(wheels.rows().map(|(t, row)| (t, mean(row))))
+        }
+        _ => column(&Stream::read(&speed_folder, 1)?, 0),
+    };
+    let steering_rad =
+        optional(&log.join("CAN/steering_angle"), 1)?.map(|s| column(&s, 0).map(f64::to_radians));
+    let accelerometer = optional(&log.join("IMU/accelerometer"), 3)?;
+    let gyro = optional(&log.join("IMU/gyro"), 3)?;
+    let imu = accelerometer.zip(gyro).map(|(a, g)| join_imu(&a, &g));
+    let sensors = VehicleSensors {
+        speed_mps,
+        steering_rad,
+        imu,
+    };
+    Ok((sensors, wheel_speeds_mps))
 }
 
 /// A folder with the arrays `t` and `value`.

@@ -24,6 +24,12 @@ pub enum MessageError {
         /// The field.
         field: String,
     },
+    /// A message of ROS 2 is laid out in another way than plain CDR.
+    #[error("encapsulation {found:#06x}: expected plain CDR, 0x0000 or 0x0001")]
+    Encapsulation {
+        /// The representation's number.
+        found: u16,
+    },
     /// A cloud has no field of the name.
     #[error("no field {field} in the cloud; there are {}", fields.join(", "))]
     NoField {
@@ -77,6 +83,9 @@ impl MessageError {
         let text = match self {
             Self::Short { .. } | Self::Long { .. } | Self::Text { .. } => {
                 "the message is damaged, or was recorded with another definition than its MD5 says"
+            }
+            Self::Encapsulation { .. } => {
+                "the message is damaged, or its middleware wrote XCDR version 2 or parameter lists, which are not read"
             }
             Self::NoField { .. } => "name one of the fields there are",
             Self::Datatype { .. } | Self::Layout { .. } => {

@@ -14,7 +14,7 @@ mod image;
 mod nav_msgs;
 mod sensor_msgs;
 mod std_msgs;
-mod wire;
+pub(crate) mod wire;
 
 pub use ackermann_msgs::{AckermannDrive, AckermannDriveStamped};
 pub use can_msgs::Frame;
@@ -45,6 +45,13 @@ pub trait RosMessage<'a>: Sized {
     /// # Errors
     /// [`MessageError`] naming the field that does not fit, or telling how many bytes are left over.
     fn decode(bytes: &'a [u8]) -> Result<Self, MessageError>;
+
+    /// From a message's bytes as ROS 2 sends them: CDR of either byte order behind its four bytes of encapsulation.
+    /// ROS 2 has no [`Header::seq`]; it is 0.
+    ///
+    /// # Errors
+    /// As [`Self::decode`], and [`MessageError::Encapsulation`] for another representation than plain CDR.
+    fn decode_cdr(bytes: &'a [u8]) -> Result<Self, MessageError>;
 
     /// Appends the message's bytes to `out`.
     fn encode(&self, out: &mut Vec<u8>);

@@ -1,17 +1,40 @@
+use super::MessageError;
 use super::definition::definition;
-use super::wire::message;
+use super::wire::{Reader, Wire, message};
 use crate::Time;
 
-message! {
-    /// What most messages begin with: when and in which frame something was measured.
-    #[derive(Eq, Hash, Default)]
-    Header;
-    /// A number that the publisher counts up; many leave it 0.
-    seq: u32,
+/// What most messages begin with: when and in which frame something was measured.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Header {
+    /// A number that the publisher counts up; many leave it 0. ROS 2 has none, it is 0 there.
+    pub seq: u32,
     /// When it was measured, by the sensor's or its driver's clock.
-    stamp: Time,
+    pub stamp: Time,
     /// The frame its coordinates are in.
-    frame_id: String,
+    pub frame_id: String,
+}
+
+impl<'a> Wire<'a> for Header {
+    /// Of ROS 2, which has the fewer fields.
+    const LEAST: usize = Time::LEAST + String::LEAST;
+
+    fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
+        let within = |field: &'static str| move |error: MessageError| error.within(field);
+        Ok(Self {
+            seq: match reader.is_cdr() {
+                true => 0,
+                false => u32::read(reader).map_err(within("seq"))?,
+            },
+            stamp: Time::read(reader).map_err(within("stamp"))?,
+            frame_id: String::read(reader).map_err(within("frame_id"))?,
+        })
+    }
+
+    fn write(&self, out: &mut Vec<u8>) {
+        self.seq.write(out);
+        self.stamp.write(out);
+        self.frame_id.write(out);
+    }
 }
 
 message! {

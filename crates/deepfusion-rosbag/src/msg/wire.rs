@@ -5,29 +5,60 @@ use crate::Time;
 use std::borrow::Cow;
 
 /// A message's bytes that have not been read yet.
-pub(crate) struct Reader<'a>(pub &'a [u8]);
+pub(crate) struct Reader<'a> {
+    rest: &'a [u8],
+    format: Format,
+}
+
+/// How the bytes are laid out.
+#[derive(Clone, Copy)]
+enum Format {
+    /// Little-endian, without padding, strings without an end mark.
+    Ros1,
+    /// Numbers lie at multiples of their size, counted from the payload's start; strings end in a zero.
+    Cdr { big: bool, length: usize },
+}
 
 impl<'a> Reader<'a> {
     #[inline]
     fn take(&mut self, count: usize) -> Result<&'a [u8], MessageError> {
-        match self.0.split_at_checked(count) {
+        match self.rest.split_at_checked(count) {
             Some((taken, rest)) => {
-                self.0 = rest;
+                self.rest = rest;
                 Ok(taken)
             }
             None => Err(self.short(count as u64)),
         }
     }
 
+    /// A number's bytes, lowest first.
+    #[inline]
+    fn number<const N: usize>(&mut self) -> Result<[u8; N], MessageError> {
+        let Format::Cdr { big, length } = self.format else {
+            return self.array();
+        };
+        self.take((length - self.rest.len()).next_multiple_of(N) - (length - self.rest.len()))?;
+        let mut bytes = self.array()?;
+        if big {
+            bytes.reverse();
+        }
+        Ok(bytes)
+    }
+
     #[inline]
     fn array<const N: usize>(&mut self) -> Result<[u8; N], MessageError> {
-        match self.0.split_first_chunk() {
+        match self.rest.split_first_chunk() {
             Some((taken, rest)) => {
-                self.0 = rest;
+                self.rest = rest;
                 Ok(*taken)
             }
             None => Err(self.short(N as u64)),
         }
+    }
+
+    /// Whether the message is one of ROS 2.
+    pub(crate) fn is_cdr(&self) -> bool {
+        matches!(self.format, Format::Cdr { .. })
     }
 
     #[cold]
@@ -35,7 +66,7 @@ impl<'a> Reader<'a> {
         MessageError::Short {
             field: String::new(),
             needed,
-            left: self.0.len(),
+            left: self.rest.len(),
         }
     }
 
@@ -43,20 +74,62 @@ impl<'a> Reader<'a> {
     /// than there are bytes for.
     fn length(&mut self, item: usize) -> Result<usize, MessageError> {
         let length = u32::read(self)? as usize;
-        match length.saturating_mul(item) > self.0.len() {
+        match length.saturating_mul(item) > self.rest.len() {
             true => Err(self.short(length as u64 * item as u64)),
             false => Ok(length),
         }
     }
 }
 
-/// Decodes a whole message, up to its last byte.
+/// Decodes a whole message of ROS 1, up to its last byte.
 pub(crate) fn decode<'a, T: Wire<'a>>(bytes: &'a [u8]) -> Result<T, MessageError> {
-    let mut reader = Reader(bytes);
+    let mut reader = Reader {
+        rest: bytes,
+        format: Format::Ros1,
+    };
     let message = T::read(&mut reader)?;
-    match reader.0.len() {
+    match reader.rest.len() {
         0 => Ok(message),
         left => Err(MessageError::Long { left }),
+    }
+}
+
+/// Decodes a whole message of ROS 2: four bytes that say how it is laid out, then plain CDR (OMG DDSI-RTPS 10.5, XCDR
+/// version 1).
+pub(crate) fn decode_cdr<'a, T: Wire<'a>>(bytes: &'a [u8]) -> Result<T, MessageError> {
+    let big = cdr_is_big_endian(bytes)?;
+    let payload = bytes.get(CDR_HEADER..).unwrap_or_default();
+    let mut reader = Reader {
+        rest: payload,
+        format: Format::Cdr {
+            big,
+            length: payload.len(),
+        },
+    };
+    let message = T::read(&mut reader)?;
+    // Middleware rounds a message up to a multiple of four bytes.
+    match reader.rest.len() {
+        0..4 => Ok(message),
+        left => Err(MessageError::Long { left }),
+    }
+}
+
+/// Bytes in front of a CDR payload: what it is, and options.
+pub(crate) const CDR_HEADER: usize = 4;
+
+/// Whether the numbers of a CDR message begin with their highest byte.
+pub(crate) fn cdr_is_big_endian(bytes: &[u8]) -> Result<bool, MessageError> {
+    match bytes {
+        [0, 0, _, _, ..] => Ok(true),
+        [0, 1, _, _, ..] => Ok(false),
+        [high, low, _, _, ..] => Err(MessageError::Encapsulation {
+            found: u16::from_be_bytes([*high, *low]),
+        }),
+        _ => Err(MessageError::Short {
+            field: "encapsulation".to_owned(),
+            needed: CDR_HEADER as u64,
+            left: bytes.len(),
+        }),
     }
 }
 
@@ -75,7 +148,7 @@ macro_rules! number {
 
             #[inline]
             fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
-                reader.array().map(<$number>::from_le_bytes)
+                reader.number().map(<$number>::from_le_bytes)
             }
 
             fn write(&self, out: &mut Vec<u8>) {
@@ -102,7 +175,13 @@ impl<'a> Wire<'a> for Time {
     const LEAST: usize = 8;
 
     fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
-        reader.array().map(crate::record::time)
+        let (sec, nsec) = (u32::read(reader)?, u32::read(reader)?);
+        // ROS 2 counts seconds with a sign; what lies before 1970 is no time of a recording.
+        let before_1970 = reader.is_cdr() && sec > i32::MAX as u32;
+        Ok(match before_1970 {
+            true => Self::ZERO,
+            false => Self { sec, nsec },
+        })
     }
 
     fn write(&self, out: &mut Vec<u8>) {
@@ -116,7 +195,11 @@ impl<'a> Wire<'a> for String {
 
     fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
         let length = reader.length(1)?;
-        let text = std::str::from_utf8(reader.take(length)?);
+        let mut bytes = reader.take(length)?;
+        if reader.is_cdr() {
+            bytes = bytes.strip_suffix(&[0]).unwrap_or(bytes);
+        }
+        let text = std::str::from_utf8(bytes);
         text.map(str::to_owned).map_err(|_| MessageError::Text {
             field: String::new(),
         })
@@ -217,6 +300,10 @@ macro_rules! message {
 
             fn decode(bytes: &'a [u8]) -> Result<Self, $crate::msg::MessageError> {
                 $crate::msg::wire::decode(bytes)
+            }
+
+            fn decode_cdr(bytes: &'a [u8]) -> Result<Self, $crate::msg::MessageError> {
+                $crate::msg::wire::decode_cdr(bytes)
             }
 
             fn encode(&self, out: &mut Vec<u8>) {

@@ -2,7 +2,7 @@
 #![allow(dead_code)]
 
 use deepfusion_rosbag::msg::*;
-use deepfusion_rosbag::{Message, Time};
+use deepfusion_rosbag::{Message, Serialization, Time};
 use sha2::{Digest, Sha256};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -146,9 +146,11 @@ fields! {
 
 fn typed<'m, T: RosMessage<'m> + Lines>(message: &'m Message<'_>) -> Vec<String> {
     let value: T = message.decode().unwrap();
-    let mut again = Vec::new();
-    value.encode(&mut again);
-    assert_eq!(again, message.data(), "{message:?} encodes to other bytes");
+    if message.serialization() == Serialization::Ros1 {
+        let mut again = Vec::new();
+        value.encode(&mut again);
+        assert_eq!(again, message.data(), "{message:?} encodes to other bytes");
+    }
     let mut lines = Vec::new();
     value.lines("", &mut lines);
     lines

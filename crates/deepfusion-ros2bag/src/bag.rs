@@ -1,0 +1,224 @@
+use crate::mcap::McapFile;
+use crate::metadata;
+use crate::sqlite::SqliteFile;
+use crate::storage::{self, Storage, hull};
+use deepfusion_rosbag::{
+    Connection, Error, Message, MessageIter, MessageSource, Result, Selection, Time, TopicInfo,
+};
+use std::collections::VecDeque;
+use std::iter::Peekable;
+use std::path::{Path, PathBuf};
+
+/// Whether a path is a bag of ROS 2: an `.mcap` or `.db3` file, or a folder with the recorder's `metadata.yaml`.
+#[must_use]
+pub fn is_ros2_bag(path: &Path) -> bool {
+    match path.is_dir() {
+        true => metadata::is_bag(path),
+        false => path.is_file() && Kind::of(path).is_some(),
+    }
+}
+
+/// A bag of ROS 2, open for reading.
+///
+/// ```no_run
+/// use deepfusion_ros2bag::Ros2Bag;
+/// use deepfusion_rosbag::{MessageSource, Selection, msg::Imu};
+/// # fn main() -> deepfusion_rosbag::Result<()> {
+/// let bag = Ros2Bag::open("drive")?;
+/// for message in bag.messages(Selection::topics(["/imu/data"]))? {
+///     let message = message?;
+///     let imu: Imu = message.decode()?;
+///     println!("{} {:?}", message.time(), imu.linear_acceleration);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Ros2Bag {
+    path: PathBuf,
+    files: Vec<Box<dyn Storage>>,
+    /// Files that `metadata.yaml` names and that are not there.
+    missing: Vec<PathBuf>,
+}
+
+/// What a file is, by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Mcap,
+    Sqlite,
+    /// Compressed as a whole.
+    Packed,
+}
+
+impl Kind {
+    fn of(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+        let ends = |endings: [&str; 2]| endings.iter().any(|e| name.ends_with(e));
+        if name.ends_with(".mcap") {
+            return Some(Self::Mcap);
+        }
+        if name.ends_with(".db3") {
+            return Some(Self::Sqlite);
+        }
+        ends([".mcap.zstd", ".db3.zstd"]).then_some(Self::Packed)
+    }
+}
+
+impl Ros2Bag {
+    /// Opens a recording's folder, or one file of it. An MCAP file without a summary (its recorder was stopped) and a
+    /// damaged one are scanned from the front to the break; a database that was cut off is read as far as it goes.
+    /// [`MessageSource::damage`] says so.
+    ///
+    /// MCAP files are mapped: they must not be shortened while the bag is open.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchPath`], [`Error::File`]; [`Error::Storage`] for files of another kind, ones that are compressed as
+    /// a whole, and a `metadata.yaml` that cannot be read.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let metadata = std::fs::metadata(path).map_err(|e| Error::file(path, e))?;
+        let named = match metadata.is_dir() {
+            true => metadata::files(path)?,
+            false => vec![path.to_owned()],
+        };
+        let (there, missing): (Vec<_>, Vec<_>) = named.into_iter().partition(|file| file.is_file());
+        let files = there.iter().map(|file| open_file(file));
+        let files: Vec<_> = files.collect::<Result<_>>()?;
+        match missing.first() {
+            Some(first) if files.is_empty() => Err(Error::NoSuchPath {
+                path: first.clone(),
+            }),
+            _ => Ok(Self {
+                path: path.to_owned(),
+                files,
+                missing,
+            }),
+        }
+    }
+
+    fn channels(&self) -> impl Iterator<Item = &storage::Channel> {
+        self.files.iter().flat_map(|file| file.channels())
+    }
+
+    /// Every file's connections, one for each topic and publisher.
+    pub fn connections(&self) -> impl Iterator<Item = &Connection> {
+        self.channels().map(|channel| &channel.connection)
+    }
+
+    /// How many messages the bag holds.
+    #[must_use]
+    pub fn message_count(&self) -> u64 {
+        self.connections().map(|c| c.count).sum()
+    }
+}
+
+fn open_file(path: &Path) -> Result<Box<dyn Storage>> {
+    match Kind::of(path) {
+        Some(Kind::Mcap) => Ok(Box::new(McapFile::open(path)?)),
+        Some(Kind::Sqlite) => Ok(Box::new(SqliteFile::open(path)?)),
+        Some(Kind::Packed) => Err(storage::error(
+            path,
+            "the whole file is compressed (zstd), so that nothing in it can be found",
+            "unpack it first: zstd -d FILE; `ros2 bag record --compression-mode message` keeps files open to reading",
+        )),
+        None => Err(storage::error(
+            path,
+            "neither .mcap nor .db3",
+            "give the recording's folder, or one of its .mcap or .db3 files",
+        )),
+    }
+}
+
+impl MessageSource for Ros2Bag {
+    fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn topics(&self) -> Result<Vec<TopicInfo>> {
+        Ok(storage::topics(self.channels()))
+    }
+
+    fn time_range(&self) -> Option<(Time, Time)> {
+        self.files.iter().map(|file| file.range()).fold(None, hull)
+    }
+
+    fn damage(&self) -> Option<String> {
+        let missing = self
+            .missing
+            .iter()
+            .map(|file| format!("{} is not there", file.display()));
+        let all: Vec<String> = self
+            .files
+            .iter()
+            .filter_map(|file| file.damage())
+            .chain(missing)
+            .collect();
+        (!all.is_empty()).then(|| all.join("; "))
+    }
+
+    fn messages(&self, selection: Selection) -> Result<MessageIter<'_>> {
+        let connections: Vec<Connection> = self.connections().cloned().collect();
+        let mut wanted = selection.wanted(&connections, &self.path)?.into_iter();
+        let mut waiting = Vec::new();
+        for file in &self.files {
+            let wanted: Vec<bool> = wanted.by_ref().take(file.channels().len()).collect();
+            let Some((first, last)) = file.range() else {
+                continue;
+            };
+            if wanted.contains(&true) && selection.meets(first, last) {
+                waiting.push(Waiting {
+                    first,
+                    file: file.as_ref(),
+                    wanted,
+                });
+            }
+        }
+        waiting.sort_by_key(|w| w.first);
+        Ok(Box::new(InOrder {
+            selection,
+            waiting: waiting.into(),
+            active: Vec::new(),
+        }))
+    }
+}
+
+struct Waiting<'a> {
+    first: Time,
+    file: &'a dyn Storage,
+    wanted: Vec<bool>,
+}
+
+/// The messages of several files in time order. A file that begins later is not touched before its time.
+struct InOrder<'a> {
+    selection: Selection,
+    waiting: VecDeque<Waiting<'a>>,
+    active: Vec<Peekable<MessageIter<'a>>>,
+}
+
+impl<'a> Iterator for InOrder<'a> {
+    type Item = Result<Message<'a>>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            self.active.retain_mut(|file| file.peek().is_some());
+            // An error comes first: it has no time.
+            let time = |file: &mut Peekable<MessageIter<'a>>| match file.peek() {
+                Some(Ok(message)) => message.time(),
+                _ => Time::ZERO,
+            };
+            let times = self.active.iter_mut().map(time).enumerate();
+            let next = times.min_by_key(|(place, time)| (*time, *place));
+            match (next, self.waiting.front()) {
+                (None, None) => return None,
+                (Some((place, time)), front) if front.is_none_or(|w| w.first > time) => {
+                    return self.active[place].next();
+                }
+                _ => {
+                    let Waiting { file, wanted, .. } = self.waiting.pop_front()?;
+                    let messages = file.messages(wanted, &self.selection);
+                    self.active.push(messages.peekable());
+                }
+            }
+        }
+    }
+}

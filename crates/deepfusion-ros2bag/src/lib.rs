@@ -1,0 +1,20 @@
+//! Bags of ROS 2 as the messages that `deepfusion-rosbag` knows.
+//!
+//! [`Ros2Bag::open`] takes a recording's folder (`metadata.yaml` and its files) or one of its files: MCAP or SQLite. It is
+//! a [`MessageSource`](deepfusion_rosbag::MessageSource): messages by topic and time, in time order, decoded as
+//! `deepfusion_rosbag::msg`'s types by name. ROS 2 has no MD5 of a type; a message of another definition shows by its
+//! length.
+//!
+//! The way of a message: `metadata` (which files) → `storage` (what MCAP and SQLite have in common): `mcap` (`record` →
+//! `index`, or `scan` where there is none → `chunk` → `messages`) or `sqlite` → `bag` (all files in time order) →
+//! [`Message`](deepfusion_rosbag::Message), whose bytes are CDR.
+//!
+//! A crate of its own because it brings C code (SQLite, Zstandard) that a reader of ROS 1 needs none of.
+
+mod bag;
+mod mcap;
+mod metadata;
+mod sqlite;
+mod storage;
+
+pub use bag::{Ros2Bag, is_ros2_bag};

@@ -1,0 +1,175 @@
+//! A file's summary, which stands at its end.
+
+use super::chunk::{self, indexed_times, walk};
+use super::definitions::Definitions;
+use super::record::{Fields, MAGIC, TAIL, op, record};
+use super::{ChunkInfo, Index};
+use crate::storage::hull;
+use deepfusion_rosbag::Time;
+
+/// Numbers of the statistics record that say whether the summary is complete.
+struct Statistics {
+    messages: u64,
+    channels: u64,
+    chunks: u64,
+    /// Messages by channel.
+    counts: Vec<(u16, u64)>,
+}
+
+/// Where a chunk's message indexes are, by channel.
+struct Indexes(Vec<(u16, u64)>);
+
+/// The index by the summary; else why the file has to be scanned.
+pub(super) fn read(bytes: &[u8]) -> Result<Index, String> {
+    let tail = bytes.len().checked_sub(TAIL);
+    let (Some(tail), true) = (tail, bytes.ends_with(MAGIC)) else {
+        return Err("the recorder did not finish the file, it has no summary".into());
+    };
+    let footer = match record(bytes, tail) {
+        Ok(Some(footer)) if footer.op == op::FOOTER => footer,
+        _ => return Err("the file's end is damaged".into()),
+    };
+    let start = Fields(footer.content).u64().unwrap_or_default();
+    if start == 0 {
+        return Err(String::new());
+    }
+    let damaged = |what: &str| format!("the summary is damaged: {what}");
+    let mut definitions = Definitions::default();
+    let (mut chunks, mut indexes, mut statistics) = (Vec::new(), Vec::new(), None);
+    let mut at = usize::try_from(start).unwrap_or(usize::MAX);
+    if at >= tail {
+        return Err(damaged("it begins behind its end"));
+    }
+    while at < tail {
+        let found = match record(&bytes[..tail], at) {
+            Ok(Some(found)) => found,
+            Ok(None) => break,
+            Err(cut) => return Err(damaged(&cut.problem())),
+        };
+        let sound = match found.op {
+            op::SCHEMA | op::CHANNEL => definitions.add(found.op, found.content).is_some(),
+            op::CHUNK_INDEX => match chunk_index(bytes, found.content) {
+                Some((info, index)) => {
+                    chunks.push(info);
+                    indexes.push(index);
+                    true
+                }
+                None => false,
+            },
+            op::STATISTICS => {
+                statistics = read_statistics(found.content);
+                statistics.is_some()
+            }
+            _ => true,
+        };
+        if !sound {
+            return Err(damaged(&format!("the record at byte {at}")));
+        }
+        at = found.end();
+    }
+    // Recorders may leave parts of the summary out; then nothing but the file itself tells.
+    let Some(statistics) = statistics else {
+        return Err(String::new());
+    };
+    let complete = statistics.chunks == chunks.len() as u64
+        && statistics.channels == definitions.channels.len() as u64
+        && (statistics.messages == 0 || !chunks.is_empty());
+    if !complete {
+        return Err(String::new());
+    }
+    for (id, count) in &statistics.counts {
+        if let Some(place) = definitions.places.get(id) {
+            definitions.channels[*place].connection.count = *count;
+        }
+    }
+    let mut index = Index {
+        channels: definitions.channels,
+        places: definitions.places,
+        chunks,
+        ..Index::default()
+    };
+    set_ranges(bytes, &mut index, &indexes);
+    Ok(index)
+}
+
+fn read_statistics(content: &[u8]) -> Option<Statistics> {
+    let mut fields = Fields(content);
+    let (messages, _schemas, channels) = (fields.u64()?, fields.u16()?, fields.u32()?);
+    let (_attachments, _metadata, chunks) = (fields.u32()?, fields.u32()?, fields.u32()?);
+    let (_first, _last) = (fields.u64()?, fields.u64()?);
+    Some(Statistics {
+        messages,
+        channels: u64::from(channels),
+        chunks: u64::from(chunks),
+        counts: fields.map()?,
+    })
+}
+
+fn chunk_index(bytes: &[u8], content: &[u8]) -> Option<(ChunkInfo, Indexes)> {
+    let mut fields = Fields(content);
+    let (first, last) = (fields.u64()?, fields.u64()?);
+    let (start, _length) = (fields.u64()?, fields.u64()?);
+    let indexes = fields.map()?;
+    let found = record(bytes, usize::try_from(start).ok()?).ok()??;
+    let channels: Vec<u16> = indexes.iter().map(|(channel, _)| *channel).collect();
+    let info = ChunkInfo {
+        from: found.start,
+        to: found.end(),
+        first: Time::from_nanos(first),
+        last: Time::from_nanos(last),
+        // Without message indexes nothing says what is in it.
+        channels: (!channels.is_empty()).then_some(channels),
+        scanned: false,
+    };
+    (found.op == op::CHUNK).then_some((info, Indexes(indexes)))
+}
+
+/// Each channel's first and last time, by the message indexes of the few chunks that can hold them.
+fn set_ranges(bytes: &[u8], index: &mut Index, indexes: &[Indexes]) {
+    let mut by_first: Vec<usize> = (0..index.chunks.len()).collect();
+    let mut by_last = by_first.clone();
+    by_first.sort_by_key(|i| index.chunks[*i].first);
+    by_last.sort_by_key(|i| std::cmp::Reverse(index.chunks[*i].last));
+    let ids: Vec<(u16, usize)> = index
+        .places
+        .iter()
+        .map(|(id, place)| (*id, *place))
+        .collect();
+    for (id, place) in ids {
+        let times = |i: usize| times_in(bytes, &index.chunks[i], &indexes[i], id);
+        let mut range: Option<(Time, Time)> = None;
+        for &i in &by_first {
+            if range.is_some_and(|(first, _)| index.chunks[i].first > first) {
+                break;
+            }
+            range = hull(range, times(i));
+        }
+        for &i in &by_last {
+            if range.is_some_and(|(_, last)| index.chunks[i].last < last) {
+                break;
+            }
+            range = hull(range, times(i));
+        }
+        index.channels[place].range = range;
+    }
+}
+
+/// The times of a channel's first and last message in a chunk.
+fn times_in(bytes: &[u8], info: &ChunkInfo, indexes: &Indexes, id: u16) -> Option<(Time, Time)> {
+    let times: Vec<Time> = match &info.channels {
+        Some(channels) if !channels.contains(&id) => return None,
+        Some(_) => {
+            let (_, offset) = indexes.0.iter().find(|(channel, _)| *channel == id)?;
+            let found = record(bytes, usize::try_from(*offset).ok()?).ok()??;
+            let sound = found.op == op::MESSAGE_INDEX;
+            sound.then(|| indexed_times(found.content, id))??
+        }
+        None => {
+            let (content, _) = chunk::open(&bytes[info.from..info.to]);
+            let messages = walk(content.bytes()).messages;
+            let of_channel = messages.iter().filter(|m| m.channel == id);
+            of_channel.map(|m| m.time).collect()
+        }
+    };
+    Some((*times.iter().min()?, *times.iter().max()?))
+}

@@ -1,0 +1,169 @@
+//! A file's messages in time order, chunk by chunk.
+
+use super::chunk::{self, Content, Entry};
+use super::{ChunkInfo, McapFile};
+use crate::storage::{COPY_AGAIN, error};
+use deepfusion_rosbag::{Error, Message, Result, Selection, Time};
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque, binary_heap::PeekMut};
+use std::sync::Arc;
+
+/// Memory: a chunk is unpacked shortly before its first message and released after its last; of each open chunk 40
+/// bytes a message.
+pub(super) struct Messages<'a> {
+    file: &'a McapFile,
+    wanted: Vec<bool>,
+    selection: Selection,
+    /// Chunks not open yet, by their first message's time.
+    waiting: VecDeque<&'a ChunkInfo>,
+    /// Open chunks, the one with the next message first.
+    open: BinaryHeap<Reverse<OpenChunk<'a>>>,
+    errors: VecDeque<Error>,
+}
+
+/// A chunk with messages left; ordered by the next of them, then by its place in the file.
+struct OpenChunk<'a> {
+    next: (Time, usize),
+    entries: std::vec::IntoIter<Entry>,
+    content: Content<'a>,
+}
+
+impl<'a> Messages<'a> {
+    pub fn new(file: &'a McapFile, wanted: Vec<bool>, selection: &Selection) -> Self {
+        let index = &file.index;
+        let is_wanted = |channel: &u16| index.places.get(channel).is_some_and(|p| wanted[*p]);
+        let chunks = index.chunks.iter().filter(|info| {
+            let holds = info.channels.as_ref();
+            selection.meets(info.first, info.last)
+                && holds.is_none_or(|channels| channels.iter().any(is_wanted))
+        });
+        let mut waiting: Vec<&ChunkInfo> = chunks.collect();
+        waiting.sort_by_key(|info| (info.first, info.from));
+        let loose = index.loose.iter();
+        let loose = loose.filter(|e| is_wanted(&e.channel) && selection.holds(e.time));
+        let loose: Vec<Entry> = loose.cloned().collect();
+        let mut messages = Self {
+            file,
+            wanted,
+            selection: selection.clone(),
+            waiting: waiting.into(),
+            open: BinaryHeap::new(),
+            errors: VecDeque::new(),
+        };
+        messages.push(Content::Stored(file.bytes()), loose, 0);
+        messages
+    }
+
+    /// Opens what must be open to know the next message.
+    fn advance(&mut self) {
+        while self.errors.is_empty() {
+            let next = self.open.peek().map(|Reverse(chunk)| chunk.next.0);
+            let first = self.waiting.front().map(|info| info.first);
+            match (first, next) {
+                (None, _) => return,
+                (Some(first), Some(next)) if first > next => return,
+                _ => {
+                    if let Some(info) = self.waiting.pop_front() {
+                        self.open_chunk(info);
+                    }
+                }
+            }
+        }
+    }
+
+    fn open_chunk(&mut self, info: &'a ChunkInfo) {
+        let (content, problem) = chunk::open(&self.file.bytes()[info.from..info.to]);
+        let walk = chunk::walk(content.bytes());
+        // What is wrong with a scanned chunk is known since the scan.
+        if let Some(problem) = problem.or(walk.broken).filter(|_| !info.scanned) {
+            return self.fail(info, &problem);
+        }
+        let mut entries = walk.messages;
+        if let Some(early) = entries.iter().find(|e| e.time < info.first) {
+            // It has come too late to keep the order.
+            let (time, first) = (early.time, info.first);
+            let problem = format!("a message at {time}, the index says the first is at {first}");
+            return self.fail(info, &problem);
+        }
+        let places = &self.file.index.places;
+        let wanted = |channel: &u16| places.get(channel).is_some_and(|p| self.wanted[*p]);
+        entries.retain(|e| wanted(&e.channel) && self.selection.holds(e.time));
+        entries.sort_by_key(|e| (e.time, e.range.start));
+        self.push(content, entries, info.from);
+    }
+
+    fn push(&mut self, content: Content<'a>, entries: Vec<Entry>, place: usize) {
+        if let Some(first) = entries.first() {
+            self.open.push(Reverse(OpenChunk {
+                next: (first.time, place),
+                entries: entries.into_iter(),
+                content,
+            }));
+        }
+    }
+
+    fn fail(&mut self, info: &ChunkInfo, problem: &str) {
+        let problem = format!("the chunk at byte {}: {problem}", info.from);
+        self.errors
+            .push_back(error(&self.file.path, problem, COPY_AGAIN));
+    }
+}
+
+impl<'a> Iterator for Messages<'a> {
+    type Item = Result<Message<'a>>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.advance();
+        if let Some(error) = self.errors.pop_front() {
+            return Some(Err(error));
+        }
+        let mut top = self.open.peek_mut()?;
+        let Reverse(chunk) = &mut *top;
+        let entry = chunk.entries.next()?;
+        let index = &self.file.index;
+        let channel = &index.channels[*index.places.get(&entry.channel)?];
+        let (path, connection) = (&*self.file.path, &channel.connection);
+        let message = match &chunk.content {
+            Content::Stored(bytes) => Message::stored(
+                path,
+                connection,
+                entry.time,
+                channel.serialization,
+                &bytes[entry.range],
+            ),
+            Content::Unpacked(bytes) => Message::held(
+                path,
+                connection,
+                entry.time,
+                channel.serialization,
+                Arc::clone(bytes),
+                entry.range,
+            ),
+        };
+        match chunk.entries.as_slice().first() {
+            Some(following) => chunk.next.0 = following.time,
+            None => drop(PeekMut::pop(top)),
+        }
+        Some(Ok(message))
+    }
+}
+
+impl Ord for OpenChunk<'_> {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.next.cmp(&other.next)
+    }
+}
+
+impl PartialOrd for OpenChunk<'_> {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for OpenChunk<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        self.next == other.next
+    }
+}
+
+impl Eq for OpenChunk<'_> {}

@@ -1,0 +1,125 @@
+//! MCAP files, mapped. The format: <https://mcap.dev/spec>.
+//!
+//! Read by an own reader: the `mcap` crate copies every chunk, and stops at the first thing that is wrong.
+
+mod chunk;
+mod definitions;
+mod index;
+mod messages;
+mod record;
+mod scan;
+
+use crate::storage::{Channel, Storage, error, hull};
+use chunk::Entry;
+use deepfusion_rosbag::{Error, MessageIter, Result, Selection, Time};
+use memmap2::Mmap;
+use record::MAGIC;
+use std::collections::HashMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// An MCAP file, open for reading.
+pub(crate) struct McapFile {
+    path: PathBuf,
+    bytes: Bytes,
+    index: Index,
+}
+
+enum Bytes {
+    Mapped(Mmap),
+    Empty,
+}
+
+/// What is in a file, and where.
+#[derive(Debug, Default)]
+struct Index {
+    channels: Vec<Channel>,
+    /// From a channel's number to its place in `channels`.
+    places: HashMap<u16, usize>,
+    chunks: Vec<ChunkInfo>,
+    /// Messages outside of chunks, in time order, by place in the file.
+    loose: Vec<Entry>,
+    damage: Option<String>,
+}
+
+/// A chunk.
+#[derive(Debug, Clone)]
+struct ChunkInfo {
+    /// The record's content in the file.
+    from: usize,
+    to: usize,
+    first: Time,
+    last: Time,
+    /// The channels it has messages of, by number; `None` where nothing says it.
+    channels: Option<Vec<u16>>,
+    /// What of it is not sound is known: it is read as far as it goes.
+    scanned: bool,
+}
+
+impl McapFile {
+    /// Opens a file by its summary; without one, by reading all of it.
+    ///
+    /// # Errors
+    /// [`Error::File`], [`Error::NoSuchPath`]; [`Error::Storage`] for a file of another kind.
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        let failed = |e| Error::file(path, e);
+        let file = File::open(path).map_err(failed)?;
+        let bytes = match file.metadata().map_err(failed)?.len() {
+            0 => Bytes::Empty,
+            // SAFETY: the mapping is read-only and private. What remains is memmap2's caveat, stated at
+            // `Ros2Bag::open`: nobody may shorten the file meanwhile.
+            _ => Bytes::Mapped(unsafe { Mmap::map(&file) }.map_err(failed)?),
+        };
+        let mut opened = Self {
+            path: path.to_owned(),
+            bytes,
+            index: Index::default(),
+        };
+        if !opened.bytes().starts_with(MAGIC) {
+            return Err(error(
+                path,
+                "not an MCAP file: it does not begin as one",
+                "give the recording's own .mcap file",
+            ));
+        }
+        opened.index = match index::read(opened.bytes()) {
+            Ok(index) => index,
+            Err(why) => scan::read(opened.bytes(), why),
+        };
+        Ok(opened)
+    }
+
+    fn bytes(&self) -> &[u8] {
+        match &self.bytes {
+            Bytes::Mapped(map) => map,
+            Bytes::Empty => &[],
+        }
+    }
+}
+
+impl Storage for McapFile {
+    fn channels(&self) -> &[Channel] {
+        &self.index.channels
+    }
+
+    fn range(&self) -> Option<(Time, Time)> {
+        let channels = self.index.channels.iter().map(|c| c.range);
+        channels.fold(None, hull)
+    }
+
+    fn damage(&self) -> Option<String> {
+        self.index.damage.clone()
+    }
+
+    fn messages<'a>(&'a self, wanted: Vec<bool>, selection: &Selection) -> MessageIter<'a> {
+        Box::new(messages::Messages::new(self, wanted, selection))
+    }
+}
+
+impl std::fmt::Debug for McapFile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("McapFile")
+            .field("path", &self.path)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,189 @@
+//! Records, from which everything in the file is built: a number that says what it is, its length, its content.
+//!
+//! All numbers are little-endian; a string is its length (u32) and its bytes.
+
+/// The file's first and last bytes.
+pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+/// What a record is, and its length.
+const HEAD: usize = 9;
+/// The footer and the magic behind it.
+pub(super) const TAIL: usize = HEAD + 20 + MAGIC.len();
+
+pub(super) mod op {
+    pub const FOOTER: u8 = 0x02;
+    pub const SCHEMA: u8 = 0x03;
+    pub const CHANNEL: u8 = 0x04;
+    pub const MESSAGE: u8 = 0x05;
+    pub const CHUNK: u8 = 0x06;
+    pub const MESSAGE_INDEX: u8 = 0x07;
+    pub const CHUNK_INDEX: u8 = 0x08;
+    pub const STATISTICS: u8 = 0x0b;
+    pub const DATA_END: u8 = 0x0f;
+}
+
+/// A record in its file or chunk.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Record<'a> {
+    pub op: u8,
+    /// Where its content begins.
+    pub start: usize,
+    pub content: &'a [u8],
+}
+
+impl Record<'_> {
+    /// Where the next one begins.
+    pub fn end(&self) -> usize {
+        self.start + self.content.len()
+    }
+}
+
+/// A record that is not whole.
+#[derive(Debug, PartialEq)]
+pub(super) struct Cut<'a> {
+    pub op: Option<u8>,
+    /// Where it begins.
+    pub at: usize,
+    /// Where its content begins, and what is there of it.
+    pub start: usize,
+    pub content: &'a [u8],
+    pub missing: u64,
+}
+
+impl Cut<'_> {
+    pub fn problem(&self) -> String {
+        match self.op {
+            Some(op) => format!(
+                "the record at byte {} (type {op:#04x}) lacks {} bytes",
+                self.at, self.missing
+            ),
+            None => format!("the record at byte {} is cut off within its head", self.at),
+        }
+    }
+}
+
+/// The record at `at`; `None` at the end.
+pub(super) fn record(bytes: &[u8], at: usize) -> Result<Option<Record<'_>>, Cut<'_>> {
+    let rest = bytes.get(at..).unwrap_or_default();
+    if rest.is_empty() {
+        return Ok(None);
+    }
+    let head = rest.first_chunk::<HEAD>();
+    let Some([op, length @ ..]) = head else {
+        return Err(Cut {
+            op: None,
+            at,
+            start: bytes.len(),
+            content: &[],
+            missing: 0,
+        });
+    };
+    let (length, content) = (u64::from_le_bytes(*length), &rest[HEAD..]);
+    let start = at + HEAD;
+    let whole = usize::try_from(length).ok().and_then(|n| content.get(..n));
+    match whole {
+        Some(content) => Ok(Some(Record {
+            op: *op,
+            start,
+            content,
+        })),
+        None => Err(Cut {
+            op: Some(*op),
+            at,
+            start,
+            content,
+            missing: length - content.len() as u64,
+        }),
+    }
+}
+
+/// A record's content that has not been read yet. `None` where it ends too early.
+pub(super) struct Fields<'a>(pub &'a [u8]);
+
+impl<'a> Fields<'a> {
+    pub fn bytes(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(count)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (taken, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(*taken)
+    }
+
+    pub fn u16(&mut self) -> Option<u16> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    pub fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    pub fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    pub fn text(&mut self) -> Option<String> {
+        let length = self.u32()? as usize;
+        let bytes = self.bytes(length)?;
+        Some(String::from_utf8_lossy(bytes).into_owned())
+    }
+
+    /// A map of numbers, whose length in bytes stands in front.
+    pub fn map(&mut self) -> Option<Vec<(u16, u64)>> {
+        let length = self.u32()? as usize;
+        let mut inside = Fields(self.bytes(length)?);
+        let mut entries = Vec::new();
+        while !inside.0.is_empty() {
+            entries.push((inside.u16()?, inside.u64()?));
+        }
+        Some(entries)
+    }
+}
+
+/// A message's channel and time (of recording), in front of its bytes.
+pub(super) struct MessageHead {
+    pub channel: u16,
+    pub log_time: u64,
+}
+
+/// Bytes in front of a message's own.
+pub(super) const MESSAGE_HEAD: usize = 2 + 4 + 8 + 8;
+
+impl MessageHead {
+    pub fn read(content: &[u8]) -> Option<Self> {
+        let mut fields = Fields(content);
+        let (channel, _sequence) = (fields.u16()?, fields.u32()?);
+        let (log_time, _publish_time) = (fields.u64()?, fields.u64()?);
+        Some(Self { channel, log_time })
+    }
+}
+
+/// What a chunk says of itself, and where its content lies in the file.
+#[derive(Debug, Clone)]
+pub(super) struct ChunkHead {
+    pub size: u64,
+    pub crc: u32,
+    pub compression: String,
+    /// Bytes as they are stored.
+    pub stored: u64,
+    /// Bytes of this head.
+    pub length: usize,
+}
+
+impl ChunkHead {
+    pub fn read(content: &[u8]) -> Option<Self> {
+        let mut fields = Fields(content);
+        let (_first, _last, size) = (fields.u64()?, fields.u64()?, fields.u64()?);
+        let (crc, compression) = (fields.u32()?, fields.text()?);
+        let stored = fields.u64()?;
+        Some(Self {
+            size,
+            crc,
+            compression,
+            stored,
+            length: content.len() - fields.0.len(),
+        })
+    }
+}

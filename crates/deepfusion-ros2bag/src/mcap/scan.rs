@@ -1,0 +1,137 @@
+//! A file without a usable summary, read from the front to its end or its break.
+
+use super::chunk::{self, Entry, walk};
+use super::definitions::Definitions;
+use super::record::{MAGIC, MESSAGE_HEAD, MessageHead, op, record};
+use super::{ChunkInfo, Index};
+use deepfusion_rosbag::Time;
+
+/// The index by going through the file; `why` is what was wrong with its summary, nothing where it never had one.
+pub(super) fn read(bytes: &[u8], why: String) -> Index {
+    let mut scan = Scan {
+        bytes,
+        definitions: Definitions::default(),
+        chunks: Vec::new(),
+        loose: Vec::new(),
+        broken: Vec::new(),
+    };
+    scan.go();
+    let mut index = Index {
+        channels: scan.definitions.channels,
+        places: scan.definitions.places,
+        chunks: scan.chunks,
+        loose: scan.loose,
+        damage: None,
+    };
+    index.loose.sort_by_key(|m| (m.time, m.range.start));
+    let mut problems = scan.broken;
+    if !why.is_empty() {
+        problems.insert(0, why);
+    }
+    index.damage = (!problems.is_empty()).then(|| problems.join("; "));
+    index
+}
+
+struct Scan<'a> {
+    bytes: &'a [u8],
+    definitions: Definitions,
+    chunks: Vec<ChunkInfo>,
+    loose: Vec<Entry>,
+    broken: Vec<String>,
+}
+
+impl Scan<'_> {
+    fn go(&mut self) {
+        let mut at = MAGIC.len();
+        loop {
+            match record(self.bytes, at) {
+                Ok(Some(found)) => {
+                    let content = found.content;
+                    match found.op {
+                        op::SCHEMA | op::CHANNEL => self.define(found.op, content, at),
+                        op::MESSAGE => self.message(content, found.start, at),
+                        op::CHUNK => self.chunk(found.start, found.end(), at),
+                        // What follows is the summary, which repeats.
+                        op::DATA_END | op::FOOTER => return,
+                        _ => {}
+                    }
+                    at = found.end();
+                }
+                Ok(None) => return,
+                Err(cut) => {
+                    if cut.op == Some(op::CHUNK) {
+                        self.chunk(cut.start, cut.start + cut.content.len(), at);
+                    }
+                    self.broken.push(cut.problem());
+                    return;
+                }
+            }
+        }
+    }
+
+    fn define(&mut self, op: u8, content: &[u8], at: usize) {
+        if self.definitions.add(op, content).is_none() {
+            self.broken
+                .push(format!("the definition at byte {at} is cut off"));
+        }
+    }
+
+    fn message(&mut self, content: &[u8], start: usize, at: usize) {
+        match MessageHead::read(content) {
+            Some(head) => {
+                let time = Time::from_nanos(head.log_time);
+                let range = start + MESSAGE_HEAD..start + content.len();
+                let entry = self.count(head.channel, time, range);
+                self.loose.extend(entry);
+            }
+            None => self
+                .broken
+                .push(format!("the message at byte {at} is too short")),
+        }
+    }
+
+    /// Counts a message of a channel that is known.
+    fn count(&mut self, channel: u16, time: Time, range: std::ops::Range<usize>) -> Option<Entry> {
+        let place = *self.definitions.places.get(&channel)?;
+        self.definitions.channels[place].add(time);
+        Some(Entry {
+            time,
+            channel,
+            range,
+        })
+    }
+
+    fn chunk(&mut self, from: usize, to: usize, at: usize) {
+        let bytes = self.bytes;
+        let (content, problem) = chunk::open(&bytes[from..to]);
+        let walk = walk(content.bytes());
+        for problem in problem.iter().chain(&walk.broken) {
+            self.broken
+                .push(format!("the chunk at byte {at}: {problem}"));
+        }
+        for (op, content) in &walk.definitions {
+            self.define(*op, content, at);
+        }
+        let mut channels: Vec<u16> = Vec::new();
+        let mut range: Option<(Time, Time)> = None;
+        for message in walk.messages {
+            let (channel, time) = (message.channel, message.time);
+            if self.count(channel, time, message.range).is_some() {
+                range = crate::storage::hull(range, Some((time, time)));
+                if !channels.contains(&channel) {
+                    channels.push(channel);
+                }
+            }
+        }
+        // Else an empty one, or one whose messages nothing describes.
+        let Some((first, last)) = range else { return };
+        self.chunks.push(ChunkInfo {
+            from,
+            to,
+            first,
+            last,
+            channels: Some(channels),
+            scanned: true,
+        });
+    }
+}

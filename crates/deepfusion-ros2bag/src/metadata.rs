@@ -1,0 +1,55 @@
+//! `metadata.yaml`: which files a recording's folder holds. What is in them they say themselves.
+
+use crate::storage::error;
+use deepfusion_rosbag::{Error, Result};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// The file that makes a folder a bag.
+pub(crate) const NAME: &str = "metadata.yaml";
+const KEY: &str = "rosbag2_bagfile_information";
+
+#[derive(Deserialize)]
+struct Root {
+    rosbag2_bagfile_information: Information,
+}
+
+#[derive(Deserialize)]
+struct Information {
+    relative_file_paths: Vec<String>,
+}
+
+/// Whether a folder is a bag: other programs have files of this name too.
+pub(crate) fn is_bag(folder: &Path) -> bool {
+    let text = std::fs::read_to_string(folder.join(NAME));
+    text.is_ok_and(|text| text.contains(KEY))
+}
+
+/// The recording's files, in order of time.
+///
+/// # Errors
+/// [`Error::NoSuchPath`], [`Error::File`]; [`Error::Storage`] where it is no such file.
+pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let path = folder.join(NAME);
+    let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
+    let root: Root = serde_saphyr::from_str(&text).map_err(|e| {
+        let first = e.to_string();
+        let first = first.lines().next().unwrap_or_default().to_owned();
+        error(
+            &path,
+            format!("{KEY}: {first}"),
+            "`ros2 bag reindex FOLDER` writes it anew",
+        )
+    })?;
+    let files = root.rosbag2_bagfile_information.relative_file_paths;
+    Ok(files.iter().map(|file| place(folder, file)).collect())
+}
+
+/// Old recorders put the folder's own name in front.
+fn place(folder: &Path, file: &str) -> PathBuf {
+    let path = folder.join(file);
+    match (path.is_file(), Path::new(file).file_name()) {
+        (false, Some(name)) => folder.join(name),
+        _ => path,
+    }
+}

@@ -1,0 +1,228 @@
+//! SQLite files (`.db3`), in which every message is a row.
+
+mod rows;
+
+use crate::storage::{COPY_AGAIN, Channel, MOST_BYTES, Storage, error, hull};
+use deepfusion_rosbag::{Error, MessageIter, Result, Selection, Time};
+use rows::{Key, Rows};
+use rusqlite::limits::Limit;
+use rusqlite::{Connection, ErrorCode, OpenFlags};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// A database of messages, open for reading.
+pub(crate) struct SqliteFile {
+    path: PathBuf,
+    /// One reader at a time: a connection is no thing to share.
+    database: Mutex<Connection>,
+    channels: Vec<Channel>,
+    /// From a topic's number to its place in `channels`.
+    places: HashMap<i64, usize>,
+    /// Every message in time order, where the database cannot order them itself: its index is missing, or it is damaged.
+    listed: Option<Vec<Key>>,
+    damage: Option<String>,
+}
+
+impl SqliteFile {
+    /// Opens a database; one that was cut off is read as far as it goes.
+    ///
+    /// # Errors
+    /// [`Error::Storage`] for a file that is no recorder's database.
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        std::fs::File::open(path).map_err(|e| Error::file(path, e))?;
+        let failed = |e: rusqlite::Error| failed(path, &e);
+        let database = connect(path).map_err(failed)?;
+        let mut file = Self {
+            path: path.to_owned(),
+            database: Mutex::new(database),
+            channels: Vec::new(),
+            places: HashMap::new(),
+            listed: None,
+            damage: None,
+        };
+        match file.read_topics() {
+            Err(e) if is_damage(&e) => {
+                // SQLite refuses a file that is shorter than it says, unless it is told that the file is being mended.
+                let database = file.database();
+                database
+                    .execute_batch("PRAGMA writable_schema = ON")
+                    .map_err(failed)?;
+                drop(database);
+                file.damage = Some(e.to_string());
+                file.read_topics().map_err(failed)?;
+            }
+            other => other.map_err(failed)?,
+        }
+        file.read_index()?;
+        Ok(file)
+    }
+
+    fn database(&self) -> std::sync::MutexGuard<'_, Connection> {
+        // A reader that panicked has changed nothing.
+        self.database
+            .lock()
+            .unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+
+    fn read_topics(&mut self) -> rusqlite::Result<()> {
+        let (mut channels, mut places) = (Vec::new(), HashMap::new());
+        {
+            let database = self.database();
+            let mut rows =
+                database.prepare("SELECT id, name, type, serialization_format FROM topics")?;
+            let mut rows = rows.query([])?;
+            while let Some(row) = rows.next()? {
+                let (id, place): (i64, usize) = (row.get(0)?, channels.len());
+                let (topic, type_name): (String, String) = (row.get(1)?, row.get(2)?);
+                let encoding: String = row.get(3)?;
+                let number = u32::try_from(id).unwrap_or(place as u32);
+                let definition = String::new();
+                let channel = Channel::new(number, topic, &type_name, &encoding, definition);
+                channels.push(channel);
+                places.insert(id, place);
+            }
+        }
+        (self.channels, self.places) = (channels, places);
+        Ok(())
+    }
+
+    /// Counts the messages; lists them where their order is not at hand.
+    fn read_index(&mut self) -> Result<()> {
+        let (keys, broken) = {
+            let database = self.database();
+            let ordered = self.damage.is_none() && rows::is_indexed(&database);
+            if ordered {
+                let counts = rows::counts(&database);
+                drop(database);
+                match counts {
+                    Ok(counts) => {
+                        for (topic, count, range) in counts {
+                            if let Some(place) = self.places.get(&topic) {
+                                let channel = &mut self.channels[*place];
+                                channel.connection.count = count;
+                                channel.range = Some(range);
+                            }
+                        }
+                        return Ok(());
+                    }
+                    Err(e) if !is_damage(&e) => return Err(failed(&self.path, &e)),
+                    Err(e) => self.damage = Some(e.to_string()),
+                }
+                rows::all(&self.database())
+            } else {
+                rows::all(&database)
+            }
+        };
+        if let Some(broken) = broken.filter(|_| self.damage.is_none()) {
+            self.damage = Some(broken.to_string());
+        }
+        let known = keys.into_iter().filter_map(|mut key| {
+            key.topic = i64::try_from(*self.places.get(&key.topic)?).ok()?;
+            Some(key)
+        });
+        let mut keys: Vec<Key> = known.collect();
+        keys.sort_by_key(|key| (key.time, key.id));
+        for key in &keys {
+            self.channels[key.topic as usize].add(Time::from_nanos(key.time));
+        }
+        if let Some(problem) = &mut self.damage {
+            let found = keys.len();
+            *problem = format!("the database is damaged ({problem}); {found} messages were found");
+        }
+        self.listed = Some(keys);
+        Ok(())
+    }
+}
+
+/// Opens the file for reading only; what a recorder left in its journal is taken in, where there is one.
+fn connect(path: &Path) -> rusqlite::Result<Connection> {
+    let beside = |ending: &str| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(ending);
+        Path::new(&name).exists()
+    };
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let database = match beside("-wal") || beside("-journal") {
+        true => Connection::open_with_flags(path, flags)?,
+        // Nobody writes to it: no locks are needed, which a read-only disk could not hold.
+        false => match uri(path) {
+            Some(uri) => Connection::open_with_flags(uri, flags | OpenFlags::SQLITE_OPEN_URI)?,
+            None => Connection::open_with_flags(path, flags)?,
+        },
+    };
+    database.set_limit(Limit::SQLITE_LIMIT_LENGTH, MOST_BYTES as i32)?;
+    // A file from elsewhere must not bring code of its own: views, triggers.
+    database.execute_batch("PRAGMA trusted_schema = OFF; PRAGMA query_only = ON")?;
+    Ok(database)
+}
+
+/// The path as SQLite's URI for a file that does not change; `None` for a path that is no text.
+fn uri(path: &Path) -> Option<String> {
+    let absolute = std::path::absolute(path).ok()?;
+    let mut uri = String::from("file:");
+    for byte in absolute.to_str()?.bytes() {
+        match byte {
+            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' => {
+                uri.push(char::from(byte));
+            }
+            other => uri.push_str(&format!("%{other:02X}")),
+        }
+    }
+    uri.push_str("?immutable=1");
+    Some(uri)
+}
+
+fn is_damage(e: &rusqlite::Error) -> bool {
+    e.sqlite_error_code() == Some(ErrorCode::DatabaseCorrupt)
+}
+
+fn failed(path: &Path, e: &rusqlite::Error) -> Error {
+    let (problem, remedy) = match e.sqlite_error_code() {
+        Some(ErrorCode::NotADatabase) => (
+            "not an SQLite database".to_owned(),
+            "give the recording's own .db3 file",
+        ),
+        Some(ErrorCode::DatabaseCorrupt) => (
+            format!("the database is damaged: {e}"),
+            "copy the file again",
+        ),
+        Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen) => (
+            format!("cannot be opened: {e}"),
+            "its recorder was stopped: copy the file with its -wal or -journal to where it can be written, and open it \
+             once with sqlite3",
+        ),
+        None | Some(ErrorCode::Unknown) => (
+            format!("no recorder's database: {e}"),
+            "a bag has the tables `topics` and `messages`, as rosbag2 writes them",
+        ),
+        _ => (e.to_string(), COPY_AGAIN),
+    };
+    error(path, problem, remedy)
+}
+
+impl Storage for SqliteFile {
+    fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    fn range(&self) -> Option<(Time, Time)> {
+        self.channels.iter().map(|c| c.range).fold(None, hull)
+    }
+
+    fn damage(&self) -> Option<String> {
+        self.damage.clone()
+    }
+
+    fn messages<'a>(&'a self, wanted: Vec<bool>, selection: &Selection) -> MessageIter<'a> {
+        Box::new(Rows::new(self, wanted, selection))
+    }
+}
+
+impl std::fmt::Debug for SqliteFile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("SqliteFile")
+            .field("path", &self.path)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,121 @@
+//! What a file of either kind gives.
+
+use deepfusion_rosbag::{
+    Connection, Error, MessageIter, Selection, Serialization, Time, TopicInfo,
+};
+use std::fmt;
+use std::path::Path;
+
+/// The largest chunk or message that is read, in bytes: what a damaged or hostile file can make one take.
+pub(crate) const MOST_BYTES: u64 = 1 << 30;
+
+/// The remedy for what a copy gone wrong looks like.
+pub(crate) const COPY_AGAIN: &str = "copy the file again; what can be read of it is";
+
+/// A file of a bag.
+pub(crate) trait Storage: fmt::Debug + Send + Sync {
+    /// Its topics, one connection each publisher.
+    fn channels(&self) -> &[Channel];
+
+    /// The times of the first and the last message.
+    fn range(&self) -> Option<(Time, Time)>;
+
+    /// What of it cannot be read.
+    fn damage(&self) -> Option<String>;
+
+    /// The messages of the channels that are `wanted`, by place, in time order.
+    fn messages<'a>(&'a self, wanted: Vec<bool>, selection: &Selection) -> MessageIter<'a>;
+}
+
+/// A connection, how its messages are written, and when.
+#[derive(Debug, Clone)]
+pub(crate) struct Channel {
+    pub connection: Connection,
+    pub serialization: Serialization,
+    /// The times of its first and last message.
+    pub range: Option<(Time, Time)>,
+}
+
+impl Channel {
+    /// A channel without messages yet.
+    pub fn new(
+        id: u32,
+        topic: String,
+        type_name: &str,
+        encoding: &str,
+        definition: String,
+    ) -> Self {
+        // `sensor_msgs/msg/Imu` is ROS 2's way to write `sensor_msgs/Imu`.
+        let name = type_name.replacen("/msg/", "/", 1);
+        let (serialization, type_name) = match encoding {
+            "cdr" => (Serialization::Cdr, name),
+            "ros1" => (Serialization::Ros1, name),
+            // No type that anybody asks for: messages of other middleware are listed, and not read.
+            other => (Serialization::Cdr, format!("{name} ({other})")),
+        };
+        Self {
+            connection: Connection {
+                id,
+                topic,
+                type_name,
+                md5: "*".to_owned(),
+                definition,
+                caller_id: None,
+                latching: false,
+                count: 0,
+            },
+            serialization,
+            range: None,
+        }
+    }
+
+    /// Counts a message.
+    pub fn add(&mut self, time: Time) {
+        self.connection.count += 1;
+        self.range = hull(self.range, Some((time, time)));
+    }
+}
+
+/// From the earlier to the later.
+pub(crate) fn hull(a: Option<(Time, Time)>, b: Option<(Time, Time)>) -> Option<(Time, Time)> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some((a.0.min(b.0), a.1.max(b.1))),
+        (one, None) | (None, one) => one,
+    }
+}
+
+/// Channels gathered by topic, in order of names.
+pub(crate) fn topics<'a>(channels: impl Iterator<Item = &'a Channel>) -> Vec<TopicInfo> {
+    let mut topics: Vec<TopicInfo> = Vec::new();
+    for Channel {
+        connection, range, ..
+    } in channels
+    {
+        match topics.iter_mut().find(|t| t.name == connection.topic) {
+            Some(topic) => {
+                topic.connections += 1;
+                topic.count += connection.count;
+                topic.range = hull(topic.range, *range);
+            }
+            None => topics.push(TopicInfo {
+                name: connection.topic.clone(),
+                type_name: connection.type_name.clone(),
+                md5: connection.md5.clone(),
+                connections: 1,
+                count: connection.count,
+                range: *range,
+            }),
+        }
+    }
+    topics.sort_by(|a, b| a.name.cmp(&b.name));
+    topics
+}
+
+/// An error of a file, with what to do.
+pub(crate) fn error(path: &Path, problem: impl Into<String>, remedy: &'static str) -> Error {
+    Error::Storage {
+        path: path.to_owned(),
+        problem: problem.into(),
+        remedy: Some(remedy),
+    }
+}

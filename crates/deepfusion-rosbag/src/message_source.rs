@@ -1,0 +1,70 @@
+use crate::bag::Bag;
+use crate::message::Message;
+use crate::messages::Messages;
+use crate::topic::TopicInfo;
+use crate::{Result, Selection, Time};
+use std::fmt;
+use std::path::Path;
+
+/// Messages in time order, with what could not be read between them.
+pub type MessageIter<'a> = Box<dyn Iterator<Item = Result<Message<'a>>> + 'a>;
+
+/// A recording of messages by topic and time, whatever its format: [`Bag`] is one, a bag of ROS 2 another.
+///
+/// What is read from it can be read from several threads at once.
+pub trait MessageSource: fmt::Debug + Send + Sync {
+    /// The recording's file or folder.
+    fn path(&self) -> &Path;
+
+    /// The topics by name, with type, count, time range and rate.
+    ///
+    /// # Errors
+    /// Where the index cannot be read.
+    fn topics(&self) -> Result<Vec<TopicInfo>>;
+
+    /// The times of the first and the last message; `None` without any.
+    fn time_range(&self) -> Option<(Time, Time)>;
+
+    /// What is wrong with the recording, in a sentence, where not all of it can be read.
+    fn damage(&self) -> Option<String>;
+
+    /// The messages that `selection` asks for, in time order, streaming: memory does not grow with the recording.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchTopic`](crate::Error::NoSuchTopic).
+    fn messages(&self, selection: Selection) -> Result<MessageIter<'_>>;
+
+    /// As [`Self::messages`], for a single message or a few: nothing is read ahead, no thread is started.
+    ///
+    /// # Errors
+    /// As [`Self::messages`].
+    fn messages_on_demand(&self, selection: Selection) -> Result<MessageIter<'_>> {
+        self.messages(selection)
+    }
+}
+
+impl MessageSource for Bag {
+    fn path(&self) -> &Path {
+        self.path()
+    }
+
+    fn topics(&self) -> Result<Vec<TopicInfo>> {
+        self.topics()
+    }
+
+    fn time_range(&self) -> Option<(Time, Time)> {
+        self.time_range()
+    }
+
+    fn damage(&self) -> Option<String> {
+        self.damage().map(ToString::to_string)
+    }
+
+    fn messages(&self, selection: Selection) -> Result<MessageIter<'_>> {
+        Ok(Box::new(self.messages(selection)?))
+    }
+
+    fn messages_on_demand(&self, selection: Selection) -> Result<MessageIter<'_>> {
+        Ok(Box::new(Messages::on_demand(self, selection)?))
+    }
+}
