@@ -161,6 +161,50 @@ fn a_calibrated_run_gives_its_clouds_a_confidence() {
 }
 
 #[test]
+fn a_calibration_tools_file_brings_camera_and_lens() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    street(at);
+    let image = format!("{DRIVE}/image_02/data/0000000003.png");
+    let yaml = |width: u32| {
+        format!(
+            "image_width: {width}\nimage_height: 96\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [186, 0, 157, 0, 186, 44, 0, 0, 1]\n\
+             distortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [-0.2, 0.03, 0, 0, 0]\n"
+        )
+    };
+    std::fs::write(at.join("camera.yaml"), yaml(320)).unwrap();
+    ok(
+        at,
+        &format!("predict --model run {image} --calib camera.yaml --out depth"),
+    );
+    let sidecar: Value =
+        serde_json::from_str(&std::fs::read_to_string(at.join("depth/0000000003.json")).unwrap())
+            .unwrap();
+    assert_eq!(sidecar["intrinsics_from"], "given");
+    assert!(sidecar["made_with"]["calibration_sha256"].is_string());
+    let fx = sidecar["intrinsics"][0].as_f64().unwrap();
+    assert!((100.0..186.1).contains(&fx), "{fx}");
+    // Made with another file they are others.
+    std::fs::write(at.join("camera.yaml"), yaml(320) + "# touched\n").unwrap();
+    let args = format!("predict --model run {image} --calib camera.yaml --out depth");
+    let again = run(at, &args);
+    assert!(
+        again.code == 1 && again.stderr.contains("another camera"),
+        "{}",
+        again.stderr
+    );
+    // A calibration of another size is no calibration of this image.
+    std::fs::write(at.join("camera.yaml"), yaml(640)).unwrap();
+    let wrong = run(at, &format!("{args} --overwrite"));
+    assert_eq!(wrong.code, 1);
+    assert!(
+        wrong.stderr.contains("640x96") && wrong.stderr.contains("320x96"),
+        "{}",
+        wrong.stderr
+    );
+}
+
+#[test]
 fn exact_depth_finds_the_simulators_boxes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

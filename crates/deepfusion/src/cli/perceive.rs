@@ -26,7 +26,7 @@ pub struct PerceiveArgs {
     /// The camera, in pixels of the input images.
     #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "calib")]
     pub intrinsics: Option<CameraIntrinsics>,
-    /// A calibration file (KITTI's calib_cam_to_cam.txt).
+    /// A calibration file: KITTI's calib_cam_to_cam.txt, OpenCV's, ROS's or Kalibr's YAML, or four numbers; lenses are undone.
     #[arg(long, value_name = "FILE")]
     pub calib: Option<PathBuf>,
     /// What to write for every frame, beside its targets.

@@ -1,21 +1,25 @@
 //! The camera of an input: given, read from a calibration file, or assumed.
 
 use std::path::Path;
+use std::sync::{Arc, OnceLock};
 
 use anyhow::Result;
-use deepfusion_data::{Camera, kitti::Calibration};
+use deepfusion_data::{Camera, CameraCalibration, Lens, RgbImage, kitti::Calibration};
 use deepfusion_geometry::Intrinsics;
+use sha2::{Digest, Sha256};
 
 use crate::cli::{CameraIntrinsics, PredictArgs};
 use crate::error::CliError;
 
 /// Where the inputs' camera comes from.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub enum CameraSource {
     /// Numbers given on the command line, for images of any size.
     Given(CameraIntrinsics),
-    /// A calibration file, for images of its size.
+    /// KITTI's calibration file, for images of its size.
     File(Intrinsics),
+    /// A calibration tool's file, with the lens that is undone.
+    Lens(Arc<LensFile>),
     /// The camera trained with: the inputs are taken to see what it saw.
     Trained(Intrinsics),
     /// Nothing is known.
@@ -31,6 +35,18 @@ impl CameraSource {
         let Some(path) = &args.calib else {
             return Ok(trained.map_or(Self::Unknown, Self::Trained));
         };
+        if !(path.is_dir()
+            || path
+                .file_name()
+                .is_some_and(|name| name == Calibration::CAM_TO_CAM))
+        {
+            let bytes = std::fs::read(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
+            return Ok(Self::Lens(Arc::new(LensFile {
+                path: path.clone(),
+                sha256: format!("{:x}", Sha256::digest(&bytes)),
+                lens: OnceLock::new(),
+            })));
+        }
         let folder = if path.is_dir() {
             path.as_path()
         } else {
@@ -44,14 +60,24 @@ impl CameraSource {
     /// One word for the sidecar.
     pub fn word(&self) -> &'static str {
         match self {
-            Self::Given(_) | Self::File(_) => "given",
+            Self::Given(_) | Self::File(_) | Self::Lens(_) => "given",
             Self::Trained(_) => "assumed",
             Self::Unknown => "unknown",
         }
     }
 
+    /// The image as a pinhole camera would have taken it, and that camera.
+    pub fn see(&self, image: RgbImage) -> Result<(RgbImage, Option<Intrinsics>)> {
+        if let Self::Lens(file) = self {
+            let lens = file.lens_for(image.dimensions())?;
+            return Ok((lens.correct(image)?, Some(lens.intrinsics())));
+        }
+        let camera = self.of(image.width(), image.height())?;
+        Ok((image, camera))
+    }
+
     /// The camera of an image of this size.
-    pub fn of(&self, width: u32, height: u32) -> Result<Option<Intrinsics>, CliError> {
+    fn of(&self, width: u32, height: u32) -> Result<Option<Intrinsics>, CliError> {
         match self {
             Self::Given(k) => {
                 let k = Intrinsics {
@@ -74,8 +100,47 @@ impl CameraSource {
                 ),
             }),
             Self::File(k) => Ok(Some(*k)),
+            Self::Lens(_) => Ok(None),
             Self::Trained(k) => Ok(Some(with_the_view_of(k, width, height))),
             Self::Unknown => Ok(None),
+        }
+    }
+}
+
+/// A calibration tool's file: OpenCV's, ROS's, Kalibr's, or four numbers.
+#[derive(Debug)]
+pub struct LensFile {
+    path: std::path::PathBuf,
+    /// Of the file: outputs made with another are others.
+    pub sha256: String,
+    /// Made for the first image's size.
+    lens: OnceLock<((u32, u32), Lens)>,
+}
+
+impl LensFile {
+    fn lens_for(&self, size: (u32, u32)) -> Result<&Lens> {
+        if self.lens.get().is_none() {
+            let calibration = CameraCalibration::read(&self.path, size)?;
+            let k = &calibration.intrinsics;
+            if (k.width, k.height) != size {
+                return Err(self.of_another_size((k.width, k.height), size).into());
+            }
+            // Another thread may have been first: both made the same.
+            let _ = self.lens.set((size, calibration.lens()?));
+        }
+        match self.lens.get() {
+            Some((made_for, lens)) if *made_for == size => Ok(lens),
+            Some((made_for, _)) => Err(self.of_another_size(*made_for, size).into()),
+            None => Err(self.of_another_size((0, 0), size).into()),
+        }
+    }
+
+    fn of_another_size(&self, (width, height): (u32, u32), (w, h): (u32, u32)) -> CliError {
+        CliError::Camera {
+            why: format!(
+                "{} is for images of {width}x{height}, this one has {w}x{h}",
+                self.path.display()
+            ),
         }
     }
 }

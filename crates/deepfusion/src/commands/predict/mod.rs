@@ -167,9 +167,9 @@ impl<'a> Job<'a> {
         let camera = CameraSource::new(args, predictor.training_camera())?;
         Ok(Self {
             args,
+            made_with: MadeWith::new(args, predictor, &camera)?,
             camera,
             preparer: predictor.preparer(),
-            made_with: MadeWith::new(args, predictor, &camera)?,
             step: predictor.step,
             metric: predictor.training_camera().is_some() && predictor.config().loss.speed > 0.0,
             inspector: match args.save.contains(&Save::Features) {
@@ -193,12 +193,8 @@ impl<'a> Job<'a> {
                 Some(dataset.intrinsics(*index)),
             ),
             None => {
-                let image = load_rgb(&input.path)?;
-                let camera = self.camera.of(image.width(), image.height());
-                (
-                    image,
-                    camera.with_context(|| input.path.display().to_string())?,
-                )
+                let seen = self.camera.see(load_rgb(&input.path)?);
+                seen.with_context(|| input.path.display().to_string())?
             }
         };
         let (correct, crop) = (!self.args.no_focal_correction, !self.args.stretch);

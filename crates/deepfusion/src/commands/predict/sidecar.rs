@@ -87,6 +87,9 @@ pub struct MadeWith {
     pub max_depth_m: f64,
     /// `--intrinsics`, or those of `--calib`.
     pub intrinsics: Option<[f64; 4]>,
+    /// SHA-256 of `--calib`, where that is a calibration tool's file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration_sha256: Option<String>,
     /// Off: `--no-focal-correction`.
     pub focal_correction: bool,
     /// `--stretch`.
@@ -124,7 +127,11 @@ impl MadeWith {
             intrinsics: match camera {
                 CameraSource::Given(k) => Some([k.fx, k.fy, k.cx, k.cy]),
                 CameraSource::File(k) => Some([k.fx, k.fy, k.cx, k.cy]),
-                CameraSource::Trained(_) | CameraSource::Unknown => None,
+                CameraSource::Lens(_) | CameraSource::Trained(_) | CameraSource::Unknown => None,
+            },
+            calibration_sha256: match camera {
+                CameraSource::Lens(file) => Some(file.sha256.clone()),
+                _ => None,
             },
             focal_correction: !args.no_focal_correction,
             stretch: args.stretch,
@@ -155,7 +162,7 @@ impl MadeWith {
                 "another --max-depth",
             ),
             (
-                !self.same_camera(other),
+                !self.same_camera(other) || self.calibration_sha256 != other.calibration_sha256,
                 "another camera (--intrinsics, --calib)",
             ),
             (
