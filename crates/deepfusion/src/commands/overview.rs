@@ -8,13 +8,15 @@ deepfusion: metric depth from one camera and a speed signal, learnt without dept
 Try it, with no data at all (a few minutes):
   deepfusion demo
 
-With recordings (KITTI raw layout):
+With recordings (KITTI raw, ROS bags, videos, folders):
   deepfusion data inspect DRIVE            what is in it, and whether it can train
   deepfusion doctor DRIVE                  every reason why that would go wrong
   deepfusion train --data DRIVE            learn from its images and speeds
   deepfusion eval --model RUN --data DRIVE measure against its LiDAR
   deepfusion predict --model RUN IMAGE --out DIR
                                            depth pictures, arrays, point clouds
+  deepfusion perceive --model RUN DRIVE --out DIR
+                                           3D targets: boxes, tracks, velocities
   deepfusion view DIR                      look at them in the browser
 
 Without:
@@ -25,7 +27,8 @@ Numbers of any method, from arrays:
   deepfusion eval --pred depth.npz --pred-kind depth --gt gt.npz
 
 Also: compare (runs side by side, published tables), ablate (the system's parts on and off),
-eval-odometry (the camera's path), export (ONNX), weights import, weights list, bench.
+eval-odometry (the camera's path), eval-targets (boxes), export (ONNX), weights import,
+weights list, bench.
 Every command explains itself: deepfusion train --help
 ";
 
