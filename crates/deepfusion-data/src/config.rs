@@ -87,6 +87,22 @@ pub(crate) struct Vehicle {
     steering_offset_rad: f64,
 }
 
+/// A TOML file's settings; where there is no such file, those of an empty one.
+///
+/// # Errors
+/// [`Error::Config`], [`Error::File`].
+pub(crate) fn read_or_default<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
+        Err(e) => return Err(Error::file(path, e)),
+    };
+    toml::from_str(&text).map_err(|e| Error::Config {
+        path: path.to_owned(),
+        problem: e.to_string().trim_end().to_owned(),
+    })
+}
+
 impl FolderConfig {
     pub(crate) const NAME: &str = "dataset.toml";
 
@@ -96,15 +112,7 @@ impl FolderConfig {
     /// [`Error::Config`], [`Error::File`].
     pub(crate) fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(Self::NAME);
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
-            Err(e) => return Err(Error::file(&path, e)),
-        };
-        let mut config: Self = toml::from_str(&text).map_err(|e| Error::Config {
-            path: path.clone(),
-            problem: e.to_string().trim_end().to_owned(),
-        })?;
+        let mut config: Self = read_or_default(&path)?;
         config.path = path;
         let numbers = [("fps", config.fps), ("depth_unit_m", config.depth_unit_m)];
         for (key, value) in numbers {

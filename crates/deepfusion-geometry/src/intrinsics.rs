@@ -22,6 +22,20 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
+    /// From fx, fy, cx, cy in pixels of an image of this width and height. They are not checked:
+    /// [`Self::implausible`].
+    #[must_use]
+    pub fn from_numbers([fx, fy, cx, cy]: [f64; 4], (width, height): (u32, u32)) -> Self {
+        Self {
+            fx,
+            fy,
+            cx,
+            cy,
+            width,
+            height,
+        }
+    }
+
     /// The same camera after its image was resized to `width` × `height` with half-pixel centres
     /// (OpenCV, PIL): f' = s·f, c' = s(c + ½) − ½ on each axis.
     #[must_use]

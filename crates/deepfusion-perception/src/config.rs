@@ -1,3 +1,4 @@
+use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// What counts as ground, obstacle and target, and how much its depth can be trusted.
@@ -54,6 +55,81 @@ impl PerceptionConfig {
     }
 }
 
+impl PerceptionConfig {
+    /// Whether the settings can be.
+    ///
+    /// # Errors
+    /// [`Error::Config`] naming the first that cannot: lengths, counts and shares that are negative or not finite, and
+    /// limits of which the lower is above the upper.
+    pub fn validate(&self) -> Result<()> {
+        let [camera_low, camera_high] = self.camera_height_m;
+        let [length, width] = self.max_footprint_m;
+        let above_zero = [
+            ("max_depth_m", self.max_depth_m),
+            ("join_height_m", self.join_height_m),
+            ("max_target_height_m", self.max_target_height_m),
+            ("max_footprint_m", length.min(width)),
+            ("camera_height_m", camera_low),
+        ];
+        let from_zero = [
+            ("min_height_m", self.min_height_m),
+            ("min_target_height_m", self.min_target_height_m),
+            ("min_pixels", self.min_pixels),
+            ("min_confidence", self.min_confidence as f32),
+            ("relative_error", self.relative_error),
+            ("edge_jump", self.edge_jump),
+            ("edge_radius", self.edge_radius),
+            ("max_slope", self.max_slope),
+            ("max_tilt_deg", self.max_tilt_deg),
+        ];
+        // In order: the first limit may not be above the second.
+        let ordered = [
+            (
+                "min_height_m",
+                self.min_height_m,
+                self.join_height_m,
+                "less than join_height_m",
+            ),
+            (
+                "min_target_height_m",
+                self.min_target_height_m,
+                self.max_target_height_m,
+                "less than max_target_height_m",
+            ),
+            (
+                "camera_height_m",
+                camera_low,
+                camera_high,
+                "the lower height first",
+            ),
+            ("max_tilt_deg", self.max_tilt_deg, 80.0, "less than 80"),
+        ];
+        let wrong = |field, value: f32, expected| {
+            Err(Error::Config {
+                field,
+                value: f64::from(value),
+                expected,
+            })
+        };
+        for (field, value) in above_zero {
+            if !(value.is_finite() && value > 0.0) {
+                return wrong(field, value, "a number above 0");
+            }
+        }
+        for (field, value) in from_zero {
+            if !(value.is_finite() && value >= 0.0) {
+                return wrong(field, value, "a number from 0");
+            }
+        }
+        for (field, low, high, expected) in ordered {
+            if low.is_nan() || high.is_nan() || low >= high {
+                return wrong(field, low, expected);
+            }
+        }
+        Ok(())
+    }
+}
+
 /// For exact depth.
 impl Default for PerceptionConfig {
     fn default() -> Self {
@@ -73,6 +149,62 @@ impl Default for PerceptionConfig {
             max_slope: 0.2,
             camera_height_m: [0.3, 4.0],
             max_tilt_deg: 20.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_that_cannot_be_are_named() {
+        assert!(PerceptionConfig::default().validate().is_ok());
+        assert!(PerceptionConfig::predicted().validate().is_ok());
+        let base = PerceptionConfig::default;
+        let cases = [
+            (
+                "max_depth_m",
+                PerceptionConfig {
+                    max_depth_m: f32::NAN,
+                    ..base()
+                },
+            ),
+            (
+                "min_height_m",
+                PerceptionConfig {
+                    min_height_m: 3.0,
+                    ..base()
+                },
+            ),
+            (
+                "min_pixels",
+                PerceptionConfig {
+                    min_pixels: -1.0,
+                    ..base()
+                },
+            ),
+            (
+                "camera_height_m",
+                PerceptionConfig {
+                    camera_height_m: [2.0, 1.0],
+                    ..base()
+                },
+            ),
+            (
+                "max_tilt_deg",
+                PerceptionConfig {
+                    max_tilt_deg: 90.0,
+                    ..base()
+                },
+            ),
+        ];
+        for (field, config) in cases {
+            let error = config.validate().unwrap_err();
+            assert!(
+                error.to_string().starts_with(field) && error.hint().is_some(),
+                "{error}"
+            );
         }
     }
 }

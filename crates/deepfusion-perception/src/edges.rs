@@ -1,5 +1,7 @@
 //! Pixels between a near and a far surface: a network draws them halfway, where nothing is.
 
+use deepfusion_geometry::DepthMap;
+
 /// Tells which pixels of a depth image (row by row) hang between two surfaces.
 ///
 /// Such a pixel is farther than what is `radius` pixels to one side and nearer than what is as far to the other,
@@ -35,6 +37,19 @@ pub fn flying_pixels(depth: &[f32], width: usize, radius: usize, jump: f32) -> V
         }
     }
     flying
+}
+
+/// A depth image without its [`flying_pixels`]; `radius` is in pixels of an image 640 wide.
+#[must_use]
+pub fn without_flying_pixels(depth: &DepthMap, radius: f32, jump: f32) -> DepthMap {
+    let radius = (radius * depth.width as f32 / 640.0).round() as usize;
+    let flying = flying_pixels(&depth.data, depth.width, radius, jump);
+    let keep = |(z, flies): (&f32, bool)| if flies { 0.0 } else { *z };
+    DepthMap {
+        width: depth.width,
+        height: depth.height,
+        data: depth.data.iter().zip(flying).map(keep).collect(),
+    }
 }
 
 #[cfg(test)]

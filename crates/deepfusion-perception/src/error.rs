@@ -13,6 +13,16 @@ pub enum Error {
         /// Width and height that the camera has.
         expected: (usize, usize),
     },
+    /// A setting that cannot be.
+    #[error("{field} is {value}, expected {expected}")]
+    Config {
+        /// The setting.
+        field: &'static str,
+        /// What it is.
+        value: f64,
+        /// What it may be.
+        expected: &'static str,
+    },
     /// The intrinsics are no camera's.
     #[error("camera: {0}")]
     Camera(String),
@@ -29,6 +39,7 @@ impl Error {
             Self::Size { .. } => Some(
                 "intrinsics belong to one image size: resize them with the image (Intrinsics::resized)".into(),
             ),
+            Self::Config { .. } => Some("leave it out for its default".into()),
             Self::Camera(_) => Some("fx, fy, cx, cy are in pixels of the image".into()),
         }
     }

@@ -29,7 +29,7 @@ pub use collision::{Collision, VehicleShape, time_to_collision};
 pub use confidence::{ConfidenceModel, Evidence, MOST_ERROR, Reliability};
 pub use config::PerceptionConfig;
 pub use detect::{Detection, detect};
-pub use edges::flying_pixels;
+pub use edges::{flying_pixels, without_flying_pixels};
 pub use error::{Error, Result};
 pub use free_space::{Cell, FreeSpace};
 pub use ground::Ground;

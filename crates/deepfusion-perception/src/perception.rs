@@ -1,5 +1,5 @@
 use crate::detect::detect;
-use crate::edges::flying_pixels;
+use crate::edges::without_flying_pixels;
 use crate::tracking::{Now, Tracker};
 use crate::{Detection, Error, Ground, Obstacles, PerceptionConfig, Rays, Result, Target};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
@@ -96,7 +96,7 @@ impl Perception {
         };
         let cleaned;
         let depth = if self.config.edge_jump > 0.0 {
-            cleaned = without_edges(depth, &self.config);
+            cleaned = without_flying_pixels(depth, self.config.edge_radius, self.config.edge_jump);
             &cleaned
         } else {
             depth
@@ -138,17 +138,5 @@ impl Perception {
             detections,
             targets,
         })
-    }
-}
-
-/// The depth image without the pixels that hang between two surfaces.
-fn without_edges(depth: &DepthMap, config: &PerceptionConfig) -> DepthMap {
-    let radius = (config.edge_radius * depth.width as f32 / 640.0).round() as usize;
-    let flying = flying_pixels(&depth.data, depth.width, radius, config.edge_jump);
-    let keep = |(z, flies): (&f32, bool)| if flies { 0.0 } else { *z };
-    DepthMap {
-        width: depth.width,
-        height: depth.height,
-        data: depth.data.iter().zip(flying).map(keep).collect(),
     }
 }

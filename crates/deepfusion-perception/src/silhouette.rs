@@ -22,8 +22,6 @@ pub struct Silhouette {
     /// How far before its left and its right end stands what hides that end, in metres of depth; infinite where the
     /// image ends there, 0 where nothing hides it.
     pub hidden: [f32; 2],
-    /// Median depth, metres.
-    pub depth: f32,
 }
 
 /// Points that are kept of a cluster, about.
@@ -70,7 +68,6 @@ impl Silhouette {
         let stray = heights.len() / 100;
         silhouette.top = heights[heights.len() - 1 - stray];
         silhouette.bottom = heights[stray];
-        let mut depths = Vec::with_capacity(columns.len());
         let mut above = Above::default();
         for (column, pixels) in columns.iter_mut().enumerate() {
             if pixels.is_empty() {
@@ -81,13 +78,10 @@ impl Silhouette {
             above.look(u, pixels[0], depth, rays, ground, config);
             let nearest = pixels.len() / NEAR_SHARE;
             let (_, (z, v), _) = pixels.select_nth_unstable_by(nearest, |a, b| a.0.total_cmp(&b.0));
-            let p = ground.locate(rays.point(left as usize + column, *v as usize, *z));
+            let p = ground.locate(rays.point(u, *v as usize, *z));
             silhouette.contour.push([p[0], p[1]]);
             silhouette.tops.push(top);
-            depths.push(*z);
         }
-        depths.sort_unstable_by(f32::total_cmp);
-        silhouette.depth = depths[depths.len() / 2];
         silhouette.tall = above.is_tall();
         silhouette.top = silhouette.top.max(above.top());
         silhouette.hidden = hidden_ends(cluster, depth, width, left, right);

@@ -189,15 +189,7 @@ impl BagConfig {
         let there = candidates.iter().find(|path| path.is_file());
         // Where there is none, the first is where one would be looked for.
         let path = there.or(candidates.first()).cloned().unwrap_or_default();
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
-            Err(e) => return Err(Error::file(&path, e)),
-        };
-        let mut config: Self = toml::from_str(&text).map_err(|e| Error::Config {
-            path: path.clone(),
-            problem: e.to_string().trim_end().to_owned(),
-        })?;
+        let mut config: Self = crate::config::read_or_default(&path)?;
         config.path = path;
         config.validate()?;
         Ok(config)
@@ -263,21 +255,7 @@ impl Transform {
 
 impl CameraConfig {
     pub(super) fn intrinsics(&self) -> Intrinsics {
-        let &Self {
-            fx,
-            fy,
-            cx,
-            cy,
-            width,
-            height,
-        } = self;
-        Intrinsics {
-            fx,
-            fy,
-            cx,
-            cy,
-            width,
-            height,
-        }
+        let pinhole = [self.fx, self.fy, self.cx, self.cy];
+        Intrinsics::from_numbers(pinhole, (self.width, self.height))
     }
 }

@@ -230,15 +230,8 @@ fn camera(
         field,
     };
     let pinhole = |intrinsics: Intrinsics| Lens::new(intrinsics, &Distortion::default());
-    let (lens, place) = if let Some([fx, fy, cx, cy]) = options.intrinsics {
-        let given = Intrinsics {
-            fx,
-            fy,
-            cx,
-            cy,
-            width,
-            height,
-        };
+    let (lens, place) = if let Some(numbers) = options.intrinsics {
+        let given = Intrinsics::from_numbers(numbers, (width, height));
         (pinhole(given), place(bag, "--intrinsics"))
     } else if let Some(camera) = config.camera {
         (pinhole(camera.intrinsics()), place(&config.path, "camera"))
@@ -279,15 +272,8 @@ fn camera(
 
 /// Of rectified images P without distortion, of raw ones K with it.
 fn of_camera_info(info: &CameraInfo, rectified: bool) -> std::result::Result<Lens, String> {
-    let (width, height) = (info.width, info.height);
-    let of = |fx, fy, cx, cy| Intrinsics {
-        fx,
-        fy,
-        cx,
-        cy,
-        width,
-        height,
-    };
+    let size = (info.width, info.height);
+    let of = |fx, fy, cx, cy| Intrinsics::from_numbers([fx, fy, cx, cy], size);
     if rectified && info.p[0] > 0.0 {
         let p = &info.p;
         return Lens::new(of(p[0], p[5], p[2], p[6]), &Distortion::default());

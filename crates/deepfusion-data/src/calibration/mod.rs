@@ -73,16 +73,8 @@ impl CameraCalibration {
     }
 
     fn from_numbers(numbers: Numbers, image_size: (u32, u32), path: &Path) -> Result<Self> {
-        let [fx, fy, cx, cy] = numbers.pinhole;
-        let (width, height) = numbers.size.unwrap_or(image_size);
-        let intrinsics = Intrinsics {
-            fx,
-            fy,
-            cx,
-            cy,
-            width,
-            height,
-        };
+        let size = numbers.size.unwrap_or(image_size);
+        let intrinsics = Intrinsics::from_numbers(numbers.pinhole, size);
         if let Some(problem) = intrinsics.implausible() {
             return Err(Error::CameraFile {
                 path: path.to_owned(),

@@ -32,9 +32,9 @@ pub struct PerceiveArgs {
     /// What to write for every frame, beside its targets.
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["depth-png", "overlay"])]
     pub save: Vec<PerceiveSave>,
-    /// Farthest depth that is looked at, in metres.
-    #[arg(long, value_name = "M", default_value_t = 60.0, value_parser = positive)]
-    pub max_depth: f64,
+    /// Farthest depth that is looked at, in metres [default: 60, or what --config says].
+    #[arg(long, value_name = "M", value_parser = positive)]
+    pub max_depth: Option<f64>,
     /// Settings of the perception (TOML); what is not in it keeps its default.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
@@ -97,7 +97,7 @@ impl PerceiveArgs {
             intrinsics: self.intrinsics,
             calib: self.calib.clone(),
             save,
-            max_depth: self.max_depth,
+            max_depth: self.max_depth.unwrap_or(60.0),
             no_focal_correction: self.no_focal_correction,
             stretch: self.stretch,
             out: self.out.clone(),

@@ -58,14 +58,8 @@ fn frame(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
     let calib = Calib::read(&folder.join(format!("calib/{name}.txt")))?;
     let (width, height) = image_size(&image)?;
     let p2 = calib.p2;
-    let camera = Intrinsics {
-        fx: p2[(0, 0)],
-        fy: p2[(1, 1)],
-        cx: p2[(0, 2)],
-        cy: p2[(1, 2)],
-        width,
-        height,
-    };
+    let pinhole = [(0, 0), (1, 1), (0, 2), (1, 2)].map(|place| p2[place]);
+    let camera = Intrinsics::from_numbers(pinhole, (width, height));
     // P2 = K·[I | t]: t is what camera 2 lies off the labels' camera 0.
     let offset = camera.inverse_matrix() * p2.column(3);
     let cloud = PointCloud::read_kitti_bin(&folder.join(format!("velodyne/{name}.bin")))?;

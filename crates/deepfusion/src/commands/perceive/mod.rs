@@ -48,11 +48,10 @@ struct Found {
 pub fn run(args: &PerceiveArgs) -> Result<()> {
     let predict = args.as_predict();
     let all = inputs::find(&args.inputs, &predict.open_options())?;
-    let config = read_config(args.config.as_deref(), PerceptionConfig::predicted())?;
-    let config = PerceptionConfig {
-        max_depth_m: args.max_depth as f32,
-        ..config
-    };
+    let mut config = read_config(args.config.as_deref(), PerceptionConfig::predicted())?;
+    if let Some(far) = args.max_depth {
+        config.max_depth_m = far as f32;
+    }
     let predictor = engine::load(&args.model, &args.engine)?;
     let job = Job::new(&predict, &predictor)?;
     std::fs::create_dir_all(&args.out).map_err(|e| deepfusion_data::Error::file(&args.out, e))?;
@@ -72,11 +71,14 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
 /// Settings from a file over `base`.
 pub fn read_config(path: Option<&Path>, base: PerceptionConfig) -> Result<PerceptionConfig> {
     let Some(path) = path else { return Ok(base) };
+    // What the file says over what it does not.
     let text = std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
     let named = || path.display().to_string();
     let mut table = toml::Table::try_from(&base).with_context(named)?;
     table.extend(text.parse::<toml::Table>().with_context(named)?);
-    table.try_into().with_context(named)
+    let config: PerceptionConfig = table.try_into().with_context(named)?;
+    config.validate().with_context(named)?;
+    Ok(config)
 }
 
 /// Nothing is overwritten unless asked.

@@ -7,7 +7,7 @@ use deepfusion_cloud::PointCloud;
 use deepfusion_data::{RgbImage, save_png, write_atomically};
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::{
-    ConfidenceModel, Evidence, FreeSpace, Perception, Rays, Surroundings, flying_pixels,
+    ConfidenceModel, Evidence, FreeSpace, Perception, Rays, Surroundings, without_flying_pixels,
 };
 use deepfusion_render::{birds_eye, box_overlay, target_segments};
 use deepfusion_train::Prediction;
@@ -76,15 +76,7 @@ fn cloud(
 ) -> Option<PointCloud> {
     let config = perception.config();
     let rgb = deepfusion_data::resize_rgb(image, depth.width as u32, depth.height as u32);
-    let radius = (config.edge_radius * depth.width as f32 / 640.0).round() as usize;
-    let jump = config.edge_jump.max(0.02);
-    let flying = flying_pixels(&depth.data, depth.width, radius, jump);
-    let keep = |(z, flies): (&f32, bool)| if flies { 0.0 } else { *z };
-    let clean = DepthMap {
-        width: depth.width,
-        height: depth.height,
-        data: depth.data.iter().zip(flying).map(keep).collect(),
-    };
+    let clean = without_flying_pixels(depth, config.edge_radius, config.edge_jump.max(0.02));
     let far = config.max_depth_m;
     let mut cloud = PointCloud::from_depth(&clean, k, Some(rgb.as_raw()), far).ok()?;
     cloud.confidence = confidence.map(|(model, prediction)| {

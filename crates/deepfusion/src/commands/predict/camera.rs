@@ -80,14 +80,7 @@ impl CameraSource {
     fn of(&self, width: u32, height: u32) -> Result<Option<Intrinsics>, CliError> {
         match self {
             Self::Given(k) => {
-                let k = Intrinsics {
-                    fx: k.fx,
-                    fy: k.fy,
-                    cx: k.cx,
-                    cy: k.cy,
-                    width,
-                    height,
-                };
+                let k = Intrinsics::from_numbers(k.numbers(), (width, height));
                 match k.implausible() {
                     Some(why) => Err(CliError::Camera { why }),
                     None => Ok(Some(k)),
@@ -119,29 +112,25 @@ pub struct LensFile {
 
 impl LensFile {
     fn lens_for(&self, size: (u32, u32)) -> Result<&Lens> {
-        if self.lens.get().is_none() {
-            let calibration = CameraCalibration::read(&self.path, size)?;
-            let k = &calibration.intrinsics;
-            if (k.width, k.height) != size {
-                return Err(self.of_another_size((k.width, k.height), size).into());
+        let (made_for, lens) = match self.lens.get() {
+            Some(made) => made,
+            None => {
+                let calibration = CameraCalibration::read(&self.path, size)?;
+                let k = &calibration.intrinsics;
+                let made = ((k.width, k.height), calibration.lens()?);
+                // Another thread may have been first: it made the same.
+                self.lens.get_or_init(|| made)
             }
-            // Another thread may have been first: both made the same.
-            let _ = self.lens.set((size, calibration.lens()?));
+        };
+        if *made_for == size {
+            return Ok(lens);
         }
-        match self.lens.get() {
-            Some((made_for, lens)) if *made_for == size => Ok(lens),
-            Some((made_for, _)) => Err(self.of_another_size(*made_for, size).into()),
-            None => Err(self.of_another_size((0, 0), size).into()),
-        }
-    }
-
-    fn of_another_size(&self, (width, height): (u32, u32), (w, h): (u32, u32)) -> CliError {
-        CliError::Camera {
-            why: format!(
-                "{} is for images of {width}x{height}, this one has {w}x{h}",
-                self.path.display()
-            ),
-        }
+        let ((width, height), (w, h)) = (*made_for, size);
+        let why = format!(
+            "{} is for images of {width}x{height}, this one has {w}x{h}",
+            self.path.display()
+        );
+        Err(CliError::Camera { why }.into())
     }
 }
 
