@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 use deepfusion_motion::ScaleMonitorConfig;
 
 use super::values::positive;
-use super::{CameraIntrinsics, EngineArgs, PredictArgs, Save, Shard};
+use super::{Outputs, PredictionArgs, Save};
 
 /// `deepfusion perceive`.
 #[derive(Debug, Args)]
@@ -17,18 +17,9 @@ use super::{CameraIntrinsics, EngineArgs, PredictArgs, Save, Shard};
     deepfusion perceive --model runs/train-1 street.jpg --intrinsics 721.5,721.5,609.6,172.9 --out targets"
 )]
 pub struct PerceiveArgs {
-    /// A run folder or a checkpoint in it.
-    #[arg(long, value_name = "RUN")]
-    pub model: PathBuf,
-    /// Recordings (a KITTI drive, a bag, a video, a folder with dataset.toml), images, folders of images, or globs.
-    #[arg(required = true, value_name = "INPUT")]
-    pub inputs: Vec<String>,
-    /// The camera, in pixels of the input images.
-    #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "calib")]
-    pub intrinsics: Option<CameraIntrinsics>,
-    /// A calibration file: KITTI's calib_cam_to_cam.txt, OpenCV's, ROS's or Kalibr's YAML, or four numbers; lenses are undone.
-    #[arg(long, value_name = "FILE")]
-    pub calib: Option<PathBuf>,
+    /// Which images, through which network, to where.
+    #[command(flatten)]
+    pub prediction: PredictionArgs,
     /// What to write for every frame, beside its targets.
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["depth-png", "overlay"])]
     pub save: Vec<PerceiveSave>,
@@ -41,21 +32,6 @@ pub struct PerceiveArgs {
     /// The camera's height over the road in metres, where it was measured: the scale monitor then has nothing to learn.
     #[arg(long, value_name = "M", value_parser = positive)]
     pub camera_height: Option<f64>,
-    /// Do not correct depth for another focal length than the one trained on.
-    #[arg(long)]
-    pub no_focal_correction: bool,
-    /// Stretch images of another aspect ratio instead of cropping them about the principal row.
-    #[arg(long)]
-    pub stretch: bool,
-    /// Folder to write.
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
-    /// Replace what is there.
-    #[arg(long)]
-    pub overwrite: bool,
-    /// What runs the network.
-    #[command(flatten)]
-    pub engine: EngineArgs,
     /// Print one JSON object a frame on stdout, as it comes.
     #[arg(long)]
     pub json: bool,
@@ -85,26 +61,12 @@ impl PerceiveArgs {
         }
     }
 
-    /// The prediction that this stands on.
-    pub fn as_predict(&self) -> PredictArgs {
-        let mut save = Vec::new();
-        if self.save.contains(&PerceiveSave::DepthPng) {
-            save.push(Save::DepthPng);
-        }
-        PredictArgs {
-            model: self.model.clone(),
-            inputs: self.inputs.clone(),
-            intrinsics: self.intrinsics,
-            calib: self.calib.clone(),
-            save,
-            max_depth: self.max_depth.unwrap_or(60.0),
-            no_focal_correction: self.no_focal_correction,
-            stretch: self.stretch,
-            out: self.out.clone(),
-            shard: Shard::WHOLE,
-            overwrite: self.overwrite,
-            engine: self.engine.clone(),
-            json: false,
+    /// What is kept of the prediction that this stands on.
+    pub fn outputs(&self, max_depth_m: f64) -> Outputs {
+        let depth = self.save.contains(&PerceiveSave::DepthPng);
+        Outputs {
+            save: depth.then_some(Save::DepthPng).into_iter().collect(),
+            max_depth_m,
         }
     }
 }

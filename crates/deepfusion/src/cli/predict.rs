@@ -2,10 +2,8 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, Subcommand, ValueEnum};
 
-use deepfusion_data::OpenOptions;
-
 use super::values::positive;
-use super::{CameraIntrinsics, EngineArgs, PresetChoice, Shard, Size};
+use super::{EngineArgs, Outputs, PredictionArgs, PresetChoice, Shard, Size};
 
 /// `deepfusion predict`.
 #[derive(Debug, Args)]
@@ -20,34 +18,15 @@ use super::{CameraIntrinsics, EngineArgs, PresetChoice, Shard, Size};
     deepfusion predict --model runs/train-1 drive --out depth --shard 1/2   # and 2/2 elsewhere"
 )]
 pub struct PredictArgs {
-    /// A run folder or a checkpoint in it.
-    #[arg(long, value_name = "RUN")]
-    pub model: PathBuf,
-    /// Images, folders of images, globs, or recordings: a KITTI drive, a bag, a video, a folder with dataset.toml. Of
-    /// recordings the camera is known, and lenses are undone.
-    #[arg(required = true, value_name = "INPUT")]
-    pub inputs: Vec<String>,
-    /// The camera, in pixels of the input images.
-    #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "calib")]
-    pub intrinsics: Option<CameraIntrinsics>,
-    /// A calibration file: KITTI's calib_cam_to_cam.txt, OpenCV's, ROS's or Kalibr's YAML, or four numbers; lenses are undone.
-    #[arg(long, value_name = "FILE")]
-    pub calib: Option<PathBuf>,
+    /// Which images, through which network, to where.
+    #[command(flatten)]
+    pub prediction: PredictionArgs,
     /// What to write for every image.
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["depth-png", "color"])]
     pub save: Vec<Save>,
     /// Leave out points of the cloud beyond this depth, in metres.
     #[arg(long, value_name = "M", default_value_t = 80.0, value_parser = positive)]
     pub max_depth: f64,
-    /// Do not correct depth for another focal length than the one trained on.
-    #[arg(long)]
-    pub no_focal_correction: bool,
-    /// Stretch images of another aspect ratio instead of cropping them about the principal row.
-    #[arg(long)]
-    pub stretch: bool,
-    /// Folder to write.
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
     /// Do one part of the work: the I-th of N (counted from 1) of the images in the order of their paths. Started
     /// with the same inputs and options, N such runs, at once and on any machines, do every image once.
     #[arg(
@@ -57,23 +36,17 @@ pub struct PredictArgs {
         hide_default_value = true
     )]
     pub shard: Shard,
-    /// Replace files that were made with other options or of an image that has changed.
-    #[arg(long)]
-    pub overwrite: bool,
-    /// What runs the network.
-    #[command(flatten)]
-    pub engine: EngineArgs,
     /// Print the sidecars as a JSON array on stdout.
     #[arg(long)]
     pub json: bool,
 }
 
 impl PredictArgs {
-    /// How recordings among the inputs are opened.
-    pub fn open_options(&self) -> OpenOptions {
-        OpenOptions {
-            intrinsics: self.intrinsics.map(|k| [k.fx, k.fy, k.cx, k.cy]),
-            ..OpenOptions::default()
+    /// What is kept of every image.
+    pub fn outputs(&self) -> Outputs {
+        Outputs {
+            save: self.save.clone(),
+            max_depth_m: self.max_depth,
         }
     }
 }

@@ -79,9 +79,6 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// All of it.
-    pub const WHOLE: Self = Self { index: 1, count: 1 };
-
     /// This part of `all`: every `count`-th, so that parts are as large as each other to one item, and long
     /// images in one folder are shared too.
     pub fn part_of<T>(self, all: &[T]) -> impl Iterator<Item = &T> {

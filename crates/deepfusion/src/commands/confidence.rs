@@ -69,12 +69,19 @@ pub fn calibrate(
     datasets: &[Dataset],
     truth: &mut Truth,
     evaluated: &Evaluated,
+    correct_focal: bool,
     run: &Path,
 ) -> Result<Option<Vec<Reliability>>> {
     let mut samples: [Vec<Sampled>; 2] = [Vec::new(), Vec::new()];
     for (number, Place(set, frame)) in evaluated.places.iter().enumerate() {
         let half = number % 2;
-        samples[half].extend(of_frame(predictor, &datasets[*set], *frame, truth)?);
+        samples[half].extend(of_frame(
+            predictor,
+            &datasets[*set],
+            *frame,
+            truth,
+            correct_focal,
+        )?);
     }
     let [learned, held_out] = &samples;
     let fit = |flip: bool| ConfidenceModel::fit(&told(learned, flip));
@@ -114,16 +121,17 @@ fn of_frame(
     dataset: &Dataset,
     frame: usize,
     truth: &mut Truth,
+    correct_focal: bool,
 ) -> Result<Vec<Sampled>> {
     let Some(depth) = truth.of(dataset, frame, None)? else {
         return Ok(Vec::new());
     };
     let image = dataset.load_image(frame)?;
     let camera = dataset.intrinsics(frame);
-    let seen = predictor.predict(&image, Some(&camera), true, false)?;
+    let seen = predictor.predict(&image, Some(&camera), correct_focal, false)?;
     let mirror = flip_horizontal(&image);
     let mut mirrored = predictor
-        .predict(&mirror, Some(&camera.flipped()), true, false)?
+        .predict(&mirror, Some(&camera.flipped()), correct_focal, false)?
         .disparity;
     for row in mirrored.chunks_exact_mut(seen.width.max(1)) {
         row.reverse();

@@ -86,9 +86,14 @@ fn from_model(args: &EvalArgs) -> Result<Report> {
         Err(error) => tracing::warn!("the result is not kept beside the run: {error}"),
     }
     let reliability = match args.calibrate_confidence {
-        true => {
-            confidence::calibrate(&predictor, &datasets, &mut truth, &evaluated, folder.path())?
-        }
+        true => confidence::calibrate(
+            &predictor,
+            &datasets,
+            &mut truth,
+            &evaluated,
+            !args.no_focal_correction,
+            folder.path(),
+        )?,
         false => None,
     };
     if let Some(path) = &args.report {

@@ -9,16 +9,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Result;
-use deepfusion_data::{Dataset, OpenOptions, kitti::GtKind, read_depth_png, save_png};
+use deepfusion_data::{Dataset, OpenOptions, RgbImage, kitti::GtKind, read_depth_png, save_png};
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::{
-    Label, Perception, PerceptionConfig, Scorer, ScoringRules, TargetScore,
+    Label, Perception, PerceptionConfig, Scorer, ScoringRules, Target, TargetScore,
 };
 use deepfusion_render::box_overlay;
 use deepfusion_train::Predictor;
 use serde::Serialize;
 
 use self::labels::Labels;
+use self::object_frames::ObjectFrame;
 use super::perceive::read_config;
 use super::perceive::scene::{MotionTracker, working_depth};
 use crate::cli::{EvalTargetsArgs, TargetDepth};
@@ -40,26 +41,98 @@ struct Report {
     score: TargetScore,
 }
 
+/// Where the measured depth comes from.
+enum Source {
+    /// The simulator's exact depth.
+    Truth,
+    /// The scans.
+    Lidar,
+    /// A network, of every frame: targets need more than one to be confirmed.
+    Network(Box<Predictor>),
+}
+
+impl Source {
+    fn of(args: &EvalTargetsArgs) -> Result<Self> {
+        Ok(match (args.depth, &args.model) {
+            (None, Some(model)) => Self::Network(Box::new(engine::load(model, &args.engine)?)),
+            (Some(TargetDepth::Lidar), _) => Self::Lidar,
+            // One of the two is asked for by the command line.
+            (Some(TargetDepth::Truth), _) | (None, None) => Self::Truth,
+        })
+    }
+
+    /// One word for the report.
+    fn word(&self) -> &'static str {
+        match self {
+            Self::Truth => "truth",
+            Self::Lidar => "lidar",
+            Self::Network(_) => "predicted",
+        }
+    }
+
+    fn settings(&self) -> PerceptionConfig {
+        match self {
+            Self::Truth | Self::Lidar => PerceptionConfig::default(),
+            Self::Network(_) => PerceptionConfig::predicted(),
+        }
+    }
+
+    /// What is seen of a recording's frame; `None` where it is not measured.
+    fn of_frame(
+        &self,
+        dataset: &Dataset,
+        index: usize,
+        witness: Option<&Witness>,
+    ) -> Result<Option<(DepthMap, Intrinsics)>> {
+        let camera = dataset.intrinsics(index);
+        Ok(match self {
+            Self::Truth => witness
+                .filter(|witness| witness.dense)
+                .map(|witness| working_depth(&witness.depth, &camera)),
+            Self::Lidar => dataset
+                .ground_truth(index, GtKind::Z)?
+                .map(|scan| lidar::gathered(&scan, &camera)),
+            Self::Network(predictor) => {
+                let image = dataset.load_image(index)?;
+                Some(predicted(predictor, &image, &camera)?)
+            }
+        })
+    }
+
+    /// What is seen of a labelled frame; it has no exact depth.
+    fn of_object_frame(&self, frame: &ObjectFrame) -> Result<Option<(DepthMap, Intrinsics)>> {
+        Ok(match self {
+            Self::Truth => None,
+            Self::Lidar => Some(lidar::gathered(&frame.scan, &frame.camera)),
+            Self::Network(predictor) => {
+                let image = deepfusion_data::load_rgb(&frame.image)?;
+                Some(predicted(predictor, &image, &frame.camera)?)
+            }
+        })
+    }
+}
+
+fn predicted(
+    predictor: &Predictor,
+    image: &RgbImage,
+    camera: &Intrinsics,
+) -> Result<(DepthMap, Intrinsics)> {
+    let prediction = predictor.predict(image, Some(camera), true, true)?;
+    Ok(working_depth(&prediction.depth(), camera))
+}
+
 /// `deepfusion eval-targets`.
 pub fn run(args: &EvalTargetsArgs) -> Result<()> {
-    let (depth, base) = match args.depth {
-        Some(TargetDepth::Truth) => ("truth", PerceptionConfig::default()),
-        Some(TargetDepth::Lidar) => ("lidar", PerceptionConfig::default()),
-        None => ("predicted", PerceptionConfig::predicted()),
-    };
-    let predictor = match &args.model {
-        Some(model) => Some(engine::load(model, &args.engine)?),
-        None => None,
-    };
+    let source = Source::of(args)?;
+    let config = read_config(args.config.as_deref(), source.settings())?;
     let out = match &args.out {
         Some(out) => Some(output::run_folder(Some(out), "eval-targets")?),
         None => None,
     };
     let mut work = Work {
         out,
-        depth: args.depth,
-        predictor,
-        perception: Perception::new(read_config(args.config.as_deref(), base)?),
+        source,
+        perception: Perception::new(config),
         scorer: Scorer::new(ScoringRules::default()),
         progress: Progress::new("frames"),
     };
@@ -73,7 +146,7 @@ pub fn run(args: &EvalTargetsArgs) -> Result<()> {
         }
     }
     let report = Report {
-        depth,
+        depth: work.source.word(),
         rules: ScoringRules::default(),
         score: work.scorer.score(),
     };
@@ -86,8 +159,7 @@ pub fn run(args: &EvalTargetsArgs) -> Result<()> {
 
 struct Work {
     out: Option<PathBuf>,
-    depth: Option<TargetDepth>,
-    predictor: Option<Predictor>,
+    source: Source,
     perception: Perception,
     scorer: Scorer,
     progress: Progress,
@@ -97,75 +169,78 @@ impl Work {
     fn drive(&mut self, dataset: &Arc<Dataset>) -> Result<()> {
         let labels = Labels::read(dataset)?;
         let mut motions = MotionTracker::default();
+        let before = self.scorer.score().frames;
         self.scorer.begin_drive();
         let frames = dataset.selected();
         for (done, index) in frames.iter().enumerate() {
             self.progress.set(done, frames.len());
-            let Some(witness) = witness(dataset, *index)? else {
-                continue;
-            };
-            let camera = dataset.intrinsics(*index);
-            let seen = match self.depth {
-                Some(TargetDepth::Truth) if !witness.dense => None,
-                Some(TargetDepth::Truth) => Some(working_depth(&witness.depth, &camera)),
-                Some(TargetDepth::Lidar) => dataset
-                    .ground_truth(*index, GtKind::Z)?
-                    .map(|depth| lidar::gathered(&depth, &camera)),
-                None => Some(self.predicted(&dataset.load_image(*index)?, &camera)?),
-            };
+            let witness = witness(dataset, *index)?;
+            let seen = self.source.of_frame(dataset, *index, witness.as_ref())?;
             let Some((depth, k)) = seen else {
                 continue;
             };
-            let labels = labels.of(dataset, *index, &witness);
             let motion = motions.of(dataset, *index, &mut self.perception);
             let surroundings = self.perception.look(&depth, &k, motion.stamp)?;
-            let time_s = motion.stamp.map_or(0.0, |stamp| stamp.time_s);
-            self.scorer.add(time_s, &surroundings.targets, &labels);
-            if let Some(out) = &self.out {
-                let image = dataset.load_image(*index)?;
-                let picture = box_overlay(&image, &camera, &surroundings.targets);
-                let number = dataset.frames()[*index].number;
-                save_png(
-                    &picture,
-                    &out.join(format!("{}-{number:010}.png", dataset.name())),
-                )?;
+            // Without a witness nothing says which boxes are seen: such a frame is followed, but not scored.
+            if let Some(witness) = &witness {
+                let labels = labels.of(dataset, *index, witness);
+                let time_s = motion.stamp.map_or(0.0, |stamp| stamp.time_s);
+                self.scorer.add(time_s, &surroundings.targets, &labels);
             }
+            let number = dataset.frames()[*index].number;
+            let name = format!("{}-{number:010}.png", dataset.name());
+            self.save(
+                &name,
+                &surroundings.targets,
+                &dataset.intrinsics(*index),
+                || dataset.load_image(*index),
+            )?;
         }
-        self.some_frames(dataset.folder())
+        self.some_frames_since(before, dataset.folder())
     }
 
     fn object_frames(&mut self, folder: &Path) -> Result<()> {
+        let before = self.scorer.score().frames;
         for frame in object_frames::read(folder)? {
             self.scorer.begin_drive();
             self.perception.forget();
-            let (depth, k) = match self.depth {
-                Some(_) => lidar::gathered(&frame.scan, &frame.camera),
-                None => self.predicted(&deepfusion_data::load_rgb(&frame.image)?, &frame.camera)?,
+            let Some((depth, k)) = self.source.of_object_frame(&frame)? else {
+                continue;
             };
             let surroundings = self.perception.look(&depth, &k, None)?;
             self.scorer.add(0.0, &surroundings.targets, &frame.labels);
+            let name = frame.image.with_extension("png");
+            let name = name.file_name().unwrap_or_default().to_string_lossy();
+            self.save(&name, &surroundings.targets, &frame.camera, || {
+                deepfusion_data::load_rgb(&frame.image)
+            })?;
         }
-        self.some_frames(folder)
+        self.some_frames_since(before, folder)
     }
 
-    fn some_frames(&self, path: &Path) -> Result<()> {
-        match self.scorer.score().frames {
-            0 => Err(CliError::NothingToMeasure {
-                path: path.to_owned(),
-            }
-            .into()),
-            _ => Ok(()),
-        }
-    }
-
-    fn predicted(
+    /// Writes the image with the targets on it, where it was asked for.
+    fn save(
         &self,
-        image: &deepfusion_data::RgbImage,
+        name: &str,
+        targets: &[Target],
         camera: &Intrinsics,
-    ) -> Result<(DepthMap, Intrinsics)> {
-        let predictor = self.predictor.as_ref().ok_or(CliError::NoCamera)?;
-        let prediction = predictor.predict(image, Some(camera), true, true)?;
-        Ok(working_depth(&prediction.depth(), camera))
+        image: impl FnOnce() -> deepfusion_data::Result<RgbImage>,
+    ) -> Result<()> {
+        if let Some(out) = &self.out {
+            let picture = box_overlay(&image()?, camera, targets);
+            save_png(&picture, &out.join(name))?;
+        }
+        Ok(())
+    }
+
+    fn some_frames_since(&self, before: usize, path: &Path) -> Result<()> {
+        if self.scorer.score().frames > before {
+            return Ok(());
+        }
+        Err(CliError::NothingToMeasure {
+            path: path.to_owned(),
+        }
+        .into())
     }
 }
 

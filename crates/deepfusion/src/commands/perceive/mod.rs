@@ -21,7 +21,7 @@ use self::scene::{MotionTracker, ScaleWatch, working_depth};
 use super::confidence::Confidence;
 use super::predict::inputs::{self, Input};
 use super::predict::{Job, Loaded, Seen};
-use crate::cli::{PerceiveArgs, PerceiveSave};
+use crate::cli::{PerceiveArgs, PerceiveSave, PredictionArgs};
 use crate::error::{CliError, hint_of, told};
 use crate::pipeline::{self, Threads};
 use crate::progress::say;
@@ -46,23 +46,29 @@ struct Found {
 
 /// `deepfusion perceive`.
 pub fn run(args: &PerceiveArgs) -> Result<()> {
-    let predict = args.as_predict();
-    let all = inputs::find(&args.inputs, &predict.open_options())?;
+    let prediction = &args.prediction;
+    let out = &prediction.out;
+    let all = inputs::find(&prediction.inputs, &prediction.open_options())?;
     let mut config = read_config(args.config.as_deref(), PerceptionConfig::predicted())?;
     if let Some(far) = args.max_depth {
         config.max_depth_m = far as f32;
     }
-    let predictor = engine::load(&args.model, &args.engine)?;
-    let job = Job::new(&predict, &predictor)?;
-    std::fs::create_dir_all(&args.out).map_err(|e| deepfusion_data::Error::file(&args.out, e))?;
-    refuse_what_is_there(args, &all)?;
+    let predictor = engine::load(&prediction.model, &prediction.engine)?;
+    let job = Job::new(
+        prediction,
+        args.outputs(f64::from(config.max_depth_m)),
+        &predictor,
+    )?;
+    std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
+    refuse_what_is_there(prediction, &all)?;
     interrupt::catch("stopping after the frames at work");
     let work = Work {
         args,
         job: &job,
         all: &all,
-        confidence: Confidence::read(RunFolder::open(&args.model)?.0.path())?.map(|c| c.single),
-        lines: Mutex::new(Lines::begin(&args.out.join("targets.jsonl"))?),
+        confidence: Confidence::read(RunFolder::open(&prediction.model)?.0.path())?
+            .map(|c| c.single),
+        lines: Mutex::new(Lines::begin(&out.join("targets.jsonl"))?),
         outcome: Mutex::new(Outcome::default()),
     };
     work.go(&predictor, config)
@@ -82,7 +88,7 @@ pub fn read_config(path: Option<&Path>, base: PerceptionConfig) -> Result<Percep
 }
 
 /// Nothing is overwritten unless asked.
-fn refuse_what_is_there(args: &PerceiveArgs, all: &[Input]) -> Result<()> {
+fn refuse_what_is_there(args: &PredictionArgs, all: &[Input]) -> Result<()> {
     let first = all.iter().map(|input| record_path(&args.out, &input.name));
     let mut paths = first.chain([args.out.join("targets.jsonl")]);
     match paths.find(|path| !args.overwrite && path.exists()) {
@@ -229,7 +235,7 @@ impl Work<'_> {
     }
 
     fn write(&self, found: &Found) -> Result<()> {
-        let (out, input) = (&self.args.out, &self.all[found.index]);
+        let (out, input) = (&self.args.prediction.out, &self.all[found.index]);
         for (save, picture) in &found.pictures {
             picture.save(&pictures::path(out, &input.name, *save))?;
         }
@@ -276,7 +282,7 @@ impl Work<'_> {
             "{} frames, {} targets written to {}{}",
             outcome.done,
             outcome.targets,
-            self.args.out.display(),
+            self.args.prediction.out.display(),
             median.map_or(String::new(), |ms| format!(
                 ", {ms:.0} ms from file to targets (median)"
             ))

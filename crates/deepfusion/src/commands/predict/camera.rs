@@ -8,7 +8,7 @@ use deepfusion_data::{Camera, CameraCalibration, Lens, RgbImage, kitti::Calibrat
 use deepfusion_geometry::Intrinsics;
 use sha2::{Digest, Sha256};
 
-use crate::cli::{CameraIntrinsics, PredictArgs};
+use crate::cli::{CameraIntrinsics, PredictionArgs};
 use crate::error::CliError;
 
 /// Where the inputs' camera comes from.
@@ -28,7 +28,7 @@ pub enum CameraSource {
 
 impl CameraSource {
     /// What the arguments say; `trained` where they say nothing.
-    pub fn new(args: &PredictArgs, trained: Option<Intrinsics>) -> Result<Self> {
+    pub fn new(args: &PredictionArgs, trained: Option<Intrinsics>) -> Result<Self> {
         if let Some(k) = args.intrinsics {
             return Ok(Self::Given(k));
         }

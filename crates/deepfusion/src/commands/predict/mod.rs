@@ -20,7 +20,7 @@ use self::ledger::Ledger;
 use self::manifest::{Lock, Manifest};
 use self::sidecar::{FileMark, MadeWith, Sidecar};
 use super::device;
-use crate::cli::{PredictArgs, Save};
+use crate::cli::{Outputs, PredictArgs, PredictionArgs, Save, Shard};
 use crate::engine;
 use crate::error::CliError;
 use crate::pipeline::{self, Threads};
@@ -29,7 +29,8 @@ use crate::{interrupt, output};
 
 /// What is the same for all images of a run.
 pub(super) struct Job<'a> {
-    args: &'a PredictArgs,
+    args: &'a PredictionArgs,
+    outputs: Outputs,
     camera: CameraSource,
     preparer: Preparer,
     made_with: MadeWith,
@@ -56,20 +57,24 @@ pub(super) struct Seen {
 
 /// `deepfusion predict`.
 pub fn run(args: &PredictArgs) -> Result<()> {
-    let all = inputs::find(&args.inputs, &args.open_options())?;
-    let mine: Vec<&Input> = args.shard.part_of(&all).collect();
-    let predictor = engine::load(&args.model, &args.engine)?;
-    let job = Job::new(args, &predictor)?;
+    let PredictArgs {
+        prediction, shard, ..
+    } = args;
+    let out = &prediction.out;
+    let all = inputs::find(&prediction.inputs, &prediction.open_options())?;
+    let mine: Vec<&Input> = shard.part_of(&all).collect();
+    let predictor = engine::load(&prediction.model, &prediction.engine)?;
+    let job = Job::new(prediction, args.outputs(), &predictor)?;
     let camera_known = !matches!(job.camera, CameraSource::Unknown);
     if args.save.contains(&Save::Ply)
         && !(camera_known || all.iter().all(|input| input.frame.is_some()))
     {
         return Err(CliError::NoCamera.into());
     }
-    std::fs::create_dir_all(&args.out).map_err(|e| deepfusion_data::Error::file(&args.out, e))?;
+    std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
     interrupt::catch("stopping after the images at work; the same command goes on from there");
-    let _lock = Lock::take(&args.out, args.shard)?;
-    let (ledger, todo) = begin(&job, &all, &mine)?;
+    let _lock = Lock::take(out, *shard)?;
+    let (ledger, todo) = begin(&job, *shard, args.json, &all, &mine)?;
     predict(&job, &predictor, &mine, &todo, &ledger);
     let summary = ledger.finish()?;
     if job.camera.word() == "assumed" && mine.iter().any(|input| input.frame.is_none()) {
@@ -82,7 +87,7 @@ pub fn run(args: &PredictArgs) -> Result<()> {
     say(&format!(
         "{} images written to {}{}",
         summary.done - there,
-        args.out.display(),
+        out.display(),
         if there > 0 {
             format!(", {there} were there already")
         } else {
@@ -96,20 +101,26 @@ pub fn run(args: &PredictArgs) -> Result<()> {
 }
 
 /// Looks at what is there and writes the manifest; gives the images that are left to do, by their place in `mine`.
-fn begin<'a>(job: &Job<'a>, all: &[Input], mine: &[&Input]) -> Result<(Ledger<'a>, Vec<usize>)> {
+fn begin<'a>(
+    job: &Job<'a>,
+    shard: Shard,
+    keep_sidecars: bool,
+    all: &[Input],
+    mine: &[&Input],
+) -> Result<(Ledger<'a>, Vec<usize>)> {
     let args = job.args;
-    let mut manifest = Manifest::new(args.shard, all, mine, job.made_with.clone());
+    let mut manifest = Manifest::new(shard, all, mine, job.made_with.clone());
     let before = Manifest::all(&args.out)?;
     if !args.overwrite {
         manifest.check_against(&before, &args.out)?;
     }
-    resume::remove_partial_files(args, mine)?;
+    resume::remove_partial_files(job, mine)?;
     let begun = manifest.begun(&before);
     let mut todo = Vec::new();
-    let mut sidecars = vec![None; if args.json { mine.len() } else { 0 }];
+    let mut sidecars = vec![None; if keep_sidecars { mine.len() } else { 0 }];
     for (i, input) in mine.iter().enumerate() {
         let known = begun.contains(&(input.path.as_path(), input.name.as_str()));
-        match resume::finished(args, input, &job.made_with, known)? {
+        match resume::finished(job, input, known)? {
             None => todo.push(i),
             Some(sidecar) => {
                 manifest.images[i].state = manifest::State::Done;
@@ -163,16 +174,16 @@ fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], le
 
 impl<'a> Job<'a> {
     /// The work that the arguments ask of a network.
-    pub fn new(args: &'a PredictArgs, predictor: &Predictor) -> Result<Self> {
+    pub fn new(args: &'a PredictionArgs, outputs: Outputs, predictor: &Predictor) -> Result<Self> {
         let camera = CameraSource::new(args, predictor.training_camera())?;
         Ok(Self {
             args,
-            made_with: MadeWith::new(args, predictor, &camera)?,
+            made_with: MadeWith::new(args, &outputs, predictor, &camera)?,
             camera,
             preparer: predictor.preparer(),
             step: predictor.step,
             metric: predictor.training_camera().is_some() && predictor.config().loss.speed > 0.0,
-            inspector: match args.save.contains(&Save::Features) {
+            inspector: match outputs.save.contains(&Save::Features) {
                 true => Some(Inspector::load(
                     &args.model,
                     args.engine.set.as_deref(),
@@ -180,6 +191,7 @@ impl<'a> Job<'a> {
                 )?),
                 false => None,
             },
+            outputs,
         })
     }
 
@@ -214,11 +226,12 @@ impl<'a> Job<'a> {
         let (args, image, prediction) = (self.args, &loaded.image, &seen.prediction);
         let depth = prediction.depth();
         let (mut files, mut file_bytes) = (Vec::new(), Vec::new());
-        for save in &args.save {
+        for save in &self.outputs.save {
             let file = outputs::file_name(&input.name, *save);
             let path = args.out.join(&file);
             let (camera, maps) = (loaded.camera.as_ref(), (prediction, &depth));
-            outputs::write(args, *save, image, camera, maps, &seen.layers, &path)?;
+            let far = self.outputs.max_depth_m;
+            outputs::write(*save, far, image, camera, maps, &seen.layers, &path)?;
             file_bytes.push(FileMark::of(&path)?.bytes);
             files.push(file);
         }

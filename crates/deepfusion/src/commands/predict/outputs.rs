@@ -11,7 +11,7 @@ use deepfusion_render::{DepthScale, depth_picture, side_by_side, with_depth_lege
 use deepfusion_train::{LayerMaps, Prediction};
 
 use super::features;
-use crate::cli::{PredictArgs, Save};
+use crate::cli::Save;
 use crate::error::CliError;
 
 /// The name of an output.
@@ -29,8 +29,8 @@ pub fn file_name(name: &str, save: Save) -> String {
 
 /// Writes one output, atomically; `layers` are the network's, where [`Save::Features`] was asked for.
 pub fn write(
-    args: &PredictArgs,
     save: Save,
+    max_depth_m: f64,
     image: &RgbImage,
     camera: Option<&Intrinsics>,
     (prediction, depth): (&Prediction, &DepthMap),
@@ -53,7 +53,7 @@ pub fn write(
         Save::Ply => {
             let k = camera.ok_or(CliError::NoCamera)?;
             let rgb = Some(image.as_raw().as_slice());
-            let cloud = PointCloud::from_depth(depth, k, rgb, args.max_depth as f32)?;
+            let cloud = PointCloud::from_depth(depth, k, rgb, max_depth_m as f32)?;
             write_atomically::<CloudError>(path, |out| Ok(cloud.write_ply(out)?))
                 .map_err(CloudError::into_inner)?;
         }

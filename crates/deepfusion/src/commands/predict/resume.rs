@@ -5,10 +5,10 @@ use std::path::Path;
 
 use anyhow::Result;
 
+use super::Job;
 use super::inputs::Input;
 use super::outputs::file_name;
-use super::sidecar::{FileMark, MadeWith, Sidecar};
-use crate::cli::PredictArgs;
+use super::sidecar::{FileMark, Sidecar};
 use crate::error::CliError;
 
 /// The sidecar of an image that is done; `None` where there is work to do.
@@ -16,18 +16,14 @@ use crate::error::CliError;
 /// Files that this job did not make, or made of an image that has changed since, are an error, or with `--overwrite` work
 /// to do. `begun` says that a run of this job had the image in its manifest: files without a sidecar are then what it left
 /// when it was killed.
-pub fn finished(
-    args: &PredictArgs,
-    input: &Input,
-    made_with: &MadeWith,
-    begun: bool,
-) -> Result<Option<Sidecar>> {
+pub fn finished(job: &Job, input: &Input, begun: bool) -> Result<Option<Sidecar>> {
+    let args = job.args;
     let path = Sidecar::path(&args.out, &input.name);
     let text = match std::fs::read(&path) {
         Ok(text) => text,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             if !(begun || args.overwrite) {
-                refuse_files(args, input)?;
+                refuse_files(job, input)?;
             }
             return Ok(None);
         }
@@ -38,7 +34,7 @@ pub fn finished(
         Ok(sidecar) if sidecar.image != input.path => {
             format!("made from {}", sidecar.image.display())
         }
-        Ok(sidecar) => match made_with.difference(&sidecar.made_with) {
+        Ok(sidecar) => match job.made_with.difference(&sidecar.made_with) {
             Some(what) => format!("made with {what}"),
             None if FileMark::of(&input.path).is_ok_and(|mark| mark != sidecar.image_file) => {
                 format!("and {} has changed since", input.path.display())
@@ -55,9 +51,9 @@ pub fn finished(
 }
 
 /// Without a sidecar, nothing of the image's names may be there.
-fn refuse_files(args: &PredictArgs, input: &Input) -> Result<(), CliError> {
-    for save in &args.save {
-        let path = args.out.join(file_name(&input.name, *save));
+fn refuse_files(job: &Job, input: &Input) -> Result<(), CliError> {
+    for save in &job.outputs.save {
+        let path = job.args.out.join(file_name(&input.name, *save));
         if path.exists() {
             return Err(CliError::Exists {
                 path,
@@ -69,15 +65,20 @@ fn refuse_files(args: &PredictArgs, input: &Input) -> Result<(), CliError> {
 }
 
 /// Removes the half-written files that a killed run of this shard left (`.NAME.PID-N.partial`).
-pub fn remove_partial_files(args: &PredictArgs, mine: &[&Input]) -> Result<()> {
+pub fn remove_partial_files(job: &Job, mine: &[&Input]) -> Result<()> {
+    let out = &job.args.out;
     let files_of = |input: &&Input| {
         let sidecar = format!("{}.json", input.name);
-        let outputs = args.save.iter().map(|save| file_name(&input.name, *save));
+        let outputs = job
+            .outputs
+            .save
+            .iter()
+            .map(|save| file_name(&input.name, *save));
         outputs.chain([sidecar]).collect::<Vec<_>>()
     };
     let files: HashSet<String> = mine.iter().flat_map(files_of).collect();
-    let failed = |e| deepfusion_data::Error::file(&args.out, e);
-    for entry in std::fs::read_dir(&args.out).map_err(failed)? {
+    let failed = |e| deepfusion_data::Error::file(out, e);
+    for entry in std::fs::read_dir(out).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
         if partial_of(&path).is_some_and(|file| files.contains(file)) {
             std::fs::remove_file(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;

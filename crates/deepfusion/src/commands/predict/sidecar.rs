@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 
 use super::super::device;
 use super::camera::CameraSource;
-use crate::cli::{PredictArgs, Save};
+use crate::cli::{Outputs, PredictionArgs, Save};
 
 /// A prediction's description.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -101,7 +101,12 @@ pub struct MadeWith {
 
 impl MadeWith {
     /// For these arguments and this checkpoint.
-    pub fn new(args: &PredictArgs, predictor: &Predictor, camera: &CameraSource) -> Result<Self> {
+    pub fn new(
+        args: &PredictionArgs,
+        outputs: &Outputs,
+        predictor: &Predictor,
+        camera: &CameraSource,
+    ) -> Result<Self> {
         let (folder, _) = RunFolder::open(&args.model)?;
         let mut hash = Sha256::new();
         for path in [
@@ -122,8 +127,8 @@ impl MadeWith {
                 predictor.runner().name(),
                 device::name(args.engine.device)
             ),
-            save: args.save.iter().map(|s| word(*s)).collect(),
-            max_depth_m: args.max_depth,
+            save: outputs.save.iter().map(|s| word(*s)).collect(),
+            max_depth_m: outputs.max_depth_m,
             intrinsics: match camera {
                 CameraSource::Given(k) => Some([k.fx, k.fy, k.cx, k.cy]),
                 CameraSource::File(k) => Some([k.fx, k.fy, k.cx, k.cy]),

@@ -1,0 +1,58 @@
+use std::path::PathBuf;
+
+use clap::Args;
+use deepfusion_data::OpenOptions;
+
+use super::{CameraIntrinsics, EngineArgs, Save};
+
+/// Which images, through which network, to where: what `predict` and `perceive` have in common.
+#[derive(Debug, Clone, Args)]
+pub struct PredictionArgs {
+    /// A run folder or a checkpoint in it.
+    #[arg(long, value_name = "RUN")]
+    pub model: PathBuf,
+    /// Images, folders of images, globs, or recordings: a KITTI drive, a bag, a video, a folder with dataset.toml. Of
+    /// recordings the camera is known, and lenses are undone.
+    #[arg(required = true, value_name = "INPUT")]
+    pub inputs: Vec<String>,
+    /// The camera, in pixels of the input images.
+    #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "calib")]
+    pub intrinsics: Option<CameraIntrinsics>,
+    /// A calibration file: KITTI's calib_cam_to_cam.txt, OpenCV's, ROS's or Kalibr's YAML, or four numbers; lenses are undone.
+    #[arg(long, value_name = "FILE")]
+    pub calib: Option<PathBuf>,
+    /// Do not correct depth for another focal length than the one trained on.
+    #[arg(long)]
+    pub no_focal_correction: bool,
+    /// Stretch images of another aspect ratio instead of cropping them about the principal row.
+    #[arg(long)]
+    pub stretch: bool,
+    /// Folder to write.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Replace what is there, also what was made with other options or of an image that has changed.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// What runs the network.
+    #[command(flatten)]
+    pub engine: EngineArgs,
+}
+
+impl PredictionArgs {
+    /// How recordings among the inputs are opened.
+    pub fn open_options(&self) -> OpenOptions {
+        OpenOptions {
+            intrinsics: self.intrinsics.map(|k| k.numbers()),
+            ..OpenOptions::default()
+        }
+    }
+}
+
+/// What is kept of every image.
+#[derive(Debug, Clone)]
+pub struct Outputs {
+    /// Beside the sidecar.
+    pub save: Vec<Save>,
+    /// Points of a cloud beyond this depth are left out, metres.
+    pub max_depth_m: f64,
+}
