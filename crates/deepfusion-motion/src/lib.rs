@@ -47,6 +47,7 @@ mod image_motion;
 mod imu;
 mod motion_model;
 mod road_height;
+mod scale_correction;
 mod scale_monitor;
 mod signal;
 mod time_offset;
@@ -63,6 +64,7 @@ pub use imu::{
 };
 pub use motion_model::MotionModel;
 pub use road_height::{GreyImage, GroundPair, SWEEP_M, SWEEP_RATIO, implied_camera_height};
+pub use scale_correction::ScaleCorrection;
 pub use scale_monitor::{ScaleMonitor, ScaleMonitorConfig, ScaleReading, ScaleState};
 pub use signal::Signal;
 pub use time_offset::{NoTimeOffset, OffsetConfig, TimeOffset, VehicleRates, time_offset};

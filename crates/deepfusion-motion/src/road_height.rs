@@ -104,7 +104,7 @@ impl GroundPair {
             };
             road.iter().map(difference).sum::<f64>() / road.len() as f64
         };
-        let mut costs: Vec<f64> = heights.iter().map(cost).collect();
+        let mut costs: Vec<f64> = heights.par_iter().map(cost).collect();
         let scale = median(&costs);
         if !(scale > 0.0 && scale.is_finite()) {
             return None;
@@ -124,18 +124,27 @@ impl GroundPair {
 impl GreyImage {
     /// The image less its mean over a square window about each pixel.
     fn high_pass(&self) -> Self {
+        let stride = self.width + 1;
+        // Sums over all pixels above and to the left: those of a window are four of them.
+        let mut sums = vec![0.0f64; stride * (self.height + 1)];
+        for (y, row) in self.data.chunks_exact(self.width.max(1)).enumerate() {
+            let mut so_far = 0.0;
+            for (x, value) in row.iter().enumerate() {
+                so_far += f64::from(*value);
+                sums[(y + 1) * stride + x + 1] = sums[y * stride + x + 1] + so_far;
+            }
+        }
+        let window =
+            |at: usize, size: usize| (at.saturating_sub(HIGH_PASS), (at + HIGH_PASS + 1).min(size));
         let mut data = self.data.clone();
         for y in 0..self.height {
-            let rows = y.saturating_sub(HIGH_PASS)..(y + HIGH_PASS + 1).min(self.height);
+            let (top, bottom) = window(y, self.height);
+            let (above, below) = (&sums[top * stride..], &sums[bottom * stride..]);
             for x in 0..self.width {
-                let columns = x.saturating_sub(HIGH_PASS)..(x + HIGH_PASS + 1).min(self.width);
-                let mut sum = 0.0;
-                for row in rows.clone() {
-                    let start = row * self.width;
-                    let window = &self.data[start + columns.start..start + columns.end];
-                    sum += window.iter().sum::<f32>();
-                }
-                data[y * self.width + x] -= sum / (rows.len() * columns.len()) as f32;
+                let (left, right) = window(x, self.width);
+                let sum = below[right] - below[left] - above[right] + above[left];
+                let count = (bottom - top) * (right - left);
+                data[y * self.width + x] -= (sum / count as f64) as f32;
             }
         }
         Self { data, ..*self }
@@ -162,4 +171,36 @@ fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_about_each_pixel_is_taken_off() {
+        let (width, height) = (23, 11);
+        let data: Vec<f32> = (0..width * height)
+            .map(|i| (i * 7919 % 256) as f32)
+            .collect();
+        let image = GreyImage {
+            width,
+            height,
+            data,
+        };
+        let passed = image.high_pass();
+        let reach = HIGH_PASS as isize;
+        for (i, value) in passed.data.iter().enumerate() {
+            let (x, y) = ((i % width) as isize, (i / width) as isize);
+            let window: Vec<f32> = (y - reach..=y + reach)
+                .flat_map(|v| (x - reach..=x + reach).map(move |u| (u, v)))
+                .filter(|(u, v)| {
+                    (0..width as isize).contains(u) && (0..height as isize).contains(v)
+                })
+                .map(|(u, v)| image.data[v as usize * width + u as usize])
+                .collect();
+            let mean = window.iter().sum::<f32>() / window.len() as f32;
+            assert!((value - (image.data[i] - mean)).abs() < 1e-3, "{x}, {y}");
+        }
+    }
 }

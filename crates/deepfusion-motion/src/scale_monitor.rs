@@ -38,7 +38,7 @@ impl Default for ScaleMonitorConfig {
 }
 
 /// What the monitor makes of it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ScaleState {
     /// The reference is being learned.
@@ -50,7 +50,7 @@ pub enum ScaleState {
 }
 
 /// A reading.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ScaleReading {
     /// Height now over the reference: 1.1 where images are zoomed by 10 %, or the speed is told 10 % too high. `None` while
     /// learning.

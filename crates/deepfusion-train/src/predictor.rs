@@ -34,6 +34,14 @@ pub struct Prediction {
 }
 
 impl Prediction {
+    /// Multiplies depth by `factor`.
+    pub fn scale_depth(&mut self, factor: f64) {
+        let disparity_factor = (1.0 / factor) as f32;
+        for disparity in &mut self.disparity {
+            *disparity *= disparity_factor;
+        }
+    }
+
     /// Depth at the image's own size: disparity is enlarged (bilinear, half-pixel centres), then
     /// inverted; 0 outside the window that was looked at.
     #[must_use]

@@ -2,24 +2,8 @@
 
 mod support;
 
-use std::path::Path;
-
 use serde_json::Value;
-use support::{Run, in_folder};
-
-fn run(folder: &Path, args: &str) -> Run {
-    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
-}
-
-fn ok(folder: &Path, args: &str) -> Run {
-    let run = run(folder, args);
-    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
-    run
-}
-
-fn json(folder: &Path, args: &str) -> Value {
-    serde_json::from_str(&ok(folder, args).stdout).unwrap()
-}
+use support::{json, ok, run};
 
 #[test]
 fn bags_are_trained_on_and_measured_by_scenario() {

@@ -9,33 +9,10 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use serde_json::Value;
-use support::{Run, in_folder};
+use support::{fails, ok};
 
 const DRIVE: &str = "sim/2026_01_01/2026_01_01_drive_0003_sync/image_02/data";
 const SAVE: &str = "--calib sim/2026_01_01 --save depth-png,npy,ply";
-
-fn run(folder: &Path, args: &str) -> Run {
-    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
-}
-
-fn ok(folder: &Path, args: &str) -> Run {
-    let run = run(folder, args);
-    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
-    run
-}
-
-fn fails(folder: &Path, args: &str, names: &[&str]) {
-    let run = run(folder, args);
-    assert_eq!(
-        (run.code, run.stdout.as_str()),
-        (1, ""),
-        "{args}: {}",
-        run.stderr
-    );
-    for name in names.iter().chain(&["hint: "]) {
-        assert!(run.stderr.contains(name), "{name}: {}", run.stderr);
-    }
-}
 
 fn start(folder: &Path, args: &str) -> Child {
     Command::new(env!("CARGO_BIN_EXE_deepfusion"))

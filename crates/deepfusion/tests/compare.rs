@@ -6,23 +6,11 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
-use support::{Run, in_folder};
+use support::{fails, run};
 
-fn run(folder: &Path, args: &str) -> Run {
-    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
-}
-
+/// What a run that must succeed prints.
 fn ok(folder: &Path, args: &str) -> String {
-    let run = run(folder, args);
-    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
-    run.stdout
-}
-
-fn fails(folder: &Path, args: &str, expected: &str) {
-    let run = run(folder, args);
-    assert_eq!(run.code, 1, "{args}: {}", run.stdout);
-    assert!(run.stderr.contains(expected), "{args}: {}", run.stderr);
-    assert!(run.stderr.contains("hint: "), "{args}: {}", run.stderr);
+    support::ok(folder, args).stdout
 }
 
 fn page(path: &Path) -> String {
@@ -103,7 +91,7 @@ fn runs_are_reported_kept_and_compared() {
     );
 
     // Side by side.
-    fails(at, "compare a b", "b: has no evaluation");
+    fails(at, "compare a b", &["b: has no evaluation"]);
     ok(at, "eval --model b --data sim");
     fs::write(at.join("printed.json"), &printed).unwrap();
     let text = ok(at, "compare a b printed.json");
@@ -135,11 +123,11 @@ fn runs_are_reported_kept_and_compared() {
     fails(
         at,
         "compare a printed.json --pictures sim --out d.html",
-        "pictures need a run's folder",
+        &["pictures need a run's folder"],
     );
     fs::write(at.join("broken.json"), &printed[..printed.len() / 2]).unwrap();
-    fails(at, "compare broken.json", "no evaluation");
-    fails(at, "compare nowhere.json", "nowhere.json");
+    fails(at, "compare broken.json", &["no evaluation"]);
+    fails(at, "compare nowhere.json", &["nowhere.json"]);
     let bad = run(at, "compare");
     assert_eq!(bad.code, 2, "{}", bad.stderr);
 }
@@ -157,5 +145,5 @@ fn arrays_have_a_report_too() {
     assert!(text.contains("distance along z, m (no camera)"), "{text}");
     let html = page(&at.join("r.html"));
     assert!(html.contains("Best and worst frames") && !html.contains("How it learned"));
-    fails(at, &args.replace("r.html", "no/such/r.html"), "no/such");
+    fails(at, &args.replace("r.html", "no/such/r.html"), &["no/such"]);
 }

@@ -7,18 +7,7 @@ use std::path::Path;
 use deepfusion_data::{Dataset, GtKind, OpenOptions};
 use ndarray::{Array2, Array3};
 use ndarray_npy::{NpzReader, NpzWriter, write_npy};
-use serde_json::Value;
-use support::{Run, in_folder};
-
-fn ok(folder: &Path, args: &str) -> Run {
-    let run = in_folder(folder, &args.split_whitespace().collect::<Vec<_>>());
-    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
-    run
-}
-
-fn json(folder: &Path, args: &str) -> Value {
-    serde_json::from_str(&ok(folder, args).stdout).unwrap()
-}
+use support::{in_folder, json, ok};
 
 /// Reads an .npz, changes every array, writes it under another name.
 fn derive(folder: &Path, from: &str, to: &str, change: impl Fn(&Array2<f32>) -> Array2<f32>) {

@@ -3,34 +3,12 @@
 mod support;
 
 use std::fs;
-use std::path::Path;
 
 use deepfusion_eval::odometry::PoseFile;
 use deepfusion_geometry::DepthRange;
 use deepfusion_train::{DataConfig, DataSetConfig, TrainConfig};
 use serde_json::Value;
-use support::{Run, in_folder};
-
-fn run(folder: &Path, args: &str) -> Run {
-    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
-}
-
-fn ok(folder: &Path, args: &str) -> Run {
-    let run = run(folder, args);
-    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
-    run
-}
-
-fn json(folder: &Path, args: &str) -> Value {
-    serde_json::from_str(&ok(folder, args).stdout).unwrap()
-}
-
-fn fails(folder: &Path, args: &str, expected: &str) {
-    let run = run(folder, args);
-    assert_eq!(run.code, 1, "{args}: {}", run.stdout);
-    assert!(run.stderr.contains(expected), "{args}: {}", run.stderr);
-    assert!(run.stderr.contains("hint: "), "{args}: {}", run.stderr);
-}
+use support::{fails, json, ok};
 
 #[test]
 fn a_model_is_measured_on_traffic_and_along_the_road() {
@@ -126,13 +104,13 @@ fn poses_that_cannot_be_compared_are_told() {
         fails(
             at,
             &format!("eval-odometry --pred {file} --gt six.txt"),
-            expected,
+            &[expected],
         );
     }
     fails(
         at,
         "eval-odometry --pred one.txt --gt one.txt",
-        "a motion takes two",
+        &["a motion takes two"],
     );
     let same = json(at, "eval-odometry --pred six.txt --gt six.txt --json");
     assert_eq!(same["scale"], 1.0);
@@ -185,13 +163,13 @@ fn several_data_sets_are_learned_together() {
         "eval --model both --data road",
         "eval-odometry --model both --data yard",
     ] {
-        fails(at, command, "one of road, yard");
-        fails(at, &format!("{command} --set yrad"), "found yrad");
+        fails(at, command, &["one of road, yard"]);
+        fails(at, &format!("{command} --set yrad"), &["found yrad"]);
     }
     fails(
         at,
         "train --data road --config both.toml --resume --out both",
-        "data.paths",
+        &["data.paths"],
     );
     let scale = |set: &str| {
         let report = json(

@@ -3,16 +3,11 @@
 mod support;
 
 use std::fs;
-use std::path::Path;
 
 use deepfusion_onnx::runtime::find;
 use deepfusion_onnx::{OPSET, read};
 use serde_json::Value;
-use support::{Run, in_folder};
-
-fn run(folder: &Path, args: &str) -> Run {
-    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
-}
+use support::run;
 
 #[test]
 fn a_run_becomes_a_file_that_is_its_network() {

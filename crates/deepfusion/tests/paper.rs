@@ -3,17 +3,10 @@
 mod support;
 
 use std::fs;
-use std::path::Path;
 
 use deepfusion_onnx::read;
 use serde_json::Value;
-use support::{Run, in_folder};
-
-fn ok(folder: &Path, args: &str) -> Run {
-    let run = in_folder(folder, &args.split_whitespace().collect::<Vec<_>>());
-    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
-    run
-}
+use support::ok;
 
 /// The preset `tiny` with every part of the paper's network.
 fn with_parts(config: &str) -> String {

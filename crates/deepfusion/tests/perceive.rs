@@ -5,17 +5,7 @@ mod support;
 use std::path::Path;
 
 use serde_json::Value;
-use support::{Run, in_folder};
-
-fn run(folder: &Path, args: &str) -> Run {
-    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
-}
-
-fn ok(folder: &Path, args: &str) -> Run {
-    let run = run(folder, args);
-    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
-    run
-}
+use support::{ok, run};
 
 const DRIVE: &str = "street/2026_01_01/2026_01_01_drive_0005_sync";
 

@@ -3,35 +3,9 @@
 mod support;
 
 use std::fs;
-use std::path::Path;
 
 use serde_json::Value;
-use support::{Run, in_folder};
-
-fn run(folder: &Path, args: &str) -> Run {
-    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
-}
-
-fn ok(folder: &Path, args: &str) -> Run {
-    let run = run(folder, args);
-    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
-    run
-}
-
-/// The run must fail with code 1, name every one of `names`, and give a hint.
-fn fails(folder: &Path, args: &str, names: &[&str]) {
-    let run = run(folder, args);
-    assert_eq!(run.code, 1, "{args}: {}", run.stderr);
-    for name in names {
-        assert!(
-            run.stderr.contains(name),
-            "{args}: no `{name}` in {}",
-            run.stderr
-        );
-    }
-    assert!(run.stderr.contains("hint: "), "{args}: {}", run.stderr);
-    assert!(!run.stderr.contains("panicked"), "{args}: {}", run.stderr);
-}
+use support::{fails, ok, run};
 
 const SMALL: &str = "--size 96x64 --batch 2";
 

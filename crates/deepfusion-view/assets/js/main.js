@@ -341,8 +341,9 @@ class App {
     if (Number.isFinite(perceived.speed_mps)) add('Speed', number(perceived.speed_mps, 1, 'm/s'));
     const ttc = perceived.time_to_collision_s;
     if (Number.isFinite(ttc)) add('Collision in', number(ttc, 1, 's'), ttc < 2 ? 'bad' : ttc < 4 ? 'warn' : '');
-    const scale = perceived.scale_monitor;
+    const scale = perceived.scale_monitor ?? frame?.meta?.scale_monitor;
     if (scale && Number.isFinite(scale.ratio)) add('Scale', `${scale.ratio.toFixed(3)} ${scale.state ?? ''}`, scale.state === 'drift' ? 'bad' : scale.state === 'steady' ? 'good' : '');
+    if (Number.isFinite(scale?.correction) && scale.correction !== 1) add('Corrected by', scale.correction.toFixed(3), 'warn');
     if (frame?.perceived) add('Targets', String(frame.targets.length), '', 'less');
     if (Number.isFinite(perceived.latency_ms)) add('Latency', number(perceived.latency_ms, 0, 'ms'), '', 'less');
     if (frame?.meta?.scale_trusted === false) add('Metres', 'not to be trusted', 'warn');

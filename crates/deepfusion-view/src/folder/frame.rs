@@ -19,6 +19,7 @@ const PASSED_ON: [&str; 9] = [
     "checkpoint_step",
     "intrinsics_from",
     "scale_trusted",
+    "scale_monitor",
     "focal_factor",
     "window",
     "depth_m",

@@ -45,6 +45,7 @@ impl Summary {
         if let Some(sidecar) = &sidecar {
             summary.is_frame |= sidecar.get("image").is_some() && sidecar.get("size").is_some();
             summary.depth_m = numbers(sidecar.get("depth_m"));
+            summary.add_scale(sidecar);
         }
         // A sidecar that is being written is a frame that comes.
         summary.is_frame |= !problems.is_empty();
@@ -66,7 +67,12 @@ impl Summary {
             let distances = list.iter().filter_map(|t| t.get("distance_m")?.as_f64());
             self.nearest_m = distances.min_by(f64::total_cmp);
         }
-        if let Some(monitor) = frame.get("scale_monitor") {
+        self.add_scale(frame);
+    }
+
+    /// What `predict` and `perceive` say of the metres.
+    fn add_scale(&mut self, file: &Value) {
+        if let Some(monitor) = file.get("scale_monitor") {
             self.scale_ratio = monitor.get("ratio").and_then(Value::as_f64);
             let state = monitor.get("state").and_then(Value::as_str);
             self.scale_state = state.map(str::to_owned);

@@ -1,10 +1,8 @@
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
-use deepfusion_motion::ScaleMonitorConfig;
-
 use super::values::positive;
 use super::{Outputs, PredictionArgs, Save};
+use clap::{Args, ValueEnum};
 
 /// `deepfusion perceive`.
 #[derive(Debug, Args)]
@@ -29,9 +27,6 @@ pub struct PerceiveArgs {
     /// Settings of the perception (TOML); what is not in it keeps its default.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// The camera's height over the road in metres, where it was measured: the scale monitor then has nothing to learn.
-    #[arg(long, value_name = "M", value_parser = positive)]
-    pub camera_height: Option<f64>,
     /// Print one JSON object a frame on stdout, as it comes.
     #[arg(long)]
     pub json: bool,
@@ -53,14 +48,6 @@ pub enum PerceiveSave {
 }
 
 impl PerceiveArgs {
-    /// How the scale is watched.
-    pub fn scale_config(&self) -> ScaleMonitorConfig {
-        ScaleMonitorConfig {
-            height_m: self.camera_height,
-            ..ScaleMonitorConfig::default()
-        }
-    }
-
     /// What is kept of the prediction that this stands on.
     pub fn outputs(&self, max_depth_m: f64) -> Outputs {
         let depth = self.save.contains(&PerceiveSave::DepthPng);

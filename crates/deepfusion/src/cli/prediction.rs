@@ -2,7 +2,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use deepfusion_data::OpenOptions;
+use deepfusion_motion::ScaleMonitorConfig;
 
+use super::values::positive;
 use super::{CameraIntrinsics, EngineArgs, Save};
 
 /// Which images, through which network, to where: what `predict` and `perceive` have in common.
@@ -27,6 +29,14 @@ pub struct PredictionArgs {
     /// Stretch images of another aspect ratio instead of cropping them about the principal row.
     #[arg(long)]
     pub stretch: bool,
+    /// The camera's height over the road in metres, where it was measured: the scale monitor, which watches recordings
+    /// with speed and yaw rate, then has nothing to learn.
+    #[arg(long, value_name = "M", value_parser = positive)]
+    pub camera_height: Option<f64>,
+    /// Where the scale monitor finds metres changed, bring depth back to those of the first hundred frames, slowly. It
+    /// holds on to the vehicle's metres: a wrong speed is followed.
+    #[arg(long)]
+    pub correct_scale: bool,
     /// Folder to write.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -44,6 +54,14 @@ impl PredictionArgs {
         OpenOptions {
             intrinsics: self.intrinsics.map(|k| k.numbers()),
             ..OpenOptions::default()
+        }
+    }
+
+    /// How the scale is watched.
+    pub fn scale_config(&self) -> ScaleMonitorConfig {
+        ScaleMonitorConfig {
+            height_m: self.camera_height,
+            ..ScaleMonitorConfig::default()
         }
     }
 }

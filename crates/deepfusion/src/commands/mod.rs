@@ -20,6 +20,7 @@ mod perceive;
 mod predict;
 mod recorder;
 mod run_report;
+mod scene;
 mod simulate;
 mod train;
 mod view;

@@ -1,7 +1,10 @@
 //! Runs the program as its users do.
+#![allow(dead_code, reason = "each test takes what it needs")]
 
 use std::path::Path;
 use std::process::Command;
+
+use serde_json::Value;
 
 /// What a run left.
 pub struct Run {
@@ -26,4 +29,37 @@ pub fn in_folder(folder: &Path, args: &[&str]) -> Run {
         stdout: String::from_utf8(output.stdout).unwrap(),
         stderr: String::from_utf8(output.stderr).unwrap(),
     }
+}
+
+/// As [`in_folder`], the arguments in one line.
+pub fn run(folder: &Path, args: &str) -> Run {
+    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
+}
+
+/// A run that must succeed.
+pub fn ok(folder: &Path, args: &str) -> Run {
+    let run = run(folder, args);
+    assert_eq!(run.code, 0, "{args}: {}", run.stderr);
+    run
+}
+
+/// What a run that must succeed prints, as JSON.
+pub fn json(folder: &Path, args: &str) -> Value {
+    serde_json::from_str(&ok(folder, args).stdout).unwrap()
+}
+
+/// A run that must fail with code 1, name every one of `names`, give a hint, and print nothing.
+pub fn fails(folder: &Path, args: &str, names: &[&str]) {
+    let run = run(folder, args);
+    assert_eq!(run.code, 1, "{args}: {}", run.stderr);
+    assert_eq!(run.stdout, "", "{args}");
+    for name in names {
+        assert!(
+            run.stderr.contains(name),
+            "{args}: no `{name}` in {}",
+            run.stderr
+        );
+    }
+    assert!(run.stderr.contains("hint: "), "{args}: {}", run.stderr);
+    assert!(!run.stderr.contains("panicked"), "{args}: {}", run.stderr);
 }

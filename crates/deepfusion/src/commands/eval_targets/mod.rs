@@ -21,7 +21,7 @@ use serde::Serialize;
 use self::labels::Labels;
 use self::object_frames::ObjectFrame;
 use super::perceive::read_config;
-use super::perceive::scene::{MotionTracker, working_depth};
+use super::scene::{MotionTracker, working_depth};
 use crate::cli::{EvalTargetsArgs, TargetDepth};
 use crate::error::CliError;
 use crate::progress::Progress;
@@ -179,7 +179,10 @@ impl Work {
             let Some((depth, k)) = seen else {
                 continue;
             };
-            let motion = motions.of(dataset, *index, &mut self.perception);
+            let motion = motions.of(dataset, *index);
+            if !motion.goes_on() {
+                self.perception.forget();
+            }
             let surroundings = self.perception.look(&depth, &k, motion.stamp)?;
             // Without a witness nothing says which boxes are seen: such a frame is followed, but not scored.
             if let Some(witness) = &witness {

@@ -2,14 +2,12 @@
 
 mod pictures;
 mod record;
-pub mod scene;
 
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use deepfusion_motion::{ScaleMonitor, ScaleReading, ScaleState};
 use deepfusion_perception::{
     ConfidenceModel, Perception, PerceptionConfig, VehicleShape, time_to_collision,
 };
@@ -17,10 +15,10 @@ use deepfusion_train::{Predictor, PreparedImage, RunFolder};
 
 use self::pictures::Picture;
 use self::record::{FrameRecord, Lines};
-use self::scene::{MotionTracker, ScaleWatch, working_depth};
 use super::confidence::Confidence;
 use super::predict::inputs::{self, Input};
 use super::predict::{Job, Loaded, Seen};
+use super::scene::{MotionTracker, ScaleWatch, working_depth};
 use crate::cli::{PerceiveArgs, PerceiveSave, PredictionArgs};
 use crate::error::{CliError, hint_of, told};
 use crate::pipeline::{self, Threads};
@@ -113,7 +111,6 @@ struct Outcome {
     latency_ms: Vec<f64>,
     unreadable: Vec<anyhow::Error>,
     fatal: Option<anyhow::Error>,
-    drift_told: bool,
 }
 
 struct Work<'a> {
@@ -130,7 +127,7 @@ impl Work<'_> {
     fn go(self, predictor: &Predictor, config: PerceptionConfig) -> Result<()> {
         let mut perception = Perception::new(config);
         let mut motions = MotionTracker::default();
-        let mut watch = ScaleWatch::new(ScaleMonitor::new(self.args.scale_config()));
+        let mut watch = ScaleWatch::of(&self.args.prediction);
         let load = |index: usize| {
             let start = Instant::now();
             match self.job.load(&self.all[index]) {
@@ -183,21 +180,26 @@ impl Work<'_> {
             start,
         } = begun;
         let input = &self.all[index];
-        let prediction = predictor.infer(&prepared)?;
+        let mut prediction = predictor.infer(&prepared)?;
+        if let Some(factor) = watch.correction() {
+            prediction.scale_depth(factor);
+        }
         let camera = loaded.camera.ok_or(CliError::NoCamera)?;
+        let motion = motions.next(input);
+        if !motion.goes_on() {
+            perception.forget();
+        }
         let (depth, k) = working_depth(&prediction.depth(), &camera);
-        let motion = motions.next(input, perception);
         let surroundings = perception.look(&depth, &k, motion.stamp)?;
-        let ground = surroundings.ground.as_ref();
-        let scale = watch.add(&loaded.image, &camera, &motion, ground);
-        self.tell_drift(&input.name, scale.as_ref());
         let collision = motion.speed_mps.and_then(|speed| {
             let vehicle = VehicleShape::default();
             time_to_collision(&surroundings.targets, speed, motion.yaw_rate, &vehicle)
         });
         let latency_ms = start.elapsed().as_secs_f64() * 1e3;
+        // The targets need not wait for it.
+        let ground = surroundings.ground.as_ref();
         let record = FrameRecord {
-            scale_monitor: scale,
+            scale_monitor: watch.add(&input.name, &loaded.image, &camera, &motion, ground),
             ..FrameRecord::new(&input.name, &surroundings, &motion, collision, latency_ms)
         };
         let pictures = pictures::draw(
@@ -215,23 +217,11 @@ impl Work<'_> {
             seen: Seen {
                 prediction,
                 layers: Vec::new(),
+                scale: record.scale_monitor,
             },
             record,
             pictures,
         })
-    }
-
-    /// Says once that the metres have changed.
-    fn tell_drift(&self, frame: &str, scale: Option<&ScaleReading>) {
-        let drift = scale.filter(|s| s.state == ScaleState::Drift);
-        if let Some(ratio) = drift.and_then(|s| s.ratio)
-            && !std::mem::replace(&mut self.outcome().drift_told, true)
-        {
-            tracing::warn!(
-                "{frame}: the road says that metres are {ratio:.2} times what they were: were the images zoomed, the camera \
-                 moved, or is the speed wrong? (scale_monitor in each frame's JSON)"
-            );
-        }
     }
 
     fn write(&self, found: &Found) -> Result<()> {

@@ -5,11 +5,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use deepfusion_data::write_atomically;
-use deepfusion_motion::ScaleReading;
 use deepfusion_perception::{Collision, Surroundings, Target};
 use serde::Serialize;
 
-use super::scene::Motion;
+use super::super::scene::{Motion, Scale};
 
 /// A frame's targets; everything in the camera's axes (x right, y down, z forward), metres and seconds.
 #[derive(Debug, Clone, Serialize)]
@@ -31,7 +30,7 @@ pub struct FrameRecord {
     /// That target.
     pub collision_with: Option<u64>,
     /// Whether metres still are what they were, where that is watched.
-    pub scale_monitor: Option<ScaleReading>,
+    pub scale_monitor: Option<Scale>,
     /// From opening the file to having the targets.
     pub latency_ms: f64,
 }

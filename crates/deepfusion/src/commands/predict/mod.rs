@@ -8,6 +8,7 @@ mod manifest;
 mod outputs;
 mod resume;
 pub(super) mod sidecar;
+mod watcher;
 
 use anyhow::{Context, Result};
 use deepfusion_data::{RgbImage, load_rgb};
@@ -19,7 +20,9 @@ use self::inputs::Input;
 use self::ledger::Ledger;
 use self::manifest::{Lock, Manifest};
 use self::sidecar::{FileMark, MadeWith, Sidecar};
+use self::watcher::Watcher;
 use super::device;
+use super::scene::Scale;
 use crate::cli::{Outputs, PredictArgs, PredictionArgs, Save, Shard};
 use crate::engine;
 use crate::error::CliError;
@@ -53,6 +56,8 @@ pub(super) struct Seen {
     pub prediction: Prediction,
     /// Empty where nobody asked for features.
     pub layers: Vec<LayerMaps>,
+    /// Whether the metres hold, where that is watched.
+    pub scale: Option<Scale>,
 }
 
 /// `deepfusion predict`.
@@ -146,10 +151,13 @@ fn begin<'a>(
 fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], ledger: &Ledger) {
     let load = |i: usize| {
         let loaded = job.load(mine[todo[i]]);
-        loaded.map_err(|e| ledger.failed(todo[i], e)).ok()
+        let loaded = loaded.map_err(|e| ledger.failed(todo[i], e)).ok();
+        loaded.map(|(loaded, prepared)| (i, loaded, prepared))
     };
-    let infer = |(loaded, prepared): (Loaded, PreparedImage)| {
-        let seen = predictor.infer(&prepared).map(|prediction| Seen {
+    let mut watcher = Watcher::of(job.args);
+    let infer = |(i, loaded, prepared): (usize, Loaded, PreparedImage)| {
+        let seen = predictor.infer(&prepared).map(|mut prediction| Seen {
+            scale: watcher.look(mine[todo[i]], &loaded, &mut prediction),
             prediction,
             layers: match &job.inspector {
                 Some(inspector) => inspector.inspect(&prepared.input),
@@ -168,7 +176,11 @@ fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], le
         }
     };
     let stop = || interrupt::asked() || ledger.stopped();
-    let threads = Threads::for_this_machine();
+    let mut threads = Threads::for_this_machine();
+    if mine.iter().any(|input| input.frame.is_some()) {
+        // One thread reads: a recording's frames stay in their order, as the watch over its metres needs them.
+        threads.before = 1;
+    }
     pipeline::run(todo.len(), threads, &stop, &load, infer, &write);
 }
 
@@ -256,6 +268,7 @@ impl<'a> Job<'a> {
             depth_m: known
                 .map(|d| [d, d])
                 .reduce(|ends_so_far, [d, _]| ends(ends_so_far, d)),
+            scale_monitor: seen.scale,
             files,
             file_bytes,
             made_with: self.made_with.clone(),

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::super::device;
+use super::super::scene::Scale;
 use super::camera::CameraSource;
 use crate::cli::{Outputs, PredictionArgs, Save};
 
@@ -41,6 +42,9 @@ pub struct Sidecar {
     pub window: [u32; 4],
     /// Smallest and largest depth, in metres; none where no pixel has one.
     pub depth_m: Option<[f32; 2]>,
+    /// Whether the recording's metres still are what they were, where that is watched.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_monitor: Option<Scale>,
     /// The outputs, in the sidecar's folder.
     pub files: Vec<String>,
     /// The outputs' sizes in bytes, to notice a file that was cut off.
@@ -94,6 +98,9 @@ pub struct MadeWith {
     pub focal_correction: bool,
     /// `--stretch`.
     pub stretch: bool,
+    /// `--correct-scale`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub correct_scale: bool,
     /// `--set`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub set: Option<String>,
@@ -140,6 +147,7 @@ impl MadeWith {
             },
             focal_correction: !args.no_focal_correction,
             stretch: args.stretch,
+            correct_scale: args.correct_scale,
             set: args.engine.set.clone(),
         })
     }
@@ -175,6 +183,10 @@ impl MadeWith {
                 "another --no-focal-correction",
             ),
             (self.stretch != other.stretch, "another --stretch"),
+            (
+                self.correct_scale != other.correct_scale,
+                "another --correct-scale",
+            ),
         ]
         .into_iter()
         .find_map(|(differs, what)| differs.then_some(what))
