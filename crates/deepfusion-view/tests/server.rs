@@ -86,6 +86,19 @@ fn a_frame_has_its_camera_targets_and_picture() {
 }
 
 #[test]
+fn the_watch_over_the_metres_is_shown_of_predictions_too() {
+    let folder = results(2);
+    let told = json!({"ratio": 1.08, "state": "drift", "correction": 1.02});
+    write_sidecar(folder.path(), "000001", &json!({"scale_monitor": told}));
+    let server = Running::start(folder.path(), None);
+    let index = server.json("/api/runs/0/index");
+    assert_eq!(index["series"]["scale_ratio"], json!([null, 1.08]));
+    assert_eq!(index["series"]["scale_state"], json!([null, "drift"]));
+    let frame = server.json("/api/runs/0/frame/000001");
+    assert_eq!(frame["scale_monitor"], told);
+}
+
+#[test]
 fn what_is_broken_says_so_and_the_rest_goes_on() {
     let folder = results(7);
     let at = |file: &str| folder.path().join(file);

@@ -13,7 +13,7 @@ use super::summary::{numbers, read_json};
 use crate::{Error, Result};
 
 /// Fields of the sidecar that the page shows as they are.
-const PASSED_ON: [&str; 9] = [
+const PASSED_ON: [&str; 10] = [
     "unit",
     "model",
     "checkpoint_step",

@@ -72,7 +72,7 @@ impl Summary {
 
     /// What `predict` and `perceive` say of the metres.
     fn add_scale(&mut self, file: &Value) {
-        if let Some(monitor) = file.get("scale_monitor") {
+        if let Some(monitor) = file.get("scale_monitor").filter(|m| m.is_object()) {
             self.scale_ratio = monitor.get("ratio").and_then(Value::as_f64);
             let state = monitor.get("state").and_then(Value::as_str);
             self.scale_state = state.map(str::to_owned);
