@@ -1,6 +1,7 @@
 //! ONNX files in ONNX Runtime, on the processor. The library is found and opened at run time; a process uses
 //! one library for all its models.
 
+mod foreign;
 mod library;
 mod places;
 
@@ -11,6 +12,7 @@ use ort::environment::Environment;
 use ort::session::{OutputSelector, RunOptions, Session};
 use ort::value::TensorRef;
 
+pub use foreign::{ForeignModel, Tensor, TensorInfo};
 pub use library::{Library, find};
 
 use crate::{DepthMaps, Error};

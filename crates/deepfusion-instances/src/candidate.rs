@@ -1,0 +1,24 @@
+/// A box that a model proposes, in the pixels of its input.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Left, top, right, bottom.
+    pub bounds: [f32; 4],
+    /// 0 to 1.
+    pub score: f32,
+    /// Number of the class.
+    pub class: usize,
+    /// What the prototypes of masks are weighted with; empty where the model gives boxes only.
+    pub coefficients: Vec<f32>,
+}
+
+impl Candidate {
+    /// Area in common over area in all, 0 to 1.
+    #[must_use]
+    pub fn overlap(&self, other: &Self) -> f32 {
+        let [l, t, r, b] = self.bounds;
+        let [ol, ot, or, ob] = other.bounds;
+        let common = (r.min(or) - l.max(ol)).max(0.0) * (b.min(ob) - t.max(ot)).max(0.0);
+        let all = (r - l) * (b - t) + (or - ol) * (ob - ot) - common;
+        if all > 0.0 { common / all } else { 0.0 }
+    }
+}

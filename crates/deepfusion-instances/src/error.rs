@@ -1,0 +1,60 @@
+use std::path::PathBuf;
+
+/// What can go wrong with a model of instances.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The file cannot be read.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The library is missing, or refuses the model.
+    #[error("{}: {source}", path.display())]
+    Runtime {
+        /// The model.
+        path: PathBuf,
+        /// What it says.
+        source: deepfusion_onnx::Error,
+    },
+    /// Inputs or outputs that no known kind of model has.
+    #[error("{}: no model of instances that is known: {reason}", path.display())]
+    Shape {
+        /// The model.
+        path: PathBuf,
+        /// What it has.
+        reason: String,
+    },
+    /// A class that the model does not know.
+    #[error("{}: no class `{class}`", path.display())]
+    Class {
+        /// The model.
+        path: PathBuf,
+        /// The class that was asked for.
+        class: String,
+        /// Those it knows.
+        known: Vec<String>,
+    },
+}
+
+/// [`std::result::Result`] with this crate's error.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// A one-line remedy, where there is one.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::File { .. } => None,
+            Self::Runtime { source, .. } => source.hint(),
+            Self::Shape { .. } => Some(
+                "known are exports of one picture (1x3xHxW, f32) with the outputs of YOLO-seg (v5, v8 and later, with or without NMS), of YOLO boxes, \
+                 and of YOLOX"
+                    .into(),
+            ),
+            Self::Class { known, .. } => Some(format!("it knows {}", known.join(", "))),
+        }
+    }
+}

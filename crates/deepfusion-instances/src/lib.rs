@@ -1,0 +1,28 @@
+//! Things in an image, each with its pixels: from somebody's segmentation or detection model in ONNX, run in an ONNX
+//! Runtime library.
+//!
+//! The way of an image: [`Letterbox`] fits it into the model's input; the outputs' shapes say which of the known kinds of
+//! model it is ([`Layout`]); [`decode`] makes candidates of them, [`suppress`] keeps the best of those that mean the same;
+//! [`Prototypes`] turn coefficients into masks. [`InstanceModel`] does all of it.
+//!
+//! Pixels are of the image that was given: x to the right, y down, pixel centres at whole numbers plus one half, as
+//! detectors count them.
+
+mod candidate;
+mod decode;
+mod error;
+mod layout;
+mod letterbox;
+mod mask;
+mod model;
+mod names;
+mod suppress;
+
+pub use candidate::Candidate;
+pub use decode::decode;
+pub use error::{Error, Result};
+pub use layout::{Kind, Layout};
+pub use letterbox::{Colours, Letterbox};
+pub use mask::{Mask, Prototypes, in_size};
+pub use model::{Instance, InstanceModel, Limits};
+pub use suppress::suppress;

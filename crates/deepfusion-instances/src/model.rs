@@ -1,0 +1,219 @@
+use std::path::{Path, PathBuf};
+
+use deepfusion_onnx::runtime::{ForeignModel, Tensor, TensorInfo};
+use image::RgbImage;
+
+use crate::mask::in_size;
+use crate::names::{name_of, of_note};
+use crate::{Colours, Error, Kind, Layout, Letterbox, Mask, Prototypes, Result, decode, suppress};
+
+/// Height and width of the input where a model leaves them open.
+const OPEN_SIZE: usize = 640;
+/// Most things in one image.
+const MOST: usize = 300;
+
+/// Something in an image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instance {
+    /// Name of its class.
+    pub class: String,
+    /// How sure the model is, 0 to 1.
+    pub score: f32,
+    /// Left, top, right, bottom in the size that was asked for.
+    pub bounds: [f32; 4],
+    /// Its pixels; all of the box where the model gives no masks.
+    pub mask: Mask,
+    /// Whether the model drew the mask.
+    pub drawn: bool,
+}
+
+/// What counts as found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// Least score.
+    pub score: f32,
+    /// Overlap (area in common over area in all) from which on two boxes of one class are one thing.
+    pub overlap: f32,
+    /// Names of the classes that count; empty for all.
+    pub classes: Vec<String>,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            score: 0.35,
+            overlap: 0.6,
+            classes: Vec::new(),
+        }
+    }
+}
+
+/// A segmentation or detection model of one of the known kinds ([`Kind`]).
+#[derive(Debug)]
+pub struct InstanceModel {
+    path: PathBuf,
+    model: ForeignModel,
+    /// Height and width of the input.
+    input: [usize; 2],
+    layout: Layout,
+    names: Vec<String>,
+    limits: Limits,
+}
+
+impl InstanceModel {
+    /// Loads a file; the ONNX Runtime `library` is found where none is named. `threads` is how many of the
+    /// processor's a run may use; 0 leaves it to the library.
+    ///
+    /// # Errors
+    /// [`Error::File`]; [`Error::Runtime`] where there is no library or it refuses the model; [`Error::Shape`] where
+    /// inputs and outputs are of no known kind; [`Error::Class`] for a class that the model does not have.
+    pub fn load(
+        path: &Path,
+        library: Option<&Path>,
+        threads: usize,
+        limits: Limits,
+    ) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|source| Error::File {
+            path: path.to_owned(),
+            source,
+        })?;
+        let failed = |source| Error::Runtime {
+            path: path.to_owned(),
+            source,
+        };
+        let mut model = ForeignModel::load(library, &bytes, threads).map_err(failed)?;
+        let shape = |reason| Error::Shape {
+            path: path.to_owned(),
+            reason,
+        };
+        let input = input_size(&model.inputs()).map_err(shape)?;
+        if let Some(output) = model.outputs().iter().find(|o| !o.f32) {
+            return Err(shape(format!(
+                "output `{}` is no 32-bit float",
+                output.name
+            )));
+        }
+        // Exports often leave dimensions open: only a run says them.
+        let grey = vec![0.5; 3 * input[0] * input[1]];
+        let outputs = model
+            .run(&[1, 3, input[0], input[1]], &grey)
+            .map_err(failed)?;
+        let shapes: Vec<Vec<usize>> = outputs.into_iter().map(|tensor| tensor.shape).collect();
+        let layout = Layout::of(input, &shapes).map_err(shape)?;
+        let names = model.note("names").and_then(|note| of_note(&note));
+        let names = names.unwrap_or_default();
+        let classes = layout.classes.max(names.len());
+        let known: Vec<String> = (0..classes).map(|c| name_of(&names, classes, c)).collect();
+        if let Some(class) = limits.classes.iter().find(|class| !known.contains(class)) {
+            return Err(Error::Class {
+                path: path.to_owned(),
+                class: class.clone(),
+                known,
+            });
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            model,
+            input,
+            layout,
+            names: known,
+            limits,
+        })
+    }
+
+    /// What the model's outputs are.
+    #[must_use]
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The things in an image, the surest first; boxes and masks in an image of `size` (width, height) that shows the
+    /// same.
+    ///
+    /// # Errors
+    /// [`Error::Runtime`]; [`Error::Shape`] where the outputs' shapes depend on what is in the image.
+    pub fn find(&mut self, image: &RgbImage, size: [usize; 2]) -> Result<Vec<Instance>> {
+        let [height, width] = self.input;
+        let colours = match self.layout.kind {
+            Kind::GridRows => Colours::Bgr,
+            Kind::Columns | Kind::Rows | Kind::Final => Colours::RgbToOne,
+        };
+        let from = [image.width() as usize, image.height() as usize];
+        let letterbox = Letterbox::new(from, [width, height], colours);
+        let outputs = self
+            .model
+            .run(&[1, 3, height, width], &letterbox.fill(image, colours))
+            .map_err(|source| Error::Runtime {
+                path: self.path.clone(),
+                source,
+            })?;
+        let shapes: Vec<Vec<usize>> = outputs.iter().map(|tensor| tensor.shape.clone()).collect();
+        // A model that suppresses itself may give fewer rows for another image.
+        let layout = Layout::of(self.input, &shapes)
+            .ok()
+            .filter(|layout| layout.kind == self.layout.kind)
+            .ok_or_else(|| Error::Shape {
+                path: self.path.clone(),
+                reason: "the shapes of its outputs change from image to image".into(),
+            })?;
+        let of_rank = |rank: usize| outputs.iter().find(|tensor| tensor.shape.len() == rank);
+        let values = of_rank(3).map_or(&[][..], |tensor| &tensor.data);
+        let wanted = |class: usize| {
+            self.limits.classes.is_empty() || self.limits.classes.contains(&self.name(class))
+        };
+        let mut candidates = decode(&layout, self.input, values, self.limits.score);
+        candidates.retain(|candidate| wanted(candidate.class));
+        let candidates = suppress(candidates, self.limits.overlap, MOST);
+        let prototypes = layout.prototypes.zip(of_rank(4));
+        Ok(candidates
+            .into_iter()
+            .map(|candidate| {
+                let bounds = in_size(candidate.bounds, &letterbox, size);
+                let mask = prototypes.map(|(shape, Tensor { data, .. })| {
+                    Prototypes {
+                        shape,
+                        values: data,
+                    }
+                    .mask(&candidate, &letterbox, size)
+                });
+                Instance {
+                    class: self.name(candidate.class),
+                    score: candidate.score,
+                    bounds,
+                    drawn: mask.is_some(),
+                    mask: mask.unwrap_or_else(|| Mask::of_box(bounds, size)),
+                }
+            })
+            .collect())
+    }
+
+    fn name(&self, class: usize) -> String {
+        name_of(&self.names, self.names.len(), class)
+    }
+}
+
+/// Height and width of the one input, a picture of three planes.
+fn input_size(inputs: &[TensorInfo]) -> std::result::Result<[usize; 2], String> {
+    let [input] = inputs else {
+        return Err(format!("{} inputs, expected one picture", inputs.len()));
+    };
+    let told = || {
+        let sizes = input
+            .shape
+            .iter()
+            .map(|d| d.map_or("?".into(), |d| d.to_string()));
+        let sizes: Vec<String> = sizes.collect();
+        format!(
+            "input `{}` is {}{}",
+            input.name,
+            sizes.join("x"),
+            if input.f32 { "" } else { ", no 32-bit float" }
+        )
+    };
+    match input.shape[..] {
+        [None | Some(1), None | Some(3), height, width] if input.f32 => {
+            Ok([height.unwrap_or(OPEN_SIZE), width.unwrap_or(OPEN_SIZE)])
+        }
+        _ => Err(told()),
+    }
+}

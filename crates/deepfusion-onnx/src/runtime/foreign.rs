@@ -1,0 +1,125 @@
+//! Models that others made: any names and shapes, numbers in f32.
+
+use std::path::Path;
+
+use ort::session::Session;
+use ort::value::{TensorElementType, TensorRef};
+
+use super::{Library, environment, refused};
+use crate::Error;
+
+/// What a model says of an input or an output.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TensorInfo {
+    /// Its name.
+    pub name: String,
+    /// Its dimensions; `None` for one that the model leaves open.
+    pub shape: Vec<Option<usize>>,
+    /// Whether it holds 32-bit floats.
+    pub f32: bool,
+}
+
+/// An output: its dimensions and its numbers, row by row.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Tensor {
+    /// Dimensions.
+    pub shape: Vec<usize>,
+    /// As many as their product.
+    pub data: Vec<f32>,
+}
+
+/// A model of somebody's in ONNX Runtime, with one input.
+#[derive(Debug)]
+pub struct ForeignModel {
+    session: Session,
+    library: Library,
+}
+
+impl ForeignModel {
+    /// Loads a file; `library` and `threads` as for [`super::OrtEngine::load`].
+    ///
+    /// # Errors
+    /// As [`super::find`]; [`Error::Library`] where this process uses another library already, [`Error::Runtime`]
+    /// for a model that the library refuses.
+    pub fn load(library: Option<&Path>, model: &[u8], threads: usize) -> Result<Self, Error> {
+        let (library, environment) = environment(library)?;
+        let builder = Session::builder(&environment);
+        let mut builder = builder.map_err(|e| refused("make a session", e))?;
+        if threads > 0 {
+            builder = builder
+                .with_intra_threads(threads)
+                .map_err(|e| refused("set the number of threads", e))?;
+        }
+        let session = builder.commit_from_memory(model);
+        let session = session.map_err(|e| refused("load the model", e))?;
+        Ok(Self { session, library })
+    }
+
+    /// The library it runs in.
+    #[must_use]
+    pub fn library(&self) -> &Library {
+        &self.library
+    }
+
+    /// What it takes.
+    #[must_use]
+    pub fn inputs(&self) -> Vec<TensorInfo> {
+        self.session.inputs().iter().map(info).collect()
+    }
+
+    /// What it gives.
+    #[must_use]
+    pub fn outputs(&self) -> Vec<TensorInfo> {
+        self.session.outputs().iter().map(info).collect()
+    }
+
+    /// What its maker wrote into it under a key.
+    #[must_use]
+    pub fn note(&self, key: &str) -> Option<String> {
+        self.session.metadata().ok()?.custom(key)
+    }
+
+    /// All outputs for its one input, in the order of [`Self::outputs`].
+    ///
+    /// # Shapes
+    /// - `data`: as many numbers as `shape`'s product, row by row
+    ///
+    /// # Errors
+    /// [`Error::Model`] for a model of several inputs, or of outputs that are no f32; [`Error::Runtime`].
+    pub fn run(&mut self, shape: &[usize], data: &[f32]) -> Result<Vec<Tensor>, Error> {
+        const RUN: &str = "run the model";
+        let names: Vec<&str> = self.session.inputs().iter().map(|i| i.name()).collect();
+        let &[name] = &names[..] else {
+            return Err(Error::Model {
+                part: "inputs",
+                reason: format!("{} of them, expected one picture", names.len()),
+            });
+        };
+        let name = name.to_owned();
+        let input = TensorRef::from_array_view((shape, data)).map_err(|e| refused(RUN, e))?;
+        let outputs = self
+            .session
+            .run(ort::inputs![name => input])
+            .map_err(|e| refused(RUN, e))?;
+        let tensor = |(_, value): (&str, ort::value::ValueRef<'_>)| {
+            let values = value.try_extract_tensor::<f32>();
+            let (shape, values) = values.map_err(|e| refused("give its output", e))?;
+            Ok(Tensor {
+                shape: shape.iter().map(|d| (*d).max(0) as usize).collect(),
+                data: values.to_vec(),
+            })
+        };
+        outputs.iter().map(tensor).collect()
+    }
+}
+
+fn info(outlet: &ort::value::Outlet) -> TensorInfo {
+    let shape = outlet.dtype().tensor_shape();
+    TensorInfo {
+        name: outlet.name().to_owned(),
+        shape: shape
+            .map(|s| s.iter().map(|d| usize::try_from(*d).ok()).collect())
+            .unwrap_or_default(),
+        f32: outlet.dtype().tensor_type() == Some(TensorElementType::Float32),
+    }
+}
