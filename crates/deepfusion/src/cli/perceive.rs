@@ -3,8 +3,9 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use deepfusion_motion::ScaleMonitorConfig;
 
-use super::values::positive;
-use super::{CameraIntrinsics, EngineArgs, PredictArgs, Save, Shard};
+use super::live::HEADING;
+use super::values::{not_negative, positive};
+use super::{CameraIntrinsics, EngineArgs, LiveArgs, PredictArgs, Save, Shard};
 
 /// `deepfusion perceive`.
 #[derive(Debug, Args)]
@@ -12,15 +13,20 @@ use super::{CameraIntrinsics, EngineArgs, PredictArgs, Save, Shard};
     after_help = "Targets are followed from frame to frame of a recording that brings times, speed and yaw rate: they then keep \
     their id and have a velocity over ground. Single images stand for themselves.\n\n\
     For every frame NAME_targets.json is written, and all of them as lines of targets.jsonl.\n\n\
+    A live source (camera:0, rtsp://…, http://…, udp://…, or - for a stream on standard input) is opened by ffmpeg. Always its newest \
+    frame is looked at; the others are skipped, and counted. Its targets are followed where --speed tells how the camera moves.\n\n\
     Examples:\n  deepfusion perceive --model runs/train-1 kitti/2011_09_26/2011_09_26_drive_0005_sync --out targets\n  \
     deepfusion perceive --model runs/train-1 drive.bag --out targets --save overlay,birds-eye\n  \
-    deepfusion perceive --model runs/train-1 street.jpg --intrinsics 721.5,721.5,609.6,172.9 --out targets"
+    deepfusion perceive --model runs/train-1 street.jpg --intrinsics 721.5,721.5,609.6,172.9 --out targets\n  \
+    deepfusion perceive --model runs/train-1 camera:0 --calib camera.yaml --speed 0 --out targets\n  \
+    deepfusion perceive --model runs/train-1 rtsp://192.168.1.20/stream --calib camera.yaml --json --out targets"
 )]
 pub struct PerceiveArgs {
     /// A run folder or a checkpoint in it.
     #[arg(long, value_name = "RUN")]
     pub model: PathBuf,
-    /// Recordings (a KITTI drive, a bag, a video, a folder with dataset.toml), images, folders of images, or globs.
+    /// Recordings (a KITTI drive, a bag, a video, a folder with dataset.toml), images, folders of images, or globs. Or one live
+    /// source.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<String>,
     /// The camera, in pixels of the input images.
@@ -53,6 +59,12 @@ pub struct PerceiveArgs {
     /// Replace what is there.
     #[arg(long)]
     pub overwrite: bool,
+    /// Of a live source.
+    #[command(flatten)]
+    pub live: LiveArgs,
+    /// How fast the camera's vehicle drives straight on, m/s; 0 for a camera that stands. Targets are then followed.
+    #[arg(long, value_name = "M/S", help_heading = HEADING, value_parser = not_negative)]
+    pub speed: Option<f64>,
     /// What runs the network.
     #[command(flatten)]
     pub engine: EngineArgs,
@@ -103,6 +115,7 @@ impl PerceiveArgs {
             out: self.out.clone(),
             shard: Shard::WHOLE,
             overwrite: self.overwrite,
+            live: self.live.clone(),
             engine: self.engine.clone(),
             json: false,
         }

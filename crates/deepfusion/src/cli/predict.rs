@@ -5,7 +5,7 @@ use clap::{ArgGroup, Args, Subcommand, ValueEnum};
 use deepfusion_data::OpenOptions;
 
 use super::values::positive;
-use super::{CameraIntrinsics, EngineArgs, PresetChoice, Shard, Size};
+use super::{CameraIntrinsics, EngineArgs, LiveArgs, PresetChoice, Shard, Size};
 
 /// `deepfusion predict`.
 #[derive(Debug, Args)]
@@ -14,17 +14,20 @@ use super::{CameraIntrinsics, EngineArgs, PresetChoice, Shard, Size};
     Without intrinsics the training camera's field of view is assumed, and the sidecar says so.\n\n\
     A run that was stopped goes on where it was: outputs that are complete are kept. An image that cannot be read is \
     named at the end; the others are done.\n\n\
+    A live source (camera:0, rtsp://…, http://…, udp://…, or - for a stream on standard input) is opened by ffmpeg. Always its newest \
+    frame is looked at; the others are skipped, and counted.\n\n\
     Examples:\n  deepfusion predict --model runs/train-1 street.jpg --out depth\n  \
     deepfusion predict --model runs/train-1 'drive/*.png' --save npy,ply --out depth\n  \
     deepfusion predict --model runs/train-1 drive.bag --out depth\n  \
-    deepfusion predict --model runs/train-1 drive --out depth --shard 1/2   # and 2/2 elsewhere"
+    deepfusion predict --model runs/train-1 drive --out depth --shard 1/2   # and 2/2 elsewhere\n  \
+    deepfusion predict --model runs/train-1 camera:0 --calib camera.yaml --frames 100 --out depth"
 )]
 pub struct PredictArgs {
     /// A run folder or a checkpoint in it.
     #[arg(long, value_name = "RUN")]
     pub model: PathBuf,
     /// Images, folders of images, globs, or recordings: a KITTI drive, a bag, a video, a folder with dataset.toml. Of
-    /// recordings the camera is known, and lenses are undone.
+    /// recordings the camera is known, and lenses are undone. Or one live source.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<String>,
     /// The camera, in pixels of the input images.
@@ -60,10 +63,13 @@ pub struct PredictArgs {
     /// Replace files that were made with other options or of an image that has changed.
     #[arg(long)]
     pub overwrite: bool,
+    /// Of a live source.
+    #[command(flatten)]
+    pub live: LiveArgs,
     /// What runs the network.
     #[command(flatten)]
     pub engine: EngineArgs,
-    /// Print the sidecars as a JSON array on stdout.
+    /// Print the sidecars as a JSON array on stdout; of a live source one a line, as they come.
     #[arg(long)]
     pub json: bool,
 }

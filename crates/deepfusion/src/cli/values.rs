@@ -139,6 +139,14 @@ pub fn positive(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number above 0".into())
 }
 
+/// A number of 0 or more.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|n: &f64| n.is_finite() && *n >= 0.0)
+        .ok_or_else(|| "expected 0 or a number above it".into())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,6 +1,7 @@
 //! `deepfusion perceive`: images to 3D targets, followed over time.
 
-mod pictures;
+mod live;
+pub(super) mod pictures;
 mod record;
 pub mod scene;
 
@@ -17,8 +18,9 @@ use deepfusion_train::{Predictor, PreparedImage, RunFolder};
 
 use self::pictures::Picture;
 use self::record::{FrameRecord, Lines};
-use self::scene::{MotionTracker, ScaleWatch, working_depth};
+use self::scene::{Motion, MotionTracker, ScaleWatch, working_depth};
 use super::confidence::Confidence;
+use super::live as sources;
 use super::predict::inputs::{self, Input};
 use super::predict::{Job, Loaded, Seen};
 use crate::cli::{PerceiveArgs, PerceiveSave};
@@ -29,7 +31,7 @@ use crate::{engine, interrupt, output};
 
 /// A frame that is loaded, and when that began.
 struct Begun {
-    index: usize,
+    input: Input,
     loaded: Loaded,
     prepared: PreparedImage,
     start: Instant,
@@ -37,7 +39,7 @@ struct Begun {
 
 /// A frame with all that was found in it.
 struct Found {
-    index: usize,
+    input: Input,
     loaded: Loaded,
     seen: Seen,
     record: FrameRecord,
@@ -47,7 +49,12 @@ struct Found {
 /// `deepfusion perceive`.
 pub fn run(args: &PerceiveArgs) -> Result<()> {
     let predict = args.as_predict();
-    let all = inputs::find(&args.inputs, &predict.open_options())?;
+    let source = sources::source(&args.inputs, &args.live)?;
+    let all = match (&source, args.speed) {
+        (Some(_), _) => Vec::new(),
+        (None, Some(_)) => return Err(CliError::OnlyLive { option: "--speed" }.into()),
+        (None, None) => inputs::find(&args.inputs, &predict.open_options())?,
+    };
     let mut config = read_config(args.config.as_deref(), PerceptionConfig::predicted())?;
     if let Some(far) = args.max_depth {
         config.max_depth_m = far as f32;
@@ -55,6 +62,9 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
     let predictor = engine::load(&args.model, &args.engine)?;
     let job = Job::new(&predict, &predictor)?;
     std::fs::create_dir_all(&args.out).map_err(|e| deepfusion_data::Error::file(&args.out, e))?;
+    if source.is_some() {
+        sources::make_room(&args.out, args.overwrite)?;
+    }
     refuse_what_is_there(args, &all)?;
     interrupt::catch("stopping after the frames at work");
     let work = Work {
@@ -65,7 +75,10 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
         lines: Mutex::new(Lines::begin(&args.out.join("targets.jsonl"))?),
         outcome: Mutex::new(Outcome::default()),
     };
-    work.go(&predictor, config)
+    match source {
+        Some(address) => work.go_live(&address, &predictor, config),
+        None => work.go(&predictor, config),
+    }
 }
 
 /// Settings from a file over `base`.
@@ -127,9 +140,10 @@ impl Work<'_> {
         let mut watch = ScaleWatch::new(ScaleMonitor::new(self.args.scale_config()));
         let load = |index: usize| {
             let start = Instant::now();
-            match self.job.load(&self.all[index]) {
+            let input = self.all[index].clone();
+            match self.job.load(&input) {
                 Ok((loaded, prepared)) => Some(Begun {
-                    index,
+                    input,
                     loaded,
                     prepared,
                     start,
@@ -140,8 +154,10 @@ impl Work<'_> {
                 }
             }
         };
-        let look =
-            |begun: Begun| self.look(begun, predictor, &mut perception, &mut motions, &mut watch);
+        let look = |begun: Begun| {
+            let motion = motions.next(&begun.input, &mut perception);
+            self.look(begun, motion, predictor, &mut perception, &mut watch)
+        };
         let write = |_: usize, found: Result<Found>| {
             if let Err(error) = found.and_then(|found| self.write(&found)) {
                 self.outcome().fatal.get_or_insert(error);
@@ -165,22 +181,20 @@ impl Work<'_> {
     fn look(
         &self,
         begun: Begun,
+        motion: Motion,
         predictor: &Predictor,
         perception: &mut Perception,
-        motions: &mut MotionTracker,
         watch: &mut ScaleWatch,
     ) -> Result<Found> {
         let Begun {
-            index,
+            input,
             loaded,
             prepared,
             start,
         } = begun;
-        let input = &self.all[index];
         let prediction = predictor.infer(&prepared)?;
         let camera = loaded.camera.ok_or(CliError::NoCamera)?;
         let (depth, k) = working_depth(&prediction.depth(), &camera);
-        let motion = motions.next(input, perception);
         let surroundings = perception.look(&depth, &k, motion.stamp)?;
         let ground = surroundings.ground.as_ref();
         let scale = watch.add(&loaded.image, &camera, &motion, ground);
@@ -204,7 +218,7 @@ impl Work<'_> {
             self.confidence.as_ref().map(|model| (model, &prediction)),
         );
         Ok(Found {
-            index,
+            input,
             loaded,
             seen: Seen {
                 prediction,
@@ -229,7 +243,7 @@ impl Work<'_> {
     }
 
     fn write(&self, found: &Found) -> Result<()> {
-        let (out, input) = (&self.args.out, &self.all[found.index]);
+        let (out, input) = (&self.args.out, &found.input);
         for (save, picture) in &found.pictures {
             picture.save(&pictures::path(out, &input.name, *save))?;
         }
@@ -250,13 +264,16 @@ impl Work<'_> {
             .lock()
             .unwrap_or_else(|e| e.into_inner())
             .add(&line)?;
-        if self.args.json {
+        let live = found.loaded.live.is_some();
+        if self.args.json && !live {
             output::print(&line)?;
         }
         let mut outcome = self.outcome();
         outcome.done += 1;
         outcome.targets += found.record.targets.len();
-        outcome.latency_ms.push(found.record.latency_ms);
+        if !live {
+            outcome.latency_ms.push(found.record.latency_ms);
+        }
         Ok(())
     }
 

@@ -4,13 +4,14 @@ pub(super) mod camera;
 mod features;
 pub(super) mod inputs;
 mod ledger;
+mod live;
 mod manifest;
 mod outputs;
 mod resume;
 pub(super) mod sidecar;
 
 use anyhow::{Context, Result};
-use deepfusion_data::{RgbImage, load_rgb};
+use deepfusion_data::{LiveFrame, RgbImage, load_rgb};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_train::{Inspector, LayerMaps, Prediction, Predictor, PreparedImage, Preparer};
 
@@ -19,7 +20,9 @@ use self::inputs::Input;
 use self::ledger::Ledger;
 use self::manifest::{Lock, Manifest};
 use self::sidecar::{FileMark, MadeWith, Sidecar};
-use super::device;
+use super::live::LiveMark;
+use super::perceive::pictures;
+use super::{device, live as sources};
 use crate::cli::{PredictArgs, Save};
 use crate::engine;
 use crate::error::CliError;
@@ -45,6 +48,8 @@ pub(super) struct Loaded {
     mark: FileMark,
     pub image: RgbImage,
     pub camera: Option<Intrinsics>,
+    /// Of a live source's frame.
+    pub live: Option<LiveMark>,
 }
 
 /// What the network says about an image.
@@ -56,6 +61,9 @@ pub(super) struct Seen {
 
 /// `deepfusion predict`.
 pub fn run(args: &PredictArgs) -> Result<()> {
+    if let Some(address) = sources::source(&args.inputs, &args.live)? {
+        return live::run(args, &address);
+    }
     let all = inputs::find(&args.inputs, &args.open_options())?;
     let mine: Vec<&Input> = args.shard.part_of(&all).collect();
     let predictor = engine::load(&args.model, &args.engine)?;
@@ -73,10 +81,7 @@ pub fn run(args: &PredictArgs) -> Result<()> {
     predict(&job, &predictor, &mine, &todo, &ledger);
     let summary = ledger.finish()?;
     if job.camera.word() == "assumed" && mine.iter().any(|input| input.frame.is_none()) {
-        tracing::warn!(
-            "no intrinsics given: the training camera's field of view is assumed, so the metres are \
-             only as right as that is (scale_trusted: false; give --intrinsics or --calib)"
-        );
+        tell_assumed();
     }
     let there = mine.len() - todo.len();
     say(&format!(
@@ -93,6 +98,14 @@ pub fn run(args: &PredictArgs) -> Result<()> {
         output::print_json(&summary.sidecars)?;
     }
     summary.outcome
+}
+
+/// Warns of a camera that nobody gave.
+fn tell_assumed() {
+    tracing::warn!(
+        "no intrinsics given: the training camera's field of view is assumed, so the metres are \
+         only as right as that is (scale_trusted: false; give --intrinsics or --calib)"
+    );
 }
 
 /// Looks at what is there and writes the manifest; gives the images that are left to do, by their place in `mine`.
@@ -138,19 +151,11 @@ fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], le
         loaded.map_err(|e| ledger.failed(todo[i], e)).ok()
     };
     let infer = |(loaded, prepared): (Loaded, PreparedImage)| {
-        let seen = predictor.infer(&prepared).map(|prediction| Seen {
-            prediction,
-            layers: match &job.inspector {
-                Some(inspector) => inspector.inspect(&prepared.input),
-                None => Vec::new(),
-            },
-        });
+        let seen = job.see(predictor, &prepared);
         (loaded, seen)
     };
-    let write = |i: usize, (loaded, seen): (Loaded, Result<Seen, _>)| {
-        let sidecar = seen
-            .map_err(anyhow::Error::from)
-            .and_then(|seen| job.write(mine[todo[i]], &loaded, &seen));
+    let write = |i: usize, (loaded, seen): (Loaded, Result<Seen>)| {
+        let sidecar = seen.and_then(|seen| job.write(mine[todo[i]], &loaded, &seen));
         match sidecar {
             Ok(sidecar) => ledger.done(todo[i], sidecar),
             Err(error) => ledger.stop(error),
@@ -197,6 +202,22 @@ impl<'a> Job<'a> {
                 seen.with_context(|| input.path.display().to_string())?
             }
         };
+        Ok(self.prepare(mark, image, camera))
+    }
+
+    /// Makes a live source's frame the network's input.
+    pub fn load_live(&self, frame: LiveFrame) -> Result<(Loaded, PreparedImage)> {
+        let mark = FileMark::of_frame(&frame);
+        let (image, camera) = self.camera.see(frame.image)?;
+        Ok(self.prepare(mark, image, camera))
+    }
+
+    fn prepare(
+        &self,
+        mark: FileMark,
+        image: RgbImage,
+        camera: Option<Intrinsics>,
+    ) -> (Loaded, PreparedImage) {
         let (correct, crop) = (!self.args.no_focal_correction, !self.args.stretch);
         let prepared = self
             .preparer
@@ -205,8 +226,20 @@ impl<'a> Job<'a> {
             mark,
             image,
             camera,
+            live: None,
         };
-        Ok((loaded, prepared))
+        (loaded, prepared)
+    }
+
+    /// What the network says about an image, and what its layers do where that is asked for.
+    pub fn see(&self, predictor: &Predictor, prepared: &PreparedImage) -> Result<Seen> {
+        Ok(Seen {
+            prediction: predictor.infer(prepared)?,
+            layers: match &self.inspector {
+                Some(inspector) => inspector.inspect(&prepared.input),
+                None => Vec::new(),
+            },
+        })
     }
 
     /// Writes an image's outputs, then its sidecar.
@@ -219,6 +252,14 @@ impl<'a> Job<'a> {
             let path = args.out.join(&file);
             let (camera, maps) = (loaded.camera.as_ref(), (prediction, &depth));
             outputs::write(args, *save, image, camera, maps, &seen.layers, &path)?;
+            file_bytes.push(FileMark::of(&path)?.bytes);
+            files.push(file);
+        }
+        if loaded.live.is_some() {
+            // It is nowhere else, and depth is little without it.
+            let file = format!("{}_image.jpg", input.name);
+            let path = args.out.join(&file);
+            pictures::save_jpeg(image, &path)?;
             file_bytes.push(FileMark::of(&path)?.bytes);
             files.push(file);
         }
@@ -245,6 +286,7 @@ impl<'a> Job<'a> {
                 .reduce(|ends_so_far, [d, _]| ends(ends_so_far, d)),
             files,
             file_bytes,
+            live: loaded.live,
             made_with: self.made_with.clone(),
         };
         sidecar.write(&args.out, &input.name)?;
