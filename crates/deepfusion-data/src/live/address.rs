@@ -50,9 +50,13 @@ impl Address {
         self.kind == Kind::Camera
     }
 
-    /// Whether its end can be meant: a camera has none.
+    /// Whether its end can be meant: a camera has none, be it here or at the end of a wire.
     pub(super) fn may_end(&self) -> bool {
-        self.kind != Kind::Camera
+        self.kind != Kind::Camera && !self.is_rtsp()
+    }
+
+    fn is_rtsp(&self) -> bool {
+        scheme(&self.text).is_some_and(|s| s.to_ascii_lowercase().starts_with("rtsp"))
     }
 
     /// The same text with the address' password, where that is in it, made unreadable.
@@ -80,9 +84,7 @@ impl Address {
         Ok(match self.kind {
             Kind::Stdin => words(&["-i", "pipe:0"]),
             // Over UDP a camera's pictures tear where the network loses a packet.
-            Kind::Stream if self.text.starts_with("rtsp") => {
-                words(&["-rtsp_transport", "tcp", "-i", &self.text])
-            }
+            Kind::Stream if self.is_rtsp() => words(&["-rtsp_transport", "tcp", "-i", &self.text]),
             Kind::Stream => words(&["-i", &self.text]),
             Kind::Camera => {
                 let name = self.text.strip_prefix(CAMERA).unwrap_or(&self.text);
@@ -198,6 +200,13 @@ mod tests {
         assert!(by_number.unwrap_err().hint().unwrap().contains("dshow"));
         assert_eq!(input("-", "windows"), "-i pipe:0");
         assert_eq!(input("udp://@:5000", "linux"), "-i udp://@:5000");
+    }
+
+    #[test]
+    fn cameras_have_no_end() {
+        let may_end = |text| Address::parse(text).unwrap().may_end();
+        assert!(may_end("-") && may_end("http://host/a.ts") && may_end("tcp://host:1"));
+        assert!(!may_end("camera:0") && !may_end("/dev/video0") && !may_end("RTSP://host/1"));
     }
 
     #[test]

@@ -57,6 +57,16 @@ impl Feed {
         })
     }
 
+    /// A connection that was closed in good order is an end, and may be a loss.
+    fn tell_end(&self) {
+        let address = self.source.address();
+        if !address.is_stdin() {
+            tracing::warn!(
+                "{address}: the other side closed the stream: whether it was over or is lost cannot be seen"
+            );
+        }
+    }
+
     /// The whole run's figures; `None` where nothing came.
     pub fn told(&self) -> Option<String> {
         self.figures.told()
@@ -79,7 +89,10 @@ impl Feed {
                     return Ok(Ok(frame));
                 }
                 Taken::NotYet => {}
-                Taken::Ended => return Ok(Err(Ending::Stream)),
+                Taken::Ended => {
+                    self.tell_end();
+                    return Ok(Err(Ending::Stream));
+                }
             }
         }
     }

@@ -60,7 +60,8 @@ pub struct Figures {
     lately: Latencies,
     since: Instant,
     all: Latencies,
-    first: Option<Instant>,
+    /// When the first and the last frame were done.
+    span: Option<(Instant, Instant)>,
     dropped: u64,
 }
 
@@ -71,7 +72,7 @@ impl Figures {
             lately: Latencies::new(),
             since: Instant::now(),
             all: Latencies::new(),
-            first: None,
+            span: None,
             dropped: 0,
         }
     }
@@ -79,9 +80,11 @@ impl Figures {
     /// Counts a frame that was done, and now and then says how it goes.
     pub fn add(&mut self, latency_ms: f64, dropped: u64) {
         let now = Instant::now();
-        if self.first.is_none() {
-            (self.first, self.since) = (Some(now), now);
+        let first = self.span.map_or(now, |(first, _)| first);
+        if self.span.is_none() {
+            self.since = now;
         }
+        self.span = Some((first, now));
         self.dropped = dropped;
         self.lately.add(latency_ms);
         self.all.add(latency_ms);
@@ -99,7 +102,8 @@ impl Figures {
 
     /// The whole run in a few words; `None` where nothing came.
     pub fn told(&self) -> Option<String> {
-        let took = self.first?.elapsed().as_secs_f64();
+        let (first, last) = self.span?;
+        let took = last.duration_since(first).as_secs_f64();
         let rate = match self.all.count() {
             0..=1 => String::new(),
             // The first is where the time begins.
