@@ -28,6 +28,7 @@ mod jpeg;
 pub mod kitti;
 mod layout;
 mod lens;
+mod live;
 mod moving;
 mod overlay;
 mod path;
@@ -63,6 +64,7 @@ pub use inspect::{
 };
 pub use kitti::GtKind;
 pub use lens::Lens;
+pub use live::{Address, LiveFrame, LiveSource, Taken};
 pub use moving::{MovingLabels, MovingSource};
 pub use overlay::overlay;
 pub use path::CameraPath;

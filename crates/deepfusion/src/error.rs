@@ -131,6 +131,24 @@ pub enum CliError {
         /// The recording.
         path: PathBuf,
     },
+    /// A live source beside other inputs.
+    #[error("{address}: a live source is looked at alone, without other inputs")]
+    LiveAlone {
+        /// The source.
+        address: String,
+    },
+    /// Standard input asked for, and nobody pipes anything.
+    #[error("standard input is a terminal: no stream is piped in")]
+    Terminal,
+    /// A part of a live source.
+    #[error("a live source cannot be shared among shards: nothing is there to be counted yet")]
+    LiveShard,
+    /// An option of live sources for files.
+    #[error("`{option}` is for live sources, and these inputs are files")]
+    OnlyLive {
+        /// The option.
+        option: &'static str,
+    },
     /// A cloud without a camera.
     #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
     NoCamera,
@@ -177,6 +195,12 @@ impl CliError {
             Self::NothingToMeasure { .. } => Some(
                 "exact depth is the simulator's (proj_depth), scans are in velodyne_points; without either nothing says which boxes are seen".into(),
             ),
+            Self::LiveAlone { .. } => Some("start one run for each source, each with a folder of its own".into()),
+            Self::Terminal => Some("… | deepfusion … -, or give a camera or an address instead of -".into()),
+            Self::LiveShard => Some("leave --shard out".into()),
+            Self::OnlyLive { .. } => {
+                Some("leave it out, or give camera:0, an address such as rtsp://…, or - for standard input".into())
+            }
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
         }
     }

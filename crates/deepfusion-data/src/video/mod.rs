@@ -2,7 +2,7 @@
 
 mod decode;
 mod probe;
-mod program;
+pub(crate) mod program;
 
 use crate::calibration::find_camera;
 use crate::config::FolderConfig;

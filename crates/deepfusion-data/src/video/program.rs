@@ -29,13 +29,10 @@ pub(super) fn run<S: AsRef<OsStr>>(
         .current_dir(folder)
         .stdin(Stdio::null())
         .output()
-        .map_err(|e| match e.kind() {
-            std::io::ErrorKind::NotFound => failed(
-                "is needed to read videos and is not installed".into(),
-                "install ffmpeg (it brings ffprobe) so that both are on the PATH, or extract the frames \
-                 elsewhere and give their folder",
-            ),
-            _ => failed(format!("cannot be run: {e}"), "check that it can be run from a terminal"),
+        .map_err(|e| {
+            let remedy = "install ffmpeg (it brings ffprobe) so that both are on the PATH, or extract the frames \
+                          elsewhere and give their folder";
+            not_started(file, program, &e, "videos", remedy)
         })?;
     if output.status.success() {
         return Ok(output.stdout);
@@ -46,4 +43,30 @@ pub(super) fn run<S: AsRef<OsStr>>(
         format!("failed: {said}"),
         "play the file to see whether it is whole; a newer ffmpeg may know its codec",
     ))
+}
+
+/// The error of a program that could not be started; `what` it was to read, and `remedy` where it is not installed.
+pub(crate) fn not_started(
+    file: &Path,
+    program: &'static str,
+    error: &std::io::Error,
+    what: &str,
+    remedy: &'static str,
+) -> Error {
+    let (problem, remedy) = match error.kind() {
+        std::io::ErrorKind::NotFound => (
+            format!("is needed to read {what} and is not installed"),
+            remedy,
+        ),
+        _ => (
+            format!("cannot be run: {error}"),
+            "check that it can be run from a terminal",
+        ),
+    };
+    Error::Program {
+        path: file.to_owned(),
+        program,
+        problem,
+        remedy,
+    }
 }

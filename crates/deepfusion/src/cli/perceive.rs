@@ -1,8 +1,10 @@
 use std::path::PathBuf;
 
-use super::values::positive;
-use super::{Outputs, PredictionArgs, Save};
 use clap::{Args, ValueEnum};
+
+use super::live::HEADING;
+use super::values::{not_negative, positive};
+use super::{Outputs, PredictionArgs, Save};
 
 /// `deepfusion perceive`.
 #[derive(Debug, Args)]
@@ -10,9 +12,13 @@ use clap::{Args, ValueEnum};
     after_help = "Targets are followed from frame to frame of a recording that brings times, speed and yaw rate: they then keep \
     their id and have a velocity over ground. Single images stand for themselves.\n\n\
     For every frame NAME_targets.json is written, and all of them as lines of targets.jsonl.\n\n\
+    A live source (camera:0, rtsp://…, http://…, udp://…, or - for a stream on standard input) is opened by ffmpeg. Always its newest \
+    frame is looked at; the others are skipped, and counted. Its targets are followed where --speed tells how the camera moves.\n\n\
     Examples:\n  deepfusion perceive --model runs/train-1 kitti/2011_09_26/2011_09_26_drive_0005_sync --out targets\n  \
     deepfusion perceive --model runs/train-1 drive.bag --out targets --save overlay,birds-eye\n  \
-    deepfusion perceive --model runs/train-1 street.jpg --intrinsics 721.5,721.5,609.6,172.9 --out targets"
+    deepfusion perceive --model runs/train-1 street.jpg --intrinsics 721.5,721.5,609.6,172.9 --out targets\n  \
+    deepfusion perceive --model runs/train-1 camera:0 --calib camera.yaml --speed 0 --out targets\n  \
+    deepfusion perceive --model runs/train-1 rtsp://192.168.1.20/stream --calib camera.yaml --json --out targets"
 )]
 pub struct PerceiveArgs {
     /// Which images, through which network, to where.
@@ -27,6 +33,9 @@ pub struct PerceiveArgs {
     /// Settings of the perception (TOML); what is not in it keeps its default.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// How fast the camera's vehicle drives straight on, m/s; 0 for a camera that stands. Targets are then followed.
+    #[arg(long, value_name = "M/S", help_heading = HEADING, value_parser = not_negative)]
+    pub speed: Option<f64>,
     /// Print one JSON object a frame on stdout, as it comes.
     #[arg(long)]
     pub json: bool,

@@ -12,10 +12,13 @@ use super::{EngineArgs, Outputs, PredictionArgs, PresetChoice, Shard, Size};
     Without intrinsics the training camera's field of view is assumed, and the sidecar says so.\n\n\
     A run that was stopped goes on where it was: outputs that are complete are kept. An image that cannot be read is \
     named at the end; the others are done.\n\n\
+    A live source (camera:0, rtsp://…, http://…, udp://…, or - for a stream on standard input) is opened by ffmpeg. Always its newest \
+    frame is looked at; the others are skipped, and counted.\n\n\
     Examples:\n  deepfusion predict --model runs/train-1 street.jpg --out depth\n  \
     deepfusion predict --model runs/train-1 'drive/*.png' --save npy,ply --out depth\n  \
     deepfusion predict --model runs/train-1 drive.bag --out depth\n  \
-    deepfusion predict --model runs/train-1 drive --out depth --shard 1/2   # and 2/2 elsewhere"
+    deepfusion predict --model runs/train-1 drive --out depth --shard 1/2   # and 2/2 elsewhere\n  \
+    deepfusion predict --model runs/train-1 camera:0 --calib camera.yaml --frames 100 --out depth"
 )]
 pub struct PredictArgs {
     /// Which images, through which network, to where.
@@ -36,7 +39,7 @@ pub struct PredictArgs {
         hide_default_value = true
     )]
     pub shard: Shard,
-    /// Print the sidecars as a JSON array on stdout.
+    /// Print the sidecars as a JSON array on stdout; of a live source one a line, as they come.
     #[arg(long)]
     pub json: bool,
 }

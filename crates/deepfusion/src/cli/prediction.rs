@@ -5,7 +5,7 @@ use deepfusion_data::OpenOptions;
 use deepfusion_motion::ScaleMonitorConfig;
 
 use super::values::positive;
-use super::{CameraIntrinsics, EngineArgs, Save};
+use super::{CameraIntrinsics, EngineArgs, LiveArgs, Save};
 
 /// Which images, through which network, to where: what `predict` and `perceive` have in common.
 #[derive(Debug, Clone, Args)]
@@ -14,7 +14,7 @@ pub struct PredictionArgs {
     #[arg(long, value_name = "RUN")]
     pub model: PathBuf,
     /// Images, folders of images, globs, or recordings: a KITTI drive, a bag, a video, a folder with dataset.toml. Of
-    /// recordings the camera is known, and lenses are undone.
+    /// recordings the camera is known, and lenses are undone. Or one live source.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<String>,
     /// The camera, in pixels of the input images.
@@ -43,6 +43,9 @@ pub struct PredictionArgs {
     /// Replace what is there, also what was made with other options or of an image that has changed.
     #[arg(long)]
     pub overwrite: bool,
+    /// Of a live source.
+    #[command(flatten)]
+    pub live: LiveArgs,
     /// What runs the network.
     #[command(flatten)]
     pub engine: EngineArgs,

@@ -79,6 +79,9 @@ pub struct Shard {
 }
 
 impl Shard {
+    /// All of it.
+    pub const WHOLE: Self = Self { index: 1, count: 1 };
+
     /// This part of `all`: every `count`-th, so that parts are as large as each other to one item, and long
     /// images in one folder are shared too.
     pub fn part_of<T>(self, all: &[T]) -> impl Iterator<Item = &T> {
@@ -134,6 +137,14 @@ pub fn positive(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|n: &f64| n.is_finite() && *n > 0.0)
         .ok_or_else(|| "expected a number above 0".into())
+}
+
+/// A number of 0 or more.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|n: &f64| n.is_finite() && *n >= 0.0)
+        .ok_or_else(|| "expected 0 or a number above it".into())
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ mod evaluate;
 mod export;
 mod export_gt;
 mod inspect;
+mod live;
 mod overview;
 mod perceive;
 mod predict;

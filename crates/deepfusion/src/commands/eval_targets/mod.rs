@@ -180,7 +180,7 @@ impl Work {
                 continue;
             };
             let motion = motions.of(dataset, *index);
-            if !motion.goes_on() {
+            if !motion.goes_on {
                 self.perception.forget();
             }
             let surroundings = self.perception.look(&depth, &k, motion.stamp)?;

@@ -1,6 +1,7 @@
 //! `deepfusion perceive`: images to 3D targets, followed over time.
 
-mod pictures;
+mod live;
+pub(super) mod pictures;
 mod record;
 
 use std::path::{Path, PathBuf};
@@ -16,9 +17,10 @@ use deepfusion_train::{Predictor, PreparedImage, RunFolder};
 use self::pictures::Picture;
 use self::record::{FrameRecord, Lines};
 use super::confidence::Confidence;
+use super::live as sources;
 use super::predict::inputs::{self, Input};
 use super::predict::{Job, Loaded, Seen};
-use super::scene::{MotionTracker, ScaleWatch, working_depth};
+use super::scene::{Motion, MotionTracker, ScaleWatch, working_depth};
 use crate::cli::{PerceiveArgs, PerceiveSave, PredictionArgs};
 use crate::error::{CliError, hint_of, told};
 use crate::pipeline::{self, Threads};
@@ -27,7 +29,7 @@ use crate::{engine, interrupt, output};
 
 /// A frame that is loaded, and when that began.
 struct Begun {
-    index: usize,
+    input: Input,
     loaded: Loaded,
     prepared: PreparedImage,
     start: Instant,
@@ -35,7 +37,7 @@ struct Begun {
 
 /// A frame with all that was found in it.
 struct Found {
-    index: usize,
+    input: Input,
     loaded: Loaded,
     seen: Seen,
     record: FrameRecord,
@@ -46,7 +48,12 @@ struct Found {
 pub fn run(args: &PerceiveArgs) -> Result<()> {
     let prediction = &args.prediction;
     let out = &prediction.out;
-    let all = inputs::find(&prediction.inputs, &prediction.open_options())?;
+    let source = sources::source(&prediction.inputs, &prediction.live)?;
+    let all = match (&source, args.speed) {
+        (Some(_), _) => Vec::new(),
+        (None, Some(_)) => return Err(CliError::OnlyLive { option: "--speed" }.into()),
+        (None, None) => inputs::find(&prediction.inputs, &prediction.open_options())?,
+    };
     let mut config = read_config(args.config.as_deref(), PerceptionConfig::predicted())?;
     if let Some(far) = args.max_depth {
         config.max_depth_m = far as f32;
@@ -58,6 +65,9 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
         &predictor,
     )?;
     std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
+    if source.is_some() {
+        sources::make_room(out, prediction.overwrite)?;
+    }
     refuse_what_is_there(prediction, &all)?;
     interrupt::catch("stopping after the frames at work");
     let work = Work {
@@ -69,7 +79,10 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
         lines: Mutex::new(Lines::begin(&out.join("targets.jsonl"))?),
         outcome: Mutex::new(Outcome::default()),
     };
-    work.go(&predictor, config)
+    match source {
+        Some(address) => work.go_live(&address, &predictor, config),
+        None => work.go(&predictor, config),
+    }
 }
 
 /// Settings from a file over `base`.
@@ -130,9 +143,10 @@ impl Work<'_> {
         let mut watch = ScaleWatch::of(&self.args.prediction);
         let load = |index: usize| {
             let start = Instant::now();
-            match self.job.load(&self.all[index]) {
+            let input = self.all[index].clone();
+            match self.job.load(&input) {
                 Ok((loaded, prepared)) => Some(Begun {
-                    index,
+                    input,
                     loaded,
                     prepared,
                     start,
@@ -143,8 +157,10 @@ impl Work<'_> {
                 }
             }
         };
-        let look =
-            |begun: Begun| self.look(begun, predictor, &mut perception, &mut motions, &mut watch);
+        let look = |begun: Begun| {
+            let motion = motions.next(&begun.input);
+            self.look(begun, motion, predictor, &mut perception, &mut watch)
+        };
         let write = |_: usize, found: Result<Found>| {
             if let Err(error) = found.and_then(|found| self.write(&found)) {
                 self.outcome().fatal.get_or_insert(error);
@@ -168,25 +184,23 @@ impl Work<'_> {
     fn look(
         &self,
         begun: Begun,
+        motion: Motion,
         predictor: &Predictor,
         perception: &mut Perception,
-        motions: &mut MotionTracker,
         watch: &mut ScaleWatch,
     ) -> Result<Found> {
         let Begun {
-            index,
+            input,
             loaded,
             prepared,
             start,
         } = begun;
-        let input = &self.all[index];
         let mut prediction = predictor.infer(&prepared)?;
         if let Some(factor) = watch.correction() {
             prediction.scale_depth(factor);
         }
         let camera = loaded.camera.ok_or(CliError::NoCamera)?;
-        let motion = motions.next(input);
-        if !motion.goes_on() {
+        if !motion.goes_on {
             perception.forget();
         }
         let (depth, k) = working_depth(&prediction.depth(), &camera);
@@ -212,7 +226,7 @@ impl Work<'_> {
             self.confidence.as_ref().map(|model| (model, &prediction)),
         );
         Ok(Found {
-            index,
+            input,
             loaded,
             seen: Seen {
                 prediction,
@@ -225,7 +239,7 @@ impl Work<'_> {
     }
 
     fn write(&self, found: &Found) -> Result<()> {
-        let (out, input) = (&self.args.prediction.out, &self.all[found.index]);
+        let (out, input) = (&self.args.prediction.out, &found.input);
         for (save, picture) in &found.pictures {
             picture.save(&pictures::path(out, &input.name, *save))?;
         }
@@ -246,13 +260,16 @@ impl Work<'_> {
             .lock()
             .unwrap_or_else(|e| e.into_inner())
             .add(&line)?;
-        if self.args.json {
+        let live = found.loaded.live.is_some();
+        if self.args.json && !live {
             output::print(&line)?;
         }
         let mut outcome = self.outcome();
         outcome.done += 1;
         outcome.targets += found.record.targets.len();
-        outcome.latency_ms.push(found.record.latency_ms);
+        if !live {
+            outcome.latency_ms.push(found.record.latency_ms);
+        }
         Ok(())
     }
 

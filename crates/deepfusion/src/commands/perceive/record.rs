@@ -31,8 +31,14 @@ pub struct FrameRecord {
     pub collision_with: Option<u64>,
     /// Whether metres still are what they were, where that is watched.
     pub scale_monitor: Option<Scale>,
-    /// From opening the file to having the targets.
+    /// From opening the file, or from a live frame's arrival, to having the targets.
     pub latency_ms: f64,
+    /// When a live frame arrived, seconds since 1970.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arrived_unix_s: Option<f64>,
+    /// Frames of the live source that were skipped so far.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dropped: Option<u64>,
 }
 
 /// Points p with normal·p + offset = 0.
@@ -70,6 +76,8 @@ impl FrameRecord {
             collision_with: collision.map(|c| c.id),
             scale_monitor: None,
             latency_ms,
+            arrived_unix_s: None,
+            dropped: None,
         }
     }
 
@@ -115,6 +123,12 @@ impl Lines {
         // Line by line: who watches the file sees whole frames.
         self.file.write_all(line.as_bytes()).map_err(failed)?;
         Ok(self.file.flush().map_err(failed)?)
+    }
+
+    /// Takes it away: nothing came.
+    pub fn discard(self) {
+        // What is left is an empty file that the next run takes over.
+        let _ = std::fs::remove_file(&self.partial);
     }
 
     /// Puts it in its place.

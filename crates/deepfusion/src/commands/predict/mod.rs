@@ -4,6 +4,7 @@ pub(super) mod camera;
 mod features;
 pub(super) mod inputs;
 mod ledger;
+mod live;
 mod manifest;
 mod outputs;
 mod resume;
@@ -11,7 +12,7 @@ pub(super) mod sidecar;
 mod watcher;
 
 use anyhow::{Context, Result};
-use deepfusion_data::{RgbImage, load_rgb};
+use deepfusion_data::{LiveFrame, RgbImage, load_rgb};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_train::{Inspector, LayerMaps, Prediction, Predictor, PreparedImage, Preparer};
 
@@ -21,8 +22,10 @@ use self::ledger::Ledger;
 use self::manifest::{Lock, Manifest};
 use self::sidecar::{FileMark, MadeWith, Sidecar};
 use self::watcher::Watcher;
-use super::device;
+use super::live::LiveMark;
+use super::perceive::pictures;
 use super::scene::Scale;
+use super::{device, live as sources};
 use crate::cli::{Outputs, PredictArgs, PredictionArgs, Save, Shard};
 use crate::engine;
 use crate::error::CliError;
@@ -49,6 +52,8 @@ pub(super) struct Loaded {
     mark: FileMark,
     pub image: RgbImage,
     pub camera: Option<Intrinsics>,
+    /// Of a live source's frame.
+    pub live: Option<LiveMark>,
 }
 
 /// What the network says about an image.
@@ -66,6 +71,9 @@ pub fn run(args: &PredictArgs) -> Result<()> {
         prediction, shard, ..
     } = args;
     let out = &prediction.out;
+    if let Some(address) = sources::source(&prediction.inputs, &prediction.live)? {
+        return live::run(args, &address);
+    }
     let all = inputs::find(&prediction.inputs, &prediction.open_options())?;
     let mine: Vec<&Input> = shard.part_of(&all).collect();
     let predictor = engine::load(&prediction.model, &prediction.engine)?;
@@ -83,10 +91,7 @@ pub fn run(args: &PredictArgs) -> Result<()> {
     predict(&job, &predictor, &mine, &todo, &ledger);
     let summary = ledger.finish()?;
     if job.camera.word() == "assumed" && mine.iter().any(|input| input.frame.is_none()) {
-        tracing::warn!(
-            "no intrinsics given: the training camera's field of view is assumed, so the metres are \
-             only as right as that is (scale_trusted: false; give --intrinsics or --calib)"
-        );
+        tell_assumed();
     }
     let there = mine.len() - todo.len();
     say(&format!(
@@ -103,6 +108,14 @@ pub fn run(args: &PredictArgs) -> Result<()> {
         output::print_json(&summary.sidecars)?;
     }
     summary.outcome
+}
+
+/// Warns of a camera that nobody gave.
+fn tell_assumed() {
+    tracing::warn!(
+        "no intrinsics given: the training camera's field of view is assumed, so the metres are \
+         only as right as that is (scale_trusted: false; give --intrinsics or --calib)"
+    );
 }
 
 /// Looks at what is there and writes the manifest; gives the images that are left to do, by their place in `mine`.
@@ -156,20 +169,14 @@ fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], le
     };
     let mut watcher = Watcher::of(job.args);
     let infer = |(i, loaded, prepared): (usize, Loaded, PreparedImage)| {
-        let seen = predictor.infer(&prepared).map(|mut prediction| Seen {
-            scale: watcher.look(mine[todo[i]], &loaded, &mut prediction),
-            prediction,
-            layers: match &job.inspector {
-                Some(inspector) => inspector.inspect(&prepared.input),
-                None => Vec::new(),
-            },
+        let seen = job.see(predictor, &prepared).map(|mut seen| {
+            seen.scale = watcher.look(mine[todo[i]], &loaded, &mut seen.prediction);
+            seen
         });
         (loaded, seen)
     };
-    let write = |i: usize, (loaded, seen): (Loaded, Result<Seen, _>)| {
-        let sidecar = seen
-            .map_err(anyhow::Error::from)
-            .and_then(|seen| job.write(mine[todo[i]], &loaded, &seen));
+    let write = |i: usize, (loaded, seen): (Loaded, Result<Seen>)| {
+        let sidecar = seen.and_then(|seen| job.write(mine[todo[i]], &loaded, &seen));
         match sidecar {
             Ok(sidecar) => ledger.done(todo[i], sidecar),
             Err(error) => ledger.stop(error),
@@ -221,6 +228,22 @@ impl<'a> Job<'a> {
                 seen.with_context(|| input.path.display().to_string())?
             }
         };
+        Ok(self.prepare(mark, image, camera))
+    }
+
+    /// Makes a live source's frame the network's input.
+    pub fn load_live(&self, frame: LiveFrame) -> Result<(Loaded, PreparedImage)> {
+        let mark = FileMark::of_frame(&frame);
+        let (image, camera) = self.camera.see(frame.image)?;
+        Ok(self.prepare(mark, image, camera))
+    }
+
+    fn prepare(
+        &self,
+        mark: FileMark,
+        image: RgbImage,
+        camera: Option<Intrinsics>,
+    ) -> (Loaded, PreparedImage) {
         let (correct, crop) = (!self.args.no_focal_correction, !self.args.stretch);
         let prepared = self
             .preparer
@@ -229,8 +252,21 @@ impl<'a> Job<'a> {
             mark,
             image,
             camera,
+            live: None,
         };
-        Ok((loaded, prepared))
+        (loaded, prepared)
+    }
+
+    /// What the network says about an image, and what its layers do where that is asked for.
+    pub fn see(&self, predictor: &Predictor, prepared: &PreparedImage) -> Result<Seen> {
+        Ok(Seen {
+            prediction: predictor.infer(prepared)?,
+            layers: match &self.inspector {
+                Some(inspector) => inspector.inspect(&prepared.input),
+                None => Vec::new(),
+            },
+            scale: None,
+        })
     }
 
     /// Writes an image's outputs, then its sidecar.
@@ -244,6 +280,14 @@ impl<'a> Job<'a> {
             let (camera, maps) = (loaded.camera.as_ref(), (prediction, &depth));
             let far = self.outputs.max_depth_m;
             outputs::write(*save, far, image, camera, maps, &seen.layers, &path)?;
+            file_bytes.push(FileMark::of(&path)?.bytes);
+            files.push(file);
+        }
+        if loaded.live.is_some() {
+            // It is nowhere else, and depth is little without it.
+            let file = format!("{}_image.jpg", input.name);
+            let path = args.out.join(&file);
+            pictures::save_jpeg(image, &path)?;
             file_bytes.push(FileMark::of(&path)?.bytes);
             files.push(file);
         }
@@ -271,6 +315,7 @@ impl<'a> Job<'a> {
             scale_monitor: seen.scale,
             files,
             file_bytes,
+            live: loaded.live,
             made_with: self.made_with.clone(),
         };
         sidecar.write(&args.out, &input.name)?;

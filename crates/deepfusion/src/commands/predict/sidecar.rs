@@ -5,12 +5,13 @@ use std::time::UNIX_EPOCH;
 
 use anyhow::Result;
 use clap::ValueEnum;
-use deepfusion_data::write_atomically;
+use deepfusion_data::{LiveFrame, write_atomically};
 use deepfusion_train::{Predictor, RunFolder};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::super::device;
+use super::super::live::LiveMark;
 use super::super::scene::Scale;
 use super::camera::CameraSource;
 use crate::cli::{Outputs, PredictionArgs, Save};
@@ -20,7 +21,7 @@ use crate::cli::{Outputs, PredictionArgs, Save};
 pub struct Sidecar {
     /// The input.
     pub image: PathBuf,
-    /// The input's file, to notice that it changed.
+    /// The input's file, to notice that it changed; of a live source's frame its pixels, and when they arrived.
     pub image_file: FileMark,
     /// The input's width and height.
     pub size: [u32; 2],
@@ -49,6 +50,9 @@ pub struct Sidecar {
     pub files: Vec<String>,
     /// The outputs' sizes in bytes, to notice a file that was cut off.
     pub file_bytes: Vec<u64>,
+    /// Of a live source's frame: when it arrived, and how late its depth was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub live: Option<LiveMark>,
     /// What else the outputs depend on.
     pub made_with: MadeWith,
 }
@@ -63,6 +67,15 @@ pub struct FileMark {
 }
 
 impl FileMark {
+    /// Of a live source's frame.
+    pub fn of_frame(frame: &LiveFrame) -> Self {
+        let since_1970 = frame.arrived_at.duration_since(UNIX_EPOCH);
+        Self {
+            bytes: frame.image.as_raw().len() as u64,
+            modified_ns: since_1970.ok().map(|d| d.as_nanos() as u64),
+        }
+    }
+
     /// The file's mark now.
     pub fn of(path: &Path) -> Result<Self, deepfusion_data::Error> {
         let meta = std::fs::metadata(path).map_err(|e| deepfusion_data::Error::file(path, e))?;

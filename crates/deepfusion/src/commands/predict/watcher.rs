@@ -51,7 +51,7 @@ impl Watcher {
         }
         let (_, rays) = self.rays.as_ref()?;
         // The last ground is a guess for this one only while the camera goes on.
-        let before = self.ground.take().filter(|_| motion.goes_on());
+        let before = self.ground.take().filter(|_| motion.goes_on);
         self.ground = Ground::find(&depth.data, rays, before.as_ref(), &self.config);
         let ground = self.ground.as_ref();
         self.watch

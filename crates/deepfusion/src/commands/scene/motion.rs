@@ -20,15 +20,10 @@ pub struct Motion {
     pub yaw_rate: f64,
     /// The camera in the last frame's camera, where this frame goes on from it.
     pub last_from_this: Option<Se3>,
+    /// Whether the frame goes on from the last one, so that what was followed there still means something.
+    pub goes_on: bool,
     /// Which way is down in the camera, where its mount is known.
     pub down_in_cam: Option<Vector3<f64>>,
-}
-
-impl Motion {
-    /// Whether the frame goes on from the last one, so that what was followed there still means something.
-    pub fn goes_on(&self) -> bool {
-        self.last_from_this.is_some()
-    }
 }
 
 /// Adds up the camera's way over the frames of a recording.
@@ -74,6 +69,7 @@ impl MotionTracker {
             // The camera's y points down: a turn to the left is a negative one about it.
             yaw_rate: step.map_or(0.0, |(_, motion, dt)| -motion.axis_angle().y / dt),
             last_from_this: step.map(|(_, motion, _)| motion),
+            goes_on: step.is_some(),
             down_in_cam: dataset
                 .cam_from_vehicle()
                 .map(|cam| -cam.rotate(&Vector3::z())),

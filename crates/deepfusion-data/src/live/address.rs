@@ -1,0 +1,230 @@
+//! What names a live source, and how ffmpeg is told of it.
+
+use crate::{Error, Result};
+use std::fmt;
+use std::path::PathBuf;
+
+/// A camera, the address of a stream, or standard input. Displayed without its password.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Address {
+    text: String,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Camera,
+    Stream,
+    Stdin,
+}
+
+/// What stands before a camera's number or name.
+const CAMERA: &str = "camera:";
+
+impl Address {
+    /// `camera:0`, `/dev/video0`, `-`, or anything with a scheme (`rtsp://…`); `None` is for files.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        let kind = if text == "-" {
+            Kind::Stdin
+        } else if text.starts_with(CAMERA) || text.starts_with("/dev/video") {
+            Kind::Camera
+        } else if scheme(text).is_some() {
+            Kind::Stream
+        } else {
+            return None;
+        };
+        let text = text.to_owned();
+        Some(Self { text, kind })
+    }
+
+    /// Whether it is standard input.
+    #[must_use]
+    pub fn is_stdin(&self) -> bool {
+        self.kind == Kind::Stdin
+    }
+
+    /// Whether it is a camera of this machine.
+    #[must_use]
+    pub fn is_camera(&self) -> bool {
+        self.kind == Kind::Camera
+    }
+
+    /// Whether its end can be meant: a camera has none, be it here or at the end of a wire.
+    pub(super) fn may_end(&self) -> bool {
+        self.kind != Kind::Camera && !self.is_rtsp()
+    }
+
+    fn is_rtsp(&self) -> bool {
+        scheme(&self.text).is_some_and(|s| s.to_ascii_lowercase().starts_with("rtsp"))
+    }
+
+    /// The same text with the address' password, where that is in it, made unreadable.
+    pub(super) fn without_password(&self, text: &str) -> String {
+        match self.credentials() {
+            Some(secret) => text.replace(secret, "***"),
+            None => text.to_owned(),
+        }
+    }
+
+    /// Name and password, between `://` and the host's `@`.
+    fn credentials(&self) -> Option<&str> {
+        let rest = &self.text[scheme(&self.text)?.len() + 3..];
+        let host = rest.split(['/', '?', '#']).next()?;
+        let (secret, _) = host.rsplit_once('@')?;
+        (!secret.is_empty()).then_some(secret)
+    }
+
+    /// ffmpeg's arguments up to and with `-i`, on this system (as [`std::env::consts::OS`] names it).
+    ///
+    /// # Errors
+    /// [`Error::Program`] where a camera is not named as this system does.
+    pub(super) fn input(&self, system: &str) -> Result<Vec<String>> {
+        let words = |words: &[&str]| words.iter().map(|w| (*w).to_owned()).collect();
+        Ok(match self.kind {
+            Kind::Stdin => words(&["-i", "pipe:0"]),
+            // Over UDP a camera's pictures tear where the network loses a packet.
+            Kind::Stream if self.is_rtsp() => words(&["-rtsp_transport", "tcp", "-i", &self.text]),
+            Kind::Stream => words(&["-i", &self.text]),
+            Kind::Camera => {
+                let name = self.text.strip_prefix(CAMERA).unwrap_or(&self.text);
+                let number = name.parse::<u32>().is_ok();
+                match system {
+                    "linux" if number => words(&["-f", "v4l2", "-i", &format!("/dev/video{name}")]),
+                    "linux" => words(&["-f", "v4l2", "-i", name]),
+                    // Its default of 29.97 frames a second is one that cameras do not have.
+                    "macos" => words(&[
+                        "-f",
+                        "avfoundation",
+                        "-framerate",
+                        "30",
+                        "-i",
+                        &format!("{name}:none"),
+                    ]),
+                    "windows" if !number => words(&["-f", "dshow", "-i", &format!("video={name}")]),
+                    "windows" => {
+                        return Err(self.unknown(
+                            "knows cameras by name here, not by number",
+                            "`ffmpeg -list_devices true -f dshow -i dummy` lists them: camera:NAME",
+                        ));
+                    }
+                    _ => {
+                        return Err(self.unknown(
+                            "reads no cameras on this system",
+                            "give a stream's address, or pipe a stream in and give -",
+                        ));
+                    }
+                }
+            }
+        })
+    }
+
+    fn unknown(&self, problem: &str, remedy: &'static str) -> Error {
+        Error::Program {
+            path: PathBuf::from(self.to_string()),
+            program: "ffmpeg",
+            problem: problem.into(),
+            remedy,
+        }
+    }
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self.kind {
+            Kind::Stdin => f.write_str("standard input"),
+            _ => f.write_str(&self.without_password(&self.text)),
+        }
+    }
+}
+
+/// What stands before `://`, where that is a scheme.
+fn scheme(text: &str) -> Option<&str> {
+    let (scheme, rest) = text.split_once("://")?;
+    let word = scheme.starts_with(|c: char| c.is_ascii_alphabetic())
+        && scheme
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
+    (word && !rest.is_empty()).then_some(scheme)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn input(text: &str, system: &str) -> String {
+        Address::parse(text)
+            .unwrap()
+            .input(system)
+            .unwrap()
+            .join(" ")
+    }
+
+    #[test]
+    fn addresses_are_told_from_files() {
+        for live in [
+            "-",
+            "camera:0",
+            "camera:Integrated Webcam",
+            "/dev/video2",
+            "rtsp://host/1",
+            "udp://@:5000",
+            "http://host:80/a.mjpg?x=[1]",
+        ] {
+            assert!(Address::parse(live).is_some(), "{live}");
+        }
+        for file in [
+            "a.png",
+            "drive/*.png",
+            "C:\\a.mp4",
+            "camera",
+            "://x",
+            "a b://c",
+            "--",
+            "rtsp://",
+        ] {
+            assert!(Address::parse(file).is_none(), "{file}");
+        }
+    }
+
+    #[test]
+    fn each_system_names_its_cameras() {
+        assert_eq!(input("camera:1", "linux"), "-f v4l2 -i /dev/video1");
+        assert_eq!(input("/dev/video1", "linux"), "-f v4l2 -i /dev/video1");
+        assert_eq!(
+            input("camera:0", "macos"),
+            "-f avfoundation -framerate 30 -i 0:none"
+        );
+        assert_eq!(input("camera:Cam A", "windows"), "-f dshow -i video=Cam A");
+        let by_number = Address::parse("camera:0").unwrap().input("windows");
+        assert!(by_number.unwrap_err().hint().unwrap().contains("dshow"));
+        assert_eq!(input("-", "windows"), "-i pipe:0");
+        assert_eq!(input("udp://@:5000", "linux"), "-i udp://@:5000");
+    }
+
+    #[test]
+    fn cameras_have_no_end() {
+        let may_end = |text| Address::parse(text).unwrap().may_end();
+        assert!(may_end("-") && may_end("http://host/a.ts") && may_end("tcp://host:1"));
+        assert!(!may_end("camera:0") && !may_end("/dev/video0") && !may_end("RTSP://host/1"));
+    }
+
+    #[test]
+    fn passwords_are_not_shown() {
+        let address = Address::parse("rtsp://me:p@ss@cam.local:554/live").unwrap();
+        assert_eq!(address.to_string(), "rtsp://***@cam.local:554/live");
+        let said =
+            address.without_password("rtsp://me:p@ss@cam.local:554/live: Connection refused");
+        assert_eq!(said, "rtsp://***@cam.local:554/live: Connection refused");
+        assert_eq!(
+            input("rtsp://me:p@ss@cam.local:554/live", "linux"),
+            "-rtsp_transport tcp -i rtsp://me:p@ss@cam.local:554/live"
+        );
+        assert_eq!(
+            Address::parse("udp://@:5000").unwrap().to_string(),
+            "udp://@:5000"
+        );
+        let mail = "http://host/?to=a@b";
+        assert_eq!(Address::parse(mail).unwrap().to_string(), mail);
+    }
+}

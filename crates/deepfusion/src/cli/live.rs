@@ -1,0 +1,38 @@
+use clap::Args;
+
+use super::values::positive;
+
+/// What only live sources (cameras, streams, standard input) have.
+#[derive(Debug, Clone, Default, Args)]
+pub struct LiveArgs {
+    /// Stop after this many frames; skipped ones do not count.
+    #[arg(long, value_name = "N", help_heading = HEADING, value_parser = clap::value_parser!(u64).range(1..))]
+    pub frames: Option<u64>,
+    /// Stop this many seconds after the first frame.
+    #[arg(long, value_name = "S", help_heading = HEADING, value_parser = positive)]
+    pub duration: Option<f64>,
+    /// Take a source that has sent nothing for this many seconds for lost [default: 10].
+    #[arg(long, value_name = "S", help_heading = HEADING, value_parser = positive)]
+    pub timeout: Option<f64>,
+}
+
+/// Where their options stand in the help.
+pub const HEADING: &str = "Live sources";
+
+impl LiveArgs {
+    /// The first option that was given.
+    pub fn given(&self) -> Option<&'static str> {
+        [
+            (self.frames.is_some(), "--frames"),
+            (self.duration.is_some(), "--duration"),
+            (self.timeout.is_some(), "--timeout"),
+        ]
+        .into_iter()
+        .find_map(|(given, name)| given.then_some(name))
+    }
+
+    /// Seconds of silence that are borne.
+    pub fn timeout_s(&self) -> f64 {
+        self.timeout.unwrap_or(10.0)
+    }
+}

@@ -1,0 +1,315 @@
+//! Live sources through the program alone: streams on standard input and of a server in this test. What needs ffmpeg is
+//! skipped, and says so, where there is none.
+
+#[path = "support/streams.rs"]
+mod streams;
+mod support;
+
+use std::io::Write;
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+use streams::{brightness, piped, serve, stream, with_path};
+use support::{Run, in_folder};
+
+const CAMERA: &str = "--intrinsics 186,186,157,44";
+
+fn run(folder: &Path, args: &str) -> Run {
+    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
+}
+
+fn there_is_ffmpeg() -> bool {
+    let answer = Command::new("ffmpeg").arg("-version").output();
+    let there = answer.is_ok_and(|o| o.status.success());
+    if !there {
+        eprintln!("skipped: there is no ffmpeg that could read a stream");
+    }
+    there
+}
+
+/// A network that has seen a few steps of a street.
+fn network(folder: &Path) {
+    for args in [
+        "simulate --out street --frames 6 --seed 5 --size 320x96",
+        "train --data street --preset tiny --size 128x64 --batch 2 --steps 2 --out run",
+    ] {
+        let run = run(folder, args);
+        assert_eq!(run.code, 0, "{args}: {}", run.stderr);
+    }
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// The lines of `targets.jsonl`; every file beside it is whole.
+fn whole(folder: &Path) -> Vec<Value> {
+    let text = std::fs::read_to_string(folder.join("targets.jsonl")).unwrap();
+    let lines: Vec<Value> = text
+        .lines()
+        .map(|l| serde_json::from_str(l).unwrap())
+        .collect();
+    for line in &lines {
+        let name = line["frame"].as_str().unwrap();
+        assert_eq!(&json(&folder.join(format!("{name}_targets.json"))), line);
+        let sidecar = json(&folder.join(format!("{name}.json")));
+        assert_eq!(sidecar["live"]["dropped"], line["dropped"]);
+        let files = sidecar["files"].as_array().unwrap();
+        for (file, bytes) in files.iter().zip(sidecar["file_bytes"].as_array().unwrap()) {
+            let found = std::fs::metadata(folder.join(file.as_str().unwrap())).unwrap();
+            assert_eq!(found.len(), bytes.as_u64().unwrap());
+        }
+    }
+    let names = files(folder);
+    assert!(!names.iter().any(|n| n.ends_with("partial")), "{names:?}");
+    let records = names.iter().filter(|n| n.ends_with("_targets.json"));
+    assert_eq!(records.count(), lines.len());
+    lines
+}
+
+fn number(line: &Value) -> u64 {
+    line["frame"]
+        .as_str()
+        .unwrap()
+        .strip_prefix("live-")
+        .unwrap()
+        .parse()
+        .unwrap()
+}
+
+#[test]
+fn a_source_that_is_too_fast_loses_frames_and_no_time() {
+    if !there_is_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    network(at);
+    const SENT: usize = 1000;
+    let args = format!("perceive --model run - {CAMERA} --out seen --speed 5 --json");
+    let told = piped(at, &args, stream(SENT));
+    assert_eq!(told.code, 0, "{}", told.stderr);
+    let lines = whole(&at.join("seen"));
+    assert_eq!(told.stdout.lines().count(), lines.len());
+    for (place, line) in lines.iter().enumerate() {
+        // The gaps in the numbers are the frames that were skipped.
+        assert_eq!(
+            line["dropped"].as_u64().unwrap(),
+            number(line) - place as u64
+        );
+        assert!(line["latency_ms"].as_f64().unwrap() > 0.0);
+        assert!(line["arrived_unix_s"].as_f64().unwrap() > 1.7e9);
+        assert_eq!(line["speed_mps"], 5.0);
+        // A frame's picture is that of its number, and depth was made of no other.
+        let name = line["frame"].as_str().unwrap();
+        let picture = image::open(at.join(format!("seen/{name}_image.jpg")))
+            .unwrap()
+            .into_rgb8();
+        let grey = picture.get_pixel(160, 48).0[1];
+        assert!(
+            grey.abs_diff(brightness(number(line) as usize)) < 4,
+            "{name}: {grey}"
+        );
+    }
+    let last = lines.last().unwrap();
+    assert_eq!(number(last), SENT as u64 - 1, "the newest is looked at");
+    assert!(last["dropped"].as_u64().unwrap() > 0, "{last}");
+    // Straight on, as long as it took to arrive.
+    let forward = last["camera_motion"][11].as_f64().unwrap();
+    let took =
+        last["arrived_unix_s"].as_f64().unwrap() - lines[0]["arrived_unix_s"].as_f64().unwrap();
+    assert!(
+        (forward - 5.0 * took).abs() < 0.5,
+        "{forward} m in {took} s"
+    );
+    assert!(
+        told.stderr.contains("skipped") && told.stderr.contains("latency"),
+        "{}",
+        told.stderr
+    );
+    // Frames of another run would stand between these.
+    let again = piped(at, &args, stream(2));
+    assert_eq!(again.code, 1);
+    assert!(
+        again.stderr.contains("live-") && again.stderr.contains("--overwrite"),
+        "{}",
+        again.stderr
+    );
+    let anew = piped(at, &format!("{args} --overwrite"), stream(1));
+    assert_eq!(anew.code, 0, "{}", anew.stderr);
+    assert_eq!(whole(&at.join("seen")).len(), 1);
+}
+
+#[test]
+fn depth_of_a_stream_stops_where_it_is_told() {
+    if !there_is_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    network(at);
+    let args = format!("predict --model run - {CAMERA} --out depth --frames 2 --save npy --json");
+    let told = piped(at, &args, stream(2000));
+    assert_eq!(told.code, 0, "{}", told.stderr);
+    let sidecars: Vec<Value> = told
+        .stdout
+        .lines()
+        .map(|l| serde_json::from_str(l).unwrap())
+        .collect();
+    assert_eq!(sidecars.len(), 2);
+    for sidecar in &sidecars {
+        assert_eq!(sidecar["image"], "standard input");
+        assert!(sidecar["live"]["latency_ms"].as_f64().unwrap() > 0.0);
+        assert_eq!(sidecar["intrinsics_from"], "given");
+        for file in sidecar["files"].as_array().unwrap() {
+            assert!(at.join("depth").join(file.as_str().unwrap()).is_file());
+        }
+    }
+    // Two frames of three files each: no manifest, no lock.
+    assert_eq!(files(&at.join("depth")).len(), 6);
+}
+
+#[test]
+fn what_was_seen_before_the_connection_was_lost_is_kept() {
+    if !there_is_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    network(at);
+    // The server is there, and sends no more.
+    let (stop, until) = std::sync::mpsc::channel::<()>();
+    let (address, server) = serve(move |mut connection| {
+        connection.write_all(&stream(60)).unwrap();
+        until.recv().ok();
+    });
+    let args = format!("perceive --model run {address} {CAMERA} --out silent --timeout 5");
+    let silent = run(at, &args);
+    drop(stop);
+    server.join().unwrap();
+    assert_eq!(silent.code, 1, "{}", silent.stderr);
+    for part in [
+        address.as_str(),
+        "gave no frame for 5 s, after 60 frames",
+        "hint:",
+        "--timeout",
+        "was lost",
+    ] {
+        assert!(silent.stderr.contains(part), "{part}: {}", silent.stderr);
+    }
+    assert!(!whole(&at.join("silent")).is_empty());
+    // The server goes away, in the middle of what it said would come.
+    let (address, server) = serve(|mut connection| {
+        for part in stream(60).chunks(200_000) {
+            connection.write_all(part).unwrap();
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+    });
+    let gone = run(
+        at,
+        &format!("perceive --model run {address} {CAMERA} --out gone"),
+    );
+    server.join().unwrap();
+    assert_eq!(gone.code, 1, "{}", gone.stderr);
+    for part in ["lost the connection after", "ends prematurely", "hint:"] {
+        assert!(gone.stderr.contains(part), "{part}: {}", gone.stderr);
+    }
+    assert!(!whole(&at.join("gone")).is_empty());
+}
+
+#[test]
+fn what_cannot_be_opened_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    network(at);
+    let nobody = {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        listener.local_addr().unwrap()
+    };
+    let refused = |run: &Run, parts: &[&str]| {
+        assert_eq!((run.code, run.stdout.as_str()), (1, ""), "{}", run.stderr);
+        for part in parts.iter().chain(&["hint:"]) {
+            assert!(run.stderr.contains(part), "{part}: {}", run.stderr);
+        }
+    };
+    let image = "street/2026_01_01/2026_01_01_drive_0005_sync/image_02/data/0000000003.png";
+    let cases = [
+        ("predict --model run camera:0 - --out a".to_owned(), "alone"),
+        (
+            format!("perceive --model run camera:0 {image} --out a"),
+            "alone",
+        ),
+        (
+            "predict --model run - --shard 1/2 --out a".to_owned(),
+            "shard",
+        ),
+        (
+            format!("predict --model run {image} --frames 3 --out a"),
+            "--frames",
+        ),
+        (
+            format!("perceive --model run {image} --speed 0 --out a"),
+            "--speed",
+        ),
+    ];
+    for (args, part) in &cases {
+        refused(&run(at, args), &[part]);
+    }
+    // No ffmpeg.
+    let absent = with_path(
+        at,
+        "perceive --model run udp://127.0.0.1:1 --out b",
+        at.as_os_str(),
+    );
+    refused(
+        &absent,
+        &["udp://127.0.0.1:1", "ffmpeg", "not installed", "PATH"],
+    );
+    if !there_is_ffmpeg() {
+        return;
+    }
+    for command in ["perceive", "predict"] {
+        let args = format!("{command} --model run tcp://me:secret@{nobody} --out c");
+        let run = run(at, &args);
+        refused(&run, &["gave no frame", "is the source running"]);
+        assert!(!run.stderr.contains("secret"), "{}", run.stderr);
+        assert_eq!(files(&at.join("c")), Vec::<String>::new());
+    }
+    let noise = piped(at, "predict --model run - --out d", vec![7; 10_000]);
+    refused(&noise, &["standard input", "Invalid data"]);
+    let nothing = piped(at, "predict --model run - --out d", Vec::new());
+    refused(&nothing, &["standard input", "gave no frame"]);
+}
+
+/// Before ffmpeg 5.1 an option had another name.
+#[test]
+#[cfg(unix)]
+fn an_old_ffmpeg_is_asked_in_its_own_words() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    network(at);
+    let old = at.join("ffmpeg");
+    let script = "#!/bin/sh\ncase \"$*\" in *-fps_mode*) echo \"Unrecognized option 'fps_mode'.\" >&2; exit 1;; esac\n\
+                  printf 'P6\\n320 96\\n255\\n'; head -c 92160 /dev/zero\n";
+    std::fs::write(&old, script).unwrap();
+    std::fs::set_permissions(&old, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let mut path = at.as_os_str().to_owned();
+    path.push(":/usr/bin:/bin");
+    let args = format!("perceive --model run tcp://camera:1 {CAMERA} --out seen");
+    let told = with_path(at, &args, &path);
+    assert_eq!(told.code, 0, "{}", told.stderr);
+    assert_eq!(whole(&at.join("seen")).len(), 1);
+}
