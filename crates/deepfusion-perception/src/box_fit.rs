@@ -1,98 +1,8 @@
 //! An upright box around what is seen of an object, completed to what it must be.
 
-use crate::silhouette::Silhouette;
-
-/// A box on the ground, in the ground's axes (right, forward, height).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GroundBox {
-    /// Middle of the footprint: right, forward, in metres.
-    pub middle: [f32; 2],
-    /// Angle from `right` to the length, towards `forward`, in radians; a box has none beyond half a turn.
-    pub angle: f32,
-    /// Length and width, in metres; length is not the smaller.
-    pub footprint: [f32; 2],
-    /// Height of the lower and the upper face over the ground, in metres.
-    pub heights: [f32; 2],
-    /// Share of the length and of the width that was seen.
-    pub seen: [f32; 2],
-    /// The point of the footprint that stays where it is if the extents are found to be others: the corner or the
-    /// middle of the side that was seen, (right, forward) in metres.
-    pub anchor: [f32; 2],
-}
-
-impl GroundBox {
-    /// The four corners of the footprint: right, forward, in metres, around it.
-    #[must_use]
-    pub fn corners(&self) -> [[f32; 2]; 4] {
-        let [along, across] = axes(self.angle);
-        let [length, width] = self.footprint.map(|s| 0.5 * s);
-        [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]].map(|[a, b]| {
-            [0, 1].map(|k| self.middle[k] + a * length * along[k] + b * width * across[k])
-        })
-    }
-
-    /// Middle of the footprint if its extents along its own length and width were these, in metres.
-    #[must_use]
-    pub fn middle_with(&self, extents: [f32; 2]) -> [f32; 2] {
-        let mut middle = self.anchor;
-        for (i, axis) in axes(self.angle).into_iter().enumerate() {
-            let off = (self.middle[0] - self.anchor[0]) * axis[0]
-                + (self.middle[1] - self.anchor[1]) * axis[1];
-            let off = off * extents[i] / self.footprint[i].max(1e-3);
-            middle = [middle[0] + off * axis[0], middle[1] + off * axis[1]];
-        }
-        middle
-    }
-
-    /// Area that two footprints share over that of the smaller, 0 to 1.
-    #[must_use]
-    pub fn overlap(&self, other: &Self) -> f32 {
-        let apart = [0, 1].map(|k| self.middle[k] - other.middle[k]);
-        let reach = |b: &Self| 0.5 * b.footprint[0].hypot(b.footprint[1]);
-        if apart[0].hypot(apart[1]) > reach(self) + reach(other) {
-            return 0.0;
-        }
-        let area = |b: &Self| b.footprint[0] * b.footprint[1];
-        let shared = polygon_area(&clipped(self.corners().to_vec(), other));
-        shared / area(self).min(area(other)).max(1e-6)
-    }
-}
-
-/// A convex polygon's part inside a box (Sutherland and Hodgman).
-fn clipped(mut polygon: Vec<[f32; 2]>, within: &GroundBox) -> Vec<[f32; 2]> {
-    for (axis, half) in axes(within.angle).into_iter().zip(within.footprint) {
-        for sign in [1.0, -1.0] {
-            let inside = |p: &[f32; 2]| {
-                let off = (p[0] - within.middle[0]) * axis[0] + (p[1] - within.middle[1]) * axis[1];
-                0.5 * half - sign * off
-            };
-            let mut next = Vec::with_capacity(polygon.len() + 1);
-            for (i, p) in polygon.iter().enumerate() {
-                let q = &polygon[(i + 1) % polygon.len()];
-                let (a, b) = (inside(p), inside(q));
-                if a >= 0.0 {
-                    next.push(*p);
-                }
-                if (a >= 0.0) != (b >= 0.0) {
-                    let share = a / (a - b);
-                    next.push([0, 1].map(|k| p[k] + share * (q[k] - p[k])));
-                }
-            }
-            polygon = next;
-        }
-    }
-    polygon
-}
-
-fn polygon_area(polygon: &[[f32; 2]]) -> f32 {
-    let next = polygon.iter().cycle().skip(1);
-    let twice: f32 = polygon
-        .iter()
-        .zip(next)
-        .map(|(p, q)| p[0] * q[1] - p[1] * q[0])
-        .sum();
-    0.5 * twice.abs()
-}
+use crate::ground_box::{GroundBox, axes};
+use crate::rows::{Turn, Vote};
+use crate::silhouette::{FOOT_M, Silhouette};
 
 /// Length and width of a usual car, metres.
 const CAR: [f32; 2] = [4.4, 1.8];
@@ -106,19 +16,21 @@ const FACE: f32 = 0.25;
 const MEASURED: f32 = 0.6;
 /// Less than this of something, in metres, says nothing about the rest.
 const SLIVER: f32 = 0.8;
+/// Least that is seen of a bumper that stands for a car, metres.
+const BUMPER: f32 = 1.2;
 /// Smallest extent of a box, metres.
 const THIN: f32 = 0.3;
 
-/// Fits a box to a silhouette. `along`: the angle (as [`GroundBox::angle`]) most objects are expected to be turned
-/// to, which decides only between fits that are about as good.
+/// Fits a box to a silhouette. `expected`: how objects are expected to be turned, which decides only between fits that
+/// are about as good. The box comes with the say that it has on how its neighbours are turned.
 #[must_use]
-pub fn fit(silhouette: &Silhouette, along: f32) -> Option<GroundBox> {
-    let angle = best_angle(&silhouette.contour, along);
+pub fn fit(silhouette: &Silhouette, expected: Turn) -> Option<Vote> {
+    let angle = best_angle(&silhouette.contour, expected.angle());
     let axes = axes(angle);
     let span = axes.map(|axis| extent(&silhouette.points, axis));
     let size = span.map(|[from, to]| to - from);
-    let room = [0, 1].map(|i| room(silhouette, axes[i], span[i]));
-    let whole = completed(size, room, angle, along, silhouette)?;
+    let room = [0, 1].map(|i| room(silhouette, axes[i], axes[1 - i], span[i]));
+    let (whole, lean) = completed(size, room, angle, expected, silhouette)?;
     let (mut middle, mut fixed) = ([0.0; 2], [0.0; 2]);
     for i in 0..2 {
         let [from, to] = span[i];
@@ -142,19 +54,16 @@ pub fn fit(silhouette: &Silhouette, along: f32) -> Option<GroundBox> {
     } else {
         (1, std::f32::consts::FRAC_PI_2)
     };
-    Some(GroundBox {
+    let place = GroundBox {
         middle: on_ground(middle),
         angle: half_turn(angle + turn),
         footprint: [whole[first], whole[1 - first]],
         heights: [0.0, silhouette.top],
         seen: [seen[first], seen[1 - first]],
         anchor: on_ground(fixed),
-    })
-}
-
-fn axes(angle: f32) -> [[f32; 2]; 2] {
-    let (sin, cos) = angle.sin_cos();
-    [[cos, sin], [-sin, cos]]
+    };
+    let at = on_ground(span.map(|[from, to]| 0.5 * (from + to)));
+    Some(Vote { at, place, lean })
 }
 
 /// An angle in [0, π).
@@ -222,12 +131,20 @@ fn extent(points: &[[f32; 3]], axis: [f32; 2]) -> [f32; 2] {
 }
 
 /// How far an axis may go on beyond its low and its high end, in metres: 0 where a free end of the contour shows that
-/// it does not. Behind what hides an end it may go on as far as it likes, towards the camera only up to it.
-fn room(silhouette: &Silhouette, axis: [f32; 2], [from, to]: [f32; 2]) -> [f32; 2] {
+/// it does not, or a face that is seen. Behind what hides an end it may go on as far as it likes, towards the camera
+/// only up to it.
+fn room(
+    silhouette: &Silhouette,
+    axis: [f32; 2],
+    across: [f32; 2],
+    [from, to]: [f32; 2],
+) -> [f32; 2] {
     let contour = &silhouette.contour;
     let reach = 0.2 * (to - from) + 0.05;
     let ends = [contour[0], contour[contour.len() - 1]].map(|p| p[0] * axis[0] + p[1] * axis[1]);
     let far_is_high = from + to >= 0.0;
+    let near = if far_is_high { from } else { to };
+    let face = face_width(silhouette, axis, across, near);
     [false, true].map(|high| {
         let at = |x: f32| {
             if high {
@@ -251,10 +168,27 @@ fn room(silhouette: &Silhouette, axis: [f32; 2], [from, to]: [f32; 2]) -> [f32; 
         let far = high == far_is_high;
         if far && (!shown || to - from < MEASURED) {
             f32::INFINITY
+        } else if !far && face > MEASURED {
+            0.0
         } else {
             room
         }
     })
+}
+
+/// How much of the face at `place` along `axis` is seen down to the ground, metres: above something that hides the rest,
+/// what is seen may lie farther in.
+fn face_width(silhouette: &Silhouette, axis: [f32; 2], across: [f32; 2], place: f32) -> f32 {
+    let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+    for (p, foot) in silhouette.contour.iter().zip(&silhouette.feet) {
+        let off = p[0] * axis[0] + p[1] * axis[1] - place;
+        if off.abs() < FACE && *foot < FOOT_M {
+            let x = p[0] * across[0] + p[1] * across[1];
+            low = low.min(x);
+            high = high.max(x);
+        }
+    }
+    high - low
 }
 
 /// Whole extents along the two axes, from those seen.
@@ -262,9 +196,9 @@ fn completed(
     size: [f32; 2],
     room: [[f32; 2]; 2],
     angle: f32,
-    along: f32,
+    expected: Turn,
     silhouette: &Silhouette,
-) -> Option<[f32; 2]> {
+) -> Option<([f32; 2], f32)> {
     // Where its lower half is hidden, what is seen is a roof, which is shorter than the whole.
     let roof_only = silhouette.bottom > 0.55 * silhouette.top && silhouette.top > 1.0;
     let hidden = silhouette.hidden.iter().any(|step| *step > 0.0) || roof_only;
@@ -278,8 +212,10 @@ fn completed(
         (false, true) => SMALL,
         (false, false) => SHORTEST[1],
     };
-    if largest < small || silhouette.top < 0.9 {
-        return Some(size.map(|s| s.max(THIN)));
+    // Of a car whose rest is hidden, the bumper may be all that is seen.
+    let lowest = if hidden && largest > BUMPER { 0.6 } else { 0.9 };
+    if largest < small || silhouette.top < lowest {
+        return Some((size.map(|s| s.max(THIN)), 0.0));
     }
     let room = room.map(|[low, high]| low + high);
     let usual = |i: usize, length_on: usize| CAR[usize::from(i != length_on)];
@@ -296,11 +232,14 @@ fn completed(
                 0.5 * (-more - room[i]).max(0.0)
             };
         }
-        let turned = angle + length_on as f32 * std::f32::consts::FRAC_PI_2 - along;
-        cost + 0.25 * (1.0 - (2.0 * turned).cos())
+        cost
     };
-    let length_on = usize::from(as_car(1) < as_car(0));
-    Some([0, 1].map(|i| {
+    let costs = [0, 1].map(as_car);
+    let against =
+        |i: usize| costs[i] + expected.against(angle + i as f32 * std::f32::consts::FRAC_PI_2);
+    let length_on = usize::from(against(1) < against(0));
+    let lean = costs[1 - length_on] - costs[length_on];
+    let whole = [0, 1].map(|i| {
         let usual = usual(i, length_on);
         let least = SHORTEST[usize::from(i != length_on)];
         if size[i] + room[i] < least {
@@ -309,5 +248,61 @@ fn completed(
         } else {
             size[i].max(usual.min(size[i] + room[i]))
         }
-    }))
+    });
+    Some((whole, lean))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The front of a car, 1.7 m of it along x = 4, and 1 m of its side, behind which the image ends.
+    fn corner() -> Silhouette {
+        let front = (0..18).map(|i| [4.0, 9.7 - 0.1 * i as f32]);
+        let side = (1..11).map(|i| [4.0 + 0.1 * i as f32, 8.0]);
+        let contour: Vec<[f32; 2]> = front.chain(side).collect();
+        Silhouette {
+            points: contour.iter().map(|p| [p[0], p[1], 0.5]).collect(),
+            feet: vec![0.3; contour.len()],
+            top: 1.5,
+            bottom: 0.3,
+            hidden: [0.0, f32::INFINITY],
+            contour,
+            ..Silhouette::default()
+        }
+    }
+
+    #[test]
+    fn a_box_does_not_go_on_before_a_face_that_is_seen() {
+        let seen = fit(&corner(), Turn::ahead()).unwrap();
+        // Its length points away from the lane: both ends of the front are seen, and a car is not so short.
+        let [right, forward] = seen.place.middle;
+        assert!(
+            (right - 6.2).abs() < 0.2 && (forward - 8.85).abs() < 0.2,
+            "{seen:?}"
+        );
+        assert!(
+            seen.place.angle.sin().abs() < 0.1 && seen.lean > 0.5,
+            "{seen:?}"
+        );
+        // Where the side's foot is hidden it may lie farther in than the car's end.
+        let mut hidden = corner();
+        hidden.feet.fill(0.9);
+        let seen = fit(&hidden, Turn::ahead()).unwrap();
+        assert!(seen.place.angle.sin() > 0.9, "{seen:?}");
+    }
+
+    #[test]
+    fn neighbours_decide_where_what_is_seen_does_not() {
+        // A corner of which both ends are hidden.
+        let unclear = Silhouette {
+            hidden: [f32::INFINITY; 2],
+            feet: vec![0.9; corner().contour.len()],
+            ..corner()
+        };
+        let alone = fit(&unclear, Turn::ahead()).unwrap();
+        let in_row = fit(&unclear, Turn::new(0.0, 2.0)).unwrap();
+        assert!(alone.place.angle.sin() > 0.9, "{alone:?}");
+        assert!(in_row.place.angle.sin().abs() < 0.1, "{in_row:?}");
+    }
 }

@@ -39,6 +39,40 @@ impl Cluster {
             },
         )
     }
+
+    /// Its two parts: where `beyond`, of a pixel's point in the camera's frame, is not so, and where it is; `None` where
+    /// one of them would be empty.
+    pub fn divided(
+        &self,
+        depth: &[f32],
+        rays: &Rays,
+        beyond: impl Fn([f32; 3]) -> bool,
+    ) -> Option<[Self; 2]> {
+        let width = rays.x.len();
+        let mut parts = [Self::default(), Self::default()];
+        for run in &self.runs {
+            let side = |u: u32| {
+                let z = depth[run.v as usize * width + u as usize];
+                usize::from(beyond(rays.point(u as usize, run.v as usize, z)))
+            };
+            let mut open = Run {
+                to: run.from,
+                ..*run
+            };
+            let mut current = side(run.from);
+            for u in run.from + 1..=run.to {
+                let next = if u == run.to { 1 - current } else { side(u) };
+                if next != current {
+                    open.to = u;
+                    parts[current].pixels += (open.to - open.from) as usize;
+                    parts[current].runs.push(open);
+                    open.from = u;
+                    current = next;
+                }
+            }
+        }
+        parts.iter().all(|part| part.pixels > 0).then_some(parts)
+    }
 }
 
 /// How far two neighbouring pixels of one surface may lie apart in depth.
@@ -46,13 +80,22 @@ impl Cluster {
 /// On an upright surface seen at a grazing angle, as the side of a car ahead is, depth grows by z²·δ/|x| from
 /// one column to the next (δ: the angle between them, x: the surface's distance to the side); on a level one by
 /// z²·δ/|y| from row to row. The depth's own error grows with z² in metres, thus with z relative to it.
-struct Gaps {
+pub struct Gaps {
     error: f32,
     step: [f32; 2],
 }
 
 impl Gaps {
-    fn across(&self, x: f32, z: f32) -> f32 {
+    /// Of a camera's depth.
+    pub fn of(rays: &Rays, config: &PerceptionConfig) -> Self {
+        Self {
+            error: config.relative_error,
+            step: rays.step,
+        }
+    }
+
+    /// From one column to the next, for a surface at `x` to the side and `z` ahead, metres.
+    pub fn across(&self, x: f32, z: f32) -> f32 {
         0.12 + self.limit(x.abs(), z, self.step[0])
     }
 
@@ -84,10 +127,7 @@ pub fn clusters(
     config: &PerceptionConfig,
 ) -> Vec<Cluster> {
     let width = rays.x.len();
-    let gaps = Gaps {
-        error: config.relative_error,
-        step: rays.step,
-    };
+    let gaps = Gaps::of(rays, config);
     let mut runs: Vec<Run> = Vec::new();
     let mut parent: Vec<u32> = Vec::new();
     let mut above = 0..0;

@@ -1,15 +1,20 @@
 //! One depth image to boxes.
 
-use crate::box_fit::{GroundBox, fit};
+use crate::box_fit::fit;
 use crate::clusters::{Cluster, Run, clusters};
 use crate::obstacles::Obstacles;
+use crate::rows::{Turn, Vote, expected};
+use crate::seams::part_at_seam;
 use crate::silhouette::Silhouette;
 use crate::split::split;
-use crate::{Ground, PerceptionConfig, Rays, Target};
+use crate::{Ground, GroundBox, PerceptionConfig, Rays, Target};
 use rayon::prelude::*;
 
 /// Visible height from which on something is a target, metres.
 const MIN_VISIBLE_HEIGHT: f32 = 0.25;
+
+/// How often the boxes are fitted again by what those in their row say.
+const ROUNDS: usize = 2;
 
 /// A box and what it was made from.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,24 +70,54 @@ pub fn detect(
     let area = depth.len() as f32 / (640.0 * 192.0);
     let min_pixels = ((config.min_pixels * area) as usize).max(4);
     let mut left = clusters(depth, obstacles, rays, min_pixels, config);
-    let mut detections = Vec::new();
+    let mut candidates = Vec::new();
     // What is cut in two is looked at again.
     while !left.is_empty() {
-        let looked_at: Vec<Looked> = left
-            .par_iter()
+        let looked_at: Vec<Looked> = std::mem::take(&mut left)
+            .into_par_iter()
             .filter(|cluster| cluster.pixels >= min_pixels)
             .map(|cluster| look(cluster, depth, obstacles, rays, ground, config))
             .collect();
-        left.clear();
         for looked in looked_at {
             match looked {
                 Looked::Several(halves) => left.extend(halves),
-                Looked::Target(detection) => detections.push(detection),
+                Looked::Target(candidate) => candidates.push(*candidate),
                 Looked::Nothing => {}
             }
         }
     }
-    without_parts(detections)
+    without_parts(in_rows(candidates, config))
+}
+
+/// A cluster that may be a target.
+struct Candidate {
+    cluster: Cluster,
+    silhouette: Silhouette,
+    vote: Vote,
+}
+
+/// Their boxes, fitted again as those beside each say that it is turned.
+fn in_rows(candidates: Vec<Candidate>, config: &PerceptionConfig) -> Vec<Detection> {
+    let mut votes: Vec<Vote> = candidates.iter().map(|c| c.vote).collect();
+    for _ in 0..ROUNDS {
+        votes = candidates
+            .par_iter()
+            .enumerate()
+            .map(|(i, candidate)| {
+                fit(&candidate.silhouette, expected(&votes, i)).unwrap_or(candidate.vote)
+            })
+            .collect();
+    }
+    let told = candidates.into_iter().zip(votes);
+    told.filter(|(candidate, vote)| is_target(&candidate.silhouette, &vote.place, config))
+        .map(|(candidate, vote)| Detection {
+            place: vote.place,
+            pixels: candidate.cluster.pixels,
+            bounds: candidate.cluster.bounds(),
+            runs: candidate.cluster.runs,
+            confidence: 0.5 * (vote.place.seen[0] + vote.place.seen[1]),
+        })
+        .collect()
 }
 
 /// Drops what lies inside a larger detection: a roof's edge, a mirror, a number plate's frame.
@@ -100,32 +135,33 @@ fn without_parts(mut detections: Vec<Detection>) -> Vec<Detection> {
 /// What a cluster turned out to be.
 enum Looked {
     Several([Cluster; 2]),
-    Target(Detection),
+    Target(Box<Candidate>),
     Nothing,
 }
 
 fn look(
-    cluster: &Cluster,
+    cluster: Cluster,
     depth: &[f32],
     obstacles: &Obstacles,
     rays: &Rays,
     ground: &Ground,
     config: &PerceptionConfig,
 ) -> Looked {
-    let silhouette = Silhouette::of(cluster, depth, obstacles, rays, ground, config);
-    let Some(place) = fit(&silhouette, std::f32::consts::FRAC_PI_2) else {
+    let silhouette = Silhouette::of(&cluster, depth, obstacles, rays, ground, config);
+    if let Some(parts) = part_at_seam(&cluster, &silhouette, depth, rays, ground, config) {
+        return Looked::Several(parts);
+    }
+    let Some(vote) = fit(&silhouette, Turn::ahead()) else {
         return Looked::Nothing;
     };
-    if let Some(halves) = split(cluster, &silhouette, &place, depth, rays, ground) {
+    if let Some(halves) = split(&cluster, &silhouette, &vote.place, depth, rays, ground) {
         Looked::Several(halves)
-    } else if is_target(&silhouette, &place, config) {
-        Looked::Target(Detection {
-            place,
-            pixels: cluster.pixels,
-            bounds: cluster.bounds(),
-            runs: cluster.runs.clone(),
-            confidence: 0.5 * (place.seen[0] + place.seen[1]),
-        })
+    } else if is_target(&silhouette, &vote.place, config) {
+        Looked::Target(Box::new(Candidate {
+            cluster,
+            silhouette,
+            vote,
+        }))
     } else {
         Looked::Nothing
     }

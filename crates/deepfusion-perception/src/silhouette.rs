@@ -11,6 +11,12 @@ pub struct Silhouette {
     pub contour: Vec<[f32; 2]>,
     /// Of each of those columns the highest point's height, metres.
     pub tops: Vec<f32>,
+    /// Of each of those columns the lowest point's height, metres; 0 where the image ends below it.
+    pub feet: Vec<f32>,
+    /// Whether it goes on upwards there, beyond the highest target, up to a ceiling or out of the image.
+    pub rises: Vec<bool>,
+    /// Those columns in the image.
+    pub columns: Vec<u32>,
     /// A sample of all points, (right, forward, height) in metres.
     pub points: Vec<[f32; 3]>,
     /// Height of its top, metres.
@@ -24,6 +30,8 @@ pub struct Silhouette {
     pub hidden: [f32; 2],
 }
 
+/// A column whose lowest point is higher than this does not show its near end: something hides it, metres.
+pub const FOOT_M: f32 = 0.6;
 /// Points that are kept of a cluster, about.
 const POINTS: usize = 400;
 /// Of a column's depths, sorted, which share lies before its contour: single pixels do not decide.
@@ -75,12 +83,22 @@ impl Silhouette {
             }
             let u = left as usize + column;
             let top = obstacles.height[pixels[0].1 as usize * width + u];
-            above.look(u, pixels[0], depth, rays, ground, config);
+            let rises = above.look(u, pixels[0], depth, rays, ground, config);
+            let lowest = pixels[pixels.len() - 1].1 as usize;
+            // Below the image's last row it goes on.
+            let foot = if lowest + 1 == rays.y.len() {
+                0.0
+            } else {
+                obstacles.height[lowest * width + u]
+            };
             let nearest = pixels.len() / NEAR_SHARE;
             let (_, (z, v), _) = pixels.select_nth_unstable_by(nearest, |a, b| a.0.total_cmp(&b.0));
             let p = ground.locate(rays.point(u, *v as usize, *z));
             silhouette.contour.push([p[0], p[1]]);
             silhouette.tops.push(top);
+            silhouette.feet.push(foot);
+            silhouette.rises.push(rises);
+            silhouette.columns.push(u as u32);
         }
         silhouette.tall = above.is_tall();
         silhouette.top = silhouette.top.max(above.top());
@@ -103,7 +121,8 @@ struct Above {
 }
 
 impl Above {
-    /// Follows a column upwards from its topmost pixel (depth and row) as long as it stays at its distance.
+    /// Follows a column upwards from its topmost pixel (depth and row) as long as it stays at its distance: whether it
+    /// goes on to where no target ends.
     fn look(
         &mut self,
         u: usize,
@@ -112,29 +131,34 @@ impl Above {
         rays: &Rays,
         ground: &Ground,
         config: &PerceptionConfig,
-    ) {
+    ) -> bool {
         self.columns += 1;
         let width = rays.x.len();
         let mut row = v as usize;
         let mut height = ground.locate(rays.point(u, row, start))[2];
         // Three rows at most are skipped between the last joined pixel and the height of joining.
         if height + 3.0 * start * rays.step[1] < config.join_height_m {
-            return;
+            return false;
         }
+        let near = 0.5 + 0.03 * start;
+        let mut rises = true;
         while height <= config.max_target_height_m {
             let Some(next) = row.checked_sub(1) else {
                 self.tall += 1;
-                return;
+                return true;
             };
             let z = depth[next * width + u];
-            if z <= 0.0 || (z - start).abs() > 0.5 + 0.03 * start {
+            if z <= 0.0 || (z - start).abs() > near {
+                // A ceiling, or a pipe below it, is nearer; above a roof is what lies behind it.
+                rises = z > 0.0 && z < start;
                 break;
             }
             row = next;
             height = ground.locate(rays.point(u, row, z))[2];
         }
-        self.tall += usize::from(height > config.max_target_height_m);
+        self.tall += usize::from(rises);
         self.tops.push(height);
+        rises
     }
 
     fn is_tall(&self) -> bool {

@@ -1,9 +1,8 @@
 //! A row of parked cars seen at a grazing angle comes as one cluster: cut where one ends and the next begins.
 
-use crate::box_fit::GroundBox;
-use crate::clusters::{Cluster, Run};
+use crate::clusters::Cluster;
 use crate::silhouette::Silhouette;
-use crate::{Ground, Rays};
+use crate::{Ground, GroundBox, Rays};
 
 /// Longer than this, and as wide and high as a car, a cluster is taken for several, metres.
 const LONGEST: f32 = 5.7;
@@ -48,29 +47,7 @@ pub fn split(
     } else {
         return None;
     };
-    let along = |p: [f32; 3]| dot(axis, p);
-    let image_width = rays.x.len();
-    let mut halves = [Cluster::default(), Cluster::default()];
-    for run in &cluster.runs {
-        let side = |u: u32| {
-            let z = depth[run.v as usize * image_width + u as usize];
-            usize::from(along(ground.locate(rays.point(u as usize, run.v as usize, z))) > cut)
-        };
-        let mut from = run.from;
-        for u in run.from + 1..=run.to {
-            if u == run.to || side(u) != side(from) {
-                let half = &mut halves[side(from)];
-                half.pixels += (u - from) as usize;
-                half.runs.push(Run {
-                    v: run.v,
-                    from,
-                    to: u,
-                });
-                from = u;
-            }
-        }
-    }
-    halves.iter().all(|half| half.pixels > 0).then_some(halves)
+    cluster.divided(depth, rays, |p| dot(axis, ground.locate(p)) > cut)
 }
 
 /// Whether hardly any of it is as low as a car: a lorry, a wall.

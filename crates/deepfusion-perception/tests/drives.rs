@@ -34,3 +34,15 @@ fn targets_of_true_depth_are_where_the_simulator_put_them() {
     assert!(score.motion_accuracy.unwrap() >= 0.95, "{score:?}");
     assert!(score.identity_switches <= 6, "{score:?}");
 }
+
+/// Cars doors to doors along an aisle, behind pillars: less is found there than on a street (docs/BENCHMARKS.md), but no
+/// less than this.
+#[test]
+fn a_row_of_cars_in_a_garage_is_told_apart_more_often_than_not() {
+    let score = common::score(&[drive(Scene::Garage, 71), drive(Scene::Garage, 75)]);
+    assert!(score.labels > 300, "{score:?}");
+    assert!(score.recall.unwrap() >= 0.5, "{score:?}");
+    assert!(score.precision.unwrap() >= 0.65, "{score:?}");
+    assert!(score.center_error_m.unwrap() <= 0.5, "{score:?}");
+    assert!(score.yaw_error_deg.unwrap() <= 16.0, "{score:?}");
+}

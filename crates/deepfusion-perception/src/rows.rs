@@ -1,0 +1,148 @@
+//! Cars stand in rows: how one is turned says how its neighbours are, of which less is seen.
+
+use crate::GroundBox;
+
+/// How something is turned, up to half a turn, and how surely.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turn {
+    /// Cosine and sine of twice the angle (as [`crate::GroundBox::angle`]), times the weight.
+    doubled: [f32; 2],
+}
+
+/// What one that is turned otherwise than all expect costs, per unit of weight.
+const COST: f32 = 0.25;
+/// Most weight of a vote for the way of the road, of one against it, and of all together.
+const MOST: [f32; 3] = [0.5, 4.0, 6.0];
+/// How far a row goes on to both sides of one that stands in it, metres; what is near says more.
+const ROW_M: f32 = 15.0;
+/// How far beside a box's own length or width its row reaches, metres.
+const BESIDE_M: f32 = 0.3;
+
+impl Turn {
+    /// To an angle in radians, with a weight; one of 1 is that of the road.
+    pub fn new(angle: f32, weight: f32) -> Self {
+        let (sin, cos) = (2.0 * angle).sin_cos();
+        Self {
+            doubled: [weight * cos, weight * sin],
+        }
+    }
+
+    /// Along the road.
+    pub fn ahead() -> Self {
+        Self::new(std::f32::consts::FRAC_PI_2, 1.0)
+    }
+
+    /// The angle, in radians.
+    pub fn angle(self) -> f32 {
+        0.5 * self.doubled[1].atan2(self.doubled[0])
+    }
+
+    fn weight(self) -> f32 {
+        self.doubled[0].hypot(self.doubled[1])
+    }
+
+    /// What speaks against an angle.
+    pub fn against(self, angle: f32) -> f32 {
+        let (sin, cos) = (2.0 * angle).sin_cos();
+        COST * (self.weight() - self.doubled[0] * cos - self.doubled[1] * sin)
+    }
+
+    fn at_most(self, most: f32) -> Self {
+        let share = (most / self.weight().max(1e-6)).min(1.0);
+        Self {
+            doubled: self.doubled.map(|x| share * x),
+        }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            doubled: [0, 1].map(|i| self.doubled[i] + other.doubled[i]),
+        }
+    }
+}
+
+/// What one that is seen says about its neighbours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vote {
+    /// Middle of what is seen of it: right, forward, in metres.
+    pub at: [f32; 2],
+    /// Where it is taken to stand.
+    pub place: GroundBox,
+    /// How much worse it would be turned otherwise.
+    pub lean: f32,
+}
+
+impl Vote {
+    /// What it says of something that is seen at `at`, if that lies in its row: before, behind or beside it.
+    fn on(&self, at: [f32; 2]) -> Option<Turn> {
+        let (sin, cos) = self.place.angle.sin_cos();
+        let middle = self.place.middle;
+        let off = [at[0] - middle[0], at[1] - middle[1]];
+        let apart = [cos * off[0] + sin * off[1], cos * off[1] - sin * off[0]].map(f32::abs);
+        let inside = |i: usize| apart[i] < 0.5 * self.place.footprint[i] + BESIDE_M;
+        let farthest = apart[0].max(apart[1]);
+        // That something stands as all do says less than that it does not.
+        let as_all = Turn::ahead().against(self.place.angle) < COST;
+        let weight = self.lean.min(MOST[usize::from(!as_all)]) * (1.0 - farthest / ROW_M);
+        ((inside(0) || inside(1)) && weight > 0.0).then(|| Turn::new(self.place.angle, weight))
+    }
+}
+
+/// How the `index`-th is expected to be turned by what the others in its row say.
+pub fn expected(votes: &[Vote], index: usize) -> Turn {
+    let others = votes.iter().enumerate().filter(|(i, _)| *i != index);
+    others
+        .filter_map(|(_, vote)| vote.on(votes[index].at))
+        .fold(Turn::ahead(), Turn::plus)
+        .at_most(MOST[2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts::FRAC_PI_2;
+
+    /// A car that is seen whole, turned to `angle`.
+    fn vote(middle: [f32; 2], angle: f32, lean: f32) -> Vote {
+        Vote {
+            at: middle,
+            place: GroundBox {
+                middle,
+                angle,
+                footprint: [4.4, 1.8],
+                heights: [0.0, 1.5],
+                seen: [1.0; 2],
+                anchor: middle,
+            },
+            lean,
+        }
+    }
+
+    #[test]
+    fn a_row_tells_how_those_in_it_are_turned() {
+        let clear = vote([6.0, 10.0], 0.0, 3.0);
+        let beside = vote([5.0, 15.2], FRAC_PI_2, 0.0);
+        let in_the_lane = vote([0.5, 12.0], FRAC_PI_2, 0.0);
+        let votes = [clear, beside, in_the_lane];
+        assert!(expected(&votes, 1).angle().abs() < 0.1);
+        // Neither beside nor before it: as the road.
+        assert_eq!(expected(&votes, 2), Turn::ahead());
+    }
+
+    #[test]
+    fn one_that_stands_as_all_do_says_less_than_one_that_does_not() {
+        let votes = [
+            vote([6.0, 10.0], 0.0, 3.0),
+            vote([6.0, 13.0], 0.0, 0.0),
+            vote([6.0, 16.0], FRAC_PI_2, 3.0),
+        ];
+        assert!(expected(&votes, 1).angle().abs() < 0.2);
+    }
+
+    #[test]
+    fn what_is_against_an_angle_is_least_at_its_own() {
+        let turn = Turn::new(0.3, 2.0);
+        assert!(turn.against(0.3).abs() < 1e-6);
+        assert!((turn.against(0.3 + FRAC_PI_2) - 4.0 * COST).abs() < 1e-5);
+    }
+}
