@@ -47,7 +47,7 @@ impl Error {
     #[must_use]
     pub fn hint(&self) -> Option<String> {
         match self {
-            Self::File { .. } => None,
+            Self::File { .. } => Some("a model is a file that a training framework exported as ONNX".into()),
             Self::Runtime { source, .. } => source.hint(),
             Self::Shape { .. } => Some(
                 "known are exports of one picture (1x3xHxW, f32) with the outputs of YOLO-seg (v5, v8 and later, with or without NMS), of YOLO boxes, \

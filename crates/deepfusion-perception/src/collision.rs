@@ -134,6 +134,7 @@ mod tests {
             confidence: 1.0,
             pixels: 1,
             bounds: None,
+            class: None,
             detection: None,
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::box_fit::fit;
 use crate::clusters::{Cluster, Run, clusters};
+use crate::instances::{Instance, Kind};
 use crate::obstacles::Obstacles;
 use crate::rows::{Turn, Vote, expected};
 use crate::seams::part_at_seam;
@@ -29,6 +30,8 @@ pub struct Detection {
     pub runs: Vec<Run>,
     /// 0 to 1.
     pub confidence: f32,
+    /// What it is, where somebody knows.
+    pub kind: Option<Kind>,
 }
 
 impl Detection {
@@ -53,24 +56,36 @@ impl Detection {
             confidence: f64::from(self.confidence),
             pixels: self.pixels,
             bounds: Some(self.bounds),
+            class: self.kind.as_ref().map(|kind| kind.class.clone()),
             detection: Some(index),
         }
     }
 }
 
-/// Boxes of the obstacles of one depth image, row by row at `rays`' size, that have a target's size.
+/// Boxes of the obstacles of one depth image, row by row at `rays`' size, that have a target's size: first of the `instances`,
+/// of which somebody else knows the pixels, then of what is left.
 #[must_use]
 pub fn detect(
     depth: &[f32],
     obstacles: &Obstacles,
+    instances: &[Instance],
     rays: &Rays,
     ground: &Ground,
     config: &PerceptionConfig,
 ) -> Vec<Detection> {
     let area = depth.len() as f32 / (640.0 * 192.0);
     let min_pixels = ((config.min_pixels * area) as usize).max(4);
-    let mut left = clusters(depth, obstacles, rays, min_pixels, config);
-    let mut candidates = Vec::new();
+    let named = |instance: &Instance| {
+        let cluster = instance.cluster(depth, rays.x.len(), obstacles, config);
+        let enough = cluster.pixels >= min_pixels;
+        let known = Some(instance.kind());
+        enough.then(|| candidate(cluster, known, depth, obstacles, rays, ground, config))?
+    };
+    let mut candidates: Vec<Candidate> = instances.par_iter().filter_map(named).collect();
+    let taken: Vec<&Cluster> = candidates.iter().map(|c| &c.cluster).collect();
+    let unnamed = (!taken.is_empty()).then(|| obstacles.without(&taken, rays.x.len()));
+    let unnamed = unnamed.as_ref().unwrap_or(obstacles);
+    let mut left = clusters(depth, unnamed, rays, min_pixels, config);
     // What is cut in two is looked at again.
     while !left.is_empty() {
         let looked_at: Vec<Looked> = std::mem::take(&mut left)
@@ -91,6 +106,7 @@ pub fn detect(
 
 /// A cluster that may be a target.
 struct Candidate {
+    kind: Option<Kind>,
     cluster: Cluster,
     silhouette: Silhouette,
     vote: Vote,
@@ -115,14 +131,21 @@ fn in_rows(candidates: Vec<Candidate>, config: &PerceptionConfig) -> Vec<Detecti
             pixels: candidate.cluster.pixels,
             bounds: candidate.cluster.bounds(),
             runs: candidate.cluster.runs,
-            confidence: 0.5 * (vote.place.seen[0] + vote.place.seen[1]),
+            confidence: confidence(&vote.place, candidate.kind.as_ref()),
+            kind: candidate.kind,
         })
         .collect()
 }
 
-/// Drops what lies inside a larger detection: a roof's edge, a mirror, a number plate's frame.
+/// How much of a box is seen, and what a model says of it: independent witnesses.
+fn confidence(place: &GroundBox, kind: Option<&Kind>) -> f32 {
+    let seen = 0.5 * (place.seen[0] + place.seen[1]);
+    1.0 - (1.0 - seen) * (1.0 - kind.map_or(0.0, |kind| kind.score))
+}
+
+/// Drops what lies inside a larger detection (a roof's edge, a mirror, a number plate's frame), or in one that is known.
 fn without_parts(mut detections: Vec<Detection>) -> Vec<Detection> {
-    detections.sort_by_key(|d| std::cmp::Reverse(d.pixels));
+    detections.sort_by_key(|d| std::cmp::Reverse((d.kind.is_some(), d.pixels)));
     let mut kept: Vec<Detection> = Vec::with_capacity(detections.len());
     for detection in detections {
         if !kept.iter().any(|k| k.place.overlap(&detection.place) > 0.4) {
@@ -158,6 +181,7 @@ fn look(
         Looked::Several(halves)
     } else if is_target(&silhouette, &vote.place, config) {
         Looked::Target(Box::new(Candidate {
+            kind: None,
             cluster,
             silhouette,
             vote,
@@ -165,6 +189,26 @@ fn look(
     } else {
         Looked::Nothing
     }
+}
+
+/// A thing that is known to be one: it is not cut.
+fn candidate(
+    cluster: Cluster,
+    kind: Option<Kind>,
+    depth: &[f32],
+    obstacles: &Obstacles,
+    rays: &Rays,
+    ground: &Ground,
+    config: &PerceptionConfig,
+) -> Option<Candidate> {
+    let silhouette = Silhouette::of(&cluster, depth, obstacles, rays, ground, config);
+    let vote = fit(&silhouette, Turn::ahead())?;
+    is_target(&silhouette, &vote.place, config).then_some(Candidate {
+        kind,
+        cluster,
+        silhouette,
+        vote,
+    })
 }
 
 fn is_target(silhouette: &Silhouette, place: &GroundBox, config: &PerceptionConfig) -> bool {

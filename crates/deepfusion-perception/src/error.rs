@@ -23,6 +23,16 @@ pub enum Error {
         /// What it may be.
         expected: &'static str,
     },
+    /// Pixels of an instance that the depth image does not have.
+    #[error("instance `{class}`: row {}, columns {} to {} of a depth image of {}x{}", run[0], run[1], run[2], size.0, size.1)]
+    Instance {
+        /// What it is.
+        class: String,
+        /// Row, first column, and the column after the last.
+        run: [u32; 3],
+        /// Width and height of the depth image.
+        size: (usize, usize),
+    },
     /// The intrinsics are no camera's.
     #[error("camera: {0}")]
     Camera(String),
@@ -39,6 +49,7 @@ impl Error {
             Self::Size { .. } => Some(
                 "intrinsics belong to one image size: resize them with the image (Intrinsics::resized)".into(),
             ),
+            Self::Instance { .. } => Some("masks are taken in the depth image's size".into()),
             Self::Config { .. } => Some("leave it out for its default".into()),
             Self::Camera(_) => Some("fx, fy, cx, cy are in pixels of the image".into()),
         }

@@ -1,5 +1,6 @@
 //! Which pixels see something that stands on the ground.
 
+use crate::clusters::Cluster;
 use crate::{Ground, PerceptionConfig, Rays};
 
 /// Heights above the ground, pixel by pixel, where there is an obstacle.
@@ -14,6 +15,16 @@ pub struct Obstacles {
 pub const NONE: f32 = -1.0;
 
 impl Obstacles {
+    /// Without the pixels of these clusters.
+    pub(crate) fn without(&self, clusters: &[&Cluster], width: usize) -> Self {
+        let mut rest = self.clone();
+        for run in clusters.iter().flat_map(|cluster| &cluster.runs) {
+            let row = run.v as usize * width;
+            rest.height[row + run.from as usize..row + run.to as usize].fill(NONE);
+        }
+        rest
+    }
+
     /// Fills in the heights of a depth image, row by row.
     pub fn find(&mut self, depth: &[f32], rays: &Rays, ground: &Ground, config: &PerceptionConfig) {
         let width = rays.x.len();

@@ -1,7 +1,9 @@
 use crate::detect::detect;
 use crate::edges::without_flying_pixels;
 use crate::tracking::{Now, Tracker};
-use crate::{Detection, Error, Ground, Obstacles, PerceptionConfig, Rays, Result, Target};
+use crate::{
+    Detection, Error, Ground, Instance, Obstacles, PerceptionConfig, Rays, Result, Target,
+};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 
 /// When a frame was taken and from where.
@@ -77,6 +79,21 @@ impl Perception {
         k: &Intrinsics,
         stamp: Option<Stamp>,
     ) -> Result<Surroundings> {
+        self.look_with(depth, k, stamp, &[])
+    }
+
+    /// As [`Self::look`], with things whose pixels somebody else knows: each becomes a target of its own, of its class,
+    /// where its depth makes it one; all others are found by depth alone.
+    ///
+    /// # Errors
+    /// As [`Self::look`], and [`Error::Instance`] for pixels outside the depth image.
+    pub fn look_with(
+        &mut self,
+        depth: &DepthMap,
+        k: &Intrinsics,
+        stamp: Option<Stamp>,
+        instances: &[Instance],
+    ) -> Result<Surroundings> {
         if let Some(problem) = k.implausible() {
             return Err(Error::Camera(problem));
         }
@@ -86,6 +103,9 @@ impl Perception {
                 found: (depth.width, depth.height),
                 expected: size,
             });
+        }
+        for instance in instances {
+            instance.check(size)?;
         }
         if self.rays.as_ref().is_none_or(|(before, _)| before != k) {
             self.rays = Some((*k, Rays::of(k)));
@@ -109,7 +129,14 @@ impl Perception {
         };
         self.obstacles
             .find(&depth.data, rays, &ground, &self.config);
-        let detections = detect(&depth.data, &self.obstacles, rays, &ground, &self.config);
+        let detections = detect(
+            &depth.data,
+            &self.obstacles,
+            instances,
+            rays,
+            &ground,
+            &self.config,
+        );
         let mut targets = match stamp {
             Some(stamp) => self.tracker.step(
                 &detections,

@@ -285,6 +285,7 @@ mod tests {
             confidence: 1.0,
             pixels: 100,
             bounds: None,
+            class: None,
             detection: None,
         }
     }

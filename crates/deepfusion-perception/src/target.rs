@@ -22,6 +22,9 @@ pub struct Target {
     pub confidence: f64,
     /// How many pixels see it; 0 where the track goes on without being seen.
     pub pixels: usize,
+    /// What it is, where a model of instances says so: the class it was seen as most.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub class: Option<String>,
     /// Left, top, right, bottom of those pixels.
     pub bounds: Option<[u32; 4]>,
     /// Which of the image's detections it is.

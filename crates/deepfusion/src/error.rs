@@ -269,6 +269,7 @@ pub fn hint_of(problem: &anyhow::Error) -> Option<String> {
             deepfusion_compare::Error,
             deepfusion_data::Error,
             deepfusion_eval::Error,
+            deepfusion_instances::Error,
             deepfusion_eval::odometry::PoseFileError,
             deepfusion_eval::odometry::TrackError,
             deepfusion_train::Error,

@@ -12,13 +12,9 @@ use std::process::Command;
 
 use serde_json::Value;
 use streams::{brightness, piped, serve, stream, with_path};
-use support::{Run, in_folder};
+use support::{Run, run};
 
 const CAMERA: &str = "--intrinsics 186,186,157,44";
-
-fn run(folder: &Path, args: &str) -> Run {
-    in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
-}
 
 fn there_is_ffmpeg() -> bool {
     let answer = Command::new("ffmpeg").arg("-version").output();

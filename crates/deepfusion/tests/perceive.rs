@@ -5,7 +5,7 @@ mod support;
 use std::path::Path;
 
 use serde_json::Value;
-use support::{ok, run};
+use support::{fails, ok, run};
 
 const DRIVE: &str = "street/2026_01_01/2026_01_01_drive_0005_sync";
 
@@ -218,6 +218,65 @@ fn exact_depth_finds_the_simulators_boxes() {
     assert_eq!(std::fs::read_dir(at.join("pictures")).unwrap().count(), 14);
     let lidar = ok(at, "eval-targets --data street --depth lidar").stdout;
     assert!(lidar.contains("targets from lidar depth"), "{lidar}");
+}
+
+/// A model of the instances' crate's own tests.
+fn model(name: &str) -> String {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let path = crates.join(format!("deepfusion-instances/tests/fixtures/{name}.onnx"));
+    path.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_users_model_names_what_stands_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    street(at);
+    let with = |name: &str, more: &str| {
+        format!(
+            "perceive --model run {DRIVE} --out {name} --save overlay --json --instances {} {more}",
+            model(name)
+        )
+    };
+    fails(at, &with("missing", ""), &["missing.onnx"]);
+    let without = run(
+        at,
+        &format!("perceive --model run {DRIVE} --out x --classes car"),
+    );
+    assert!(
+        without.code == 2 && without.stderr.contains("--instances"),
+        "{}",
+        without.stderr
+    );
+    if deepfusion_onnx::runtime::find(None).is_err() {
+        eprintln!("no ONNX Runtime library on this machine: models are not run");
+        return;
+    }
+    fails(
+        at,
+        &with("no_detector", ""),
+        &["no_detector.onnx", "1x1x64x64"],
+    );
+    fails(
+        at,
+        &with("red_things", "--classes cat"),
+        &["no class `cat`"],
+    );
+    assert!(
+        !at.join("no_detector").exists(),
+        "nothing is begun with a model that is none"
+    );
+    let told = ok(at, &with("red_things", "--instance-score 0.5"));
+    for line in told.stdout.lines() {
+        let record: Value = serde_json::from_str(line).unwrap();
+        for target in record["targets"].as_array().unwrap() {
+            let class = &target["class"];
+            assert!(
+                class.is_null() || class == "left" || class == "right",
+                "{class}"
+            );
+        }
+    }
 }
 
 #[test]

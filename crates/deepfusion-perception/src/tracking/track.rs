@@ -1,6 +1,6 @@
 use super::kalman::Kalman;
 use super::measurement::Measurement;
-use crate::{PerceptionConfig, Target};
+use crate::{Kind, PerceptionConfig, Target};
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -13,6 +13,9 @@ const TOLD_MPS: f64 = 0.7;
 const GUESS: f64 = 0.05;
 /// Most weight that a size or a heading gathers, so that it stays able to change.
 const MOST_WEIGHT: f64 = 40.0;
+
+/// Most that a class can have behind it, in looks of score 1: so that it stays able to change.
+const MOST_VOTES: f32 = 5.0;
 
 /// A mean that remembers how much it is worth.
 #[derive(Debug, Clone, Copy)]
@@ -66,6 +69,8 @@ pub struct Track {
     moving: Option<bool>,
     /// Confidence of the last detection.
     confidence: f64,
+    /// What it was seen as most, and by how much.
+    kind: Option<Kind>,
     /// How it was seen in the last frame, if it was.
     pub seen: Option<Seen>,
 }
@@ -93,6 +98,7 @@ impl Track {
             unseen_s: 0.0,
             moving: None,
             confidence: f64::from(measurement.detection.confidence),
+            kind: measurement.detection.kind.clone(),
             seen: Some(Seen::of(measurement)),
         }
     }
@@ -164,7 +170,20 @@ impl Track {
         self.unseen_s = 0.0;
         self.confidence += 0.3 * (f64::from(measurement.detection.confidence) - self.confidence);
         self.seen = Some(Seen::of(measurement));
+        self.vote(measurement.detection.kind.as_ref());
         self.tell_motion();
+    }
+
+    /// One more look at what it is: the class with the most behind it stays.
+    fn vote(&mut self, seen: Option<&Kind>) {
+        let Some(seen) = seen else { return };
+        match &mut self.kind {
+            Some(kind) if kind.class == seen.class => {
+                kind.score = (kind.score + seen.score).min(MOST_VOTES);
+            }
+            Some(kind) if kind.score > seen.score => kind.score -= seen.score,
+            kind => *kind = Some(seen.clone()),
+        }
     }
 
     fn tell_motion(&mut self) {
@@ -231,6 +250,7 @@ impl Track {
             velocity_mps: velocity.map(Into::into),
             moving: self.moving,
             confidence: (self.confidence * proven * fading).clamp(0.0, 1.0),
+            class: self.kind.as_ref().map(|kind| kind.class.clone()),
             pixels: self.seen.map_or(0, |seen| seen.pixels),
             bounds: self.seen.map(|seen| seen.bounds),
             detection: self.seen.map(|seen| seen.detection),

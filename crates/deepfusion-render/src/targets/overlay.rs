@@ -10,8 +10,8 @@ use crate::text::{TextSize, draw_text, text_width};
 /// Nearest depth at which an edge is still drawn, metres.
 const NEAR_M: f64 = 0.3;
 
-/// The image with the targets' boxes, farthest first: the face they move with is crossed, and above each stands its number,
-/// distance and, where it moves, speed.
+/// The image with the targets' boxes, farthest first: the face they move with is crossed, and above each stands its class
+/// (where that is known), number, distance and, where it moves, speed.
 #[must_use]
 pub fn box_overlay(image: &RgbImage, k: &Intrinsics, targets: &[Target]) -> RgbImage {
     let mut picture = image.clone();
@@ -69,6 +69,9 @@ fn draw_label(picture: &mut RgbImage, k: &Intrinsics, target: &Target) {
         return;
     };
     let mut text = format!("{} {:.1}m", target.id, target.distance_m);
+    if let Some(class) = &target.class {
+        text = format!("{class} {text}");
+    }
     if let (Some(true), Some(v)) = (target.moving, target.velocity_mps) {
         let speed = v.iter().map(|x| x * x).sum::<f64>().sqrt();
         text += &format!(" {speed:.1}m/s");

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 
 use super::live::HEADING;
 use super::values::{not_negative, positive};
-use super::{Outputs, PredictionArgs, Save};
+use super::{InstanceArgs, Outputs, PredictionArgs, Save};
 
 /// `deepfusion perceive`.
 #[derive(Debug, Args)]
@@ -33,6 +33,9 @@ pub struct PerceiveArgs {
     /// Settings of the perception (TOML); what is not in it keeps its default.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// Masks of a user's model.
+    #[command(flatten)]
+    pub masks: InstanceArgs,
     /// How fast the camera's vehicle drives straight on, m/s; 0 for a camera that stands. Targets are then followed.
     #[arg(long, value_name = "M/S", help_heading = HEADING, value_parser = not_negative)]
     pub speed: Option<f64>,

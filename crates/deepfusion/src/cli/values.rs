@@ -131,6 +131,14 @@ pub fn scaling(text: &str) -> Result<Scaling, String> {
     }
 }
 
+/// A number from 0 to 1.
+pub fn share(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|n: &f64| (0.0..=1.0).contains(n))
+        .ok_or_else(|| "expected a number from 0 to 1".into())
+}
+
 /// A number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     text.parse()

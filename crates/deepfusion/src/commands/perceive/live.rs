@@ -5,28 +5,20 @@ use std::time::Instant;
 use anyhow::Result;
 use deepfusion_data::{Address, LiveFrame};
 use deepfusion_geometry::Se3;
-use deepfusion_perception::{Perception, PerceptionConfig, Stamp};
-use deepfusion_train::Predictor;
+use deepfusion_perception::Stamp;
 use nalgebra::Vector3;
 
-use super::{Begun, Found, Work};
+use super::Work;
+use super::eyes::{Begun, Eyes, Found};
 use crate::commands::live::{self, Feed, LiveMark};
-use crate::commands::scene::{Motion, ScaleWatch};
+use crate::commands::scene::Motion;
 use crate::output;
 use crate::progress::say;
 
 impl Work<'_> {
     /// Looks at a live source until it ends.
-    pub(super) fn go_live(
-        self,
-        address: &Address,
-        predictor: &Predictor,
-        config: PerceptionConfig,
-    ) -> Result<()> {
-        let mut perception = Perception::new(config);
+    pub(super) fn go_live(self, address: &Address, mut eyes: Eyes) -> Result<()> {
         let mut way = StraightWay::new(self.args.speed);
-        // Nothing to watch: a speed that is told once for all says nothing of the metres.
-        let mut watch = ScaleWatch::of(&self.args.prediction);
         let mut feed = Feed::open(address, &self.args.prediction.live)?;
         let look = |frame: LiveFrame| {
             let input = live::input(address, &frame);
@@ -39,7 +31,7 @@ impl Work<'_> {
                 start,
             };
             let motion = way.at(start);
-            let mut found = self.look(begun, motion, predictor, &mut perception, &mut watch)?;
+            let mut found = eyes.look(begun, motion)?;
             let latency_ms = found.record.latency_ms;
             found.loaded.live = Some(LiveMark { latency_ms, ..mark });
             found.record.arrived_unix_s = Some(mark.arrived_unix_s);
@@ -71,7 +63,8 @@ impl Work<'_> {
     }
 }
 
-/// The way of a camera that looks straight ahead from a vehicle that drives straight on.
+/// The way of a camera that looks straight ahead from a vehicle that drives straight on. The scale is not watched: a speed
+/// that is told once for all says nothing of the metres.
 struct StraightWay {
     speed_mps: Option<f64>,
     first: Option<Instant>,

@@ -1,5 +1,7 @@
 //! `deepfusion perceive`: images to 3D targets, followed over time.
 
+mod eyes;
+mod instances;
 mod live;
 pub(super) mod pictures;
 mod record;
@@ -9,40 +11,19 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use deepfusion_perception::{
-    ConfidenceModel, Perception, PerceptionConfig, VehicleShape, time_to_collision,
-};
-use deepfusion_train::{Predictor, PreparedImage, RunFolder};
+use deepfusion_perception::PerceptionConfig;
 
-use self::pictures::Picture;
-use self::record::{FrameRecord, Lines};
-use super::confidence::Confidence;
+use self::eyes::{Begun, Eyes, Found};
+use self::record::Lines;
 use super::live as sources;
+use super::predict::Job;
 use super::predict::inputs::{self, Input};
-use super::predict::{Job, Loaded, Seen};
-use super::scene::{Motion, MotionTracker, ScaleWatch, working_depth};
-use crate::cli::{PerceiveArgs, PerceiveSave, PredictionArgs};
+use super::scene::MotionTracker;
+use crate::cli::{PerceiveArgs, PredictionArgs};
 use crate::error::{CliError, hint_of, told};
 use crate::pipeline::{self, Threads};
 use crate::progress::say;
 use crate::{engine, interrupt, output};
-
-/// A frame that is loaded, and when that began.
-struct Begun {
-    input: Input,
-    loaded: Loaded,
-    prepared: PreparedImage,
-    start: Instant,
-}
-
-/// A frame with all that was found in it.
-struct Found {
-    input: Input,
-    loaded: Loaded,
-    seen: Seen,
-    record: FrameRecord,
-    pictures: Vec<(PerceiveSave, Picture)>,
-}
 
 /// `deepfusion perceive`.
 pub fn run(args: &PerceiveArgs) -> Result<()> {
@@ -64,6 +45,7 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
         args.outputs(f64::from(config.max_depth_m)),
         &predictor,
     )?;
+    let eyes = Eyes::open(args, &predictor, config)?;
     std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
     if source.is_some() {
         sources::make_room(out, prediction.overwrite)?;
@@ -74,14 +56,12 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
         args,
         job: &job,
         all: &all,
-        confidence: Confidence::read(RunFolder::open(&prediction.model)?.0.path())?
-            .map(|c| c.single),
         lines: Mutex::new(Lines::begin(&out.join("targets.jsonl"))?),
         outcome: Mutex::new(Outcome::default()),
     };
     match source {
-        Some(address) => work.go_live(&address, &predictor, config),
-        None => work.go(&predictor, config),
+        Some(address) => work.go_live(&address, eyes),
+        None => work.go(eyes),
     }
 }
 
@@ -130,17 +110,13 @@ struct Work<'a> {
     args: &'a PerceiveArgs,
     job: &'a Job<'a>,
     all: &'a [Input],
-    /// What a pixel's depth is worth, where the run was calibrated.
-    confidence: Option<ConfidenceModel>,
     lines: Mutex<Lines>,
     outcome: Mutex<Outcome>,
 }
 
 impl Work<'_> {
-    fn go(self, predictor: &Predictor, config: PerceptionConfig) -> Result<()> {
-        let mut perception = Perception::new(config);
+    fn go(self, mut eyes: Eyes) -> Result<()> {
         let mut motions = MotionTracker::default();
-        let mut watch = ScaleWatch::of(&self.args.prediction);
         let load = |index: usize| {
             let start = Instant::now();
             let input = self.all[index].clone();
@@ -159,7 +135,7 @@ impl Work<'_> {
         };
         let look = |begun: Begun| {
             let motion = motions.next(&begun.input);
-            self.look(begun, motion, predictor, &mut perception, &mut watch)
+            eyes.look(begun, motion)
         };
         let write = |_: usize, found: Result<Found>| {
             if let Err(error) = found.and_then(|found| self.write(&found)) {
@@ -179,63 +155,6 @@ impl Work<'_> {
     fn outcome(&self) -> std::sync::MutexGuard<'_, Outcome> {
         // A thread that panicked ends the program with its own message.
         self.outcome.lock().unwrap_or_else(|e| e.into_inner())
-    }
-
-    fn look(
-        &self,
-        begun: Begun,
-        motion: Motion,
-        predictor: &Predictor,
-        perception: &mut Perception,
-        watch: &mut ScaleWatch,
-    ) -> Result<Found> {
-        let Begun {
-            input,
-            loaded,
-            prepared,
-            start,
-        } = begun;
-        let mut prediction = predictor.infer(&prepared)?;
-        if let Some(factor) = watch.correction() {
-            prediction.scale_depth(factor);
-        }
-        let camera = loaded.camera.ok_or(CliError::NoCamera)?;
-        if !motion.goes_on {
-            perception.forget();
-        }
-        let (depth, k) = working_depth(&prediction.depth(), &camera);
-        let surroundings = perception.look(&depth, &k, motion.stamp)?;
-        let collision = motion.speed_mps.and_then(|speed| {
-            let vehicle = VehicleShape::default();
-            time_to_collision(&surroundings.targets, speed, motion.yaw_rate, &vehicle)
-        });
-        let latency_ms = start.elapsed().as_secs_f64() * 1e3;
-        // The targets need not wait for it.
-        let ground = surroundings.ground.as_ref();
-        let record = FrameRecord {
-            scale_monitor: watch.add(&input.name, &loaded.image, &camera, &motion, ground),
-            ..FrameRecord::new(&input.name, &surroundings, &motion, collision, latency_ms)
-        };
-        let pictures = pictures::draw(
-            &self.args.save,
-            &loaded.image,
-            &camera,
-            (&depth, &k),
-            &surroundings,
-            perception,
-            self.confidence.as_ref().map(|model| (model, &prediction)),
-        );
-        Ok(Found {
-            input,
-            loaded,
-            seen: Seen {
-                prediction,
-                layers: Vec::new(),
-                scale: record.scale_monitor,
-            },
-            record,
-            pictures,
-        })
     }
 
     fn write(&self, found: &Found) -> Result<()> {

@@ -1,0 +1,174 @@
+//! Masks of somebody's model beside depth: what touches is told apart, and keeps its class.
+
+use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use deepfusion_perception::{Error, Instance, Perception, PerceptionConfig, Run, Stamp, Target};
+use nalgebra::Vector3;
+
+const SIZE: (usize, usize) = (640, 192);
+const HEIGHT_M: f64 = 1.65;
+
+fn camera() -> Intrinsics {
+    Intrinsics::from_numbers([370.0, 370.0, 319.5, 80.0], (SIZE.0 as u32, SIZE.1 as u32))
+}
+
+/// A box: from left, front to right, back on a level ground, and so high, metres.
+type Block = ([f64; 2], [f64; 2], f64);
+
+/// Two cars doors to doors, fronts in one line: a single wall to the depth.
+const CARS: [Block; 2] = [
+    ([-2.6, 10.0], [-0.8, 14.2], 1.5),
+    ([-0.8, 10.0], [1.0, 14.2], 1.5),
+];
+
+/// Depth of each pixel, and which block it sees.
+fn scene(blocks: &[Block]) -> (DepthMap, Vec<Option<usize>>) {
+    let k = camera();
+    let (width, height) = SIZE;
+    let seen = |i: usize| {
+        let ray = k.inverse_matrix() * Vector3::new((i % width) as f64, (i / width) as f64, 1.0);
+        let ground = (ray.y > 1e-6)
+            .then(|| HEIGHT_M / ray.y)
+            .filter(|z| *z < 80.0);
+        let hit = |(n, (low, high, tall)): (usize, &Block)| {
+            // Entering and leaving between the planes of each axis.
+            let slab = |from: f64, to: f64, along: f64| {
+                let (a, b) = (from / along, to / along);
+                (a.min(b), a.max(b))
+            };
+            let x = slab(low[0], high[0], ray.x);
+            let y = slab(HEIGHT_M - tall, HEIGHT_M, ray.y);
+            let enter = x.0.max(y.0).max(low[1]);
+            (enter <= x.1.min(y.1).min(high[1])).then_some((enter, Some(n)))
+        };
+        let blocks = blocks.iter().enumerate().filter_map(hit);
+        let all = blocks.chain(ground.map(|z| (z, None)));
+        all.min_by(|a, b| a.0.total_cmp(&b.0))
+            .unwrap_or((0.0, None))
+    };
+    let pixels: Vec<(f64, Option<usize>)> = (0..width * height).map(seen).collect();
+    let depth = DepthMap {
+        width,
+        height,
+        data: pixels.iter().map(|(z, _)| *z as f32).collect(),
+    };
+    (depth, pixels.into_iter().map(|(_, block)| block).collect())
+}
+
+/// The pixels that see a block, as a model would draw them.
+fn mask(of: &[Option<usize>], block: usize, class: &str) -> Instance {
+    let mut runs: Vec<Run> = Vec::new();
+    for (i, seen) in of.iter().enumerate() {
+        let (v, u) = ((i / SIZE.0) as u32, (i % SIZE.0) as u32);
+        if *seen != Some(block) {
+            continue;
+        }
+        match runs.last_mut() {
+            Some(run) if run.v == v && run.to == u => run.to = u + 1,
+            _ => runs.push(Run {
+                v,
+                from: u,
+                to: u + 1,
+            }),
+        }
+    }
+    Instance {
+        class: class.into(),
+        score: 0.8,
+        runs,
+        drawn: true,
+    }
+}
+
+fn near(targets: &[Target], x: f64) -> Option<&Target> {
+    targets.iter().find(|t| (t.center_m[0] - x).abs() < 0.3)
+}
+
+#[test]
+fn what_touches_is_told_apart_by_its_masks() {
+    let (depth, seen) = scene(&CARS);
+    let mut perception = Perception::new(PerceptionConfig::default());
+    let masks = [mask(&seen, 0, "car"), mask(&seen, 1, "van")];
+    let found = perception
+        .look_with(&depth, &camera(), None, &masks)
+        .unwrap()
+        .targets;
+    assert_eq!(found.len(), 2, "{found:#?}");
+    for (x, class) in [(-1.7, "car"), (0.1, "van")] {
+        let target = near(&found, x).unwrap();
+        assert_eq!(target.class.as_deref(), Some(class));
+        assert!((target.size_m[1] - 1.8).abs() < 0.15, "{target:?}");
+        assert!(target.confidence > 0.8);
+    }
+    // Of one alone, the other is still found by its depth, and nobody says what it is.
+    let found = perception
+        .look_with(&depth, &camera(), None, &masks[..1])
+        .unwrap()
+        .targets;
+    assert_eq!(found.len(), 2);
+    assert_eq!(near(&found, 0.1).unwrap().class, None);
+    assert_eq!(near(&found, -1.7).unwrap().class.as_deref(), Some("car"));
+    // A mask of the road makes no target of it.
+    let mut road = mask(&seen, 0, "car");
+    road.runs = (170..190)
+        .map(|v| Run {
+            v,
+            from: 100,
+            to: 500,
+        })
+        .collect();
+    let found = perception
+        .look_with(&depth, &camera(), None, &[road])
+        .unwrap()
+        .targets;
+    assert!(found.iter().all(|t| t.class.is_none()), "{found:?}");
+}
+
+#[test]
+fn a_track_keeps_the_class_it_was_seen_as_most() {
+    let (depth, seen) = scene(&CARS[..1]);
+    let mut perception = Perception::new(PerceptionConfig::default());
+    let classes = [
+        Some("car"),
+        Some("car"),
+        None,
+        Some("van"),
+        Some("car"),
+        None,
+    ];
+    let mut last = Vec::new();
+    for (i, class) in classes.into_iter().enumerate() {
+        let stamp = Stamp {
+            time_s: 0.1 * i as f64,
+            world_from_cam: Se3::identity(),
+        };
+        let masks: Vec<Instance> = class
+            .map(|class| mask(&seen, 0, class))
+            .into_iter()
+            .collect();
+        let found = perception
+            .look_with(&depth, &camera(), Some(stamp), &masks)
+            .unwrap();
+        last = found.targets;
+    }
+    assert_eq!(last.len(), 1);
+    assert_eq!(last[0].class.as_deref(), Some("car"));
+}
+
+#[test]
+fn masks_of_another_size_are_refused() {
+    let (depth, seen) = scene(&CARS);
+    let mut wrong = mask(&seen, 0, "car");
+    wrong.runs.push(Run {
+        v: 192,
+        from: 0,
+        to: 3,
+    });
+    let mut perception = Perception::new(PerceptionConfig::default());
+    let error = perception
+        .look_with(&depth, &camera(), None, &[wrong])
+        .unwrap_err();
+    assert!(
+        matches!(error, Error::Instance { .. }) && error.hint().is_some(),
+        "{error}"
+    );
+}
