@@ -116,6 +116,8 @@ pub(crate) fn road_camera_height(dataset: &Dataset) -> Result<Option<(f64, usize
             earlier: grey_image(&earlier, WIDTH, height),
             later: grey_image(&later, WIDTH, height),
             intrinsics: k.resized(WIDTH, height),
+            // Pairs stand alone here: no acceleration is known.
+            seconds: f64::NAN,
             earlier_from_later,
             down_in_cam,
         })

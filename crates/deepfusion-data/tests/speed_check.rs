@@ -65,6 +65,7 @@ fn pairs(factor: f64) -> Vec<GroundPair> {
         earlier: render(0.5 * i as f64),
         later: render(0.5 * (i + 1) as f64),
         intrinsics: camera(),
+        seconds: 0.1,
         earlier_from_later: Se3::from_axis_angle(
             Vector3::zeros(),
             Vector3::new(0.0, 0.0, 0.5 * factor),

@@ -21,6 +21,16 @@ const MIN_PAIRS: usize = 4;
 /// steeply down as the bottom row's.
 const COLUMNS: (f64, f64) = (0.2, 0.8);
 const STEEPNESS: f64 = 0.35;
+/// The far scene, which a camera's way hardly moves: columns in the middle, and rows about the horizon, as the share of
+/// depth that rays there go down or up.
+const FAR_COLUMNS: (f64, f64) = (0.3, 0.7);
+const FAR_SLOPE: f64 = 0.06;
+/// Pitch between two frames that is looked for, to both sides, and in what steps, radians: a speed and a yaw rate do not
+/// tell it, and a tenth of a degree moves the road as much as a change of its height.
+const PITCH: f64 = 0.0105;
+const PITCH_STEP: f64 = 0.0007;
+/// Of so many of the road's pixels one is looked at.
+const THIN: usize = 2;
 /// Half the window whose mean is taken off, so that shade and exposure do not count, in pixels.
 const HIGH_PASS: usize = 4;
 /// Largest difference of one pixel that counts, in grey levels of 255: cars and kerbs are not the plane.
@@ -46,6 +56,8 @@ pub struct GroundPair {
     pub later: GreyImage,
     /// Of these small images.
     pub intrinsics: Intrinsics,
+    /// Time between them, seconds; NaN where it is not known.
+    pub seconds: f64,
     /// A point of the later camera in the earlier one; its translation is what is tested.
     pub earlier_from_later: Se3,
     /// The direction to the ground in the camera's frame, of length 1.
@@ -79,12 +91,89 @@ impl GroundPair {
     /// where the road is not in view or has no texture.
     #[must_use]
     pub fn costs(&self, heights: &[f64]) -> Option<Vec<f64>> {
+        self.look(heights, 0.0).0
+    }
+
+    /// As [`Self::costs`], for a camera that was pitched by `tilt` (radians, nose up) from its mount in the earlier frame,
+    /// and how much more it is in the later one.
+    pub(crate) fn look(&self, heights: &[f64], tilt: f64) -> (Option<Vec<f64>>, f64) {
         let (earlier, later) = (self.earlier.high_pass(), self.later.high_pass());
+        let pitch = self.pitch(&earlier, &later);
+        let pitched = self.pitched(tilt, pitch);
+        (pitched.road_costs(&earlier, &later, heights), pitch)
+    }
+
+    /// Rotation of the camera's nose upwards.
+    fn nose_up(&self, angle: f64) -> Se3 {
+        let side = self.down_in_cam.cross(&Vector3::z());
+        Se3::from_axis_angle(side * angle, Vector3::zeros())
+    }
+
+    /// The motion and the direction to the ground as a pitched camera has them: what the vehicle tells is without.
+    fn pitched(&self, tilt: f64, pitch: f64) -> Pitched<'_> {
+        let motion = &self.earlier_from_later;
+        let rotation = self.nose_up(pitch).rotation() * motion.rotation();
+        let way = self.nose_up(-tilt).rotate(&motion.translation());
+        Pitched {
+            intrinsics: &self.intrinsics,
+            motion: Se3::from_parts(&rotation, way),
+            down: self.nose_up(-tilt - pitch).rotate(&self.down_in_cam),
+        }
+    }
+
+    /// The pitch between the frames that carries the far scene best from one image to the other, radians, nose up.
+    fn pitch(&self, earlier: &GreyImage, later: &GreyImage) -> f64 {
+        let k_inverse = self.intrinsics.inverse_matrix();
+        let (width, height) = (later.width, later.height);
+        let columns = [FAR_COLUMNS.0, FAR_COLUMNS.1].map(|share| (width as f64 * share) as usize);
+        let far: Vec<(usize, Vector3<f64>)> = (0..height)
+            .flat_map(|y| (columns[0]..columns[1]).map(move |x| (x, y)))
+            .map(|(x, y)| {
+                let ray = k_inverse * Vector3::new(x as f64, y as f64, 1.0);
+                (y * width + x, ray)
+            })
+            .filter(|(_, ray)| self.down_in_cam.dot(ray).abs() < FAR_SLOPE)
+            .collect();
+        if far.is_empty() {
+            return 0.0;
+        }
+        let steps = (2.0 * PITCH / PITCH_STEP).round() as usize;
+        let angle = |step: f64| step * PITCH_STEP - PITCH;
+        let cost = |step: usize| {
+            let rotation = self.nose_up(angle(step as f64)).rotation();
+            let infinity = self.intrinsics.matrix() * rotation * self.earlier_from_later.rotation();
+            let difference = |(i, ray): &(usize, Vector3<f64>)| {
+                let q = infinity * ray;
+                let seen = earlier.sample(q.x / q.z, q.y / q.z);
+                f64::from((seen - later.data[*i]).abs()).min(CLIP)
+            };
+            far.iter().map(difference).sum::<f64>()
+        };
+        let costs: Vec<f64> = (0..=steps).into_par_iter().map(cost).collect();
+        least(&costs).map_or(0.0, angle)
+    }
+}
+
+/// A camera on its way, and where the ground is in it.
+struct Pitched<'a> {
+    intrinsics: &'a Intrinsics,
+    motion: Se3,
+    down: Vector3<f64>,
+}
+
+impl Pitched<'_> {
+    /// See [`GroundPair::costs`].
+    fn road_costs(
+        &self,
+        earlier: &GreyImage,
+        later: &GreyImage,
+        heights: &[f64],
+    ) -> Option<Vec<f64>> {
         let k_inverse = self.intrinsics.inverse_matrix();
         let (width, height) = (later.width, later.height);
         let steepness = |x: usize, y: usize| {
             let ray = k_inverse * Vector3::new(x as f64, y as f64, 1.0);
-            self.down_in_cam.dot(&ray)
+            self.down.dot(&ray)
         };
         let bottom = steepness(width / 2, height.checked_sub(1)?);
         if bottom < 0.05 {
@@ -93,6 +182,7 @@ impl GroundPair {
         let columns = (width as f64 * COLUMNS.0) as usize..(width as f64 * COLUMNS.1) as usize;
         let road: Vec<(usize, usize)> = (0..height)
             .flat_map(|y| columns.clone().map(move |x| (x, y)))
+            .filter(|(x, y)| (x + y) % THIN == 0)
             .filter(|(x, y)| steepness(*x, *y) >= STEEPNESS * bottom)
             .collect();
         let cost = |h: &f64| {
@@ -115,10 +205,25 @@ impl GroundPair {
 
     /// Pixels of the later image to pixels of the earlier, for points on the plane at height `h`.
     fn homography(&self, h: f64, k_inverse: &Matrix3<f64>) -> Matrix3<f64> {
-        let motion = &self.earlier_from_later;
-        let plane = motion.rotation() + motion.translation() * self.down_in_cam.transpose() / h;
+        let plane = self.motion.rotation() + self.motion.translation() * self.down.transpose() / h;
         self.intrinsics.matrix() * plane * k_inverse
     }
+}
+
+/// Place of the least of some costs, between the steps by a parabola; `None` where it is the first or the last.
+pub(crate) fn least(costs: &[f64]) -> Option<f64> {
+    let least = (0..costs.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
+    if least == 0 || least + 1 == costs.len() {
+        return None;
+    }
+    let (a, b, c) = (costs[least - 1], costs[least], costs[least + 1]);
+    let bend = a - 2.0 * b + c;
+    let shift = if bend > 0.0 {
+        0.5 * (a - c) / bend
+    } else {
+        0.0
+    };
+    Some(least as f64 + shift.clamp(-0.5, 0.5))
 }
 
 impl GreyImage {

@@ -5,7 +5,7 @@
 //! speed goes wrong (other tyres, another unit). The network's depth takes no part, so that a street on which it errs is no
 //! alarm; beside it stands how high the network's own road lies below the camera: their ratio is the depth's scale.
 
-use crate::road_height::{CONCLUSIVE, GroundPair};
+use crate::road_height::{CONCLUSIVE, GroundPair, least};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -21,6 +21,8 @@ pub struct ScaleMonitorConfig {
     pub min_distance_m: f64,
     /// Smallest change that is an alarm, as a share.
     pub min_change: f64,
+    /// How far the vehicle's nose rises while it speeds up, radians to 1 m/s²; cars' do by 1.5 to 3 degrees to 1 g.
+    pub pitch_per_acceleration: f64,
     /// The camera's height over the road in metres, where it was measured: nothing has to be learned then.
     pub height_m: Option<f64>,
 }
@@ -31,7 +33,8 @@ impl Default for ScaleMonitorConfig {
             learn_pairs: 90,
             window_pairs: 60,
             min_distance_m: 0.25,
-            min_change: 0.05,
+            min_change: 0.04,
+            pitch_per_acceleration: 0.0035,
             height_m: None,
         }
     }
@@ -65,10 +68,12 @@ pub struct ScaleReading {
     pub state: ScaleState,
 }
 
-/// Heights over the guess that are tried: 35 % to both sides in steps of 1 %.
+/// Heights over the guess that are tried: 35 % to both sides in steps of 2 %.
 const REACH: f64 = 0.35;
 /// See [`REACH`].
-const STEP: f64 = 0.01;
+const STEP: f64 = 0.02;
+/// Share of the camera's fast pitch that is kept from one pair to the next.
+const TILT_KEPT: f64 = 0.9;
 /// Pairs whose costs make one estimate: single pairs say little.
 const BLOCK: usize = 10;
 /// Heights tried first, metres: those of anything that drives, in steps of 6 %.
@@ -93,6 +98,10 @@ pub struct ScaleMonitor {
     /// ln of the height of the network's road, the latest last.
     depth_heights: VecDeque<f64>,
     drifting: bool,
+    /// How the camera is pitched from its mount, radians, nose up.
+    tilt: f64,
+    /// Speed over each of the latest pairs, m/s, and their seconds.
+    speeds: VecDeque<(f64, f64)>,
 }
 
 impl ScaleMonitor {
@@ -108,6 +117,8 @@ impl ScaleMonitor {
             learned: Vec::new(),
             depth_heights: VecDeque::new(),
             drifting: false,
+            tilt: 0.0,
+            speeds: VecDeque::new(),
         }
     }
 
@@ -136,13 +147,41 @@ impl ScaleMonitor {
         self.reading()
     }
 
+    /// A pair's costs. A camera pitches as the vehicle brakes and the road waves, which neither speed nor yaw rate tell,
+    /// and a tenth of a degree counts: what is fast is seen in the far scene from frame to frame, summed up and forgotten
+    /// before it drifts away; what is slow goes with the acceleration.
+    fn costs(&mut self, pair: &GroundPair, heights: &[f64]) -> Option<Vec<f64>> {
+        let tilt = self.tilt + self.config.pitch_per_acceleration * self.acceleration(pair);
+        let (costs, pitch) = pair.look(heights, tilt);
+        self.tilt = TILT_KEPT * (self.tilt + pitch);
+        costs
+    }
+
+    /// The vehicle's acceleration over the latest pairs, m/s².
+    fn acceleration(&mut self, pair: &GroundPair) -> f64 {
+        let speed = pair.earlier_from_later.translation().norm() / pair.seconds;
+        if !speed.is_finite() {
+            return 0.0;
+        }
+        self.speeds.push_back((speed, pair.seconds));
+        if self.speeds.len() > BLOCK {
+            self.speeds.pop_front();
+        }
+        let seconds: f64 = self.speeds.iter().skip(1).map(|(_, s)| s).sum();
+        match self.speeds.front() {
+            Some((before, _)) if seconds > 0.0 => (speed - before) / seconds,
+            _ => 0.0,
+        }
+    }
+
     /// Before anything is known: a coarse sweep over all heights that can be.
     fn look_around(&mut self, pair: &GroundPair) {
         let count = ((FIRST_M.1 / FIRST_M.0).ln() / 0.06).ceil() as usize;
         let heights: Vec<f64> = (0..=count)
             .map(|i| FIRST_M.0 * (0.06 * i as f64).exp())
             .collect();
-        self.first.extend(pair.costs(&heights));
+        let costs = self.costs(pair, &heights);
+        self.first.extend(costs);
         if self.first.len() >= BLOCK {
             // Where the images say nothing it is tried again.
             self.guess_m = best(&self.first).map(|place| FIRST_M.0 * (0.06 * place).exp());
@@ -155,7 +194,8 @@ impl ScaleMonitor {
         let heights: Vec<f64> = (0..=count)
             .map(|i| guess * (STEP * i as f64 - REACH).exp())
             .collect();
-        self.block.extend(pair.costs(&heights));
+        let costs = self.costs(pair, &heights);
+        self.block.extend(costs);
         if self.block.len() < BLOCK {
             return;
         }
@@ -221,21 +261,10 @@ fn best(costs: &[Vec<f64>]) -> Option<f64> {
     let pooled: Vec<f64> = (0..count)
         .map(|i| costs.iter().map(|c| c[i]).sum::<f64>())
         .collect();
-    let least = (0..count).min_by(|a, b| pooled[*a].total_cmp(&pooled[*b]))?;
-    let mut sorted = pooled.clone();
+    let place = least(&pooled)?;
+    let mut sorted = pooled;
     sorted.sort_by(f64::total_cmp);
-    let conclusive = pooled[least] <= CONCLUSIVE * sorted[sorted.len() / 2];
-    if !conclusive || least == 0 || least + 1 == count {
-        return None;
-    }
-    let (a, b, c) = (pooled[least - 1], pooled[least], pooled[least + 1]);
-    let bend = a - 2.0 * b + c;
-    let shift = if bend > 0.0 {
-        0.5 * (a - c) / bend
-    } else {
-        0.0
-    };
-    Some(least as f64 + shift.clamp(-0.5, 0.5))
+    (sorted[0] <= CONCLUSIVE * sorted[count / 2]).then_some(place)
 }
 
 /// Mean and standard error of independent values; the middle half of them, so that a car ahead in one block does not count.

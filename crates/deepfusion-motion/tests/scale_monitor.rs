@@ -1,5 +1,6 @@
 //! The monitor on simulated drives whose images are zoomed on the way.
 
+use deepfusion_geometry::Se3;
 use deepfusion_motion::{
     GreyImage, GroundPair, ScaleMonitor, ScaleMonitorConfig, ScaleReading, ScaleState,
 };
@@ -77,12 +78,14 @@ fn readings(drive: &Drive, zoom: f64, speed: f64, config: ScaleMonitorConfig) ->
         .map(|i| {
             let at = |frame| drive.simulation.world_from_cam(frame);
             let motion = at(i - 1).inverse() * at(i);
+            let motion = planar(&motion);
             let factor = if i < FRAMES[0] { 1.0 } else { speed };
             let pair = GroundPair {
                 earlier: images[i - 1].clone(),
                 later: images[i].clone(),
                 intrinsics: drive.simulation.intrinsics(),
-                earlier_from_later: deepfusion_geometry::Se3::from_parts(
+                seconds: 0.1,
+                earlier_from_later: Se3::from_parts(
                     &motion.rotation(),
                     motion.translation() * factor,
                 ),
@@ -91,6 +94,13 @@ fn readings(drive: &Drive, zoom: f64, speed: f64, config: ScaleMonitorConfig) ->
             monitor.add(&pair, None)
         })
         .collect()
+}
+
+/// What a vehicle's speed and yaw rate tell of a motion: neither its pitch nor its heave.
+fn planar(motion: &Se3) -> Se3 {
+    let turn = Vector3::new(0.0, motion.axis_angle().y, 0.0);
+    let way = motion.translation();
+    Se3::from_axis_angle(turn, Vector3::new(way.x, 0.0, way.z))
 }
 
 fn alarms(readings: &[ScaleReading]) -> usize {
@@ -102,7 +112,7 @@ fn alarms(readings: &[ScaleReading]) -> usize {
 
 #[test]
 fn clean_drives_are_silent_and_a_zoom_is_noticed() {
-    for seed in [81, 82] {
+    for seed in [81, 82, 88, 89] {
         let drive = drive(seed);
         let clean = readings(&drive, 1.0, 1.0, ScaleMonitorConfig::default());
         assert_eq!(alarms(&clean), 0, "{seed}");
@@ -165,6 +175,7 @@ fn the_network_s_metres_stand_beside_the_vehicle_s() {
             earlier: drive.images[i - 1].clone(),
             later: drive.images[i].clone(),
             intrinsics: drive.simulation.intrinsics(),
+            seconds: 0.1,
             earlier_from_later: at(i - 1).inverse() * at(i),
             down_in_cam: Vector3::y(),
         };
@@ -195,6 +206,7 @@ fn images_without_a_road_and_a_standing_car_give_no_reading() {
                 earlier: flat.clone(),
                 later: flat.clone(),
                 intrinsics: simulation.intrinsics(),
+                seconds: 0.1,
                 earlier_from_later: deepfusion_geometry::Se3::from_axis_angle(
                     Vector3::zeros(),
                     Vector3::new(0.0, 0.0, way),

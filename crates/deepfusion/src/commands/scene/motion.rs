@@ -18,6 +18,8 @@ pub struct Motion {
     pub speed_mps: Option<f64>,
     /// rad/s, positive to the left.
     pub yaw_rate: f64,
+    /// Time since the last frame, seconds, where this frame goes on from it.
+    pub seconds: Option<f64>,
     /// The camera in the last frame's camera, where this frame goes on from it.
     pub last_from_this: Option<Se3>,
     /// Whether the frame goes on from the last one, so that what was followed there still means something.
@@ -69,6 +71,7 @@ impl MotionTracker {
             // The camera's y points down: a turn to the left is a negative one about it.
             yaw_rate: step.map_or(0.0, |(_, motion, dt)| -motion.axis_angle().y / dt),
             last_from_this: step.map(|(_, motion, _)| motion),
+            seconds: step.map(|(.., dt)| dt),
             goes_on: step.is_some(),
             down_in_cam: dataset
                 .cam_from_vehicle()

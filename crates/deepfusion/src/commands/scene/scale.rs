@@ -98,6 +98,7 @@ impl ScaleWatch {
             earlier: earlier?,
             later,
             intrinsics: camera.resized(width, height),
+            seconds: motion.seconds?,
             earlier_from_later: motion.last_from_this?,
             down_in_cam: motion.down_in_cam.or_else(seen)?,
         };
