@@ -7,7 +7,7 @@ use deepfusion_onnx::runtime::find;
 use image::{Rgb, RgbImage};
 
 fn fixture(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("tests/fixtures/{name}.onnx"))
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("tests/reference/{name}.onnx"))
 }
 
 /// Without a library nothing can be run; the shapes and masks are tested without one.

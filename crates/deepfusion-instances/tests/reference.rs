@@ -1,4 +1,4 @@
-//! Against what detectors' own programs make of the same numbers (tests/fixtures/generate.py).
+//! Against what detectors' own programs make of the same numbers (tests/reference/generate.py).
 
 use deepfusion_instances::{
     Colours, Kind, Layout, Letterbox, Prototypes, decode, in_size, suppress,
@@ -13,7 +13,7 @@ struct Fixture(NpzReader<std::fs::File>);
 
 impl Fixture {
     fn open() -> Self {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/reference.npz");
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/reference.npz");
         Self(NpzReader::new(std::fs::File::open(path).unwrap()).unwrap())
     }
 

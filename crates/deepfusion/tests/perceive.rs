@@ -223,7 +223,7 @@ fn exact_depth_finds_the_simulators_boxes() {
 /// A model of the instances' crate's own tests.
 fn model(name: &str) -> String {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let path = crates.join(format!("deepfusion-instances/tests/fixtures/{name}.onnx"));
+    let path = crates.join(format!("deepfusion-instances/tests/reference/{name}.onnx"));
     path.to_str().unwrap().to_owned()
 }
 
