@@ -7,6 +7,7 @@
 mod box_fit;
 mod clusters;
 mod collision;
+mod columns;
 mod confidence;
 mod config;
 mod detect;
