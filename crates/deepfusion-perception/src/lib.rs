@@ -4,6 +4,7 @@
 //! Camera: x right, y down, z forward; depth is camera z in metres, 0 = none. On the ground: right, forward,
 //! height. Metres, seconds, radians.
 
+mod angle;
 mod box_fit;
 mod clusters;
 mod collision;
@@ -17,6 +18,7 @@ mod free_space;
 mod ground;
 mod ground_box;
 mod instances;
+mod lanes;
 mod obstacles;
 mod perception;
 mod rays;
