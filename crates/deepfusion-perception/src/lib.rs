@@ -11,6 +11,7 @@ mod collision;
 mod columns;
 mod confidence;
 mod config;
+mod consensus;
 mod detect;
 mod edges;
 mod error;
