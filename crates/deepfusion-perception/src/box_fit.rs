@@ -1,5 +1,6 @@
 //! An upright box around what is seen of an object, completed to what it must be.
 
+use crate::angle::{FACE, best_angle};
 use crate::ground_box::{GroundBox, axes};
 use crate::rows::{Turn, Vote};
 use crate::silhouette::{FOOT_M, Silhouette};
@@ -10,8 +11,6 @@ const CAR: [f32; 2] = [4.4, 1.8];
 const SHORTEST: [f32; 2] = [3.2, 1.45];
 /// Up to this extent in metres something is taken for a person or a thing of that size, even where a part is hidden.
 const SMALL: f32 = 1.0;
-/// How near a point of the contour lies to a face that it belongs to, metres.
-const FACE: f32 = 0.25;
 /// Extent from which on a side that is seen says how long it is, metres.
 const MEASURED: f32 = 0.6;
 /// Less than this of something, in metres, says nothing about the rest.
@@ -69,49 +68,6 @@ pub fn fit(silhouette: &Silhouette, expected: Turn) -> Option<Vote> {
 /// An angle in [0, π).
 fn half_turn(angle: f32) -> f32 {
     angle.rem_euclid(std::f32::consts::PI)
-}
-
-/// The angle at which most of the contour lies on the two faces that look at the camera (after the closeness
-/// criterion of Zhang et al., "Efficient L-shape fitting for vehicle detection using laser scanners", 2017).
-fn best_angle(contour: &[[f32; 2]], along: f32) -> f32 {
-    const COARSE: usize = 30;
-    let step = std::f32::consts::FRAC_PI_2 / COARSE as f32;
-    let score = |angle: f32| {
-        // Four times an angle is the same for all of a box's sides.
-        let prior = 0.03 * (4.0 * (angle - along)).cos();
-        closeness(contour, axes(angle)) / contour.len().max(1) as f32 + prior
-    };
-    let best_of = |angles: &mut dyn Iterator<Item = f32>| {
-        angles
-            .map(|angle| (score(angle), angle))
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .map_or(along, |(_, angle)| angle)
-    };
-    // Counted from the expected angle, which thus is among those that are tried.
-    let coarse = best_of(&mut (0..COARSE).map(|i| along + i as f32 * step));
-    best_of(&mut (-4..=4).map(|i| coarse + i as f32 * step / 5.0))
-}
-
-fn closeness(contour: &[[f32; 2]], axes: [[f32; 2]; 2]) -> f32 {
-    let near = axes.map(|axis| {
-        let along = contour.iter().map(|p| p[0] * axis[0] + p[1] * axis[1]);
-        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-        for x in along {
-            low = low.min(x);
-            high = high.max(x);
-        }
-        // The camera is at 0.
-        if low + high >= 0.0 { low } else { high }
-    });
-    contour
-        .iter()
-        .map(|p| {
-            let off = |i: usize| (p[0] * axes[i][0] + p[1] * axes[i][1] - near[i]).abs();
-            let off = off(0).min(off(1)) / FACE;
-            // Falls off slowly: a bumper is round.
-            1.0 / (1.0 + off * off)
-        })
-        .sum()
 }
 
 /// From where to where the points reach along an axis, less the outermost ones.

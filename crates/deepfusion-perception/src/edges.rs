@@ -1,6 +1,10 @@
 //! Pixels between a near and a far surface: a network draws them halfway, where nothing is.
 
 use deepfusion_geometry::DepthMap;
+use rayon::prelude::*;
+
+/// Fewest rows that are worth another core.
+const ROWS: usize = 16;
 
 /// Tells which pixels of a depth image (row by row) hang between two surfaces.
 ///
@@ -9,33 +13,8 @@ use deepfusion_geometry::DepthMap;
 /// faster.
 #[must_use]
 pub fn flying_pixels(depth: &[f32], width: usize, radius: usize, jump: f32) -> Vec<bool> {
-    let height = depth.len().checked_div(width).unwrap_or(0);
     let mut flying = vec![false; depth.len()];
-    let radius = radius.max(1);
-    let between = |a: f32, z: f32, b: f32| {
-        let least = 0.3 + jump * z;
-        let (up, down) = (b - z, z - a);
-        (a > 0.0) & (b > 0.0) & (up.abs() > least) & (down.abs() > least) & (up * down > 0.0)
-    };
-    for v in 0..height {
-        let row = &depth[v * width..(v + 1) * width];
-        for u in 0..width {
-            let z = row[u];
-            if z <= 0.0 {
-                continue;
-            }
-            let across =
-                u >= radius && u + radius < width && between(row[u - radius], z, row[u + radius]);
-            let down = v >= radius
-                && v + radius < height
-                && between(
-                    depth[(v - radius) * width + u],
-                    z,
-                    depth[(v + radius) * width + u],
-                );
-            flying[v * width + u] = across || down;
-        }
-    }
+    mark(depth, width, radius, jump, &mut flying, true);
     flying
 }
 
@@ -43,12 +22,59 @@ pub fn flying_pixels(depth: &[f32], width: usize, radius: usize, jump: f32) -> V
 #[must_use]
 pub fn without_flying_pixels(depth: &DepthMap, radius: f32, jump: f32) -> DepthMap {
     let radius = (radius * depth.width as f32 / 640.0).round() as usize;
-    let flying = flying_pixels(&depth.data, depth.width, radius, jump);
-    let keep = |(z, flies): (&f32, bool)| if flies { 0.0 } else { *z };
-    DepthMap {
-        width: depth.width,
-        height: depth.height,
-        data: depth.data.iter().zip(flying).map(keep).collect(),
+    let mut clean = depth.clone();
+    mark(&depth.data, depth.width, radius, jump, &mut clean.data, 0.0);
+    clean
+}
+
+/// Sets `marks`, one of each pixel, to `flying` where a pixel flies.
+fn mark<T: Copy + Send + Sync>(
+    depth: &[f32],
+    width: usize,
+    radius: usize,
+    jump: f32,
+    marks: &mut [T],
+    flying: T,
+) {
+    // Farther than the image is wide and high nothing lies.
+    let radius = radius.clamp(1, depth.len().max(1));
+    let rows = marks.par_chunks_exact_mut(width.max(1));
+    rows.with_min_len(ROWS).enumerate().for_each(|(v, marks)| {
+        let row = |v: usize| depth.get(v * width..(v + 1) * width);
+        let Some(here) = row(v) else { return };
+        if width > 2 * radius {
+            let marks = &mut marks[radius..];
+            mark_between(
+                here,
+                &here[radius..],
+                &here[2 * radius..],
+                jump,
+                marks,
+                flying,
+            );
+        }
+        if let (Some(above), Some(below)) = (v.checked_sub(radius).and_then(row), row(v + radius)) {
+            mark_between(above, here, below, jump, marks, flying);
+        }
+    });
+}
+
+/// Sets `marks` to `flying` where the second of three depths hangs between the other two.
+fn mark_between<T: Copy>(
+    ones: &[f32],
+    depths: &[f32],
+    others: &[f32],
+    jump: f32,
+    marks: &mut [T],
+    flying: T,
+) {
+    let sides = ones.iter().zip(others);
+    for (((a, b), z), mark) in sides.zip(depths).zip(marks) {
+        let least = 0.3 + jump * z;
+        let (up, down) = (b - z, z - a);
+        let known = (*a > 0.0) & (*z > 0.0) & (*b > 0.0);
+        let flies = known & (up.abs() > least) & (down.abs() > least) & (up * down > 0.0);
+        *mark = if flies { flying } else { *mark };
     }
 }
 

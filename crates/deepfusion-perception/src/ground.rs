@@ -1,12 +1,11 @@
 //! The ground: a plane by consensus, then how the road rises and falls along the way.
 
+use crate::consensus::consensus;
 use crate::{PerceptionConfig, Rays};
 use nalgebra::{Matrix3, Vector3};
 
 /// Samples for the plane, at most about this many.
 const SAMPLES: usize = 1_600;
-/// Hypotheses that are drawn.
-const HYPOTHESES: usize = 160;
 /// How far from the plane a point may lie, as a share of its distance plus a constant: slopes and the
 /// disparity's error both grow with distance.
 const TOLERANCE: (f32, f32) = (0.08, 0.006);
@@ -84,7 +83,8 @@ impl Ground {
         Some(ground)
     }
 
-    fn is_plausible(&self, config: &PerceptionConfig) -> bool {
+    /// Whether a vehicle could stand on it.
+    pub(crate) fn is_plausible(&self, config: &PerceptionConfig) -> bool {
         let [low, high] = config.camera_height_m;
         -self.up[1] >= config.max_tilt_deg.to_radians().cos()
             && (low..=high).contains(&self.camera_height_m)
@@ -94,7 +94,8 @@ impl Ground {
     #[must_use]
     pub fn profile_at(&self, forward_m: f32) -> f32 {
         let place = (forward_m / PIECE_M - 0.5).clamp(0.0, PIECES as f32 - 1.0);
-        let index = (place as usize).min(PIECES - 2);
+        // By way of 32 bits, of which a machine converts many at a time.
+        let index = (place as u32 as usize).min(PIECES - 2);
         let share = place - index as f32;
         self.profile[index] + share * (self.profile[index + 1] - self.profile[index])
     }
@@ -158,10 +159,10 @@ impl Ground {
 
 /// A pixel's ray and disparity.
 #[derive(Debug, Clone, Copy)]
-struct Sample {
-    ray: [f32; 2],
-    disparity: f32,
-    depth: f32,
+pub(crate) struct Sample {
+    pub ray: [f32; 2],
+    pub disparity: f32,
+    pub depth: f32,
     /// What the disparity gains from row to row, per unit of the ray's y: on a level surface 1 over the camera's
     /// height above it, on an upright one 0.
     gain: f32,
@@ -223,15 +224,20 @@ impl Sample {
         let on_plane = plane.x * self.ray[0] + plane.y * self.ray[1] + plane.z;
         let above = (self.disparity - on_plane) * self.depth * height;
         // A point above the plane is nearer than the plane: its disparity is larger.
-        (above, TOLERANCE.0 + TOLERANCE.1 * self.depth)
+        (above, self.tolerance())
+    }
+
+    /// How far above or below the plane it may lie, metres.
+    pub fn tolerance(&self) -> f32 {
+        TOLERANCE.0 + TOLERANCE.1 * self.depth
     }
 }
 
 /// A plane as (a, b, c) with 1/z = a·x + b·y + c over the rays (x, y, 1).
-type DisparityPlane = Vector3<f32>;
+pub(crate) type DisparityPlane = Vector3<f32>;
 
 /// Normal (up) and height of the camera above a plane.
-fn plane_of(plane: &DisparityPlane) -> Option<([f32; 3], f32)> {
+pub(crate) fn plane_of(plane: &DisparityPlane) -> Option<([f32; 3], f32)> {
     let norm = plane.norm();
     // plane·p = 1 on the plane, and the camera (p = 0) is above it: up = −plane / |plane|.
     (norm > 1e-3 && norm.is_finite()).then(|| {
@@ -240,58 +246,6 @@ fn plane_of(plane: &DisparityPlane) -> Option<([f32; 3], f32)> {
             1.0 / norm,
         )
     })
-}
-
-fn consensus(
-    samples: &[Sample],
-    level: &[Sample],
-    before: Option<&Ground>,
-    config: &PerceptionConfig,
-) -> Option<DisparityPlane> {
-    if level.len() < 30 {
-        return None;
-    }
-    let mut best: Option<(f32, DisparityPlane)> = None;
-    let mut consider = |plane: DisparityPlane| {
-        let plausible = plane_of(&plane)
-            .is_some_and(|(up, height)| Ground::plane(up, height).is_plausible(config));
-        if plausible {
-            let score = score(samples, level, &plane);
-            if best.is_none_or(|(highest, _)| score > highest) {
-                best = Some((score, plane));
-            }
-        }
-    };
-    if let Some(ground) = before {
-        let scale = -1.0 / ground.camera_height_m;
-        consider(Vector3::from(ground.up) * scale);
-    }
-    let mut random = Random(0x2545_F491_4F6C_DD1D);
-    for _ in 0..HYPOTHESES {
-        let three = [0; 3].map(|_| level[random.below(level.len())]);
-        let rays = Matrix3::from_fn(|i, j| if j < 2 { three[i].ray[j] } else { 1.0 });
-        let disparities = Vector3::from_fn(|i, _| three[i].disparity);
-        if let Some(inverse) = rays.try_inverse() {
-            consider(inverse * disparities);
-        }
-    }
-    let (score, plane) = best?;
-    (score > 0.1 * level.len() as f32).then_some(plane)
-}
-
-/// Level points on the plane count for it, all points below it against it: nothing is below the ground.
-fn score(samples: &[Sample], level: &[Sample], plane: &DisparityPlane) -> f32 {
-    let height = 1.0 / plane.norm();
-    let on = |sample: &Sample| {
-        let (above, tolerance) = sample.residual(plane, height);
-        let x = above / tolerance;
-        (1.0 - x * x).max(0.0)
-    };
-    let below = |sample: &Sample| {
-        let (above, tolerance) = sample.residual(plane, height);
-        f32::from(above < -2.5 * tolerance)
-    };
-    level.iter().map(on).sum::<f32>() - 0.5 * samples.iter().map(below).sum::<f32>()
 }
 
 /// Weighted least squares on the points near the plane, a few times (Tukey's weights), ever nearer: the road is to
@@ -337,18 +291,6 @@ fn support(samples: &[Sample], plane: &DisparityPlane) -> f32 {
         }
     }
     on / all.max(1.0)
-}
-
-/// xorshift64*: the same numbers every time, so that a frame always gives the same ground.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        ((self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33) as usize) % limit
-    }
 }
 
 pub(crate) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {

@@ -4,11 +4,14 @@
 //! Camera: x right, y down, z forward; depth is camera z in metres, 0 = none. On the ground: right, forward,
 //! height. Metres, seconds, radians.
 
+mod angle;
 mod box_fit;
 mod clusters;
 mod collision;
+mod columns;
 mod confidence;
 mod config;
+mod consensus;
 mod detect;
 mod edges;
 mod error;
@@ -16,6 +19,7 @@ mod free_space;
 mod ground;
 mod ground_box;
 mod instances;
+mod lanes;
 mod obstacles;
 mod perception;
 mod rays;

@@ -2,6 +2,7 @@
 
 use crate::clusters::Cluster;
 use crate::{Ground, PerceptionConfig, Rays};
+use rayon::prelude::*;
 
 /// Heights above the ground, pixel by pixel, where there is an obstacle.
 #[derive(Debug, Clone, Default)]
@@ -10,6 +11,9 @@ pub struct Obstacles {
     /// away, is ground, or hangs too high.
     pub height: Vec<f32>,
 }
+
+/// Fewest rows that are worth another core.
+const ROWS: usize = 16;
 
 /// Not an obstacle.
 pub const NONE: f32 = -1.0;
@@ -32,11 +36,12 @@ impl Obstacles {
         self.height.resize(depth.len(), NONE);
         // Per column, what the ray's x adds to the distance along `up` and `forward` at depth 1.
         let up_x: Vec<f32> = rays.x.iter().map(|x| ground.up[0] * x).collect();
-        for (v, (row, heights)) in depth
-            .chunks_exact(width)
-            .zip(self.height.chunks_exact_mut(width))
-            .enumerate()
-        {
+        let rows = depth.par_chunks_exact(width);
+        let rows = rows.zip(self.height.par_chunks_exact_mut(width));
+        let rows = rows.with_min_len(ROWS).enumerate();
+        rows.for_each(|(v, (row, heights))| {
+            // Its own, so that the compiler sees that writing heights changes none of it and takes many at a time.
+            let (ground, config) = (ground.clone(), config.clone());
             let up_y = ground.up[1] * rays.y[v] + ground.up[2];
             let forward_y = ground.forward[1] * rays.y[v] + ground.forward[2];
             for ((z, height), up_x) in row.iter().zip(heights).zip(&up_x) {
@@ -51,6 +56,6 @@ impl Obstacles {
                     & (above < config.join_height_m);
                 *height = if is { above } else { NONE };
             }
-        }
+        });
     }
 }

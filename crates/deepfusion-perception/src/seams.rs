@@ -2,6 +2,7 @@
 //! a border between what rises to the ceiling and what does not.
 
 use crate::clusters::{Cluster, Gaps};
+use crate::lanes::Points;
 use crate::silhouette::{FOOT_M, Silhouette};
 use crate::{Ground, PerceptionConfig, Rays};
 
@@ -23,24 +24,18 @@ pub fn part_at_seam(
     config: &PerceptionConfig,
 ) -> Option<[Cluster; 2]> {
     let seam = clearest(silhouette, rays, config)?;
-    let [left, right] = [
-        &silhouette.contour[..=seam],
-        &silhouette.contour[seam + 1..],
-    ];
+    let (left, right) = silhouette.contour.split_at(seam + 1);
+    let [left, right] = [left, right].map(some_of);
     cluster.divided(depth, rays, |p| {
         let [x, forward, _] = ground.locate(p);
-        from_contour(right, [x, forward]) < from_contour(left, [x, forward])
+        right.nearest([x, forward]) < left.nearest([x, forward])
     })
 }
 
-/// Squared distance of a place on the ground from the nearest of some points of a part of a contour, metres.
-fn from_contour(part: &[[f32; 2]], at: [f32; 2]) -> f32 {
+/// About as many points of a part of a contour as say where it is; the last is among them.
+fn some_of(part: &[[f32; 2]]) -> Points {
     let stride = part.len().div_ceil(POINTS);
-    part.iter()
-        .step_by(stride)
-        .chain(part.last())
-        .map(|p| (p[0] - at[0]).powi(2) + (p[1] - at[1]).powi(2))
-        .fold(f32::INFINITY, f32::min)
+    Points::new(part.iter().step_by(stride).chain(part.last()).copied())
 }
 
 /// The place in the contour after which the widest seam is.

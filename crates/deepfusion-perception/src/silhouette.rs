@@ -1,6 +1,7 @@
 //! What a cluster looks like from above, and which of its ends are its own.
 
 use crate::clusters::Cluster;
+use crate::columns::Columns;
 use crate::obstacles::Obstacles;
 use crate::{Ground, PerceptionConfig, Rays};
 
@@ -49,39 +50,13 @@ impl Silhouette {
         config: &PerceptionConfig,
     ) -> Self {
         let width = rays.x.len();
-        let [left, _, right, _] = cluster.bounds();
-        let mut columns: Vec<Vec<(f32, u32)>> = vec![Vec::new(); (right - left + 1) as usize];
         let mut silhouette = Self {
-            bottom: f32::INFINITY,
+            points: sampled(cluster, depth, rays, ground),
             ..Self::default()
         };
-        let stride = (cluster.pixels / POINTS).max(1);
-        let mut place = 0;
-        let mut heights = Vec::with_capacity(cluster.pixels);
-        for run in &cluster.runs {
-            for u in run.from..run.to {
-                let index = run.v as usize * width + u as usize;
-                columns[(u - left) as usize].push((depth[index], run.v));
-                heights.push(obstacles.height[index]);
-                // Scattered: an even stride would meet the same columns in every row.
-                if scatter(place).is_multiple_of(stride) {
-                    let p = rays.point(u as usize, run.v as usize, depth[index]);
-                    silhouette.points.push(ground.locate(p));
-                }
-                place += 1;
-            }
-        }
-        // The topmost and lowest pixels may be strays.
-        heights.sort_unstable_by(f32::total_cmp);
-        let stray = heights.len() / 100;
-        silhouette.top = heights[heights.len() - 1 - stray];
-        silhouette.bottom = heights[stray];
+        [silhouette.bottom, silhouette.top] = reach(cluster, obstacles, width);
         let mut above = Above::default();
-        for (column, pixels) in columns.iter_mut().enumerate() {
-            if pixels.is_empty() {
-                continue;
-            }
-            let u = left as usize + column;
+        Columns::of(cluster, depth, width).for_each(|u, pixels| {
             let top = obstacles.height[pixels[0].1 as usize * width + u];
             let rises = above.look(u, pixels[0], depth, rays, ground, config);
             let lowest = pixels[pixels.len() - 1].1 as usize;
@@ -99,17 +74,62 @@ impl Silhouette {
             silhouette.feet.push(foot);
             silhouette.rises.push(rises);
             silhouette.columns.push(u as u32);
-        }
+        });
         silhouette.tall = above.is_tall();
         silhouette.top = silhouette.top.max(above.top());
-        silhouette.hidden = hidden_ends(cluster, depth, width, left, right);
+        silhouette.hidden = hidden_ends(cluster, depth, width);
         silhouette
     }
 }
 
+/// Where about [`POINTS`] of a cluster's pixels lie: (right, forward, height) in metres.
+fn sampled(cluster: &Cluster, depth: &[f32], rays: &Rays, ground: &Ground) -> Vec<[f32; 3]> {
+    let width = rays.x.len();
+    let stride = Stride::new((cluster.pixels / POINTS).max(1) as u32);
+    let pixels = cluster.runs.iter().flat_map(|run| {
+        let v = run.v as usize;
+        (run.from as usize..run.to as usize).map(move |u| (u, v))
+    });
+    let mut points = Vec::with_capacity(2 * POINTS);
+    for (place, (u, v)) in pixels.enumerate() {
+        // Scattered: an even stride would meet the same columns in every row.
+        if stride.divides(scatter(place)) {
+            points.push(ground.locate(rays.point(u, v, depth[v * width + u])));
+        }
+    }
+    points
+}
+
 /// A number that looks like chance, the same for the same place.
-fn scatter(place: usize) -> usize {
-    ((place as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as usize
+fn scatter(place: usize) -> u32 {
+    ((place as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as u32
+}
+
+/// Asks for every pixel whether a number is a multiple of the same one, without a division (Lemire et al., "Faster
+/// remainder by direct computation", 2019).
+struct Stride(u64);
+
+impl Stride {
+    fn new(stride: u32) -> Self {
+        Self((u64::MAX / u64::from(stride)).wrapping_add(1))
+    }
+
+    fn divides(&self, number: u32) -> bool {
+        u64::from(number).wrapping_mul(self.0) <= self.0.wrapping_sub(1)
+    }
+}
+
+/// Height of a cluster's lowest and of its highest pixel.
+fn reach(cluster: &Cluster, obstacles: &Obstacles, width: usize) -> [f32; 2] {
+    let mut heights = Vec::with_capacity(cluster.pixels);
+    for run in &cluster.runs {
+        let row = &obstacles.height[run.v as usize * width..];
+        heights.extend_from_slice(&row[run.from as usize..run.to as usize]);
+    }
+    // The topmost and lowest pixels may be strays.
+    let stray = heights.len() / 100;
+    let last = heights.len() - 1 - stray;
+    [stray, last].map(|place| *heights.select_nth_unstable_by(place, f32::total_cmp).1)
 }
 
 /// What goes on above a cluster, past the height up to which pixels are joined.
@@ -179,7 +199,8 @@ impl Above {
 }
 
 /// An end is hidden where most of the outermost runs end at something nearer, or at the border.
-fn hidden_ends(cluster: &Cluster, depth: &[f32], width: usize, left: u32, right: u32) -> [f32; 2] {
+fn hidden_ends(cluster: &Cluster, depth: &[f32], width: usize) -> [f32; 2] {
+    let [left, _, right, _] = cluster.bounds();
     let reach = ((right - left) / 6).max(1);
     let mut steps: [Vec<f32>; 2] = [Vec::new(), Vec::new()];
     for run in &cluster.runs {

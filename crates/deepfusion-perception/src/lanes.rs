@@ -1,0 +1,88 @@
+//! Points on the ground, as many at a time as a machine takes in one step.
+
+/// How many that is.
+pub const LANES: usize = 8;
+
+/// Points in lanes, of which the last are filled up with the last point.
+pub struct Points {
+    /// Right and forward of each, metres.
+    pub blocks: Vec<[[f32; LANES]; 2]>,
+    /// How many there are.
+    pub count: usize,
+}
+
+impl Points {
+    /// These.
+    pub fn new(points: impl IntoIterator<Item = [f32; 2]>) -> Self {
+        let mut blocks: Vec<[[f32; LANES]; 2]> = Vec::new();
+        let mut count = 0;
+        for point in points {
+            let lane = count % LANES;
+            if lane == 0 {
+                blocks.push([[0.0; LANES]; 2]);
+            }
+            if let Some(block) = blocks.last_mut() {
+                for (lanes, x) in block.iter_mut().zip(point) {
+                    lanes[lane..].fill(x);
+                }
+            }
+            count += 1;
+        }
+        Self { blocks, count }
+    }
+
+    /// Squared distance of a place from the nearest of them, infinite where there is none.
+    pub fn nearest(&self, [x, y]: [f32; 2]) -> f32 {
+        let mut nearest = [f32::INFINITY; LANES];
+        for [right, forward] in &self.blocks {
+            for i in 0..LANES {
+                let distance = (right[i] - x).powi(2) + (forward[i] - y).powi(2);
+                nearest[i] = less(distance, nearest[i]);
+            }
+        }
+        nearest.into_iter().fold(f32::INFINITY, less)
+    }
+
+    /// From where to where they reach along an axis.
+    pub fn extent(&self, axis: [f32; 2]) -> [f32; 2] {
+        let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+        for [right, forward] in &self.blocks {
+            for i in 0..LANES {
+                let x = right[i] * axis[0] + forward[i] * axis[1];
+                low[i] = less(x, low[i]);
+                high[i] = more(x, high[i]);
+            }
+        }
+        let low = low.into_iter().fold(f32::INFINITY, less);
+        [low, high.into_iter().fold(f32::NEG_INFINITY, more)]
+    }
+}
+
+/// The lesser of two numbers: unlike [`f32::min`], which asks for NaN, one instruction.
+fn less(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers, as [`less`].
+fn more(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_fills_the_last_lanes_up_changes_nothing() {
+        for count in [1, 7, 8, 9] {
+            let all: Vec<[f32; 2]> = (0..count).map(|i| [i as f32, 10.0 - i as f32]).collect();
+            let points = Points::new(all.iter().copied());
+            assert_eq!(points.count, count);
+            let last = (count - 1) as f32;
+            assert_eq!(points.extent([1.0, 0.0]), [0.0, last]);
+            assert_eq!(points.extent([0.0, 1.0]), [10.0 - last, 10.0]);
+            assert_eq!(points.nearest([0.0, 12.0]), 4.0);
+        }
+        assert_eq!(Points::new([]).nearest([0.0; 2]), f32::INFINITY);
+    }
+}
