@@ -1,10 +1,11 @@
-//! Point clouds: from depth maps, and as PLY and KITTI `.bin` files.
+//! Point clouds: from depth maps, and as PLY, PCD and KITTI `.bin` files.
 //!
 //! Points are in metres, in the frame the cloud was made in: the camera's (x right, y down, z forward)
 //! for [`PointCloud::from_depth`], the sensor's (x forward, y left, z up) for a velodyne scan.
 
 mod error;
 mod kitti_bin;
+mod pcd;
 mod ply;
 mod point_cloud;
 

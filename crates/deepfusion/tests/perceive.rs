@@ -27,7 +27,7 @@ fn a_drive_becomes_targets_frame_by_frame() {
     let at = folder.path();
     street(at);
     let args = format!(
-        "perceive --model run {DRIVE} --out targets --save depth-png,overlay,birds-eye,segments,ply --json"
+        "perceive --model run {DRIVE} --out targets --save depth-png,overlay,birds-eye,segments,ply,pcd --json"
     );
     let told = ok(at, &args);
     let lines: Vec<Value> = told
@@ -52,6 +52,7 @@ fn a_drive_becomes_targets_frame_by_frame() {
             "_overlay.png",
             "_segments.png",
             ".ply",
+            ".pcd",
             ".json",
         ] {
             let path = at.join(format!("targets/{name}{ending}"));

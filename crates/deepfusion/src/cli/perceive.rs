@@ -55,8 +55,10 @@ pub enum PerceiveSave {
     BirdsEye,
     /// Disparity with each target in its colour.
     Segments,
-    /// Coloured point cloud in the camera's axes, without the points that hang between near and far.
+    /// Coloured point cloud in the camera's axes, without the points that hang between near and far, as PLY.
     Ply,
+    /// The same as PCD, for the Point Cloud Library and ROS.
+    Pcd,
 }
 
 impl PerceiveArgs {

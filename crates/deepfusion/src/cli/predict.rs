@@ -65,10 +65,19 @@ pub enum Save {
     Color,
     /// The image and its depth in colours.
     SideBySide,
-    /// Coloured point cloud in the camera's axes.
+    /// Coloured point cloud in the camera's axes, as PLY.
     Ply,
+    /// The same as PCD, for the Point Cloud Library and ROS.
+    Pcd,
     /// What the network sees: its features and attention masks on the image.
     Features,
+}
+
+impl Save {
+    /// Whether it is a cloud, which needs the camera.
+    pub fn is_cloud(self) -> bool {
+        matches!(self, Self::Ply | Self::Pcd)
+    }
 }
 
 /// `deepfusion weights …`.

@@ -23,7 +23,7 @@ const BIRDS_EYE: (u32, u32) = (480, 600);
 pub enum Picture {
     /// As PNG.
     Image(RgbImage),
-    /// As PLY.
+    /// As PLY or PCD, by its file's ending.
     Cloud(PointCloud),
 }
 
@@ -59,7 +59,9 @@ pub fn draw(
             targets,
             &surroundings.detections,
         ))),
-        PerceiveSave::Ply => cloud(image, depth, k, perception, confidence).map(Picture::Cloud),
+        PerceiveSave::Ply | PerceiveSave::Pcd => {
+            cloud(image, depth, k, perception, confidence).map(Picture::Cloud)
+        }
     };
     save.iter()
         .filter_map(|save| Some((*save, picture(*save)?)))
@@ -128,6 +130,7 @@ pub fn path(out: &Path, name: &str, save: PerceiveSave) -> PathBuf {
         PerceiveSave::BirdsEye => format!("{name}_birds_eye.png"),
         PerceiveSave::Segments => format!("{name}_segments.png"),
         PerceiveSave::Ply => format!("{name}.ply"),
+        PerceiveSave::Pcd => format!("{name}.pcd"),
     })
 }
 
@@ -137,7 +140,11 @@ impl Picture {
         match self {
             Self::Image(picture) => save_png(picture, path)?,
             Self::Cloud(cloud) => {
-                write_atomically::<anyhow::Error>(path, |out| Ok(cloud.write_ply(out)?))?;
+                let pcd = path.extension().is_some_and(|ending| ending == "pcd");
+                write_atomically::<anyhow::Error>(path, |out| match pcd {
+                    true => Ok(cloud.write_pcd(out)?),
+                    false => Ok(cloud.write_ply(out)?),
+                })?;
             }
         }
         Ok(())

@@ -6,7 +6,7 @@ use deepfusion_data::{Address, LiveFrame};
 use super::camera::CameraSource;
 use super::manifest::Lock;
 use super::{Job, tell_assumed};
-use crate::cli::{PredictArgs, Save, Shard};
+use crate::cli::{PredictArgs, Shard};
 use crate::commands::live::{self, Feed, LiveMark};
 use crate::error::CliError;
 use crate::progress::say;
@@ -20,7 +20,7 @@ pub fn run(args: &PredictArgs, address: &Address) -> Result<()> {
     }
     let predictor = engine::load(&prediction.model, &prediction.engine)?;
     let job = Job::new(prediction, args.outputs(), &predictor)?;
-    if args.save.contains(&Save::Ply) && matches!(job.camera, CameraSource::Unknown) {
+    if args.save.iter().any(|save| save.is_cloud()) && matches!(job.camera, CameraSource::Unknown) {
         return Err(CliError::NoCamera.into());
     }
     live::make_room(out, prediction.overwrite)?;

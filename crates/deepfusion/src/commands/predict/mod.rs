@@ -79,7 +79,7 @@ pub fn run(args: &PredictArgs) -> Result<()> {
     let predictor = engine::load(&prediction.model, &prediction.engine)?;
     let job = Job::new(prediction, args.outputs(), &predictor)?;
     let camera_known = !matches!(job.camera, CameraSource::Unknown);
-    if args.save.contains(&Save::Ply)
+    if args.save.iter().any(|save| save.is_cloud())
         && !(camera_known || all.iter().all(|input| input.frame.is_some()))
     {
         return Err(CliError::NoCamera.into());

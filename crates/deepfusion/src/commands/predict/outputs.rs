@@ -22,6 +22,7 @@ pub fn file_name(name: &str, save: Save) -> String {
         Save::Color => "_color.png",
         Save::SideBySide => "_side.png",
         Save::Ply => ".ply",
+        Save::Pcd => ".pcd",
         Save::Features => "_features.png",
     };
     format!("{name}{ending}")
@@ -50,12 +51,15 @@ pub fn write(
             let picture = features::picture(image, depth, prediction.window, layers)?;
             save_png(&picture, path)?;
         }
-        Save::Ply => {
+        Save::Ply | Save::Pcd => {
             let k = camera.ok_or(CliError::NoCamera)?;
             let rgb = Some(image.as_raw().as_slice());
             let cloud = PointCloud::from_depth(depth, k, rgb, max_depth_m as f32)?;
-            write_atomically::<CloudError>(path, |out| Ok(cloud.write_ply(out)?))
-                .map_err(CloudError::into_inner)?;
+            write_atomically::<CloudError>(path, |out| match save {
+                Save::Pcd => Ok(cloud.write_pcd(out)?),
+                _ => Ok(cloud.write_ply(out)?),
+            })
+            .map_err(CloudError::into_inner)?;
         }
     }
     Ok(())
