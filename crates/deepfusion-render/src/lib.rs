@@ -35,6 +35,6 @@ pub use html::{Cell, HtmlReport, Mark, PictureFormat, ReliabilityBin, ShownFrame
 pub use learning::LearningLog;
 pub use panel::{SamplePanel, sample_panel};
 pub use shrink::{shrink_depth, shrink_picture};
-pub use targets::{birds_eye, box_overlay, target_segments};
+pub use targets::{birds_eye, box_overlay, colour_of, target_segments};
 pub use text::{TextSize, draw_text, text_width};
 pub use top_view::TopView;

@@ -36,7 +36,31 @@ pub enum Error {
         /// What the first holds.
         expected: &'static str,
     },
-    /// A file or folder cannot be read.
+    /// A training run, where frames are needed.
+    #[error("{}: a training run has no frames", path.display())]
+    NoFrames {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file that was not written to its end, because somebody asked to stop.
+    #[error("{}: not written: stopped after {done} of {total} frames", path.display())]
+    Stopped {
+        /// The file that would have been written.
+        path: PathBuf,
+        /// Frames done.
+        done: usize,
+        /// Frames in all.
+        total: usize,
+    },
+    /// A frame that another viewer's format cannot hold.
+    #[error("{}: cannot be written: {problem}", path.display())]
+    Encoding {
+        /// The file that would have been written.
+        path: PathBuf,
+        /// Why.
+        problem: String,
+    },
+    /// A file or folder cannot be read or written.
     #[error("{}: {source}", path.display())]
     File {
         /// The file.
@@ -107,7 +131,13 @@ impl Error {
             Self::OtherKind { .. } => {
                 Some("give two folders of predictions, or two of training runs".into())
             }
-            Self::File { .. } | Self::Content { .. } => None,
+            Self::NoFrames { .. } => {
+                Some("give the folder that `predict` or `perceive` wrote".into())
+            }
+            Self::File { .. }
+            | Self::Content { .. }
+            | Self::Stopped { .. }
+            | Self::Encoding { .. } => None,
             Self::Picture(error) => error.hint(),
             Self::PortInUse { .. } => {
                 Some("give another --port, or --port 0 for any that is free".into())

@@ -24,6 +24,9 @@ pub enum CliError {
         /// The device's name.
         device: &'static str,
     },
+    /// A file of a viewer that was not compiled in.
+    #[error("this build writes no files for the rerun viewer")]
+    NoRerun,
     /// A folder or pattern without images.
     #[error("{input}: no image (.png, .jpg, .jpeg) there")]
     NoImages {
@@ -161,6 +164,9 @@ impl CliError {
             Self::NoBackend { device } => Some(format!(
                 "build it with `cargo build --release --features {device}`, or use --device cpu"
             )),
+            Self::NoRerun => Some(
+                "build it with `cargo build --release --features rerun`, or leave out --rerun to look at the folder in a browser".into(),
+            ),
             Self::NoImages { .. } => None,
             Self::NoModel { .. } => Some("give run folders alone, or leave out --pictures".into()),
             Self::SeveralDrives { .. } => Some("convert them one by one: give a drive's own folder".into()),

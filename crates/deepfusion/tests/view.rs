@@ -65,3 +65,61 @@ fn it_tells_its_address_answers_and_ends() {
         .unwrap();
     assert!(said.starts_with("1 frame in .; Ctrl-C ends\n"), "{said}");
 }
+
+#[cfg(not(feature = "rerun"))]
+#[test]
+fn without_the_feature_it_tells_how_to_get_rerun_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = in_folder(folder.path(), &["view", ".", "--rerun", "a.rrd"]);
+    assert_eq!((run.code, run.stdout.as_str()), (1, ""));
+    assert_eq!(
+        run.stderr,
+        "error: this build writes no files for the rerun viewer\n\
+         hint: build it with `cargo build --release --features rerun`, or leave out --rerun to look at the folder in a browser\n"
+    );
+    assert!(!folder.path().join("a.rrd").exists());
+}
+
+#[cfg(feature = "rerun")]
+#[test]
+fn a_rerun_file_is_written_once_and_bad_frames_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = DepthMap {
+        width: 4,
+        height: 2,
+        data: vec![1.5; 8],
+    };
+    deepfusion_data::write_depth_png(&map, &folder.path().join("a_depth.png")).unwrap();
+    std::fs::write(folder.path().join("b_depth.png"), "no picture").unwrap();
+    let write = |more: &[&str]| {
+        let args: Vec<&str> = [&["view", ".", "--rerun", "a.rrd"], more].concat();
+        in_folder(folder.path(), &args)
+    };
+    let first = write(&[]);
+    assert_eq!(
+        (first.code, first.stdout.as_str()),
+        (0, ""),
+        "{}",
+        first.stderr
+    );
+    assert!(first.stderr.contains("a.rrd: 2 frames"), "{}", first.stderr);
+    assert!(
+        first.stderr.contains("WARN b: ./b_depth.png: "),
+        "{}",
+        first.stderr
+    );
+    let bytes = std::fs::read(folder.path().join("a.rrd")).unwrap();
+    assert!(bytes.starts_with(b"RRF2"));
+
+    let second = write(&[]);
+    assert_eq!(second.code, 1);
+    assert_eq!(
+        second.stderr,
+        "error: a.rrd: is there already\n\
+         hint: choose another name, or give --overwrite to replace a file\n"
+    );
+    assert_eq!(std::fs::read(folder.path().join("a.rrd")).unwrap(), bytes);
+    assert_eq!(write(&["--overwrite"]).code, 0);
+    let names = std::fs::read_dir(folder.path()).unwrap();
+    assert_eq!(names.count(), 3, "nothing half-written");
+}

@@ -12,7 +12,8 @@ pub use segments::target_segments;
 use image::Rgb;
 
 /// A target's colour: the same for all its frames, and other than its neighbours'.
-fn colour_of(id: u64) -> Rgb<u8> {
+#[must_use]
+pub fn colour_of(id: u64) -> Rgb<u8> {
     /// Distinct on grey and on each other.
     const COLOURS: [[u8; 3]; 10] = [
         [255, 127, 14],

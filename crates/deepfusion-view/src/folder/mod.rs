@@ -9,9 +9,11 @@ mod summary;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+pub(crate) use entry::Entry;
 pub(crate) use frame::{frame_json, picture_of, targets_of};
+#[cfg(feature = "rerun")]
+pub(crate) use summary::{Summary, numbers};
 
-use self::entry::Entry;
 use self::listing::Listing;
 use crate::training;
 use crate::{Error, Result};

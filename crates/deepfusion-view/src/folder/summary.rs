@@ -81,7 +81,7 @@ impl Summary {
 }
 
 /// N finite numbers; JSON has no others.
-pub(super) fn numbers<const N: usize>(value: Option<&Value>) -> Option<[f64; N]> {
+pub(crate) fn numbers<const N: usize>(value: Option<&Value>) -> Option<[f64; N]> {
     let list: Option<Vec<f64>> = value?.as_array()?.iter().map(Value::as_f64).collect();
     list?.try_into().ok()
 }

@@ -10,7 +10,8 @@ use clap::Args;
     that is still being written is shown as it grows. `?` in the page tells its keys. Ctrl-C ends.\n\n\
     Examples:\n  deepfusion view depth\n  deepfusion view depth --other depth-of-another-model\n  \
     deepfusion view depth --host 0.0.0.0        # for a phone in the same network, and for everybody else there\n  \
-    deepfusion view runs/train-1                # learning curve and panels"
+    deepfusion view runs/train-1                # learning curve and panels\n  \
+    deepfusion view depth --rerun depth.rrd     # a file for the rerun viewer"
 )]
 pub struct ViewArgs {
     /// A folder that `predict` or `perceive` wrote, or a run of `train`.
@@ -28,4 +29,10 @@ pub struct ViewArgs {
     /// Do not open a browser.
     #[arg(long)]
     pub no_open: bool,
+    /// Write a file for the rerun viewer instead, and end (feature `rerun`).
+    #[arg(long, value_name = "FILE.rrd", conflicts_with_all = ["other", "port", "host", "no_open"])]
+    pub rerun: Option<PathBuf>,
+    /// Replace a FILE.rrd that is there.
+    #[arg(long, requires = "rerun")]
+    pub overwrite: bool,
 }

@@ -25,6 +25,7 @@ mod scene;
 mod simulate;
 mod train;
 mod view;
+mod view_rerun;
 mod weights;
 
 use anyhow::Result;

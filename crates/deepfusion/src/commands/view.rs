@@ -10,6 +10,9 @@ use crate::{interrupt, output};
 
 /// `deepfusion view`.
 pub fn run(args: &ViewArgs) -> Result<()> {
+    if let Some(file) = &args.rerun {
+        return super::view_rerun::run(args, file);
+    }
     let folder = Folder::open(&args.folder)?;
     let other = args.other.as_deref().map(Folder::open).transpose()?;
     let holds = if folder.is_training_run() {

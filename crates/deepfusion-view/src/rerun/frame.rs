@@ -1,0 +1,205 @@
+//! One frame.
+
+use std::io::Write;
+use std::path::Path;
+
+use deepfusion_geometry::Intrinsics;
+use re_log_types::{TimeInt, TimePoint, Timeline};
+use re_sdk_types::AsComponents;
+use re_sdk_types::archetypes::{DepthImage, EncodedImage, Pinhole, Scalars, TextLog, Transform3D};
+use re_sdk_types::components::{PinholeProjection, TextLogLevel};
+use re_sdk_types::datatypes::ChannelDatatype;
+use serde_json::Value;
+
+use super::recording::{Problem, Recording};
+use super::targets::{SeenTarget, boxes, ground, velocities};
+use super::tracks::Tracks;
+use crate::folder::{Entry, Summary, frame_json, numbers, picture_of};
+use crate::{DepthCode, DepthFile};
+
+/// Logs frames in their order.
+#[derive(Default)]
+pub(super) struct FrameLogger {
+    tracks: Tracks,
+}
+
+impl FrameLogger {
+    /// Logs what there is of a frame, and returns what is wrong with it.
+    pub fn log<W: Write>(
+        &mut self,
+        recording: &mut Recording<W>,
+        folder: &Path,
+        entry: &Entry,
+        place: usize,
+    ) -> Result<Vec<String>, Problem> {
+        let frame = frame_json(folder, entry);
+        let summary = Summary::read(folder, entry);
+        let time = time_of(place, summary.time_s);
+        let mut problems: Vec<String> = frame["problems"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .filter_map(|p| p.as_str().map(str::to_owned))
+            .collect();
+
+        let camera: Option<Intrinsics> = serde_json::from_value(frame["intrinsics"].clone()).ok();
+        let world_from_cam = numbers::<12>(frame["targets"].get("camera_motion"));
+        recording.log("world/camera", &time, &transform(world_from_cam))?;
+        let pinhole = camera.map(|k| pinhole(&k));
+        recording.log_or_clear("world/camera/image", &time, any(&pinhole))?;
+
+        let size = camera.map(|k| (k.width, k.height));
+        let picture = picture(folder, entry, size, &mut problems);
+        recording.log_or_clear("world/camera/image/rgb", &time, any(&picture))?;
+        let depth = depth(folder, entry, size, &mut problems);
+        recording.log_or_clear("world/camera/image/depth", &time, any(&depth))?;
+
+        self.log_targets(recording, &time, &frame["targets"], world_from_cam)?;
+        for (entity, number) in [
+            ("speed_mps", summary.speed_mps),
+            ("time_to_collision_s", summary.time_to_collision_s),
+            ("nearest_m", summary.nearest_m),
+            ("scale_ratio", summary.scale_ratio),
+            ("latency_ms", summary.latency_ms),
+        ] {
+            let scalar = number.map(Scalars::single);
+            recording.log_or_clear(entity, &time, any(&scalar))?;
+        }
+        log_name(recording, &time, &entry.name, &problems)?;
+        Ok(problems)
+    }
+
+    fn log_targets<W: Write>(
+        &mut self,
+        recording: &mut Recording<W>,
+        time: &TimePoint,
+        frame: &Value,
+        world_from_cam: Option<[f64; 12]>,
+    ) -> Result<(), Problem> {
+        let list = frame.get("targets").and_then(Value::as_array);
+        let targets: Vec<SeenTarget> = list
+            .into_iter()
+            .flatten()
+            .filter_map(SeenTarget::of)
+            .collect();
+        recording.log_or_clear("world/camera/targets", time, any(&boxes(&targets)))?;
+        recording.log_or_clear("world/camera/velocities", time, any(&velocities(&targets)))?;
+        recording.log_or_clear(
+            "world/camera/ground",
+            time,
+            any(&ground(frame.get("ground"))),
+        )?;
+        let paths = self.tracks.add(&targets, world_from_cam);
+        recording.log_or_clear("world/tracks", time, any(&paths))
+    }
+}
+
+fn any<T: AsComponents>(what: &Option<T>) -> Option<&dyn AsComponents> {
+    what.as_ref().map(|w| w as &dyn AsComponents)
+}
+
+fn time_of(place: usize, time_s: Option<f64>) -> TimePoint {
+    let frame = TimePoint::default().with(Timeline::new_sequence("frame"), place as i64);
+    match time_s {
+        Some(seconds) => frame.with(Timeline::new_duration("time"), TimeInt::from_secs(seconds)),
+        None => frame,
+    }
+}
+
+/// `world_from_cam`, row by row, as the viewer takes it: column by column.
+fn transform(world_from_cam: Option<[f64; 12]>) -> Transform3D {
+    let Some(m) = world_from_cam.map(|m| m.map(|x| x as f32)) else {
+        return Transform3D::from_translation([0.0, 0.0, 0.0]);
+    };
+    let columns = [[m[0], m[4], m[8]], [m[1], m[5], m[9]], [m[2], m[6], m[10]]];
+    Transform3D::from_translation_mat3x3([m[3], m[7], m[11]], columns)
+}
+
+/// The viewer's cloud takes pixels at integers too: (u − cx)/fx, nothing to be shifted by half a pixel.
+fn pinhole(k: &Intrinsics) -> Pinhole {
+    Pinhole::new(PinholeProjection::from_focal_length_and_principal_point(
+        [k.fx as f32, k.fy as f32],
+        [k.cx as f32, k.cy as f32],
+    ))
+    .with_resolution([k.width as f32, k.height as f32])
+}
+
+/// The picture's bytes as they are. One of another size than the camera's would be drawn where it is not.
+fn picture(
+    folder: &Path,
+    entry: &Entry,
+    size: Option<(u32, u32)>,
+    problems: &mut Vec<String>,
+) -> Option<EncodedImage> {
+    // That there is none has been told with the frame, as has a size that the sidecar contradicts.
+    let picture = picture_of(folder, entry).ok()?;
+    if size.is_some_and(|size| size != picture.size) {
+        return None;
+    }
+    match std::fs::read(&picture.path) {
+        Ok(bytes) => Some(EncodedImage::new(bytes).with_media_type(picture.content_type)),
+        Err(e) => {
+            add(problems, format!("{}: {e}", picture.path.display()));
+            None
+        }
+    }
+}
+
+/// Depth in the numbers of its file. 0 means none, as in the viewer.
+fn depth(
+    folder: &Path,
+    entry: &Entry,
+    size: Option<(u32, u32)>,
+    problems: &mut Vec<String>,
+) -> Option<DepthImage> {
+    let path = folder.join(&entry.depth.as_ref()?.file);
+    let file = match DepthFile::read(&path) {
+        Ok(file) => file,
+        Err(e) => {
+            add(problems, e.to_string());
+            return None;
+        }
+    };
+    let (width, height) = (file.width, file.height);
+    if let Some((w, h)) = size.filter(|size| *size != (width, height)) {
+        // A PNG's size has been compared with the sidecar's already.
+        if file.code == DepthCode::Metres {
+            add(
+                problems,
+                format!("depth is {width}x{height}, the sidecar says {w}x{h}"),
+            );
+        }
+        return None;
+    }
+    let (datatype, values_per_metre) = match file.code {
+        DepthCode::Steps256 => (ChannelDatatype::U16, 256.0_f32),
+        DepthCode::Metres => (ChannelDatatype::F32, 1.0),
+    };
+    let image = DepthImage::from_data_type_and_bytes(file.values, [width, height], datatype);
+    Some(image.with_meter(values_per_metre))
+}
+
+/// Some things are noticed twice.
+fn add(problems: &mut Vec<String>, problem: String) {
+    if !problems.contains(&problem) {
+        problems.push(problem);
+    }
+}
+
+/// A line for the frame: its name, or a warning for each thing that is wrong with it.
+fn log_name<W: Write>(
+    recording: &mut Recording<W>,
+    time: &TimePoint,
+    name: &str,
+    problems: &[String],
+) -> Result<(), Problem> {
+    if problems.is_empty() {
+        let line = TextLog::new(name).with_level(TextLogLevel::INFO);
+        return recording.log("frames", time, &line);
+    }
+    for problem in problems {
+        let line = TextLog::new(format!("{name}: {problem}")).with_level(TextLogLevel::WARN);
+        recording.log("frames", time, &line)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,121 @@
+//! Messages of the viewer, one after the other.
+
+use std::collections::HashSet;
+use std::io::Write;
+use std::path::Path;
+
+use re_build_info::CrateVersion;
+use re_chunk::{Chunk, ChunkError, EntityPath, RowId};
+use re_log_encoding::{EncodeError, Encoder, EncodingOptions};
+use re_log_types::{LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreKind, StoreSource, TimePoint};
+use re_sdk_types::AsComponents;
+use re_sdk_types::archetypes::{Clear, RecordingInfo, ViewCoordinates};
+
+use crate::Error;
+
+/// What recordings are called by the program that made them: the viewer keeps one layout of its windows for each.
+const APPLICATION: &str = "deepfusion";
+
+/// A recording that is being written.
+pub(super) struct Recording<W: Write> {
+    encoder: Encoder<W>,
+    store: StoreId,
+    /// Entities that show something now: what is not there any more has to be taken away.
+    shown: HashSet<&'static str>,
+}
+
+impl<W: Write> Recording<W> {
+    /// Begins with what holds at all times. `name` is what a person calls it.
+    pub fn begin(out: W, name: &str) -> Result<Self, Problem> {
+        // Another id each time: two files of one folder stay two recordings.
+        let store = StoreId::random(StoreKind::Recording, APPLICATION);
+        let made_by = format!("deepfusion {}", env!("CARGO_PKG_VERSION"));
+        let info = StoreInfo::new(store.clone(), StoreSource::Other(made_by));
+        let mut recording = Self {
+            encoder: Encoder::new_eager(
+                CrateVersion::LOCAL,
+                EncodingOptions::PROTOBUF_COMPRESSED,
+                out,
+            )?,
+            store,
+            shown: HashSet::new(),
+        };
+        recording
+            .encoder
+            .append(&LogMsg::SetStoreInfo(SetStoreInfo {
+                row_id: *RowId::new(),
+                info,
+            }))?;
+        let always = TimePoint::STATIC;
+        let info = RecordingInfo::new().with_name(name);
+        recording.append(EntityPath::properties(), &always, &info)?;
+        recording.append("world".into(), &always, &ViewCoordinates::RDF())?;
+        Ok(recording)
+    }
+
+    /// Logs what an entity shows from then on.
+    pub fn log(
+        &mut self,
+        entity: &'static str,
+        time: &TimePoint,
+        what: &dyn AsComponents,
+    ) -> Result<(), Problem> {
+        self.shown.insert(entity);
+        self.append(entity.into(), time, what)
+    }
+
+    /// Logs what an entity shows, or that it shows nothing any more: the viewer holds on to the last thing it was told.
+    pub fn log_or_clear(
+        &mut self,
+        entity: &'static str,
+        time: &TimePoint,
+        what: Option<&dyn AsComponents>,
+    ) -> Result<(), Problem> {
+        match what {
+            Some(what) => self.log(entity, time, what),
+            None if self.shown.remove(entity) => self.append(entity.into(), time, &Clear::flat()),
+            None => Ok(()),
+        }
+    }
+
+    /// Writes the end.
+    pub fn finish(mut self) -> Result<(), Problem> {
+        Ok(self.encoder.finish()?)
+    }
+
+    fn append(
+        &mut self,
+        entity: EntityPath,
+        time: &TimePoint,
+        what: &dyn AsComponents,
+    ) -> Result<(), Problem> {
+        let chunk = Chunk::builder(entity)
+            .with_archetype(RowId::new(), time.clone(), what)
+            .build()?;
+        let message = LogMsg::ArrowMsg(self.store.clone(), chunk.to_arrow_msg()?);
+        self.encoder.append(&message)?;
+        Ok(())
+    }
+}
+
+/// Why something could not be logged.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Problem {
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+    #[error(transparent)]
+    Chunk(#[from] ChunkError),
+}
+
+impl Problem {
+    /// The failure of a file.
+    pub fn of(self, path: &Path) -> Error {
+        match self {
+            Self::Encode(EncodeError::Write(source)) => Error::file(path, source),
+            other => Error::Encoding {
+                path: path.to_owned(),
+                problem: other.to_string(),
+            },
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Where the targets were, in the world's axes (those of the recording's first camera).
+
+use std::collections::{HashMap, VecDeque};
+
+use re_sdk_types::archetypes::LineStrips3D;
+
+use super::targets::SeenTarget;
+
+/// So many frames back a path is drawn.
+const FRAMES: usize = 50;
+
+/// The ways of the tracks seen so far.
+#[derive(Default)]
+pub(super) struct Tracks {
+    ways: HashMap<u64, Way>,
+    frame: usize,
+}
+
+/// Centres in the world, metres, each with the frame it was seen in.
+type Way = VecDeque<(usize, [f32; 3])>;
+
+impl Tracks {
+    /// Takes in a frame; the ways of its targets, where there are any. Without the camera's place there is no world to draw them in.
+    pub fn add(
+        &mut self,
+        targets: &[SeenTarget],
+        world_from_cam: Option<[f64; 12]>,
+    ) -> Option<LineStrips3D> {
+        let world_from_cam = world_from_cam?;
+        self.frame += 1;
+        for target in targets {
+            let way = self.ways.entry(target.id).or_default();
+            way.push_back((self.frame, moved(&world_from_cam, target.centre)));
+        }
+        let oldest = self.frame.saturating_sub(FRAMES);
+        self.ways.retain(|_, way| {
+            way.retain(|(seen, _)| *seen > oldest);
+            !way.is_empty()
+        });
+        let ways: Vec<_> = targets
+            .iter()
+            .filter_map(|t| Some((t, self.ways.get(&t.id).filter(|way| way.len() > 1)?)))
+            .collect();
+        let points = |way: &Way| -> Vec<[f32; 3]> { way.iter().map(|(_, p)| *p).collect() };
+        (!ways.is_empty()).then(|| {
+            LineStrips3D::new(ways.iter().map(|(_, way)| points(way)))
+                .with_colors(ways.iter().map(|(t, _)| t.colour()))
+        })
+    }
+}
+
+/// A point moved by a rigid motion, row by row.
+fn moved(m: &[f64; 12], [x, y, z]: [f64; 3]) -> [f32; 3] {
+    std::array::from_fn(|i| {
+        let row = &m[4 * i..4 * i + 4];
+        (row[0] * x + row[1] * y + row[2] * z + row[3]) as f32
+    })
+}

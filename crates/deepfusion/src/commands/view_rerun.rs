@@ -1,0 +1,66 @@
+//! `deepfusion view --rerun`: a file for the rerun viewer, where the program was built for it.
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use crate::cli::ViewArgs;
+use crate::error::CliError;
+
+/// Writes the folder's frames to `file`.
+#[cfg(feature = "rerun")]
+pub fn run(args: &ViewArgs, file: &Path) -> Result<()> {
+    use crate::progress::{Progress, say};
+    use crate::{interrupt, output};
+
+    if file.exists() && (!args.overwrite || file.is_dir()) {
+        return Err(CliError::Exists {
+            path: file.to_owned(),
+            remedy: "choose another name, or give --overwrite to replace a file",
+        }
+        .into());
+    }
+    output::require_folder_of(file)?;
+    let folder = deepfusion_view::Folder::open(&args.folder)?;
+    interrupt::catch("stopping; nothing is written");
+    let mut bar = Progress::new("writing");
+    let report = deepfusion_view::write_rerun(
+        &folder,
+        file,
+        |done, total| bar.set(done, total),
+        interrupt::asked,
+    );
+    drop(bar);
+    let report = report?;
+    warn(&report.problems);
+    let frames = match report.frames {
+        1 => "1 frame".to_owned(),
+        n => format!("{n} frames"),
+    };
+    say(&format!(
+        "{}: {frames}; open it with `rerun {}` (version {})",
+        file.display(),
+        file.display(),
+        deepfusion_view::rerun_version()
+    ));
+    Ok(())
+}
+
+/// Without the feature: how to get it.
+#[cfg(not(feature = "rerun"))]
+pub fn run(_args: &ViewArgs, _file: &Path) -> Result<()> {
+    Err(CliError::NoRerun.into())
+}
+
+/// The problems of frames, as many as a person reads; the file has them all.
+#[cfg(feature = "rerun")]
+fn warn(problems: &[(String, String)]) {
+    const TOLD: usize = 20;
+    for (frame, problem) in problems.iter().take(TOLD) {
+        tracing::warn!("{frame}: {problem}");
+    }
+    if problems.len() > TOLD {
+        let more = problems.len() - TOLD;
+        tracing::warn!("and {more} more, at the entity `frames` of the file");
+    }
+}
