@@ -322,6 +322,10 @@ fn bad_frames_are_named_and_show_nothing_of_the_frame_before() {
         "already cleared"
     );
     assert!(read.at("/world/camera/targets", 2).is_some());
+    // Its way is not known without targets: the camera is the world, not where it was before.
+    let place = a::Transform3D::descriptor_translation();
+    let place = read.get::<Translation3D>("/world/camera", 1, place);
+    assert_eq!(place, [Translation3D::from([0.0_f32; 3])]);
     let lines = read.rows["/frames"].len();
     assert_eq!(lines, 1 + 2 + 2, "a name, and a line for each problem");
 }

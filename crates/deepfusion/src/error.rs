@@ -25,6 +25,7 @@ pub enum CliError {
         device: &'static str,
     },
     /// A file of a viewer that was not compiled in.
+    #[cfg(not(feature = "rerun"))]
     #[error("this build writes no files for the rerun viewer")]
     NoRerun,
     /// A folder or pattern without images.
@@ -164,6 +165,7 @@ impl CliError {
             Self::NoBackend { device } => Some(format!(
                 "build it with `cargo build --release --features {device}`, or use --device cpu"
             )),
+            #[cfg(not(feature = "rerun"))]
             Self::NoRerun => Some(
                 "build it with `cargo build --release --features rerun`, or leave out --rerun to look at the folder in a browser".into(),
             ),

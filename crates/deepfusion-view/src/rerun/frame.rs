@@ -106,11 +106,10 @@ fn time_of(place: usize, time_s: Option<f64>) -> TimePoint {
     }
 }
 
-/// `world_from_cam`, row by row, as the viewer takes it: column by column.
+/// `world_from_cam`, row by row, as the viewer takes it: column by column. Where it is not known the camera is the world.
 fn transform(world_from_cam: Option<[f64; 12]>) -> Transform3D {
-    let Some(m) = world_from_cam.map(|m| m.map(|x| x as f32)) else {
-        return Transform3D::from_translation([0.0, 0.0, 0.0]);
-    };
+    const HERE: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let m = world_from_cam.unwrap_or(HERE).map(|x| x as f32);
     let columns = [[m[0], m[4], m[8]], [m[1], m[5], m[9]], [m[2], m[6], m[10]]];
     Transform3D::from_translation_mat3x3([m[3], m[7], m[11]], columns)
 }
