@@ -9,11 +9,14 @@
 use crate::snippet::Snippet;
 use crate::{Dataset, Result, resize_rgb};
 use deepfusion_geometry::Se3;
-use deepfusion_motion::{GreyImage, GroundPair, SWEEP_M, SWEEP_RATIO, implied_camera_height};
+use deepfusion_motion::{
+    GreyImage, GroundPair, RoadTexture, SWEEP_M, SWEEP_RATIO, implied_camera_height,
+};
 use image::RgbImage;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::fmt;
+use std::sync::Arc;
 
 /// Heights that a camera on a road vehicle can have, in metres.
 pub(crate) const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.9..=2.6;
@@ -112,9 +115,10 @@ pub(crate) fn road_camera_height(dataset: &Dataset) -> Result<Option<(f64, usize
         let height = (k.height * WIDTH).div_ceil(k.width).max(1);
         let source = &snippet.sources[0];
         let earlier = dataset.load_image(source.frame)?;
+        let texture = |image| Arc::new(RoadTexture::from(&grey_image(image, WIDTH, height)));
         Ok(GroundPair {
-            earlier: grey_image(&earlier, WIDTH, height),
-            later: grey_image(&later, WIDTH, height),
+            earlier: texture(&earlier),
+            later: texture(&later),
             intrinsics: k.resized(WIDTH, height),
             // Pairs stand alone here: no acceleration is known.
             seconds: f64::NAN,

@@ -4,8 +4,9 @@ mod common;
 
 use deepfusion_data::{Dataset, OpenOptions, SpeedWarning, speed_unit_warning};
 use deepfusion_geometry::{Intrinsics, Se3};
-use deepfusion_motion::{GreyImage, GroundPair, implied_camera_height};
+use deepfusion_motion::{GreyImage, GroundPair, RoadTexture, implied_camera_height};
 use nalgebra::Vector3;
+use std::sync::Arc;
 
 const HEIGHT_M: f64 = 1.65;
 
@@ -61,9 +62,10 @@ fn render(travelled_m: f64) -> GreyImage {
 
 /// Pairs 0.5 m apart that are said to be `factor` times that.
 fn pairs(factor: f64) -> Vec<GroundPair> {
+    let texture = |i: usize| Arc::new(RoadTexture::from(&render(0.5 * i as f64)));
     let pair = |i: usize| GroundPair {
-        earlier: render(0.5 * i as f64),
-        later: render(0.5 * (i + 1) as f64),
+        earlier: texture(i),
+        later: texture(i + 1),
         intrinsics: camera(),
         seconds: 0.1,
         earlier_from_later: Se3::from_axis_angle(

@@ -54,6 +54,9 @@ impl Error {
                  and of YOLOX"
                     .into(),
             ),
+            Self::Class { known, .. } if known.is_empty() => {
+                Some("the file names no classes: leave --classes out, and all are taken".into())
+            }
             Self::Class { known, .. } => Some(format!("it knows {}", known.join(", "))),
         }
     }

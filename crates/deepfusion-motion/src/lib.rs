@@ -63,7 +63,9 @@ pub use imu::{
     ImuConfig, ImuMount, ImuSample, ImuTrack, Standstill, StandstillConfig, standstills,
 };
 pub use motion_model::MotionModel;
-pub use road_height::{GreyImage, GroundPair, SWEEP_M, SWEEP_RATIO, implied_camera_height};
+pub use road_height::{
+    GreyImage, GroundPair, RoadTexture, SWEEP_M, SWEEP_RATIO, implied_camera_height,
+};
 pub use scale_correction::ScaleCorrection;
 pub use scale_monitor::{ScaleMonitor, ScaleMonitorConfig, ScaleReading, ScaleState};
 pub use signal::Signal;

@@ -7,6 +7,7 @@
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Heights tried, in metres, and the ratio of one to the next. Beyond 15 m the road hardly moves.
 pub const SWEEP_M: (f64, f64) = (0.3, 15.0);
@@ -47,13 +48,24 @@ pub struct GreyImage {
     pub data: Vec<f32>,
 }
 
+/// What of a frame tells how the road moves: its texture, without shade and exposure. Made once, it serves the pair
+/// before and the pair after.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoadTexture(GreyImage);
+
+impl From<&GreyImage> for RoadTexture {
+    fn from(image: &GreyImage) -> Self {
+        Self(image.high_pass())
+    }
+}
+
 /// Two frames of a drive, and how the camera is said to have moved between them.
 #[derive(Debug, Clone)]
 pub struct GroundPair {
     /// The frame before.
-    pub earlier: GreyImage,
-    /// The frame after.
-    pub later: GreyImage,
+    pub earlier: Arc<RoadTexture>,
+    /// The frame after, of the same size.
+    pub later: Arc<RoadTexture>,
     /// Of these small images.
     pub intrinsics: Intrinsics,
     /// Time between them, seconds; NaN where it is not known.
@@ -97,10 +109,10 @@ impl GroundPair {
     /// As [`Self::costs`], for a camera that was pitched by `tilt` (radians, nose up) from its mount in the earlier frame,
     /// and how much more it is in the later one.
     pub(crate) fn look(&self, heights: &[f64], tilt: f64) -> (Option<Vec<f64>>, f64) {
-        let (earlier, later) = (self.earlier.high_pass(), self.later.high_pass());
-        let pitch = self.pitch(&earlier, &later);
+        let (earlier, later) = (&self.earlier.0, &self.later.0);
+        let pitch = self.pitch(earlier, later);
         let pitched = self.pitched(tilt, pitch);
-        (pitched.road_costs(&earlier, &later, heights), pitch)
+        (pitched.road_costs(earlier, later, heights), pitch)
     }
 
     /// Rotation of the camera's nose upwards.
@@ -126,13 +138,12 @@ impl GroundPair {
         let k_inverse = self.intrinsics.inverse_matrix();
         let (width, height) = (later.width, later.height);
         let columns = [FAR_COLUMNS.0, FAR_COLUMNS.1].map(|share| (width as f64 * share) as usize);
-        let far: Vec<(usize, Vector3<f64>)> = (0..height)
+        let far: Vec<(usize, usize)> = (0..height)
             .flat_map(|y| (columns[0]..columns[1]).map(move |x| (x, y)))
-            .map(|(x, y)| {
-                let ray = k_inverse * Vector3::new(x as f64, y as f64, 1.0);
-                (y * width + x, ray)
+            .filter(|(x, y)| {
+                let ray = k_inverse * Vector3::new(*x as f64, *y as f64, 1.0);
+                self.down_in_cam.dot(&ray).abs() < FAR_SLOPE
             })
-            .filter(|(_, ray)| self.down_in_cam.dot(ray).abs() < FAR_SLOPE)
             .collect();
         if far.is_empty() {
             return 0.0;
@@ -141,15 +152,13 @@ impl GroundPair {
         let angle = |step: f64| step * PITCH_STEP - PITCH;
         let cost = |step: usize| {
             let rotation = self.nose_up(angle(step as f64)).rotation();
-            let infinity = self.intrinsics.matrix() * rotation * self.earlier_from_later.rotation();
-            let difference = |(i, ray): &(usize, Vector3<f64>)| {
-                let q = infinity * ray;
-                let seen = earlier.sample(q.x / q.z, q.y / q.z);
-                f64::from((seen - later.data[*i]).abs()).min(CLIP)
-            };
-            far.iter().map(difference).sum::<f64>()
+            let infinity = self.intrinsics.matrix()
+                * rotation
+                * self.earlier_from_later.rotation()
+                * k_inverse;
+            difference(earlier, later, &infinity, &far)
         };
-        let costs: Vec<f64> = (0..=steps).into_par_iter().map(cost).collect();
+        let costs: Vec<f64> = (0..=steps).map(cost).collect();
         least(&costs).map_or(0.0, angle)
     }
 }
@@ -187,14 +196,9 @@ impl Pitched<'_> {
             .collect();
         let cost = |h: &f64| {
             let earlier_from_later = self.homography(*h, &k_inverse);
-            let difference = |(x, y): &(usize, usize)| {
-                let q = earlier_from_later * Vector3::new(*x as f64, *y as f64, 1.0);
-                let seen = earlier.sample(q.x / q.z, q.y / q.z);
-                f64::from((seen - later.data[y * width + x]).abs()).min(CLIP)
-            };
-            road.iter().map(difference).sum::<f64>() / road.len() as f64
+            difference(earlier, later, &earlier_from_later, &road)
         };
-        let mut costs: Vec<f64> = heights.par_iter().map(cost).collect();
+        let mut costs: Vec<f64> = heights.iter().map(cost).collect();
         let scale = median(&costs);
         if !(scale > 0.0 && scale.is_finite()) {
             return None;
@@ -208,6 +212,39 @@ impl Pitched<'_> {
         let plane = self.motion.rotation() + self.motion.translation() * self.down.transpose() / h;
         self.intrinsics.matrix() * plane * k_inverse
     }
+}
+
+/// Mean difference of the later image's pixels and the places of the earlier one that a homography takes them to.
+fn difference(
+    earlier: &GreyImage,
+    later: &GreyImage,
+    earlier_from_later: &Matrix3<f64>,
+    pixels: &[(usize, usize)],
+) -> f64 {
+    // A hundredth of a pixel is far less than what the images tell: single precision is enough.
+    let h = earlier_from_later.map(|v| v as f32);
+    let clip = CLIP as f32;
+    let width = earlier.width;
+    if width < 2 || earlier.height < 2 {
+        return f64::NAN;
+    }
+    let most = [width, earlier.height].map(|size| size as f32 - 1.0);
+    let last = [width - 2, earlier.height - 2];
+    // As `sample`, with one check of bounds for its four pixels: this is where the time goes.
+    let one = |&(x, y): &(usize, usize)| {
+        let (u, v) = (x as f32, y as f32);
+        let row = |i: usize| h[(i, 0)] * u + h[(i, 1)] * v + h[(i, 2)];
+        let inverse = 1.0 / row(2);
+        let to = [row(0) * inverse, row(1) * inverse];
+        let [x0, y0] = [0, 1].map(|i| (to[i].max(0.0).min(most[i]) as usize).min(last[i]));
+        let [fx, fy] = [(0, x0), (1, y0)].map(|(i, low)| to[i].max(0.0).min(most[i]) - low as f32);
+        let four = &earlier.data[y0 * width + x0..][..width + 2];
+        let top = four[0] + (four[1] - four[0]) * fx;
+        let bottom = four[width] + (four[width + 1] - four[width]) * fx;
+        let seen = top + (bottom - top) * fy;
+        (seen - later.data[y * later.width + x]).abs().min(clip)
+    };
+    pixels.iter().map(one).sum::<f32>() as f64 / pixels.len() as f64
 }
 
 /// Place of the least of some costs, between the steps by a parabola; `None` where it is the first or the last.
@@ -257,12 +294,12 @@ impl GreyImage {
 
     /// Bilinear value at a position, which is moved into the image first.
     #[must_use]
-    pub fn sample(&self, x: f64, y: f64) -> f32 {
-        let at = |v: f64, size: usize| {
+    pub fn sample(&self, x: f32, y: f32) -> f32 {
+        let at = |v: f32, size: usize| {
             // NaN becomes 0 here.
-            let v = v.max(0.0).min(size as f64 - 1.0);
+            let v = v.max(0.0).min(size as f32 - 1.0);
             let low = (v as usize).min(size.saturating_sub(2));
-            (low, (low + 1).min(size - 1), (v - low as f64) as f32)
+            (low, (low + 1).min(size - 1), v - low as f32)
         };
         let ((x0, x1, fx), (y0, y1, fy)) = (at(x, self.width), at(y, self.height));
         let value = |x: usize, y: usize| self.data[y * self.width + x];

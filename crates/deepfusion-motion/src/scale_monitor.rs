@@ -21,7 +21,7 @@ pub struct ScaleMonitorConfig {
     pub min_distance_m: f64,
     /// Smallest change that is an alarm, as a share.
     pub min_change: f64,
-    /// How far the vehicle's nose rises while it speeds up, radians to 1 m/s²; cars' do by 1.5 to 3 degrees to 1 g.
+    /// How far the vehicle's nose rises while it speeds up, radians to 1 m/s²: 2 degrees to 1 g, a guess of a car.
     pub pitch_per_acceleration: f64,
     /// The camera's height over the road in metres, where it was measured: nothing has to be learned then.
     pub height_m: Option<f64>,
@@ -145,6 +145,13 @@ impl ScaleMonitor {
             }
         }
         self.reading()
+    }
+
+    /// The next pair does not go on from the last one: how the camera was pitched and how fast it was say nothing of it.
+    /// What was learned stays.
+    pub fn pause(&mut self) {
+        self.tilt = 0.0;
+        self.speeds.clear();
     }
 
     /// A pair's costs. A camera pitches as the vehicle brakes and the road waves, which neither speed nor yaw rate tell,

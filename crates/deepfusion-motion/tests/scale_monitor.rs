@@ -2,10 +2,11 @@
 
 use deepfusion_geometry::Se3;
 use deepfusion_motion::{
-    GreyImage, GroundPair, ScaleMonitor, ScaleMonitorConfig, ScaleReading, ScaleState,
+    GreyImage, GroundPair, RoadTexture, ScaleMonitor, ScaleMonitorConfig, ScaleReading, ScaleState,
 };
 use deepfusion_sim::{SimConfig, Simulation};
 use nalgebra::Vector3;
+use std::sync::Arc;
 
 /// Width of the images, pixels.
 const WIDTH: u32 = 320;
@@ -53,7 +54,7 @@ fn zoomed(image: &GreyImage, zoom: f64) -> GreyImage {
         .flat_map(|y| (0..image.width).map(move |x| [x, y]))
         .map(|p| {
             let [x, y] = [0, 1].map(|i| middle[i] + (p[i] as f64 - middle[i]) / zoom);
-            image.sample(x, y)
+            image.sample(x as f32, y as f32)
         })
         .collect();
     GreyImage { data, ..*image }
@@ -62,16 +63,16 @@ fn zoomed(image: &GreyImage, zoom: f64) -> GreyImage {
 /// The readings after each frame; from the second stretch on the images are zoomed and the speed is told so much too high.
 fn readings(drive: &Drive, zoom: f64, speed: f64, config: ScaleMonitorConfig) -> Vec<ScaleReading> {
     let mut monitor = ScaleMonitor::new(config);
-    let images: Vec<GreyImage> = drive
+    let images: Vec<Arc<RoadTexture>> = drive
         .images
         .iter()
         .enumerate()
         .map(|(i, image)| {
-            if i < FRAMES[0] {
-                image.clone()
-            } else {
-                zoomed(image, zoom)
-            }
+            let seen = match i < FRAMES[0] {
+                true => image.clone(),
+                false => zoomed(image, zoom),
+            };
+            Arc::new(RoadTexture::from(&seen))
         })
         .collect();
     (1..images.len())
@@ -169,11 +170,12 @@ fn the_network_s_metres_stand_beside_the_vehicle_s() {
     let drive = drive(81);
     let mut monitor = ScaleMonitor::new(ScaleMonitorConfig::default());
     let mut last = None;
+    let texture = |frame: usize| Arc::new(RoadTexture::from(&drive.images[frame]));
     for i in 1..FRAMES[0] {
         let at = |frame| drive.simulation.world_from_cam(frame);
         let pair = GroundPair {
-            earlier: drive.images[i - 1].clone(),
-            later: drive.images[i].clone(),
+            earlier: texture(i - 1),
+            later: texture(i),
             intrinsics: drive.simulation.intrinsics(),
             seconds: 0.1,
             earlier_from_later: at(i - 1).inverse() * at(i),
@@ -194,11 +196,11 @@ fn images_without_a_road_and_a_standing_car_give_no_reading() {
         ..SimConfig::default()
     })
     .unwrap();
-    let flat = GreyImage {
+    let flat = Arc::new(RoadTexture::from(&GreyImage {
         width: 640,
         height: 192,
         data: vec![7.0; 640 * 192],
-    };
+    }));
     let mut monitor = ScaleMonitor::new(ScaleMonitorConfig::default());
     for way in [0.0, 1.0, f64::NAN] {
         for _ in 0..30 {

@@ -42,6 +42,19 @@ impl Prediction {
         }
     }
 
+    /// Depth at the network's size, and the camera that sees it so; `camera` is the whole image's.
+    #[must_use]
+    pub fn network_depth(&self, camera: &Intrinsics) -> (DepthMap, Intrinsics) {
+        let [x, y, w, h] = self.window;
+        let depth = DepthMap {
+            width: self.width,
+            height: self.height,
+            data: self.disparity.iter().map(|d| 1.0 / d).collect(),
+        };
+        let k = camera.cropped(x, y, w, h);
+        (depth, k.resized(self.width as u32, self.height as u32))
+    }
+
     /// Depth at the image's own size: disparity is enlarged (bilinear, half-pixel centres), then
     /// inverted; 0 outside the window that was looked at.
     #[must_use]

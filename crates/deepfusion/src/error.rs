@@ -153,6 +153,19 @@ pub enum CliError {
         /// The option.
         option: &'static str,
     },
+    /// An option of the scale monitor where nothing can be watched.
+    #[error("{input}: {why}, and `{option}` needs both speed and yaw rate")]
+    Unwatched {
+        /// The option.
+        option: &'static str,
+        /// The first input that cannot be watched.
+        input: String,
+        /// Why not.
+        why: &'static str,
+    },
+    /// A correction that follows the frames, of which this run sees a part.
+    #[error("`--correct-scale` follows all frames of a recording, and a shard sees only some")]
+    CorrectShard,
     /// A cloud without a camera.
     #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
     NoCamera,
@@ -209,6 +222,8 @@ impl CliError {
             Self::OnlyLive { .. } => {
                 Some("leave it out, or give camera:0, an address such as rtsp://…, or - for standard input".into())
             }
+            Self::Unwatched { .. } => Some("leave it out, or give recordings with speed and yaw rate alone".into()),
+            Self::CorrectShard => Some("leave --shard out: give each run recordings of its own".into()),
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
         }
     }

@@ -1,8 +1,6 @@
 //! Three stages at once, on threads of their own, with bounded queues between them: what comes before the
 //! network, the network, what comes after it.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use crossbeam_channel::bounded;
 
 /// How many items may wait for the next stage, for every thread that makes or takes them: enough to even out
@@ -32,7 +30,8 @@ impl Threads {
 
 /// Runs `before`, `middle` and `after` for the items 0 to `items` − 1, the stages at the same time; `middle` on
 /// the calling thread. An item of which `before` makes nothing goes no further. Once `stop` says so, nothing new is
-/// begun; what has left the middle is still finished. Items may overtake each other.
+/// begun; what has left the middle is still finished. `middle` takes the items in their order; behind it they may overtake
+/// each other.
 pub fn run<P: Send, O: Send>(
     items: usize,
     threads: Threads,
@@ -41,26 +40,23 @@ pub fn run<P: Send, O: Send>(
     mut middle: impl FnMut(P) -> O,
     after: &(dyn Fn(usize, O) + Sync),
 ) {
-    let next = AtomicUsize::new(0);
-    let (to_middle, prepared) = bounded(threads.before * WAITING_PER_THREAD);
+    let makers = threads.before.max(1);
     let (to_after, computed) = bounded(threads.after * WAITING_PER_THREAD);
     std::thread::scope(|scope| {
-        for _ in 0..threads.before.max(1) {
-            let (to_middle, next) = (to_middle.clone(), &next);
-            scope.spawn(move || {
-                while !stop() {
-                    let item = next.fetch_add(1, Ordering::Relaxed);
-                    if item >= items {
-                        break;
+        // In turn, each from a queue of its own: so they come in order whoever is done first.
+        let prepared: Vec<_> = (0..makers)
+            .map(|first| {
+                let (to_middle, prepared) = bounded(WAITING_PER_THREAD);
+                scope.spawn(move || {
+                    for item in (first..items).step_by(makers) {
+                        if stop() || to_middle.send(before(item)).is_err() {
+                            break;
+                        }
                     }
-                    if let Some(made) = before(item)
-                        && to_middle.send((item, made)).is_err()
-                    {
-                        break;
-                    }
-                }
-            });
-        }
+                });
+                prepared
+            })
+            .collect();
         for _ in 0..threads.after.max(1) {
             let computed = computed.clone();
             scope.spawn(move || {
@@ -70,13 +66,18 @@ pub fn run<P: Send, O: Send>(
             });
         }
         // The threads hold the other ends: the loops end when those do.
-        drop((to_middle, computed));
-        for (item, made) in prepared {
+        drop(computed);
+        for item in 0..items {
+            // A maker that ends early was told to stop.
+            let Ok(made) = prepared[item % makers].recv() else {
+                break;
+            };
+            let Some(made) = made else { continue };
             if stop() || to_after.send((item, middle(made))).is_err() {
                 break;
             }
         }
-        drop(to_after);
+        drop((prepared, to_after));
     });
 }
 
@@ -84,6 +85,7 @@ pub fn run<P: Send, O: Send>(
 mod tests {
     use super::*;
     use std::sync::Mutex;
+    use std::sync::atomic::{AtomicUsize, Ordering};
     use std::time::{Duration, Instant};
 
     const THREADS: Threads = Threads {
@@ -103,6 +105,30 @@ mod tests {
             .filter(|i| i % 10 != 3)
             .map(|i| (i, 2 * i + 1))
             .collect::<Vec<_>>();
+        assert_eq!(seen, expected);
+    }
+
+    #[test]
+    fn the_middle_takes_items_in_their_order() {
+        let before = |i: usize| {
+            // The even ones are late.
+            std::thread::sleep(Duration::from_micros(if i.is_multiple_of(2) {
+                300
+            } else {
+                10
+            }));
+            (i % 7 != 3).then_some(i)
+        };
+        let mut seen = Vec::new();
+        run(
+            200,
+            THREADS,
+            &|| false,
+            &before,
+            |i| seen.push(i),
+            &|_, ()| (),
+        );
+        let expected: Vec<usize> = (0..200).filter(|i| i % 7 != 3).collect();
         assert_eq!(seen, expected);
     }
 

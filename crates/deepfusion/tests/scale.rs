@@ -90,4 +90,22 @@ fn a_zoom_is_noticed_and_depth_brought_back() {
         &format!("predict --model run {DRIVE} --save depth-png --out corrected"),
         &["another --correct-scale"],
     );
+    // Where nothing is watched, nothing is silently left undone.
+    let images = format!("{DRIVE}/image_02/data");
+    fails(
+        at,
+        &format!("predict --model run {images} --camera-height 1.6 --out none"),
+        &["an image stands for itself", "--camera-height", "hint:"],
+    );
+    fails(
+        at,
+        "perceive --model run tcp://127.0.0.1:9 --correct-scale --out none",
+        &["a live source tells no motion", "--correct-scale"],
+    );
+    fails(
+        at,
+        &format!("predict --model run {DRIVE} --shard 1/2 --correct-scale --out none"),
+        &["a shard sees only some"],
+    );
+    assert!(!at.join("none").exists());
 }

@@ -140,7 +140,7 @@ fn refine(
     inside(a, at)?;
     for (i, (value, slope)) in patch.iter_mut().zip(&mut slopes).enumerate() {
         let p = at + place(i);
-        let v = |dx: f64, dy: f64| f64::from(a.sample(p.x + dx, p.y + dy));
+        let v = |dx: f64, dy: f64| f64::from(a.sample((p.x + dx) as f32, (p.y + dy) as f32));
         *value = v(0.0, 0.0);
         *slope = 0.5 * Vector2::new(v(1.0, 0.0) - v(-1.0, 0.0), v(0.0, 1.0) - v(0.0, -1.0));
     }
@@ -157,7 +157,7 @@ fn refine(
         let mut seen = [0.0; SIDE * SIDE];
         for (i, value) in seen.iter_mut().enumerate() {
             let p = at + by + place(i);
-            *value = f64::from(b.sample(p.x, p.y));
+            *value = f64::from(b.sample(p.x as f32, p.y as f32));
         }
         let seen_mean = self::mean(&seen);
         let mut gradient = Vector2::zeros();

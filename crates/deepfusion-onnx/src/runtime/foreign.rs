@@ -5,7 +5,7 @@ use std::path::Path;
 use ort::session::Session;
 use ort::value::{TensorElementType, TensorRef};
 
-use super::{Library, environment, refused};
+use super::{Library, refused, session};
 use crate::Error;
 
 /// What a model says of an input or an output.
@@ -42,16 +42,7 @@ impl ForeignModel {
     /// As [`super::find`]; [`Error::Library`] where this process uses another library already, [`Error::Runtime`]
     /// for a model that the library refuses.
     pub fn load(library: Option<&Path>, model: &[u8], threads: usize) -> Result<Self, Error> {
-        let (library, environment) = environment(library)?;
-        let builder = Session::builder(&environment);
-        let mut builder = builder.map_err(|e| refused("make a session", e))?;
-        if threads > 0 {
-            builder = builder
-                .with_intra_threads(threads)
-                .map_err(|e| refused("set the number of threads", e))?;
-        }
-        let session = builder.commit_from_memory(model);
-        let session = session.map_err(|e| refused("load the model", e))?;
+        let (session, library) = session(library, model, threads)?;
         Ok(Self { session, library })
     }
 

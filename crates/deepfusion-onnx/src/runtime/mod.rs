@@ -40,16 +40,7 @@ impl OrtEngine {
     /// [`Error::Runtime`] for a model that the library refuses, [`Error::Model`] for one that is no depth
     /// model.
     pub fn load(library: Option<&Path>, model: &[u8], threads: usize) -> Result<Self, Error> {
-        let (library, environment) = environment(library)?;
-        let builder = Session::builder(&environment);
-        let mut builder = builder.map_err(|e| refused("make a session", e))?;
-        if threads > 0 {
-            builder = builder
-                .with_intra_threads(threads)
-                .map_err(|e| refused("set the number of threads", e))?;
-        }
-        let session = builder.commit_from_memory(model);
-        let session = session.map_err(|e| refused("load the model", e))?;
+        let (session, library) = session(library, model, threads)?;
         let (width, height) = size_of(&session)?;
         Ok(Self {
             session,
@@ -173,6 +164,25 @@ fn size_of(session: &Session) -> Result<(usize, usize), Error> {
         part: "input",
         reason: "no 1×H×W×3 picture of bytes named `image`".into(),
     })
+}
+
+/// A session for a model, and the library that it is in; `threads` as for [`OrtEngine::load`].
+fn session(
+    library: Option<&Path>,
+    model: &[u8],
+    threads: usize,
+) -> Result<(Session, Library), Error> {
+    let (library, environment) = environment(library)?;
+    let builder = Session::builder(&environment);
+    let mut builder = builder.map_err(|e| refused("make a session", e))?;
+    if threads > 0 {
+        builder = builder
+            .with_intra_threads(threads)
+            .map_err(|e| refused("set the number of threads", e))?;
+    }
+    let session = builder.commit_from_memory(model);
+    let session = session.map_err(|e| refused("load the model", e))?;
+    Ok((session, library))
 }
 
 /// Opens the library, or gives the one that is open.

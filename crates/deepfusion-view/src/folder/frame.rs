@@ -53,15 +53,8 @@ pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
         .as_ref()
         .map(|s| (numbers::<4>(s.get("intrinsics")), said_size))
     {
-        Some((Some([fx, fy, cx, cy]), Some((width, height)))) => {
-            let camera = Intrinsics {
-                fx,
-                fy,
-                cx,
-                cy,
-                width,
-                height,
-            };
+        Some((Some(k), Some((width, height)))) => {
+            let camera = Intrinsics::from_numbers(k, (width, height));
             match camera.implausible() {
                 None => frame["intrinsics"] = json!(camera),
                 Some(why) => problems.push(format!("the sidecar's camera cannot be: {why}")),

@@ -18,7 +18,7 @@ use self::record::Lines;
 use super::live as sources;
 use super::predict::Job;
 use super::predict::inputs::{self, Input};
-use super::scene::MotionTracker;
+use super::scene::{MotionTracker, ScaleWatch};
 use crate::cli::{PerceiveArgs, PredictionArgs};
 use crate::error::{CliError, hint_of, told};
 use crate::pipeline::{self, Threads};
@@ -35,6 +35,7 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
         (None, Some(_)) => return Err(CliError::OnlyLive { option: "--speed" }.into()),
         (None, None) => inputs::find(&prediction.inputs, &prediction.open_options())?,
     };
+    ScaleWatch::check(prediction, source.as_ref(), &all)?;
     let mut config = read_config(args.config.as_deref(), PerceptionConfig::predicted())?;
     if let Some(far) = args.max_depth {
         config.max_depth_m = far as f32;

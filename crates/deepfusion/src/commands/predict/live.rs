@@ -8,6 +8,7 @@ use super::manifest::Lock;
 use super::{Job, tell_assumed};
 use crate::cli::{PredictArgs, Shard};
 use crate::commands::live::{self, Feed, LiveMark};
+use crate::commands::scene::ScaleWatch;
 use crate::error::CliError;
 use crate::progress::say;
 use crate::{engine, interrupt, output};
@@ -18,6 +19,7 @@ pub fn run(args: &PredictArgs, address: &Address) -> Result<()> {
     if args.shard != Shard::WHOLE {
         return Err(CliError::LiveShard.into());
     }
+    ScaleWatch::check(prediction, Some(address), &[])?;
     let predictor = engine::load(&prediction.model, &prediction.engine)?;
     let job = Job::new(prediction, args.outputs(), &predictor)?;
     if args.save.iter().any(|save| save.is_cloud()) && matches!(job.camera, CameraSource::Unknown) {

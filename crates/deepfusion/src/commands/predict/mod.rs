@@ -24,7 +24,7 @@ use self::sidecar::{FileMark, MadeWith, Sidecar};
 use self::watcher::Watcher;
 use super::live::LiveMark;
 use super::perceive::pictures;
-use super::scene::Scale;
+use super::scene::{Scale, ScaleWatch};
 use super::{device, live as sources};
 use crate::cli::{Outputs, PredictArgs, PredictionArgs, Save, Shard};
 use crate::engine;
@@ -75,6 +75,10 @@ pub fn run(args: &PredictArgs) -> Result<()> {
         return live::run(args, &address);
     }
     let all = inputs::find(&prediction.inputs, &prediction.open_options())?;
+    ScaleWatch::check(prediction, None, &all)?;
+    if prediction.correct_scale && *shard != Shard::WHOLE {
+        return Err(CliError::CorrectShard.into());
+    }
     let mine: Vec<&Input> = shard.part_of(&all).collect();
     let predictor = engine::load(&prediction.model, &prediction.engine)?;
     let job = Job::new(prediction, args.outputs(), &predictor)?;
@@ -183,11 +187,7 @@ fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], le
         }
     };
     let stop = || interrupt::asked() || ledger.stopped();
-    let mut threads = Threads::for_this_machine();
-    if mine.iter().any(|input| input.frame.is_some()) {
-        // One thread reads: a recording's frames stay in their order, as the watch over its metres needs them.
-        threads.before = 1;
-    }
+    let threads = Threads::for_this_machine();
     pipeline::run(todo.len(), threads, &stop, &load, infer, &write);
 }
 

@@ -4,7 +4,7 @@ use deepfusion_geometry::Intrinsics;
 use deepfusion_perception::{Ground, PerceptionConfig, Rays};
 use deepfusion_train::Prediction;
 
-use super::super::scene::{MotionTracker, Scale, ScaleWatch, working_depth};
+use super::super::scene::{MotionTracker, Scale, ScaleWatch};
 use super::Loaded;
 use super::inputs::Input;
 use crate::cli::PredictionArgs;
@@ -44,7 +44,7 @@ impl Watcher {
         }
         motion.stamp?;
         let camera = loaded.camera?;
-        let (depth, k) = working_depth(&prediction.depth(), &camera);
+        let (depth, k) = prediction.network_depth(&camera);
         if self.rays.as_ref().is_none_or(|(before, _)| *before != k) {
             self.rays = Some((k, Rays::of(&k)));
             self.ground = None;

@@ -28,6 +28,11 @@ pub struct Motion {
     pub down_in_cam: Option<Vector3<f64>>,
 }
 
+/// Whether a recording tells how its camera moved.
+pub fn motion_known(dataset: &Dataset) -> bool {
+    dataset.track().is_some() && dataset.yaw_known()
+}
+
 /// Adds up the camera's way over the frames of a recording.
 #[derive(Debug, Default)]
 pub struct MotionTracker {
@@ -54,8 +59,8 @@ impl MotionTracker {
             Some((world_from_cam * motion, motion, dt))
         });
         // The first frame of a recording whose motion is known begins a way.
-        let known = dataset.track().is_some() && dataset.yaw_known();
-        let world_from_cam = step.map(|(pose, ..)| pose).or(known.then(Se3::identity));
+        let begun = motion_known(dataset).then(Se3::identity);
+        let world_from_cam = step.map(|(pose, ..)| pose).or(begun);
         let stamp = world_from_cam
             .zip(frame.time_s)
             .map(|(world_from_cam, time_s)| Stamp {

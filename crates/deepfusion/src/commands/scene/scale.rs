@@ -1,17 +1,23 @@
 //! Whether a recording's metres still are what they were.
 
-use deepfusion_data::{RgbImage, grey_image};
+use std::fmt::Display;
+use std::sync::Arc;
+
+use deepfusion_data::{Address, RgbImage, grey_image};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_motion::{
-    GreyImage, GroundPair, ScaleCorrection, ScaleMonitor, ScaleMonitorConfig, ScaleReading,
+    GroundPair, RoadTexture, ScaleCorrection, ScaleMonitor, ScaleMonitorConfig, ScaleReading,
     ScaleState,
 };
 use deepfusion_perception::Ground;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::super::predict::inputs::Input;
 use super::Motion;
+use super::motion::motion_known;
 use crate::cli::PredictionArgs;
+use crate::error::CliError;
 
 /// Width of the images that the scale is watched in.
 const WIDTH: u32 = 320;
@@ -35,7 +41,7 @@ pub struct ScaleWatch {
     camera: Option<Intrinsics>,
     monitor: ScaleMonitor,
     correction: Option<ScaleCorrection>,
-    last: Option<GreyImage>,
+    last: Option<Arc<RoadTexture>>,
     drift_told: bool,
 }
 
@@ -52,6 +58,44 @@ impl ScaleWatch {
             correct: args.correct_scale,
             config,
         }
+    }
+
+    /// That the monitor's options are not given where it would never look: they would change nothing, silently.
+    ///
+    /// # Errors
+    /// [`CliError::Unwatched`].
+    pub fn check(
+        args: &PredictionArgs,
+        source: Option<&Address>,
+        inputs: &[Input],
+    ) -> Result<(), CliError> {
+        let option = match args {
+            args if args.correct_scale => "--correct-scale",
+            args if args.camera_height.is_some() => "--camera-height",
+            _ => return Ok(()),
+        };
+        let unwatched = |input: &dyn Display, why| CliError::Unwatched {
+            option,
+            input: input.to_string(),
+            why,
+        };
+        if let Some(address) = source {
+            return Err(unwatched(address, "a live source tells no motion"));
+        }
+        for input in inputs {
+            match &input.frame {
+                None => {
+                    let path = input.path.display();
+                    return Err(unwatched(&path, "an image stands for itself"));
+                }
+                Some((dataset, _)) if !motion_known(dataset) => {
+                    let name = dataset.name();
+                    return Err(unwatched(&name, "its motion is not known"));
+                }
+                Some(_) => {}
+            }
+        }
+        Ok(())
     }
 
     /// Begins anew where another camera begins: nothing that was learned of the last one holds for it.
@@ -82,15 +126,16 @@ impl ScaleWatch {
         motion: &Motion,
         ground: Option<&Ground>,
     ) -> Option<Scale> {
-        if motion.stamp.is_none() {
-            // A frame that stands for itself moves by nothing that is known.
+        if !motion.goes_on {
+            self.monitor.pause();
             self.last = None;
-            return None;
         }
+        // A frame that stands for itself moves by nothing that is known.
+        motion.stamp?;
         self.meet(camera);
         let width = WIDTH.min(camera.width);
         let height = (width * camera.height).div_ceil(camera.width).max(1);
-        let later = grey_image(image, width, height);
+        let later = Arc::new(RoadTexture::from(&grey_image(image, width, height)));
         let earlier = self.last.replace(later.clone());
         // The mount knows better than a single image's ground where down is.
         let seen = || ground.map(|ground| -Vector3::from(ground.up.map(f64::from)));
