@@ -17,6 +17,9 @@ const MIN_VISIBLE_HEIGHT: f32 = 0.25;
 /// How often the boxes are fitted again by what those in their row say.
 const ROUNDS: usize = 2;
 
+/// How things are usually turned at a place on the ground.
+pub(crate) type UsualTurn<'a> = dyn Fn([f32; 2]) -> Turn + Sync + 'a;
+
 /// A box and what it was made from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detection {
@@ -73,6 +76,20 @@ pub fn detect(
     ground: &Ground,
     config: &PerceptionConfig,
 ) -> Vec<Detection> {
+    let ahead = |_| Turn::ahead();
+    detect_turned(depth, obstacles, instances, rays, ground, &ahead, config)
+}
+
+/// As [`detect`], where somebody knows how things are usually turned at a place on the ground (right, forward).
+pub(crate) fn detect_turned(
+    depth: &[f32],
+    obstacles: &Obstacles,
+    instances: &[Instance],
+    rays: &Rays,
+    ground: &Ground,
+    usual_turn: &UsualTurn,
+    config: &PerceptionConfig,
+) -> Vec<Detection> {
     let area = depth.len() as f32 / (640.0 * 192.0);
     let min_pixels = ((config.min_pixels * area) as usize).max(4);
     let named = |instance: &Instance| {
@@ -101,7 +118,7 @@ pub fn detect(
             }
         }
     }
-    without_parts(in_rows(candidates, config))
+    without_parts(in_rows(candidates, usual_turn, config))
 }
 
 /// A cluster that may be a target.
@@ -113,14 +130,22 @@ struct Candidate {
 }
 
 /// Their boxes, fitted again as those beside each say that it is turned.
-fn in_rows(candidates: Vec<Candidate>, config: &PerceptionConfig) -> Vec<Detection> {
+fn in_rows(
+    candidates: Vec<Candidate>,
+    usual_turn: &UsualTurn,
+    config: &PerceptionConfig,
+) -> Vec<Detection> {
     let mut votes: Vec<Vote> = candidates.iter().map(|c| c.vote).collect();
     for _ in 0..ROUNDS {
         votes = candidates
             .par_iter()
             .enumerate()
             .map(|(i, candidate)| {
-                fit(&candidate.silhouette, expected(&votes, i)).unwrap_or(candidate.vote)
+                fit(
+                    &candidate.silhouette,
+                    expected(&votes, i, usual_turn(votes[i].at)),
+                )
+                .unwrap_or(candidate.vote)
             })
             .collect();
     }

@@ -1,5 +1,6 @@
-use crate::detect::detect;
+use crate::detect::detect_turned;
 use crate::edges::without_flying_pixels;
+use crate::parking::{Parking, View};
 use crate::tracking::{Now, Tracker};
 use crate::{
     Detection, Error, Ground, Instance, Obstacles, PerceptionConfig, Rays, Result, Target,
@@ -36,6 +37,7 @@ pub struct Perception {
     ground: Option<Ground>,
     rays: Option<(Intrinsics, Rays)>,
     obstacles: Obstacles,
+    parking: Parking,
 }
 
 impl Perception {
@@ -63,6 +65,7 @@ impl Perception {
     /// Forgets the past: what comes next does not go on from what was.
     pub fn forget(&mut self) {
         self.tracker.forget();
+        self.parking.forget();
         self.ground = None;
     }
 
@@ -129,14 +132,26 @@ impl Perception {
         };
         self.obstacles
             .find(&depth.data, rays, &ground, &self.config);
-        let detections = detect(
+        let pose = stamp.as_ref().map(|stamp| &stamp.world_from_cam);
+        self.parking.recall(&ground, pose);
+        let detections = detect_turned(
             &depth.data,
             &self.obstacles,
             instances,
             rays,
             &ground,
+            &|at| self.parking.usual_turn(at),
             &self.config,
         );
+        let moving: Vec<_> = self.tracker.moving().collect();
+        let view = View {
+            depth: &depth.data,
+            obstacles: &self.obstacles,
+            rays,
+            ground: &ground,
+            config: &self.config,
+        };
+        let detections = self.parking.complete(detections, &moving, view, pose);
         let mut targets = match stamp {
             Some(stamp) => self.tracker.step(
                 &detections,

@@ -88,12 +88,12 @@ impl Vote {
     }
 }
 
-/// How the `index`-th is expected to be turned by what the others in its row say.
-pub fn expected(votes: &[Vote], index: usize) -> Turn {
+/// How the `index`-th is expected to be turned by what is `usual` there, and by what the others in its row say.
+pub fn expected(votes: &[Vote], index: usize, usual: Turn) -> Turn {
     let others = votes.iter().enumerate().filter(|(i, _)| *i != index);
     others
         .filter_map(|(_, vote)| vote.on(votes[index].at))
-        .fold(Turn::ahead(), Turn::plus)
+        .fold(usual, Turn::plus)
         .at_most(MOST[2])
 }
 
@@ -124,9 +124,9 @@ mod tests {
         let beside = vote([5.0, 15.2], FRAC_PI_2, 0.0);
         let in_the_lane = vote([0.5, 12.0], FRAC_PI_2, 0.0);
         let votes = [clear, beside, in_the_lane];
-        assert!(expected(&votes, 1).angle().abs() < 0.1);
+        assert!(expected(&votes, 1, Turn::ahead()).angle().abs() < 0.1);
         // Neither beside nor before it: as the road.
-        assert_eq!(expected(&votes, 2), Turn::ahead());
+        assert_eq!(expected(&votes, 2, Turn::ahead()), Turn::ahead());
     }
 
     #[test]
@@ -136,7 +136,7 @@ mod tests {
             vote([6.0, 13.0], 0.0, 0.0),
             vote([6.0, 16.0], FRAC_PI_2, 3.0),
         ];
-        assert!(expected(&votes, 1).angle().abs() < 0.2);
+        assert!(expected(&votes, 1, Turn::ahead()).angle().abs() < 0.2);
     }
 
     #[test]

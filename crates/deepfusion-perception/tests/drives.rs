@@ -14,7 +14,8 @@ fn drive(scene: Scene, seed: u64) -> SimConfig {
     }
 }
 
-/// On many streets (`deepfusion eval-targets --depth truth`, docs/BENCHMARKS.md) both are above 0.9; these few are a sample.
+/// On many streets (`deepfusion eval-targets --depth truth`, docs/BENCHMARKS.md) both are above 0.9; these few were chosen
+/// among those that were measured: they keep what was reached, they do not show it.
 #[test]
 fn targets_of_true_depth_are_where_the_simulator_put_them() {
     let drives = [
@@ -35,14 +36,13 @@ fn targets_of_true_depth_are_where_the_simulator_put_them() {
     assert!(score.identity_switches <= 6, "{score:?}");
 }
 
-/// Cars doors to doors along an aisle, behind pillars: less is found there than on a street (docs/BENCHMARKS.md), but no
-/// less than this.
+/// Cars doors to doors along an aisle, behind pillars: a row tells where those stand of which little is seen.
 #[test]
-fn a_row_of_cars_in_a_garage_is_told_apart_more_often_than_not() {
+fn rows_of_cars_in_a_garage_are_told_apart() {
     let score = common::score(&[drive(Scene::Garage, 71), drive(Scene::Garage, 75)]);
     assert!(score.labels > 300, "{score:?}");
-    assert!(score.recall.unwrap() >= 0.5, "{score:?}");
-    assert!(score.precision.unwrap() >= 0.65, "{score:?}");
+    assert!(score.recall.unwrap() >= 0.8, "{score:?}");
+    assert!(score.precision.unwrap() >= 0.85, "{score:?}");
     assert!(score.center_error_m.unwrap() <= 0.5, "{score:?}");
-    assert!(score.yaw_error_deg.unwrap() <= 16.0, "{score:?}");
+    assert!(score.yaw_error_deg.unwrap() <= 10.0, "{score:?}");
 }

@@ -103,6 +103,11 @@ impl Track {
         }
     }
 
+    /// Whether it is said to move.
+    pub fn is_moving(&self) -> bool {
+        self.moving == Some(true)
+    }
+
     pub fn predict(&mut self, dt: f64) {
         self.filter.predict(dt);
         self.unseen_s += dt;

@@ -45,6 +45,12 @@ impl Tracker {
         self.time_s = None;
     }
 
+    /// Where what moves was last, in the world.
+    pub fn moving(&self) -> impl Iterator<Item = Vector3<f64>> {
+        let moving = self.tracks.iter().filter(|track| track.is_moving());
+        moving.map(Track::centre)
+    }
+
     /// Takes a frame's detections in and tells the targets that are there.
     pub fn step(
         &mut self,

@@ -1,0 +1,95 @@
+//! A car of a row: a box of usual size, square to it.
+
+use super::parts::Seen;
+use super::{CAR, Row, View};
+use crate::clusters::Cluster;
+use crate::{Detection, GroundBox, Run};
+
+/// Where a car's near end may lie off the row's middle, away from the lane, metres.
+const FRONT_M: [f32; 2] = [-3.0, -1.5];
+/// What is taken to be seen of a length, at least: the row tells how it is turned, and where it stands.
+const KNOWN: f32 = 0.4;
+
+/// No car is lower, metres: of some only the lower part is seen.
+const LOWEST_M: f32 = 1.3;
+
+/// The car at a place along a row that some points belong to, and whether its front is seen, which says where it stands.
+pub fn car(along: f32, points: &[&Seen], row: &Row, view: &View) -> Option<(Detection, bool)> {
+    let mut alongs = points.iter().map(|p| p.along).collect();
+    let [first, last] = ends(&mut alongs, 1000)?;
+    let away = row.at(along).signum();
+    let mut off = points.iter().map(|p| away * p.off).collect();
+    let [near, far] = ends(&mut off, 20)?;
+    let mut heights = points.iter().map(|p| p.height).collect();
+    let [_, top] = ends(&mut heights, 100)?;
+    if top < view.config.min_target_height_m {
+        return None;
+    }
+    let front = (FRONT_M[0]..FRONT_M[1]).contains(&near);
+    let behind_front = if front { near + 0.5 * CAR[0] } else { 0.0 };
+    let middle = row.place(along, away * behind_front);
+    let place = GroundBox {
+        middle,
+        angle: row.angle(along).rem_euclid(std::f32::consts::PI),
+        footprint: CAR,
+        heights: [0.0, top.max(LOWEST_M)],
+        seen: [
+            ((far - near) / CAR[0]).clamp(KNOWN, 1.0),
+            ((last - first) / CAR[1]).clamp(0.1, 1.0),
+        ],
+        anchor: middle,
+    };
+    let mut pixels: Vec<u32> = points.iter().map(|p| p.pixel).collect();
+    pixels.sort_unstable();
+    let cluster = cluster(&pixels, view.rays.x.len() as u32);
+    let detection = Detection {
+        place,
+        pixels: cluster.pixels,
+        bounds: cluster.bounds(),
+        runs: cluster.runs,
+        confidence: 0.5 * (place.seen[0] + place.seen[1]),
+        kind: None,
+    };
+    Some((detection, front))
+}
+
+/// The least and the largest of some values, but for one in so many at both ends.
+fn ends(values: &mut Vec<f32>, stray: usize) -> Option<[f32; 2]> {
+    values.sort_unstable_by(f32::total_cmp);
+    let stray = values.len() / stray;
+    let last = values.len().checked_sub(1 + stray)?;
+    Some([*values.get(stray)?, *values.get(last)?])
+}
+
+/// A cluster of some pixels, in their order.
+fn cluster(pixels: &[u32], width: u32) -> Cluster {
+    let mut runs: Vec<Run> = Vec::new();
+    for pixel in pixels {
+        let (v, u) = (pixel / width, pixel % width);
+        match runs.last_mut() {
+            Some(run) if run.v == v && run.to == u => run.to += 1,
+            _ => runs.push(Run {
+                v,
+                from: u,
+                to: u + 1,
+            }),
+        }
+    }
+    Cluster {
+        runs,
+        pixels: pixels.len(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbouring_pixels_are_runs() {
+        let made = cluster(&[8, 9, 10, 13, 20], 10);
+        let runs: Vec<_> = made.runs.iter().map(|r| (r.v, r.from, r.to)).collect();
+        assert_eq!(runs, [(0, 8, 10), (1, 0, 1), (1, 3, 4), (2, 0, 1)]);
+        assert_eq!(made.pixels, 5);
+    }
+}

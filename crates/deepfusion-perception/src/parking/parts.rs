@@ -1,0 +1,283 @@
+//! What stands on the line of a row, parted by its gaps.
+
+use super::{CAR, HALF_M, Row, View};
+use crate::Detection;
+use crate::obstacles::NONE;
+
+/// Cells in which it is told whether something rises to the ceiling, metres, and how many of them to the sides and ahead.
+const CELL_M: f32 = 0.25;
+/// See [`CELL_M`].
+const CELLS: [usize; 2] = [160, 280];
+/// What rises above this is a pillar, metres; a car does not.
+const TALL_M: f32 = 2.1;
+/// Heights at which a car is seen, metres.
+const HEIGHTS_M: [f32; 2] = [0.1, 2.0];
+/// How far to the side something may stand, metres.
+const SIDE_M: f32 = 14.0;
+/// Size of the places along a row that are free or not, and from how much free a gap is one, metres.
+const PLACE_M: f32 = 0.1;
+/// See [`PLACE_M`].
+const GAP_M: f32 = 0.25;
+/// Widest part that is one car, and from one car to the next, metres.
+const WIDEST_M: f32 = 2.4;
+/// See [`WIDEST_M`].
+const BAY_M: f32 = 2.6;
+/// More than so many that cannot be told apart are a wall or a hedge.
+const MOST_CARS: usize = 3;
+/// Least depth of one car, and of several that cannot be told apart, across the row, metres: a fence has less.
+const DEPTH_M: [f32; 2] = [0.15, 0.5];
+/// A part as wide as this shows both ends of a car, metres.
+const WHOLE_M: f32 = 1.4;
+/// How much of a car's side must be seen to say where its near end is, metres.
+const SIDE_SEEN_M: f32 = 0.5;
+/// Width of the places, across the row, of which the nearest point is taken to find a side's direction, how many of them
+/// there are, how many must show the side, and how far they may lie off one line, metres.
+const STRIP_M: f32 = 0.25;
+/// See [`STRIP_M`].
+const STRIPS: usize = 24;
+/// See [`STRIP_M`].
+const SIDE_STRIPS: usize = 5;
+/// See [`STRIP_M`].
+const STRAIGHT_M: f32 = 0.08;
+/// Steepest direction of a side that still is one.
+const STEEPEST: f32 = 0.7;
+
+/// A point of an obstacle that may be a car.
+struct Point {
+    at: [f32; 2],
+    height: f32,
+    pixel: u32,
+}
+
+/// What stands about, without what rises to the ceiling.
+pub struct Standing {
+    points: Vec<Point>,
+}
+
+impl Standing {
+    /// In an image, but for the pixels of what is known not to be parked.
+    pub fn find(view: &View, others: &[&Detection]) -> Self {
+        let width = view.rays.x.len();
+        let mut taken = vec![false; view.depth.len()];
+        for run in others.iter().flat_map(|detection| &detection.runs) {
+            let row = run.v as usize * width;
+            taken[row + run.from as usize..row + run.to as usize].fill(true);
+        }
+        let mut points = Vec::new();
+        let mut tall = vec![false; CELLS[0] * CELLS[1]];
+        for (pixel, height) in view.obstacles.height.iter().enumerate() {
+            if *height == NONE || taken[pixel] {
+                continue;
+            }
+            let z = view.depth[pixel];
+            let p = view.rays.point(pixel % width, pixel / width, z);
+            let [right, forward, _] = view.ground.locate(p);
+            let at = [right, forward];
+            if right.abs() > SIDE_M {
+                continue;
+            }
+            if *height > TALL_M {
+                if let Some(cell) = cell(at) {
+                    tall[cell] = true;
+                }
+            } else if (HEIGHTS_M[0]..HEIGHTS_M[1]).contains(height) {
+                points.push(Point {
+                    at,
+                    height: *height,
+                    pixel: pixel as u32,
+                });
+            }
+        }
+        points.retain(|p| cell(p.at).is_none_or(|cell| !tall[cell]));
+        Self { points }
+    }
+
+    /// What of it stands on a row between two places along it, in their order.
+    pub fn parts(&self, row: &Row, [from, to]: [f32; 2], view: &View) -> Vec<Part> {
+        let places = ((to - from).max(0.0) / PLACE_M) as usize + 1;
+        let mut taken = vec![false; places];
+        let mut there = Vec::new();
+        for point in &self.points {
+            if point.at[1] < from - HALF_M || point.at[1] > to + HALF_M {
+                continue;
+            }
+            let [along, off] = row.locate(point.at);
+            if off.abs() < HALF_M && along > from && along < to {
+                let place = ((along - from) / PLACE_M) as usize;
+                taken[place] = true;
+                there.push((
+                    place,
+                    Seen {
+                        along,
+                        off,
+                        height: point.height,
+                        pixel: point.pixel,
+                    },
+                ));
+            }
+        }
+        let mut parts: Vec<Part> = Vec::new();
+        let mut part_of = vec![0; places];
+        let mut last: Option<usize> = None;
+        for place in (0..places).filter(|place| taken[*place]) {
+            let near = last.is_some_and(|last| ((place - last - 1) as f32) * PLACE_M < GAP_M);
+            let start = from + place as f32 * PLACE_M;
+            match parts.last_mut().filter(|_| near) {
+                Some(part) => part.along[1] = start + PLACE_M,
+                None => parts.push(Part {
+                    along: [start, start + PLACE_M],
+                    points: Vec::new(),
+                }),
+            }
+            part_of[place] = parts.len() - 1;
+            last = Some(place);
+        }
+        for (place, seen) in there {
+            parts[part_of[place]].points.push(seen);
+        }
+        let area = view.depth.len() as f32 / (640.0 * 192.0);
+        let least = ((view.config.min_pixels * area) as usize).max(4);
+        parts.retain(|part| part.points.len() >= least);
+        parts
+    }
+}
+
+fn cell([right, forward]: [f32; 2]) -> Option<usize> {
+    let x = right / CELL_M + 0.5 * CELLS[0] as f32;
+    let y = forward / CELL_M;
+    let inside = x >= 0.0 && y >= 0.0 && (x as usize) < CELLS[0] && (y as usize) < CELLS[1];
+    inside.then(|| y as usize * CELLS[0] + x as usize)
+}
+
+/// A point as its row has it, metres.
+pub struct Seen {
+    /// Along the line.
+    pub along: f32,
+    /// To the right of the row's line.
+    pub off: f32,
+    /// Over the ground.
+    pub height: f32,
+    /// Which it is.
+    pub pixel: u32,
+}
+
+/// What stands together on a row.
+pub struct Part {
+    /// From where to where along it, metres.
+    pub along: [f32; 2],
+    points: Vec<Seen>,
+}
+
+impl Part {
+    /// Where the middles of the cars are that it is, along the row, and their points.
+    pub fn cars(&self, row: &Row, view: &View) -> Vec<(f32, Vec<&Seen>)> {
+        let [from, to] = self.along;
+        let width = to - from;
+        let count = match width > WIDEST_M {
+            true => ((width + 0.5) / BAY_M).round().max(1.0) as usize,
+            false => 1,
+        };
+        if count > MOST_CARS || self.depth() < DEPTH_M[usize::from(count > 1)] {
+            return Vec::new();
+        }
+        if count == 1 {
+            return vec![(self.middle(row, view), self.points.iter().collect())];
+        }
+        let (piece, step) = (width / count as f32, (width - CAR[1]) / (count - 1) as f32);
+        let which = |p: &Seen| (((p.along - from) / piece) as usize).min(count - 1);
+        (0..count)
+            .map(|i| {
+                let own = self.points.iter().filter(|p| which(p) == i).collect();
+                (from + 0.5 * CAR[1] + i as f32 * step, own)
+            })
+            .collect()
+    }
+
+    /// How deep it is across the row, metres.
+    fn depth(&self) -> f32 {
+        let mut off: Vec<f32> = self.points.iter().map(|p| p.off).collect();
+        off.sort_unstable_by(f32::total_cmp);
+        let stray = off.len() / 20;
+        off[off.len() - 1 - stray] - off[stray]
+    }
+
+    /// Where the middle of a single car is along the row: inwards of the end that is its own.
+    fn middle(&self, row: &Row, view: &View) -> f32 {
+        let [near, far] = self.along;
+        let by_near = near + 0.5 * CAR[1];
+        if far - near > WHOLE_M || self.shows_side() {
+            return by_near;
+        }
+        // What is nearer along the row is farther out in the image.
+        let outwards = if row.at(near) > 0.0 { 1 } else { -1 };
+        match [
+            self.is_hidden(near, outwards, view),
+            self.is_hidden(far, -outwards, view),
+        ] {
+            [true, false] => far - 0.5 * CAR[1],
+            _ => by_near,
+        }
+    }
+
+    /// Whether the side towards the camera is seen.
+    fn shows_side(&self) -> bool {
+        let near = self.points.iter();
+        let near = near.filter(|p| p.along < self.along[0] + 0.2);
+        let ends = [f32::INFINITY, f32::NEG_INFINITY];
+        let [low, high] = near.fold(ends, |[low, high], p| [low.min(p.off), high.max(p.off)]);
+        high - low > SIDE_SEEN_M
+    }
+
+    /// Whether something nearer, or the image's border, hides how it goes on at an end, `step` columns farther.
+    fn is_hidden(&self, end: f32, step: i64, view: &View) -> bool {
+        let width = view.rays.x.len() as i64;
+        let (mut hidden, mut all) = (0, 0);
+        let there = self.points.iter().filter(|p| (p.along - end).abs() < 0.2);
+        for pixel in there.map(|p| i64::from(p.pixel)) {
+            let here = view.depth[pixel as usize];
+            let nearer = |z: f32| z > 0.0 && z < here - 0.4 - 0.01 * here;
+            let inside = (0..width).contains(&(pixel % width + 2 * step));
+            all += 1;
+            hidden += usize::from(!inside || nearer(view.depth[(pixel + 2 * step) as usize]));
+        }
+        2 * hidden > all
+    }
+
+    /// The slope of a row to which the near side of its first car is square, where that side is seen.
+    pub fn slope(&self, row: &Row) -> Option<f32> {
+        let half = 0.5 * STRIP_M * STRIPS as f32;
+        let (mut near, mut counts) = ([f32::INFINITY; STRIPS], [0; STRIPS]);
+        for p in self.points.iter().filter(|p| p.along < self.along[0] + 1.0) {
+            let strip = ((p.off + half) / STRIP_M) as usize;
+            if strip < STRIPS {
+                near[strip] = near[strip].min(p.along);
+                counts[strip] += 1;
+            }
+        }
+        let middle = |strip: usize| (strip as f32 + 0.5) * STRIP_M - half;
+        let side: Vec<[f32; 2]> = (0..STRIPS)
+            .filter(|strip| counts[*strip] > 2)
+            .map(|strip| [middle(strip), near[strip]])
+            .collect();
+        if side.len() < SIDE_STRIPS {
+            return None;
+        }
+        // The median over pairs: a bonnet or a roof lies behind.
+        let pairs = side
+            .iter()
+            .enumerate()
+            .flat_map(|(i, a)| side[i + 1..].iter().map(move |b| (a, b)));
+        let mut turns: Vec<f32> = pairs
+            .filter(|(a, b)| b[0] - a[0] > 2.0 * STRIP_M)
+            .map(|(a, b)| (b[1] - a[1]) / (b[0] - a[0]))
+            .collect();
+        turns.sort_unstable_by(f32::total_cmp);
+        let turn = *turns.get(turns.len() / 2)?;
+        let mut off: Vec<f32> = side.iter().map(|p| p[1] - turn * p[0]).collect();
+        off.sort_unstable_by(f32::total_cmp);
+        let spread = off[off.len() * 3 / 4] - off[off.len() / 4];
+        let slope = row.slope(self.along[0]);
+        let straight = spread <= STRAIGHT_M && turn.abs() <= STEEPEST;
+        straight.then(|| (slope - turn) / (1.0 + slope * (turn - slope)))
+    }
+}

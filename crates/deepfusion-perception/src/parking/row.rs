@@ -1,0 +1,297 @@
+//! The line on which cars stand side by side.
+
+use nalgebra::{Matrix4, Vector4};
+
+/// A car that stands across the way, in the ground's axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parked {
+    /// Its middle: right, forward, in metres.
+    pub middle: [f32; 2],
+    /// How the row goes on beside it, right over forward: at a right angle to the car.
+    pub slope: f32,
+    /// How often it was seen, about.
+    pub weight: f32,
+}
+
+/// How far the middles of two neighbours may lie off the line through them, and off each other along it, metres.
+const OFF_M: f32 = 0.9;
+/// See [`OFF_M`].
+const APART_M: [f32; 2] = [1.5, 14.0];
+/// How differently two neighbours may be turned, radians.
+const TURN: f32 = 0.35;
+/// How much a car's own turn counts beside its place: as a place so far away would, metres.
+const TURN_M: f32 = 12.0;
+/// What keeps a row straight, and in the way's direction, where its cars do not say otherwise.
+const STRAIGHT: f32 = 4.0;
+/// See [`STRAIGHT`].
+const AHEAD: f32 = 1.0;
+/// A row's bend is counted in 1/this, per metre.
+const BEND: f32 = 10.0;
+/// How far along a row what its cars say counts, metres: a lane does not bend alike everywhere. Beyond, a little is left.
+const COUNTS_M: f32 = 15.0;
+/// See [`COUNTS_M`].
+const LEFT: f32 = 0.02;
+/// Looks from which on it is certain that a car stands there: in a row of its own, and across the lane from one.
+const SURE: f32 = 3.0;
+/// See [`SURE`].
+const SURE_ACROSS: f32 = 2.0;
+/// How far beyond the last car, of its own or across the lane, a row is looked at, metres.
+const GOES_ON_M: f32 = 15.0;
+/// Two rows are at least so far apart, metres.
+const ROWS_M: f32 = 5.0;
+
+/// A row of cars, side by side along the way: right = p₀ + p₁ q + p₂ q² / 10 with q = forward − `from`.
+///
+/// The row across the lane, if there is one, goes the same way at another p₀.
+#[derive(Debug, Clone)]
+pub struct Row {
+    cars: Vec<Parked>,
+    across: Vec<Parked>,
+    from: f32,
+    /// p₀, p₁, p₂, and the other row's p₀.
+    line: Vector4<f32>,
+    /// What is near this far forward counts most.
+    focus: Option<f32>,
+}
+
+impl Row {
+    /// The rows that some cars stand in, the surest first: of at least two each, or of one across the lane from such a row.
+    pub fn all(cars: &[Parked]) -> Vec<Self> {
+        let mut groups: Vec<Vec<Parked>> = Vec::new();
+        for car in cars {
+            // Those that it belongs to become one.
+            let (own, others): (Vec<_>, Vec<_>) = groups
+                .into_iter()
+                .partition(|group| group.iter().any(|other| beside(car, other)));
+            groups = others;
+            let joined = own.into_iter().flatten().chain([*car]);
+            groups.push(joined.collect());
+        }
+        let (several, single): (Vec<_>, Vec<_>) = groups.into_iter().partition(|g| g.len() > 1);
+        let mut rows: Vec<Self> = several.into_iter().map(Self::through).collect();
+        let across = single.into_iter().flatten();
+        let across = across.filter(|car| rows.iter().any(|row| row.faces(car)));
+        let across: Vec<Self> = across.map(|car| Self::through(vec![car])).collect();
+        rows.extend(across);
+        rows.sort_by_key(|row| std::cmp::Reverse(row.sure()));
+        let mut apart: Vec<Self> = Vec::new();
+        for row in rows {
+            if !apart.iter().any(|surer| row.crowds(surer)) {
+                apart.push(row);
+            }
+        }
+        apart
+    }
+
+    fn through(cars: Vec<Parked>) -> Self {
+        let mut row = Self {
+            cars,
+            across: Vec::new(),
+            from: 0.0,
+            line: Vector4::zeros(),
+            focus: None,
+        };
+        row.fit();
+        row
+    }
+
+    /// Whether a car that was seen often enough stands across the lane from this row.
+    fn faces(&self, car: &Parked) -> bool {
+        let seen = |c: &&Parked| c.weight >= SURE_ACROSS;
+        let [first, last] = self.reach();
+        let turn = self.slope(car.middle[1]).atan() - car.slope.atan();
+        seen(&car)
+            && self.cars.iter().filter(seen).count() > 1
+            && (first - APART_M[1]..last + APART_M[1]).contains(&car.middle[1])
+            && turn.abs() < TURN
+            && self.at(car.middle[1]) * car.middle[0] < 0.0
+    }
+
+    /// Whether two are closer to each other than rows can be.
+    fn crowds(&self, other: &Self) -> bool {
+        let [from, to] = self.reach();
+        [from, 0.5 * (from + to), to]
+            .iter()
+            .any(|at| (self.at(*at) - other.at(*at)).abs() < ROWS_M)
+    }
+
+    /// Goes as another goes, if that is across the lane.
+    pub fn lean_on(&mut self, other: &Self) {
+        let [from, to] = self.reach();
+        let [other_from, other_to] = other.reach();
+        let between = 0.5 * (from.max(other_from) + to.min(other_to));
+        let turn = self.slope(between).atan() - other.slope(between).atan();
+        if self.at(between) * other.at(between) < 0.0 && turn.abs() < TURN {
+            self.across.extend(&other.cars);
+            self.fit();
+        }
+    }
+
+    /// One more car.
+    pub fn add(&mut self, car: Parked) {
+        self.cars.push(car);
+        self.fit();
+    }
+
+    /// From now on what is near this place counts most, forward in metres.
+    pub fn focus(&mut self, forward: f32) {
+        self.focus = Some(forward);
+        self.fit();
+    }
+
+    /// Weighted least squares over places and turns.
+    fn fit(&mut self) {
+        let weight: f32 = self.cars.iter().map(|c| c.weight).sum();
+        let forward = |c: &Parked| c.weight * c.middle[1];
+        self.from = self.cars.iter().map(forward).sum::<f32>() / weight;
+        // Without a row across nothing else would hold its place.
+        let least = Vector4::new(0.0, AHEAD.powi(2), STRAIGHT.powi(2), 1e-3);
+        let mut normal = Matrix4::from_diagonal(&least);
+        let mut sum = Vector4::zeros();
+        let own = self.cars.iter().map(|car| (car, 1.0));
+        let across = self.across.iter().map(|car| (car, 0.0));
+        for (car, own) in own.chain(across) {
+            let off = self.focus.map_or(0.0, |focus| car.middle[1] - focus);
+            let weight = car.weight * (-(off / COUNTS_M).powi(2)).exp().max(LEFT);
+            let q = car.middle[1] - self.from;
+            let place = Vector4::new(own, q, q * q / BEND, 1.0 - own) * weight;
+            normal += place * place.transpose();
+            sum += place * (weight * car.middle[0]);
+            let turn = Vector4::new(0.0, 1.0, 2.0 * q / BEND, 0.0) * (TURN_M * weight);
+            normal += turn * turn.transpose();
+            sum += turn * (TURN_M * weight * car.slope);
+        }
+        // Positive definite for weights above 0.
+        if let Some(cholesky) = normal.cholesky() {
+            self.line = cholesky.solve(&sum);
+        }
+    }
+
+    /// Where its cars' middles are, right in metres, so far forward.
+    pub fn at(&self, forward: f32) -> f32 {
+        let q = forward - self.from;
+        self.line[0] + self.line[1] * q + self.line[2] * q * q / BEND
+    }
+
+    /// Its direction there, right over forward.
+    pub fn slope(&self, forward: f32) -> f32 {
+        self.line[1] + 2.0 * self.line[2] * (forward - self.from) / BEND
+    }
+
+    /// From where to where its own cars stand, forward in metres.
+    pub fn reach(&self) -> [f32; 2] {
+        let ends = [f32::INFINITY, f32::NEG_INFINITY];
+        self.cars.iter().fold(ends, |[low, high], car| {
+            [low.min(car.middle[1]), high.max(car.middle[1])]
+        })
+    }
+
+    /// How far forward it is looked at, metres.
+    pub fn end(&self) -> f32 {
+        let all = self.cars.iter().chain(&self.across);
+        let last = all.map(|car| car.middle[1]);
+        last.fold(f32::NEG_INFINITY, f32::max) + GOES_ON_M
+    }
+
+    /// How many of its cars were seen often.
+    pub fn sure(&self) -> usize {
+        self.cars.iter().filter(|car| car.weight >= SURE).count()
+    }
+
+    /// A point as seen from the row: how far along it (as forward, on its line), and how far off the line to the right.
+    pub fn locate(&self, [right, forward]: [f32; 2]) -> [f32; 2] {
+        let off = right - self.at(forward);
+        [forward + self.slope(forward) * off, off]
+    }
+
+    /// The point so far along the row and, square to it, so far off to the right: right, forward in metres.
+    pub fn place(&self, along: f32, off: f32) -> [f32; 2] {
+        let (sin, cos) = self.angle(along).sin_cos();
+        [self.at(along) + off * cos, along + off * sin]
+    }
+
+    /// How its cars are turned there: as [`crate::GroundBox::angle`].
+    pub fn angle(&self, along: f32) -> f32 {
+        (-self.slope(along)).atan()
+    }
+}
+
+/// Whether two stand side by side.
+fn beside(a: &Parked, b: &Parked) -> bool {
+    let apart = a.middle[1] - b.middle[1];
+    let slope = 0.5 * (a.slope + b.slope);
+    let off = a.middle[0] - b.middle[0] - slope * apart;
+    (APART_M[0]..APART_M[1]).contains(&apart.abs())
+        && off.abs() < OFF_M + 0.05 * apart.abs()
+        && (a.slope.atan() - b.slope.atan()).abs() < TURN
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn car(right: f32, forward: f32, slope: f32) -> Parked {
+        Parked {
+            middle: [right, forward],
+            slope,
+            weight: 1.0,
+        }
+    }
+
+    #[test]
+    fn both_sides_of_a_lane_are_rows_and_a_car_in_it_is_none() {
+        let cars = [
+            car(6.0, 4.0, 0.0),
+            car(-6.1, 6.0, 0.0),
+            car(5.9, 9.0, 0.0),
+            car(0.2, 10.0, 0.0),
+            car(-5.9, 11.5, 0.0),
+            car(6.1, 22.0, 0.0),
+        ];
+        let mut rows = Row::all(&cars);
+        rows.sort_by(|a, b| a.at(5.0).total_cmp(&b.at(5.0)));
+        assert_eq!(rows.len(), 2);
+        assert!((rows[0].at(9.0) + 6.0).abs() < 0.1);
+        assert!((rows[1].at(30.0) - 6.0).abs() < 0.3);
+        assert_eq!(rows[1].reach(), [4.0, 22.0]);
+    }
+
+    #[test]
+    fn one_car_across_the_lane_is_a_row_once_it_was_seen_often() {
+        let often = |car: Parked| Parked { weight: 3.0, ..car };
+        let row = [often(car(6.0, 4.0, 0.0)), often(car(6.0, 9.0, 0.0))];
+        let once = [row[0], row[1], car(-6.0, 7.0, 0.0)];
+        assert_eq!(Row::all(&once).len(), 1);
+        let rows = Row::all(&[row[0], row[1], often(car(-6.0, 7.0, 0.0))]);
+        assert_eq!(rows.len(), 2);
+    }
+
+    #[test]
+    fn a_row_goes_on_as_its_cars_are_turned() {
+        let row = Row::through(vec![car(5.0, 5.0, 0.1), car(5.3, 8.0, 0.1)]);
+        assert!((row.slope(10.0) - 0.1).abs() < 0.02, "{row:?}");
+        let [along, off] = row.locate([row.at(10.0) + 1.0, 10.0]);
+        // A metre to the right, square to the row, is a little less off it and a little farther along.
+        assert!(
+            (along - 10.1).abs() < 0.02 && (off - 1.0).abs() < 0.01,
+            "{along} {off}"
+        );
+        let back = row.place(along, off);
+        assert!((back[1] - 10.0).abs() < 0.05, "{back:?}");
+    }
+
+    #[test]
+    fn a_row_bends_as_the_one_across_the_lane_does() {
+        // A bend of 40 m radius, of which the left row shows more.
+        let turn = |forward: f32| forward / 40.0;
+        let on = |right: f32, forward: f32| {
+            car(right + forward * forward / 80.0, forward, turn(forward))
+        };
+        let mut right = Row::through(vec![on(6.0, 2.0), on(6.0, 5.0)]);
+        let left = Row::through((1..7).map(|i| on(-6.0, 4.0 * i as f32)).collect());
+        right.lean_on(&left);
+        let expected = 6.0 + 24.0 * 24.0 / 80.0;
+        assert!((right.at(24.0) - expected).abs() < 0.6, "{right:?}");
+        assert!((right.end() - 39.0).abs() < 1e-3);
+    }
+}
