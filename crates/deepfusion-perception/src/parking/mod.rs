@@ -45,6 +45,8 @@ const BEFORE_M: f32 = 10.0;
 const BEHIND_M: f32 = 15.0;
 /// Half of a row's depth, metres.
 const HALF_M: f32 = 2.8;
+/// Cars that were seen often, of all rows together, before a row is believed: on a street hedges and drives look like one.
+const LEAST_SURE: usize = 3;
 /// From where to where, across the lane from a row's line, the cars of the other side may be, metres.
 const ACROSS_M: [f32; 2] = [8.6, 15.0];
 
@@ -107,7 +109,7 @@ impl Parking {
     }
 
     /// Puts the cars of rows in the place of what was found there, but for what moves (in the world) and what is known by
-    /// name. Without a pose nothing is remembered.
+    /// name. Without a pose nothing is remembered, and no row believed.
     pub fn complete(
         &mut self,
         detections: Vec<Detection>,
@@ -129,7 +131,10 @@ impl Parking {
             meet(&mut cars, car);
         }
         self.remember(&cars, view.ground, world_from_cam);
-        let rows = Row::all(&cars);
+        let mut rows = Row::all(&cars);
+        if rows.iter().map(Row::sure).sum::<usize>() < LEAST_SURE {
+            rows.clear();
+        }
         if !rows.is_empty() {
             let standing = Standing::find(&view, &kept.iter().collect::<Vec<_>>());
             let mut found: Vec<Detection> = Vec::new();
