@@ -3,25 +3,39 @@
 #![allow(missing_docs)]
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use deepfusion_geometry::Intrinsics;
 use deepfusion_perception::{Perception, PerceptionConfig, Stamp};
-use deepfusion_sim::{SimConfig, Simulation};
+use deepfusion_sim::{Scene, SimConfig, SimFrame, Simulation};
 
-fn targets(criterion: &mut Criterion) {
+/// The camera and the frames of a short drive.
+fn drive(scene: Scene) -> (Intrinsics, Vec<SimFrame>) {
     let simulation = Simulation::new(&SimConfig {
+        scene,
         seed: 5,
         frames: 20,
         moving_cars: 6,
         ..SimConfig::default()
     })
-    .expect("a plain street");
-    let k = simulation.intrinsics();
-    let frames: Vec<_> = (0..20).map(|i| simulation.frame(i)).collect();
+    .expect("a plain drive");
+    let frames = (0..20).map(|i| simulation.frame(i)).collect();
+    (simulation.intrinsics(), frames)
+}
+
+fn targets(criterion: &mut Criterion) {
+    let street = drive(Scene::Urban);
+    let garage = drive(Scene::Garage);
     let mut group = criterion.benchmark_group("targets");
-    for (name, config) in [
-        ("true depth, 640x192", PerceptionConfig::default()),
+    for (name, (k, frames), config) in [
+        ("true depth, 640x192", &street, PerceptionConfig::default()),
         (
             "predicted depth's settings, 640x192",
+            &street,
             PerceptionConfig::predicted(),
+        ),
+        (
+            "rows of cars in a garage, 640x192",
+            &garage,
+            PerceptionConfig::default(),
         ),
     ] {
         let mut perception = Perception::new(config);
@@ -34,7 +48,7 @@ fn targets(criterion: &mut Criterion) {
                     time_s,
                     world_from_cam: frames[i].world_from_cam,
                 };
-                perception.look(&frames[i].depth, &k, Some(stamp))
+                perception.look(&frames[i].depth, k, Some(stamp))
             });
         });
     }

@@ -246,11 +246,13 @@ fn follow(row: &mut Row, standing: &Standing, view: &View) -> Vec<Detection> {
     let mut found = Vec::new();
     let mut done = f32::NEG_INFINITY;
     loop {
+        let [first, _] = row.reach();
+        let mut from = first - BEFORE_M;
         if done.is_finite() {
             row.focus(done);
+            from = done;
         }
-        let [first, _] = row.reach();
-        let ends = [first - BEFORE_M, row.end()];
+        let ends = [from, row.end()];
         let before = done;
         for part in standing.parts(row, ends, view) {
             if part.along[1] <= done + 0.3 {
