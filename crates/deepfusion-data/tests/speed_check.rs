@@ -106,13 +106,16 @@ fn a_wrong_unit_scales_the_height_and_is_named() {
 fn images_that_tell_nothing_give_no_height() {
     let mut flat = pairs(1.0);
     for pair in &mut flat {
-        pair.earlier.data.fill(90.0);
-        pair.later.data.fill(90.0);
+        let mut flat = render(0.0);
+        flat.data.fill(90.0);
+        let flat = Arc::new(RoadTexture::from(&flat));
+        pair.earlier = flat.clone();
+        pair.later = flat;
     }
     assert_eq!(implied_camera_height(&flat), None, "no texture");
     let mut strangers = pairs(1.0);
     for (i, pair) in strangers.iter_mut().enumerate() {
-        pair.earlier = render(1000.0 * (i + 1) as f64);
+        pair.earlier = Arc::new(RoadTexture::from(&render(1000.0 * (i + 1) as f64)));
     }
     assert_eq!(implied_camera_height(&strangers), None, "two places");
     let mut up = pairs(1.0);

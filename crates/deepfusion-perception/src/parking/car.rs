@@ -15,12 +15,12 @@ const LOWEST_M: f32 = 1.3;
 
 /// The car at a place along a row that some points belong to, and whether its front is seen, which says where it stands.
 pub fn car(along: f32, points: &[&Seen], row: &Row, view: &View) -> Option<(Detection, bool)> {
-    let mut alongs = points.iter().map(|p| p.along).collect();
+    let mut alongs: Vec<f32> = points.iter().map(|p| p.along).collect();
     let [first, last] = ends(&mut alongs, 1000)?;
     let away = row.at(along).signum();
-    let mut off = points.iter().map(|p| away * p.off).collect();
+    let mut off: Vec<f32> = points.iter().map(|p| away * p.off).collect();
     let [near, far] = ends(&mut off, 20)?;
-    let mut heights = points.iter().map(|p| p.height).collect();
+    let mut heights: Vec<f32> = points.iter().map(|p| p.height).collect();
     let [_, top] = ends(&mut heights, 100)?;
     if top < view.config.min_target_height_m {
         return None;
@@ -54,7 +54,7 @@ pub fn car(along: f32, points: &[&Seen], row: &Row, view: &View) -> Option<(Dete
 }
 
 /// The least and the largest of some values, but for one in so many at both ends.
-fn ends(values: &mut Vec<f32>, stray: usize) -> Option<[f32; 2]> {
+fn ends(values: &mut [f32], stray: usize) -> Option<[f32; 2]> {
     values.sort_unstable_by(f32::total_cmp);
     let stray = values.len() / stray;
     let last = values.len().checked_sub(1 + stray)?;
