@@ -2,11 +2,12 @@
 
 use crate::angle::{FACE, best_angle};
 use crate::ground_box::{GroundBox, axes};
+use crate::outermost::ends;
 use crate::rows::{Turn, Vote};
 use crate::silhouette::{FOOT_M, Silhouette};
 
 /// Length and width of a usual car, metres.
-const CAR: [f32; 2] = [4.4, 1.8];
+pub const CAR: [f32; 2] = [4.4, 1.8];
 /// Length and width of the smallest car, metres.
 const SHORTEST: [f32; 2] = [3.2, 1.45];
 /// Up to this extent in metres something is taken for a person or a thing of that size, even where a part is hidden.
@@ -76,14 +77,7 @@ fn extent(points: &[[f32; 3]], axis: [f32; 2]) -> [f32; 2] {
         .iter()
         .map(|p| p[0] * axis[0] + p[1] * axis[1])
         .collect();
-    if along.is_empty() {
-        return [0.0; 2];
-    }
-    let stray = along.len() / 100;
-    let last = along.len() - 1 - stray;
-    let low = *along.select_nth_unstable_by(stray, f32::total_cmp).1;
-    let high = *along.select_nth_unstable_by(last, f32::total_cmp).1;
-    [low, high]
+    ends(&mut along, 100).unwrap_or_default()
 }
 
 /// How far an axis may go on beyond its low and its high end, in metres: 0 where a free end of the contour shows that

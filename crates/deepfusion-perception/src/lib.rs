@@ -21,6 +21,7 @@ mod ground_box;
 mod instances;
 mod lanes;
 mod obstacles;
+mod outermost;
 mod parking;
 mod perception;
 mod rays;

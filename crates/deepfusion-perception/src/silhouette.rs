@@ -3,6 +3,7 @@
 use crate::clusters::Cluster;
 use crate::columns::Columns;
 use crate::obstacles::Obstacles;
+use crate::outermost::ends;
 use crate::{Ground, PerceptionConfig, Rays};
 
 /// A cluster laid onto the ground.
@@ -127,9 +128,7 @@ fn reach(cluster: &Cluster, obstacles: &Obstacles, width: usize) -> [f32; 2] {
         heights.extend_from_slice(&row[run.from as usize..run.to as usize]);
     }
     // The topmost and lowest pixels may be strays.
-    let stray = heights.len() / 100;
-    let last = heights.len() - 1 - stray;
-    [stray, last].map(|place| *heights.select_nth_unstable_by(place, f32::total_cmp).1)
+    ends(&mut heights, 100).unwrap_or_default()
 }
 
 /// What goes on above a cluster, past the height up to which pixels are joined.

@@ -1,8 +1,10 @@
 //! A car of a row: a box of usual size, square to it.
 
 use super::parts::Seen;
-use super::{CAR, Row, View};
+use super::{Row, View};
+use crate::box_fit::CAR;
 use crate::clusters::Cluster;
+use crate::outermost::ends;
 use crate::{Detection, GroundBox, Run};
 
 /// Where a car's near end may lie off the row's middle, away from the lane, metres.
@@ -51,14 +53,6 @@ pub fn car(along: f32, points: &[&Seen], row: &Row, view: &View) -> Option<(Dete
         kind: None,
     };
     Some((detection, front))
-}
-
-/// The least and the largest of some values, but for one in so many at both ends.
-fn ends(values: &mut [f32], stray: usize) -> Option<[f32; 2]> {
-    values.sort_unstable_by(f32::total_cmp);
-    let stray = values.len() / stray;
-    let last = values.len().checked_sub(1 + stray)?;
-    Some([*values.get(stray)?, *values.get(last)?])
 }
 
 /// A cluster of some pixels, in their order.

@@ -6,58 +6,30 @@
 //! are remembered, so that a row that was passed goes on ahead.
 
 mod car;
+mod follow;
+mod known;
 mod parts;
 mod row;
+#[cfg(test)]
+mod scene;
 
 use crate::rows::Turn;
-use crate::{Detection, Ground, GroundBox, Obstacles, PerceptionConfig, Rays};
-use car::car;
+use crate::{Detection, Ground, Obstacles, PerceptionConfig, Rays};
 use deepfusion_geometry::Se3;
+use follow::follow;
+use known::{Known, distance, heading, meet, on_ground, parked};
 use nalgebra::Vector3;
 use parts::Standing;
-use row::{Parked, Row};
+use row::{Heading, Parked, Row};
 
-/// Length and width of a usual car, metres.
-const CAR: [f32; 2] = [4.4, 1.8];
-/// Lengths, widths and heights of boxes that may be cars of a row, metres.
-const LENGTHS_M: [f32; 2] = [3.2, 5.6];
-/// See [`LENGTHS_M`].
-const WIDTHS_M: [f32; 2] = [1.4, 2.3];
-/// See [`LENGTHS_M`].
-const HIGHEST_M: f32 = 2.15;
-/// Shares of length and width that must have been seen of a car that makes a row.
-const SEEN: [f32; 2] = [0.05, 0.4];
-/// How far from square to the way a car of a row may stand, radians.
-const TURN: f32 = 0.6;
-/// How far beside the camera a row is, at least, metres.
-const BESIDE_M: f32 = 3.0;
-/// Within this distance it is the same car, metres.
-const SAME_M: f32 = 1.2;
 /// Within this distance of where something moves it is that, metres.
 const MOVING_M: f32 = 1.5;
-/// Most looks that count of one car.
-const MOST_LOOKS: f32 = 4.0;
-/// What a car that was found by its row says about where the row goes on, in looks.
-const FOUND: f32 = 2.0;
-/// How far before its first car a row is looked at, and how far behind the camera cars are remembered, metres.
-const BEFORE_M: f32 = 10.0;
-/// See [`BEFORE_M`].
-const BEHIND_M: f32 = 15.0;
 /// Half of a row's depth, metres.
 const HALF_M: f32 = 2.8;
 /// Cars that were seen often, of all rows together, before a row is believed: on a street hedges and drives look like one.
 const LEAST_SURE: usize = 3;
 /// From where to where, across the lane from a row's line, the cars of the other side may be, metres.
 const ACROSS_M: [f32; 2] = [8.6, 15.0];
-
-/// A car of a row, remembered.
-#[derive(Debug, Clone)]
-struct Known {
-    /// Its middle and the row's direction, in the world's axes.
-    middle: Vector3<f64>,
-    along: Vector3<f64>,
-    looks: f32,
-}
 
 /// Completes rows of parked cars, frame by frame.
 #[derive(Debug, Clone, Default)]
@@ -99,10 +71,9 @@ impl Parking {
     pub fn usual_turn(&self, at: [f32; 2]) -> Turn {
         let square = |row: &Row| {
             let [along, off] = row.locate(at);
-            let [first, _] = row.reach();
             let across = -off * row.at(along).signum();
             let on = across.abs() < HALF_M || (ACROSS_M[0]..ACROSS_M[1]).contains(&across);
-            (on && (first - BEFORE_M..row.end()).contains(&along)).then(|| row.angle(along))
+            (on && row.passes(along)).then(|| row.angle(along))
         };
         let angle = self.rows.iter().find_map(square);
         angle.map_or(Turn::ahead(), |angle| Turn::new(angle, 1.0))
@@ -122,36 +93,28 @@ impl Parking {
             let seen = |p| on_ground(view.ground, &cam_from_world.transform(p));
             moving.iter().map(seen).collect()
         });
-        let moves = |at: [f32; 2]| moving.iter().any(|m| distance(*m, at) < MOVING_M);
+        let moves = |d: &Detection| {
+            let at = d.place.middle;
+            moving.iter().any(|m| distance(*m, at) < MOVING_M)
+        };
         let (mut kept, mut open): (Vec<_>, Vec<_>) = detections
             .into_iter()
-            .partition(|d| d.kind.is_some() || moves(d.place.middle));
+            .partition(|d| d.kind.is_some() || moves(d));
         let mut cars = std::mem::take(&mut self.cars);
         for car in open.iter().filter_map(|d| parked(&d.place)) {
             meet(&mut cars, car);
         }
-        self.remember(&cars, view.ground, world_from_cam);
-        let mut rows = Row::all(&cars);
-        if rows.iter().map(Row::sure).sum::<usize>() < LEAST_SURE {
-            rows.clear();
-        }
+        self.known = world_from_cam.map_or(Vec::new(), |pose| {
+            let known = cars.iter().map(|car| Known::new(car, view.ground, pose));
+            known.collect()
+        });
+        let rows = believed(&cars);
         if !rows.is_empty() {
-            let standing = Standing::find(&view, &kept.iter().collect::<Vec<_>>());
-            let mut found: Vec<Detection> = Vec::new();
-            let mut done: Vec<Row> = Vec::new();
-            for (i, row) in rows.iter().enumerate() {
-                let mut row = row.clone();
-                for other in done.iter().chain(&rows[i + 1..]) {
-                    row.lean_on(other);
-                }
-                found.extend(follow(&mut row, &standing, &view));
-                let [first, _] = row.reach();
-                open.retain(|detection| {
-                    let [along, off] = row.locate(detection.place.middle);
-                    off.abs() > HALF_M || !(first - BEFORE_M..row.end()).contains(&along)
-                });
-                done.push(row);
-            }
+            let driving = kept.iter().filter(|d| moves(d));
+            let lane: Vec<Heading> = driving.filter_map(|d| heading(&d.place)).collect();
+            let standing = Standing::find(&view, &kept);
+            let (rows, found) = follow_all(rows, &lane, &standing, &view);
+            open.retain(|d| !rows.iter().any(|row| row.holds(d.place.middle)));
             for car in found {
                 let taken = |other: &Detection| other.place.overlap(&car.place) > 0.4;
                 if !kept.iter().chain(&open).any(taken) {
@@ -162,127 +125,152 @@ impl Parking {
         kept.extend(open);
         kept
     }
+}
 
-    fn remember(&mut self, cars: &[Parked], ground: &Ground, world_from_cam: Option<&Se3>) {
-        self.known.clear();
-        let Some(pose) = world_from_cam else { return };
-        let in_world = |at: [f32; 2]| {
-            let p = ground.place([at[0], at[1], 0.0]);
-            pose.transform(&Vector3::from(p.map(f64::from)))
-        };
-        self.known.extend(cars.iter().map(|car| {
-            let [right, forward] = car.middle;
-            let middle = in_world(car.middle);
-            Known {
-                middle,
-                along: in_world([right + car.slope, forward + 1.0]) - middle,
-                looks: car.weight,
-            }
-        }));
+/// The rows that some cars stand in, if enough of them were seen often.
+fn believed(cars: &[Parked]) -> Vec<Row> {
+    let mut rows = Row::all(cars);
+    if rows.iter().map(Row::sure).sum::<usize>() < LEAST_SURE {
+        rows.clear();
     }
+    rows
 }
 
-impl Known {
-    /// As it is seen now; `None` where it was passed long ago, or does not stand across the way any more.
-    fn seen(&self, ground: &Ground, cam_from_world: &Se3) -> Option<Parked> {
-        let middle = on_ground(ground, &cam_from_world.transform(&self.middle));
-        let next = cam_from_world.transform(&(self.middle + self.along));
-        let next = on_ground(ground, &next);
-        let along = [0, 1].map(|i| next[i] - middle[i]);
-        let across = along[0].abs() < 1.5 * TURN.tan() * along[1].abs();
-        (across && middle[1] > -BEHIND_M).then(|| Parked {
-            middle,
-            slope: along[0] / along[1],
-            weight: self.looks,
-        })
-    }
-}
-
-/// A point of the camera's frame, on the ground: right, forward.
-fn on_ground(ground: &Ground, p: &Vector3<f64>) -> [f32; 2] {
-    let [right, forward, _] = ground.locate([p.x as f32, p.y as f32, p.z as f32]);
-    [right, forward]
-}
-
-fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
-}
-
-/// A box as a car of a row, if it may be one.
-fn parked(place: &GroundBox) -> Option<Parked> {
-    use std::f32::consts::{FRAC_PI_2, PI};
-    let off = (place.angle + FRAC_PI_2).rem_euclid(PI) - FRAC_PI_2;
-    let [length, width] = place.footprint;
-    let fits = (LENGTHS_M[0]..LENGTHS_M[1]).contains(&length)
-        && (WIDTHS_M[0]..WIDTHS_M[1]).contains(&width)
-        && place.heights[1] < HIGHEST_M
-        && place.seen[0] > SEEN[0]
-        && place.seen[1] > SEEN[1]
-        && place.middle[0].abs() > BESIDE_M
-        && off.abs() < TURN;
-    fits.then(|| Parked {
-        middle: place.middle,
-        slope: -off.tan(),
-        weight: 1.0,
-    })
-}
-
-/// Takes a car into those that are known.
-fn meet(cars: &mut Vec<Parked>, car: Parked) {
-    let same = |other: &&mut Parked| distance(other.middle, car.middle) < SAME_M;
-    let Some(known) = cars.iter_mut().find(same) else {
-        cars.push(car);
-        return;
-    };
-    let weight = known.weight + car.weight;
-    let mean = |a: f32, b: f32| (a * known.weight + b * car.weight) / weight;
-    known.middle = [0, 1].map(|i| mean(known.middle[i], car.middle[i]));
-    known.slope = mean(known.slope, car.slope);
-    known.weight = weight.min(MOST_LOOKS);
-}
-
-/// Follows a row from its near end to its far one: each car of which enough is seen says where it goes on.
-fn follow(row: &mut Row, standing: &Standing, view: &View) -> Vec<Detection> {
+/// Follows each of some rows, which bend alike, and as the lane does: they themselves, as they go then, and their cars.
+fn follow_all(
+    rows: Vec<Row>,
+    lane: &[Heading],
+    standing: &Standing,
+    view: &View,
+) -> (Vec<Row>, Vec<Detection>) {
+    let mut followed: Vec<Row> = Vec::with_capacity(rows.len());
     let mut found = Vec::new();
-    let mut done = f32::NEG_INFINITY;
-    loop {
-        let [first, _] = row.reach();
-        let mut from = first - BEFORE_M;
-        if done.is_finite() {
-            row.focus(done);
-            from = done;
+    for i in 0..rows.len() {
+        let mut row = rows[i].clone();
+        row.keep_to(lane);
+        for other in followed.iter().chain(&rows[i + 1..]) {
+            row.lean_on(other);
         }
-        let ends = [from, row.end()];
-        let before = done;
-        for part in standing.parts(row, ends, view) {
-            if part.along[1] <= done + 0.3 {
-                continue;
-            }
-            done = part.along[1];
-            let slope = part.slope(row);
-            let mut told = slope.is_some();
-            let line = row.clone();
-            for (along, points) in part.cars(&line, view) {
-                let Some((car, front)) = car(along, &points, &line, view) else {
-                    continue;
-                };
-                if front || slope.is_some() {
-                    row.add(Parked {
-                        middle: car.place.middle,
-                        slope: slope.unwrap_or_else(|| line.slope(along)),
-                        weight: FOUND,
-                    });
-                    told = true;
-                }
-                found.push(car);
-            }
-            if told {
-                // It may go on otherwise than was thought.
-                break;
-            }
+        found.extend(follow(&mut row, standing, view));
+        followed.push(row);
+    }
+    (followed, found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::GroundBox;
+    use crate::instances::Kind;
+    use scene::Scene;
+
+    /// A car of a row 6 m to the right, square to the lane.
+    fn car(forward: f32) -> GroundBox {
+        GroundBox {
+            middle: [6.0, forward],
+            angle: 0.0,
+            footprint: [4.4, 1.8],
+            heights: [0.0, 1.5],
+            seen: [0.5, 0.9],
+            anchor: [6.0, forward],
         }
-        if done <= before {
-            return found;
+    }
+
+    fn detection(place: GroundBox) -> Detection {
+        Detection {
+            place,
+            pixels: 500,
+            bounds: [0; 4],
+            runs: Vec::new(),
+            confidence: 0.5,
+            kind: None,
         }
+    }
+
+    /// Three cars of a row, looked at so often.
+    fn passed(scene: &Scene, looks: usize, pose: Option<&Se3>) -> Parking {
+        let mut parking = Parking::default();
+        for _ in 0..looks {
+            parking.recall(scene.view().ground, pose);
+            let seen = [8.0, 11.0, 14.0].map(|forward| detection(car(forward)));
+            parking.complete(seen.into(), &[], scene.view(), pose);
+        }
+        parking
+    }
+
+    #[test]
+    fn a_row_tells_where_one_stands_that_was_taken_for_something_else() {
+        let scene = Scene::of(&[8.0, 11.0, 14.0, 17.0].map(car));
+        let pose = Se3::identity();
+        let mut parking = passed(&scene, 2, Some(&pose));
+        parking.recall(scene.view().ground, Some(&pose));
+        // Beside its neighbour only a strip of its front is seen: across it.
+        let mut wrong = car(17.4);
+        wrong.angle = 1.2;
+        wrong.seen = [0.1, 0.2];
+        let seen = vec![detection(wrong)];
+        let found = parking.complete(seen, &[], scene.view(), Some(&pose));
+        let at = |forward: f32| {
+            let near = |d: &&Detection| distance(d.place.middle, [6.0, forward]) < 0.5;
+            found.iter().filter(near).count()
+        };
+        assert_eq!([8.0, 11.0, 14.0, 17.0].map(at), [1; 4], "{found:?}");
+        assert_eq!(found.len(), 4, "{found:?}");
+        let square = |d: &Detection| d.place.angle.sin().abs() < 0.1;
+        assert!(found.iter().all(square), "{found:?}");
+    }
+
+    #[test]
+    fn a_row_is_believed_once_its_cars_were_seen_again_and_only_with_a_pose() {
+        // Nothing stands where the row goes on: what was found there is no car.
+        let scene = Scene::of(&[]);
+        let pose = Se3::identity();
+        let left = |looks: usize, pose: Option<&Se3>| {
+            let mut parking = passed(&scene, looks, pose);
+            parking.recall(scene.view().ground, pose);
+            let seen = vec![detection(car(17.0))];
+            parking.complete(seen, &[], scene.view(), pose).len()
+        };
+        assert_eq!(left(2, Some(&pose)), 0);
+        assert_eq!(left(1, Some(&pose)), 1);
+        assert_eq!(left(5, None), 1);
+        let mut parking = passed(&scene, 5, Some(&pose));
+        parking.forget();
+        parking.recall(scene.view().ground, Some(&pose));
+        let seen = vec![detection(car(17.0))];
+        assert_eq!(
+            parking.complete(seen, &[], scene.view(), Some(&pose)).len(),
+            1
+        );
+    }
+
+    #[test]
+    fn what_moves_and_what_is_known_by_name_stays_as_it_is() {
+        let scene = Scene::of(&[]);
+        let pose = Se3::identity();
+        let mut parking = passed(&scene, 2, Some(&pose));
+        parking.recall(scene.view().ground, Some(&pose));
+        let mut named = detection(car(8.0));
+        named.kind = Some(Kind {
+            class: "truck".into(),
+            score: 0.9,
+        });
+        let seen = vec![detection(car(5.0)), named.clone(), detection(car(11.0))];
+        let there = scene.view().ground.place([6.0, 11.3, 0.0]).map(f64::from);
+        let kept = parking.complete(seen, &[there.into()], scene.view(), Some(&pose));
+        assert_eq!(kept, [named, detection(car(11.0))]);
+    }
+
+    #[test]
+    fn in_a_row_things_are_turned_square_to_the_lane() {
+        let scene = Scene::of(&[]);
+        let pose = Se3::identity();
+        let mut parking = passed(&scene, 2, Some(&pose));
+        parking.recall(scene.view().ground, Some(&pose));
+        let turned = |at: [f32; 2]| parking.usual_turn(at).angle();
+        assert!(turned([6.0, 14.0]).sin().abs() < 0.1);
+        // Across the lane from it too, but not in the lane.
+        assert!(turned([-6.0, 9.0]).sin().abs() < 0.1);
+        assert!(turned([0.5, 9.0]).sin().abs() > 0.9);
     }
 }

@@ -1,8 +1,10 @@
 //! What stands on the line of a row, parted by its gaps.
 
-use super::{CAR, HALF_M, Row, View};
+use super::{HALF_M, Row, View};
 use crate::Detection;
+use crate::box_fit::CAR;
 use crate::obstacles::NONE;
+use crate::outermost::ends;
 
 /// Cells in which it is told whether something rises to the ceiling, metres, and how many of them to the sides and ahead.
 const CELL_M: f32 = 0.25;
@@ -56,7 +58,7 @@ pub struct Standing {
 
 impl Standing {
     /// In an image, but for the pixels of what is known not to be parked.
-    pub fn find(view: &View, others: &[&Detection]) -> Self {
+    pub fn find(view: &View, others: &[Detection]) -> Self {
         let width = view.rays.x.len();
         let mut taken = vec![false; view.depth.len()];
         for run in others.iter().flat_map(|detection| &detection.runs) {
@@ -196,9 +198,7 @@ impl Part {
     /// How deep it is across the row, metres.
     fn depth(&self) -> f32 {
         let mut off: Vec<f32> = self.points.iter().map(|p| p.off).collect();
-        off.sort_unstable_by(f32::total_cmp);
-        let stray = off.len() / 20;
-        off[off.len() - 1 - stray] - off[stray]
+        ends(&mut off, 20).map_or(0.0, |[low, high]| high - low)
     }
 
     /// Where the middle of a single car is along the row: inwards of the end that is its own.
@@ -279,5 +279,89 @@ impl Part {
         let slope = row.slope(self.along[0]);
         let straight = spread <= STRAIGHT_M && turn.abs() <= STEEPEST;
         straight.then(|| (slope - turn) / (1.0 + slope * (turn - slope)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parking::row::Parked;
+    use crate::parking::scene::Scene;
+
+    /// What is seen between two places on a row 6 m to the right, so deep across it, metres.
+    fn standing(pieces: &[[f32; 3]]) -> Standing {
+        let mut points = Vec::new();
+        for [from, to, deep] in pieces {
+            let steps = ((to - from) / 0.05) as usize;
+            for (i, j) in (0..steps).flat_map(|i| (0..20).map(move |j| (i, j))) {
+                let j = j as f32 / 20.0;
+                points.push(Point {
+                    at: [4.2 + deep * j, from + 0.05 * i as f32],
+                    height: 0.2 + 1.2 * j,
+                    pixel: points.len() as u32,
+                });
+            }
+        }
+        Standing { points }
+    }
+
+    fn row() -> Row {
+        let car = |forward: f32| Parked {
+            middle: [6.0, forward],
+            slope: 0.0,
+            weight: 3.0,
+        };
+        Row::all(&[car(2.0), car(5.0)]).remove(0)
+    }
+
+    #[test]
+    fn what_stands_on_a_row_is_parted_by_its_gaps() {
+        let scene = Scene::of(&[]);
+        let standing = standing(&[[9.0, 10.8, 2.0], [11.4, 13.2, 2.0]]);
+        let parts = standing.parts(&row(), [6.0, 20.0], &scene.view());
+        assert_eq!(parts.len(), 2);
+        let cars = parts[1].cars(&row(), &scene.view());
+        let [(along, points)] = &cars[..] else {
+            panic!("{} cars", cars.len());
+        };
+        assert!((along - 12.3).abs() < 0.15, "{along}");
+        assert!(points.len() > 400);
+        // Only what lies between the ends asked for.
+        assert_eq!(standing.parts(&row(), [6.0, 11.0], &scene.view()).len(), 1);
+    }
+
+    #[test]
+    fn cars_doors_to_doors_are_told_apart_by_their_width_and_a_wall_is_none() {
+        let scene = Scene::of(&[]);
+        let count = |piece: [f32; 3]| {
+            let parts = standing(&[piece]).parts(&row(), [6.0, 40.0], &scene.view());
+            parts[0].cars(&row(), &scene.view()).len()
+        };
+        assert_eq!(count([9.0, 10.9, 2.0]), 1);
+        assert_eq!(count([9.0, 13.6, 2.0]), 2);
+        assert_eq!(count([9.0, 16.1, 2.0]), 3);
+        // Longer than three cars, or a fence: neither is cars.
+        assert_eq!(count([9.0, 24.0, 2.0]), 0);
+        assert_eq!(count([9.0, 13.6, 0.2]), 0);
+    }
+
+    #[test]
+    fn a_side_that_is_seen_says_how_the_row_is_turned() {
+        let scene = Scene::of(&[]);
+        // The side towards the camera, turned by 0.15 as the whole car.
+        let points = (0..400).map(|i| {
+            let across = (i / 5) as f32 * 0.05;
+            Point {
+                at: [4.0 + across, 9.0 + 0.15 * across],
+                height: 0.3 + 0.2 * (i % 5) as f32,
+                pixel: i,
+            }
+        });
+        let standing = Standing {
+            points: points.collect(),
+        };
+        let parts = standing.parts(&row(), [6.0, 20.0], &scene.view());
+        let slope = parts[0].slope(&row()).unwrap();
+        assert!((slope + 0.15).abs() < 0.03, "{slope}");
     }
 }

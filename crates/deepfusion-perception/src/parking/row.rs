@@ -1,5 +1,6 @@
 //! The line on which cars stand side by side.
 
+use super::HALF_M;
 use nalgebra::{Matrix4, Vector4};
 
 /// A car that stands across the way, in the ground's axes.
@@ -31,14 +32,25 @@ const BEND: f32 = 10.0;
 const COUNTS_M: f32 = 15.0;
 /// See [`COUNTS_M`].
 const LEFT: f32 = 0.02;
-/// Looks from which on it is certain that a car stands there: in a row of its own, and across the lane from one.
-const SURE: f32 = 3.0;
-/// See [`SURE`].
-const SURE_ACROSS: f32 = 2.0;
-/// How far beyond the last car, of its own or across the lane, a row is looked at, metres.
+/// Looks from which on it is certain that a car stands there.
+const SURE: f32 = 2.0;
+/// How far before its first car, and beyond the last one of its own or across the lane, a row is looked at, metres.
+const BEFORE_M: f32 = 10.0;
+/// See [`BEFORE_M`].
 const GOES_ON_M: f32 = 15.0;
+/// What something that drives along the lane says about how it bends, in looks at a car: the same wherever it is.
+const DRIVEN: f32 = 2.0;
 /// Two rows are at least so far apart, metres.
 const ROWS_M: f32 = 5.0;
+
+/// How the lane goes somewhere, as something that drives along it shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Heading {
+    /// Where, forward in metres.
+    pub forward: f32,
+    /// Right over forward.
+    pub slope: f32,
+}
 
 /// A row of cars, side by side along the way: right = p₀ + p₁ q + p₂ q² / 10 with q = forward − `from`.
 ///
@@ -47,6 +59,7 @@ const ROWS_M: f32 = 5.0;
 pub struct Row {
     cars: Vec<Parked>,
     across: Vec<Parked>,
+    lane: Vec<Heading>,
     from: f32,
     /// p₀, p₁, p₂, and the other row's p₀.
     line: Vector4<f32>,
@@ -87,6 +100,7 @@ impl Row {
         let mut row = Self {
             cars,
             across: Vec::new(),
+            lane: Vec::new(),
             from: 0.0,
             line: Vector4::zeros(),
             focus: None,
@@ -97,7 +111,7 @@ impl Row {
 
     /// Whether a car that was seen often enough stands across the lane from this row.
     fn faces(&self, car: &Parked) -> bool {
-        let seen = |c: &&Parked| c.weight >= SURE_ACROSS;
+        let seen = |c: &&Parked| c.weight >= SURE;
         let [first, last] = self.reach();
         let turn = self.slope(car.middle[1]).atan() - car.slope.atan();
         seen(&car)
@@ -127,6 +141,12 @@ impl Row {
         }
     }
 
+    /// Bends as what drives along the lane shows.
+    pub fn keep_to(&mut self, lane: &[Heading]) {
+        self.lane = lane.to_vec();
+        self.fit();
+    }
+
     /// One more car.
     pub fn add(&mut self, car: Parked) {
         self.cars.push(car);
@@ -148,6 +168,7 @@ impl Row {
         let least = Vector4::new(0.0, AHEAD.powi(2), STRAIGHT.powi(2), 1e-3);
         let mut normal = Matrix4::from_diagonal(&least);
         let mut sum = Vector4::zeros();
+        let mut turns = Vec::with_capacity(self.cars.len() + self.across.len());
         let own = self.cars.iter().map(|car| (car, 1.0));
         let across = self.across.iter().map(|car| (car, 0.0));
         for (car, own) in own.chain(across) {
@@ -157,9 +178,14 @@ impl Row {
             let place = Vector4::new(own, q, q * q / BEND, 1.0 - own) * weight;
             normal += place * place.transpose();
             sum += place * (weight * car.middle[0]);
+            turns.push((car.middle[1], car.slope, weight));
+        }
+        let lane = self.lane.iter().map(|h| (h.forward, h.slope, DRIVEN));
+        for (forward, slope, weight) in turns.into_iter().chain(lane) {
+            let q = forward - self.from;
             let turn = Vector4::new(0.0, 1.0, 2.0 * q / BEND, 0.0) * (TURN_M * weight);
             normal += turn * turn.transpose();
-            sum += turn * (TURN_M * weight * car.slope);
+            sum += turn * (TURN_M * weight * slope);
         }
         // Positive definite for weights above 0.
         if let Some(cholesky) = normal.cholesky() {
@@ -186,11 +212,27 @@ impl Row {
         })
     }
 
+    /// From how far forward on it is looked at, metres.
+    pub fn start(&self) -> f32 {
+        self.reach()[0] - BEFORE_M
+    }
+
     /// How far forward it is looked at, metres.
     pub fn end(&self) -> f32 {
         let all = self.cars.iter().chain(&self.across);
         let last = all.map(|car| car.middle[1]);
         last.fold(f32::NEG_INFINITY, f32::max) + GOES_ON_M
+    }
+
+    /// Whether it is looked at so far along.
+    pub fn passes(&self, along: f32) -> bool {
+        (self.start()..self.end()).contains(&along)
+    }
+
+    /// Whether what stands at a point (right, forward) stands in it.
+    pub fn holds(&self, at: [f32; 2]) -> bool {
+        let [along, off] = self.locate(at);
+        off.abs() <= HALF_M && self.passes(along)
     }
 
     /// How many of its cars were seen often.
@@ -278,6 +320,19 @@ mod tests {
         );
         let back = row.place(along, off);
         assert!((back[1] - 10.0).abs() < 0.05, "{back:?}");
+    }
+
+    #[test]
+    fn a_row_bends_as_what_drives_along_the_lane_shows() {
+        let mut row = Row::through(vec![car(6.0, 2.0, 0.0), car(6.0, 5.0, 0.0)]);
+        let straight = row.at(24.0);
+        row.keep_to(&[Heading {
+            forward: 25.0,
+            slope: -0.4,
+        }]);
+        assert!((row.at(4.0) - 6.0).abs() < 0.3, "{row:?}");
+        assert!((row.slope(25.0) + 0.4).abs() < 0.15, "{row:?}");
+        assert!(row.at(24.0) < straight - 2.0, "{row:?}");
     }
 
     #[test]

@@ -1,0 +1,55 @@
+//! A row from its near end to its far one.
+
+use super::View;
+use super::car::car;
+use super::parts::Standing;
+use super::row::{Parked, Row};
+use crate::Detection;
+
+/// What a car that was found by its row says about where the row goes on, in looks.
+const FOUND: f32 = 2.0;
+
+/// Follows a row from its near end to its far one: each car of which enough is seen says where it goes on.
+pub fn follow(row: &mut Row, standing: &Standing, view: &View) -> Vec<Detection> {
+    let mut found = Vec::new();
+    let mut done = f32::NEG_INFINITY;
+    loop {
+        let mut from = row.start();
+        if done.is_finite() {
+            row.focus(done);
+            from = done;
+        }
+        let ends = [from, row.end()];
+        let before = done;
+        for part in standing.parts(row, ends, view) {
+            if part.along[1] <= done + 0.3 {
+                continue;
+            }
+            done = part.along[1];
+            let slope = part.slope(row);
+            let mut told = slope.is_some();
+            let line = row.clone();
+            for (along, points) in part.cars(&line, view) {
+                let Some((car, front)) = car(along, &points, &line, view) else {
+                    continue;
+                };
+                if front || slope.is_some() {
+                    row.add(Parked {
+                        middle: car.place.middle,
+                        slope: slope.unwrap_or_else(|| line.slope(along)),
+                        weight: FOUND,
+                    });
+                    told = true;
+                }
+                found.push(car);
+            }
+            if told {
+                // It may go on otherwise than was thought.
+                break;
+            }
+        }
+        if done <= before {
+            return found;
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! For the tests: upright boxes before a level camera.
+
+use super::View;
+use crate::obstacles::NONE;
+use crate::{Ground, GroundBox, Obstacles, PerceptionConfig, Rays};
+use deepfusion_geometry::Intrinsics;
+
+/// Height of the camera over the ground, metres.
+const CAMERA_M: f32 = 1.6;
+
+/// What a camera of 640×192 sees of some boxes.
+pub struct Scene {
+    depth: Vec<f32>,
+    obstacles: Obstacles,
+    rays: Rays,
+    ground: Ground,
+    config: PerceptionConfig,
+}
+
+impl Scene {
+    /// Sees these boxes.
+    pub fn of(boxes: &[GroundBox]) -> Self {
+        let (width, height) = (640, 192);
+        let rays = Rays::of(&Intrinsics {
+            fx: 370.0,
+            fy: 370.0,
+            cx: 320.0,
+            cy: 96.0,
+            width: width as u32,
+            height: height as u32,
+        });
+        let mut scene = Self {
+            depth: vec![0.0; width * height],
+            obstacles: Obstacles {
+                height: vec![NONE; width * height],
+            },
+            rays,
+            ground: Ground::plane([0.0, -1.0, 0.0], CAMERA_M),
+            config: PerceptionConfig::default(),
+        };
+        for pixel in 0..width * height {
+            let (x, y) = (scene.rays.x[pixel % width], scene.rays.y[pixel / width]);
+            let hits = boxes.iter().filter_map(|seen| hit(seen, x, y));
+            if let Some(z) = hits.min_by(f32::total_cmp) {
+                scene.depth[pixel] = z;
+                scene.obstacles.height[pixel] = CAMERA_M - y * z;
+            }
+        }
+        scene
+    }
+
+    /// What is seen.
+    pub fn view(&self) -> View<'_> {
+        View {
+            depth: &self.depth,
+            obstacles: &self.obstacles,
+            rays: &self.rays,
+            ground: &self.ground,
+            config: &self.config,
+        }
+    }
+}
+
+/// How far forward a ray (x, y, 1) meets a side of a box, metres.
+fn hit(seen: &GroundBox, x: f32, y: f32) -> Option<f32> {
+    let (sin, cos) = seen.angle.sin_cos();
+    let [right, forward] = seen.middle;
+    let from = [
+        -(cos * right + sin * forward),
+        -(cos * forward - sin * right),
+    ];
+    let along = [cos * x + sin, cos - sin * x];
+    let (mut near, mut far) = (0.1f32, 60.0f32);
+    for i in 0..2 {
+        let half = 0.5 * seen.footprint[i];
+        let [a, b] = [-half, half].map(|end| (end - from[i]) / along[i]);
+        near = near.max(a.min(b));
+        far = far.min(a.max(b));
+    }
+    let height = CAMERA_M - y * near;
+    (near < far && (seen.heights[0]..seen.heights[1]).contains(&height)).then_some(near)
+}
