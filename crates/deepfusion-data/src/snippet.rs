@@ -48,6 +48,21 @@ impl Dataset {
     /// [`Error::Offsets`]; [`Error::Missing`] or [`Error::NoTrack`] without times, speeds or the camera's
     /// place on the car; and where none is left [`Error::OneFrame`], [`Error::Standing`] or [`Error::NoPairs`].
     pub fn snippets(&self, offsets: &[i32], min_speed_mps: f64) -> Result<Vec<Snippet>> {
+        self.snippets_apart(offsets, 0.0, min_speed_mps)
+    }
+
+    /// As [`Self::snippets`], where an offset counts in steps of at least `frame_distance_m` metres that the camera
+    /// moved: the source of offset n is the first frame at least |n| away, and at least |n| × `frame_distance_m`
+    /// metres. One frame of a slow drive differs from the next by less than a pixel; 0 counts frames alone.
+    ///
+    /// # Errors
+    /// As [`Self::snippets`].
+    pub fn snippets_apart(
+        &self,
+        offsets: &[i32],
+        frame_distance_m: f64,
+        min_speed_mps: f64,
+    ) -> Result<Vec<Snippet>> {
         let distinct: HashSet<_> = offsets.iter().collect();
         if offsets.is_empty() || offsets.contains(&0) || distinct.len() != offsets.len() {
             return Err(Error::Offsets {
@@ -70,26 +85,36 @@ impl Dataset {
             let number = self.frames()[target].number;
             let mut sources = Vec::with_capacity(offsets.len());
             for &offset in offsets {
-                let neighbour = number.checked_add_signed(i64::from(offset));
-                let Some(&frame) = neighbour.and_then(|n| index_of.get(&n)) else {
-                    no_neighbour += 1;
-                    continue 'targets;
+                let least_m = f64::from(offset.unsigned_abs()) * frame_distance_m;
+                let mut offset = offset;
+                let source = loop {
+                    let neighbour = number.checked_add_signed(i64::from(offset));
+                    let Some(&frame) = neighbour.and_then(|n| index_of.get(&n)) else {
+                        no_neighbour += 1;
+                        continue 'targets;
+                    };
+                    let motion = match ego.between(self.frames(), target, frame) {
+                        Ok(motion) => motion,
+                        Err(NoMotion::Time) => {
+                            bad_time += 1;
+                            continue 'targets;
+                        }
+                        Err(NoMotion::Speed) => {
+                            no_motion += 1;
+                            continue 'targets;
+                        }
+                    };
+                    // A pair that is too slow is dropped below, so nobody waits for a car that stands.
+                    if motion.distance_m >= least_m || motion.speed_mps < min_speed_mps {
+                        break Source {
+                            offset,
+                            frame,
+                            motion,
+                        };
+                    }
+                    offset += offset.signum();
                 };
-                match ego.between(self.frames(), target, frame) {
-                    Ok(motion) => sources.push(Source {
-                        offset,
-                        frame,
-                        motion,
-                    }),
-                    Err(NoMotion::Time) => {
-                        bad_time += 1;
-                        continue 'targets;
-                    }
-                    Err(NoMotion::Speed) => {
-                        no_motion += 1;
-                        continue 'targets;
-                    }
-                }
+                sources.push(source);
             }
             let slowest = sources.iter().map(|s| s.motion.speed_mps);
             let slowest = slowest.fold(f64::INFINITY, f64::min);

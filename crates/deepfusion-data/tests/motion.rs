@@ -106,6 +106,34 @@ fn missing_frames_break_pairs() {
 }
 
 #[test]
+fn a_source_is_as_far_away_as_is_asked_for() {
+    let root = tempfile::tempdir().unwrap();
+    let dataset = open(&TinyDrive::default().write(root.path()));
+    let next = dataset.snippets(&[1], 0.5).unwrap();
+    let step = next[0].sources[0].motion.distance_m;
+    // Frames are farther apart than that: as if nothing had been asked for.
+    let near = dataset.snippets_apart(&[1], 0.5 * step, 0.5).unwrap();
+    assert_eq!(near, next);
+    for (offset, expected) in [(1, 2), (-1, -2), (2, 3)] {
+        let least = 1.3 * step * f64::from(offset).abs();
+        let apart = dataset.snippets_apart(&[offset], 1.3 * step, 0.5).unwrap();
+        assert!(!apart.is_empty());
+        for snippet in &apart {
+            let [source] = snippet.sources[..] else {
+                panic!("{snippet:?}");
+            };
+            assert_eq!(source.offset, expected, "{snippet:?}");
+            let frame = snippet.target as i64 + i64::from(expected);
+            assert_eq!(source.frame as i64, frame);
+            assert!(source.motion.distance_m >= least, "{snippet:?}");
+        }
+    }
+    // Farther than the whole drive: nothing is left, and the error says what was looked for.
+    let error = dataset.snippets_apart(&[1], 1000.0, 0.5).unwrap_err();
+    assert!(matches!(error, Error::NoPairs { .. }), "{error}");
+}
+
+#[test]
 fn standing_pairs_are_dropped_and_a_standing_car_is_an_error() {
     let root = tempfile::tempdir().unwrap();
     let drive = TinyDrive::default().write(root.path());

@@ -84,6 +84,10 @@ pub struct TrainConfig {
     pub size: InputSize,
     /// Offsets of the sources: `[1]` or `[-1, 1]`.
     pub frames: Vec<i32>,
+    /// An offset counts in steps of at least so many metres that the camera moved, where its frames are closer; 0:
+    /// in frames. At walking pace a frame differs from the next by less than a pixel, which says nothing about depth.
+    #[serde(default)]
+    pub frame_distance_m: f64,
     /// How views are compared.
     pub reprojection: Reprojection,
     /// Where the reversed pair's motion comes from.
@@ -287,6 +291,7 @@ impl TrainConfig {
         let weights = [
             ("clip_norm", self.clip_norm),
             ("min_speed_mps", self.min_speed_mps),
+            ("frame_distance_m", self.frame_distance_m),
             ("pose_net.metres_per_unit", self.pose_net.metres_per_unit),
         ];
         for (field, weight) in weights {

@@ -44,6 +44,7 @@ impl Preset {
                 height: 192,
             },
             frames: vec![1],
+            frame_distance_m: 0.0,
             reprojection: Reprojection::Bidirectional,
             reversed_pose: ReversedPose::Predicted,
             batch: 12,

@@ -102,7 +102,8 @@ impl SampleSet {
         let (mut train, mut held) = (Vec::new(), Vec::new());
         let mut last = None;
         for (dataset, recording) in datasets.iter().enumerate() {
-            match recording.snippets(&config.frames, config.min_speed_mps) {
+            let distance = config.frame_distance_m;
+            match recording.snippets_apart(&config.frames, distance, config.min_speed_mps) {
                 Ok(_) if config.reads_rotation() && !recording.yaw_known() => {
                     return Err(Error::NoYawRate {
                         drive: recording.name().to_owned(),
