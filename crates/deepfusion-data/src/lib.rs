@@ -74,4 +74,5 @@ pub use resize::{resize_rgb, to_chw, to_network_input};
 pub use snippet::{EgoMotion, Snippet, Source, hold_out};
 pub use speed_check::{SpeedWarning, grey_image, speed_unit_warning};
 pub use split::{Split, SplitEntry};
+pub use video::{Shown, can_write_video, shown_for, write_video};
 pub use write::write_atomically;

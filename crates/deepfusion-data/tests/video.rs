@@ -4,7 +4,9 @@ mod common;
 #[path = "common/folder.rs"]
 mod folder;
 
-use deepfusion_data::{Dataset, DatasetKind, FrameImage, OpenOptions, RgbImage, inspect};
+use deepfusion_data::{
+    Dataset, DatasetKind, FrameImage, OpenOptions, RgbImage, Shown, inspect, shown_for,
+};
 use image::Rgb;
 use ndarray::Array1;
 use ndarray_npy::WriteNpyExt;
@@ -185,4 +187,57 @@ fn what_is_no_video_is_told() {
     fs::write(root.path().join("y.mkv"), "another").unwrap();
     let error = Dataset::open(root.path(), &OpenOptions::default()).unwrap_err();
     assert!(error.to_string().contains("2 videos are there"), "{error}");
+}
+
+#[test]
+fn pictures_become_a_video_at_their_own_times() {
+    let root = tempfile::tempdir().unwrap();
+    if encode(root.path(), "there_is_ffmpeg.mp4", &[]).is_none() {
+        return;
+    }
+    let folder = root.path().join("made");
+    fs::create_dir(&folder).unwrap();
+    let times = [0.0, 0.04, 0.08, 0.2, 0.24];
+    let seconds = shown_for(&times.map(Some));
+    let shown: Vec<Shown> = seconds
+        .into_iter()
+        .enumerate()
+        .map(|(i, seconds)| {
+            let file = format!("it's {i}.png");
+            // Of an odd size, and one that is smaller.
+            let (w, h) = if i == 3 { (32, 24) } else { (65, 49) };
+            let grey = RgbImage::from_pixel(w, h, Rgb([40 + 40 * i as u8; 3]));
+            grey.save(folder.join(&file)).unwrap();
+            Shown { file, seconds }
+        })
+        .collect();
+    deepfusion_data::write_video(&folder, &shown, "drive.mp4").unwrap();
+    let left = fs::read_dir(&folder).unwrap().count();
+    assert_eq!(left, 6, "the pictures and the video");
+    fs::write(folder.join("intrinsics.txt"), "50,50,32,24").unwrap();
+    let opened = Dataset::open(&folder.join("drive.mp4"), &OpenOptions::default()).unwrap();
+    let frames = opened[0].frames();
+    for (i, expected) in times.into_iter().enumerate() {
+        let time = frames[i].time_s.unwrap();
+        assert!(
+            (time - expected).abs() < 0.005,
+            "{i}: {time} for {expected}"
+        );
+        let image = opened[0].load_image(i).unwrap();
+        assert_eq!(image.dimensions(), (66, 50));
+        let grey = image.get_pixel(33, 25)[0];
+        assert!(grey.abs_diff(40 + 40 * i as u8) < 12, "{i}: {grey}");
+    }
+    // What is no picture is an error that names it, and leaves nothing behind.
+    fs::write(folder.join("it's 0.png"), "no picture").unwrap();
+    let error = deepfusion_data::write_video(&folder, &shown, "other.mp4").unwrap_err();
+    assert!(error.to_string().contains("it's 0.png"), "{error}");
+    fs::remove_file(folder.join("it's 1.png")).unwrap();
+    let error = deepfusion_data::write_video(&folder, &shown[1..], "other.mp4").unwrap_err();
+    assert!(error.to_string().contains("it's 1.png"), "{error}");
+    let names = fs::read_dir(&folder)
+        .unwrap()
+        .map(|e| e.unwrap().file_name());
+    let mut names = names.map(|n| n.into_string().unwrap());
+    assert!(names.all(|n| !n.contains("partial") && n != "other.mp4"));
 }

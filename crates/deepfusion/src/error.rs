@@ -166,6 +166,11 @@ pub enum CliError {
     /// A correction that follows the frames, of which this run sees a part.
     #[error("`--correct-scale` follows all frames of a recording, and a shard sees only some")]
     CorrectShard,
+    /// A video of every other frame.
+    #[error(
+        "`--save video` shows the frames of a recording one after the other, and a shard sees only some"
+    )]
+    VideoShard,
     /// A cloud without a camera.
     #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
     NoCamera,
@@ -224,6 +229,9 @@ impl CliError {
             }
             Self::Unwatched { .. } => Some("leave it out, or give recordings with speed and yaw rate alone".into()),
             Self::CorrectShard => Some("leave --shard out: give each run recordings of its own".into()),
+            Self::VideoShard => {
+                Some("save side-by-side in the shards, then run once more with --save video and without --shard".into())
+            }
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
         }
     }

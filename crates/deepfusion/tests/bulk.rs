@@ -277,3 +277,49 @@ fn what_is_there_is_kept_only_where_nothing_changed() {
         b"mine"
     );
 }
+
+#[test]
+fn the_pictures_of_a_recording_become_a_video() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    prepare(at);
+    let predict = "predict --model run sim --save video";
+    // Before any work: a shard has no video to show, and without ffmpeg there is none.
+    let shard = format!("{predict} --out out --shard 1/2");
+    fails(at, &shard, &["--save video", "a shard sees only some"]);
+    let without = Command::new(env!("CARGO_BIN_EXE_deepfusion"))
+        .current_dir(at)
+        .args(format!("{predict} --out out").split_whitespace())
+        .env("PATH", at)
+        .output()
+        .unwrap();
+    let said = String::from_utf8(without.stderr).unwrap();
+    assert!(
+        !without.status.success() && said.contains("ffmpeg is needed to write videos"),
+        "{said}"
+    );
+    assert!(!at.join("out").exists());
+    let there = Command::new("ffmpeg").arg("-version").output();
+    if !there.is_ok_and(|o| o.status.success()) {
+        eprintln!("skipped: there is no ffmpeg that could write a video");
+        return;
+    }
+    // Shards leave the pictures; one more run shows them.
+    for i in 1..=2 {
+        let args = format!("predict --model run sim --save side-by-side --out out --shard {i}/2");
+        ok(at, &args);
+    }
+    ok(at, &format!("{predict} --out out"));
+    let video = "2026_01_01_drive_0003_sync_video.mp4";
+    let made = outputs(&at.join("out"));
+    assert_eq!(made.len(), 30 * 2 + 1, "{:?}", made.keys());
+    assert!(made[video].len() > 1000, "{:?}", made.keys());
+    // A video is a recording, too, once its camera is known: the drive's frames, the last one named twice.
+    fs::write(at.join("out/intrinsics.txt"), "50,50,48,32").unwrap();
+    let inspected = ok(at, &format!("data inspect out/{video}"));
+    assert!(
+        inspected.stdout.contains("31 frames"),
+        "{}",
+        inspected.stdout
+    );
+}

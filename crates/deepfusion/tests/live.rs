@@ -155,7 +155,8 @@ fn depth_of_a_stream_stops_where_it_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     network(at);
-    let args = format!("predict --model run - {CAMERA} --out depth --frames 2 --save npy --json");
+    let args =
+        format!("predict --model run - {CAMERA} --out depth --frames 2 --save npy,video --json");
     let told = piped(at, &args, stream(2000));
     assert_eq!(told.code, 0, "{}", told.stderr);
     let sidecars: Vec<Value> = told
@@ -172,8 +173,10 @@ fn depth_of_a_stream_stops_where_it_is_told() {
             assert!(at.join("depth").join(file.as_str().unwrap()).is_file());
         }
     }
-    // Two frames of three files each: no manifest, no lock.
-    assert_eq!(files(&at.join("depth")).len(), 6);
+    // Two frames of four files each, and their video: no manifest, no lock.
+    let files = files(&at.join("depth"));
+    assert_eq!(files.len(), 9, "{files:?}");
+    assert!(files.contains(&"live_video.mp4".to_owned()), "{files:?}");
 }
 
 #[test]

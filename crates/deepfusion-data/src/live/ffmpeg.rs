@@ -67,7 +67,7 @@ impl Ffmpeg {
         let mut child = command.spawn().map_err(|e| {
             let name = address.to_string();
             let remedy = "install ffmpeg so that it is on the PATH; it opens cameras and streams";
-            not_started(Path::new(&name), "ffmpeg", &e, "live sources", remedy)
+            not_started(Path::new(&name), "ffmpeg", &e, "read live sources", remedy)
         })?;
         let slot = Arc::new(Slot::new());
         let said = Arc::new(Mutex::new(VecDeque::new()));

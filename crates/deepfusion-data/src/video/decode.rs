@@ -5,7 +5,7 @@
 //! `cache` in `dataset.toml` names), as JPEGs of ffmpeg's best quality but one; the folder can be deleted at
 //! any time. It takes part under another name and is renamed when it is whole.
 
-use super::program::run;
+use super::program::{READ, run};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
@@ -98,7 +98,7 @@ fn ffmpeg(video: &Path, part: &Path, mode: &str) -> Result<Vec<u8>> {
         // Within the folder: a `%` in its own path would count as a number's place.
         "%010d.jpg".as_ref(),
     ];
-    run("ffmpeg", &arguments, video, part)
+    run("ffmpeg", &arguments, (video, READ), part)
 }
 
 impl Origin {

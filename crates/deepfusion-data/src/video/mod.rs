@@ -1,8 +1,11 @@
 //! A video file with tables and a calibration beside it, decoded by the user's ffmpeg.
 
 mod decode;
+mod encode;
 mod probe;
 pub(crate) mod program;
+
+pub use encode::{Shown, can_write_video, shown_for, write_video};
 
 use crate::calibration::find_camera;
 use crate::config::FolderConfig;

@@ -1,6 +1,6 @@
 //! What ffprobe says of a video, without decoding it.
 
-use super::program::run;
+use super::program::{READ, run};
 use crate::clock::TimeUnit;
 use crate::{Error, Result};
 use serde::Deserialize;
@@ -62,7 +62,7 @@ pub(super) fn probe(file: &Path) -> Result<Probed> {
     let mut arguments: Vec<&std::ffi::OsStr> = arguments.iter().map(|a| a.as_ref()).collect();
     arguments.push(file.as_os_str());
     let folder = file.parent().unwrap_or(Path::new("."));
-    parse(&run("ffprobe", &arguments, file, folder)?).map_err(|problem| Error::Program {
+    parse(&run("ffprobe", &arguments, (file, READ), folder)?).map_err(|problem| Error::Program {
         path: file.to_owned(),
         program: "ffprobe",
         problem,

@@ -16,7 +16,7 @@ use super::{EngineArgs, Outputs, PredictionArgs, PresetChoice, Shard, Size};
     frame is looked at; the others are skipped, and counted.\n\n\
     Examples:\n  deepfusion predict --model runs/train-1 street.jpg --out depth\n  \
     deepfusion predict --model runs/train-1 'drive/*.png' --save npy,ply --out depth\n  \
-    deepfusion predict --model runs/train-1 drive.bag --out depth\n  \
+    deepfusion predict --model runs/train-1 drive.bag --save video --out depth\n  \
     deepfusion predict --model runs/train-1 drive --out depth --shard 1/2   # and 2/2 elsewhere\n  \
     deepfusion predict --model runs/train-1 camera:0 --calib camera.yaml --frames 100 --out depth"
 )]
@@ -47,10 +47,21 @@ pub struct PredictArgs {
 impl PredictArgs {
     /// What is kept of every image.
     pub fn outputs(&self) -> Outputs {
+        // A video is made of pictures, when they are all there.
+        let mut save = self.save.clone();
+        if self.video() && !save.contains(&Save::SideBySide) {
+            save.push(Save::SideBySide);
+        }
+        save.retain(|save| *save != Save::Video);
         Outputs {
-            save: self.save.clone(),
+            save,
             max_depth_m: self.max_depth,
         }
+    }
+
+    /// Whether videos are wanted.
+    pub fn video(&self) -> bool {
+        self.save.contains(&Save::Video)
     }
 }
 
@@ -71,6 +82,8 @@ pub enum Save {
     Pcd,
     /// What the network sees: its features and attention masks on the image.
     Features,
+    /// The pictures of `side-by-side`, which are kept, too, as an MP4 of each recording (through ffmpeg).
+    Video,
 }
 
 impl Save {

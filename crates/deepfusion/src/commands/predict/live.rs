@@ -1,11 +1,13 @@
 //! Depth of a camera or a stream.
 
+use std::sync::{Mutex, PoisonError};
+
 use anyhow::Result;
-use deepfusion_data::{Address, LiveFrame};
+use deepfusion_data::{Address, LiveFrame, shown_for};
 
 use super::camera::CameraSource;
 use super::manifest::Lock;
-use super::{Job, tell_assumed};
+use super::{Job, tell_assumed, video};
 use crate::cli::{PredictArgs, Shard};
 use crate::commands::live::{self, Feed, LiveMark};
 use crate::commands::scene::ScaleWatch;
@@ -41,22 +43,32 @@ pub fn run(args: &PredictArgs, address: &Address) -> Result<()> {
         loaded.live = Some(LiveMark { latency_ms, ..mark });
         Ok(((input, loaded, seen), latency_ms))
     };
-    let done = std::sync::atomic::AtomicUsize::new(0);
+    // Name and time of each frame that was written.
+    let done = Mutex::new(Vec::new());
     let ending = live::run(&mut feed, look, |(input, loaded, seen)| {
         let sidecar = job.write(&input, &loaded, &seen)?;
-        done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        let mark = loaded.live.as_ref().map(|mark| mark.arrived_unix_s);
+        let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
+        done.push((input.name, mark));
+        drop(done);
         match args.json {
             true => output::print(&(serde_json::to_string(&sidecar)? + "\n")),
             false => Ok(()),
         }
     });
+    let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     if let Some(figures) = feed.told() {
         let ended = ending.as_ref().map_or("the source was lost", |e| e.told());
         say(&format!(
             "{} images written to {} ({ended}): {figures}",
-            done.into_inner(),
+            done.len(),
             out.display()
         ));
+    }
+    if args.video() {
+        let times: Vec<Option<f64>> = done.iter().map(|(_, time)| *time).collect();
+        let shown = done.iter().map(|(name, _)| name.as_str());
+        video::write_one(out, shown.zip(shown_for(&times)), "live")?;
     }
     ending.map(|_| ())
 }

@@ -9,6 +9,7 @@ mod manifest;
 mod outputs;
 mod resume;
 pub(super) mod sidecar;
+mod video;
 mod watcher;
 
 use anyhow::{Context, Result};
@@ -71,6 +72,7 @@ pub fn run(args: &PredictArgs) -> Result<()> {
         prediction, shard, ..
     } = args;
     let out = &prediction.out;
+    video::check(args)?;
     if let Some(address) = sources::source(&prediction.inputs, &prediction.live)? {
         return live::run(args, &address);
     }
@@ -111,7 +113,11 @@ pub fn run(args: &PredictArgs) -> Result<()> {
     if args.json {
         output::print_json(&summary.sidecars)?;
     }
-    summary.outcome
+    summary.outcome?;
+    match args.video() {
+        true => video::write(out, &all),
+        false => Ok(()),
+    }
 }
 
 /// Warns of a camera that nobody gave.

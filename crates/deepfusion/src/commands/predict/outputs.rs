@@ -24,6 +24,7 @@ pub fn file_name(name: &str, save: Save) -> String {
         Save::Ply => ".ply",
         Save::Pcd => ".pcd",
         Save::Features => "_features.png",
+        Save::Video => "_video.mp4",
     };
     format!("{name}{ending}")
 }
@@ -46,6 +47,8 @@ pub fn write(
             let picture = with_depth_legend(&depth_picture(depth, &scale), &scale);
             save_png(&picture, path)?;
         }
+        // Of all images, by `video`.
+        Save::Video => {}
         Save::SideBySide => save_png(&side_by_side(image, depth, &scale)?, path)?,
         Save::Features => {
             let picture = features::picture(image, depth, prediction.window, layers)?;
