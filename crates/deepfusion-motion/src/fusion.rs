@@ -8,6 +8,10 @@ const TURNING_RADPS: f64 = 0.03;
 /// Shorter turning, in seconds, does not prove that two sensors disagree about left and right.
 const ENOUGH_TURNING_S: f64 = 3.0;
 
+/// Up to this long the accelerometer's share of a distance is the configured one, in seconds. What is left of its bias grows
+/// with the square of time, the wheels' error with time: beyond, its share falls with the square.
+const DRIFTS_S: f64 = 1.0;
+
 /// What a vehicle's sensors recorded, on one clock.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct VehicleSensors {
@@ -27,7 +31,7 @@ pub struct VehicleSensors {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FusionConfig {
-    /// α_d, the inertial unit's share of the distance (Eq. 30).
+    /// α_d, the inertial unit's share of the distance (Eq. 30) over up to a second; over T seconds 1/T² of it.
     pub alpha_distance: f64,
     /// α_θ, the inertial unit's share of the yaw (Eq. 31).
     pub alpha_yaw: f64,
@@ -194,7 +198,7 @@ impl FusedTrack {
     }
 
     /// What the vehicle did from `from_s` to `to_s` (Eq. 30–31): d_F = α_d d_I + (1 − α_d) d_V and θ_F
-    /// likewise. A sensor that is absent, or has a gap there, leaves all the weight to the other.
+    /// likewise, α_d falling with the square of time beyond a second. A sensor that is absent, or has a gap there, leaves all the weight to the other.
     /// `None` where the speed has a gap, or all that measures yaw has; or where time runs backward.
     #[must_use]
     pub fn motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {
@@ -210,6 +214,7 @@ impl FusedTrack {
             (None, None) => 0.0,
         };
         let distance_v = parts.vehicle_distance_m;
+        let alpha_distance = alpha_distance * (DRIFTS_S / (to_s - from_s)).min(1.0).powi(2);
         Some(VehicleMotion {
             distance_m: parts.imu_distance_m.map_or(distance_v, |imu| {
                 alpha_distance * imu + (1.0 - alpha_distance) * distance_v

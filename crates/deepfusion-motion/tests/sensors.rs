@@ -270,6 +270,28 @@ fn gaps_are_refused_or_left_to_the_other_sensor() {
 }
 
 #[test]
+fn the_accelerometer_counts_less_the_longer_it_drifts() {
+    let track = FusedTrack::new(&all(), &config()).unwrap();
+    let alpha = config().fusion.alpha_distance;
+    for (seconds, share) in [
+        (0.1, alpha),
+        (1.0, alpha),
+        (2.0, alpha / 4.0),
+        (10.0, alpha / 100.0),
+    ] {
+        let (from, to) = (20.0, 20.0 + seconds);
+        let parts = track.parts(from, to).unwrap();
+        let (imu, vehicle) = (parts.imu_distance_m.unwrap(), parts.vehicle_distance_m);
+        let fused = track.motion(from, to).unwrap().distance_m;
+        let expected = share * imu + (1.0 - share) * vehicle;
+        assert!(
+            (fused - expected).abs() < 1e-9,
+            "{seconds}: {fused} for {expected}"
+        );
+    }
+}
+
+#[test]
 fn opposite_signs_of_steering_and_gyro_are_refused() {
     let mut turned = config();
     turned.bicycle = Some(Bicycle::new(2.7).with_steering_wheel(-15.0));
