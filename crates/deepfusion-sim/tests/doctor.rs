@@ -380,5 +380,5 @@ fn a_bag_whose_camera_clock_is_ahead_is_told() {
     assert_eq!(offset.vehicle_minus_camera_s, value(finding));
     assert!(offset.std_error_s < 0.05, "{offset:?}");
     assert!(seen.to_string().contains("vehicle less camera -"), "{seen}");
-    assert!((value(finding) + 0.3).abs() < 0.05, "{finding:?}");
+    assert!((value(finding) + 0.3).abs() < 0.010, "{finding:?}");
 }

@@ -12,6 +12,11 @@ const MOST_S: f64 = 0.020;
 const SIGMAS: f64 = 4.0;
 const SURE_S: f64 = 0.05;
 
+/// How often the offset is measured again with what it says, at most, and by how little it then changes, seconds.
+const ROUNDS: usize = 4;
+/// See [`ROUNDS`].
+const SETTLED_S: f64 = 0.001;
+
 pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     let Estimate { offset, rates } = match estimate(survey, pairs) {
         Ok(estimate) => estimate,
@@ -60,8 +65,7 @@ pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Es
         return Err("no speed and yaw rate to compare the picture with".into());
     };
     let rates = VehicleRates::from(track);
-    let offset = time_offset(&pictures(survey, pairs), &rates, &OffsetConfig::default());
-    let offset = offset.map_err(|why| why.to_string())?;
+    let offset = settled(survey, pairs, &rates)?;
     let (value, error) = (offset.vehicle_minus_camera_s, offset.std_error_s);
     match error.is_nan() || error >= SURE_S {
         true => Err(format!(
@@ -69,6 +73,30 @@ pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Es
         )),
         false => Ok(Estimate { offset, rates }),
     }
+}
+
+/// The offset, and with it which way the camera headed: that is taken from the vehicle, whose times are known once the offset
+/// is. Taken at another time it adds a part of that time's turn to the picture's, and a tenth to the offset.
+fn settled(
+    survey: &Survey<'_>,
+    pairs: &[EpipolarPair],
+    rates: &VehicleRates,
+) -> Result<TimeOffset, String> {
+    let measure = |pairs: &[EpipolarPair]| {
+        let offset = time_offset(&pictures(survey, pairs), rates, &OffsetConfig::default());
+        offset.map_err(|why| why.to_string())
+    };
+    let mut offset = measure(pairs)?;
+    let ego = survey.dataset.ego().map_err(|why| why.to_string())?;
+    for _ in 0..ROUNDS {
+        let before = offset.vehicle_minus_camera_s;
+        let headed = |pair: &EpipolarPair| pair.with_clock(&ego, before);
+        offset = measure(&pairs.iter().filter_map(headed).collect::<Vec<_>>())?;
+        if (offset.vehicle_minus_camera_s - before).abs() < SETTLED_S {
+            break;
+        }
+    }
+    Ok(offset)
 }
 
 /// How the pictures moved. The turn by the points that were followed is truer than the shift of the whole picture, which

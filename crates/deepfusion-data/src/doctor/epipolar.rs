@@ -11,6 +11,7 @@
 
 use super::flow::Flow;
 use super::survey::Survey;
+use crate::ego::Ego;
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix2x3, Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
@@ -78,6 +79,19 @@ fn in_plane(k: &Intrinsics, flow: &Flow) -> (Vector2<f64>, Vector2<f64>) {
 }
 
 impl EpipolarPair {
+    /// The same where the vehicle's clock is so far ahead of the frames': another motion by the vehicle. `None` where its
+    /// track does not reach so far.
+    pub(crate) fn with_clock(&self, ego: &Ego<'_>, vehicle_ahead_s: f64) -> Option<Self> {
+        let middle_s = self.middle_s + vehicle_ahead_s;
+        let [from_s, to_s] = [-0.5, 0.5].map(|half| middle_s + half * self.dt_s);
+        let vehicle = ego.track.motion(from_s, to_s)?;
+        Some(Self {
+            earlier_from_later: vehicle.camera0_from_camera1(&ego.cam_from_vehicle),
+            speed_mps: vehicle.distance_m.abs() / self.dt_s,
+            ..self.clone()
+        })
+    }
+
     /// The turn that the points show if the camera moved along `direction`; `None` where they do not
     /// determine one.
     pub(crate) fn turn(&self, direction: &Vector3<f64>, yaw: YawTrust) -> Option<Turn> {
