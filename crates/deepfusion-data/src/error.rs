@@ -336,7 +336,8 @@ pub enum Error {
     /// No pair is left, for the reasons counted.
     #[error(
         "{drive}: no pair of frames can be used: of {targets} frames, {no_neighbour} lack a neighbour \
-         at offsets {offsets:?}, {bad_time} have time stamps that do not increase, {no_motion} are not covered by the speeds (oxts, speed.csv)"
+         at offsets {offsets:?}{}, {bad_time} have time stamps that do not increase, {no_motion} are not covered by the speeds (oxts, speed.csv)",
+        a_step(*frame_distance_m)
     )]
     NoPairs {
         /// The drive.
@@ -345,6 +346,8 @@ pub enum Error {
         targets: usize,
         /// The offsets of the neighbours asked for.
         offsets: Vec<i32>,
+        /// Metres that each step of an offset was asked to have moved; 0: none.
+        frame_distance_m: f64,
         /// How many have no such neighbour.
         no_neighbour: usize,
         /// How many have time stamps out of order.
@@ -475,6 +478,11 @@ impl Error {
             Self::Standing { .. } => {
                 "a standing camera shows no parallax: leave the drive out, or lower the smallest speed"
             }
+            Self::NoPairs {
+                frame_distance_m, ..
+            } if *frame_distance_m > 0.0 => {
+                "the drive is too short for frames so far apart: lower frame_distance_m, or the offsets"
+            }
             Self::NoPairs { .. } => {
                 "train on a drive with consecutive frames and speeds about their times, at least every 0.5 s"
             }
@@ -486,5 +494,13 @@ impl Error {
             Self::Size { .. } => return None,
         };
         Some(text.to_owned())
+    }
+}
+
+/// How far apart the frames of a step were to be, if they were.
+fn a_step(frame_distance_m: f64) -> String {
+    match frame_distance_m > 0.0 {
+        true => format!(", {frame_distance_m} m a step"),
+        false => String::new(),
     }
 }

@@ -141,6 +141,7 @@ impl Dataset {
                 drive,
                 targets: self.selected().len(),
                 offsets: offsets.to_vec(),
+                frame_distance_m,
                 no_neighbour,
                 bad_time,
                 no_motion,

@@ -130,7 +130,8 @@ fn a_source_is_as_far_away_as_is_asked_for() {
     }
     // Farther than the whole drive: nothing is left, and the error says what was looked for.
     let error = dataset.snippets_apart(&[1], 1000.0, 0.5).unwrap_err();
-    assert!(matches!(error, Error::NoPairs { .. }), "{error}");
+    assert!(error.to_string().contains("[1], 1000 m a step"), "{error}");
+    assert!(error.hint().unwrap().contains("frame_distance_m"));
 }
 
 #[test]

@@ -197,44 +197,56 @@ fn pictures_become_a_video_at_their_own_times() {
     }
     let folder = root.path().join("made");
     fs::create_dir(&folder).unwrap();
-    let times = [0.0, 0.04, 0.08, 0.2, 0.24];
+    // Thirty and sixty a second, and a pause.
+    let times = [0.0, 1.0 / 30.0, 2.0 / 30.0, 0.2, 0.2 + 1.0 / 60.0, 0.25];
     let seconds = shown_for(&times.map(Some));
     let shown: Vec<Shown> = seconds
         .into_iter()
         .enumerate()
         .map(|(i, seconds)| {
-            let file = format!("it's {i}.png");
+            // Names that ffmpeg would take for a protocol, a quotation or a sequence.
+            let file = format!("12:30 it's %03d {i}.png");
             // Of an odd size, and one that is smaller.
             let (w, h) = if i == 3 { (32, 24) } else { (65, 49) };
-            let grey = RgbImage::from_pixel(w, h, Rgb([40 + 40 * i as u8; 3]));
+            let grey = RgbImage::from_pixel(w, h, Rgb([40 + 30 * i as u8; 3]));
             grey.save(folder.join(&file)).unwrap();
             Shown { file, seconds }
         })
         .collect();
-    deepfusion_data::write_video(&folder, &shown, "drive.mp4").unwrap();
-    let left = fs::read_dir(&folder).unwrap().count();
-    assert_eq!(left, 6, "the pictures and the video");
+    let made = |name: &str| deepfusion_data::write_video(&folder, &shown, name);
+    made("drive.mp4").unwrap();
     fs::write(folder.join("intrinsics.txt"), "50,50,32,24").unwrap();
     let opened = Dataset::open(&folder.join("drive.mp4"), &OpenOptions::default()).unwrap();
     let frames = opened[0].frames();
+    // The last one is shown for its time, too, and then once more.
+    assert_eq!(frames.len(), 7);
     for (i, expected) in times.into_iter().enumerate() {
         let time = frames[i].time_s.unwrap();
         assert!(
-            (time - expected).abs() < 0.005,
+            (time - expected).abs() < 0.001,
             "{i}: {time} for {expected}"
         );
         let image = opened[0].load_image(i).unwrap();
         assert_eq!(image.dimensions(), (66, 50));
         let grey = image.get_pixel(33, 25)[0];
-        assert!(grey.abs_diff(40 + 40 * i as u8) < 12, "{i}: {grey}");
+        assert!(grey.abs_diff(40 + 30 * i as u8) < 12, "{i}: {grey}");
     }
-    // What is no picture is an error that names it, and leaves nothing behind.
-    fs::write(folder.join("it's 0.png"), "no picture").unwrap();
-    let error = deepfusion_data::write_video(&folder, &shown, "other.mp4").unwrap_err();
-    assert!(error.to_string().contains("it's 0.png"), "{error}");
-    fs::remove_file(folder.join("it's 1.png")).unwrap();
-    let error = deepfusion_data::write_video(&folder, &shown[1..], "other.mp4").unwrap_err();
-    assert!(error.to_string().contains("it's 1.png"), "{error}");
+    // What is no picture, wherever it is, is an error, and leaves nothing behind; what was there stays.
+    let before = fs::read(folder.join("drive.mp4")).unwrap();
+    for broken in [0, 2] {
+        let path = folder.join(&shown[broken].file);
+        let whole = fs::read(&path).unwrap();
+        fs::write(&path, "no picture").unwrap();
+        for name in ["drive.mp4", "other.mp4"] {
+            let error = made(name).unwrap_err();
+            assert!(error.hint().is_some(), "{error}");
+        }
+        fs::remove_file(&path).unwrap();
+        let error = made("other.mp4").unwrap_err();
+        assert!(error.to_string().contains(&shown[broken].file), "{error}");
+        fs::write(&path, whole).unwrap();
+    }
+    assert_eq!(fs::read(folder.join("drive.mp4")).unwrap(), before);
     let names = fs::read_dir(&folder)
         .unwrap()
         .map(|e| e.unwrap().file_name());

@@ -23,7 +23,8 @@ pub struct VehicleSensors {
     pub imu: Option<Vec<ImuSample>>,
 }
 
-/// The weights of the fusion: 1 is the inertial unit alone, 0 the vehicle's speed and steering alone.
+/// The weights of the fusion: 1 is the inertial unit alone (of a distance up to a second), 0 the vehicle's speed and
+/// steering alone.
 ///
 /// Speed from wheels has a small constant error of scale; speed from an integrated accelerometer
 /// drifts. Heading is the reverse: a gyro's error is a slow bias, the steering wheel's angle knows

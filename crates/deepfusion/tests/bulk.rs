@@ -306,13 +306,14 @@ fn the_pictures_of_a_recording_become_a_video() {
     }
     // Shards leave the pictures; one more run shows them.
     for i in 1..=2 {
-        let args = format!("predict --model run sim --save side-by-side --out out --shard {i}/2");
+        let args =
+            format!("predict --model run sim --save side-by-side,npy --out out --shard {i}/2");
         ok(at, &args);
     }
-    ok(at, &format!("{predict} --out out"));
+    ok(at, "predict --model run sim --save video,npy --out out");
     let video = "2026_01_01_drive_0003_sync_video.mp4";
     let made = outputs(&at.join("out"));
-    assert_eq!(made.len(), 30 * 2 + 1, "{:?}", made.keys());
+    assert_eq!(made.len(), 30 * 3 + 1, "{:?}", made.keys());
     assert!(made[video].len() > 1000, "{:?}", made.keys());
     // A video is a recording, too, once its camera is known: the drive's frames, the last one named twice.
     fs::write(at.join("out/intrinsics.txt"), "50,50,48,32").unwrap();
@@ -322,4 +323,16 @@ fn the_pictures_of_a_recording_become_a_video() {
         "{}",
         inspected.stdout
     );
+    // Made again it is the same; a file that nobody here made is not replaced unasked.
+    ok(at, "predict --model run sim --save video,npy --out out");
+    fs::create_dir(at.join("other")).unwrap();
+    fs::write(at.join("other").join(video), "mine").unwrap();
+    fails(
+        at,
+        &format!("{predict} --out other"),
+        &[video, "--overwrite"],
+    );
+    assert_eq!(fs::read(at.join("other").join(video)).unwrap(), b"mine");
+    ok(at, &format!("{predict} --out other --overwrite"));
+    assert!(fs::read(at.join("other").join(video)).unwrap().len() > 1000);
 }

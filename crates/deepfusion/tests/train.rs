@@ -40,6 +40,18 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
         &["run"],
     );
 
+    // A new run may start from another's networks; its PoseNet goes on to speak of that one's unit.
+    ok(
+        at,
+        &format!("train --data sim {SMALL} --steps 1 --init run --out tuned"),
+    );
+    let unit = |run: &str| {
+        let config = fs::read_to_string(at.join(run).join("config.toml")).unwrap();
+        let line = config.lines().find(|l| l.starts_with("metres_per_unit"));
+        line.unwrap().to_owned()
+    };
+    assert_eq!(unit("tuned"), unit("run"));
+
     let report: Value =
         serde_json::from_str(&ok(at, "eval --model run --data sim --json").stdout).unwrap();
     assert_eq!(report["n"], 3);

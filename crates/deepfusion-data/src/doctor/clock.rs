@@ -76,7 +76,8 @@ pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Es
 }
 
 /// The offset, and with it which way the camera headed: that is taken from the vehicle, whose times are known once the offset
-/// is. Taken at another time it adds a part of that time's turn to the picture's, and a tenth to the offset.
+/// is. Taken at another time it adds a part of that time's turn to the picture's, and a tenth to the offset. By how much it
+/// still changes in the end is in the standard error.
 fn settled(
     survey: &Survey<'_>,
     pairs: &[EpipolarPair],
@@ -91,8 +92,15 @@ fn settled(
     for _ in 0..ROUNDS {
         let before = offset.vehicle_minus_camera_s;
         let headed = |pair: &EpipolarPair| pair.with_clock(&ego, before);
-        offset = measure(&pairs.iter().filter_map(headed).collect::<Vec<_>>())?;
-        if (offset.vehicle_minus_camera_s - before).abs() < SETTLED_S {
+        let again: Vec<EpipolarPair> = pairs.iter().filter_map(headed).collect();
+        // A track that ends too early for the offset leaves too few pairs: what was measured before holds.
+        let Ok(measured) = measure(&again) else { break };
+        let change = (measured.vehicle_minus_camera_s - before).abs();
+        offset = TimeOffset {
+            std_error_s: measured.std_error_s.max(change),
+            ..measured
+        };
+        if change < SETTLED_S {
             break;
         }
     }

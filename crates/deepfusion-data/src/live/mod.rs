@@ -167,7 +167,7 @@ fn remedy(address: &Address, came: u64, end: &End) -> &'static str {
     if address.is_stdin() {
         return "pipe a stream that ffmpeg knows: Motion-JPEG, MPEG-TS, YUV4MPEG, Matroska";
     }
-    if end.said_one_of(&["401", "403", "nauthorized", "orbidden"]) {
+    if end.said_one_of(&["nauthorized", "orbidden"]) {
         return "give name and password: rtsp://NAME:PASSWORD@HOST/…";
     }
     if address.is_camera() {

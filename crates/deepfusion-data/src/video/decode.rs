@@ -5,7 +5,7 @@
 //! `cache` in `dataset.toml` names), as JPEGs of ffmpeg's best quality but one; the folder can be deleted at
 //! any time. It takes part under another name and is renamed when it is whole.
 
-use super::program::{READ, run};
+use super::program::{READ, in_either_words, run};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
@@ -59,10 +59,7 @@ pub(super) fn ensure(video: &Path, cache: &Path, frames: usize) -> Result<()> {
 fn decode(video: &Path, part: &Path, origin: &Origin) -> Result<()> {
     std::fs::create_dir_all(part).map_err(|e| Error::file(part, e))?;
     // One file a frame: none doubled or dropped to keep a rate.
-    if ffmpeg(video, part, "-fps_mode").is_err() {
-        // Before ffmpeg 5.1 the option had another name.
-        ffmpeg(video, part, "-vsync")?;
-    }
+    in_either_words(|mode| ffmpeg(video, part, mode))?;
     let written = std::fs::read_dir(part)
         .map_err(|e| Error::file(part, e))?
         .count();

@@ -13,7 +13,15 @@ pub(super) const WRITE: &str = "write videos";
 /// Longest complaint that is passed on, in characters.
 const LONGEST: usize = 400;
 
-/// Runs a program on `file` in a folder, to do `what`, and gives what it printed.
+/// What a program that succeeded printed.
+pub(super) struct Printed {
+    /// On its standard output.
+    pub(super) text: Vec<u8>,
+    /// On its standard error, shortened.
+    pub(super) complaint: String,
+}
+
+/// Runs a program on `file` in a folder, to do `what`, and gives what it printed on its standard output.
 ///
 /// # Errors
 /// [`Error::Program`] where it is not installed, or fails.
@@ -23,12 +31,19 @@ pub(super) fn run<S: AsRef<OsStr>>(
     (file, what): (&Path, &str),
     folder: &Path,
 ) -> Result<Vec<u8>> {
-    let failed = |problem: String, remedy| Error::Program {
-        path: file.to_owned(),
-        program,
-        problem,
-        remedy,
-    };
+    Ok(output(program, arguments, (file, what), folder)?.text)
+}
+
+/// As [`run`], with what it complained of.
+///
+/// # Errors
+/// As [`run`].
+pub(super) fn output<S: AsRef<OsStr>>(
+    program: &'static str,
+    arguments: &[S],
+    (file, what): (&Path, &str),
+    folder: &Path,
+) -> Result<Printed> {
     let output = Command::new(program)
         .args(arguments)
         .current_dir(folder)
@@ -46,15 +61,34 @@ pub(super) fn run<S: AsRef<OsStr>>(
             };
             not_started(file, program, &e, what, remedy)
         })?;
-    if output.status.success() {
-        return Ok(output.stdout);
-    }
     let said = String::from_utf8_lossy(&output.stderr);
-    let said: String = said.trim().chars().take(LONGEST).collect();
-    Err(failed(
-        format!("failed: {said}"),
-        "see whether the disk is full and, of a video that is read, whether it plays; a newer ffmpeg knows more codecs",
-    ))
+    let complaint: String = said.trim().chars().take(LONGEST).collect();
+    if output.status.success() {
+        return Ok(Printed {
+            text: output.stdout,
+            complaint,
+        });
+    }
+    Err(Error::Program {
+        path: file.to_owned(),
+        program,
+        problem: format!("failed: {complaint}"),
+        remedy: match what {
+            WRITE => "see whether the disk is full; a newer ffmpeg may have an encoder for MP4",
+            _ => "play the file to see whether it is whole; a newer ffmpeg may know its codec",
+        },
+    })
+}
+
+/// Runs ffmpeg with `-fps_mode`, or as before ffmpeg 5.1, where the option had another name.
+///
+/// # Errors
+/// Those of `run`.
+pub(super) fn in_either_words<T>(run: impl Fn(&str) -> Result<T>) -> Result<T> {
+    match run("-fps_mode") {
+        Err(Error::Program { problem, .. }) if problem.contains("fps_mode") => run("-vsync"),
+        other => other,
+    }
 }
 
 /// The error of a program that could not be started; `what` it was to do, and `remedy` where it is not installed.

@@ -14,9 +14,9 @@ const WIDTHS_M: [f32; 2] = [1.4, 2.3];
 const HIGHEST_M: f32 = 2.15;
 /// Shares of length and width that must have been seen of a car that makes a row.
 const SEEN: [f32; 2] = [0.02, 0.3];
-/// Least height of a car of which hardly more than one flat face is seen, as a share of its length, metres: a hedge looks alike.
+/// Up to this share of its length hardly more than one flat face of a car is seen.
 const FLAT: f32 = 0.1;
-/// See [`FLAT`].
+/// Least height of a car of which no more is seen, metres: a hedge looks alike, and is lower.
 const FLAT_HEIGHT_M: f32 = 1.3;
 /// How far from square to the way a car of a row may stand, radians.
 const TURN: f32 = 0.6;
@@ -106,11 +106,12 @@ pub fn meet(cars: &mut Vec<Parked>, car: Parked) {
     known.weight = weight.min(MOST_LOOKS);
 }
 
-/// How the lane goes where something that moves drives along it, if it does.
+/// How the lane goes where something that moves drives along it, if it does: who walks goes anywhere.
 pub fn heading(place: &GroundBox) -> Option<Heading> {
     let off = place.angle.rem_euclid(PI) - FRAC_PI_2;
     let [_, forward] = place.middle;
-    (off.abs() < ASTRAY && forward > AHEAD_M).then(|| Heading {
+    let drives = place.footprint[0] > LENGTHS_M[0] && place.footprint[1] > WIDTHS_M[0];
+    (drives && off.abs() < ASTRAY && forward > AHEAD_M).then(|| Heading {
         forward,
         slope: -off.tan(),
     })
@@ -195,7 +196,12 @@ mod tests {
         // The same, turned round.
         driven.angle += PI;
         assert!((heading(&driven).unwrap().slope - shown.slope).abs() < 1e-5);
-        driven.angle = 0.1;
-        assert_eq!(heading(&driven), None);
+        let mut across = driven;
+        across.angle = 0.1;
+        let mut walks = driven;
+        walks.footprint = [0.6, 0.5];
+        for other in [across, walks] {
+            assert_eq!(heading(&other), None, "{other:?}");
+        }
     }
 }

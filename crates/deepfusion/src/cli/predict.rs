@@ -48,11 +48,16 @@ impl PredictArgs {
     /// What is kept of every image.
     pub fn outputs(&self) -> Outputs {
         // A video is made of pictures, when they are all there.
-        let mut save = self.save.clone();
-        if self.video() && !save.contains(&Save::SideBySide) {
-            save.push(Save::SideBySide);
+        let of_an_image = |save: &Save| match save {
+            Save::Video => Save::SideBySide,
+            other => *other,
+        };
+        let mut save: Vec<Save> = Vec::new();
+        for each in self.save.iter().map(of_an_image) {
+            if !save.contains(&each) {
+                save.push(each);
+            }
         }
-        save.retain(|save| *save != Save::Video);
         Outputs {
             save,
             max_depth_m: self.max_depth,

@@ -4,8 +4,8 @@ use anyhow::Result;
 use deepfusion_data::{Camera, CameraChoice, Dataset, speed_unit_warning};
 use deepfusion_nn::weights::load_torchvision_resnet;
 use deepfusion_train::{
-    DataConfig, DataSetConfig, Error, Model, Preset, RunFolder, SampleSet, TrainConfig, Trainer,
-    ViewMotion,
+    CheckpointKind, DataConfig, DataSetConfig, Error, Model, Preset, RunFolder, SampleSet,
+    TrainConfig, Trainer, ViewMotion,
 };
 
 use super::device;
@@ -47,6 +47,12 @@ pub fn run(args: &TrainArgs) -> Result<()> {
             let folder = output::run_folder(args.out.as_deref(), "train")?;
             let folder = RunFolder::create(&folder)?;
             let init = args.init.as_deref();
+            if let Some(folder) = init.map(run_of).transpose()?.flatten()
+                && config.pose_net.metres_per_unit == 0.0
+            {
+                // Its PoseNet speaks of this unit.
+                config.pose_net.metres_per_unit = folder.0.read_config()?.pose_net.metres_per_unit;
+            }
             let settings = config.clone();
             Trainer::create(config, folder, sets, &device, |model| match init {
                 Some(path) => initialise(model, path, &settings, &device),
@@ -231,6 +237,13 @@ fn warn_of_speed(dataset: &Dataset) {
     }
 }
 
+/// The run that a path is, or is a checkpoint of; `None` of other weights.
+fn run_of(path: &Path) -> Result<Option<(RunFolder, Option<CheckpointKind>)>, Error> {
+    let in_a_run = |p: &Path| p.join("config.toml").exists();
+    let is_run = path.is_dir() || path.parent().is_some_and(in_a_run);
+    is_run.then(|| RunFolder::open(path)).transpose()
+}
+
 /// Starts from the networks of a run, or from an ImageNet encoder's weights.
 fn initialise(
     model: Model,
@@ -239,12 +252,7 @@ fn initialise(
     device: &burn::tensor::Device,
 ) -> Result<Model, Error> {
     let device = device.clone().autodiff();
-    let is_run = path.is_dir()
-        || path
-            .parent()
-            .is_some_and(|p| p.join("config.toml").exists());
-    if is_run {
-        let (folder, kind) = RunFolder::open(path)?;
+    if let Some((folder, kind)) = run_of(path)? {
         let kind = kind.unwrap_or_else(|| folder.preferred());
         return Ok(folder.load(kind, config, &device)?.0);
     }

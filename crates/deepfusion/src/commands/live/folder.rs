@@ -16,8 +16,14 @@ pub fn name(number: u64) -> String {
     format!("{PREFIX}{number:0DIGITS$}")
 }
 
-/// Whether a file is an output of a live frame.
+/// The video of all frames.
+pub const VIDEO: &str = "live_video.mp4";
+
+/// Whether a file is an output of a live frame, or of all.
 fn is_of_a_frame(file: &str) -> bool {
+    if file == VIDEO {
+        return true;
+    }
     let Some(rest) = file.strip_prefix(PREFIX) else {
         return false;
     };

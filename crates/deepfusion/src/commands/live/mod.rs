@@ -5,7 +5,7 @@ mod figures;
 mod folder;
 
 pub use self::feed::{Feed, run};
-pub use self::folder::make_room;
+pub use self::folder::{VIDEO, make_room};
 
 use std::io::IsTerminal;
 use std::time::UNIX_EPOCH;

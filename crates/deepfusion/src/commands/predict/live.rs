@@ -65,10 +65,12 @@ pub fn run(args: &PredictArgs, address: &Address) -> Result<()> {
             out.display()
         ));
     }
+    let mut filmed = Ok(());
     if args.video() {
         let times: Vec<Option<f64>> = done.iter().map(|(_, time)| *time).collect();
         let shown = done.iter().map(|(name, _)| name.as_str());
-        video::write_one(out, shown.zip(shown_for(&times)), "live")?;
+        filmed = video::write_one(out, shown.zip(shown_for(&times)), live::VIDEO);
     }
-    ending.map(|_| ())
+    // Why the source ended comes first: a full disk ends the video, too.
+    ending.and(filmed)
 }

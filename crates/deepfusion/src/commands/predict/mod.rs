@@ -93,7 +93,7 @@ pub fn run(args: &PredictArgs) -> Result<()> {
     std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
     interrupt::catch("stopping after the images at work; the same command goes on from there");
     let _lock = Lock::take(out, *shard)?;
-    let (ledger, todo) = begin(&job, *shard, args.json, &all, &mine)?;
+    let (ledger, todo) = begin(&job, args, &all, &mine)?;
     predict(&job, &predictor, &mine, &todo, &ledger);
     let summary = ledger.finish()?;
     if job.camera.word() == "assumed" && mine.iter().any(|input| input.frame.is_none()) {
@@ -131,21 +131,23 @@ fn tell_assumed() {
 /// Looks at what is there and writes the manifest; gives the images that are left to do, by their place in `mine`.
 fn begin<'a>(
     job: &Job<'a>,
-    shard: Shard,
-    keep_sidecars: bool,
+    command: &PredictArgs,
     all: &[Input],
     mine: &[&Input],
 ) -> Result<(Ledger<'a>, Vec<usize>)> {
     let args = job.args;
-    let mut manifest = Manifest::new(shard, all, mine, job.made_with.clone());
+    let mut manifest = Manifest::new(command.shard, all, mine, job.made_with.clone());
     let before = Manifest::all(&args.out)?;
     if !args.overwrite {
         manifest.check_against(&before, &args.out)?;
+        if command.video() {
+            video::make_room(&args.out, all, &manifest, &before)?;
+        }
     }
     resume::remove_partial_files(job, mine)?;
     let begun = manifest.begun(&before);
     let mut todo = Vec::new();
-    let mut sidecars = vec![None; if keep_sidecars { mine.len() } else { 0 }];
+    let mut sidecars = vec![None; if command.json { mine.len() } else { 0 }];
     for (i, input) in mine.iter().enumerate() {
         let known = begun.contains(&(input.path.as_path(), input.name.as_str()));
         match resume::finished(job, input, known)? {

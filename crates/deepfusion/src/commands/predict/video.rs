@@ -1,11 +1,13 @@
 //! The pictures of a run as videos, one of each recording.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::Result;
 use deepfusion_data::{Shown, can_write_video, shown_for, write_video};
 
 use super::inputs::Input;
+use super::manifest::Manifest;
 use super::outputs::file_name;
 use crate::cli::{PredictArgs, Save, Shard};
 use crate::error::CliError;
@@ -25,32 +27,53 @@ pub fn check(args: &PredictArgs) -> Result<()> {
     Ok(can_write_video(&args.prediction.out)?)
 }
 
-/// One video of each recording among the inputs, and one of the images that are of none, in the folder of their
-/// pictures. Others of the same names are replaced: they are made of the pictures that are there.
-pub fn write(folder: &Path, inputs: &[Input]) -> Result<()> {
-    for same in inputs.chunk_by(|a, b| recording(a) == recording(b)) {
-        let times: Vec<Option<f64>> = same.iter().map(time_s).collect();
-        let shown = same.iter().zip(shown_for(&times));
-        let shown = shown.map(|(input, seconds)| (input.name.as_str(), seconds));
-        let name = recording(&same[0]).unwrap_or(IMAGES);
-        write_one(folder, shown, name)?;
+/// Whether the videos of the inputs may be written: they replace no file but those that runs of the same inputs, as a
+/// manifest tells, left there.
+pub fn make_room(
+    folder: &Path,
+    inputs: &[Input],
+    ours: &Manifest,
+    before: &[Manifest],
+) -> Result<()> {
+    if before.iter().any(|m| m.inputs_sha256 == ours.inputs_sha256) {
+        return Ok(());
+    }
+    for (name, _) in videos(inputs) {
+        let path = folder.join(name);
+        if path.exists() {
+            let remedy = "allow it with --overwrite, or choose another folder";
+            return Err(CliError::Exists { path, remedy }.into());
+        }
     }
     Ok(())
 }
 
-/// The video of pictures, by the names of their images, each with the seconds that it is shown.
+/// One video of each recording among the inputs, and one of the images that are of none, in the folder of their
+/// pictures.
+pub fn write(folder: &Path, inputs: &[Input]) -> Result<()> {
+    for (name, same) in videos(inputs) {
+        let times: Vec<Option<f64>> = same.iter().map(time_s).collect();
+        let names = same.iter().map(|input| input.name.as_str());
+        write_one(folder, names.zip(shown_for(&times)), &name)?;
+    }
+    Ok(())
+}
+
+/// The video of pictures, by the names of their images, each with the seconds that it is shown; none of no picture.
 pub fn write_one<'a>(
     folder: &Path,
     shown: impl Iterator<Item = (&'a str, f64)>,
-    recording: &str,
+    name: &str,
 ) -> Result<()> {
     let picture = |(name, seconds): (&str, f64)| Shown {
         file: file_name(name, Save::SideBySide),
         seconds,
     };
     let pictures: Vec<Shown> = shown.map(picture).collect();
-    let name = file_name(&recording.replace(['/', '\\'], "-"), Save::Video);
-    write_video(folder, &pictures, &name)?;
+    if pictures.is_empty() {
+        return Ok(());
+    }
+    write_video(folder, &pictures, name)?;
     say(&format!(
         "{}: {} frames",
         folder.join(name).display(),
@@ -59,12 +82,64 @@ pub fn write_one<'a>(
     Ok(())
 }
 
-/// The name of the recording that an input is a frame of.
-fn recording(input: &Input) -> Option<&str> {
-    input.frame.as_ref().map(|(dataset, _)| dataset.name())
+/// The name of a recording's video.
+fn video_name(of: &str) -> String {
+    file_name(&of.replace(['/', '\\'], "-"), Save::Video)
+}
+
+/// The inputs of each video and its name, numbered where two recordings share one.
+fn videos(inputs: &[Input]) -> Vec<(String, &[Input])> {
+    let same = |a: &Input, b: &Input| match (&a.frame, &b.frame) {
+        (Some((a, _)), Some((b, _))) => Arc::ptr_eq(a, b),
+        (None, None) => true,
+        _ => false,
+    };
+    let mut named: Vec<(String, &[Input])> = Vec::new();
+    for inputs in inputs.chunk_by(same) {
+        let recording = inputs[0].frame.as_ref().map(|(dataset, _)| dataset.name());
+        let of = recording.unwrap_or(IMAGES);
+        let numbered = |n: usize| match n {
+            1 => video_name(of),
+            _ => video_name(&format!("{of}-{n}")),
+        };
+        let free = |name: &String| {
+            named
+                .iter()
+                .all(|(other, _)| !other.eq_ignore_ascii_case(name))
+        };
+        let name = (1..).map(numbered).find(free).unwrap_or_default();
+        named.push((name, inputs));
+    }
+    named
 }
 
 fn time_s(input: &Input) -> Option<f64> {
     let (dataset, index) = input.frame.as_ref()?;
     dataset.frames()[*index].time_s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(name: &str) -> Input {
+        Input {
+            path: name.into(),
+            name: name.into(),
+            frame: None,
+        }
+    }
+
+    #[test]
+    fn images_of_no_recording_are_one_video() {
+        let inputs = [image("a"), image("b")];
+        let found = videos(&inputs);
+        assert_eq!(found.len(), 1);
+        assert_eq!(
+            (found[0].0.as_str(), found[0].1.len()),
+            ("images_video.mp4", 2)
+        );
+        assert!(videos(&[]).is_empty());
+        assert_eq!(video_name("a/b"), "a-b_video.mp4");
+    }
 }
