@@ -300,6 +300,73 @@ fn a_bonnet_is_measured_and_cut() {
 }
 
 #[test]
+fn a_black_frame_is_measured_and_cut() {
+    let drive = Drive::clean();
+    drive.images(|_, image| {
+        let width = image.width();
+        for (x, _, pixel) in image.enumerate_pixels_mut() {
+            if x < 12 || x >= width - 12 {
+                *pixel = image::Rgb([0; 3]);
+            }
+        }
+    });
+    let diagnosis = drive.diagnose();
+    for (side, kept) in [
+        ("left", "keep columns from 1"),
+        ("right", "keep columns 0 to 30"),
+    ] {
+        let finding = found(&diagnosis, "bonnet", side);
+        assert!(value(finding) > 50.0, "{finding:?}");
+        assert!(finding.remedy.contains(kept), "{finding:?}");
+        // The rim itself may belong to either.
+        let told = finding.what.starts_with("12 ") || finding.what.starts_with("13 ");
+        assert!(told, "{finding:?}");
+    }
+}
+
+#[test]
+fn cameras_that_are_swapped_are_told() {
+    let drive = Drive::clean();
+    drive.second_camera(-6);
+    let right = drive.diagnose();
+    let said = &right.recording[0];
+    assert_eq!(said.check, "stereo");
+    assert!(
+        said.skipped.is_none() && said.findings.is_empty(),
+        "{said:?}"
+    );
+
+    let drive = Drive::clean();
+    drive.second_camera(6);
+    let diagnosis = drive.diagnose();
+    let finding = found(&diagnosis, "stereo", "disparity");
+    assert_eq!(finding.severity, Severity::Error);
+    assert!((value(finding) + 6.0).abs() < 0.5, "{finding:?}");
+    assert!(finding.remedy.contains("image_03"), "{finding:?}");
+}
+
+#[test]
+fn frames_between_which_hardly_anything_moves_are_told() {
+    let drive = Drive::clean();
+    // Everything far away: from frame to frame the picture grows by a fifth of a thousandth.
+    let far = std::sync::Mutex::new(None);
+    drive.images(|i, image| {
+        let mut far = far.lock().unwrap();
+        let far = far.get_or_insert_with(|| image.clone());
+        let (cx, cy) = (0.5 * image.width() as f32, 0.5 * image.height() as f32);
+        let scale = (-2e-4 * i as f32).exp();
+        for (x, y, pixel) in image.enumerate_pixels_mut() {
+            let [u, v] = [(x, cx), (y, cy)].map(|(at, c)| c + scale * (at as f32 - c));
+            *pixel = image::imageops::interpolate_bilinear(far, u, v).unwrap_or(*pixel);
+        }
+    });
+    let diagnosis = drive.diagnose();
+    let finding = found(&diagnosis, "parallax", "parallax");
+    assert!(value(finding) < 0.1, "{finding:?}");
+    assert!(finding.remedy.contains("frame_distance_m"), "{finding:?}");
+}
+
+#[test]
 fn standing_parts_are_counted() {
     let drive = Drive::clean();
     drive.oxts(|i, values| {

@@ -37,7 +37,8 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     outcome.judge(Severity::Warning, figure, || {
         (
             "from frame to frame the picture hardly moves: what is taught lies below the images' noise".into(),
-            "take frames further apart (every second or third), or drives at more speed".into(),
+            "take frames further apart (frames = [3], or frame_distance_m = 0.2, in the training's configuration), or drives at \
+             more speed".into(),
         )
     });
     outcome

@@ -154,6 +154,32 @@ impl Drive {
         }
     }
 
+    /// A second camera, beside the first, that sees all of it so many pixels farther to the right: to the left of it (negative)
+    /// if it is the right one.
+    pub fn second_camera(&self, shift: i64) {
+        let second = self.drive().join("image_03");
+        std::fs::create_dir(&second).unwrap();
+        copy(&self.drive().join("image_02"), &second);
+        for number in 0..SimConfig::default().frames {
+            let seen = image::open(self.image(number)).unwrap().into_rgb8();
+            let last = i64::from(seen.width()) - 1;
+            let moved = RgbImage::from_fn(seen.width(), seen.height(), |x, y| {
+                *seen.get_pixel((i64::from(x) - shift).clamp(0, last) as u32, y)
+            });
+            let path = second.join(format!("data/{number:010}.png"));
+            moved.save(path).unwrap();
+        }
+        let path = self.date().join("calib_cam_to_cam.txt");
+        let text = std::fs::read_to_string(&path).unwrap();
+        if !text.contains("P_rect_03:") {
+            let again = text.lines().filter(|line| line.contains("_02:"));
+            let again: String = again
+                .map(|line| line.replacen("_02:", "_03:", 1) + "\n")
+                .collect();
+            std::fs::write(&path, text + &again).unwrap();
+        }
+    }
+
     pub fn remove_images(&self, numbers: &[usize]) {
         for number in numbers {
             std::fs::remove_file(self.image(*number)).unwrap();
