@@ -432,20 +432,22 @@ fn what_cannot_be_opened_is_a_finding() {
 }
 
 #[test]
-fn a_bag_whose_camera_clock_is_ahead_is_told() {
-    let folder = tempfile::tempdir().unwrap();
-    let settings = BagSettings {
-        clock_offset_s: 0.3,
-        ..BagSettings::default()
-    };
-    let path = bag(folder.path(), Scene::Urban, settings);
-    let diagnosis = doctor(&path, None);
-    let finding = found(&diagnosis, "clock", "offset");
-    // `data inspect` tells the same, as a figure.
-    let seen = deepfusion_data::inspect(&path).unwrap();
-    let offset = seen.drives[0].time_offset.unwrap();
-    assert_eq!(offset.vehicle_minus_camera_s, value(finding));
-    assert!(offset.std_error_s < 0.05, "{offset:?}");
-    assert!(seen.to_string().contains("vehicle less camera -"), "{seen}");
-    assert!((value(finding) + 0.3).abs() < 0.010, "{finding:?}");
+fn a_bag_whose_camera_clock_is_off_is_told() {
+    for ahead_s in [0.3, -0.3] {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = BagSettings {
+            clock_offset_s: ahead_s,
+            ..BagSettings::default()
+        };
+        let path = bag(folder.path(), Scene::Urban, settings);
+        let diagnosis = doctor(&path, None);
+        let finding = found(&diagnosis, "clock", "offset");
+        // `data inspect` tells the same, as a figure.
+        let seen = deepfusion_data::inspect(&path).unwrap();
+        let offset = seen.drives[0].time_offset.unwrap();
+        assert_eq!(offset.vehicle_minus_camera_s, value(finding));
+        assert!(offset.std_error_s < 0.05, "{offset:?}");
+        assert!(seen.to_string().contains("vehicle less camera"), "{seen}");
+        assert!((value(finding) + ahead_s).abs() < 0.010, "{finding:?}");
+    }
 }

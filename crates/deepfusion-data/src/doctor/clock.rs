@@ -3,7 +3,7 @@
 use super::epipolar::EpipolarPair;
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::survey::Survey;
-use super::turn::picture_yaw_rate;
+use super::turn::picture_turn;
 use deepfusion_motion::{ImageMotion, OffsetConfig, Signal, TimeOffset, VehicleRates, time_offset};
 
 /// Offset that matters, in seconds: at 10 m/s² of braking 20 ms are 0.2 m/s.
@@ -107,15 +107,18 @@ fn settled(
     Ok(offset)
 }
 
-/// How the pictures moved. The turn by the points that were followed is truer than the shift of the whole picture, which
-/// near things move as well; it is taken where enough pairs have it.
+/// How the pictures moved. The turn by the points that were followed is truer than shift, drop and roll of the whole picture,
+/// which near things move as well; it is taken where enough pairs have it.
 fn pictures(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Vec<ImageMotion> {
     let whole: Vec<ImageMotion> = survey.pairs.iter().filter_map(|p| p.image).collect();
     let turned = |pair: &EpipolarPair| {
         let from_s = pair.middle_s - 0.5 * pair.dt_s;
         let same = whole.iter().find(|m| (m.from_s - from_s).abs() < 1e-6)?;
+        let turn = picture_turn(pair)?;
         Some(ImageMotion {
-            shift: picture_yaw_rate(pair)? * pair.dt_s,
+            shift: -turn.y,
+            drop: turn.x,
+            clockwise_rad: -turn.z,
             ..*same
         })
     };

@@ -3,8 +3,9 @@
 //! A camera that turns by Δθ moves what it sees by f·Δθ, so turns measured in the images with a focal length that is
 //! too large come out too small by the same factor, whatever is seen.
 
-use super::epipolar::{EpipolarPair, YawTrust};
+use super::epipolar::EpipolarPair;
 use super::finding::{Figure, Limit, Outcome, Severity};
+use nalgebra::Vector3;
 
 /// Least standard deviation of the vehicle's yaw rate that can be compared, rad/s.
 const LEAST_TURN: f64 = 0.015;
@@ -78,8 +79,12 @@ pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
 
 /// The yaw rate by the vehicle and by the picture, rad/s, positive to the left.
 fn turns(pair: &EpipolarPair) -> Option<(f64, f64)> {
-    let turn = pair.turn(&pair.direction()?, YawTrust(f64::INFINITY))?;
-    Some((pair.vehicle_yaw_rate(), -turn.omega.y / pair.dt_s))
+    Some((pair.vehicle_yaw_rate(), -picture_turn(pair)?.y / pair.dt_s))
+}
+
+/// The camera's turn by the points that were followed, radians about its axes.
+pub(super) fn picture_turn(pair: &EpipolarPair) -> Option<Vector3<f64>> {
+    pair.turn_of_a_pitching_body(&pair.direction()?)
 }
 
 /// The picture's yaw rate, rad/s, for plots.
