@@ -7,8 +7,8 @@ use crate::recording::Recording;
 use crate::selection::Selection;
 use crate::split::Split;
 use crate::{
-    Camera, CameraChoice, CameraPath, DatasetKind, Error, Frame, LidarMotion, MotionModel,
-    MovingLabels, Result, Stream, bag, image_size,
+    Camera, CameraChoice, CameraPath, DatasetKind, DynamicAgreement, Error, Frame, LidarMotion,
+    MotionModel, MovingLabels, Result, ScanTruth, Stream, bag, image_size,
 };
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use deepfusion_rosbag::MessageSource;
@@ -80,6 +80,14 @@ impl Dataset {
     /// [`Error::Table`], [`Error::Config`], [`Error::Clocks`], [`Error::Program`].
     pub fn open(path: &Path, options: &OpenOptions) -> Result<Vec<Self>> {
         Layout::of(path)?.open(path, options)
+    }
+
+    /// The layout in which [`Self::open`] reads what is at a path, told without opening it.
+    ///
+    /// # Errors
+    /// [`Error::UnknownLayout`], [`Error::NoSuchPath`], [`Error::Config`].
+    pub fn kind_at(path: &Path) -> Result<DatasetKind> {
+        Ok(Layout::of(path)?.kind())
     }
 
     /// A recording of messages, such as an open bag of another format, as [`Self::open`] opens a bag: topics are found
@@ -286,8 +294,21 @@ impl Dataset {
         self.recording.ground_truth(&self.frames()[frame], kind)
     }
 
-    /// What tells this recording's moving pixels from its static ones: the simulator's masks, or KITTI's
-    /// tracklets together with the car's own motion. `None` where neither is there, or nothing says how
+    /// [`Self::ground_truth`] and, where a LiDAR measured them, the velocities of what is seen at each pixel with depth
+    /// (H×W, m/s over ground along the LiDAR's ray, NaN where unknown).
+    ///
+    /// # Errors
+    /// As [`Self::ground_truth`].
+    ///
+    /// # Panics
+    /// If there is no frame of that index.
+    pub fn scan_truth(&self, frame: usize, kind: GtKind) -> Result<Option<ScanTruth>> {
+        self.recording.scan_truth(&self.frames()[frame], kind)
+    }
+
+    /// What tells this recording's moving pixels from its static ones: the simulator's masks, KITTI's
+    /// tracklets together with the car's own motion, or a bag's LiDAR: its radial velocities, else its topic of dynamic
+    /// points. `None` where none of these is there, or nothing says how
     /// the car itself moves.
     ///
     /// A tracklet is moving in a frame where its box's centre, seen from the ground, moves at 0.75 m/s
@@ -317,6 +338,15 @@ impl Dataset {
     /// Where a scan cannot be read.
     pub fn lidar_motion(&self, most: usize) -> Result<Vec<LidarMotion>> {
         self.recording.lidar_motion(most)
+    }
+
+    /// How far a topic of dynamic points agrees with the radial velocities of the LiDAR beside it, in at most `most` scans
+    /// spread over the drive; `None` where the recording has not both.
+    ///
+    /// # Errors
+    /// Where a scan cannot be read.
+    pub fn dynamic_agreement(&self, most: usize) -> Result<Option<DynamicAgreement>> {
+        self.recording.dynamic_agreement(most)
     }
 
     /// What was recorded, stream by stream.

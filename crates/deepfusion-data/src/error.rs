@@ -1,3 +1,4 @@
+use crate::layout::WITHOUT_ROS2;
 use std::path::{Path, PathBuf};
 
 /// What can go wrong with a recording.
@@ -419,6 +420,11 @@ impl Error {
                 ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
                 _ => return None,
             },
+            Self::UnknownLayout { found, .. }
+                if cfg!(not(feature = "ros2")) && found.ends_with(WITHOUT_ROS2) =>
+            {
+                "build with `--features ros2` to read the bags of ROS 2: cargo install --path crates/deepfusion --features ros2"
+            }
             Self::UnknownLayout { .. } => {
                 "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
             }

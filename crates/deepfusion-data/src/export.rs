@@ -30,8 +30,14 @@ pub fn ground_truth_names(datasets: &[Dataset]) -> Vec<Vec<String>> {
         .collect()
 }
 
+/// Before a frame's name: its velocities in the file that [`export_gt`] writes.
+pub const VELOCITY: &str = "velocity_mps/";
+
 /// Writes the sparse depth of every selected frame that has a scan as H×W f32 arrays, metres, 0 =
 /// none, into a compressed `.npz`; returns how many. `progress` is told (done, all) after each frame.
+///
+/// A frame whose scan has radial velocities has a second array of that size, named with [`VELOCITY`] before its name:
+/// [`crate::ScanTruth::velocity_mps`].
 ///
 /// # Errors
 /// [`Error::NoScans`] if no frame has one, [`Error::Array`] or [`Error::File`] if writing fails, and
@@ -50,11 +56,17 @@ pub fn export_gt(
         let mut done = 0;
         for (dataset, names) in datasets.iter().zip(&names) {
             for (&frame, name) in dataset.selected().iter().zip(names) {
-                if let Some(depth) = dataset.ground_truth(frame, kind)? {
-                    let array = ArrayView2::from_shape((depth.height, depth.width), &depth.data)
-                        .map_err(|e| failed(out, e.to_string()))?;
-                    npz.add_array(name.as_str(), &array)
-                        .map_err(|e| write_error(out, e))?;
+                if let Some(truth) = dataset.scan_truth(frame, kind)? {
+                    let mut add = |name: &str, values: &[f32]| -> Result<()> {
+                        let size = (truth.depth.height, truth.depth.width);
+                        let array = ArrayView2::from_shape(size, values)
+                            .map_err(|e| failed(out, e.to_string()))?;
+                        npz.add_array(name, &array).map_err(|e| write_error(out, e))
+                    };
+                    add(name, &truth.depth.data)?;
+                    if let Some(velocity) = &truth.velocity_mps {
+                        add(&format!("{VELOCITY}{name}"), velocity)?;
+                    }
                     written += 1;
                 }
                 done += 1;

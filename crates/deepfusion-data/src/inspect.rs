@@ -34,7 +34,7 @@ pub struct Inspection {
 pub struct DriveInspection {
     /// The drive's name.
     pub name: String,
-    /// The camera looked at: 2, or 3 where there is only that.
+    /// The camera looked at: 2, or 3 where there is only that. Layouts other than KITTI raw have one, which counts as 2.
     pub camera: u8,
     /// Its images.
     pub frames: usize,

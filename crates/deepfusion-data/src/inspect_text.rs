@@ -1,6 +1,6 @@
 //! An inspection in words.
 
-use crate::{Inspection, SpeedRange};
+use crate::{DatasetKind, Inspection, SpeedRange};
 use std::fmt;
 
 impl fmt::Display for Inspection {
@@ -18,15 +18,22 @@ impl fmt::Display for Inspection {
             )?;
         }
         let known = |value: Option<f64>, unit: &str| match value {
-            Some(value) => format!("{value:.1} {unit}"),
+            Some(value) => format!("{:.1} {unit}", unsigned_zero(value)),
             None => "unknown".into(),
         };
         let speed = |range: Option<SpeedRange>| match range {
-            Some(r) => format!("{:.1} to {:.1} m/s, mean {:.1}", r.min, r.max, r.mean),
+            Some(r) => {
+                let [min, max, mean] = [r.min, r.max, r.mean].map(unsigned_zero);
+                format!("{min:.1} to {max:.1} m/s, mean {mean:.1}")
+            }
             None => "unknown".into(),
         };
         for drive in &self.drives {
-            writeln!(f, "\n{} (camera {})", drive.name, drive.camera)?;
+            // Only KITTI numbers its cameras.
+            match self.kind {
+                DatasetKind::KittiRaw => writeln!(f, "\n{} (camera {})", drive.name, drive.camera)?,
+                _ => writeln!(f, "\n{}", drive.name)?,
+            }
             writeln!(
                 f,
                 "  frames    {}{}",
@@ -77,6 +84,14 @@ impl fmt::Display for Inspection {
             )?;
         }
         Ok(())
+    }
+}
+
+/// A value that one decimal shows as 0 or −0 as 0.
+fn unsigned_zero(value: f64) -> f64 {
+    match value.abs() < 0.05 {
+        true => 0.0,
+        false => value,
     }
 }
 

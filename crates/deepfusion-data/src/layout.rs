@@ -2,7 +2,7 @@
 
 use crate::config::FolderConfig;
 use crate::kitti::{self, Drive, find_drives, layout};
-use crate::{Dataset, Error, OpenOptions, Result, bag, comma, folder, rgbd, video};
+use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, bag, comma, folder, rgbd, video};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -33,8 +33,10 @@ impl Layout {
             path: path.to_owned(),
             found,
         };
-        if bag::is_bag(&real) {
-            return Ok(Self::Bags(vec![real]));
+        let given = named(path, &real);
+        // By either name: a link may have no ending, or lead to a store whose files have none.
+        if bag::is_bag(&given) || bag::is_bag(&real) {
+            return Ok(Self::Bags(vec![given]));
         }
         if !real.is_dir() {
             return match video::is_video(&real) {
@@ -72,6 +74,18 @@ impl Layout {
         }
     }
 
+    /// Its name.
+    pub(crate) fn kind(&self) -> DatasetKind {
+        match self {
+            Self::Kitti(_) => DatasetKind::KittiRaw,
+            Self::Comma(_) => DatasetKind::Comma2k19,
+            Self::RgbD(_) => DatasetKind::RgbD,
+            Self::Bags(_) => DatasetKind::Bag,
+            Self::Folder(_) => DatasetKind::Folder,
+            Self::Video(_) => DatasetKind::Video,
+        }
+    }
+
     /// Opens what was found.
     pub(crate) fn open(&self, path: &Path, options: &OpenOptions) -> Result<Vec<Dataset>> {
         let one = |dataset: Result<Dataset>| Ok(vec![dataset?.select(path, options)?]);
@@ -86,8 +100,17 @@ impl Layout {
     }
 }
 
+/// The path as it was given, links and all, since a bag's file lies beside the link; what it resolves to where the given
+/// path ends without a name (`..`).
+fn named(path: &Path, real: &Path) -> PathBuf {
+    let given = std::path::absolute(path).ok();
+    given
+        .filter(|given| given.file_name().is_some())
+        .unwrap_or_else(|| real.to_owned())
+}
+
 /// Why a ROS 2 bag is no recording here.
-const WITHOUT_ROS2: &str = match cfg!(feature = "ros2") {
+pub(crate) const WITHOUT_ROS2: &str = match cfg!(feature = "ros2") {
     true => "",
     false => ", and this program was built without the feature `ros2`",
 };

@@ -5,6 +5,7 @@
 //! the camera's ego-motion, [`Dataset::ground_truth`] the measured depth. Another layout is another
 //! [`Recording`]. Nothing here knows of tensors.
 
+mod agreement;
 mod bag;
 mod calibration;
 mod camera;
@@ -47,6 +48,7 @@ mod vehicle_log;
 mod video;
 mod write;
 
+pub use agreement::DynamicAgreement;
 pub use bag::{DopplerEgo, ego_velocity, ground_radial};
 pub use calibration::CameraCalibration;
 pub use camera::{Camera, CameraChoice};
@@ -55,7 +57,7 @@ pub use dataset::{Dataset, DatasetParts, OpenOptions};
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
 pub use depth_png::{read_depth_png, write_depth_png};
 pub use error::{Error, Result};
-pub use export::{export_gt, ground_truth_names};
+pub use export::{VELOCITY, export_gt, ground_truth_names};
 pub use frame::{Frame, FrameImage};
 pub use image::RgbImage;
 pub use inspect::{
@@ -69,7 +71,7 @@ pub use moving::{MovingLabels, MovingSource};
 pub use overlay::overlay;
 pub use path::CameraPath;
 pub use picture::{decode_rgb, image_size, load_rgb, save_png};
-pub use recording::{CalibrationPlace, DatasetKind, LidarMotion, Recording};
+pub use recording::{CalibrationPlace, DatasetKind, LidarMotion, Recording, ScanTruth};
 pub use resize::{resize_rgb, to_chw, to_network_input};
 pub use snippet::{EgoMotion, Snippet, Source, hold_out};
 pub use speed_check::{SpeedWarning, grey_image, speed_unit_warning};

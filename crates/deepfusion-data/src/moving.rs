@@ -32,6 +32,8 @@ pub enum MovingSource {
     Tracklets,
     /// Radial velocities of a frequency-modulated LiDAR.
     RadialVelocity,
+    /// A topic with the points of a scan that move, beside a LiDAR without velocities.
+    DynamicPoints,
 }
 
 /// What moves in a recording.
@@ -49,6 +51,7 @@ enum Kind {
         scans: Arc<BagScans>,
         /// Of the frames, by number, in seconds.
         times_s: BTreeMap<u64, f64>,
+        source: MovingSource,
     },
 }
 
@@ -61,8 +64,16 @@ struct MovingBox {
 
 impl MovingLabels {
     /// Of a bag's scans; `times_s` are those of the frames, by number.
-    pub(crate) fn of_scans(scans: Arc<BagScans>, times_s: BTreeMap<u64, f64>) -> Self {
-        Self(Kind::Scans { scans, times_s })
+    pub(crate) fn of_scans(
+        scans: Arc<BagScans>,
+        times_s: BTreeMap<u64, f64>,
+        source: MovingSource,
+    ) -> Self {
+        Self(Kind::Scans {
+            scans,
+            times_s,
+            source,
+        })
     }
 
     /// Of a KITTI raw drive; see [`Dataset::moving_labels`].
@@ -131,7 +142,7 @@ impl MovingLabels {
         match &self.0 {
             Kind::Masks(_) => MovingSource::Masks,
             Kind::Boxes { .. } => MovingSource::Tracklets,
-            Kind::Scans { .. } => MovingSource::RadialVelocity,
+            Kind::Scans { source, .. } => *source,
         }
     }
 
@@ -172,7 +183,7 @@ impl MovingLabels {
                 };
                 Ok(Some(truth.data.iter().enumerate().map(moves).collect()))
             }
-            Kind::Scans { scans, times_s } => match times_s.get(&frame) {
+            Kind::Scans { scans, times_s, .. } => match times_s.get(&frame) {
                 Some(time_s) => scans.moving(*time_s),
                 None => Ok(None),
             },

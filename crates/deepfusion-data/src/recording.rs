@@ -1,7 +1,7 @@
 //! What a layout has to offer for its recordings to be a [`Dataset`].
 
 use crate::kitti::GtKind;
-use crate::{CameraPath, Dataset, Error, Frame, MovingLabels, Result, Stream};
+use crate::{CameraPath, Dataset, DynamicAgreement, Error, Frame, MovingLabels, Result, Stream};
 use deepfusion_geometry::DepthMap;
 use image::RgbImage;
 use nalgebra::Vector3;
@@ -89,6 +89,18 @@ pub trait Recording: fmt::Debug + Send + Sync {
         Ok(None)
     }
 
+    /// [`Self::ground_truth`] with the velocities that were measured beside it.
+    ///
+    /// # Errors
+    /// As [`Self::ground_truth`].
+    fn scan_truth(&self, frame: &Frame, kind: GtKind) -> Result<Option<ScanTruth>> {
+        let depth = self.ground_truth(frame, kind)?;
+        Ok(depth.map(|depth| ScanTruth {
+            depth,
+            velocity_mps: None,
+        }))
+    }
+
     /// What tells moving pixels from static ones.
     ///
     /// # Errors
@@ -106,6 +118,15 @@ pub trait Recording: fmt::Debug + Send + Sync {
         Ok(Vec::new())
     }
 
+    /// How far a topic of dynamic points agrees with the radial velocities, in at most `most` scans spread over the
+    /// drive; `None` where the recording has not both.
+    ///
+    /// # Errors
+    /// Where a scan cannot be read.
+    fn dynamic_agreement(&self, _most: usize) -> Result<Option<DynamicAgreement>> {
+        Ok(None)
+    }
+
     /// The time of a number without an image, in seconds on the frames' clock.
     fn time_of(&self, _number: u64) -> Option<f64> {
         None
@@ -121,6 +142,17 @@ pub trait Recording: fmt::Debug + Send + Sync {
             layout: self.kind().label(),
         })
     }
+}
+
+/// Depth of a frame by its scan, and how fast what is seen there moves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanTruth {
+    /// H×W camera z in metres, 0 = none; as [`Dataset::ground_truth`].
+    pub depth: DepthMap,
+    /// Velocity over ground along the LiDAR's ray, m/s, receding is positive, row by row, of the point that the depth is
+    /// of: about 0 for what stands still, NaN where there is no depth or no velocity. `None` where the scan has no
+    /// radial velocities.
+    pub velocity_mps: Option<Vec<f32>>,
 }
 
 /// The velocity of a LiDAR over ground, by its scan and by the vehicle.

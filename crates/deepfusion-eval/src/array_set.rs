@@ -9,8 +9,11 @@ use ndarray_npy::{NpzReader, ReadNpyError, ReadNpyExt, ReadNpzError};
 use crate::error::first_names;
 use crate::{Error, Grid, Result};
 
+/// Before the names of the velocities that `data export-gt` writes beside depths: they are no depths.
+const VELOCITY: &str = "velocity_mps/";
+
 /// A file of H×W arrays, read one at a time: a NumPy `.npz` (arrays with names), or an N×H×W (or H×W) `.npy`, whose
-/// arrays have no name but an order. `float32` and `float64`.
+/// arrays have no name but an order. `float32` and `float64`. Velocities beside depths (`velocity_mps/…`) are left out.
 #[derive(Debug)]
 pub struct ArraySet {
     path: PathBuf,
@@ -21,6 +24,8 @@ enum Source {
     Npz {
         reader: Box<NpzReader<BufReader<File>>>,
         names: Vec<String>,
+        /// Each name's place in the archive.
+        places: Vec<usize>,
     },
     /// N×H×W.
     Stack(ArrayD<f64>),
@@ -52,9 +57,13 @@ impl ArraySet {
         let source = if magic.starts_with(b"PK") {
             let mut reader = NpzReader::new(file).map_err(|e| unreadable_archive(path, &e))?;
             let names = reader.names().map_err(|e| unreadable_archive(path, &e))?;
+            let depths = names.into_iter().enumerate();
+            let depths = depths.filter(|(_, name)| !name.starts_with(VELOCITY));
+            let (places, names) = depths.unzip();
             Source::Npz {
                 reader: Box::new(reader),
                 names,
+                places,
             }
         } else if magic == b"\x93NUMPY" {
             let array = match ArrayD::<f64>::read_npy(&mut file) {
@@ -140,8 +149,12 @@ impl ArraySet {
                 &format!("array {index}"),
                 array.index_axis(Axis(0), index).to_owned(),
             ),
-            Source::Npz { reader, names } => {
-                let name = names[index].clone();
+            Source::Npz {
+                reader,
+                names,
+                places,
+            } => {
+                let (name, index) = (names[index].clone(), places[index]);
                 // By index, not by name: an archive may hold a name twice.
                 let array = match reader.by_index::<ndarray::OwnedRepr<f64>, _>(index) {
                     Err(ReadNpzError::Npy(ReadNpyError::WrongDescriptor(_))) => reader

@@ -81,7 +81,7 @@ fn on_a_comma_segment_the_fusion_is_better_than_its_parts_where_they_err_apart()
 }
 
 #[test]
-fn with_the_tyres_known_the_distance_is_right_to_three_tenths_of_a_percent() {
+fn with_the_tyres_known_the_fusion_is_no_worse_than_the_better_of_its_parts() {
     let Some(segment) = segment() else { return };
     let (first, second) = halves(&segment.reference);
     let config = MotionConfig {
@@ -94,10 +94,24 @@ fn with_the_tyres_known_the_distance_is_right_to_three_tenths_of_a_percent() {
         config.speed_scale
     );
     let track = FusedTrack::new(&segment.sensors, &config).unwrap();
-    let [(_, vehicle), (_, imu), (_, fused)] = rows(&track, &windows(&second, 10.0, 0.5));
+    // The windows of docs/concepts/ego-motion.md.
+    let truths = windows(&second, 10.0, 0.1);
+    assert!(truths.len() > 140, "{}", truths.len());
+    let [(_, vehicle), (_, imu), (_, fused)] = rows(&track, &truths);
+    eprintln!("{vehicle:?}\n{imu:?}\n{fused:?}");
     assert!(vehicle.distance_bias.abs() < 0.003, "{vehicle:?}");
     assert!(fused.distance_bias.abs() < 0.003, "{fused:?}");
-    assert!(fused.distance_m < imu.distance_m, "{fused:?} {imu:?}");
+    // No worse than the better part, in both: a millimetre and a hundredth of a degree are what the document's digits show.
+    assert!(
+        fused.distance_m <= vehicle.distance_m.min(imu.distance_m) + 1e-3,
+        "{fused:?} {vehicle:?} {imu:?}"
+    );
+    assert!(
+        fused.yaw_rad <= vehicle.yaw_rad.min(imu.yaw_rad) + 0.01_f64.to_radians(),
+        "{fused:?} {vehicle:?} {imu:?}"
+    );
+    // Neither part is so poor that any mean would do.
+    assert!(imu.distance_m > vehicle.distance_m + 0.1 && vehicle.yaw_rad > 2.0 * imu.yaw_rad);
 }
 
 #[test]

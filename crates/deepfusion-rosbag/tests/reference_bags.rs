@@ -145,7 +145,7 @@ fn pixels_are_what_numpy_reads() {
     });
     assert_eq!(
         pictures, 3,
-        "bgr8, rgba8 and 16UC1; a Bayer pattern has no colours yet"
+        "bgr8, rgba8 and 16UC1; Bayer patterns: image_encodings.rs"
     );
 }
 

@@ -48,6 +48,12 @@ pub enum CliError {
         /// How many it holds.
         drives: usize,
     },
+    /// A ROS 2 bag asked for.
+    #[error("{}: bags of ROS 2 are read, not written", path.display())]
+    NoRos2Writer {
+        /// The output's name.
+        path: PathBuf,
+    },
     /// Intrinsics that cannot be the image's.
     #[error("the intrinsics do not fit the image: {why}")]
     Camera {
@@ -190,6 +196,9 @@ impl CliError {
             Self::NoImages { .. } => None,
             Self::NoModel { .. } => Some("give run folders alone, or leave out --pictures".into()),
             Self::SeveralDrives { .. } => Some("convert them one by one: give a drive's own folder".into()),
+            Self::NoRos2Writer { .. } => {
+                Some("give a name that ends in .bag for a ROS 1 bag, or another folder for KITTI raw".into())
+            }
             Self::Camera { .. } => {
                 Some("give fx,fy,cx,cy in pixels of the input image, at its own size".into())
             }

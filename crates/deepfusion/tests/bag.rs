@@ -2,8 +2,15 @@
 
 mod support;
 
+use std::path::Path;
+
+use deepfusion_rosbag::msg::{
+    Header, Imu, Odometry, Pose, PoseWithCovariance, Quaternion, Twist, TwistWithCovariance,
+    Vector3,
+};
+use deepfusion_rosbag::{BagWriter, Time, WriterOptions};
 use serde_json::Value;
-use support::{json, ok, run};
+use support::{fails, json, ok, run};
 
 #[test]
 fn bags_are_trained_on_and_measured_by_scenario() {
@@ -72,6 +79,11 @@ fn a_bag_is_converted_both_ways() {
     let inspection = json(at, "data inspect kitti --json");
     assert_eq!(inspection["kind"], "kitti_raw");
     assert_eq!(inspection["size"], serde_json::json!([64, 48]));
+    // KITTI alone numbers its cameras.
+    let text = ok(at, "data inspect kitti").stdout;
+    assert!(text.contains("_sync (camera 2)"), "{text}");
+    let text = ok(at, "data inspect sim").stdout;
+    assert!(!text.contains("(camera"), "{text}");
     ok(at, "data convert kitti again.bag");
     let again = json(at, "data inspect again.bag --json");
     assert_eq!(again["frames"], 6);
@@ -83,6 +95,141 @@ fn a_bag_is_converted_both_ways() {
         refused.stderr
     );
     assert!(refused.stderr.contains("hint:"), "{}", refused.stderr);
+}
+
+#[test]
+fn what_was_noticed_while_opening_is_told_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out sim --format bag --frames 40 --size 96x64 --moving-cars 0",
+    );
+    let whole = ok(at, "data convert sim/urban_0001.bag whole");
+    assert!(!whole.stderr.contains("damaged"), "{}", whole.stderr);
+    let bag = at.join("sim/urban_0001.bag");
+    let bytes = std::fs::read(&bag).unwrap();
+    std::fs::write(&bag, &bytes[..bytes.len() / 2]).unwrap();
+    let warned = |stderr: &str| {
+        let about: Vec<&str> = stderr.lines().filter(|l| l.contains("damaged")).collect();
+        assert_eq!(about.len(), 1, "{stderr}");
+        assert!(about[0].contains("urban_0001.bag: "), "{stderr}");
+    };
+    let converted = ok(at, "data convert sim/urban_0001.bag kitti --json");
+    warned(&converted.stderr);
+    let written: Value = serde_json::from_str(&converted.stdout).unwrap();
+    let frames = written["frames"].as_u64().unwrap();
+    assert!(
+        (1..40).contains(&frames),
+        "cut in the middle: {frames} frames"
+    );
+    // The same recording to train and to validate on is one.
+    let trained = ok(
+        at,
+        "train --data sim --val-data sim --preset tiny --size 64x64 --batch 2 --steps 1 --out run",
+    );
+    warned(&trained.stderr);
+    let predicted = ok(at, "predict --model run sim/urban_0001.bag --out depth");
+    warned(&predicted.stderr);
+}
+
+/// A bag of two seconds without a camera: an inertial unit that turns left by 0.3 rad/s, and, where asked for, odometry
+/// of a vehicle that stands and turns right by 0.2 rad/s.
+fn write_without_camera(path: &Path, odometry: bool) {
+    let mut bag = BagWriter::create(path, WriterOptions::default()).unwrap();
+    let imu = bag.add_connection::<Imu>("/imu/data").unwrap();
+    let odom = odometry.then(|| bag.add_connection::<Odometry>("/odom").unwrap());
+    for i in 0..=200 {
+        let stamp = Time {
+            sec: 1_700_000_000 + i / 100,
+            nsec: (i % 100) * 10_000_000,
+        };
+        let header = Header {
+            stamp,
+            ..Header::default()
+        };
+        let up = |z| Vector3 {
+            z,
+            ..Vector3::default()
+        };
+        if let Some(odom) = odom {
+            let twist = Twist {
+                linear: Vector3 {
+                    x: -0.0,
+                    ..Vector3::default()
+                },
+                angular: up(-0.2),
+            };
+            let odometry = Odometry {
+                header,
+                child_frame_id: "vehicle".into(),
+                pose: PoseWithCovariance {
+                    pose: Pose::default(),
+                    covariance: [0.0; 36],
+                },
+                twist: TwistWithCovariance {
+                    twist,
+                    covariance: [0.0; 36],
+                },
+            };
+            bag.write(odom, stamp, &odometry).unwrap();
+        } else {
+            let sample = Imu {
+                header,
+                orientation: Quaternion::default(),
+                orientation_covariance: [0.0; 9],
+                angular_velocity: up(0.3),
+                angular_velocity_covariance: [0.0; 9],
+                linear_acceleration: up(9.81),
+                linear_acceleration_covariance: [0.0; 9],
+            };
+            bag.write(imu, stamp, &sample).unwrap();
+        }
+    }
+    bag.finish().unwrap();
+}
+
+#[test]
+fn a_bag_without_a_camera_says_how_the_vehicle_turned() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (name, odometry, turned) in [("imu.bag", false, 0.6), ("odom.bag", true, -0.4)] {
+        write_without_camera(&at.join(name), odometry);
+        let seen = json(at, &format!("data inspect {name} --json"));
+        let turn = seen["drives"][0]["turn_rad"].as_f64().unwrap();
+        assert!((turn - turned).abs() < 1e-3, "{name}: {turn}");
+        let text = ok(at, &format!("data inspect {name}")).stdout;
+        assert!(text.contains("without images"), "{text}");
+        assert!(!text.contains("(camera"), "it has none: {text}");
+        assert!(!text.contains("-0.0"), "{text}");
+    }
+}
+
+#[test]
+fn bags_of_ros_2_are_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 4 --size 64x48");
+    for name in ["foo.mcap", "foo.DB3"] {
+        let args = format!("data convert sim {name}");
+        fails(at, &args, &[name, "read, not written", ".bag"]);
+        assert!(!at.join(name).exists());
+    }
+}
+
+#[cfg(not(feature = "ros2"))]
+#[test]
+fn a_build_without_ros_2_says_how_to_build_one_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::create_dir(at.join("drive")).unwrap();
+    std::fs::write(at.join("drive/drive_0.mcap"), b"").unwrap();
+    for place in ["drive", "drive/drive_0.mcap"] {
+        let args = format!("data inspect {place}");
+        fails(at, &args, &["ROS 2 bag", "--features ros2"]);
+        let args = format!("predict --model none {place} --out depth");
+        fails(at, &args, &["ROS 2 bag", "--features ros2"]);
+    }
 }
 
 #[test]

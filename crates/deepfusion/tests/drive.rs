@@ -116,6 +116,52 @@ fn a_simulated_drive_is_inspected_exported_and_scored() {
     );
 }
 
+/// Velocities stand beside the depths and are never taken for some.
+#[test]
+fn a_bag_s_velocities_are_exported_beside_its_depths() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out sim --format bag --frames 11 --size 96x72 --moving-cars 6",
+    );
+    ok(at, "data export-gt sim --out gt.npz");
+    let dataset = Dataset::open(&at.join("sim"), &OpenOptions::default())
+        .unwrap()
+        .remove(0);
+    let truth = dataset.scan_truth(5, GtKind::Z).unwrap().unwrap();
+    let mut npz = NpzReader::new(std::fs::File::open(at.join("gt.npz")).unwrap()).unwrap();
+    let depth: Array2<f32> = npz.by_name("0000000005").unwrap();
+    let velocity: Array2<f32> = npz.by_name("velocity_mps/0000000005").unwrap();
+    assert_eq!((depth.dim(), velocity.dim()), ((72, 96), (72, 96)));
+    assert!(depth.iter().eq(&truth.depth.data));
+    let expected = truth.velocity_mps.unwrap();
+    let bits = |v: &f32| v.to_bits();
+    assert!(velocity.iter().map(bits).eq(expected.iter().map(bits)));
+    assert!(
+        depth
+            .iter()
+            .zip(&velocity)
+            .all(|(d, v)| (*d == 0.0) == v.is_nan())
+    );
+    let names = npz.names().unwrap();
+    let depths = names.iter().filter(|n| !n.contains('/')).count();
+    assert!(depths > 2 && names.len() == 2 * depths, "{names:?}");
+
+    // What reads the file back as depths leaves the velocities out.
+    let mut writer = NpzWriter::new(std::fs::File::create(at.join("pred.npz")).unwrap());
+    for name in names.iter().filter(|n| !n.contains('/')) {
+        let everywhere = Array2::<f32>::from_elem((72, 96), 10.0);
+        writer.add_array(name.as_str(), &everywhere).unwrap();
+    }
+    writer.finish().unwrap();
+    let report = json(
+        at,
+        "eval --pred pred.npz --pred-kind depth --gt gt.npz --trivial gt.npz --crop none --json",
+    );
+    assert_eq!(report["n"], depths);
+}
+
 #[test]
 fn bad_arrays_end_in_an_error_with_the_array_and_a_hint() {
     let folder = tempfile::tempdir().unwrap();

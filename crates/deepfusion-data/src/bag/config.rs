@@ -1,5 +1,6 @@
 //! The file beside a bag, `<bag>.toml` or `bag.toml` for all bags of a folder: what the bag does not say.
 
+use super::can::CanConfig;
 use crate::{Error, Result};
 use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_motion::FusionConfig;
@@ -22,6 +23,8 @@ pub(super) struct BagConfig {
     pub(super) topics: TopicNames,
     /// A camera without distortion, where there is no CameraInfo.
     pub(super) camera: Option<CameraConfig>,
+    /// A calibration tool's file, from this one's folder.
+    pub(super) calibration: Option<PathBuf>,
     /// A point of the LiDAR in the camera.
     pub(super) cam_from_lidar: Option<Transform>,
     /// A point of the vehicle (middle of the rear axle; x forward, y left, z up) in the camera.
@@ -166,26 +169,17 @@ impl Default for ClockConfig {
     }
 }
 
-/// Signals of CAN frames: `Message.Signal` of a DBC file.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct CanConfig {
-    /// The DBC file, beside this one.
-    pub(super) dbc: PathBuf,
-    pub(super) speed: Option<String>,
-    pub(super) speed_unit: Option<SpeedUnit>,
-    pub(super) steering: Option<String>,
-    /// Radians for one unit of the steering signal: 0.0174533 where it is in degrees.
-    pub(super) steering_rad: Option<f64>,
-}
-
 impl BagConfig {
     /// Reads the file beside a bag; where there is none, nothing is said.
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
     pub(super) fn beside(bag: &Path) -> Result<Self> {
-        let candidates = Self::candidates(bag);
+        let mut candidates = Self::candidates(bag);
+        // Of a link, the file beside what it leads to, where the link has none beside itself.
+        if let Ok(real) = bag.canonicalize() {
+            candidates.extend(Self::candidates(&real));
+        }
         let there = candidates.iter().find(|path| path.is_file());
         // Where there is none, the first is where one would be looked for.
         let path = there.or(candidates.first()).cloned().unwrap_or_default();
@@ -229,11 +223,21 @@ impl BagConfig {
                 return Err(self.wrong(format!("{key} holds a number that is not finite")));
             }
         }
+        if self.camera.is_some() && self.calibration.is_some() {
+            return Err(self.wrong(
+                "[camera] and calibration both say what the camera is: keep one of them".into(),
+            ));
+        }
         let known = self.profile.as_deref().is_none_or(|p| p == "umad");
         match known {
             true => Ok(()),
             false => Err(self.wrong("profile: the only one there is is \"umad\"".into())),
         }
+    }
+
+    /// Where files that it names are looked for.
+    pub(super) fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(&self.path)
     }
 
     pub(super) fn wrong(&self, problem: String) -> Error {

@@ -1,11 +1,11 @@
 //! One pass over a bag: when images and scans were taken, and what the vehicle said meanwhile.
 
-use super::config::{BagConfig, SpeedUnit};
+use super::can::Can;
+use super::config::BagConfig;
 use super::topics::{Role, Topics};
 use crate::{Error, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::ImuSample;
-use deepfusion_motion::can::{CanFrame, CanId, CanSignal, Dbc};
 use deepfusion_rosbag::msg::{
     AckermannDriveStamped, CameraInfo, Float32, Float64, Frame, Imu, Odometry, TwistStamped,
 };
@@ -26,6 +26,8 @@ pub(super) struct Place {
 pub(super) struct Index {
     pub(super) images: Vec<Place>,
     pub(super) scans: Vec<Place>,
+    /// Messages of the points that move.
+    pub(super) dynamic: Vec<Place>,
     pub(super) camera_info: Option<CameraInfo>,
     pub(super) speed_mps: Vec<(i64, f64)>,
     /// Of the message that holds the speed, rad/s; not every publisher fills it.
@@ -36,12 +38,8 @@ pub(super) struct Index {
     pub(super) truth: Vec<(i64, Se3)>,
     /// Chunks or messages that could not be read, in sentences.
     pub(super) lost: Vec<String>,
-}
-
-/// Signals of CAN frames.
-struct Can {
-    speed: Option<(CanSignal, f64)>,
-    steering: Option<(CanSignal, f64)>,
+    /// CAN signals that no frame holds, in sentences.
+    pub(super) silent: Vec<String>,
 }
 
 impl Index {
@@ -69,8 +67,10 @@ impl Index {
                 Err(error) => index.lost.push(error.to_string()),
             }
         }
+        index.silent = can.silent(index.speed_mps.len(), index.steering_rad.len());
         index.images.sort_by_key(|p| p.stamp_ns);
         index.scans.sort_by_key(|p| p.stamp_ns);
+        index.dynamic.sort_by_key(|p| p.stamp_ns);
         index.truth.sort_by_key(|p| p.0);
         Ok(index)
     }
@@ -84,13 +84,14 @@ impl Index {
     ) -> Result<()> {
         for role in topics.roles(message.topic()) {
             match role {
-                Role::Image | Role::Lidar => {
+                Role::Image | Role::Lidar | Role::Dynamic => {
                     let place = Place {
                         recorded: message.time(),
                         stamp_ns: stamp(message),
                     };
                     match role {
                         Role::Image => self.images.push(place),
+                        Role::Dynamic => self.dynamic.push(place),
                         _ => self.scans.push(place),
                     }
                 }
@@ -119,13 +120,13 @@ impl Index {
                         .extend(yaw_rate.map(|yaw_rate| (at_ns, yaw_rate)));
                 }
                 Role::Steering => {
-                    let drive: AckermannDriveStamped = message.decode()?;
-                    let angle = f64::from(drive.drive.steering_angle);
-                    self.steering_rad.push((nanos(drive.header.stamp), angle));
+                    self.steering_rad.push(steering(message)?);
                 }
                 Role::Can => {
                     let frame: Frame = message.decode()?;
-                    self.add_can(&frame, can);
+                    let said = can.read(&frame);
+                    self.speed_mps.extend(said.speed_mps);
+                    self.steering_rad.extend(said.steering_rad);
                 }
                 Role::Truth => {
                     let odometry: Odometry = message.decode()?;
@@ -137,76 +138,6 @@ impl Index {
             }
         }
         Ok(())
-    }
-
-    fn add_can(&mut self, frame: &Frame, can: &Can) {
-        let id = match frame.is_extended {
-            true => CanId::Extended { extended: frame.id },
-            false => CanId::Standard(frame.id as u16),
-        };
-        let time_ns = nanos(frame.header.stamp);
-        let length = usize::from(frame.dlc).min(frame.data.len());
-        let seen = CanFrame {
-            time_s: 0.0,
-            id,
-            data: &frame.data[..length],
-        };
-        let value = |signal: &Option<(CanSignal, f64)>| {
-            let (signal, factor) = signal.as_ref()?;
-            let value = (signal.id == seen.id).then(|| signal.decode(seen.data))??;
-            Some((time_ns, value * factor))
-        };
-        self.speed_mps.extend(value(&can.speed));
-        self.steering_rad.extend(value(&can.steering));
-    }
-}
-
-impl Can {
-    fn of(config: &BagConfig) -> Result<Self> {
-        let Some(can) = &config.can else {
-            return Ok(Self {
-                speed: None,
-                steering: None,
-            });
-        };
-        let folder = config.path.parent().unwrap_or(&config.path);
-        let path = folder.join(&can.dbc);
-        let wrong = |e: deepfusion_motion::Error| config.wrong(format!("can: {e}"));
-        let dbc = Dbc::open(&path).map_err(wrong)?;
-        let speed = match &can.speed {
-            None => None,
-            Some(name) => {
-                let signal = dbc.signal(name).map_err(wrong)?;
-                let unit = can.speed_unit.or_else(|| unit_of(dbc.unit(name)?));
-                let unit = unit.ok_or_else(|| {
-                    config.wrong(format!(
-                        "can.speed_unit is missing, and the DBC file gives {name} none that is known: \"m/s\", \"km/h\" or \"mph\""
-                    ))
-                })?;
-                Some((signal, unit.metres_per_second()))
-            }
-        };
-        let steering = match &can.steering {
-            None => None,
-            Some(name) => {
-                let factor = can.steering_rad.ok_or_else(|| {
-                    config.wrong(
-                        "can.steering_rad is missing: radians for one unit of the signal, 0.0174533 for degrees".into(),
-                    )
-                })?;
-                Some((dbc.signal(name).map_err(wrong)?, factor))
-            }
-        };
-        Ok(Self { speed, steering })
-    }
-}
-
-fn unit_of(text: &str) -> Option<SpeedUnit> {
-    match text.trim().to_lowercase().as_str() {
-        "m/s" => Some(SpeedUnit::MetresPerSecond),
-        "km/h" | "kph" | "kmh" => Some(SpeedUnit::KilometresPerHour),
-        "mph" => Some(SpeedUnit::MilesPerHour),
-        _ => None,
     }
 }
 
@@ -244,10 +175,7 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
             yaw_rate: Some(twist.angular.z),
         });
     }
-    let value = match message.is::<Float32>() {
-        true => f64::from(message.decode::<Float32>()?.data),
-        false => message.decode::<Float64>()?.data,
-    };
+    let value = number(message)?;
     let unit = config.vehicle.speed_unit.ok_or_else(|| {
         config.wrong(format!(
             "vehicle.speed_unit is missing: {} is a bare number, \"m/s\", \"km/h\" or \"mph\"",
@@ -258,6 +186,24 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
         at_ns: nanos(message.time()),
         speed_mps: value * unit.metres_per_second(),
         yaw_rate: None,
+    })
+}
+
+/// The steering angle in radians and its time, by whatever message holds it.
+fn steering(message: &Message<'_>) -> Result<(i64, f64)> {
+    if message.is::<AckermannDriveStamped>() {
+        let drive: AckermannDriveStamped = message.decode()?;
+        let angle = f64::from(drive.drive.steering_angle);
+        return Ok((nanos(drive.header.stamp), angle));
+    }
+    Ok((nanos(message.time()), number(message)?))
+}
+
+/// A bare number.
+fn number(message: &Message<'_>) -> Result<f64> {
+    Ok(match message.is::<Float32>() {
+        true => f64::from(message.decode::<Float32>()?.data),
+        false => message.decode::<Float64>()?.data,
     })
 }
 

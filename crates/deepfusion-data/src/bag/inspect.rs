@@ -3,10 +3,11 @@
 use super::config::BagConfig;
 use super::index::Index;
 use super::recording::{remarks_on, streams};
-use super::source;
 use super::topics::{Role, Topics};
+use super::{sensors, source};
 use crate::inspect::{DriveInspection, Inspection, SpeedRange};
 use crate::{DatasetKind, Result};
+use deepfusion_motion::Signal;
 use std::path::Path;
 
 /// Speeds farther apart than this are not joined, in seconds.
@@ -47,7 +48,7 @@ pub(crate) fn without_images(path: &Path) -> Result<Option<Inspection>> {
         scans: 0,
         speed_mps,
         distance_m,
-        turn_rad: None,
+        turn_rad: turn(path, &index, &config),
         duration_s,
         time_offset: None,
         remarks: remarks_on(bag.as_ref(), &index),
@@ -63,4 +64,44 @@ pub(crate) fn without_images(path: &Path) -> Result<Option<Inspection>> {
         duration_s,
         drives: vec![drive],
     }))
+}
+
+/// How far the vehicle turned, in radians, positive to the left: by all its sensors where it has a speed, else by the
+/// yaw rates as they were measured, bias included. `None` where there are none.
+fn turn(path: &Path, index: &Index, config: &BagConfig) -> Option<f64> {
+    let origin_ns = index.speed_mps.iter().map(|s| s.0).min();
+    // Sensors that contradict each other end an opening; here they still say what they measured.
+    let motion = origin_ns.and_then(|ns| sensors::motion(path, index, config, ns).ok().flatten());
+    if let Some(motion) = motion.filter(|m| m.yaw_known) {
+        let track = &motion.track;
+        let pairs = track.times_s().windows(2);
+        return total(pairs.filter_map(|t| Some(track.motion(t[0], t[1])?.yaw_rad)));
+    }
+    let mut rates = yaw_rates(index, config);
+    rates.sort_by_key(|r| r.0);
+    let first_ns = rates.first()?.0;
+    let seconds = |ns: i64| (ns - first_ns) as f64 * 1e-9;
+    let signal = Signal::new(rates.into_iter().map(|(ns, rate)| (seconds(ns), rate)));
+    let pairs = signal.times_s().windows(2);
+    total(pairs.filter_map(|t| signal.integral(t[0], t[1])))
+}
+
+/// Yaw rates in rad/s by whoever measures them: the speed's messages if they ever say a turn (not every publisher
+/// fills it), else the inertial unit, whose z is up unless the file beside the bag turns it.
+fn yaw_rates(index: &Index, config: &BagConfig) -> Vec<(i64, f64)> {
+    if index.yaw_rate.iter().any(|(_, rate)| *rate != 0.0) {
+        return index.yaw_rate.clone();
+    }
+    let vehicle_from_imu = config.vehicle_from_imu.map(|t| t.se3());
+    let rates = index.imu.iter().map(|(ns, sample)| {
+        let rate = sample.angular_rate_radps;
+        let turned = vehicle_from_imu.map_or(rate, |t| t.rotate(&rate));
+        (*ns, turned.z)
+    });
+    rates.collect()
+}
+
+/// The sum; `None` of nothing.
+fn total(parts: impl Iterator<Item = f64>) -> Option<f64> {
+    parts.reduce(|sum, part| sum + part)
 }

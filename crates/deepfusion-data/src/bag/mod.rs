@@ -2,10 +2,12 @@
 //!
 //! The way of a bag: `source` (its reader: whatever is a [`deepfusion_rosbag::MessageSource`]) → `topics` (which is which, by message type) → `sensors` (speed, steering and IMU as a motion) and
 //! `index` (when images and scans were taken) → `recording` (a [`crate::Recording`]), which reads an `image` or a
-//! `scan` when it is asked for. What a bag cannot say (where the sensors are) stands in a file beside it: `config`.
+//! `scan` when it is asked for, with the points that its `dynamic` topic lists. What a bag cannot say (where the sensors are) stands in a file beside it: `config`.
 
+mod can;
 mod config;
 mod doppler;
+mod dynamic;
 mod image;
 mod index;
 mod inspect;

@@ -2,6 +2,7 @@
 
 use super::config::{BagConfig, LidarConfig};
 use super::doppler::ego_velocity;
+use super::dynamic::{DynamicPoints, Listed};
 use super::index::{Index, Place};
 use super::profile;
 use super::scan::{Scan, SeenScan};
@@ -10,8 +11,9 @@ use super::{image, sensors, source};
 use crate::kitti::GtKind;
 use crate::recording::{CalibrationPlace, Recording};
 use crate::{
-    Camera, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame, FrameImage, Lens,
-    LidarMotion, MotionModel, MovingLabels, OpenOptions, Result, Stream,
+    Camera, CameraCalibration, CameraPath, Dataset, DatasetKind, DatasetParts, DynamicAgreement,
+    Error, Frame, FrameImage, Lens, LidarMotion, MotionModel, MovingLabels, MovingSource,
+    OpenOptions, Result, ScanTruth, Stream,
 };
 use ::image::RgbImage;
 use deepfusion_geometry::{DepthMap, Distortion, Intrinsics, Se3, StampedPose, Trajectory};
@@ -68,6 +70,8 @@ pub(crate) struct BagScans {
     topic: String,
     /// Each scan's place and its time on the frames' clock.
     places: Vec<(Place, f64)>,
+    /// Those points of the scans that move, by another topic.
+    dynamic: Option<DynamicPoints>,
     lidar: LidarConfig,
     within_s: f64,
     cam_from_lidar: Se3,
@@ -153,15 +157,19 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         (None, Some("umad")) => Some(profile::umad_cam_from_lidar().se3()),
         _ => None,
     };
+    let timed = |places: &[Place]| {
+        let timed = places.iter().map(|p| (*p, seconds(p.stamp_ns)));
+        timed.collect::<Vec<_>>()
+    };
     let scans = match (topics.of(Role::Lidar), cam_from_lidar) {
         (Some(topic), Some(cam_from_lidar)) => Some(Arc::new(BagScans {
             bag: Arc::clone(&bag),
             topic: topic.to_owned(),
-            places: index
-                .scans
-                .iter()
-                .map(|p| (*p, seconds(p.stamp_ns)))
-                .collect(),
+            places: timed(&index.scans),
+            dynamic: topics.of(Role::Dynamic).map(|topic| DynamicPoints {
+                topic: topic.to_owned(),
+                places: timed(&index.dynamic),
+            }),
             lidar: config.lidar.clone(),
             within_s: config.clock.scan_within_s,
             cam_from_lidar,
@@ -213,6 +221,7 @@ pub(super) fn remarks_on(bag: &dyn MessageSource, index: &Index) -> Vec<String> 
             index.lost.len()
         ));
     }
+    remarks.extend(index.silent.iter().cloned());
     remarks
 }
 
@@ -235,6 +244,9 @@ fn camera(
         (pinhole(given), place(bag, "--intrinsics"))
     } else if let Some(camera) = config.camera {
         (pinhole(camera.intrinsics()), place(&config.path, "camera"))
+    } else if let Some(file) = &config.calibration {
+        let (lens, place) = calibrated(config, file, (width, height), rectified)?;
+        (Ok(lens), place)
     } else if let Some(info) = index.camera_info.as_ref().filter(|info| info.k[0] > 0.0) {
         (of_camera_info(info, rectified), place(bag, "CameraInfo"))
     } else if config.profile.as_deref() == Some("umad") {
@@ -245,7 +257,7 @@ fn camera(
             path: bag.to_owned(),
             problem: "nothing says what the camera is: no CameraInfo with a K".into(),
             remedy: format!(
-                "[camera] fx, fy, cx, cy, width, height in {}, or --intrinsics fx,fy,cx,cy",
+                "[camera] fx, fy, cx, cy, width, height or calibration = \"camera.yaml\" in {}, or --intrinsics fx,fy,cx,cy",
                 config.path.display()
             ),
         });
@@ -268,6 +280,32 @@ fn camera(
         });
     }
     Ok((lens, place))
+}
+
+/// The camera of the calibration file that the file beside the bag names.
+fn calibrated(
+    config: &BagConfig,
+    file: &Path,
+    size: (u32, u32),
+    rectified: bool,
+) -> Result<(Lens, CalibrationPlace)> {
+    let path = config.folder().join(file);
+    if !path.is_file() {
+        return Err(config.wrong(format!("calibration: there is no {}", path.display())));
+    }
+    let calibration = CameraCalibration::read(&path, size)?;
+    // Such a file is of the raw images: rectified ones have another matrix, and no distortion left to take out.
+    if rectified && !calibration.distortion.is_none() {
+        return Err(Error::CameraFile {
+            path,
+            problem: "it has a distortion, and the images are of a topic with `rect` in its name, rectified already".into(),
+            remedy: format!(
+                "name the raw images' topic (topics.image), or give the rectified camera as [camera], both in {}",
+                config.path.display()
+            ),
+        });
+    }
+    Ok((calibration.lens()?, calibration.place()))
 }
 
 /// Of rectified images P without distortion, of raw ones K with it.
@@ -313,6 +351,10 @@ pub(super) fn streams(
                 "point_cloud",
                 index.scans.iter().map(|p| p.stamp_ns).collect(),
             ),
+            Some(Role::Dynamic) => (
+                "point_cloud",
+                index.dynamic.iter().map(|p| p.stamp_ns).collect(),
+            ),
             Some(Role::Imu) => ("imu", index.imu.iter().map(|s| s.0).collect()),
             Some(Role::Speed) => ("speed", index.speed_mps.iter().map(|s| s.0).collect()),
             Some(Role::Steering) => ("steering", index.steering_rad.iter().map(|s| s.0).collect()),
@@ -331,32 +373,46 @@ pub(super) fn streams(
 }
 
 impl BagScans {
-    /// The scan nearest in time to a frame, if it is near enough, as the frame's camera sees it: what stands still is
-    /// brought to the frame's time by the vehicle's motion meanwhile.
+    /// The scan nearest in time to a frame, if it is near enough, and its time.
     ///
     /// # Errors
     /// As [`Scan::decode`].
-    fn at(&self, frame_s: f64) -> Result<Option<SeenScan>> {
-        let Some(&(place, time_s)) = self.nearest(frame_s) else {
+    fn scan(&self, frame_s: f64) -> Result<Option<(Scan, f64)>> {
+        let Some((place, time_s)) = nearest(&self.places, frame_s, self.within_s) else {
             return Ok(None);
         };
-        let message = image::message(self.bag.as_ref(), &self.topic, &place)?;
-        let scan = Scan::decode(self.bag.as_ref(), &message, &self.lidar)?;
-        let ground = scan.ground_radial(self.sensor_velocity(time_s), self.lidar.over_ground);
-        let cam_from_lidar = self.frame_from_scan(frame_s, time_s) * self.cam_from_lidar;
-        Ok(Some(scan.seen(
-            &cam_from_lidar,
-            &self.intrinsics,
-            ground.as_deref(),
-        )))
+        Ok(Some((self.decode(place)?, *time_s)))
     }
 
-    fn nearest(&self, frame_s: f64) -> Option<&(Place, f64)> {
-        let after = self.places.partition_point(|p| p.1 < frame_s);
-        let around = self.places[after.saturating_sub(1)..].iter().take(2);
-        let apart = |p: &&(Place, f64)| (p.1 - frame_s).abs();
-        let nearest = around.min_by(|a, b| apart(a).total_cmp(&apart(b)));
-        nearest.filter(|p| apart(p) <= self.within_s)
+    fn decode(&self, place: &Place) -> Result<Scan> {
+        let message = image::message(self.bag.as_ref(), &self.topic, place)?;
+        Scan::decode(self.bag.as_ref(), &message, &self.lidar)
+    }
+
+    /// A scan as a frame's camera sees it: what stands still is brought to the frame's time by the vehicle's motion
+    /// meanwhile.
+    fn seen(&self, scan: &Scan, frame_s: f64, scan_s: f64) -> SeenScan {
+        let cam_from_lidar = self.frame_from_scan(frame_s, scan_s) * self.cam_from_lidar;
+        scan.seen(&cam_from_lidar, &self.intrinsics)
+    }
+
+    /// Each point's speed over ground along its ray, m/s; `None` without radial velocities.
+    fn ground(&self, scan: &Scan, scan_s: f64) -> Option<Vec<f32>> {
+        scan.ground_radial(self.sensor_velocity(scan_s), self.lidar.over_ground)
+    }
+
+    /// Which points move by their speeds over ground.
+    fn fast(&self, ground: &[f32]) -> Vec<bool> {
+        let limit = self.lidar.moving_mps as f32;
+        ground.iter().map(|v| v.abs() > limit).collect()
+    }
+
+    /// Which points the topic of dynamic points lists; `None` without it, or where it is not of this scan.
+    fn listed(&self, scan: &Scan, scan_s: f64) -> Result<Option<Listed>> {
+        let Some(dynamic) = &self.dynamic else {
+            return Ok(None);
+        };
+        dynamic.of(self.bag.as_ref(), &scan.xyz, scan_s, self.within_s)
     }
 
     /// Camera at the frame's time from camera at the scan's.
@@ -387,18 +443,72 @@ impl BagScans {
 
     /// Whether a frame has a scan near enough.
     pub(crate) fn has(&self, frame_s: f64) -> bool {
-        self.nearest(frame_s).is_some()
+        nearest(&self.places, frame_s, self.within_s).is_some()
     }
 
-    /// Which pixels of a frame's ground truth move; `None` without a scan or without velocities.
+    /// A frame's ground truth, H×W; `None` without a scan.
     ///
     /// # Errors
-    /// As [`Self::at`].
+    /// As [`Self::scan`].
+    fn depth(&self, frame_s: f64) -> Result<Option<DepthMap>> {
+        let scan = self.scan(frame_s)?;
+        Ok(scan.map(|(scan, scan_s)| self.seen(&scan, frame_s, scan_s).depth))
+    }
+
+    /// As [`Recording::scan_truth`].
+    fn truth(&self, frame_s: f64) -> Result<Option<ScanTruth>> {
+        let Some((scan, scan_s)) = self.scan(frame_s)? else {
+            return Ok(None);
+        };
+        let seen = self.seen(&scan, frame_s, scan_s);
+        let ground = self.ground(&scan, scan_s);
+        Ok(Some(ScanTruth {
+            velocity_mps: ground.map(|ground| seen.pixels(&ground, f32::NAN)),
+            depth: seen.depth,
+        }))
+    }
+
+    /// Which pixels of a frame's ground truth move: by the radial velocities, or, where the scan has none, by the topic
+    /// of dynamic points. `None` without a scan or without either.
+    ///
+    /// # Errors
+    /// As [`Self::scan`].
     pub(crate) fn moving(&self, frame_s: f64) -> Result<Option<Vec<bool>>> {
-        let limit = self.lidar.moving_mps as f32;
-        let seen = self.at(frame_s)?;
-        let ground = seen.and_then(|seen| seen.ground_mps);
-        Ok(ground.map(|ground| ground.iter().map(|v| v.abs() > limit).collect()))
+        let Some((scan, scan_s)) = self.scan(frame_s)? else {
+            return Ok(None);
+        };
+        let moves = match self.ground(&scan, scan_s) {
+            Some(ground) => Some(self.fast(&ground)),
+            None => self
+                .listed(&scan, scan_s)?
+                .filter(Listed::is_of_scan)
+                .map(|listed| listed.moves),
+        };
+        let seen = self.seen(&scan, frame_s, scan_s);
+        Ok(moves.map(|moves| seen.pixels(&moves, false)))
+    }
+
+    /// As [`Recording::dynamic_agreement`].
+    fn agreement(&self, most: usize) -> Result<Option<DynamicAgreement>> {
+        let mut sum = DynamicAgreement::default();
+        let step = self.places.len().div_ceil(most.max(1)).max(1);
+        for (place, scan_s) in self.places.iter().step_by(step).take(most) {
+            let scan = self.decode(place)?;
+            let Some(ground) = self.ground(&scan, *scan_s) else {
+                continue;
+            };
+            let Some(listed) = self.listed(&scan, *scan_s)? else {
+                continue;
+            };
+            let fast = self.fast(&ground);
+            sum.scans += 1;
+            sum.listed += listed.points;
+            sum.in_scan += listed.found;
+            sum.fast += fast.iter().filter(|fast| **fast).count();
+            let both = fast.iter().zip(&listed.moves).filter(|(a, b)| **a && **b);
+            sum.both += both.count();
+        }
+        Ok((sum.scans > 0).then_some(sum))
     }
 
     /// As [`Recording::lidar_motion`].
@@ -410,8 +520,7 @@ impl BagScans {
         let step = self.places.len().div_ceil(most).max(1);
         let mut motions = Vec::new();
         for (place, time_s) in self.places.iter().step_by(step) {
-            let message = image::message(self.bag.as_ref(), &self.topic, place)?;
-            let scan = Scan::decode(self.bag.as_ref(), &message, &self.lidar)?;
+            let scan = self.decode(place)?;
             let (Some(radial), Some(by_vehicle)) = (&scan.radial, self.sensor_velocity(*time_s))
             else {
                 continue;
@@ -434,11 +543,21 @@ impl BagScans {
         let Some((place, _)) = self.places.first() else {
             return Ok(false);
         };
-        let message = image::message(self.bag.as_ref(), &self.topic, place)?;
-        Ok(Scan::decode(self.bag.as_ref(), &message, &self.lidar)?
-            .radial
-            .is_some())
+        Ok(self.decode(place)?.radial.is_some())
     }
+}
+
+/// The message nearest to a time, no farther than `within_s`; `places` by time.
+pub(super) fn nearest(
+    places: &[(Place, f64)],
+    time_s: f64,
+    within_s: f64,
+) -> Option<&(Place, f64)> {
+    let after = places.partition_point(|p| p.1 < time_s);
+    let around = places[after.saturating_sub(1)..].iter().take(2);
+    let apart = |p: &&(Place, f64)| (p.1 - time_s).abs();
+    let nearest = around.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    nearest.filter(|p| apart(p) <= within_s)
 }
 
 impl Recording for BagRecording {
@@ -501,7 +620,19 @@ impl Recording for BagRecording {
         let (Some(scans), Some(time_s)) = (&self.scans, frame.time_s) else {
             return Ok(None);
         };
-        Ok(scans.at(time_s)?.map(|seen| seen.depth))
+        scans.depth(time_s)
+    }
+
+    fn scan_truth(&self, frame: &Frame, kind: GtKind) -> Result<Option<ScanTruth>> {
+        if kind != GtKind::Z {
+            return Err(Error::DepthKind {
+                drive: frame.drive.clone(),
+            });
+        }
+        match (&self.scans, frame.time_s) {
+            (Some(scans), Some(time_s)) => scans.truth(time_s),
+            _ => Ok(None),
+        }
     }
 
     fn lidar_motion(&self, most: usize) -> Result<Vec<LidarMotion>> {
@@ -510,13 +641,21 @@ impl Recording for BagRecording {
             .map_or(Ok(Vec::new()), |scans| scans.motion(most))
     }
 
+    fn dynamic_agreement(&self, most: usize) -> Result<Option<DynamicAgreement>> {
+        let scans = self.scans.as_ref();
+        let scans = scans.filter(|scans| scans.dynamic.is_some());
+        scans.map_or(Ok(None), |scans| scans.agreement(most))
+    }
+
     fn moving_labels(&self, dataset: &Dataset) -> Result<Option<MovingLabels>> {
         let Some(scans) = &self.scans else {
             return Ok(None);
         };
-        if !scans.has_velocities()? {
-            return Ok(None);
-        }
+        let source = match (scans.has_velocities()?, &scans.dynamic) {
+            (true, _) => MovingSource::RadialVelocity,
+            (false, Some(_)) => MovingSource::DynamicPoints,
+            (false, None) => return Ok(None),
+        };
         let times = dataset
             .frames()
             .iter()
@@ -524,6 +663,7 @@ impl Recording for BagRecording {
         Ok(Some(MovingLabels::of_scans(
             Arc::clone(scans),
             times.collect(),
+            source,
         )))
     }
 

@@ -33,8 +33,49 @@ pub(super) struct Scan {
 pub(super) struct SeenScan {
     /// Camera z in metres, 0 = none.
     pub(super) depth: DepthMap,
-    /// Speed over ground along the LiDAR's ray, m/s, receding is positive; NaN where there is none.
-    pub(super) ground_mps: Option<Vec<f32>>,
+    /// The scan's point that a pixel's depth is of; [`SeenScan::NONE`] where there is none.
+    point: Vec<u32>,
+}
+
+impl SeenScan {
+    const NONE: u32 = u32::MAX;
+
+    /// What each pixel's point has, of one value a point of the scan; `none` where a pixel has no point.
+    pub(super) fn pixels<T: Copy>(&self, of_points: &[T], none: T) -> Vec<T> {
+        let value = |point: &u32| of_points.get(*point as usize).copied().unwrap_or(none);
+        self.point.iter().map(value).collect()
+    }
+}
+
+/// The points of a cloud alone.
+///
+/// # Errors
+/// [`Error::Bag`] for a message that is no cloud; [`Error::Topic`] without x, y and z.
+pub(super) fn points(bag: &dyn MessageSource, message: &Message<'_>) -> Result<Vec<[f32; 3]>> {
+    let cloud: PointCloud2<'_> = message.decode()?;
+    xyz(|name| column(bag, message, &cloud, name))
+}
+
+fn xyz(column: impl Fn(&str) -> Result<Vec<f32>>) -> Result<Vec<[f32; 3]>> {
+    let (x, y, z) = (column("x")?, column("y")?, column("z")?);
+    let points = x.iter().zip(&y).zip(&z).map(|((x, y), z)| [*x, *y, *z]);
+    Ok(points.collect())
+}
+
+fn column(
+    bag: &dyn MessageSource,
+    message: &Message<'_>,
+    cloud: &PointCloud2<'_>,
+    name: &str,
+) -> Result<Vec<f32>> {
+    let column = cloud.column(name).map_err(|e| Error::Topic {
+        path: bag.path().to_owned(),
+        problem: format!("{}: {e}", message.topic()),
+        remedy:
+            "lidar.velocity_field names the field of the radial velocity; x, y and z must be there"
+                .into(),
+    })?;
+    Ok(column.f32s().collect())
 }
 
 impl Scan {
@@ -47,16 +88,8 @@ impl Scan {
         lidar: &LidarConfig,
     ) -> Result<Self> {
         let cloud: PointCloud2<'_> = message.decode()?;
-        let column = |name: &str| -> Result<Vec<f32>> {
-            let column = cloud.column(name).map_err(|e| Error::Topic {
-                path: bag.path().to_owned(),
-                problem: format!("{}: {e}", message.topic()),
-                remedy: "lidar.velocity_field names the field of the radial velocity; x, y and z must be there"
-                    .into(),
-            })?;
-            Ok(column.f32s().collect())
-        };
-        let (x, y, z) = (column("x")?, column("y")?, column("z")?);
+        let column = |name: &str| column(bag, message, &cloud, name);
+        let xyz = xyz(column)?;
         let has = |name: &&str| cloud.fields.iter().any(|f| f.name == **name);
         let named = lidar.velocity_field.as_deref();
         let usual = || VELOCITY_NAMES.iter().find(|name| has(name)).copied();
@@ -68,9 +101,8 @@ impl Scan {
             Sign::Positive => 1.0,
             Sign::Negative => -1.0,
         };
-        let xyz = x.iter().zip(&y).zip(&z).map(|((x, y), z)| [*x, *y, *z]);
         Ok(Self {
-            xyz: xyz.collect(),
+            xyz,
             radial: radial.map(|r| r.into_iter().map(|v| sign * v).collect()),
         })
     }
@@ -96,16 +128,11 @@ impl Scan {
 
     /// The scan from a camera; the nearest point wins a pixel. `cam_from_lidar` is from the LiDAR at the scan's time
     /// to the camera at the frame's.
-    pub(super) fn seen(
-        &self,
-        cam_from_lidar: &Se3,
-        k: &Intrinsics,
-        ground: Option<&[f32]>,
-    ) -> SeenScan {
+    pub(super) fn seen(&self, cam_from_lidar: &Se3, k: &Intrinsics) -> SeenScan {
         let (width, height) = (k.width as usize, k.height as usize);
         let mut depth = DepthMap::empty(width, height);
-        let mut velocity = ground.map(|_| vec![f32::NAN; width * height]);
-        for (i, point) in self.xyz.iter().enumerate() {
+        let mut nearest = vec![SeenScan::NONE; width * height];
+        for (i, point) in (0_u32..).zip(&self.xyz) {
             let seen = cam_from_lidar.transform(&Vector3::from(point.map(f64::from)));
             let Some(pixel) = k.project(&seen) else {
                 continue;
@@ -118,14 +145,12 @@ impl Scan {
             let old = depth.data[at];
             if old == 0.0 || seen.z < f64::from(old) {
                 depth.data[at] = seen.z as f32;
-                if let (Some(velocity), Some(ground)) = (&mut velocity, ground) {
-                    velocity[at] = ground[i];
-                }
+                nearest[at] = i;
             }
         }
         SeenScan {
             depth,
-            ground_mps: velocity,
+            point: nearest,
         }
     }
 }

@@ -45,8 +45,15 @@ pub(crate) fn bags_in(folder: &Path) -> Result<Vec<PathBuf>> {
 /// [`Error::Bag`].
 pub(super) fn open(path: &Path) -> Result<Arc<dyn MessageSource>> {
     #[cfg(feature = "ros2")]
-    if is_ros2_bag(path) {
-        return Ok(Arc::new(deepfusion_ros2bag::Ros2Bag::open(path)?));
+    {
+        // The reader goes by the name, which a link need not have.
+        let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        if let Some(bag) = [path, real.as_path()]
+            .into_iter()
+            .find(|path| is_ros2_bag(path))
+        {
+            return Ok(Arc::new(deepfusion_ros2bag::Ros2Bag::open(bag)?));
+        }
     }
     Ok(Arc::new(Bag::open(path)?))
 }

@@ -15,6 +15,7 @@ pub(super) enum Role {
     Image,
     CameraInfo,
     Lidar,
+    Dynamic,
     Imu,
     Speed,
     Steering,
@@ -64,31 +65,27 @@ impl Topics {
             )?,
         );
         let clouds = [PointCloud2::<'_>::TYPE];
+        let lidar = search.one("lidar", &names.lidar, &clouds, |t| !is_dynamic(&t.name))?;
+        add(Role::Lidar, lidar.clone());
         add(
-            Role::Lidar,
-            search.one("lidar", &names.lidar, &clouds, |t| {
-                !t.name.to_lowercase().contains(DYNAMIC)
-            })?,
+            Role::Dynamic,
+            search.dynamic(&names.dynamic, lidar.as_deref())?,
         );
         add(
             Role::Imu,
             search.one("imu", &names.imu, &[Imu::TYPE], |_| true)?,
         );
-        add(
-            Role::Steering,
-            search.one(
-                "steering",
-                &names.steering,
-                &[AckermannDriveStamped::TYPE],
-                |_| true,
-            )?,
-        );
-        add(Role::Speed, search.speed(&names.speed)?);
-        if config.can.is_some() {
-            add(
-                Role::Can,
-                search.one("can", &names.can, &[Frame::TYPE], |_| true)?,
-            );
+        let can = config.can.as_ref();
+        let steered = can.is_some_and(|can| can.steering.is_some());
+        let driven = can.is_some_and(|can| can.speed.is_some());
+        if !search.on_can("steering", steered, &names.steering)? {
+            add(Role::Steering, search.steering(&names.steering)?);
+        }
+        if !search.on_can("speed", driven, &names.speed)? {
+            add(Role::Speed, search.speed(&names.speed)?);
+        }
+        if steered || driven {
+            add(Role::Can, Some(search.can(&names.can)?));
         }
         let truth = match &names.truth {
             Some(_) => search.one("truth", &names.truth, &[Odometry::TYPE], |_| true)?,
@@ -116,6 +113,15 @@ impl Topics {
 
 fn is_depth(name: &str) -> bool {
     name.to_lowercase().contains("depth")
+}
+
+fn is_dynamic(name: &str) -> bool {
+    name.to_lowercase().contains(DYNAMIC)
+}
+
+/// A topic's name up to its last slash.
+fn namespace(name: &str) -> &str {
+    name.rsplit_once('/').map_or("", |(space, _)| space)
 }
 
 struct Search<'a> {
@@ -171,8 +177,42 @@ impl Search<'_> {
         }
     }
 
-    /// The vehicle's speed: a TwistStamped, else steering messages with a speed, else an odometry. A bare number
-    /// must be named, since its unit must be said too.
+    /// Whether a quantity is read from CAN frames. No topic is looked for then: the values of two sources, each with its
+    /// own scale, would be read as one's.
+    fn on_can(&self, key: &str, signal: bool, named: &Option<String>) -> Result<bool> {
+        match named {
+            Some(name) if signal => Err(Error::Topic {
+                path: self.config.to_owned(),
+                problem: format!(
+                    "topics.{key} (\"{name}\") and can.{key} both say where the {key} is"
+                ),
+                remedy: format!("keep one of them: delete topics.{key} or can.{key}"),
+            }),
+            _ => Ok(signal),
+        }
+    }
+
+    /// The topic of CAN frames, without which `[can]` would silently say nothing.
+    fn can(&self, named: &Option<String>) -> Result<String> {
+        self.one("can", named, &[Frame::TYPE], |_| true)?
+            .ok_or_else(|| {
+                let problem = format!("has no topic of {}, which [can] reads", Frame::TYPE);
+                self.error(problem, || "delete [can], or record the bus".into())
+            })
+    }
+
+    /// The steering angle: a message that says so by its type. A bare number must be named.
+    fn steering(&self, named: &Option<String>) -> Result<Option<String>> {
+        let any = [AckermannDriveStamped::TYPE, Float32::TYPE, Float64::TYPE];
+        let types = match named {
+            Some(_) => &any[..],
+            None => &any[..1],
+        };
+        self.one("steering", named, types, |_| true)
+    }
+
+    /// The vehicle's speed: a TwistStamped, else an odometry, else steering messages with a speed; never two of them.
+    /// A bare number must be named, since its unit must be said too.
     fn speed(&self, named: &Option<String>) -> Result<Option<String>> {
         let any = [
             TwistStamped::TYPE,
@@ -194,6 +234,27 @@ impl Search<'_> {
             }
         }
         Ok(None)
+    }
+
+    /// The cloud of what moves: of several in the bag the one in the LiDAR's namespace. Without a LiDAR it is of no use.
+    fn dynamic(&self, named: &Option<String>, lidar: Option<&str>) -> Result<Option<String>> {
+        let clouds = [PointCloud2::<'_>::TYPE];
+        let one = |fits: &dyn Fn(&str) -> bool| {
+            self.one("dynamic", named, &clouds, |t| {
+                is_dynamic(&t.name) && Some(t.name.as_str()) != lidar && fits(&t.name)
+            })
+        };
+        let Some(space) = lidar.map(namespace) else {
+            return if named.is_some() {
+                one(&|_| true)
+            } else {
+                Ok(None)
+            };
+        };
+        match one(&|name| namespace(name) == space)? {
+            Some(beside) => Ok(Some(beside)),
+            None => one(&|_| true),
+        }
     }
 
     fn error(&self, problem: String, remedy: impl Fn() -> String) -> Error {

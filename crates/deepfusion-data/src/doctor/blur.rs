@@ -35,7 +35,8 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
         .collect();
     let share = 100.0 * blurred.len() as f64 / seen.len() as f64;
     let figure = Figure::new("blurred frames", share, "%", Limit::AtMost(MOST));
-    outcome.judge(Severity::Warning, figure, || {
+    let first = blurred.first().copied();
+    outcome.judge_at(Severity::Warning, first, figure, || {
         (
             format!(
                 "{} of {} frames have less than half the drive's usual sharpness, the first of them frame {}",

@@ -19,9 +19,9 @@ const STANDS: f64 = 0.85;
 /// A part that is this thin is the lens' shade or an encoder's rim, pixels of the small picture.
 const LEAST_DEPTH: usize = 3;
 /// Share of a side that the part may take, percent: of the bottom, where bonnets are, and of the others, where a black
-/// frame takes all, and a plain sky over houses that lie ahead a sixth.
+/// frame takes all, and a plain sky over houses that lie ahead a sixth, in four seconds of drive up to a half.
 const MOST_BOTTOM: f64 = 15.0;
-const MOST_ELSEWHERE: f64 = 50.0;
+const MOST_ELSEWHERE: f64 = 75.0;
 
 pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let Some(still) = Still::of(survey) else {

@@ -38,7 +38,8 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     }
     let share = 100.0 * repeated.len() as f64 / f64::from(compared);
     let figure = Figure::new("repeated frames", share, "%", Limit::AtMost(MOST));
-    outcome.judge(Severity::Error, figure, || {
+    let first = repeated.first().copied();
+    outcome.judge_at(Severity::Error, first, figure, || {
         (
             format!(
                 "{} of {compared} frames are the frame before once more while the vehicle moves, the first of them \

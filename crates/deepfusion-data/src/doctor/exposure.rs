@@ -35,7 +35,8 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
             "%",
             Limit::AtMost(MOST_JUMPS),
         );
-        outcome.judge(Severity::Warning, figure, || {
+        let first = jumps.first().map(|jump| jump.0);
+        outcome.judge_at(Severity::Warning, first, figure, || {
             let (number, ratio) = jumps[0];
             (
                 format!(

@@ -48,7 +48,7 @@ pub struct Finding {
     pub severity: Severity,
     /// The check that found it, such as `clock`.
     pub check: &'static str,
-    /// The number of the frame it is about, where it is about one.
+    /// The number of the frame it is about, where it is about one; the first, where it is about several.
     pub frame: Option<u64>,
     /// What was measured, where something was.
     pub figure: Option<Figure>,
@@ -128,12 +128,23 @@ impl Outcome {
         figure: Figure,
         what: impl FnOnce() -> (String, String),
     ) {
+        self.judge_at(severity, None, figure, what);
+    }
+
+    /// The same of a figure that comes from single frames: the first of them, to look at.
+    pub(crate) fn judge_at(
+        &mut self,
+        severity: Severity,
+        frame: Option<u64>,
+        figure: Figure,
+        what: impl FnOnce() -> (String, String),
+    ) {
         if !figure.holds() {
             let (what, remedy) = what();
             self.findings.push(Finding {
                 severity,
                 check: self.check,
-                frame: None,
+                frame,
                 figure: Some(figure.clone()),
                 what,
                 remedy,

@@ -14,6 +14,12 @@ const AHEAD_M: std::ops::Range<f64> = 3.0..18.0;
 const ASIDE_M: f64 = 4.0;
 const BELOW_M: std::ops::Range<f64> = 0.5..3.5;
 const LEAST_POINTS: usize = 60;
+/// How far the road has to be seen, metres along and across: what is shorter is a car's roof or bonnet as well as a road.
+const LEAST_LENGTH_M: f64 = 5.0;
+const LEAST_WIDTH_M: f64 = 2.5;
+/// Frames that have to show it, and by how much their angles may scatter about the median, as a share of the limit.
+const LEAST_PLANES: usize = 4;
+const MOST_SCATTER: f64 = 0.5;
 /// Roughness of a road and noise of a scan, metres.
 const NOISE_M: f64 = 0.04;
 const ROUNDS: usize = 10;
@@ -52,27 +58,40 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     }
     // What is turned by more is a wall or a car, not the road: a LiDAR that looks ahead sees little of that.
     planes.retain(|(n, _)| n.angle(&up).to_degrees() <= MOST_TILT_DEG);
-    if planes.is_empty() {
-        return Outcome::skipped(
-            "ground",
-            "no measured depth shows the road before the camera",
+    if planes.len() < LEAST_PLANES {
+        let why = format!(
+            "the measured depth of {} frames shows the road before the camera, {LEAST_PLANES} are needed",
+            planes.len()
         );
+        return Outcome::skipped("ground", why);
     }
     // Up by the road, turned into the mount's: about the camera's x and z.
     let pitch = |(n, _): &(Vector3<f64>, f64)| up.cross(n).x.asin().to_degrees();
     let roll = |(n, _): &(Vector3<f64>, f64)| up.cross(n).z.asin().to_degrees();
+    // Road, kerb and what stands on it do not lie alike from frame to frame; a mount that is off always is by as much.
+    let pitches = Angle::of(planes.iter().map(pitch).collect());
+    let rolls = Angle::of(planes.iter().map(roll).collect());
+    if pitches.scatter > MOST_SCATTER * MOST_PITCH_DEG
+        || rolls.scatter > MOST_SCATTER * MOST_ROLL_DEG
+    {
+        let why = format!(
+            "the planes before the camera differ between frames (pitch by {:.1} degrees, roll by {:.1}): not the road alone",
+            pitches.scatter, rolls.scatter
+        );
+        return Outcome::skipped("ground", why);
+    }
     let height = median(planes.iter().map(|p| p.1).collect());
     let mut outcome = Outcome::new("ground");
     let angles = [
         (
             "pitch of the road against the mount",
-            median(planes.iter().map(pitch).collect()),
+            pitches.median,
             "pitch",
             MOST_PITCH_DEG,
         ),
         (
             "roll of the road against the mount",
-            median(planes.iter().map(roll).collect()),
+            rolls.median,
             "roll",
             MOST_ROLL_DEG,
         ),
@@ -99,6 +118,24 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
         )
     });
     outcome
+}
+
+/// An angle over the frames, degrees.
+struct Angle {
+    median: f64,
+    /// Median distance from it.
+    scatter: f64,
+}
+
+impl Angle {
+    fn of(angles: Vec<f64>) -> Self {
+        let middle = median(angles.clone());
+        let scatter = median(angles.iter().map(|a| (a - middle).abs()).collect());
+        Self {
+            median: middle,
+            scatter,
+        }
+    }
 }
 
 /// The measured points, in the camera's axes, metres.
@@ -140,10 +177,23 @@ fn plane(points: &[Vector3<f64>], up: &Vector3<f64>) -> Option<(Vector3<f64>, f6
         plane = m.try_inverse()? * y;
     }
     let height = 1.0 / plane.norm();
-    let inside = near
+    let inside: Vec<_> = near
         .iter()
-        .filter(|p| ((plane.dot(p) + 1.0) * height).abs() < 3.0 * NOISE_M);
-    (inside.count() > LEAST_POINTS / 2).then(|| (plane * height, height))
+        .filter(|p| ((plane.dot(p) + 1.0) * height).abs() < 3.0 * NOISE_M)
+        .collect();
+    let long = inner_range(inside.iter().map(|p| p.z).collect()) >= LEAST_LENGTH_M;
+    let wide = inner_range(inside.iter().map(|p| p.x).collect()) >= LEAST_WIDTH_M;
+    (inside.len() > LEAST_POINTS / 2 && long && wide).then(|| (plane * height, height))
+}
+
+/// Where the middle nine tenths lie.
+fn inner_range(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let at = |share: f64| values[((values.len() - 1) as f64 * share) as usize];
+    match values.is_empty() {
+        true => 0.0,
+        false => at(0.95) - at(0.05),
+    }
 }
 
 #[cfg(test)]
@@ -175,5 +225,10 @@ mod tests {
             .map(|i| Vector3::new(0.0, -f64::from(i) * 0.01, 8.0))
             .collect();
         assert!(plane(&wall, &-Vector3::y()).is_none());
+        // A roof is as flat as a road, and short.
+        let roof: Vec<_> = (0..500)
+            .map(|i| Vector3::new(f64::from(i % 20) * 0.08, 1.0, 9.0 + f64::from(i / 20) * 0.1))
+            .collect();
+        assert!(plane(&roof, &-Vector3::y()).is_none());
     }
 }

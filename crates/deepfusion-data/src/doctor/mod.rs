@@ -8,6 +8,7 @@ mod blur;
 mod bonnet;
 mod clock;
 mod duplicates;
+mod dynamic_points;
 mod epipolar;
 mod exposure;
 mod finding;
@@ -130,6 +131,7 @@ pub fn examine(dataset: &Dataset) -> DriveDiagnosis {
         standing::check(dataset),
         speed::check(dataset),
         lidar_speed::check(dataset),
+        dynamic_points::check(dataset),
         clock::check(&survey, &pairs),
         turn::check(&pairs),
         heading::check(&survey, &pairs),

@@ -48,8 +48,9 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     let first = steps.iter().find(|(_, apart, n)| lost_in(*apart, *n) > 0.0);
     let share = 100.0 * lost / (lost + frames.len() as f64);
     let figure = Figure::new("lost frames", share, "%", Limit::AtMost(MOST_LOST));
-    outcome.judge(Severity::Warning, figure, || {
-        let at = first.map_or(0, |(number, _, _)| *number);
+    let first = first.map(|(number, _, _)| *number);
+    outcome.judge_at(Severity::Warning, first, figure, || {
+        let at = first.unwrap_or(0);
         (
             format!(
                 "{lost:.0} frames are missing at {:.1} frames a second, the first before frame {at}: pairs across \

@@ -4,7 +4,10 @@ use serde::{Deserialize, Serialize};
 
 /// What a frame is known by on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "id must be a number for 11 bits, or { extended = … } for 29"
+)]
 pub enum CanId {
     /// 11 bits.
     Standard(u16),

@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 /// What can be wrong within a message.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -60,7 +62,7 @@ pub enum MessageError {
         /// The image's.
         encoding: String,
         /// Those that would do.
-        expected: &'static str,
+        expected: Cow<'static, str>,
     },
 }
 
@@ -91,8 +93,10 @@ impl MessageError {
             Self::Datatype { .. } | Self::Layout { .. } => {
                 "the driver that made the message describes it wrongly"
             }
-            Self::Encoding { .. } => {
-                "convert the topic (image_proc makes colour images of Bayer patterns)"
+            Self::Encoding { expected, .. } => {
+                return Some(format!(
+                    "convert the topic, with image_proc or cv_bridge, to one of {expected}"
+                ));
             }
         };
         Some(text.to_owned())

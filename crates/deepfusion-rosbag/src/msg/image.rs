@@ -1,6 +1,13 @@
 //! An image's pixels, by its encoding and step.
 
-use super::{Image, MessageError};
+use super::{Image, MessageError, bayer, yuv};
+use std::borrow::Cow;
+
+/// What [`Image::to_rgb8`] reads.
+const PICTURES: &str = "mono8, 8UC1, mono16, rgb8, bgr8, 8UC3, rgba8, bgra8, 8UC4, bayer_rggb8, bayer_bggr8, bayer_gbrg8, bayer_grbg8, \
+     yuv422, uyvy, yuv422_yuy2, yuyv";
+/// What is known beside [`PICTURES`].
+const NUMBERS: &str = "16UC1, 32FC1, bayer_rggb16, bayer_bggr16, bayer_gbrg16, bayer_grbg16";
 
 /// The order of a sensor's colour filters: the first row's two, then the second's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -25,14 +32,20 @@ pub enum Encoding {
     Rgba8,
     /// `bgra8`, `8UC4`.
     Bgra8,
-    /// `mono16`, `16UC1`: brightness, or depth in millimetres.
+    /// `mono16`: brightness over the whole range of 16 bits.
     Mono16,
+    /// `16UC1`: any number, mostly depth in millimetres, which is no picture.
+    U16,
     /// `32FC1`: depth in metres.
     Float32,
     /// `bayer_rggb8` and its kin: one colour a pixel, to be interpolated before use.
     Bayer8(BayerPattern),
     /// `bayer_rggb16` and its kin.
     Bayer16(BayerPattern),
+    /// `yuv422`, `uyvy`: brightness and, of every two pixels, a colour, in the order U, Y, V, Y.
+    Uyvy,
+    /// `yuv422_yuy2`, `yuyv`: the same in the order Y, U, Y, V.
+    Yuyv,
 }
 
 impl Encoding {
@@ -59,8 +72,11 @@ impl Encoding {
             "bgr8" | "8UC3" => Self::Bgr8,
             "rgba8" => Self::Rgba8,
             "bgra8" | "8UC4" => Self::Bgra8,
-            "mono16" | "16UC1" => Self::Mono16,
+            "mono16" => Self::Mono16,
+            "16UC1" => Self::U16,
             "32FC1" => Self::Float32,
+            "yuv422" | "uyvy" => Self::Uyvy,
+            "yuv422_yuy2" | "yuyv" => Self::Yuyv,
             _ => return None,
         })
     }
@@ -70,7 +86,7 @@ impl Encoding {
     pub fn pixel_bytes(self) -> usize {
         match self {
             Self::Mono8 | Self::Bayer8(_) => 1,
-            Self::Mono16 | Self::Bayer16(_) => 2,
+            Self::Mono16 | Self::U16 | Self::Bayer16(_) | Self::Uyvy | Self::Yuyv => 2,
             Self::Rgb8 | Self::Bgr8 => 3,
             Self::Rgba8 | Self::Bgra8 | Self::Float32 => 4,
         }
@@ -83,11 +99,8 @@ impl Image<'_> {
     /// # Errors
     /// [`MessageError::Encoding`] for one that is not known here.
     pub fn pixel_encoding(&self) -> Result<Encoding, MessageError> {
-        Encoding::from_name(&self.encoding).ok_or_else(|| {
-            self.wrong_encoding(
-                "mono8, rgb8, bgr8, rgba8, bgra8, mono16, 16UC1, 32FC1 or a Bayer pattern",
-            )
-        })
+        Encoding::from_name(&self.encoding)
+            .ok_or_else(|| self.wrong_encoding(format!("{PICTURES}, {NUMBERS}")))
     }
 
     /// Its rows from top to bottom, each `width` pixels without the padding behind them.
@@ -101,12 +114,8 @@ impl Image<'_> {
             width.saturating_mul(self.pixel_encoding()?.pixel_bytes()),
             self.step as usize,
         );
-        let wrong = |problem| MessageError::Layout {
-            what: format!("image of {width}x{height} {}", self.encoding),
-            problem,
-        };
         if height > 0 && row > step {
-            return Err(wrong(format!(
+            return Err(self.wrong_layout(format!(
                 "a row of {row} bytes does not fit into a step of {step}"
             )));
         }
@@ -116,7 +125,7 @@ impl Image<'_> {
             .saturating_mul(step)
             .saturating_add(row);
         if height > 0 && needed > self.data.len() {
-            return Err(wrong(format!(
+            return Err(self.wrong_layout(format!(
                 "{needed} bytes needed, there are {}",
                 self.data.len()
             )));
@@ -132,8 +141,8 @@ impl Image<'_> {
     /// # Errors
     /// As [`Image::rows`]; [`MessageError::Encoding`] for other encodings.
     pub fn u16s(&self) -> Result<impl Iterator<Item = u16>, MessageError> {
-        if self.pixel_encoding()? != Encoding::Mono16 {
-            return Err(self.wrong_encoding("mono16 or 16UC1"));
+        if !matches!(self.pixel_encoding()?, Encoding::Mono16 | Encoding::U16) {
+            return Err(self.wrong_encoding("mono16, 16UC1"));
         }
         let big = self.is_bigendian != 0;
         let number = move |bytes: &[u8; 2]| {
@@ -165,42 +174,71 @@ impl Image<'_> {
         Ok(self.rows()?.flat_map(|row| row.as_chunks().0).map(number))
     }
 
-    /// The picture as RGB, `height` × `width` × 3, without padding; alpha is dropped, brightness becomes grey.
+    /// The picture as RGB, `height` × `width` × 3, without padding; alpha is dropped, brightness becomes grey, 16 bits of it are
+    /// scaled by 255 / 65535. Bayer patterns are interpolated bilinearly, and YUV is BT.601 in its limited range, as cv_bridge has both.
     ///
     /// # Errors
-    /// As [`Image::rows`]; [`MessageError::Encoding`] for Bayer patterns and wider pixels, which say no colour yet.
+    /// As [`Image::rows`]; [`MessageError::Encoding`] for wider pixels, which are no picture or none that is read yet;
+    /// [`MessageError::Layout`] for a Bayer pattern below 2 × 2 and for YUV of an odd width.
     pub fn to_rgb8(&self) -> Result<Vec<u8>, MessageError> {
-        let encoding = self.pixel_encoding()?;
-        let rows = self.rows()?;
-        let mut rgb = Vec::with_capacity(self.data.len() / encoding.pixel_bytes() * 3);
-        for row in rows {
-            match encoding {
-                Encoding::Rgb8 => rgb.extend_from_slice(row),
-                Encoding::Mono8 => rgb.extend(row.iter().flat_map(|&grey| [grey; 3])),
-                Encoding::Bgr8 => {
-                    rgb.extend(row.as_chunks().0.iter().flat_map(|&[b, g, r]| [r, g, b]))
-                }
-                Encoding::Rgba8 => {
-                    rgb.extend(row.as_chunks().0.iter().flat_map(|&[r, g, b, _]| [r, g, b]))
-                }
-                Encoding::Bgra8 => {
-                    rgb.extend(row.as_chunks().0.iter().flat_map(|&[b, g, r, _]| [r, g, b]))
-                }
-                Encoding::Mono16
-                | Encoding::Float32
-                | Encoding::Bayer8(_)
-                | Encoding::Bayer16(_) => {
-                    return Err(self.wrong_encoding("mono8, rgb8, bgr8, rgba8 or bgra8"));
-                }
+        let Some(encoding) = Encoding::from_name(&self.encoding) else {
+            return Err(self.wrong_encoding(PICTURES));
+        };
+        match encoding {
+            Encoding::Rgb8 => self.each_pixel(|rgb: &[u8; 3]| *rgb),
+            Encoding::Bgr8 => self.each_pixel(|&[b, g, r]| [r, g, b]),
+            Encoding::Rgba8 => self.each_pixel(|&[r, g, b, _]| [r, g, b]),
+            Encoding::Bgra8 => self.each_pixel(|&[b, g, r, _]| [r, g, b]),
+            Encoding::Mono8 => self.each_pixel(|&[grey]| [grey; 3]),
+            // 65535 is 257 · 255; half of 257 rounds to the nearest.
+            Encoding::Mono16 => {
+                let grey = |wide: u16| ((u32::from(wide) + 128) / 257) as u8;
+                Ok(self.u16s()?.flat_map(|wide| [grey(wide); 3]).collect())
             }
+            Encoding::Bayer8(pattern) => {
+                let rows: Vec<&[u8]> = self.rows()?.collect();
+                if rows.is_empty() {
+                    return Ok(Vec::new());
+                }
+                let rgb = bayer::to_rgb8(&rows, pattern);
+                rgb.ok_or_else(|| {
+                    self.wrong_layout("a Bayer pattern has two rows and columns or more")
+                })
+            }
+            Encoding::Uyvy | Encoding::Yuyv if self.width % 2 == 1 => {
+                Err(self.wrong_layout("two pixels share a colour, so the width must be even"))
+            }
+            Encoding::Uyvy => self.each_pixel(|&[u, y0, v, y1]| yuv::pair([y0, y1], u, v)),
+            Encoding::Yuyv => self.each_pixel(|&[y0, u, y1, v]| yuv::pair([y0, y1], u, v)),
+            Encoding::U16 | Encoding::Float32 | Encoding::Bayer16(_) => {
+                Err(self.wrong_encoding(PICTURES))
+            }
+        }
+    }
+
+    /// `change` of every `N` bytes of every row, one after the other.
+    fn each_pixel<const N: usize, const M: usize>(
+        &self,
+        change: impl Fn(&[u8; N]) -> [u8; M],
+    ) -> Result<Vec<u8>, MessageError> {
+        let mut rgb = Vec::with_capacity(self.data.len() / N * M);
+        for row in self.rows()? {
+            rgb.extend(row.as_chunks().0.iter().flat_map(&change));
         }
         Ok(rgb)
     }
 
-    fn wrong_encoding(&self, expected: &'static str) -> MessageError {
+    fn wrong_encoding(&self, expected: impl Into<Cow<'static, str>>) -> MessageError {
         MessageError::Encoding {
             encoding: self.encoding.clone(),
-            expected,
+            expected: expected.into(),
+        }
+    }
+
+    fn wrong_layout(&self, problem: impl Into<String>) -> MessageError {
+        MessageError::Layout {
+            what: format!("image of {}x{} {}", self.width, self.height, self.encoding),
+            problem: problem.into(),
         }
     }
 }
@@ -209,7 +247,6 @@ impl Image<'_> {
 mod tests {
     use super::*;
     use crate::msg::Header;
-    use std::borrow::Cow;
 
     fn image<'a>(encoding: &str, width: u32, height: u32, step: u32, data: &'a [u8]) -> Image<'a> {
         Image {
@@ -262,10 +299,56 @@ mod tests {
             Some(Encoding::Bayer8(BayerPattern::Grbg))
         );
         assert_eq!(Encoding::from_name("bayer_ééé"), None);
-        for encoding in ["bayer_rggb8", "16UC1", "yuv422"] {
+        for encoding in ["bayer_rggb16", "16UC1", "32FC1", "nv12", ""] {
             let error = image(encoding, 1, 1, 4, &[0; 4]).to_rgb8().unwrap_err();
             assert!(error.to_string().contains(encoding), "{error}");
-            assert!(error.hint().is_some());
+            assert!(error.hint().is_some_and(|hint| hint.contains(PICTURES)));
+        }
+    }
+
+    /// What the hint says is read, is; what it does not, is not.
+    #[test]
+    fn the_list_of_what_is_read_is_true() {
+        let names = |list: &'static str| list.split(',').map(str::trim);
+        for name in names(PICTURES) {
+            let rgb = image(name, 2, 2, 8, &[0; 16]).to_rgb8();
+            assert_eq!(rgb.map(|rgb| rgb.len()), Ok(12), "{name}");
+        }
+        for name in names(NUMBERS) {
+            let wide = image(name, 2, 2, 8, &[0; 16]);
+            assert!(wide.pixel_encoding().is_ok(), "{name}");
+            assert!(wide.to_rgb8().is_err(), "{name}");
+        }
+    }
+
+    #[test]
+    fn sizes_that_a_pattern_cannot_have_are_errors() {
+        let problem = |encoding, width, height| {
+            let error = image(encoding, width, height, 8, &[0; 32]).to_rgb8();
+            error.unwrap_err().to_string()
+        };
+        for (width, height) in [(1, 4), (4, 1), (1, 1)] {
+            let text = problem("bayer_gbrg8", width, height);
+            assert!(
+                text.contains("two rows") && text.contains("bayer_gbrg8"),
+                "{text}"
+            );
+        }
+        assert!(problem("bayer_gbrg8", 9, 2).contains("step of 8"));
+        assert!(problem("bayer_gbrg8", 8, 5).contains("40 bytes needed, there are 32"));
+        for encoding in ["yuv422", "yuv422_yuy2"] {
+            assert!(problem(encoding, 3, 2).contains("3x2"), "{encoding}");
+            assert!(problem(encoding, 3, 2).contains("even"), "{encoding}");
+            assert!(problem(encoding, 6, 2).contains("step of 8"), "{encoding}");
+        }
+        assert!(problem("mono16", 5, 2).contains("step of 8"));
+        for encoding in ["bayer_rggb8", "yuv422", "mono16"] {
+            assert_eq!(image(encoding, 0, u32::MAX, 0, &[]).to_rgb8(), Ok(vec![]));
+            assert!(
+                image(encoding, u32::MAX - 1, u32::MAX, u32::MAX, &[0; 8])
+                    .to_rgb8()
+                    .is_err()
+            );
         }
     }
 
@@ -286,5 +369,18 @@ mod tests {
         assert!(rows(3, 2, 6).unwrap_err().to_string().contains("step of 6"));
         assert!(rows(u32::MAX, u32::MAX, u32::MAX).is_err());
         assert_eq!(rows(0, u32::MAX, 0), Ok(0));
+    }
+
+    proptest::proptest! {
+        /// Whatever a driver claims, there are all of the pixels or an error.
+        #[test]
+        fn no_claim_panics(number in 0usize..40, width in 0..12u32, height in 0..12u32, step in 0..40u32, data in proptest::collection::vec(0..=255u8, 0..300), big in 0..2u8) {
+            let names: Vec<&str> = PICTURES.split(',').chain(NUMBERS.split(',')).collect();
+            let name = names[number % names.len()].trim();
+            let picture = Image { is_bigendian: big, ..image(name, width, height, step, &data) };
+            if let Ok(rgb) = picture.to_rgb8() {
+                proptest::prop_assert_eq!(rgb.len(), (width * height * 3) as usize);
+            }
+        }
     }
 }

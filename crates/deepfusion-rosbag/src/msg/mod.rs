@@ -5,6 +5,7 @@
 //! implementation. Pixels and points are borrowed from the bag; everything else is owned.
 
 mod ackermann_msgs;
+mod bayer;
 mod can_msgs;
 mod cloud;
 mod definition;
@@ -15,6 +16,7 @@ mod nav_msgs;
 mod sensor_msgs;
 mod std_msgs;
 pub(crate) mod wire;
+mod yuv;
 
 pub use ackermann_msgs::{AckermannDrive, AckermannDriveStamped};
 pub use can_msgs::Frame;

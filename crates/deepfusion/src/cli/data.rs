@@ -73,7 +73,8 @@ pub struct ConvertArgs {
 #[derive(Debug, Args)]
 #[command(
     after_help = "One H×W array of f32 metres a frame, 0 = none, named 0000000005, or <drive>/0000000005 where \
-    several drives are given.\n\n\
+    several drives are given. Where the LiDAR measured radial velocities, velocity_mps/0000000005 beside it: m/s over \
+    ground along the ray, receding is positive, NaN = none.\n\n\
     Example:\n  deepfusion data export-gt kitti --split eigen/test_files.txt --out gt.npz"
 )]
 pub struct ExportGtArgs {

@@ -13,8 +13,8 @@ pub struct PredictionArgs {
     /// A run folder or a checkpoint in it.
     #[arg(long, value_name = "RUN")]
     pub model: PathBuf,
-    /// Images, folders of images, globs, or recordings: a KITTI drive, a bag, a video, a folder with dataset.toml. Of
-    /// recordings the camera is known, and lenses are undone. Or one live source.
+    /// Images, folders of images, globs, or recordings: a KITTI drive, a bag, a video, an RGB-D folder, a folder with
+    /// dataset.toml. Of recordings the camera is known, and lenses are undone. Or one live source.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<String>,
     /// The camera, in pixels of the input images.

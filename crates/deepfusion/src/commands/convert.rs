@@ -1,5 +1,7 @@
+use std::path::Path;
+
 use anyhow::Result;
-use deepfusion_data::{convert_to_bag, convert_to_kitti};
+use deepfusion_data::{Dataset, convert_to_bag, convert_to_kitti};
 
 use super::evaluate::open_with_camera;
 use crate::cli::ConvertArgs;
@@ -9,15 +11,17 @@ use crate::progress::{Progress, say};
 
 /// `deepfusion data convert`.
 pub fn run(args: &ConvertArgs) -> Result<()> {
+    let ends_in = |ending: &str| has_ending(&args.out, ending);
+    // It would become a folder of that name, and nobody who names a bag wants one.
+    if ends_in("mcap") || ends_in("db3") {
+        let path = args.out.clone();
+        return Err(CliError::NoRos2Writer { path }.into());
+    }
     let input = std::slice::from_ref(&args.input);
     let datasets = open_with_camera(input, None, args.camera, args.intrinsics)?;
     let mut progress = Progress::new("converting");
     let mut report = |done, total| progress.set(done, total);
-    let to_bag = args
-        .out
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("bag"));
-    let written = if to_bag {
+    let written = if ends_in("bag") {
         let [dataset] = datasets.as_slice() else {
             let drives = datasets.len();
             let input = args.input.clone();
@@ -29,6 +33,7 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
         convert_to_kitti(&datasets, &args.out, &mut report)?
     };
     drop(progress);
+    datasets.iter().for_each(tell_missing);
     let frames: usize = datasets.iter().map(|d| d.frames().len()).sum();
     if args.json {
         return output::print_json(&serde_json::json!({ "written": written, "frames": frames }));
@@ -38,4 +43,24 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
         output::print(&format!("{}\n", path.display()))?;
     }
     Ok(())
+}
+
+fn has_ending(path: &Path, ending: &str) -> bool {
+    let found = path.extension();
+    found.is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}
+
+/// Warns of what the recording does not have, and so what was written has not either.
+fn tell_missing(dataset: &Dataset) {
+    let timed = dataset.frames().iter().any(|f| f.time_s.is_some());
+    let missing = match (timed, dataset.track().is_some()) {
+        (true, true) => return,
+        (true, false) => "no speeds",
+        (false, true) => "no times",
+        (false, false) => "no times and no speeds",
+    };
+    tracing::warn!(
+        "{}: {missing}, so none were written: evaluate and predict on it, training needs both",
+        dataset.name()
+    );
 }

@@ -11,9 +11,10 @@ use deepfusion_eval::{
 };
 use deepfusion_geometry::DepthMap;
 
+use super::remarks;
 use crate::cli::CameraIntrinsics;
 
-/// Opens the recordings at several paths, each drive and camera a data set.
+/// Opens the recordings at several paths, each drive and camera a data set, and tells what was noticed.
 pub fn open_datasets(
     paths: &[PathBuf],
     split: Option<&Path>,
@@ -38,6 +39,7 @@ pub fn open_with_camera(
     for path in paths {
         datasets.extend(Dataset::open(path, &options)?);
     }
+    remarks::tell(&datasets);
     Ok(datasets)
 }
 

@@ -20,6 +20,7 @@ mod overview;
 mod perceive;
 mod predict;
 mod recorder;
+mod remarks;
 mod run_report;
 mod scene;
 mod simulate;

@@ -21,6 +21,7 @@ use serde::Serialize;
 use self::labels::Labels;
 use self::object_frames::ObjectFrame;
 use super::perceive::read_config;
+use super::remarks;
 use super::scene::{MotionTracker, working_depth};
 use crate::cli::{EvalTargetsArgs, TargetDepth};
 use crate::error::CliError;
@@ -141,7 +142,9 @@ pub fn run(args: &EvalTargetsArgs) -> Result<()> {
             work.object_frames(path)?;
             continue;
         }
-        for dataset in Dataset::open(path, &OpenOptions::default())? {
+        let datasets = Dataset::open(path, &OpenOptions::default())?;
+        remarks::tell(&datasets);
+        for dataset in datasets {
             work.drive(&Arc::new(dataset))?;
         }
     }

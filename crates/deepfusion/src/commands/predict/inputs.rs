@@ -5,8 +5,9 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Result;
-use deepfusion_data::{Dataset, OpenOptions};
+use deepfusion_data::{Dataset, DatasetKind, OpenOptions};
 
+use crate::commands::remarks;
 use crate::error::CliError;
 
 /// The endings of images.
@@ -36,8 +37,8 @@ const RECORDINGS: [&str; 8] = ["bag", "mcap", "db3", "mp4", "mkv", "mov", "avi",
 /// recordings in their order. Neither order nor names depend on the order of the arguments, so that shards started
 /// apart agree on both.
 ///
-/// A folder with images in it (and no `dataset.toml`) is a folder of images; any other that [`Dataset::open`] takes is
-/// a recording, whose cameras are `options`' and its own.
+/// A folder with images in it (neither `dataset.toml` nor depth beside colour) is a folder of images; any other that
+/// [`Dataset::open`] takes is a recording, whose cameras are `options`' and its own.
 pub fn find(arguments: &[String], options: &OpenOptions) -> Result<Vec<Input>> {
     let mut found = Vec::new();
     let mut recordings = Vec::new();
@@ -48,7 +49,7 @@ pub fn find(arguments: &[String], options: &OpenOptions) -> Result<Vec<Input>> {
                 std::fs::read_dir(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
             let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
             let images: Vec<_> = paths.filter(|p| is_image(p)).collect();
-            if images.is_empty() || path.join("dataset.toml").exists() {
+            if images.is_empty() || path.join("dataset.toml").exists() || is_rgbd(&path) {
                 recordings.extend(open(&path, argument, options)?);
             } else {
                 found.extend(images);
@@ -63,17 +64,27 @@ pub fn find(arguments: &[String], options: &OpenOptions) -> Result<Vec<Input>> {
             found.extend(images_among(paths, argument)?);
         }
     }
+    remarks::tell(&recordings);
     let mut inputs = named(found);
     let used: HashSet<String> = inputs.iter().map(|i| i.name.to_lowercase()).collect();
     inputs.extend(frames_of(recordings, &used));
     Ok(inputs)
 }
 
+/// Whether the images of a folder are colour and depth, of which only the colour is to be looked at.
+fn is_rgbd(folder: &Path) -> bool {
+    // What is wrong with the folder as a recording says nothing of its images.
+    Dataset::kind_at(folder).is_ok_and(|kind| kind == DatasetKind::RgbD)
+}
+
 /// Opens a recording; that it is none is an error that names the argument.
 fn open(path: &Path, argument: &str, options: &OpenOptions) -> Result<Vec<Dataset>> {
     match Dataset::open(path, options) {
         Ok(datasets) => Ok(datasets),
-        Err(deepfusion_data::Error::UnknownLayout { .. }) if path.is_dir() => {
+        // A folder of ROS 2 bags has a remedy of its own.
+        Err(deepfusion_data::Error::UnknownLayout { found, .. })
+            if path.is_dir() && !found.contains("ROS 2") =>
+        {
             let input = argument.to_owned();
             Err(CliError::NoImages { input }.into())
         }

@@ -1,0 +1,366 @@
+//! Which of a bag's sources drives, and the files beside a bag.
+
+#[path = "common/bag.rs"]
+mod bag;
+
+use bag::{CAMERA, TinyBag};
+use deepfusion_data::{Dataset, Error, OpenOptions, inspect};
+use deepfusion_rosbag::msg::Frame;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// Speed in 0.01 km/h on frame 0x158, bytes 0 and 1; angle in 0.1° on frame 0x25.
+const DBC: &str = "VERSION \"\"\n\nBU_: ECU\n\n\
+    BO_ 344 WHEELS: 8 ECU\n SG_ SPEED : 7|16@0+ (0.01,0) [0|250] \"km/h\" ECU\n\n\
+    BO_ 37 STEERING: 8 ECU\n SG_ ANGLE : 7|16@0- (0.1,0) [-500|500] \"deg\" ECU\n";
+const BY_DBC: &str = "[can]\ndbc = \"vehicle.dbc\"\nspeed = \"WHEELS.SPEED\"\n";
+/// The same signal without the file.
+const INLINE: &str = "[can]\nspeed_unit = \"km/h\"\n\
+    speed = { id = 0x158, layout = { start_bit = 7, length = 16, byte_order = \"motorola\", scale = 0.01 } }\n";
+const INLINE_STEERING: &str = "[vehicle]\nwheelbase_m = 2.5\n[can]\nsteering_rad = 0.0174533\n\
+    steering = { id = 0x25, layout = { start_bit = 7, length = 16, byte_order = \"motorola\", number = \"signed\", scale = 0.1 } }\n";
+
+/// A frame of a number in its first two bytes, high byte first.
+fn frame(id: u32, raw: i16) -> Frame {
+    let [high, low] = raw.to_be_bytes();
+    Frame {
+        id,
+        dlc: 8,
+        data: [high, low, 0, 0, 0, 0, 0, 0],
+        ..Frame::default()
+    }
+}
+
+/// 10 m/s on the bus, of 3600 steps of 0.01 km/h.
+fn ten_mps() -> Frame {
+    frame(0x158, 3600)
+}
+
+/// A bag `drive.bag` in a folder of its own, and its file.
+struct Drive {
+    folder: TempDir,
+    bag: PathBuf,
+}
+
+impl Drive {
+    fn new(sidecar: &str, fill: impl FnOnce(&mut TinyBag)) -> Self {
+        Self::on("/camera/image", &format!("{CAMERA}{sidecar}"), fill)
+    }
+
+    fn on(image: &str, sidecar: &str, fill: impl FnOnce(&mut TinyBag)) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("drive.bag");
+        let mut bag = TinyBag::new(&path, image);
+        fill(&mut bag);
+        bag.finish();
+        fs::write(folder.path().join("vehicle.dbc"), DBC).unwrap();
+        fs::write(folder.path().join("drive.toml"), sidecar).unwrap();
+        Self { folder, bag: path }
+    }
+
+    fn speed(&self) -> f64 {
+        open(&self.bag).unwrap().frames()[12].speed_mps.unwrap()
+    }
+
+    /// Over half a second.
+    fn turn_rad(&self) -> f64 {
+        let dataset = open(&self.bag).unwrap();
+        let track = dataset.track().unwrap();
+        track.motion(0.2, 0.7).unwrap().yaw_rad
+    }
+
+    fn refusal(&self) -> String {
+        let error = open(&self.bag).unwrap_err();
+        format!("{error}\nhint: {}", error.hint().unwrap_or_default())
+    }
+}
+
+fn open(bag: &Path) -> Result<Dataset, Error> {
+    Ok(Dataset::open(bag, &OpenOptions::default())?.remove(0))
+}
+
+fn near(found: f64, expected: f64) {
+    assert!((found - expected).abs() < 1e-3, "{found}, not {expected}");
+}
+
+fn says(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "`{part}` is not in: {text}");
+    }
+}
+
+#[test]
+fn a_speed_on_the_bus_is_not_mixed_with_a_topics() {
+    for sidecar in [BY_DBC, INLINE] {
+        let drive = Drive::new(sidecar, |bag| {
+            bag.can("/can", &ten_mps()).twist("/twist", 5.0);
+            bag.odometry("/odom", 5.0).ackermann("/drive", 5.0, 0.0);
+        });
+        near(drive.speed(), 10.0);
+    }
+}
+
+#[test]
+fn requests_and_error_frames_carry_no_speed() {
+    let drive = Drive::new(INLINE, |bag| {
+        let zero = frame(0x158, 0);
+        let rtr = Frame {
+            is_rtr: true,
+            ..zero.clone()
+        };
+        let error = Frame {
+            is_error: true,
+            ..zero.clone()
+        };
+        // Of 29 bits, another frame with the same number.
+        let extended = Frame {
+            is_extended: true,
+            ..zero
+        };
+        bag.can("/can", &ten_mps());
+        bag.can("/can", &rtr)
+            .can("/can", &error)
+            .can("/can", &extended);
+    });
+    near(drive.speed(), 10.0);
+}
+
+#[test]
+fn an_extended_frame_is_told_by_its_own_identifier() {
+    let sidecar = INLINE.replace("id = 0x158", "id = { extended = 0x18fef100 }");
+    let drive = Drive::new(&sidecar, |bag| {
+        let extended = Frame {
+            is_extended: true,
+            ..frame(0x18fe_f100, 3600)
+        };
+        bag.can("/can", &extended).can("/can", &frame(0x158, 720));
+    });
+    near(drive.speed(), 10.0);
+}
+
+#[test]
+fn a_topic_and_a_signal_of_one_quantity_are_refused() {
+    for (key, sidecar) in [("speed", INLINE), ("steering", INLINE_STEERING)] {
+        let named = format!("{sidecar}[topics]\n{key} = \"/drive\"\n");
+        let drive = Drive::new(&named, |bag| {
+            bag.can("/can", &ten_mps()).ackermann("/drive", 5.0, 0.1);
+        });
+        let (topic, signal) = (format!("topics.{key}"), format!("can.{key}"));
+        says(
+            &drive.refusal(),
+            &["drive.toml", "/drive", &topic, &signal, "keep one of them"],
+        );
+    }
+}
+
+#[test]
+fn steering_on_the_bus_is_not_mixed_with_a_topics() {
+    // 5.73° on the bus to the left, the topic's wheels to the right.
+    let drive = Drive::new(INLINE_STEERING, |bag| {
+        bag.can("/can", &frame(0x25, 57)).twist("/twist", 10.0);
+        bag.ackermann("/drive", 5.0, -0.2);
+    });
+    let yaw_rate = 10.0 * (57.0 * 0.1 * 0.0174533_f64).tan() / 2.5;
+    near(drive.turn_rad(), 0.5 * yaw_rate);
+    // The other quantity of the same message stays its own.
+    near(drive.speed(), 10.0);
+}
+
+#[test]
+fn one_topic_is_chosen_by_its_type() {
+    let drive = Drive::new("", |bag| {
+        bag.ackermann("/drive", 3.0, 0.0).odometry("/odom", 4.0);
+        bag.twist("/twist", 5.0);
+    });
+    near(drive.speed(), 5.0);
+    let drive = Drive::new("", |bag| {
+        bag.ackermann("/drive", 3.0, 0.0).odometry("/odom", 4.0);
+    });
+    near(drive.speed(), 4.0);
+    let drive = Drive::new("", |bag| {
+        bag.twist("/a", 5.0).twist("/b", 10.0);
+    });
+    says(&drive.refusal(), &["/a, /b", "[topics] speed ="]);
+}
+
+#[test]
+fn steering_of_a_bare_number_is_read_where_it_is_named() {
+    let fill = |bag: &mut TinyBag| {
+        bag.twist("/twist", 10.0).float("/wheel", 0.1);
+    };
+    let vehicle = "[vehicle]\nwheelbase_m = 2.5\n";
+    let named = format!("{vehicle}[topics]\nsteering = \"/wheel\"\n");
+    near(
+        Drive::new(&named, fill).turn_rad(),
+        0.5 * 10.0 * 0.1_f64.tan() / 2.5,
+    );
+    near(Drive::new(vehicle, fill).turn_rad(), 0.0);
+}
+
+#[test]
+fn the_documented_signals_are_read() {
+    let page = include_str!("../../../docs/reference/bag-toml.md");
+    let (_, section) = page.split_once("## Signals without a DBC file").unwrap();
+    let example = section.split("```toml").nth(1).unwrap();
+    let (example, _) = example.split_once("```").unwrap();
+    let drive = Drive::new(
+        &format!("{example}\n[vehicle]\nwheelbase_m = 2.5\n"),
+        |bag| {
+            // 4 steps of 1.5°, of 12 bits from the lowest on.
+            bag.can("/can", &ten_mps())
+                .can("/can", &frame(0x25, 0x0400));
+        },
+    );
+    near(drive.speed(), 10.0);
+    near(
+        drive.turn_rad(),
+        0.5 * 10.0 * (4.0 * 1.5 * 0.0174533_f64).tan() / 2.5,
+    );
+}
+
+#[test]
+fn a_signal_that_cannot_be_is_refused_by_its_field() {
+    let by_name = BY_DBC.replace("dbc = \"vehicle.dbc\"\n", "");
+    let steering = INLINE_STEERING.replace("steering_rad = 0.0174533\n", "");
+    for (sidecar, parts) in [
+        (by_name, ["can.speed names WHEELS.SPEED", "can.dbc"]),
+        (
+            BY_DBC.replace("WHEELS.SPEED", "WHEELS.SPED"),
+            ["SPED", "`WHEELS` has SPEED"],
+        ),
+        (
+            BY_DBC.replace("vehicle.dbc", "gone.dbc"),
+            ["can:", "gone.dbc"],
+        ),
+        (
+            INLINE.replace("speed_unit = \"km/h\"\n", ""),
+            ["can.speed_unit", "km/h"],
+        ),
+        (steering, ["can.steering_rad is missing", "0.0174533"]),
+        (
+            INLINE.replace("0x158", "0x18fe"),
+            ["can.speed: id is 0x18fe", "extended"],
+        ),
+        (
+            INLINE.replace("0x158", "-1"),
+            ["speed", "id must be a number"],
+        ),
+        (
+            INLINE.replace("length = 16", "length = 65"),
+            ["can.speed", "length is 65"],
+        ),
+        (
+            INLINE.replace("length = 16", "len = 16"),
+            ["speed", "unknown field `len`"],
+        ),
+        (
+            INLINE.replace("0.01", "0"),
+            ["can.speed: scale is 0", "every value"],
+        ),
+    ] {
+        let drive = Drive::new(&sidecar, |bag| {
+            bag.can("/can", &ten_mps());
+        });
+        let refusal = drive.refusal();
+        says(&refusal, &["drive.toml"]);
+        says(&refusal, &parts);
+    }
+}
+
+#[test]
+fn a_bus_that_was_not_recorded_is_an_error() {
+    let drive = Drive::new(INLINE, |bag| {
+        bag.twist("/twist", 5.0);
+    });
+    says(&drive.refusal(), &["can_msgs/Frame", "[can]", "drive.toml"]);
+}
+
+#[test]
+fn a_signal_without_a_frame_is_told() {
+    let drive = Drive::new(INLINE, |bag| {
+        bag.can("/can", &frame(0x159, 3600)).twist("/twist", 5.0);
+    });
+    let dataset = open(&drive.bag).unwrap();
+    assert_eq!(dataset.frames()[12].speed_mps, None);
+    says(&dataset.remarks().join("\n"), &["can.speed", "0x158"]);
+}
+
+const CALIBRATION: &str = "%YAML:1.0\n---\n\
+    camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 70., 0., 31., 0., 71., 23., 0., 0., 1. ]\n\
+    distortion_coefficients: !!opencv-matrix\n   rows: 4\n   cols: 1\n   dt: d\n   data: [ -0.1, 0., 0., 0. ]\n";
+
+#[test]
+fn a_calibration_file_is_the_camera() {
+    let file = "calibration = \"sensors/camera.yaml\"\n";
+    let drive = |image, sidecar: &str| {
+        let drive = Drive::on(image, sidecar, |_| {});
+        let sensors = drive.folder.path().join("sensors");
+        fs::create_dir(&sensors).unwrap();
+        fs::write(sensors.join("camera.yaml"), CALIBRATION).unwrap();
+        drive
+    };
+    let dataset = open(&drive("/camera/image", file).bag).unwrap();
+    let k = dataset.intrinsics(0);
+    assert_eq!((k.width, k.height), (64, 48));
+    // The lens' correction keeps the matrix, or all but.
+    let plain = CALIBRATION.replace("-0.1", "0.");
+    let straight = drive("/camera/image", file);
+    fs::write(straight.folder.path().join("sensors/camera.yaml"), plain).unwrap();
+    let straight = open(&straight.bag).unwrap();
+    let found = straight.intrinsics(0);
+    assert_eq!(
+        (found.fx, found.fy, found.cx, found.cy),
+        (70.0, 71.0, 31.0, 23.0)
+    );
+    // The distortion is taken out of the pictures, not only read.
+    let [bent, flat] = [&dataset, &straight].map(|d| d.load_image(0).unwrap());
+    assert_ne!(bent, flat);
+
+    let rectified = drive("/camera/image_rect", file).refusal();
+    says(&rectified, &["camera.yaml", "`rect`", "topics.image"]);
+    let both = drive("/camera/image", &format!("{CAMERA}{file}")).refusal();
+    says(&both, &["drive.toml", "[camera] and calibration"]);
+    let gone = drive("/camera/image", "calibration = \"gone.yaml\"\n").refusal();
+    says(&gone, &["drive.toml", "calibration", "gone.yaml"]);
+}
+
+/// The file beside a link is the link's; where there is none, what it leads to has one.
+#[cfg(unix)]
+#[test]
+fn the_file_beside_a_link_counts() {
+    use std::os::unix::fs::symlink;
+    let drive = Drive::new("scenario = \"target\"\n", |bag| {
+        bag.twist("/twist", 5.0);
+    });
+    let scenario = |dataset: &Dataset| dataset.scenario().map(str::to_owned);
+    let links = tempfile::tempdir().unwrap();
+    let link = links.path().join("monday.bag");
+    symlink(&drive.bag, &link).unwrap();
+    assert_eq!(scenario(&open(&link).unwrap()).as_deref(), Some("target"));
+
+    fs::write(
+        links.path().join("monday.toml"),
+        format!("{CAMERA}scenario = \"link\"\n"),
+    )
+    .unwrap();
+    // Given itself, or found in its folder.
+    for path in [link.as_path(), links.path()] {
+        let dataset = open(path).unwrap();
+        assert_eq!(scenario(&dataset).as_deref(), Some("link"));
+        assert_eq!(dataset.name(), "monday");
+    }
+    assert_eq!(inspect(&link).unwrap().drives[0].name, "monday");
+    // A store whose files have no ending.
+    let stored = links.path().join("9f86d081");
+    fs::rename(&drive.bag, &stored).unwrap();
+    fs::remove_file(&link).unwrap();
+    symlink(&stored, &link).unwrap();
+    assert_eq!(scenario(&open(&link).unwrap()).as_deref(), Some("link"));
+    // Down a folder and up again.
+    let around = links
+        .path()
+        .join("../")
+        .join(links.path().file_name().unwrap());
+    assert_eq!(open(&around).unwrap().name(), "monday");
+}
