@@ -52,7 +52,8 @@ fn check(config: &DepthNetConfig, width: usize, height: usize) {
         let output = engine.output(0);
         assert_eq!(output.len(), expected.len());
         let off = output.iter().zip(&expected).map(|(a, b)| (a - b).abs());
-        off.fold(0.0, f32::max)
+        let square = off.clone().map(|off| off * off).sum::<f32>() / expected.len() as f32;
+        (off.fold(0.0, f32::max), square.sqrt())
     };
     let span = expected
         .iter()
@@ -63,12 +64,14 @@ fn check(config: &DepthNetConfig, width: usize, height: usize) {
         span.1 - span.0 > 0.05,
         "a flat answer would prove nothing: {span:?}"
     );
-    let f32_off = off(Precision::F32);
+    let (f32_off, _) = off(Precision::F32);
     assert!(f32_off < 1e-4, "f32 off by {f32_off}");
     if Engine::has_bf16() {
-        // Rounding to eight bits in each of some sixty layers.
-        let bf16_off = off(Precision::Bf16);
-        assert!(bf16_off < 0.1, "bf16 off by {bf16_off}");
+        // Rounding to eight bits in each of some sixty layers; processors' dot products round differently. The paper's product
+        // of masks makes the most of it: 0.009 in the mean square, the others up to 0.0025 (AMD's AVX-512 BF16).
+        let (most, usual) = off(Precision::Bf16);
+        assert!(usual < 0.02, "bf16 off by {usual} in the mean square");
+        assert!(most < 0.2, "bf16 off by {most}");
     }
 }
 
