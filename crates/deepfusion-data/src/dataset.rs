@@ -61,6 +61,8 @@ pub struct Dataset {
     parts: DatasetParts,
     selected: Vec<usize>,
     recording: Arc<dyn Recording>,
+    /// The recording's, and what was noticed about its neighbours.
+    remarks: Vec<String>,
 }
 
 impl Dataset {
@@ -106,6 +108,7 @@ impl Dataset {
         Self {
             selected: (0..parts.frames.len()).collect(),
             parts,
+            remarks: recording.remarks().to_vec(),
             recording,
         }
     }
@@ -360,7 +363,12 @@ impl Dataset {
     /// What was taken for granted or looks odd, in sentences.
     #[must_use]
     pub fn remarks(&self) -> &[String] {
-        self.recording.remarks()
+        &self.remarks
+    }
+
+    /// Adds what was noticed beside it.
+    pub(crate) fn remark(&mut self, remark: String) {
+        self.remarks.push(remark);
     }
 
     /// The camera of frame `to` in the camera of frame `from` (`from_from_to`, metres), from the vehicle's speed and yaw
@@ -382,6 +390,7 @@ impl Dataset {
                 track,
                 yaw_known: self.parts.yaw_known,
                 cam_from_vehicle,
+                leans: true,
             }),
             _ => Err(self.recording.no_motion()),
         }

@@ -1,7 +1,7 @@
 //! The camera's motion between two frames, from the car's.
 
 use crate::snippet::{EgoMotion, NoMotion};
-use crate::{Frame, MotionModel};
+use crate::{Frame, MotionModel, VehicleMotion};
 use deepfusion_geometry::Se3;
 
 /// The car's track and the camera's place on the car.
@@ -9,9 +9,25 @@ pub(crate) struct Ego<'a> {
     pub(crate) track: &'a MotionModel,
     pub(crate) yaw_known: bool,
     pub(crate) cam_from_vehicle: Se3,
+    /// Whether the body's lean, where an inertial unit felt it, turns the camera.
+    pub(crate) leans: bool,
 }
 
 impl Ego<'_> {
+    /// The same on a body that never leans: for what looks in the pictures for how it does.
+    pub(crate) fn level(self) -> Self {
+        Self {
+            leans: false,
+            ..self
+        }
+    }
+
+    /// What the vehicle did between two times, in seconds.
+    pub(crate) fn vehicle_motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {
+        let motion = self.track.motion(from_s, to_s)?;
+        Some(if self.leans { motion } else { motion.level() })
+    }
+
     /// The camera's motion between two frames given by index, in either order of time.
     pub(crate) fn between(
         &self,
@@ -26,7 +42,7 @@ impl Ego<'_> {
         if to_s <= from_s {
             return Err(NoMotion::Time);
         }
-        let vehicle = self.track.motion(from_s, to_s).ok_or(NoMotion::Speed)?;
+        let vehicle = self.vehicle_motion(from_s, to_s).ok_or(NoMotion::Speed)?;
         let earlier_from_later = vehicle.camera0_from_camera1(&self.cam_from_vehicle);
         let dt_s = to_s - from_s;
         Ok(EgoMotion {

@@ -364,3 +364,29 @@ fn the_file_beside_a_link_counts() {
         .join(links.path().file_name().unwrap());
     assert_eq!(open(&around).unwrap().name(), "monday");
 }
+
+#[test]
+fn a_bag_without_a_camera_is_left_out_of_a_folder_and_named() {
+    let drive = Drive::new("", |bag| {
+        bag.twist("/vehicle/twist", 10.0);
+    });
+    let other = drive.folder.path().join("lidar.bag");
+    let options = deepfusion_rosbag::WriterOptions::default();
+    let mut bag = deepfusion_rosbag::BagWriter::create(&other, options).unwrap();
+    let topic = bag.add_connection::<Frame>("/can").unwrap();
+    let time = deepfusion_rosbag::Time::from_nanos(1_000_000_000);
+    bag.write(topic, time, &ten_mps()).unwrap();
+    bag.finish().unwrap();
+    let all = Dataset::open(drive.folder.path(), &OpenOptions::default()).unwrap();
+    assert_eq!(all.len(), 1);
+    let remarks = all[0].remarks().join("\n");
+    assert!(
+        remarks.contains("left out") && remarks.contains("lidar"),
+        "{remarks}"
+    );
+    let seen = inspect(drive.folder.path()).unwrap();
+    assert_eq!((seen.frames, seen.drives.len()), (all[0].frames().len(), 1));
+    // Alone it is what it is.
+    let error = open(&other).unwrap_err().to_string();
+    assert!(error.contains("holds images"), "{error}");
+}

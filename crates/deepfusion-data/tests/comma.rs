@@ -143,7 +143,8 @@ fn the_real_segment_is_inspected() {
         "{speed:?}"
     );
     assert!(
-        (seen.distance_m.unwrap() - 1003.2599).abs() < 1e-3,
+        // The inertial unit's share over a minute is 0.1 / 60² of what it drifts.
+        (seen.distance_m.unwrap() - 1003.2599).abs() < 5e-3,
         "{:?}",
         seen.distance_m
     );

@@ -1,5 +1,8 @@
 //! One motion from all of a vehicle's sensors (Eq. 28–31).
 
+use crate::imu::{DrivingBias, bias_at};
+use crate::vehicle_motion::tilt_between;
+use crate::yaw_error::{KNOWN_BIAS, UNKNOWN_BIAS, yaw_errors};
 use crate::{Bicycle, Error, ImuConfig, ImuSample, ImuTrack, Result, Signal, VehicleMotion};
 use serde::{Deserialize, Serialize};
 
@@ -91,6 +94,8 @@ pub struct MotionParts {
 pub struct FusedTrack {
     speed_mps: Signal,
     steering_yaw_rate: Option<Signal>,
+    /// The gyro's and the steering's, without what they show each other to be wrong by.
+    freed_yaw_rates: Option<[Signal; 2]>,
     imu: Option<ImuTrack>,
     weights: FusionConfig,
 }
@@ -131,12 +136,20 @@ impl FusedTrack {
             Some(samples) => Some(ImuTrack::new(samples, speed, &config.imu)?),
             None => None,
         };
-        if let (Some(steering), Some(imu)) = (&steering_yaw_rate, &imu) {
+        let mut freed = None;
+        if let (Some(bicycle), Some(steering), Some(imu)) =
+            (&config.bicycle, &steering_yaw_rate, &imu)
+        {
             check_signs(steering, imu.yaw_rate())?;
+            let known = !imu.standstills().is_empty() || config.imu.gyro_bias_radps.is_some();
+            let usual_bias = if known { KNOWN_BIAS } else { UNKNOWN_BIAS };
+            let found = yaw_errors(imu.yaw_rate(), steering, speed, bicycle, usual_bias);
+            freed = Some(freed_of(&found, imu.yaw_rate(), steering, speed));
         }
         Ok(Self {
             speed_mps: speed.clone(),
             steering_yaw_rate,
+            freed_yaw_rates: freed,
             imu,
             weights: config.fusion,
         })
@@ -172,11 +185,46 @@ impl FusedTrack {
         self.imu.as_ref()
     }
 
+    /// Roll and pitch by the inertial unit at a time, in radians ([`ImuTrack::tilt`]); `None` without one.
+    #[must_use]
+    pub fn tilt(&self, time_s: f64) -> Option<[f64; 2]> {
+        self.imu.as_ref()?.tilt(time_s)
+    }
+
     /// Whether anything measures how the vehicle turns. If not, every motion is straight: its distance
     /// is right, its lever arm is not.
     #[must_use]
     pub fn knows_yaw(&self) -> bool {
         self.imu.is_some() || self.steering_yaw_rate.is_some()
+    }
+
+    /// How far the gyro turns for what the steering says, while the vehicle turns no faster than `most_mps` (tyres slip in
+    /// fast bends): 1 where wheelbase and steering ratio are right. With it, for how many seconds it turned so. `None`
+    /// without either sensor, or where it never did.
+    #[must_use]
+    pub fn gyro_over_steering(&self, most_mps: f64) -> Option<(f64, f64)> {
+        let steering = self.steering_yaw_rate.as_ref()?;
+        let gyro = self.imu.as_ref()?.yaw_rate();
+        // Least squares with the gyro's bias: gyro = bias + factor · steering, over all that is slow.
+        let (mut n, mut turning_s) = (0.0, 0.0);
+        let (mut s, mut g, mut ss, mut sg) = (0.0, 0.0, 0.0, 0.0);
+        for (times, rate) in gyro.times_s().windows(2).zip(gyro.values()) {
+            let step_s = times[1] - times[0];
+            let (Some(said), Some(speed)) = (steering.at(times[0]), self.speed_at(times[0])) else {
+                continue;
+            };
+            if step_s > gyro.max_gap_s() || speed.abs() > most_mps {
+                continue;
+            }
+            n += step_s;
+            (s, g) = (s + said * step_s, g + rate * step_s);
+            (ss, sg) = (ss + said * said * step_s, sg + said * rate * step_s);
+            if said.abs() > TURNING_RADPS {
+                turning_s += step_s;
+            }
+        }
+        let spread = ss - s * s / n;
+        (turning_s > 0.0 && spread > 0.0).then(|| ((sg - s * g / n) / spread, turning_s))
     }
 
     /// What each sensor says about `from_s` to `to_s`. `None` where the speed does not cover it.
@@ -208,12 +256,19 @@ impl FusedTrack {
             alpha_distance,
             alpha_yaw,
         } = self.weights;
-        let yaw_rad = match (parts.imu_yaw_rad, parts.steering_yaw_rad) {
+        let freed = self.freed_yaw_rates.as_ref();
+        let freed = freed.map(|both| both.each_ref().map(|rate| rate.integral(from_s, to_s)));
+        let [imu_yaw_rad, steering_yaw_rad] = match freed {
+            Some([Some(imu), Some(steering)]) => [Some(imu), Some(steering)],
+            _ => [parts.imu_yaw_rad, parts.steering_yaw_rad],
+        };
+        let yaw_rad = match (imu_yaw_rad, steering_yaw_rad) {
             (Some(imu), Some(steering)) => alpha_yaw * imu + (1.0 - alpha_yaw) * steering,
             (Some(only), None) | (None, Some(only)) => only,
             (None, None) if self.knows_yaw() => return None,
             (None, None) => 0.0,
         };
+        let tilts = self.tilt(from_s).zip(self.tilt(to_s));
         let distance_v = parts.vehicle_distance_m;
         let alpha_distance = alpha_distance * (DRIFTS_S / (to_s - from_s)).min(1.0).powi(2);
         Some(VehicleMotion {
@@ -221,8 +276,38 @@ impl FusedTrack {
                 alpha_distance * imu + (1.0 - alpha_distance) * distance_v
             }),
             yaw_rad,
+            tilt_rad: tilts.map_or([0.0; 2], |(from, to)| tilt_between(from, to, yaw_rad)),
         })
     }
+}
+
+/// The gyro's and the steering's yaw rate without the errors that were found.
+fn freed_of(
+    found: &[DrivingBias],
+    gyro: &Signal,
+    steering: &Signal,
+    speed: &Signal,
+) -> [Signal; 2] {
+    let error_at = |time_s| bias_at(found, time_s).unwrap_or_default();
+    let gyro_freed = |(t, rate): (&f64, &f64)| (*t, rate - error_at(*t).x);
+    let steering_freed = |(t, rate): (&f64, &f64)| {
+        let (error, speed) = (error_at(*t), speed.at(*t).unwrap_or_default());
+        (*t, rate + error.y * speed + error.z * rate)
+    };
+    [
+        Signal::with_max_gap(
+            gyro.times_s().iter().zip(gyro.values()).map(gyro_freed),
+            gyro.max_gap_s(),
+        ),
+        Signal::with_max_gap(
+            steering
+                .times_s()
+                .iter()
+                .zip(steering.values())
+                .map(steering_freed),
+            steering.max_gap_s(),
+        ),
+    ]
 }
 
 impl FusionConfig {

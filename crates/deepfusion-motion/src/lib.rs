@@ -53,6 +53,7 @@ mod signal;
 mod time_offset;
 mod vehicle_motion;
 mod vehicle_track;
+mod yaw_error;
 
 pub use bicycle::Bicycle;
 pub use error::{Error, Result};

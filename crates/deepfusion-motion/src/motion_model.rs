@@ -28,6 +28,15 @@ impl MotionModel {
         }
     }
 
+    /// Roll (the left side up) and pitch (the nose down) at a time, in radians; `None` where nothing measures them.
+    #[must_use]
+    pub fn tilt(&self, time_s: f64) -> Option<[f64; 2]> {
+        match self {
+            Self::Track(track) => track.tilt(time_s),
+            Self::Fused(track) => track.tilt(time_s),
+        }
+    }
+
     /// What the vehicle did between two times; `None` across gaps, outside the recording, and
     /// backwards in time.
     #[must_use]

@@ -1,7 +1,7 @@
 //! A piece of a drive: an arc, and how a camera on the vehicle moved thereby (SPEC 3.4).
 
 use deepfusion_geometry::Se3;
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 
 /// A piece of an arc that a car drove, seen from its start: x forward, y left, z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -10,6 +10,9 @@ pub struct VehicleMotion {
     pub distance_m: f64,
     /// Change of heading, in radians; positive to the left.
     pub yaw_rad: f64,
+    /// How the body leans at the end, seen from its start after the turn, in radians: roll (about x, the left side up)
+    /// and pitch (about y, the nose down), as Rz(yaw)·Ry(pitch)·Rx(roll). Zero where nothing measured it.
+    pub tilt_rad: [f64; 2],
 }
 
 impl VehicleMotion {
@@ -31,12 +34,34 @@ impl VehicleMotion {
         )
     }
 
-    /// `camera0_from_camera1` of a camera fixed to the car: the rigid body's motion at the camera's
-    /// place, lever arm included.
+    /// The same on a body that does not lean.
+    #[must_use]
+    pub fn level(self) -> Self {
+        Self {
+            tilt_rad: [0.0; 2],
+            ..self
+        }
+    }
+
+    /// `camera0_from_camera1` of a camera fixed to the car: the rigid body's motion along the arc at the
+    /// camera's place, lever arm included, and the body's lean. What the body leans about is not known (it
+    /// hangs on springs, between the axles); it turns the camera and leaves it in its place.
     #[must_use]
     pub fn camera0_from_camera1(&self, cam_from_vehicle: &Se3) -> Se3 {
-        *cam_from_vehicle * self.vehicle0_from_vehicle1() * cam_from_vehicle.inverse()
+        let level = *cam_from_vehicle * self.vehicle0_from_vehicle1() * cam_from_vehicle.inverse();
+        let [roll, pitch] = self.tilt_rad;
+        let lean = Rotation3::from_euler_angles(roll, pitch, 0.0).scaled_axis();
+        level * Se3::from_axis_angle(cam_from_vehicle.rotate(&lean), Vector3::zeros())
     }
+}
+
+/// [`VehicleMotion::tilt_rad`] of a body that leans `from` at the start and `to` at the end (roll and pitch against the
+/// vertical, in radians): the turn T₀ᵀ·Rz(θ)·T₁ without its yaw.
+pub(crate) fn tilt_between(from: [f64; 2], to: [f64; 2], yaw_rad: f64) -> [f64; 2] {
+    let [from, to] = [from, to].map(|[roll, pitch]| Rotation3::from_euler_angles(roll, pitch, 0.0));
+    let turn = Rotation3::from_euler_angles(0.0, 0.0, yaw_rad);
+    let (roll, pitch, _) = (from.inverse() * turn * to).euler_angles();
+    [roll, pitch]
 }
 
 #[cfg(test)]
@@ -56,6 +81,7 @@ mod tests {
         let motion = VehicleMotion {
             distance_m: 2.0,
             yaw_rad: 0.0,
+            tilt_rad: [0.0; 2],
         };
         let frame1_from_frame0 = motion
             .camera0_from_camera1(&cam_from_vehicle(1.0, 0.5))
@@ -73,6 +99,7 @@ mod tests {
         let motion = VehicleMotion {
             distance_m: 0.0,
             yaw_rad: 0.1,
+            tilt_rad: [0.0; 2],
         };
         let moved = motion
             .camera0_from_camera1(&cam_from_vehicle(2.0, 0.0))
@@ -84,11 +111,35 @@ mod tests {
         );
     }
 
+    #[test]
+    fn a_nose_that_dips_turns_the_camera_down_and_leaves_its_place() {
+        let motion = VehicleMotion {
+            distance_m: 2.0,
+            yaw_rad: 0.1,
+            tilt_rad: [0.02, 0.03],
+        };
+        let mount = cam_from_vehicle(1.5, 1.2);
+        let (leaning, level) = [motion, motion.level()]
+            .map(|m| m.camera0_from_camera1(&mount))
+            .into();
+        assert!((leaning.translation() - level.translation()).norm() < 1e-12);
+        // The camera's y points down: looking down moves its axis to +y; Rz(yaw)·Ry(pitch) takes x to
+        // z = −sin(pitch).
+        let axis = leaning.rotate(&Vector3::z());
+        assert!((axis.y - 0.03_f64.sin()).abs() < 1e-12, "{axis}");
+        // The left side up: the camera's x (right) dips, by cos(pitch)·sin(roll).
+        let right = leaning.rotate(&Vector3::x());
+        assert!(
+            (right.y - 0.03_f64.cos() * 0.02_f64.sin()).abs() < 1e-12,
+            "{right}"
+        );
+    }
+
     proptest! {
         /// Two pieces of an arc of constant curvature make the whole.
         #[test]
         fn arcs_join(d in 0.1..5.0f64, yaw in -1.0..1.0f64, part in 0.05..0.95f64) {
-            let piece = |f: f64| VehicleMotion { distance_m: d * f, yaw_rad: yaw * f }.vehicle0_from_vehicle1();
+            let piece = |f: f64| VehicleMotion { distance_m: d * f, yaw_rad: yaw * f, tilt_rad: [0.0; 2] }.vehicle0_from_vehicle1();
             let joined = piece(part) * piece(1.0 - part);
             prop_assert!((joined.translation() - piece(1.0).translation()).norm() < 1e-9);
             prop_assert!((joined.axis_angle() - piece(1.0).axis_angle()).norm() < 1e-9);

@@ -1,15 +1,18 @@
-//! A vehicle's forward speed and yaw rate over time, as one unit measures both.
+//! A vehicle's forward speed and yaw rate over time, and how its body leans, as one unit measures all.
 
+use crate::vehicle_motion::tilt_between;
 use crate::{Signal, VehicleMotion};
 
 /// Longest gap that is bridged, in seconds: five packets of KITTI's oxts.
 const MAX_GAP_S: f64 = 0.5;
 
-/// A car's forward speed and yaw rate over time.
+/// A car's forward speed and yaw rate over time, and its roll and pitch where they are known.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct VehicleTrack {
     speed_mps: Signal,
     yaw_rate_radps: Signal,
+    /// Roll and pitch.
+    tilt_rad: Option<[Signal; 2]>,
 }
 
 impl VehicleTrack {
@@ -26,7 +29,31 @@ impl VehicleTrack {
         Self {
             speed_mps: Signal::with_max_gap(good().map(|s| (s.0, s.1)), MAX_GAP_S),
             yaw_rate_radps: Signal::with_max_gap(good().map(|s| (s.0, s.2)), MAX_GAP_S),
+            tilt_rad: None,
         }
+    }
+
+    /// The same with samples of how the body leans (time in s, roll and pitch in radians, as [`VehicleTrack::tilt`]).
+    #[must_use]
+    pub fn with_tilt(self, samples: &[(f64, f64, f64)]) -> Self {
+        let good = || {
+            samples
+                .iter()
+                .filter(|(t, roll, pitch)| t.is_finite() && roll.is_finite() && pitch.is_finite())
+        };
+        let roll = Signal::with_max_gap(good().map(|s| (s.0, s.1)), MAX_GAP_S);
+        let pitch = Signal::with_max_gap(good().map(|s| (s.0, s.2)), MAX_GAP_S);
+        Self {
+            tilt_rad: Some([roll, pitch]),
+            ..self
+        }
+    }
+
+    /// Roll (the left side up) and pitch (the nose down) at a time, in radians; `None` where they are not known.
+    #[must_use]
+    pub fn tilt(&self, time_s: f64) -> Option<[f64; 2]> {
+        let [roll, pitch] = self.tilt_rad.as_ref()?;
+        Some([roll.at(time_s)?, pitch.at(time_s)?])
     }
 
     /// Times of the samples, in seconds.
@@ -61,9 +88,12 @@ impl VehicleTrack {
         if from_s >= to_s {
             return None;
         }
+        let yaw_rad = self.yaw_rate_radps.integral(from_s, to_s)?;
+        let tilts = self.tilt(from_s).zip(self.tilt(to_s));
         Some(VehicleMotion {
             distance_m: self.speed_mps.integral(from_s, to_s)?,
-            yaw_rad: self.yaw_rate_radps.integral(from_s, to_s)?,
+            yaw_rad,
+            tilt_rad: tilts.map_or([0.0; 2], |(from, to)| tilt_between(from, to, yaw_rad)),
         })
     }
 }

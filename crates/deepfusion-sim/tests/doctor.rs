@@ -5,6 +5,7 @@ mod doctor_faults;
 use deepfusion_data::doctor::{Diagnosis, Finding, Outcome, Severity, doctor};
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 use doctor_faults::{Drive, oxts};
+use nalgebra::{Rotation3, Vector3};
 use std::path::{Path, PathBuf};
 
 /// What disturbs: errors and warnings.
@@ -485,5 +486,77 @@ fn a_bag_whose_camera_clock_is_off_is_told() {
         assert!(offset.std_error_s < 0.05, "{offset:?}");
         assert!(seen.to_string().contains("vehicle less camera"), "{seen}");
         assert!((value(finding) + ahead_s).abs() < 0.010, "{finding:?}");
+    }
+}
+
+#[test]
+fn a_gap_in_the_speed_is_told_with_its_frame() {
+    let drive = Drive::clean();
+    drive.remove_oxts(40..56);
+    let diagnosis = drive.diagnose();
+    let finding = found(&diagnosis, "timing", "time without a motion");
+    // From the last packet before the gap to the first after it, less what a track is held on at both ends.
+    assert!((14.0..18.0).contains(&value(finding)), "{finding:?}");
+    assert!(finding.what.contains("in 1 stretches"), "{finding:?}");
+    assert!(
+        finding.frame.is_some_and(|f| (39..=41).contains(&f)),
+        "{finding:?}"
+    );
+}
+
+#[test]
+fn a_wrong_wheelbase_is_told_by_the_gyro() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = SimConfig {
+        frames: 300,
+        width: 240,
+        height: 180,
+        scene: Scene::Garage,
+        ..SimConfig::default()
+    };
+    let path = bag_of(folder.path(), &config, BagSettings::default());
+    let clean = doctor(&path, None);
+    let measured = &outcome(&clean, "steering").measured;
+    assert!((measured[0].value - 1.0).abs() < 0.02, "{measured:?}");
+    let sidecar = path.with_extension("toml");
+    let text = std::fs::read_to_string(&sidecar).unwrap();
+    let wrong = text.replace("wheelbase_m = 2.7", "wheelbase_m = 4.1");
+    assert_ne!(text, wrong);
+    std::fs::write(&sidecar, wrong).unwrap();
+    let diagnosis = doctor(&path, None);
+    let finding = found(&diagnosis, "steering", "turns by the gyro");
+    assert!((value(finding) - 4.1 / 2.7).abs() < 0.03, "{finding:?}");
+    assert!(
+        finding.remedy.contains("wheelbase_m by 0.66"),
+        "{finding:?}"
+    );
+}
+
+#[test]
+fn a_lidar_that_is_turned_or_pitched_on_the_car_is_told_by_its_velocities() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = bag(folder.path(), Scene::Urban, BagSettings::default());
+    let sidecar = path.with_extension("toml");
+    let text = std::fs::read_to_string(&sidecar).unwrap();
+    // The rotation of cam_from_lidar, turned by 4 degrees about the camera's x (pitch) or y (yaw).
+    let place = text.find("[cam_from_lidar]").unwrap();
+    let begin = place + text[place..].find("rotation = [").unwrap() + "rotation = [".len();
+    let end = begin + text[begin..].find(']').unwrap();
+    let numbers: Vec<f64> = text[begin..end]
+        .split(',')
+        .map(|w| w.trim().parse().unwrap())
+        .collect();
+    let mount = Rotation3::from_scaled_axis(Vector3::from_row_slice(&numbers));
+    for (axis, quantity) in [
+        (Vector3::x(), "climbs by"),
+        (Vector3::y(), "drifts to the left by"),
+    ] {
+        let turned = Rotation3::from_scaled_axis(axis * 4.0_f64.to_radians()) * mount;
+        let [x, y, z]: [f64; 3] = turned.scaled_axis().into();
+        let wrong = format!("{}{x}, {y}, {z}{}", &text[..begin], &text[end..]);
+        std::fs::write(&sidecar, wrong).unwrap();
+        let diagnosis = doctor(&path, None);
+        let finding = found(&diagnosis, "lidar-speed", quantity);
+        assert!((value(finding).abs() - 4.0).abs() < 0.5, "{finding:?}");
     }
 }

@@ -7,7 +7,7 @@ use crate::{Error, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::ImuSample;
 use deepfusion_rosbag::msg::{
-    AckermannDriveStamped, CameraInfo, Float32, Float64, Frame, Imu, Odometry, TwistStamped,
+    AckermannDriveStamped, CameraInfo, Float32, Float64, Frame, Imu, Odometry, Twist, TwistStamped,
 };
 use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
 use nalgebra::Vector3;
@@ -32,6 +32,8 @@ pub(super) struct Index {
     pub(super) speed_mps: Vec<(i64, f64)>,
     /// Of the message that holds the speed, rad/s; not every publisher fills it.
     pub(super) yaw_rate: Vec<(i64, f64)>,
+    /// Roll and pitch rate, in rad/s, where a twist gives all three.
+    pub(super) tilt_rates: Vec<(i64, [f64; 2])>,
     pub(super) steering_rad: Vec<(i64, f64)>,
     pub(super) imu: Vec<(i64, ImuSample)>,
     /// `world_from_vehicle`, exact.
@@ -113,11 +115,13 @@ impl Index {
                     let Reading {
                         at_ns,
                         speed_mps,
-                        yaw_rate,
+                        rates,
                     } = reading(message, config)?;
                     self.speed_mps.push((at_ns, speed_mps));
-                    self.yaw_rate
-                        .extend(yaw_rate.map(|yaw_rate| (at_ns, yaw_rate)));
+                    if let Some([roll, pitch, yaw]) = rates {
+                        self.yaw_rate.push((at_ns, yaw));
+                        self.tilt_rates.push((at_ns, [roll, pitch]));
+                    }
                 }
                 Role::Steering => {
                     self.steering_rad.push(steering(message)?);
@@ -145,7 +149,8 @@ impl Index {
 struct Reading {
     at_ns: i64,
     speed_mps: f64,
-    yaw_rate: Option<f64>,
+    /// Roll, pitch and yaw rate, in rad/s.
+    rates: Option<[f64; 3]>,
 }
 
 /// The vehicle's forward speed by whatever message holds it.
@@ -155,7 +160,7 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
         return Ok(Reading {
             at_ns: nanos(twist.header.stamp),
             speed_mps: twist.twist.linear.x,
-            yaw_rate: Some(twist.twist.angular.z),
+            rates: Some(rates(&twist.twist)),
         });
     }
     if message.is::<AckermannDriveStamped>() {
@@ -163,7 +168,7 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
         return Ok(Reading {
             at_ns: nanos(drive.header.stamp),
             speed_mps: f64::from(drive.drive.speed),
-            yaw_rate: None,
+            rates: None,
         });
     }
     if message.is::<Odometry>() {
@@ -172,7 +177,7 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
         return Ok(Reading {
             at_ns: nanos(odometry.header.stamp),
             speed_mps: twist.linear.x,
-            yaw_rate: Some(twist.angular.z),
+            rates: Some(rates(&twist)),
         });
     }
     let value = number(message)?;
@@ -185,8 +190,12 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
     Ok(Reading {
         at_ns: nanos(message.time()),
         speed_mps: value * unit.metres_per_second(),
-        yaw_rate: None,
+        rates: None,
     })
+}
+
+fn rates(twist: &Twist) -> [f64; 3] {
+    [twist.angular.x, twist.angular.y, twist.angular.z]
 }
 
 /// The steering angle in radians and its time, by whatever message holds it.

@@ -31,17 +31,30 @@ const YAW_RATE_REACH_S: f64 = 0.05;
 /// # Errors
 /// As [`Dataset::open`].
 pub(crate) fn open(path: &Path, bags: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
-    let mut datasets = Vec::new();
+    let (mut datasets, mut without_camera) = (Vec::<Dataset>::new(), Vec::new());
     let mut refused = None;
     for bag in bags {
-        match open_bag(source::open(bag)?, options)?.select(path, options) {
+        let opened = open_bag(source::open(bag)?, options);
+        match opened.and_then(|dataset| dataset.select(path, options)) {
             Ok(dataset) => datasets.push(dataset),
             Err(error @ Error::SplitSelectsNothing { .. }) => refused = Some(error),
+            // A recorder may give each computer of the vehicle its bag; the others can still be used.
+            Err(error @ Error::NoFrames { .. }) => {
+                without_camera.push(source::name(bag));
+                refused = refused.or(Some(error));
+            }
             Err(other) => return Err(other),
         }
     }
-    match refused {
-        Some(error) if datasets.is_empty() => Err(error),
+    match (datasets.first_mut(), refused) {
+        (None, Some(error)) => Err(error),
+        (Some(first), _) if !without_camera.is_empty() => {
+            let names = without_camera.join(", ");
+            first.remark(format!(
+                "left out, as none of their topics holds images: {names}"
+            ));
+            Ok(datasets)
+        }
         _ => Ok(datasets),
     }
 }

@@ -88,8 +88,30 @@ fn by_twist(index: &Index, origin_ns: i64) -> Motion {
         .map(|((ns, speed), (_, yaw_rate))| ((ns - origin_ns) as f64 * 1e-9, *speed, *yaw_rate))
         .collect();
     samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut track = VehicleTrack::new(&samples);
+    if index.tilt_rates.iter().any(|(_, rates)| *rates != [0.0; 2]) {
+        track = track.with_tilt(&leaning(index, origin_ns));
+    }
     Motion {
-        track: VehicleTrack::new(&samples).into(),
+        track: track.into(),
         yaw_known: true,
     }
+}
+
+/// Roll and pitch by their rates: from any start, since only their change counts.
+fn leaning(index: &Index, origin_ns: i64) -> Vec<(f64, f64, f64)> {
+    let mut rates = index.tilt_rates.clone();
+    rates.sort_by_key(|(ns, _)| *ns);
+    let mut tilt = [0.0; 2];
+    let mut last: Option<&(i64, [f64; 2])> = None;
+    let mut samples = Vec::with_capacity(rates.len());
+    for reading in &rates {
+        if let Some((before_ns, before)) = last {
+            let half_s = 0.5e-9 * (reading.0 - before_ns) as f64;
+            tilt = [0, 1].map(|i| tilt[i] + half_s * (before[i] + reading.1[i]));
+        }
+        last = Some(reading);
+        samples.push(((reading.0 - origin_ns) as f64 * 1e-9, tilt[0], tilt[1]));
+    }
+    samples
 }

@@ -1,4 +1,4 @@
-use super::{cam_from_scanner, points, speed_and_yaw_rate};
+use super::{cam_from_scanner, moving_at, points};
 use crate::{Dataset, Error, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_rosbag::msg::{
@@ -67,9 +67,10 @@ pub fn convert_to_bag(
     };
     if let (Some(topic), Some(track)) = (speed_topic, dataset.track()) {
         for (seq, &time_s) in track.times_s().iter().enumerate() {
-            let Some((speed, yaw_rate)) = speed_and_yaw_rate(dataset, time_s) else {
+            let Some(moving) = moving_at(dataset, time_s) else {
                 continue;
             };
+            let [x, y, z] = moving.rates_radps;
             let along = |x| Vector3 {
                 x,
                 ..Vector3::default()
@@ -77,11 +78,8 @@ pub fn convert_to_bag(
             let message = TwistStamped {
                 header: header(time(time_s), seq, "vehicle"),
                 twist: Twist {
-                    linear: along(speed),
-                    angular: Vector3 {
-                        z: yaw_rate,
-                        ..Vector3::default()
-                    },
+                    linear: along(moving.speed_mps),
+                    angular: Vector3 { x, y, z },
                 },
             };
             bag.write(topic, time(time_s), &message)?;

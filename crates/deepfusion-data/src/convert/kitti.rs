@@ -1,5 +1,5 @@
 use super::calendar::{date, stamp};
-use super::{cam_from_scanner, points, speed_and_yaw_rate};
+use super::{Moving, cam_from_scanner, moving_at, points};
 use crate::{Dataset, Error, Result, save_png, write_atomically};
 use deepfusion_cloud::PointCloud;
 use deepfusion_geometry::{Intrinsics, Se3};
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// folders. All must have one camera: KITTI's calibration is that of a date.
 ///
 /// `velodyne_points` holds the measured depth as points in the camera's place (what stands still is where it was at the
-/// frame's time), not the scanner's own; `oxts` holds speed and yaw rate, and zeros for what the recording does not
+/// frame's time), not the scanner's own; `oxts` holds speed, turn and lean, and zeros for what the recording does not
 /// know: its `navstat` says that there was no fix.
 ///
 /// # Errors
@@ -84,11 +84,10 @@ fn write_drive(dataset: &Dataset, folder: &Path, progress: &mut dyn FnMut(usize)
                     Ok(cloud.write_kitti_bin(out)?)
                 })?;
             }
-            let known = frame.time_s.and_then(|t| speed_and_yaw_rate(dataset, t));
-            if let (Some(folder), Some((speed, yaw_rate))) = (&oxts, known) {
+            let known = frame.time_s.and_then(|t| moving_at(dataset, t));
+            if let (Some(folder), Some(moving)) = (&oxts, known) {
                 let path = folder.join(format!("{name}.txt"));
-                let line = packet(speed, yaw_rate);
-                super::write_text(&path, &line)?;
+                super::write_text(&path, &packet(&moving))?;
             }
             Ok::<(), Error>(())
         })?;
@@ -123,12 +122,15 @@ fn between(dataset: &Dataset, number: u64) -> Option<f64> {
     Some(before.time_s? + share * (next.time_s? - before.time_s?))
 }
 
-/// An OXTS packet that knows speed and yaw rate alone; at rest an accelerometer reads 9.81 upwards.
-fn packet(speed: f64, yaw_rate: f64) -> String {
+/// An OXTS packet that knows speed, turn and lean alone; at rest an accelerometer reads 9.81 upwards.
+fn packet(moving: &Moving) -> String {
     let mut values = [0.0; 30];
-    values[8] = speed;
+    values[3..5].copy_from_slice(&moving.tilt_rad);
+    values[8] = moving.speed_mps;
     (values[13], values[16]) = (9.81, 9.81);
-    (values[19], values[22]) = (yaw_rate, yaw_rate);
+    for first in [17, 20] {
+        values[first..first + 3].copy_from_slice(&moving.rates_radps);
+    }
     let words: Vec<String> = values[..25].iter().map(|v| format!("{v}")).collect();
     format!("{} 0 0 0 0 0\n", words.join(" "))
 }

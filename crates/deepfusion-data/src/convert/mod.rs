@@ -1,7 +1,7 @@
 //! A recording of any layout written as another: KITTI raw, or a ROS 1 bag.
 //!
 //! What is written is what a [`Dataset`](crate::Dataset) gives: images freed of their lens' distortion, their times, the
-//! camera, its place on the vehicle, speeds and yaw rates, and the measured depth as points in the camera's place. The
+//! camera, its place on the vehicle, speeds, turns and leans, and the measured depth as points in the camera's place. The
 //! other layout then gives the same snippets and the same ground truth.
 
 mod bag;
@@ -60,23 +60,38 @@ fn write_text(path: &Path, text: &str) -> Result<()> {
     })
 }
 
-/// Half the time over which a yaw rate is taken, in seconds.
-const YAW_REACH_S: f64 = 0.05;
+/// Half the time over which a rate is taken, in seconds.
+const RATE_REACH_S: f64 = 0.05;
 
-/// Forward speed (m/s) and yaw rate (rad/s) at a time; `None` where the recording does not say.
-fn speed_and_yaw_rate(dataset: &Dataset, time_s: f64) -> Option<(f64, f64)> {
+/// How a vehicle moves at a time.
+struct Moving {
+    /// Forward, in m/s.
+    speed_mps: f64,
+    /// About x, y and z, in rad/s.
+    rates_radps: [f64; 3],
+    /// Roll and pitch, in radians; 0 where nothing measured them.
+    tilt_rad: [f64; 2],
+}
+
+/// What the recording says about a time; `None` where it does not.
+fn moving_at(dataset: &Dataset, time_s: f64) -> Option<Moving> {
     let track = dataset.track()?;
     let speed = track.speed_at(time_s)?;
     let reaches = [
-        (YAW_REACH_S, YAW_REACH_S),
-        (0.0, YAW_REACH_S),
-        (YAW_REACH_S, 0.0),
+        (RATE_REACH_S, RATE_REACH_S),
+        (0.0, RATE_REACH_S),
+        (RATE_REACH_S, 0.0),
     ];
-    let yaw_rate = reaches.iter().find_map(|(before, after)| {
+    let rates = reaches.iter().find_map(|(before, after)| {
         let motion = track.motion(time_s - before, time_s + after)?;
-        Some(motion.yaw_rad / (before + after))
+        let [roll, pitch] = motion.tilt_rad;
+        Some([roll, pitch, motion.yaw_rad].map(|angle| angle / (before + after)))
     });
-    Some((speed, yaw_rate.unwrap_or(0.0)))
+    Some(Moving {
+        speed_mps: speed,
+        rates_radps: rates.unwrap_or_default(),
+        tilt_rad: track.tilt(time_s).unwrap_or_default(),
+    })
 }
 
 #[cfg(test)]

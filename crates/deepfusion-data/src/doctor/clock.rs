@@ -88,7 +88,7 @@ fn settled(
         offset.map_err(|why| why.to_string())
     };
     let mut offset = measure(pairs)?;
-    let ego = survey.dataset.ego().map_err(|why| why.to_string())?;
+    let ego = survey.dataset.ego().map_err(|why| why.to_string())?.level();
     for _ in 0..ROUNDS {
         let before = offset.vehicle_minus_camera_s;
         let headed = |pair: &EpipolarPair| pair.with_clock(&ego, before);

@@ -84,7 +84,7 @@ impl EpipolarPair {
     pub(crate) fn with_clock(&self, ego: &Ego<'_>, vehicle_ahead_s: f64) -> Option<Self> {
         let middle_s = self.middle_s + vehicle_ahead_s;
         let [from_s, to_s] = [-0.5, 0.5].map(|half| middle_s + half * self.dt_s);
-        let vehicle = ego.track.motion(from_s, to_s)?;
+        let vehicle = ego.vehicle_motion(from_s, to_s)?;
         Some(Self {
             earlier_from_later: vehicle.camera0_from_camera1(&ego.cam_from_vehicle),
             speed_mps: vehicle.distance_m.abs() / self.dt_s,

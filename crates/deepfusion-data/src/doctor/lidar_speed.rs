@@ -2,7 +2,8 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::median;
-use crate::Dataset;
+use crate::{Dataset, LidarMotion};
+use nalgebra::Vector3;
 
 /// Scans looked at.
 const MOST_SCANS: usize = 40;
@@ -13,6 +14,9 @@ const LEAST_SCANS: usize = 4;
 const RATIO: Limit = Limit::Within(0.95, 1.05);
 /// Sideways speed over speed, as an angle in degrees: the LiDAR's yaw on the vehicle.
 const MOST_SIDEWAYS_DEG: f64 = 1.5;
+/// Upward speed over speed, as an angle in degrees: its pitch. A loaded boot lifts the nose by some tenths, and few rays look up
+/// or down.
+const MOST_UPWARD_DEG: f64 = 2.0;
 
 pub(super) fn check(dataset: &Dataset) -> Outcome {
     let motions = match dataset.lidar_motion(MOST_SCANS) {
@@ -33,11 +37,12 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
             .map(|m| m.by_vehicle_mps.x / m.by_scan_mps.x)
             .collect(),
     );
-    let sideways = |m: &&crate::LidarMotion| {
-        let angle = |v: &nalgebra::Vector3<f64>| v.y.atan2(v.x.abs());
-        (angle(&m.by_scan_mps) - angle(&m.by_vehicle_mps)).to_degrees()
+    let off = |axis: usize| {
+        let angle = |v: &Vector3<f64>| v[axis].atan2(v.x.abs());
+        let apart = |m: &&LidarMotion| angle(&m.by_scan_mps) - angle(&m.by_vehicle_mps);
+        median(moving.iter().map(apart).collect()).to_degrees()
     };
-    let sideways = median(moving.iter().map(sideways).collect());
+    let (sideways, upward) = (off(1), off(2));
     let mut outcome = Outcome::new("lidar-speed");
     let figure = Figure::new(
         "speed by the vehicle over speed by the LiDAR",
@@ -60,8 +65,24 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     );
     outcome.judge(Severity::Warning, figure, || {
         (
-            format!("by its radial velocities the LiDAR drives {sideways:.1} degrees to the left of where its mount says"),
+            format!(
+                "by its radial velocities the LiDAR drives {:.1} degrees to the {} of where its mount says",
+                sideways.abs(),
+                if sideways > 0.0 { "left" } else { "right" }
+            ),
             "correct the yaw of cam_from_lidar or of cam_from_vehicle by that angle".into(),
+        )
+    });
+    let limit = Limit::Within(-MOST_UPWARD_DEG, MOST_UPWARD_DEG);
+    let figure = Figure::new("the LiDAR climbs by", upward, "degrees", limit);
+    outcome.judge(Severity::Warning, figure, || {
+        (
+            format!(
+                "by its radial velocities the LiDAR drives {:.1} degrees {} where its mount says",
+                upward.abs(),
+                if upward > 0.0 { "above" } else { "below" }
+            ),
+            "correct the pitch of cam_from_lidar or of cam_from_vehicle by that angle".into(),
         )
     });
     outcome

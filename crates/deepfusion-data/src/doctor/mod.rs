@@ -23,6 +23,7 @@ mod parallax;
 mod plots;
 mod speed;
 mod standing;
+mod steering;
 mod stereo;
 mod survey;
 mod timing;
@@ -132,6 +133,7 @@ pub fn examine(dataset: &Dataset) -> DriveDiagnosis {
         speed::check(dataset),
         lidar_speed::check(dataset),
         dynamic_points::check(dataset),
+        steering::check(dataset),
         clock::check(&survey, &pairs),
         turn::check(&pairs),
         heading::check(&survey, &pairs),

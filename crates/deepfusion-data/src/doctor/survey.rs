@@ -2,6 +2,7 @@
 
 use super::flow::{Flow, flow};
 use super::look::Look;
+use crate::ego::Ego;
 use crate::{Dataset, EgoMotion, grey_image};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_motion::GreyImage;
@@ -99,7 +100,7 @@ impl<'a> Survey<'a> {
 
     /// Mean speed between two frames by index, m/s.
     pub(crate) fn speed_mps(&self, earlier: usize, later: usize) -> Option<f64> {
-        let ego = self.dataset.ego().ok()?;
+        let ego = self.dataset.ego().ok()?.level();
         let motion = ego.between(self.dataset.frames(), later, earlier).ok()?;
         Some(motion.speed_mps)
     }
@@ -120,7 +121,7 @@ impl<'a> Survey<'a> {
         let thin = found.len().div_ceil(MOST_FLOWS).max(1);
         let pair = |(i, (earlier, later)): (usize, (usize, usize))| {
             let (a, b) = (&self.frames[earlier], &self.frames[later]);
-            let ego = self.dataset.ego().ok();
+            let ego = self.dataset.ego().ok().map(Ego::level);
             let motion =
                 ego.and_then(|ego| ego.between(self.dataset.frames(), b.index, a.index).ok());
             let coarse = a.coarse.as_ref().zip(b.coarse.as_ref());

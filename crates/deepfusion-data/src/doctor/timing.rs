@@ -1,4 +1,5 @@
-//! Rates, gaps and lost frames, by the frames' numbers and time stamps.
+//! Rates, gaps and lost frames, by the frames' numbers and time stamps; and times at which the vehicle's motion is not
+//! known, by its own.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::median;
@@ -6,6 +7,8 @@ use crate::Dataset;
 
 /// Share of frames that may be missing, percent: KITTI's and the simulator's drives miss none.
 const MOST_LOST: f64 = 1.0;
+/// Share of the time between frames at which the motion may be unknown, percent. Sensors start and end some frames apart.
+const MOST_UNKNOWN: f64 = 2.0;
 /// Intervals longer than so many usual ones are gaps.
 const GAP: f64 = 1.5;
 
@@ -61,5 +64,49 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
                 .into(),
         )
     });
+    unknown_motion(dataset, &mut outcome);
     outcome
+}
+
+/// Where the speed has gaps, no pair can train: nothing is made up across them.
+fn unknown_motion(dataset: &Dataset, outcome: &mut Outcome) {
+    let Some(track) = dataset.track() else { return };
+    let (mut unknown, mut all, mut stretches, mut first) = (0.0, 0.0, 0, None);
+    let mut known = true;
+    for pair in dataset.frames().windows(2) {
+        let (Some(from_s), Some(to_s)) = (pair[0].time_s, pair[1].time_s) else {
+            continue;
+        };
+        if to_s <= from_s {
+            continue;
+        }
+        all += to_s - from_s;
+        let is_known = track.motion(from_s, to_s).is_some();
+        if !is_known {
+            unknown += to_s - from_s;
+            stretches += usize::from(known);
+            first = first.or(Some(pair[0].number));
+        }
+        known = is_known;
+    }
+    if all <= 0.0 {
+        return;
+    }
+    let share = 100.0 * unknown / all;
+    let figure = Figure::new(
+        "time without a motion",
+        share,
+        "%",
+        Limit::AtMost(MOST_UNKNOWN),
+    );
+    outcome.judge_at(Severity::Warning, first, figure, || {
+        let at = first.unwrap_or(0);
+        (
+            format!(
+                "the vehicle's motion is unknown for {unknown:.1} s in {stretches} stretches, the first from frame {at}: \
+                 its speed has gaps there, and no pair of these frames can train"
+            ),
+            "find out where the recorder drops messages of the speed, or cut the recording there".into(),
+        )
+    });
 }

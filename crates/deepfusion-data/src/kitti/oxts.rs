@@ -70,7 +70,7 @@ impl OxtsPacket {
     }
 }
 
-/// Reads the packets of an `oxts` folder as a track of forward speed (`vf`) and yaw rate (`wz`) over
+/// Reads the packets of an `oxts` folder as a track of forward speed (`vf`), yaw rate (`wz`), roll and pitch over
 /// seconds from `origin_ns`. Packets that are not there leave a gap.
 ///
 /// # Errors
@@ -80,10 +80,13 @@ pub fn read_oxts(folder: &Path, origin_ns: i64) -> Result<VehicleTrack> {
     let sample = |(time_s, packet): &(f64, OxtsPacket)| {
         (*time_s, packet.velocity_mps[0], packet.rate_radps[2])
     };
+    let tilt = |(time_s, packet): &(f64, OxtsPacket)| {
+        let [roll, pitch, _] = packet.attitude_rad;
+        (*time_s, roll, pitch)
+    };
     let packets = read_packets(folder, origin_ns)?;
-    Ok(VehicleTrack::new(
-        &packets.iter().map(sample).collect::<Vec<_>>(),
-    ))
+    let track = VehicleTrack::new(&packets.iter().map(sample).collect::<Vec<_>>());
+    Ok(track.with_tilt(&packets.iter().map(tilt).collect::<Vec<_>>()))
 }
 
 /// The packets of an `oxts` folder with their times in seconds from `origin_ns`, by number.

@@ -20,12 +20,15 @@ pub(super) struct Attitude<'a> {
 }
 
 impl<'a> Attitude<'a> {
-    /// Starts at the mean of what the first samples (one time constant long) say.
-    pub(super) fn level(stretch: &[ImuSample], speed: &'a Signal, time_constant_s: f64) -> Self {
+    /// Starts at the mean of what the samples of the first `start_s` say.
+    pub(super) fn level(
+        stretch: &[ImuSample],
+        speed: &'a Signal,
+        start_s: f64,
+        time_constant_s: f64,
+    ) -> Self {
         let begin = stretch[0].time_s;
-        let first = stretch
-            .iter()
-            .take_while(|s| s.time_s <= begin + time_constant_s);
+        let first = stretch.iter().take_while(|s| s.time_s <= begin + start_s);
         let sum: Vector3<f64> = first
             .map(|s| gravity_reaction(s, speed).unwrap_or(s.acceleration_mps2))
             .sum();
@@ -56,7 +59,7 @@ impl<'a> Attitude<'a> {
 
 /// The specific force without the vehicle's own acceleration: (v̇, v ω_z, 0) for wheels that do not
 /// slip. Without a speed the force itself, where it is as long as gravity.
-fn gravity_reaction(sample: &ImuSample, speed: &Signal) -> Option<Vector3<f64>> {
+pub(super) fn gravity_reaction(sample: &ImuSample, speed: &Signal) -> Option<Vector3<f64>> {
     let force = sample.acceleration_mps2;
     if let Some((v, slope)) = speed_and_slope(speed, sample.time_s) {
         return Some(force - Vector3::new(slope, v * sample.angular_rate_radps.z, 0.0));

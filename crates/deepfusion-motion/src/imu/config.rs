@@ -44,8 +44,9 @@ pub struct ImuConfig {
     /// the accelerometer, faster ones the gyro. The filter takes the vehicle's own acceleration out
     /// with the speed, so that it need not be long; a long one lets the gyro's drift tilt the horizon.
     pub attitude_time_s: f64,
-    /// The gyro's bias where the recording has no standstill, in rad/s about the vehicle's axes.
-    pub gyro_bias_radps: [f64; 3],
+    /// The gyro's bias where the recording has no standstill, in rad/s about the vehicle's axes. Where it is not given,
+    /// roll's and pitch's are found against gravity while driving, yaw's against the steering where there is one.
+    pub gyro_bias_radps: Option<[f64; 3]>,
     /// When the vehicle counts as standing still.
     pub standstill: StandstillConfig,
 }
@@ -55,7 +56,7 @@ impl Default for ImuConfig {
         Self {
             vehicle_from_imu: ImuMount::default(),
             attitude_time_s: 2.0,
-            gyro_bias_radps: [0.0; 3],
+            gyro_bias_radps: None,
             standstill: StandstillConfig::default(),
         }
     }
@@ -119,7 +120,7 @@ impl ImuConfig {
                 "a place on the vehicle, in metres",
             )?;
         }
-        for value in self.gyro_bias_radps {
+        for value in self.gyro_bias_radps.unwrap_or_default() {
             check(
                 value.abs() <= 1.0,
                 "gyro_bias_radps",

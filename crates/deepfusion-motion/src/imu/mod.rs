@@ -3,9 +3,11 @@
 
 mod attitude;
 mod config;
+mod driving_bias;
 mod standstill;
 
 pub use config::{ImuConfig, ImuMount, StandstillConfig};
+pub(crate) use driving_bias::{DrivingBias, at as bias_at};
 pub use standstill::{Standstill, standstills};
 
 use crate::{Error, Result, Signal};
@@ -20,6 +22,10 @@ pub(crate) const GRAVITY: f64 = 9.806_65;
 const GRAVITY_RANGE: std::ops::Range<f64> = 8.3..11.3;
 /// No mount is crooked by more: beyond this angle, in radians, axes are swapped.
 const MOST_TILT_RAD: f64 = std::f64::consts::FRAC_PI_4;
+
+/// Time constant of the filter that says how the body leans, in seconds. Long: within the second between two frames the
+/// gyro, freed of its bias, knows a change to a thousandth of a radian, the accelerometer does not.
+const LEAN_TIME_S: f64 = 15.0;
 
 /// One reading of an inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,6 +53,8 @@ pub struct ImuTrack {
     yaw_rate_radps: Signal,
     /// About the vehicle's x (roll) and y (pitch).
     tilt_rates_radps: [Signal; 2],
+    /// Roll and pitch against gravity.
+    tilt_rad: [Signal; 2],
     standstills: Vec<Standstill>,
 }
 
@@ -83,9 +91,16 @@ impl ImuTrack {
         check_gravity(&clean)?;
 
         let standstills = standstills(&clean, speed, &config.standstill);
+        let max_gap_s = Signal::new(clean.iter().map(|s| (s.time_s, 0.0))).max_gap_s();
+        let driving = match (standstills.is_empty(), config.gyro_bias_radps) {
+            (true, None) => driving_bias::tilt_biases(&clean, speed, max_gap_s),
+            _ => Vec::new(),
+        };
+        let configured = Vector3::from(config.gyro_bias_radps.unwrap_or_default());
         for sample in &mut clean {
             sample.angular_rate_radps -= standstill::gyro_bias(&standstills, sample.time_s)
-                .unwrap_or_else(|| Vector3::from(config.gyro_bias_radps));
+                .or_else(|| bias_at(&driving, sample.time_s))
+                .unwrap_or(configured);
             // The unit is not at the vehicle's origin: in a bend it feels ω × (ω × r) more. (ω̇ × r is
             // left in: a gyro's derivative is noisier than the term is large.)
             let omega = sample.angular_rate_radps;
@@ -93,18 +108,24 @@ impl ImuTrack {
         }
 
         // The gaps are the same for all that is derived from the samples.
-        let max_gap_s = Signal::new(clean.iter().map(|s| (s.time_s, 0.0))).max_gap_s();
         let (mut forward, mut yaw) = (Vec::new(), Vec::new());
+        let mut tilt = [Vec::new(), Vec::new()];
         for stretch in clean.chunk_by(|a, b| b.time_s - a.time_s <= max_gap_s) {
-            let mut attitude = Attitude::level(stretch, speed, config.attitude_time_s);
+            let start_s = config.attitude_time_s;
+            let mut attitude = Attitude::level(stretch, speed, start_s, start_s);
+            let mut leaning = Attitude::level(stretch, speed, start_s, LEAN_TIME_S.max(start_s));
             for sample in stretch {
                 let up = attitude.advance(sample);
+                let lean = leaning.advance(sample);
                 // Ahead, level: what the specific force has along it is the vehicle's acceleration
                 // alone. Standing or climbing, with the unit's nose up or down.
                 let ahead = Vector3::x() - up * up.x;
                 let ahead = ahead / ahead.norm().max(1e-9);
                 forward.push((sample.time_s, sample.acceleration_mps2.dot(&ahead)));
                 yaw.push((sample.time_s, sample.angular_rate_radps.dot(&up)));
+                // Up is the third row of Rz(yaw)·Ry(pitch)·Rx(roll).
+                tilt[0].push((sample.time_s, lean.y.atan2(lean.z)));
+                tilt[1].push((sample.time_s, (-lean.x).clamp(-1.0, 1.0).asin()));
             }
         }
         Ok(Self {
@@ -114,6 +135,7 @@ impl ImuTrack {
                 let rate = |s: &ImuSample| (s.time_s, s.angular_rate_radps[axis]);
                 Signal::with_max_gap(clean.iter().map(rate), max_gap_s)
             }),
+            tilt_rad: tilt.map(|angles| Signal::with_max_gap(angles, max_gap_s)),
             standstills,
         })
     }
@@ -130,6 +152,15 @@ impl ImuTrack {
         &self.yaw_rate_radps
     }
 
+    /// Roll (the left side up) and pitch (the nose down) against gravity at a time, in radians: the gyro's over
+    /// short times, the accelerometer's over long ones. Climbing counts as pitch. `None` where the recording does
+    /// not cover the time.
+    #[must_use]
+    pub fn tilt(&self, time_s: f64) -> Option<[f64; 2]> {
+        let [roll, pitch] = &self.tilt_rad;
+        Some([roll.at(time_s)?, pitch.at(time_s)?])
+    }
+
     /// Roll rate about the vehicle's x in rad/s, positive where the left side rises.
     #[must_use]
     pub fn roll_rate(&self) -> &Signal {
@@ -142,7 +173,7 @@ impl ImuTrack {
         &self.tilt_rates_radps[1]
     }
 
-    /// Where the vehicle stood still. Without any, the gyro's bias is that of the configuration.
+    /// Where the vehicle stood still. Without any, the gyro's bias is that of the configuration, or found while driving.
     #[must_use]
     pub fn standstills(&self) -> &[Standstill] {
         &self.standstills

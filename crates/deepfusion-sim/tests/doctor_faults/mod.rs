@@ -186,6 +186,13 @@ impl Drive {
         }
     }
 
+    pub fn remove_oxts(&self, numbers: std::ops::Range<usize>) {
+        for number in numbers {
+            let path = self.drive().join(format!("oxts/data/{number:010}.txt"));
+            std::fs::remove_file(path).unwrap();
+        }
+    }
+
     /// Each of these is there once more instead of the next.
     pub fn repeat_images(&self, numbers: &[usize]) {
         for number in numbers {

@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
+use deepfusion_data::DatasetKind;
 use deepfusion_data::doctor::{Diagnosis, Severity, doctor};
 
 use crate::cli::{CameraIntrinsics, DoctorArgs};
@@ -75,10 +76,15 @@ fn as_json(diagnosis: &Diagnosis) -> serde_json::Value {
 fn told(diagnosis: &Diagnosis, verbose: bool) -> String {
     let mut text = String::new();
     for drive in &diagnosis.drives {
+        // Only KITTI numbers its cameras.
+        let camera = match drive.kind {
+            DatasetKind::KittiRaw => format!(" (camera {})", drive.camera),
+            _ => String::new(),
+        };
         let _ = writeln!(
             text,
-            "{} (camera {}): {} frames, {} looked at",
-            drive.name, drive.camera, drive.frames, drive.looked_at
+            "{}{camera}: {} frames, {} looked at",
+            drive.name, drive.frames, drive.looked_at
         );
     }
     let findings = diagnosis.findings();

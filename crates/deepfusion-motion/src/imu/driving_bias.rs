@@ -1,0 +1,104 @@
+//! The gyro's bias where a vehicle never stands: what its turning and the direction of gravity disagree by.
+
+use super::ImuSample;
+use super::attitude::gravity_reaction;
+use crate::Signal;
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+/// A bias is found over at most this long, in seconds: it follows the unit's temperature.
+const WINDOW_S: f64 = 30.0;
+/// Shorter stretches say too little, in seconds.
+const SHORTEST_S: f64 = 1.0;
+/// Usual biases, in rad/s.
+const USUAL_BIAS: f64 = 0.008;
+/// Usual errors of up by the accelerometer, in radians, and how long one lasts, in seconds: bumps, and a speed's slope.
+const UP_ERROR: f64 = 0.01;
+const UP_ERROR_S: f64 = 0.5;
+/// Usual errors of the first direction of up, in radians.
+const START_ERROR: f64 = 0.1;
+
+/// Three numbers that a sensor is wrong by, and when that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct DrivingBias {
+    pub(crate) middle_s: f64,
+    pub(crate) bias: Vector3<f64>,
+}
+
+/// The bias about roll and pitch by windows, vehicle axes, in rad/s; none about the vertical, which gravity does not
+/// show.
+///
+/// In each window up is turned on from where it first was by the gyro alone; how it then leaves what the accelerometer
+/// says is linear in the first direction's error δ and in the bias b: up' = −(ω − b) × up.
+pub(super) fn tilt_biases(
+    samples: &[ImuSample],
+    speed: &Signal,
+    max_gap_s: f64,
+) -> Vec<DrivingBias> {
+    let goes_on = |a: &ImuSample, b: &ImuSample| b.time_s - a.time_s <= max_gap_s;
+    let mut found = Vec::new();
+    for stretch in samples.chunk_by(goes_on) {
+        let begin = stretch[0].time_s;
+        let length_s = stretch[stretch.len() - 1].time_s - begin;
+        // Windows of equal length, so that none is a rest.
+        let window_s = length_s / (length_s / WINDOW_S).ceil().max(1.0) + 1e-9;
+        let window = |s: &ImuSample| ((s.time_s - begin) / window_s) as u64;
+        let windows = stretch.chunk_by(|a, b| window(a) == window(b));
+        found.extend(windows.filter_map(|samples| tilt_bias(samples, speed)));
+    }
+    found
+}
+
+fn tilt_bias(samples: &[ImuSample], speed: &Signal) -> Option<DrivingBias> {
+    let (from_s, to_s) = (samples.first()?.time_s, samples.last()?.time_s);
+    if to_s - from_s < SHORTEST_S {
+        return None;
+    }
+    let measured = |s: &ImuSample| gravity_reaction(s, speed)?.try_normalize(1e-6);
+    let mut up = samples.iter().find_map(measured)?;
+    let (mut by_start, mut by_bias) = (Matrix3::identity(), Matrix3::zeros());
+    // Unknowns: the first direction's error along x and y, the bias about x and y.
+    let priors = [START_ERROR, START_ERROR, USUAL_BIAS, USUAL_BIAS];
+    let mut normal =
+        SMatrix::<f64, 4, 4>::from_diagonal(&SVector::from(priors.map(|p| p.powi(-2))));
+    let mut right = SVector::<f64, 4>::zeros();
+    let mut last_s = from_s;
+    for sample in samples {
+        let dt = sample.time_s - last_s;
+        last_s = sample.time_s;
+        let turn = -sample.angular_rate_radps.cross_matrix() * dt;
+        // Of the middle of the step, in the error as in what it depends on.
+        let step = Matrix3::identity() + turn + 0.5 * turn * turn;
+        by_bias = step * by_bias - up.cross_matrix() * dt;
+        (up, by_start) = (step * up, step * by_start);
+        let Some(measured) = measured(sample) else {
+            continue;
+        };
+        let weight = dt / UP_ERROR_S / UP_ERROR.powi(2);
+        let mut rows = SMatrix::<f64, 2, 4>::zeros();
+        rows.fixed_columns_mut::<2>(0)
+            .copy_from(&by_start.fixed_view::<2, 2>(0, 0));
+        rows.fixed_columns_mut::<2>(2)
+            .copy_from(&by_bias.fixed_view::<2, 2>(0, 0));
+        let left = (measured - up).xy();
+        normal += weight * rows.transpose() * rows;
+        right += weight * rows.transpose() * left;
+    }
+    let found = normal.cholesky()?.solve(&right);
+    Some(DrivingBias {
+        middle_s: 0.5 * (from_s + to_s),
+        bias: Vector3::new(found[2], found[3], 0.0),
+    })
+}
+
+/// The bias at a time, in proportion between those found before and after; `None` without any.
+pub(crate) fn at(found: &[DrivingBias], time_s: f64) -> Option<Vector3<f64>> {
+    let after = found.partition_point(|b| b.middle_s <= time_s);
+    match (after.checked_sub(1).map(|i| found[i]), found.get(after)) {
+        (Some(before), Some(next)) => {
+            let share = (time_s - before.middle_s) / (next.middle_s - before.middle_s);
+            Some(before.bias.lerp(&next.bias, share))
+        }
+        (Some(only), None) => Some(only.bias),
+        (None, next) => next.map(|b| b.bias),
+    }
+}
