@@ -4,7 +4,7 @@ use crate::{FusedTrack, VehicleMotion, VehicleTrack};
 #[derive(Debug, Clone, PartialEq)]
 pub enum MotionModel {
     /// One unit that gives speed and yaw rate (KITTI's oxts).
-    Track(VehicleTrack),
+    Track(Box<VehicleTrack>),
     /// Speed, steering and inertial unit, each with its own clock rate.
     Fused(Box<FusedTrack>),
 }
@@ -50,7 +50,7 @@ impl MotionModel {
 
 impl From<VehicleTrack> for MotionModel {
     fn from(track: VehicleTrack) -> Self {
-        Self::Track(track)
+        Self::Track(Box::new(track))
     }
 }
 

@@ -59,7 +59,7 @@ impl From<&FusedTrack> for VehicleRates {
 impl From<&MotionModel> for VehicleRates {
     fn from(motion: &MotionModel) -> Self {
         match motion {
-            MotionModel::Track(track) => track.into(),
+            MotionModel::Track(track) => track.as_ref().into(),
             MotionModel::Fused(track) => track.as_ref().into(),
         }
     }
