@@ -5,6 +5,7 @@ use super::finding::{Figure, Limit, Outcome, Severity};
 use super::survey::Survey;
 use super::turn::picture_turn;
 use deepfusion_motion::{ImageMotion, OffsetConfig, Signal, TimeOffset, VehicleRates, time_offset};
+use rayon::prelude::*;
 
 /// Offset that matters, in seconds: at 10 m/s² of braking 20 ms are 0.2 m/s.
 const MOST_S: f64 = 0.020;
@@ -104,7 +105,72 @@ fn settled(
             break;
         }
     }
-    Ok(offset)
+    match rates.pitch_rate_radps.is_some() {
+        true => Ok(refined(survey, pairs, offset)),
+        false => Ok(offset),
+    }
+}
+
+/// How far about a first estimate the better one is looked for, and in what steps, seconds.
+const AROUND_S: f64 = 0.06;
+/// See [`AROUND_S`].
+const STEP_S: f64 = 0.004;
+/// Pairs that are left out together for the standard error: half a second of them.
+const BLOCK: usize = 5;
+
+/// The offset at which the points agree best with the vehicle's turns about all three axes, where an inertial unit has them. A
+/// turn that is measured in the picture first is coupled to the others, and to what near things do; here none is measured.
+/// The first estimate where the best one lies at the end of what was looked at.
+fn refined(survey: &Survey<'_>, pairs: &[EpipolarPair], first: TimeOffset) -> TimeOffset {
+    let Ok(ego) = survey.dataset.ego() else {
+        return first;
+    };
+    let steps = (AROUND_S / STEP_S).round() as i32;
+    let offset_s = |step: f64| first.vehicle_minus_camera_s + step * STEP_S;
+    // Costs of each pair that has a motion at every offset, by offset.
+    let costs: Vec<Vec<f64>> = pairs
+        .par_iter()
+        .filter_map(|pair| {
+            let cost = |step: i32| {
+                let pair = pair.with_clock(&ego, offset_s(f64::from(step)))?;
+                Some(pair.cost_of_the_vehicle_s_turn(&pair.direction()?))
+            };
+            (-steps..=steps).map(cost).collect()
+        })
+        .collect();
+    let best_without = |block: Option<usize>| {
+        let kept = costs.iter().enumerate();
+        let kept = kept.filter(|(i, _)| block != Some(i / BLOCK));
+        let mut sums = vec![0.0; 2 * steps as usize + 1];
+        for (_, of_pair) in kept {
+            sums.iter_mut().zip(of_pair).for_each(|(s, c)| *s += c);
+        }
+        lowest(&sums).map(|at| offset_s(at - f64::from(steps)))
+    };
+    let Some(best) = best_without(None) else {
+        return first;
+    };
+    // Delete-a-block jackknife.
+    let blocks = costs.len().div_ceil(BLOCK);
+    let others: Vec<f64> = (0..blocks).filter_map(|b| best_without(Some(b))).collect();
+    if blocks < 4 || others.len() < blocks {
+        return first;
+    }
+    let squares: f64 = others.iter().map(|o| (o - best).powi(2)).sum();
+    let share = (blocks - 1) as f64 / blocks as f64;
+    TimeOffset {
+        vehicle_minus_camera_s: best,
+        std_error_s: (share * squares).sqrt(),
+        ..first
+    }
+}
+
+/// Where a parabola through the lowest value and its neighbours is least; `None` at an end.
+fn lowest(values: &[f64]) -> Option<f64> {
+    let at = (0..values.len()).min_by(|a, b| values[*a].total_cmp(&values[*b]))?;
+    let (before, after) = (values.get(at.checked_sub(1)?)?, values.get(at + 1)?);
+    let bend = before - 2.0 * values[at] + after;
+    Some(at as f64 + 0.5 * (before - after) / bend.max(1e-12))
 }
 
 /// How the pictures moved. The turn by the points that were followed is truer than shift, drop and roll of the whole picture,

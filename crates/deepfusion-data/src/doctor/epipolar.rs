@@ -9,6 +9,7 @@
 //! alone, only the turn moves it: for a direction given, ω follows by linear least squares, and the
 //! direction is the one that leaves the least (Bruss and Horn 1983).
 
+mod agreement;
 mod pitching;
 
 use super::flow::Flow;

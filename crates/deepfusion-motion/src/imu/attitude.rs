@@ -17,6 +17,7 @@ pub(super) struct Attitude<'a> {
     time_constant_s: f64,
     up: Vector3<f64>,
     last_s: f64,
+    last_rate: Vector3<f64>,
 }
 
 impl<'a> Attitude<'a> {
@@ -37,6 +38,7 @@ impl<'a> Attitude<'a> {
             time_constant_s,
             up: sum.try_normalize(1e-6).unwrap_or_else(Vector3::z),
             last_s: begin,
+            last_rate: stretch[0].angular_rate_radps,
         }
     }
 
@@ -45,8 +47,11 @@ impl<'a> Attitude<'a> {
     pub(super) fn advance(&mut self, sample: &ImuSample) -> Vector3<f64> {
         let dt = sample.time_s - self.last_s;
         self.last_s = sample.time_s;
+        // Trapezoidal: by the sample's own rate alone the lean would be half an interval early.
+        let rate = 0.5 * (self.last_rate + sample.angular_rate_radps);
+        self.last_rate = sample.angular_rate_radps;
         // A direction fixed to the world, seen from a body that turns at ω, changes by −ω × it.
-        let mut up = self.up - sample.angular_rate_radps.cross(&self.up) * dt;
+        let mut up = self.up - rate.cross(&self.up) * dt;
         if let Some(measured) =
             gravity_reaction(sample, self.speed).and_then(|g| g.try_normalize(1e-6))
         {
