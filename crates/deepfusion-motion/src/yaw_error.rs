@@ -1,13 +1,9 @@
 //! What gyro and steering are wrong by about the vertical, found by what they disagree by while driving.
 
-use crate::imu::DrivingBias;
+use crate::imu::{DrivingBias, by_windows};
 use crate::{Bicycle, Signal};
 use nalgebra::{SMatrix, SVector, Vector3};
 
-/// Errors are found over at most this long, in seconds: a gyro's bias follows its temperature.
-const WINDOW_S: f64 = 30.0;
-/// Shorter stretches say too little, in seconds.
-const SHORTEST_S: f64 = 1.0;
 /// Usual errors of the road wheels' straight ahead, in radians: a degree of the steering wheel.
 const USUAL_OFFSET: f64 = 0.001;
 /// Usual errors of the steering's factor: wheelbase, ratio, and tyres that slip.
@@ -39,23 +35,15 @@ pub(crate) fn yaw_errors(
         .filter_map(|(t, gyro)| Some([*t, *gyro, steering.at(*t)?, speed.at(*t)?]))
         .collect();
     let usual = [usual_bias, USUAL_OFFSET / bicycle.wheelbase_m, USUAL_FACTOR];
-    let mut found = Vec::new();
-    for stretch in readings.chunk_by(|a, b| b[0] - a[0] <= gyro.max_gap_s()) {
-        let (begin, end) = (stretch[0][0], stretch[stretch.len() - 1][0]);
-        // Windows of equal length, so that none is a rest.
-        let window_s = (end - begin) / ((end - begin) / WINDOW_S).ceil().max(1.0) + 1e-9;
-        let window = |r: &[f64; 4]| ((r[0] - begin) / window_s) as u64;
-        let windows = stretch.chunk_by(|a, b| window(a) == window(b));
-        found.extend(windows.filter_map(|readings| yaw_error(readings, usual)));
-    }
-    found
+    by_windows(
+        &readings,
+        |r| r[0],
+        gyro.max_gap_s(),
+        |window| yaw_error(window, usual),
+    )
 }
 
-fn yaw_error(readings: &[[f64; 4]], usual: [f64; 3]) -> Option<DrivingBias> {
-    let (from_s, to_s) = (readings.first()?[0], readings.last()?[0]);
-    if to_s - from_s < SHORTEST_S {
-        return None;
-    }
+fn yaw_error(readings: &[[f64; 4]], usual: [f64; 3]) -> Option<Vector3<f64>> {
     let held = SVector::from(usual.map(|error| error.powi(-2)));
     let mut normal = SMatrix::<f64, 3, 3>::from_diagonal(&held);
     let mut right = Vector3::zeros();
@@ -66,8 +54,5 @@ fn yaw_error(readings: &[[f64; 4]], usual: [f64; 3]) -> Option<DrivingBias> {
         normal += weight * row * row.transpose();
         right += weight * (gyro - steering) * row;
     }
-    Some(DrivingBias {
-        middle_s: 0.5 * (from_s + to_s),
-        bias: normal.cholesky()?.solve(&right),
-    })
+    Some(normal.cholesky()?.solve(&right))
 }

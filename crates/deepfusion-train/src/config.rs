@@ -37,7 +37,8 @@ pub enum ViewMotion {
     PoseNet,
     /// PoseNet's rotation and direction, with the length that the vehicle's speed gives.
     Distance,
-    /// The vehicle's own, from speed and yaw rate (SPEC 3.4). PoseNet learns that motion beside it.
+    /// The vehicle's own, from speed and yaw rate (SPEC 3.4), and the body's lean where it is known. PoseNet learns
+    /// that motion beside it.
     Vehicle,
 }
 

@@ -100,7 +100,9 @@ fn by_twist(index: &Index, origin_ns: i64) -> Motion {
 
 /// Roll and pitch by their rates: from any start, since only their change counts.
 fn leaning(index: &Index, origin_ns: i64) -> Vec<(f64, f64, f64)> {
-    let mut rates = index.tilt_rates.clone();
+    let finite = |(_, rates): &&(i64, [f64; 2])| rates.iter().all(|rate| rate.is_finite());
+    // One reading that is no number would spoil the sum of all after it.
+    let mut rates: Vec<_> = index.tilt_rates.iter().filter(finite).copied().collect();
     rates.sort_by_key(|(ns, _)| *ns);
     let mut tilt = [0.0; 2];
     let mut last: Option<&(i64, [f64; 2])> = None;

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// A bias is found over at most this long, in seconds: it follows the unit's temperature.
 const WINDOW_S: f64 = 30.0;
-/// Shorter stretches say too little, in seconds.
+/// Shorter windows say too little, in seconds.
 const SHORTEST_S: f64 = 1.0;
 /// Usual biases, in rad/s.
 const USUAL_BIAS: f64 = 0.008;
@@ -34,25 +34,42 @@ pub(super) fn tilt_biases(
     speed: &Signal,
     max_gap_s: f64,
 ) -> Vec<DrivingBias> {
-    let goes_on = |a: &ImuSample, b: &ImuSample| b.time_s - a.time_s <= max_gap_s;
+    by_windows(
+        samples,
+        |s| s.time_s,
+        max_gap_s,
+        |window| tilt_bias(window, speed),
+    )
+}
+
+/// What `find` says of each window: stretches without a gap, cut into parts of equal length so that none is a rest. Shorter
+/// ones than a second are left out.
+pub(crate) fn by_windows<T>(
+    samples: &[T],
+    time_s: impl Fn(&T) -> f64,
+    max_gap_s: f64,
+    find: impl Fn(&[T]) -> Option<Vector3<f64>>,
+) -> Vec<DrivingBias> {
     let mut found = Vec::new();
-    for stretch in samples.chunk_by(goes_on) {
-        let begin = stretch[0].time_s;
-        let length_s = stretch[stretch.len() - 1].time_s - begin;
-        // Windows of equal length, so that none is a rest.
+    for stretch in samples.chunk_by(|a, b| time_s(b) - time_s(a) <= max_gap_s) {
+        let begin = time_s(&stretch[0]);
+        let length_s = time_s(&stretch[stretch.len() - 1]) - begin;
         let window_s = length_s / (length_s / WINDOW_S).ceil().max(1.0) + 1e-9;
-        let window = |s: &ImuSample| ((s.time_s - begin) / window_s) as u64;
-        let windows = stretch.chunk_by(|a, b| window(a) == window(b));
-        found.extend(windows.filter_map(|samples| tilt_bias(samples, speed)));
+        let number = |s: &T| ((time_s(s) - begin) / window_s) as u64;
+        for window in stretch.chunk_by(|a, b| number(a) == number(b)) {
+            let (from_s, to_s) = (time_s(&window[0]), time_s(&window[window.len() - 1]));
+            if to_s - from_s >= SHORTEST_S
+                && let Some(bias) = find(window)
+            {
+                let middle_s = 0.5 * (from_s + to_s);
+                found.push(DrivingBias { middle_s, bias });
+            }
+        }
     }
     found
 }
 
-fn tilt_bias(samples: &[ImuSample], speed: &Signal) -> Option<DrivingBias> {
-    let (from_s, to_s) = (samples.first()?.time_s, samples.last()?.time_s);
-    if to_s - from_s < SHORTEST_S {
-        return None;
-    }
+fn tilt_bias(samples: &[ImuSample], speed: &Signal) -> Option<Vector3<f64>> {
     let measured = |s: &ImuSample| gravity_reaction(s, speed)?.try_normalize(1e-6);
     let mut up = samples.iter().find_map(measured)?;
     let (mut by_start, mut by_bias) = (Matrix3::identity(), Matrix3::zeros());
@@ -61,7 +78,7 @@ fn tilt_bias(samples: &[ImuSample], speed: &Signal) -> Option<DrivingBias> {
     let mut normal =
         SMatrix::<f64, 4, 4>::from_diagonal(&SVector::from(priors.map(|p| p.powi(-2))));
     let mut right = SVector::<f64, 4>::zeros();
-    let mut last_s = from_s;
+    let mut last_s = samples.first()?.time_s;
     for sample in samples {
         let dt = sample.time_s - last_s;
         last_s = sample.time_s;
@@ -84,10 +101,7 @@ fn tilt_bias(samples: &[ImuSample], speed: &Signal) -> Option<DrivingBias> {
         right += weight * rows.transpose() * left;
     }
     let found = normal.cholesky()?.solve(&right);
-    Some(DrivingBias {
-        middle_s: 0.5 * (from_s + to_s),
-        bias: Vector3::new(found[2], found[3], 0.0),
-    })
+    Some(Vector3::new(found[2], found[3], 0.0))
 }
 
 /// The bias at a time, in proportion between those found before and after; `None` without any.

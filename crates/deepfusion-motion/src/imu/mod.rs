@@ -7,7 +7,7 @@ mod driving_bias;
 mod standstill;
 
 pub use config::{ImuConfig, ImuMount, StandstillConfig};
-pub(crate) use driving_bias::{DrivingBias, at as bias_at};
+pub(crate) use driving_bias::{DrivingBias, at as bias_at, by_windows};
 pub use standstill::{Standstill, standstills};
 
 use crate::{Error, Result, Signal};

@@ -1,10 +1,8 @@
 //! How well a pair's points agree with a turn that is given: what decides between times of the vehicle's clock.
 
+use super::pitching::USUAL_PITCH;
 use super::{EpipolarPair, ROUNDS, along, headed_past, turning};
 use nalgebra::{Vector2, Vector3};
-
-/// How far a car's nose is usually up or down, radians.
-const USUAL_PITCH: f64 = 0.02;
 
 impl EpipolarPair {
     /// Sum of the points' robust costs, ½ ln(1 + (residual / noise)²), across their epipolar lines if the camera turned as

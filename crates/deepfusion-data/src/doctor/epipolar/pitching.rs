@@ -9,7 +9,7 @@ use super::{EpipolarPair, ROUNDS, USUAL_TILT, along, headed_past, turning};
 use nalgebra::{Matrix4, Vector2, Vector3, Vector4};
 
 /// How far a car's nose is usually up or down, radians.
-const USUAL_PITCH: f64 = 0.02;
+pub(super) const USUAL_PITCH: f64 = 0.02;
 
 impl EpipolarPair {
     /// The camera's turn by its points, radians about its axes, if it moved along `direction` but for a pitch of the moment.
