@@ -102,6 +102,9 @@ pub struct TrainConfig {
     /// Steps of the optimiser, where given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<usize>,
+    /// The least steps of the optimiser where `steps` is not given: the epochs of a short drive are too few to learn from.
+    #[serde(default)]
+    pub min_steps: usize,
     /// Adam's step size.
     pub learning_rate: f64,
     /// Steps over which the step size rises from 0: large first steps can flatten the depth for good.
@@ -239,6 +242,13 @@ impl TrainConfig {
         Ok(())
     }
 
+    /// Steps of the optimiser in a run whose epochs have so many.
+    #[must_use]
+    pub fn steps_of(&self, steps_an_epoch: usize) -> usize {
+        let of_epochs = self.epochs * steps_an_epoch;
+        self.steps.unwrap_or(of_epochs.max(self.min_steps))
+    }
+
     /// Whether anything in training reads how the vehicle turned, not only how far it went.
     #[must_use]
     pub fn reads_rotation(&self) -> bool {
@@ -372,6 +382,19 @@ mod tests {
         assert_eq!(config.depth_net, start.depth_net);
         let error = config.with("hope").unwrap_err().to_string();
         assert!(error.contains("hce, attention, aggregation"), "{error}");
+    }
+
+    /// A short drive gets the least steps, a long one its epochs, and whoever names a number that number.
+    #[test]
+    fn a_short_drive_has_enough_steps() {
+        let mut config = Preset::Light.config();
+        assert_eq!((config.epochs, config.min_steps), (20, 1200));
+        assert_eq!(config.steps_of(34), 1200);
+        assert_eq!(config.steps_of(340), 6800);
+        config.min_steps = 0;
+        assert_eq!(config.steps_of(34), 680);
+        config.steps = Some(5);
+        assert_eq!(config.steps_of(34), 5);
     }
 
     /// Without the speed term the views follow PoseNet: `without` sees to it, and whoever says otherwise

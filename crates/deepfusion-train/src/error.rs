@@ -126,7 +126,12 @@ impl Error {
             Self::Config { field: "data" | "data.paths", .. } => Some(
                 "give recordings with --data, or as data.paths or [[data.sets]] in the config file, one of the three".into(),
             ),
-            Self::Config { .. } => None,
+            Self::Config { field: "view_motion", .. } => Some(
+                "without the speed loss nothing measured may enter: take --view-motion posenet, or keep the speed loss".into(),
+            ),
+            Self::Config { field, .. } => Some(format!(
+                "set `{field}` so in the config file, or by its option; --help lists them"
+            )),
             Self::ConfigFile { .. } => Some(
                 "a run's own config.toml is a complete example; start from one and change it".into(),
             ),

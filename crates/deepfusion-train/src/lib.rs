@@ -52,7 +52,7 @@ pub use pose::{Motion, rotation_from_axis_angle};
 pub use pose_predictor::PosePredictor;
 pub use predictor::{Prediction, Predictor};
 pub use prepare::{PreparedImage, Preparer};
-pub use preset::Preset;
+pub use preset::{Compute, Preset};
 
 pub use runner::{BurnRunner, DepthRunner, FusedRunner};
 pub use sampler::Sampler;

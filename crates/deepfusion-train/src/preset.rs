@@ -24,6 +24,20 @@ pub enum Preset {
     Monodepth2,
 }
 
+/// What a run computes on, as far as a preset's sizes follow it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Compute {
+    /// A few cores.
+    Processor,
+    /// A graphics card.
+    Gpu,
+}
+
+/// Fewer steps than this teach a network from scratch hardly anything, however short the drive: on 154 frames, 1,200
+/// steps of `light` came to an abs_rel of 0.24 to 0.26 on another street, where 20 epochs would be 240 steps
+/// (docs/BENCHMARKS.md).
+const MIN_STEPS: usize = 1200;
+
 impl Preset {
     /// All presets with the names the command line takes.
     pub const ALL: [(Self, &'static str); 5] = [
@@ -34,7 +48,22 @@ impl Preset {
         (Self::Monodepth2, "monodepth2"),
     ];
 
-    /// The configuration.
+    /// The configuration to train with on such a device. On a processor every preset takes images of 320×96, four a step,
+    /// which it learns from in minutes: twelve of 640×192 are twelve times as many pixels.
+    #[must_use]
+    pub fn config_on(self, compute: Compute) -> TrainConfig {
+        let mut config = self.config();
+        if compute == Compute::Processor {
+            config.size = InputSize {
+                width: 320,
+                height: 96,
+            };
+            config.batch = 4;
+        }
+        config
+    }
+
+    /// The configuration at the preset's full size.
     #[must_use]
     pub fn config(self) -> TrainConfig {
         let base = |depth: ResNetDepth| TrainConfig {
@@ -51,6 +80,7 @@ impl Preset {
             accumulate: 1,
             epochs: 20,
             steps: None,
+            min_steps: MIN_STEPS,
             learning_rate: 1e-4,
             learning_rate_warmup_steps: 0,
             learning_rate_drop: 0.75,
@@ -153,6 +183,25 @@ impl std::fmt::Display for Preset {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A processor's images are small; on a graphics card, and where nothing is trained, the sizes are the published ones.
+    #[test]
+    fn sizes_follow_the_device() {
+        for (preset, _) in Preset::ALL {
+            let on = |compute| {
+                let config = preset.config_on(compute);
+                config.validate().unwrap();
+                (config.size.width, config.size.height, config.batch)
+            };
+            assert_eq!(on(Compute::Processor), (320, 96, 4), "{preset}");
+            let full = match preset {
+                Preset::Tiny => (320, 96, 4),
+                _ => (640, 192, 12),
+            };
+            assert_eq!(on(Compute::Gpu), full, "{preset}");
+            assert_eq!(preset.config_on(Compute::Gpu), preset.config());
+        }
+    }
 
     #[test]
     fn every_preset_is_valid_and_survives_its_file() {

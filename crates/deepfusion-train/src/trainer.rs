@@ -134,12 +134,12 @@ impl Trainer {
     /// Steps of the optimiser in the whole run.
     #[must_use]
     pub fn steps(&self) -> usize {
-        let sampler = Sampler::new(self.train.samples.len(), self.config.batch, 0);
-        let epoch = sampler.batches_per_epoch().div_ceil(self.config.accumulate);
-        self.config.steps.unwrap_or(self.config.epochs * epoch)
+        self.config.steps_of(self.epoch_steps())
     }
 
-    fn epoch_steps(&self) -> usize {
+    /// Steps of the optimiser in a pass over the data.
+    #[must_use]
+    pub fn epoch_steps(&self) -> usize {
         let sampler = Sampler::new(self.train.samples.len(), self.config.batch, 0);
         sampler.batches_per_epoch().div_ceil(self.config.accumulate)
     }

@@ -193,7 +193,9 @@ impl CliError {
             Self::NoRerun => Some(
                 "build it with `cargo build --release --features rerun`, or leave out --rerun to look at the folder in a browser".into(),
             ),
-            Self::NoImages { .. } => None,
+            Self::NoImages { .. } => Some(
+                "give images, a folder of them, or a pattern such as 'drive/*.png'; a recording is given by its own folder or file".into(),
+            ),
             Self::NoModel { .. } => Some("give run folders alone, or leave out --pictures".into()),
             Self::SeveralDrives { .. } => Some("convert them one by one: give a drive's own folder".into()),
             Self::NoRos2Writer { .. } => {
@@ -289,10 +291,32 @@ pub fn report(problem: &anyhow::Error) -> ExitCode {
             told = cause;
         }
     }
-    if let Some(hint) = hint_of(problem) {
-        anstream::eprintln!("{HINT}hint:{HINT:#} {hint}");
-    }
+    let hint = hint_of(problem).unwrap_or_else(|| general_hint(problem));
+    anstream::eprintln!("{HINT}hint:{HINT:#} {hint}");
     ExitCode::FAILURE
+}
+
+/// What to do about an error that knows no remedy of its own: the system's reason decides.
+fn general_hint(problem: &anyhow::Error) -> String {
+    use std::io::ErrorKind;
+    let kind = problem.chain().find_map(|cause| {
+        let error = cause.downcast_ref::<std::io::Error>();
+        error.map(std::io::Error::kind)
+    });
+    match kind {
+        Some(ErrorKind::NotFound) => "check the spelling, and that the disk is mounted",
+        Some(ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem) => {
+            "check the permissions, or choose a place that you may write to"
+        }
+        Some(ErrorKind::StorageFull | ErrorKind::QuotaExceeded) => {
+            "the disk is full: free some space and run the same again"
+        }
+        Some(_) => "the system gave this reason: look at the disk or the network that the file is on",
+        None => {
+            "where the message names no input of yours to mend, it is a fault of the program: please report it with the command"
+        }
+    }
+    .to_owned()
 }
 
 /// The first remedy that an error of the chain knows.
@@ -322,4 +346,28 @@ pub fn hint_of(problem: &anyhow::Error) -> Option<String> {
         );
         None
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Error as IoError, ErrorKind};
+
+    /// No error leaves its reader without a next step, whatever kind it is.
+    #[test]
+    fn every_error_has_a_hint() {
+        let full = anyhow::Error::new(IoError::from(ErrorKind::StorageFull)).context("log.csv");
+        assert!(general_hint(&full).contains("disk is full"));
+        let foreign = anyhow::anyhow!("a library's own words");
+        assert_eq!(hint_of(&foreign), None);
+        assert!(general_hint(&foreign).contains("report"));
+        let config = deepfusion_train::Error::Config {
+            field: "batch",
+            expected: "at least 1".into(),
+            found: "0".into(),
+        };
+        assert!(hint_of(&config.into()).unwrap().contains("batch"));
+        let images = CliError::NoImages { input: "x".into() };
+        assert!(hint_of(&images.into()).is_some());
+    }
 }

@@ -43,6 +43,32 @@ fn the_table_grows_by_seeds_and_keeps_what_is_done() {
     assert!(config("hce+speed+flow").contains("[depth_net.hce]"));
     assert!(!config("none").contains("[depth_net.hce]"));
     assert!(config("minimum").contains("reprojection = \"minimum\""));
+    for row in ["hce+speed+flow", "none", "minimum"] {
+        // Not attention with the context, not masks with the flow; and in no row a measured motion in the warp.
+        assert!(!config(row).contains("[depth_net.attention]"), "{row}");
+        assert!(
+            config(row).contains("[loss.moving]\nenabled = false"),
+            "{row}"
+        );
+        assert!(config(row).contains("view_motion = \"posenet\""), "{row}");
+    }
+    let header = csv.lines().next().unwrap();
+    for column in [
+        "abs_rel",
+        "sq_rel",
+        "rmse",
+        "rmse_log",
+        "a1",
+        "a2",
+        "a3",
+        "train_hours",
+        "parameters_m",
+    ] {
+        assert!(
+            header.contains(&format!(",{column},{column}_std")),
+            "{header}"
+        );
+    }
 
     // A second seed is added; the runs that are done are not made again, one that is half done goes on.
     let result = at.join("table/rows/none/seed-0/result.json");
@@ -76,6 +102,10 @@ fn what_cannot_be_a_table_is_refused() {
         (
             "ablate --data sim --budget 1 --rows hce+hope --out a",
             &["rows", "hce+hope", "hce+speed+flow"][..],
+        ),
+        (
+            "ablate --data sim --budget 1 --rows none --view-motion distance --out c",
+            &["view_motion", "distance", "--view-motion posenet"],
         ),
         ("ablate --out nothing --resume", &["nothing", "ablate.toml"]),
         (

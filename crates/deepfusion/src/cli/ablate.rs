@@ -3,17 +3,29 @@ use std::path::PathBuf;
 use clap::Args;
 use deepfusion_data::CameraChoice;
 
-use super::{DeviceChoice, PresetChoice, Size};
+use super::{DeviceChoice, PresetChoice, Size, ViewMotionChoice};
+
+/// The parts and terms that no row decides.
+const SHARED_TERMS: [&str; 6] = [
+    "attention",
+    "aggregation",
+    "smoothness",
+    "automask",
+    "affine",
+    "moving",
+];
 
 /// `deepfusion ablate`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Trains and measures the on/off table of the paper's Table 3: the context encoding (HCE with its attention), the \
-    speed loss and the flow loss (with the masks of what moves), all eight combinations, and the full system with three frames \
-    and minimum reprojection instead of two frames in both directions. Everything else, the steps included, is equal.\n\n\
+    after_help = "Trains and measures the on/off table of the paper's Table 3: the context encoding (hce), the speed loss and the flow loss, all \
+    eight combinations. A row differs from the others by these alone; steps, attention and everything else are equal, and every row \
+    warps by PoseNet's motion, as a measured one would teach the rows without the speed loss, too. A further row, minimum, is made \
+    where --rows names it: everything on, with three frames and minimum reprojection instead of two frames in both directions.\n\n\
     Every seed of a row is a run of its own, kept in DIR/rows; --resume goes on where it stopped, also inside a row. The table is \
     written after every run: table.txt, .csv, .md, .tex.\n\n\
     Examples:\n  deepfusion ablate --data street --eval-data other-street --budget 1200 --seeds 3 --out runs/ablation\n  \
+    deepfusion ablate --data street --budget 1200 --with attention,moving --rows hce+speed+flow,speed+flow,minimum\n  \
     deepfusion ablate --out runs/ablation --resume"
 )]
 pub struct AblateArgs {
@@ -40,7 +52,7 @@ pub struct AblateArgs {
     /// Settings from a file, as written into every run as config.toml.
     #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["preset", "resume"])]
     pub config: Option<PathBuf>,
-    /// Only these rows.
+    /// Only these rows: what is on, joined by +; none; or minimum [default: the eight of Table 3].
     #[arg(
         long,
         value_name = "ROW,…",
@@ -54,6 +66,15 @@ pub struct AblateArgs {
     /// Samples a step.
     #[arg(long, value_name = "N", conflicts_with = "resume")]
     pub batch: Option<usize>,
+    /// Parts that all rows have; moving works where the flow is on.
+    #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = SHARED_TERMS, conflicts_with = "resume")]
+    pub with: Vec<String>,
+    /// Parts that no row has.
+    #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = SHARED_TERMS, conflicts_with = "resume")]
+    pub without: Vec<String>,
+    /// Whose motion the views are synthesised with [default: posenet; with --config the file's].
+    #[arg(long, value_enum, value_name = "MOTION", conflicts_with = "resume")]
+    pub view_motion: Option<ViewMotionChoice>,
     /// Which cameras.
     #[arg(
         long,

@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use deepfusion_data::CameraChoice;
-use deepfusion_train::TrainConfig;
+use deepfusion_train::{Compute, TrainConfig, ViewMotion};
 
 use super::Size;
 
@@ -34,16 +34,16 @@ pub struct TrainArgs {
     /// Where to compute.
     #[arg(long, value_enum, default_value_t)]
     pub device: DeviceChoice,
-    /// Passes over the data.
+    /// Passes over the data [default: the preset's 20, and at least 1200 steps].
     #[arg(long, value_name = "N", conflicts_with = "steps")]
     pub epochs: Option<usize>,
     /// Optimiser steps, instead of epochs.
     #[arg(long, value_name = "N")]
     pub steps: Option<usize>,
-    /// Size of the network's input.
+    /// Size of the network's input [default: the preset's; on a processor 320x96].
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
-    /// Samples a step.
+    /// Samples a step [default: the preset's; on a processor 4].
     #[arg(long, value_name = "N")]
     pub batch: Option<usize>,
     /// Fixes everything that is random.
@@ -77,11 +77,11 @@ pub struct TrainArgs {
 pub enum PresetChoice {
     /// ResNet-18 at half width, 320×96: useful on two cores in minutes.
     Tiny,
-    /// ResNet-18, 640×192.
+    /// ResNet-18, 640×192; on a processor 320×96.
     Light,
-    /// ResNet-50, 640×192, batch 12.
+    /// ResNet-50, 640×192, batch 12; on a processor 320×96, batch 4.
     Resnet50,
-    /// The paper's network: ResNet-50 with context and attention, 640×192, batch 12.
+    /// The paper's network: ResNet-50 with context and attention; sizes as resnet50.
     Paper,
     /// Monodepth2's network and losses, with the speed term.
     Monodepth2,
@@ -98,18 +98,42 @@ pub enum ViewMotionChoice {
     Vehicle,
 }
 
-/// Where to compute.
+impl From<ViewMotionChoice> for ViewMotion {
+    fn from(choice: ViewMotionChoice) -> Self {
+        match choice {
+            ViewMotionChoice::Posenet => Self::PoseNet,
+            ViewMotionChoice::Distance => Self::Distance,
+            ViewMotionChoice::Vehicle => Self::Vehicle,
+        }
+    }
+}
+
+/// Where to compute. Help lists what this build has; the others are known, so that they are answered with how to build them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum DeviceChoice {
     /// This machine's processor.
     #[default]
     Cpu,
     /// A GPU through Vulkan.
+    #[cfg_attr(not(feature = "vulkan"), value(hide = true))]
     Vulkan,
     /// A GPU through WebGPU.
+    #[cfg_attr(not(feature = "wgpu"), value(hide = true))]
     Wgpu,
     /// An NVIDIA GPU.
+    #[cfg_attr(not(feature = "cuda"), value(hide = true))]
     Cuda,
     /// An Apple GPU.
+    #[cfg_attr(not(feature = "metal"), value(hide = true))]
     Metal,
+}
+
+impl DeviceChoice {
+    /// What a preset's sizes follow.
+    pub fn compute(self) -> Compute {
+        match self {
+            Self::Cpu => Compute::Processor,
+            Self::Vulkan | Self::Wgpu | Self::Cuda | Self::Metal => Compute::Gpu,
+        }
+    }
 }

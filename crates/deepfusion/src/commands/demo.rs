@@ -143,7 +143,7 @@ fn learn(mut config: TrainConfig, drives: &[PathBuf], out: &Path, device: &Devic
     let sets = train::open_samples(&config)?;
     let folder = RunFolder::create(out)?;
     let mut trainer = Trainer::create(config, folder, sets, device, Ok)?;
-    train::train(&mut trainer)
+    train::train(&mut trainer, None)
 }
 
 fn measure(predictor: &Predictor, train: &[Dataset], test: &[Dataset]) -> Result<Evaluated> {

@@ -4,7 +4,7 @@ use anyhow::Result;
 use deepfusion_compare::{
     FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation, sha256_of_file,
 };
-use deepfusion_data::{CameraChoice, Dataset, DatasetKind, GtKind, RgbImage};
+use deepfusion_data::{CameraChoice, Dataset, GtKind, RgbImage};
 use deepfusion_eval::{
     ArraySet, Crop, Grid, Prediction, Protocol, Report, Sample, TrivialBaseline, match_names,
 };
@@ -14,7 +14,7 @@ use deepfusion_train::{Predictor, RunFolder};
 
 use super::confidence;
 use super::evaluate::{
-    Comparison, Evaluated, Place, Truth, array_places, depth_map, evaluate_datasets,
+    Comparison, Evaluated, Place, Truth, array_places, default_crop, depth_map, evaluate_datasets,
     open_with_camera, trivial_from_arrays, trivial_from_datasets,
 };
 use super::run_report::{self, Choice};
@@ -48,11 +48,7 @@ fn from_model(args: &EvalArgs) -> Result<Report> {
     let predictor = engine::load(model, &args.engine)?;
     let split = args.split.as_deref();
     let datasets = open_with_camera(&args.data, split, args.camera, args.intrinsics)?;
-    let kitti = |d: &Dataset| d.kind() == DatasetKind::KittiRaw;
-    let crop = match datasets.iter().all(kitti) {
-        true => Crop::Garg,
-        false => Crop::None,
-    };
+    let crop = default_crop(&datasets);
     let kind = args.gt_depth.kind();
     let mut truth = match &args.gt {
         Some(path) => Truth::Arrays(Box::new(ArraySet::open(path)?)),

@@ -4,10 +4,12 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use deepfusion_data::{CameraChoice, Dataset, GtKind, OpenOptions, Split, ground_truth_names};
+use deepfusion_data::{
+    CameraChoice, Dataset, DatasetKind, GtKind, OpenOptions, Split, ground_truth_names,
+};
 use deepfusion_eval::{
-    ArraySet, DrawnPoint, Evaluator, Grid, GroundTruth, ImageScore, Prediction, Protocol, Report,
-    Sample, ScenarioRow, TrivialBaseline,
+    ArraySet, Crop, DrawnPoint, Evaluator, Grid, GroundTruth, ImageScore, Prediction, Protocol,
+    Report, Sample, ScenarioRow, TrivialBaseline,
 };
 use deepfusion_geometry::DepthMap;
 
@@ -41,6 +43,15 @@ pub fn open_with_camera(
     }
     remarks::tell(&datasets);
     Ok(datasets)
+}
+
+/// The crop of the recordings' field: Garg's where all of them are KITTI raw, which its tables use; else the whole image.
+pub fn default_crop(datasets: &[Dataset]) -> Crop {
+    let kitti = |d: &Dataset| d.kind() == DatasetKind::KittiRaw;
+    match datasets.iter().all(kitti) {
+        true => Crop::Garg,
+        false => Crop::None,
+    }
 }
 
 /// Where the truth comes from.

@@ -16,6 +16,7 @@ mod export;
 mod export_gt;
 mod inspect;
 mod live;
+mod outlook;
 mod overview;
 mod perceive;
 mod predict;

@@ -8,6 +8,7 @@ use deepfusion_render::sample_panel;
 use deepfusion_train::log::{CsvLog, TensorBoardLog};
 use deepfusion_train::{Control, TrainEvent};
 
+use super::outlook::Outlook;
 use crate::interrupt;
 use crate::progress::{Progress, say};
 
@@ -21,13 +22,14 @@ pub struct Recorder {
     panels: PathBuf,
     progress: Progress,
     last_line: Instant,
+    outlook: Option<Outlook>,
     /// The first failure to write a log: training goes on, the command ends with it.
     failure: Option<anyhow::Error>,
 }
 
 impl Recorder {
-    /// For the run in `folder`, going on after `step`.
-    pub fn open(folder: &Path, step: usize) -> Result<Self> {
+    /// For the run in `folder`, going on after `step`; with an `outlook` it says how long the run will take.
+    pub fn open(folder: &Path, step: usize, outlook: Option<Outlook>) -> Result<Self> {
         let panels = folder.join("panels");
         std::fs::create_dir_all(&panels)
             .with_context(|| format!("{}: cannot be made", panels.display()))?;
@@ -37,6 +39,7 @@ impl Recorder {
             panels,
             progress: Progress::new("training"),
             last_line: Instant::now(),
+            outlook,
             failure: None,
         })
     }
@@ -132,6 +135,11 @@ impl Recorder {
                 {
                     self.last_line = Instant::now();
                     say(&format!("step {step}/{steps}: {line}"));
+                }
+                if let Some(outlook) = &mut self.outlook
+                    && let Some(line) = outlook.after_step(step, steps)
+                {
+                    say(&line);
                 }
             }
             TrainEvent::Validated {

@@ -2,17 +2,19 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use deepfusion_data::{Camera, CameraChoice, Dataset, speed_unit_warning};
+use deepfusion_nn::InputSize;
 use deepfusion_nn::weights::load_torchvision_resnet;
 use deepfusion_train::{
     CheckpointKind, DataConfig, DataSetConfig, Error, Model, Preset, RunFolder, SampleSet,
-    TrainConfig, Trainer, ViewMotion,
+    TrainConfig, Trainer,
 };
 
 use super::device;
 use super::evaluate::open_datasets;
+use super::outlook::Outlook;
 use super::recorder::{Recorder, clock};
 use crate::allocator;
-use crate::cli::{PresetChoice, TrainArgs, ViewMotionChoice};
+use crate::cli::{PresetChoice, TrainArgs};
 use crate::progress::say;
 use crate::{interrupt, output};
 
@@ -30,7 +32,7 @@ pub fn run(args: &TrainArgs) -> Result<()> {
     // A resumed run may be made longer; all else is as it was.
     config.steps = args.steps.or(config.steps);
     if let Some(epochs) = args.epochs {
-        (config.epochs, config.steps) = (epochs, None);
+        (config.epochs, config.steps, config.min_steps) = (epochs, None, 0);
     }
     if !args.data.is_empty() {
         // A resumed run's sets have factors that new recordings would not have: `validate` refuses both.
@@ -60,15 +62,38 @@ pub fn run(args: &TrainArgs) -> Result<()> {
             })?
         }
     };
-    train(&mut trainer)?;
+    say(&plan(&trainer));
+    let outlook = Outlook::new(trainer.config().clone(), args.device.compute());
+    train(&mut trainer, Some(outlook))?;
     output::print(&format!("{}\n", trainer.folder().display()))
 }
 
-/// Runs a trainer with its logs.
-pub fn train(trainer: &mut Trainer) -> Result<()> {
+/// What will be done: the network, its images, and how many steps and why.
+fn plan(trainer: &Trainer) -> String {
+    let config = trainer.config();
+    let InputSize { width, height } = config.size;
+    let epochs = config.epochs * trainer.epoch_steps();
+    let steps = match config.steps {
+        None if epochs < config.min_steps => format!(
+            "{} steps (the least: {} epochs of so few images would be {epochs})",
+            trainer.steps(),
+            config.epochs
+        ),
+        None => format!("{} epochs", config.epochs),
+        Some(steps) => format!("{steps} steps"),
+    };
+    format!(
+        "{}: images of {width}x{height}, {} samples a step, {steps}",
+        config.preset,
+        config.batch * config.accumulate
+    )
+}
+
+/// Runs a trainer with its logs; with an `outlook`, how long it will take is said.
+pub fn train(trainer: &mut Trainer, outlook: Option<Outlook>) -> Result<()> {
     allocator::keep_memory();
     interrupt::catch("stopping after this step; the run is saved");
-    let mut recorder = Recorder::open(trainer.folder(), trainer.step())?;
+    let mut recorder = Recorder::open(trainer.folder(), trainer.step(), outlook)?;
     let summary = trainer.run(&mut |event| recorder.handle(event))?;
     recorder.finish()?;
     say(&format!(
@@ -96,7 +121,7 @@ pub fn train(trainer: &mut Trainer) -> Result<()> {
 fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     let mut config = match &args.config {
         Some(path) => TrainConfig::read(path)?,
-        None => preset(args.preset.unwrap_or(PresetChoice::Tiny)).config(),
+        None => preset(args.preset.unwrap_or(PresetChoice::Tiny)).config_on(args.device.compute()),
     };
     if let Some(size) = args.size {
         config.size.width = size.width as usize;
@@ -112,11 +137,7 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     }
     // Said last: a motion that contradicts a term left out is an error, and not silently another one.
     if let Some(choice) = args.view_motion {
-        config.view_motion = match choice {
-            ViewMotionChoice::Posenet => ViewMotion::PoseNet,
-            ViewMotionChoice::Distance => ViewMotion::Distance,
-            ViewMotionChoice::Vehicle => ViewMotion::Vehicle,
-        };
+        config.view_motion = choice.into();
     }
     if args.data.is_empty() {
         // The file's own recordings, of which at least one is needed.

@@ -13,6 +13,9 @@ pub struct RunResult {
     pub seed: u64,
     /// Seconds of training, interruptions left out.
     pub train_seconds: f64,
+    /// Parameters of the depth network, which is what runs after training.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parameters: Option<u64>,
     /// What `eval` says of it.
     pub report: deepfusion_eval::Report,
 }
@@ -24,47 +27,33 @@ struct Column {
     digits: usize,
 }
 
-const COLUMNS: [Column; 8] = [
-    Column {
-        name: "abs_rel",
-        value: |r| Some(r.report.unscaled.abs_rel),
-        digits: 3,
-    },
-    Column {
-        name: "rmse",
-        value: |r| Some(r.report.unscaled.rmse),
-        digits: 2,
-    },
-    Column {
-        name: "a1",
-        value: |r| Some(r.report.unscaled.a1),
-        digits: 3,
-    },
-    Column {
-        name: "abs_rel_scaled",
-        value: |r| Some(r.report.median_scaled.abs_rel),
-        digits: 3,
-    },
-    Column {
-        name: "scale_median",
-        value: |r| Some(r.report.scale.median),
-        digits: 3,
-    },
-    Column {
-        name: "abs_rel_static",
-        value: |r| r.report.still.map(|m| m.abs_rel),
-        digits: 3,
-    },
-    Column {
-        name: "abs_rel_moving",
-        value: |r| r.report.moving.map(|m| m.abs_rel),
-        digits: 3,
-    },
-    Column {
-        name: "train_min",
-        value: |r| Some(r.train_seconds / 60.0),
-        digits: 1,
-    },
+impl Column {
+    const fn new(name: &'static str, digits: usize, value: fn(&RunResult) -> Option<f64>) -> Self {
+        Self {
+            name,
+            value,
+            digits,
+        }
+    }
+}
+
+/// The field's seven metrics as the network gives metres, then what tells scale from shape, then what it cost.
+const COLUMNS: [Column; 13] = [
+    Column::new("abs_rel", 3, |r| Some(r.report.unscaled.abs_rel)),
+    Column::new("sq_rel", 3, |r| Some(r.report.unscaled.sq_rel)),
+    Column::new("rmse", 3, |r| Some(r.report.unscaled.rmse)),
+    Column::new("rmse_log", 3, |r| Some(r.report.unscaled.rmse_log)),
+    Column::new("a1", 3, |r| Some(r.report.unscaled.a1)),
+    Column::new("a2", 3, |r| Some(r.report.unscaled.a2)),
+    Column::new("a3", 3, |r| Some(r.report.unscaled.a3)),
+    Column::new("abs_rel_scaled", 3, |r| {
+        Some(r.report.median_scaled.abs_rel)
+    }),
+    Column::new("scale_median", 3, |r| Some(r.report.scale.median)),
+    Column::new("abs_rel_static", 3, |r| r.report.still.map(|m| m.abs_rel)),
+    Column::new("abs_rel_moving", 3, |r| r.report.moving.map(|m| m.abs_rel)),
+    Column::new("train_hours", 2, |r| Some(r.train_seconds / 3600.0)),
+    Column::new("parameters_m", 2, |r| r.parameters.map(|n| n as f64 / 1e6)),
 ];
 
 /// A figure over the seeds of a row.
@@ -157,30 +146,46 @@ fn views(row: Row) -> &'static str {
 
 /// For people at a terminal.
 pub fn text(table: &[TableRow]) -> String {
-    let columns = shown(table);
-    let mut out = format!(
-        "{:5}{:7}{:6}{:16}{:>6}",
-        "HCE", "speed", "flow", "frames", "seeds"
-    );
-    for i in &columns {
-        let _ = write!(out, "{:>16}", COLUMNS[*i].name);
-    }
-    out.push('\n');
-    let mark = |on: bool| if on { "x" } else { "·" };
-    for line in table {
+    let mark = |on: bool| if on { "x" } else { "·" }.to_owned();
+    let mut lines = vec![
+        ["HCE", "speed", "flow", "frames", "seeds"]
+            .map(str::to_owned)
+            .to_vec(),
+    ];
+    lines.extend(table.iter().map(|line| {
         let row = line.row;
-        let _ = write!(
-            out,
-            "{:5}{:7}{:6}{:16}{:>6}",
+        vec![
             mark(row.hce),
             mark(row.speed),
             mark(row.flow),
-            views(row),
-            line.seeds
-        );
-        for i in &columns {
-            let _ = write!(out, "{:>16}", cell(line, *i, " ± "));
+            views(row).into(),
+            line.seeds.to_string(),
+        ]
+    }));
+    for column in shown(table) {
+        lines[0].push(COLUMNS[column].name.into());
+        for (cells, row) in lines[1..].iter_mut().zip(table) {
+            cells.push(cell(row, column, " ± "));
         }
+    }
+    aligned(&lines, 4)
+}
+
+/// Cells as columns two spaces apart, the first `left` of them flush left, the others flush right.
+fn aligned(lines: &[Vec<String>], left: usize) -> String {
+    let width = |i: usize| lines.iter().map(|cells| cells[i].chars().count()).max();
+    let mut out = String::new();
+    for cells in lines {
+        let mut text = String::new();
+        for (i, cell) in cells.iter().enumerate() {
+            let width = width(i).unwrap_or(0);
+            let _ = if i < left {
+                write!(text, "{cell:<width$}  ")
+            } else {
+                write!(text, "{cell:>width$}  ")
+            };
+        }
+        out.push_str(text.trim_end());
         out.push('\n');
     }
     out
@@ -284,5 +289,84 @@ mod tests {
         assert_eq!((three.mean, three.std), (2.0, Some(1.0)));
         assert_eq!(three.text(1, " ± "), "2.0 ± 1.0");
         assert_eq!(Spread::of(&[]), None);
+    }
+
+    fn result(seed: u64, abs_rel: f64) -> RunResult {
+        let metrics = serde_json::json!({
+            "abs_rel": abs_rel, "sq_rel": 1.5, "rmse": 5.25, "rmse_log": 0.3, "a1": 0.7, "a2": 0.9, "a3": 0.95
+        });
+        let report = serde_json::json!({
+            "n": 4,
+            "protocol": {"crop": "none", "cap_m": 80.0, "min_m": 0.001, "gt": "z"},
+            "unscaled": metrics,
+            "median_scaled": metrics,
+            "scale": {"median": 1.0, "std_rel": 0.0, "bias": 0.0, "bias_ci95": null},
+            "ranges": [],
+        });
+        RunResult {
+            row: Row::table_3()[0],
+            seed,
+            train_seconds: 1800.0,
+            parameters: Some(14_330_000),
+            report: serde_json::from_value(report).unwrap(),
+        }
+    }
+
+    /// What the paper's Table 3 has: seven metrics, hours and parameters.
+    #[test]
+    fn a_row_has_every_metric_with_its_cost() {
+        let table = table(&Row::table_3(), &[result(0, 0.25), result(1, 0.27)]);
+        let text = text(&table);
+        let lines: Vec<Vec<&str>> = text
+            .lines()
+            .map(|l| {
+                l.split("  ")
+                    .map(str::trim)
+                    .filter(|c| !c.is_empty())
+                    .collect()
+            })
+            .collect();
+        assert_eq!(
+            lines[0],
+            [
+                "HCE",
+                "speed",
+                "flow",
+                "frames",
+                "seeds",
+                "abs_rel",
+                "sq_rel",
+                "rmse",
+                "rmse_log",
+                "a1",
+                "a2",
+                "a3",
+                "abs_rel_scaled",
+                "scale_median",
+                "train_hours",
+                "parameters_m"
+            ],
+            "{text}"
+        );
+        assert_eq!(lines[1][5..7], ["0.260 ± 0.014", "1.500 ± 0.000"], "{text}");
+        assert_eq!(lines[1][14..], ["0.50 ± 0.00", "14.33 ± 0.00"], "{text}");
+        assert_eq!(
+            lines.len(),
+            2,
+            "rows that have no run are not there: {text}"
+        );
+        for name in [
+            "sq_rel",
+            "rmse_log",
+            "a2",
+            "a3",
+            "train_hours",
+            "parameters_m",
+        ] {
+            assert!(
+                csv(&table).contains(&format!(",{name},{name}_std")),
+                "{name}"
+            );
+        }
     }
 }
