@@ -9,6 +9,7 @@
 mod error;
 mod evaluation;
 mod format;
+mod metric_scale;
 pub mod plausibility;
 mod published;
 mod runs;
@@ -17,6 +18,7 @@ mod table;
 
 pub use error::{Error, Result};
 pub use evaluation::{Evaluation, Origin};
+pub use metric_scale::{LEAST_IMAGES, LEAST_STEPS, MetricScale, TRUSTED_WITHIN, Verdict};
 pub use published::{Published, published_tables};
 pub use runs::run_tables;
 pub use saved::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation, sha256_of_file};

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use deepfusion_compare::{
-    Error, Evaluation, FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation,
-    published_tables, run_tables, sha256_of_file,
+    Error, Evaluation, FrameScore, Measured, MetricScale, ModelFile, SAVED_VERSION,
+    SavedEvaluation, Verdict, published_tables, run_tables, sha256_of_file,
 };
 use deepfusion_eval::{Crop, Evaluator, Grid, Prediction, Protocol, Report};
 use deepfusion_render::HtmlReport;
@@ -286,4 +286,71 @@ fn check_page(html: &str) {
             "{element}"
         );
     }
+}
+
+/// Only evaluations of this very checkpoint, on frames known to be unseen, say what its metres are worth.
+#[test]
+fn metres_are_trusted_where_they_were_measured_and_nowhere_else() {
+    type Change = fn(&mut SavedEvaluation);
+    let folder = tempfile::tempdir().unwrap();
+    let verdict = |name: &str, changes: &[Change]| {
+        let at = folder.path().join(name);
+        for (i, change) in changes.iter().enumerate() {
+            let mut saved = SavedEvaluation {
+                format_version: SAVED_VERSION,
+                measured: Measured {
+                    data: vec![PathBuf::from(format!("street-{i}"))],
+                    focal_correction: true,
+                    held_out: Some(true),
+                    ..Measured::default()
+                },
+                model: ModelFile {
+                    checkpoint: "best.safetensors".into(),
+                    sha256: "abc".into(),
+                },
+                report: report(1.0, 0.0, points()).0,
+                images: Vec::new(),
+            };
+            (saved.report.n, saved.report.scale.bias) = (20, 0.01);
+            saved.report.scale.bias_ci95 = Some([-0.03, 0.05]);
+            change(&mut saved);
+            saved.write(&at).unwrap();
+        }
+        MetricScale::measured(&at, "abc", None, true, 2000)
+    };
+    let good: Change = |_| {};
+    let found = verdict("good", &[good]);
+    assert_eq!(found.verdict, Verdict::Trusted);
+    assert_eq!((found.bias, found.ci95), (Some(0.01), Some([-0.03, 0.05])));
+    let nothing: [Change; 7] = [
+        |s| s.measured.held_out = None,
+        |s| s.measured.held_out = Some(false),
+        |s| s.model.sha256 = "another".into(),
+        |s| s.measured.set = Some("garage".into()),
+        |s| s.measured.focal_correction = false,
+        |s| s.report.n = 3,
+        |s| s.report.scale.bias_ci95 = None,
+    ];
+    for (i, change) in nothing.into_iter().enumerate() {
+        let found = verdict(&format!("nothing-{i}"), &[change]);
+        assert_eq!(found, MetricScale::default(), "{i}");
+    }
+    assert_eq!(verdict("none", &[]), MetricScale::default());
+    // Right in one street and wrong in another: the mean of the two is no measure of either.
+    let far: Change = |s| {
+        (s.report.n, s.report.scale.bias) = (60, 0.31);
+        s.report.scale.bias_ci95 = Some([0.25, 0.4]);
+    };
+    assert_eq!(verdict("far", &[far]).verdict, Verdict::Wrong);
+    let both = verdict("both", &[good, far]);
+    assert_eq!(both.verdict, Verdict::Open);
+    assert_eq!(both.ci95, Some([-0.03, 0.4]));
+    assert!((both.bias.unwrap() - (20.0 * 0.01 + 60.0 * 0.31) / 80.0).abs() < 1e-12);
+    // A damaged file says nothing.
+    let at = folder.path().join("good/eval");
+    for entry in std::fs::read_dir(&at).unwrap() {
+        std::fs::write(entry.unwrap().path(), [0_u8; 99]).unwrap();
+    }
+    let found = MetricScale::measured(&folder.path().join("good"), "abc", None, true, 2000);
+    assert_eq!(found, MetricScale::default());
 }

@@ -77,4 +77,4 @@ pub use snippet::{EgoMotion, Snippet, Source, hold_out};
 pub use speed_check::{SpeedWarning, grey_image, speed_unit_warning};
 pub use split::{Split, SplitEntry};
 pub use video::{Shown, can_write_video, shown_for, write_video};
-pub use write::write_atomically;
+pub use write::{write_atomically, write_unsynced};

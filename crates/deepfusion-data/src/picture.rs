@@ -1,6 +1,6 @@
 //! Images from files and to them.
 
-use crate::{Error, Result, jpeg, write_atomically};
+use crate::{Error, Result, jpeg, write_unsynced};
 use image::{DynamicImage, ImageError, ImageReader, RgbImage};
 use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;
@@ -107,12 +107,12 @@ fn truncated(path: &Path) -> Error {
     }
 }
 
-/// Writes the image as a PNG, atomically.
+/// Writes the image as a PNG, whole or not at all; who says that it is done syncs it first.
 ///
 /// # Errors
 /// [`Error::File`] where writing fails.
 pub fn save_png(image: &RgbImage, path: &Path) -> Result<()> {
-    write_atomically(path, |out| {
+    write_unsynced(path, |out| {
         image
             .write_to(out, image::ImageFormat::Png)
             .map_err(|e| write_failed(path, e))

@@ -31,7 +31,6 @@ mod record;
 mod scan;
 mod selection;
 mod source;
-mod temporary;
 mod time;
 mod topic;
 mod writer;

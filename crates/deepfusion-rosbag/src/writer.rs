@@ -2,8 +2,8 @@ use crate::compression::{Compression, compress};
 use crate::encode::{VERSION, bag_header, entry, field, record, record_header, time_bytes};
 use crate::msg::RosMessage;
 use crate::record::op;
-use crate::temporary::Temporary;
 use crate::{Error, Result, Time};
+use deepfusion_fs::Partial;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
@@ -50,7 +50,7 @@ pub struct ConnectionId(u32);
 /// ```
 pub struct BagWriter {
     path: PathBuf,
-    temporary: Temporary,
+    partial: Partial,
     out: BufWriter<File>,
     at: u64,
     options: WriterOptions,
@@ -79,12 +79,12 @@ impl BagWriter {
     /// [`Error::NoSuchPath`] where the folder does not exist, [`Error::File`].
     pub fn create(path: impl AsRef<Path>, options: WriterOptions) -> Result<Self> {
         let path = path.as_ref();
-        let temporary = Temporary::beside(path);
+        let partial = Partial::beside(path);
         let failed = |source| Error::file(path, source);
-        let file = File::create_new(temporary.path()).map_err(failed)?;
+        let file = partial.create().map_err(failed)?;
         let mut writer = Self {
             path: path.to_owned(),
-            temporary,
+            partial,
             out: BufWriter::with_capacity(1 << 18, file),
             at: 0,
             options,
@@ -226,7 +226,7 @@ impl BagWriter {
         file.seek(SeekFrom::Start(13)).map_err(failed)?;
         file.write_all(&header).map_err(failed)?;
         drop(file);
-        self.temporary.rename_to(&path).map_err(failed)
+        self.partial.publish().map_err(failed)
     }
 
     fn close_chunk(&mut self) -> Result<()> {

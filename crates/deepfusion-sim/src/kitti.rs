@@ -42,7 +42,8 @@ pub fn write_kitti(
     let staging = out.join(format!(".{DATE}.partial"));
     let written = write_all(simulation, &staging, progress).and_then(|drive| {
         let date = out.join(DATE);
-        fs::rename(&staging, &date).map_err(io(&date, "move the finished drive here"))?;
+        let moved = deepfusion_fs::publish_folder(&staging, &date);
+        moved.map_err(io(&date, "move the finished drive here"))?;
         Ok(date.join(drive))
     });
     if written.is_err() {
@@ -150,24 +151,19 @@ fn make_folder(path: &Path) -> Result<()> {
     fs::create_dir_all(path).map_err(io(path, "make this folder"))
 }
 
-/// Writes a file under another name and renames it, so that no half of it is ever seen.
+/// Writes a file of the drive, of which nothing is seen before all of it is on the disk.
 fn write_with(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<fs::File>) -> Result<()>,
 ) -> Result<()> {
-    let temporary = path.with_extension("partial");
     let failed = io(path, "write this file");
-    let file = fs::File::create(&temporary).map_err(&failed)?;
+    let file = fs::File::create(path).map_err(&failed)?;
     let mut writer = BufWriter::with_capacity(1 << 16, file);
-    fill(&mut writer)
-        .and_then(|()| writer.flush().map_err(&failed))
-        .and_then(|()| fs::rename(&temporary, path).map_err(&failed))
-        .inspect_err(|_| {
-            let _ = fs::remove_file(&temporary);
-        })
+    fill(&mut writer)?;
+    writer.flush().map_err(&failed)
 }
 
-pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     write_with(path, |w| {
         w.write_all(bytes).map_err(io(path, "write this file"))
     })

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::fs;
+use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 /// Noon of the first of January 2026, UTC, in nanoseconds since 1970: time 0 of every drive.
@@ -89,7 +90,13 @@ pub fn write_bag(
     let path = out.join(format!("{name}.bag"));
     let sidecar = path.with_extension("toml");
     let text = describe(&simulation.rig(), config.scene.name());
-    let written = crate::kitti::write_file(&sidecar, text.as_bytes())
+    let failed = |source| Error::Io {
+        path: sidecar.clone(),
+        action: "write this file",
+        source,
+    };
+    let write = |out: &mut BufWriter<fs::File>| out.write_all(text.as_bytes()).map_err(failed);
+    let written = deepfusion_fs::write_atomically(&sidecar, failed, write)
         .and_then(|()| write_messages(simulation, &path, settings, progress));
     if written.is_err() {
         // Best effort: the first error is the one to report.

@@ -115,12 +115,18 @@ pub struct TrainConfig {
     pub clip_norm: f64,
     /// Decides everything random.
     pub seed: u64,
+    /// The weights to begin from, as `--init` takes them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub init: Option<PathBuf>,
     /// Pairs slower than this are dropped, in m/s.
     pub min_speed_mps: f64,
     /// Share of each drive's end that is held out for validation.
     pub validation_share: f64,
     /// Steps between validations, checkpoints and panels; 0: once an epoch.
     pub validate_every: usize,
+    /// Minutes after which a checkpoint is written also between those; 0: never. What a run learns does not depend on it.
+    #[serde(default = "checkpoint_minutes")]
+    pub checkpoint_minutes: f64,
     /// A PoseNet that starts out driving ahead by the data's mean displacement, instead of standing.
     /// Needs the frames in time order, so it has no effect where the reversed pose is predicted.
     pub start_moving: bool,
@@ -147,7 +153,46 @@ pub struct TrainConfig {
     pub flow_decoder: FlowDecoderConfig,
 }
 
+/// What a kill or a power cut costs at most.
+fn checkpoint_minutes() -> f64 {
+    10.0
+}
+
+impl DataConfig {
+    /// Makes every path absolute, so that the run is gone on with and measured from any folder.
+    pub fn make_absolute(&mut self) {
+        // Every field by name: one that is added says whether it is a path.
+        let Self {
+            paths,
+            validation,
+            split,
+            camera: _,
+            sets,
+        } = self;
+        let mut all: Vec<&mut PathBuf> = paths.iter_mut().chain(validation).collect();
+        all.extend(split);
+        for set in sets {
+            all.extend(set.paths.iter_mut().chain(&mut set.validation));
+            all.extend(&mut set.split);
+        }
+        for path in all {
+            *path = absolute(std::mem::take(path));
+        }
+    }
+}
+
+/// A path from the root. An empty one stays, and any one whose working directory is gone: opening it then says so.
+fn absolute(path: PathBuf) -> PathBuf {
+    std::path::absolute(&path).unwrap_or(path)
+}
+
 impl TrainConfig {
+    /// Makes every path absolute.
+    pub fn make_absolute(&mut self) {
+        self.data.make_absolute();
+        self.init = self.init.take().map(absolute);
+    }
+
     /// The names that [`Self::with`] and [`Self::without`] take: parts of the depth network, then the terms
     /// of the loss.
     pub const TERMS: [&'static str; 9] = [
@@ -302,6 +347,7 @@ impl TrainConfig {
         let weights = [
             ("clip_norm", self.clip_norm),
             ("min_speed_mps", self.min_speed_mps),
+            ("checkpoint_minutes", self.checkpoint_minutes),
             ("frame_distance_m", self.frame_distance_m),
             ("pose_net.metres_per_unit", self.pose_net.metres_per_unit),
         ];
@@ -365,6 +411,50 @@ fn known(term: &str, field: &'static str) -> Result<&'static str, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_path_becomes_absolute() {
+        let set = DataSetConfig {
+            paths: vec!["c".into()],
+            validation: vec!["d".into()],
+            split: Some("e.txt".into()),
+            ..DataSetConfig::default()
+        };
+        let mut data = DataConfig {
+            paths: vec!["a".into(), "/b".into()],
+            validation: vec!["f".into()],
+            split: Some("g.txt".into()),
+            camera: "both".into(),
+            sets: vec![set],
+        };
+        data.make_absolute();
+        let here = std::env::current_dir().unwrap();
+        assert_eq!(data.paths, [here.join("a"), "/b".into()]);
+        assert_eq!(data.validation, [here.join("f")]);
+        assert_eq!(data.split, Some(here.join("g.txt")));
+        assert_eq!(data.sets[0].paths, [here.join("c")]);
+        assert_eq!(data.sets[0].validation, [here.join("d")]);
+        assert_eq!(data.sets[0].split, Some(here.join("e.txt")));
+    }
+
+    /// A run from before the key was there is read as one that has it.
+    #[test]
+    fn checkpoints_come_every_ten_minutes_unless_said_otherwise() {
+        let config = Preset::Tiny.config();
+        assert_eq!(config.checkpoint_minutes, 10.0);
+        let text = config.to_toml().unwrap();
+        let older: String = text
+            .lines()
+            .filter(|line| !line.starts_with("checkpoint_minutes"))
+            .map(|line| format!("{line}\n"))
+            .collect();
+        assert_ne!(older, text);
+        assert_eq!(toml::from_str::<TrainConfig>(&older).unwrap(), config);
+        let mut config = config;
+        config.checkpoint_minutes = -1.0;
+        let error = config.validate().unwrap_err().to_string();
+        assert!(error.contains("`checkpoint_minutes`"), "{error}");
+    }
 
     #[test]
     fn parts_of_the_network_go_on_and_off_by_name() {

@@ -7,7 +7,7 @@ use crate::{
 };
 use burn::tensor::Device;
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Skipped steps in a row after which training gives up.
 const MAX_SKIPPED: usize = 20;
@@ -70,6 +70,7 @@ impl Trainer {
         init: impl FnOnce(Model) -> Result<Model, Error>,
     ) -> Result<Self, Error> {
         config.validate()?;
+        config.make_absolute();
         if config.pose_net.metres_per_unit == 0.0 {
             config.pose_net.metres_per_unit = config.first_unit(train.mean_displacement_m());
         }
@@ -196,6 +197,7 @@ impl Trainer {
             mean_displacement_m: self.train.mean_displacement_m(),
         });
         let start = Instant::now();
+        let mut saved = start;
         let mut pace = Pace::new();
         let (mut skipped_in_row, mut stopped) = (0, false);
         let mut ratio = Smoothed::new();
@@ -293,6 +295,10 @@ impl Trainer {
             if due || stopped {
                 let shares = [low_view.value(), moving.value()];
                 self.report(listen, last, &names, shares, due)?;
+                saved = Instant::now();
+            } else if self.checkpoint_is_due(saved.elapsed()) {
+                self.save_last(listen)?;
+                saved = Instant::now();
             }
         }
         Ok(TrainSummary {
@@ -303,6 +309,12 @@ impl Trainer {
             seconds: start.elapsed().as_secs_f64(),
             stopped,
         })
+    }
+
+    /// Whether so much time has passed since a checkpoint that one is written between validations, too.
+    fn checkpoint_is_due(&self, passed: Duration) -> bool {
+        let minutes = self.config.checkpoint_minutes;
+        minutes > 0.0 && passed.as_secs_f64() >= 60.0 * minutes
     }
 
     /// What of the loss depends on the step.
@@ -384,6 +396,12 @@ impl Trainer {
                 listen(TrainEvent::Saved { step, path });
             }
         }
+        self.save_last(listen)
+    }
+
+    /// Writes the checkpoint to go on from.
+    fn save_last(&self, listen: &mut dyn FnMut(TrainEvent) -> Control) -> Result<(), Error> {
+        let step = self.state.step;
         let path = self.folder.save(
             CheckpointKind::Last,
             &self.model,

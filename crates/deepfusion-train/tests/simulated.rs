@@ -199,6 +199,49 @@ fn resumed_equals_whole(change: impl Fn(&mut TrainConfig)) -> Vec<(usize, LossTe
     whole
 }
 
+/// Written between validations by time, exactly where training stands; and what is learned does not depend on it.
+#[test]
+fn a_checkpoint_is_written_when_its_time_has_come() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive(&folder.path().join("street"), 8);
+    let device = Device::flex();
+    let steps_saved = |minutes: f64| {
+        let (mut config, train, validation) = small(&drive, 4);
+        config.validate_every = 3;
+        config.checkpoint_minutes = minutes;
+        let path = folder.path().join(format!("every-{minutes}"));
+        let run = RunFolder::create(&path).unwrap();
+        let mut trainer =
+            Trainer::create(config, run.clone(), (train, validation), &device, Ok).unwrap();
+        let (mut saved, mut losses) = (Vec::new(), Vec::new());
+        trainer
+            .run(&mut |event| {
+                match event {
+                    TrainEvent::Saved { step, path } if path.ends_with("last.safetensors") => {
+                        let config = run.read_config().unwrap();
+                        let (_, adam, state) = run
+                            .load(CheckpointKind::Last, &config, &device.clone().autodiff())
+                            .unwrap();
+                        assert!(adam.is_some());
+                        assert_eq!(state.step, step);
+                        saved.push(step);
+                    }
+                    TrainEvent::Step { losses: of, .. } => losses.push(of),
+                    _ => {}
+                }
+                Control::Continue
+            })
+            .unwrap();
+        (saved, losses)
+    };
+    // So short that it has passed with every step.
+    let (often, learned) = steps_saved(1e-12);
+    assert_eq!(often, [1, 2, 3, 4]);
+    let (never, the_same) = steps_saved(0.0);
+    assert_eq!(never, [3, 4]);
+    assert_eq!(learned, the_same);
+}
+
 /// Two frames are each other's target; three have one target and the flow to both sides.
 #[test]
 fn the_flow_is_seen_from_every_target_in_both_arrangements() {

@@ -37,6 +37,7 @@ const FILES: &[(&str, &str, &[u8])] = &[
         include_bytes!("../assets/js/picture_pane.js"),
     ),
     ("player.js", JS, include_bytes!("../assets/js/player.js")),
+    ("metres.js", JS, include_bytes!("../assets/js/metres.js")),
     ("run.js", JS, include_bytes!("../assets/js/run.js")),
     ("scene.js", JS, include_bytes!("../assets/js/scene.js")),
     ("shaders.js", JS, include_bytes!("../assets/js/shaders.js")),

@@ -98,6 +98,24 @@ fn the_watch_over_the_metres_is_shown_of_predictions_too() {
     assert_eq!(frame["scale_monitor"], told);
 }
 
+/// Whichever program wrote the sidecar.
+#[test]
+fn what_the_metres_are_worth_is_passed_on() {
+    let folder = results(2);
+    let scale = json!({"bias": 0.01, "ci95": [-0.02, 0.04], "verdict": "trusted"});
+    let now = json!({"camera_known": true, "scale": scale, "scale_trusted": null});
+    write_sidecar(folder.path(), "000001", &now);
+    let server = Running::start(folder.path(), None);
+    let older = server.json("/api/runs/0/frame/000000");
+    assert_eq!(older["scale_trusted"], true);
+    assert_eq!(older["problems"], json!([]));
+    let frame = server.json("/api/runs/0/frame/000001");
+    assert_eq!(
+        (&frame["camera_known"], &frame["scale"]),
+        (&json!(true), &scale)
+    );
+}
+
 #[test]
 fn what_is_broken_says_so_and_the_rest_goes_on() {
     let folder = results(7);

@@ -1,11 +1,13 @@
 //! How failures are told: `error: …`, what caused it, `hint: …`.
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anstyle::{AnsiColor, Style};
 
 use crate::cli::Shard;
+use crate::interrupt;
 
 /// Failures that only the command line knows.
 #[derive(Debug, thiserror::Error)]
@@ -135,6 +137,42 @@ pub enum CliError {
         /// Images in all.
         total: usize,
     },
+    /// Training that was stopped, and saved.
+    #[error("stopped after {step} of {steps} steps; the run is saved")]
+    Stopped {
+        /// Steps done.
+        step: usize,
+        /// Steps of the whole run.
+        steps: usize,
+        /// The command that goes on with it.
+        go_on: String,
+    },
+    /// An option that is not what a resumed run has.
+    #[error("`{option}`: {asked} contradicts the run, which {run}")]
+    Contradicts {
+        /// The option.
+        option: String,
+        /// What it asks for.
+        asked: String,
+        /// What the run has or is, in words that follow on "which".
+        run: String,
+    },
+    /// A recording of a resumed run that is not where it was.
+    #[error("{}: no such file or folder, and {} learns from it", path.display(), run.display())]
+    Moved {
+        /// The recording.
+        path: PathBuf,
+        /// The run's folder.
+        run: PathBuf,
+        /// The option that says where it is now; none for a data set's.
+        option: Option<&'static str>,
+    },
+    /// Work that was stopped and has nothing to go on with.
+    #[error("{what} was stopped before it was done")]
+    Ended {
+        /// The work.
+        what: &'static str,
+    },
     /// No frame of a recording has both labels and the depth asked for.
     #[error("{}: no frame has the depth that was asked for", path.display())]
     NothingToMeasure {
@@ -229,6 +267,18 @@ impl CliError {
             Self::Interrupted { .. } => {
                 Some("run the same again: only what is missing is done".into())
             }
+            Self::Stopped { go_on, .. } => Some(format!("go on with: {go_on}")),
+            Self::Contradicts { .. } => {
+                Some("leave it out to go on with the run, or start a new one in another folder".into())
+            }
+            Self::Moved { option: Some(option), .. } => Some(format!(
+                "if it was moved, say where it is now: {option} PATH; if its disk is not mounted, mount it"
+            )),
+            Self::Moved { run, option: None, .. } => Some(format!(
+                "if it was moved, correct its path in {}",
+                run.join("config.toml").display()
+            )),
+            Self::Ended { .. } => Some("start it again, into another folder".into()),
             Self::NothingToMeasure { .. } => Some(
                 "exact depth is the simulator's (proj_depth), scans are in velodyne_points; without either nothing says which boxes are seen".into(),
             ),
@@ -277,23 +327,44 @@ pub fn told(problem: &anyhow::Error) -> String {
     text
 }
 
-/// Prints a failure on stderr; the exit code is 1.
+/// Prints a failure on stderr; the exit code is 1, or [`interrupt::EXIT_CODE`] for work that was asked to stop.
 pub fn report(problem: &anyhow::Error) -> ExitCode {
     const ERROR: Style = AnsiColor::Red.on_default().bold();
     const HINT: Style = AnsiColor::Cyan.on_default().bold();
     let mut told = problem.to_string();
-    anstream::eprintln!("{ERROR}error:{ERROR:#} {told}");
+    let mut text = format!("{ERROR}error:{ERROR:#} {told}\n");
     for cause in problem.chain().skip(1) {
         let cause = cause.to_string();
         // Many messages already hold their cause's.
         if !told.contains(&cause) {
-            anstream::eprintln!("  because: {cause}");
+            text += &format!("  because: {cause}\n");
             told = cause;
         }
     }
     let hint = hint_of(problem).unwrap_or_else(|| general_hint(problem));
-    anstream::eprintln!("{HINT}hint:{HINT:#} {hint}");
-    ExitCode::FAILURE
+    text += &format!("{HINT}hint:{HINT:#} {hint}\n");
+    // Where nobody reads it any more, the code still tells.
+    let _ = anstream::stderr().write_all(text.as_bytes());
+    match was_stopped(problem) {
+        true => ExitCode::from(interrupt::EXIT_CODE),
+        false => ExitCode::FAILURE,
+    }
+}
+
+/// Whether nothing failed, but the work was asked to stop.
+fn was_stopped(problem: &anyhow::Error) -> bool {
+    problem.chain().any(|cause| {
+        let ours = matches!(
+            cause.downcast_ref(),
+            Some(CliError::Interrupted { .. } | CliError::Stopped { .. } | CliError::Ended { .. })
+        );
+        // Compiled in or not, the error is the same type.
+        let viewers = matches!(
+            cause.downcast_ref(),
+            Some(deepfusion_view::Error::Stopped { .. })
+        );
+        ours || viewers
+    })
 }
 
 /// What to do about an error that knows no remedy of its own: the system's reason decides.
@@ -369,5 +440,25 @@ mod tests {
         assert!(hint_of(&config.into()).unwrap().contains("batch"));
         let images = CliError::NoImages { input: "x".into() };
         assert!(hint_of(&images.into()).is_some());
+    }
+
+    /// `train && eval` and a scheduler tell by the code alone.
+    #[test]
+    fn what_was_stopped_is_neither_done_nor_failed() {
+        let go_on = String::new();
+        let (step, steps) = (3, 9);
+        let stopped = [
+            CliError::Stopped { step, steps, go_on },
+            CliError::Ended { what: "the demo" },
+            CliError::Interrupted { done: 1, total: 2 },
+        ];
+        for error in stopped {
+            assert!(was_stopped(&error.into()));
+        }
+        let path = PathBuf::from("a.rrd");
+        let (done, total) = (1, 2);
+        let view = deepfusion_view::Error::Stopped { path, done, total };
+        assert!(was_stopped(&anyhow::Error::new(view).context("view")));
+        assert!(!was_stopped(&CliError::NoCamera.into()));
     }
 }

@@ -13,6 +13,8 @@ pub fn init_logging() {
         .with_writer(std::io::stderr)
         .with_ansi(colours_on_stderr())
         .without_time()
+        // Else a warning that nobody can read any more ends the program.
+        .log_internal_errors(false)
         .with_target(false)
         .init();
 }

@@ -1,6 +1,6 @@
 //! Progress on stderr: a bar on a terminal, a line now and then elsewhere.
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -19,8 +19,13 @@ pub fn set_quiet(quiet: bool) {
 /// A line of information on stderr, unless quiet.
 pub fn say(text: &str) {
     if !QUIET.load(Ordering::Relaxed) {
-        eprintln!("{text}");
+        tell(text);
     }
+}
+
+/// A line on stderr. Where nobody reads it any more, as after the terminal was closed, the work goes on.
+fn tell(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// Progress of one piece of work.
@@ -79,7 +84,7 @@ impl Progress {
         {
             self.last_line = Instant::now();
             self.told = true;
-            eprintln!("{}: {done}/{total}", self.what);
+            tell(&format!("{}: {done}/{total}", self.what));
         }
     }
 }

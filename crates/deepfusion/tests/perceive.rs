@@ -103,7 +103,7 @@ fn images_stand_for_themselves_and_bags_bring_their_pictures() {
         serde_json::from_str(&std::fs::read_to_string(at.join("depth/0000000002.json")).unwrap())
             .unwrap();
     assert_eq!(sidecar["intrinsics_from"], "recording");
-    assert_eq!(sidecar["scale_trusted"], true);
+    assert_eq!(sidecar["camera_known"], true);
 }
 
 #[test]

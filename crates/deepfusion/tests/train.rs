@@ -70,7 +70,44 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     let sidecar = fs::read_to_string(at.join("depth/0000000001.json")).unwrap();
     let sidecar: Value = serde_json::from_str(&sidecar).unwrap();
     assert_eq!(sidecar["files"].as_array().unwrap().len(), 5);
-    assert_eq!(sidecar["scale_trusted"], true);
+    assert_eq!(sidecar["camera_known"], true);
+    // Measured on what was learned from, alone: that says nothing of the metres.
+    let unknown = serde_json::json!({"bias": null, "ci95": null, "verdict": "open"});
+    assert_eq!(sidecar["scale"], unknown);
+    ok(
+        at,
+        "simulate --out other --frames 12 --seed 9 --scan-every 1",
+    );
+    let other: Value =
+        serde_json::from_str(&ok(at, "eval --model run --data other --json").stdout).unwrap();
+    ok(
+        at,
+        &format!("predict --model run {image} --calib sim/2026_01_01 --save npy --out measured"),
+    );
+    let measured = fs::read_to_string(at.join("measured/0000000001.json")).unwrap();
+    let measured: Value = serde_json::from_str(&measured).unwrap();
+    let near = |a: &Value, b: &Value| (a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-9;
+    let (told, found) = (&measured["scale"], &other["scale"]);
+    assert!(near(&told["bias"], &found["bias"]), "{told} {found}");
+    for end in 0..2 {
+        assert!(
+            near(&told["ci95"][end], &found["bias_ci95"][end]),
+            "{told} {found}"
+        );
+    }
+    // Two steps are no reason to trust it, wherever its metres happen to lie.
+    assert_ne!(measured["scale"]["verdict"], "trusted");
+    let seen: Vec<_> = fs::read_dir(at.join("run/eval"))
+        .unwrap()
+        .map(|entry| fs::read(entry.unwrap().path()).unwrap())
+        .map(|text| serde_json::from_slice::<Value>(&text).unwrap())
+        .map(|saved| saved["measured"]["held_out"].clone())
+        .collect();
+    assert_eq!(seen.len(), 2);
+    assert!(
+        seen.contains(&Value::Bool(true)) && seen.contains(&Value::Bool(false)),
+        "{seen:?}"
+    );
     assert!((sidecar["focal_factor"].as_f64().unwrap() - 1.0).abs() < 1e-9);
     // Twice the focal length: the same picture is twice as far.
     let k = "--intrinsics 743.6,738.9,313.9,88.3";
@@ -88,7 +125,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     );
     assert!(assumed.stderr.contains("assumed"), "{}", assumed.stderr);
     assert!(
-        assumed.stdout.contains("\"scale_trusted\": false"),
+        assumed.stdout.contains("\"camera_known\": false"),
         "{}",
         assumed.stdout
     );
@@ -136,6 +173,200 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
         "train --out run --resume --steps 4",
         &["last.safetensors"],
     );
+}
+
+/// As a scheduler and a closed terminal stop it: saved, never done, and gone on with.
+#[test]
+#[cfg(unix)]
+fn a_stopped_run_is_saved_and_does_not_end_with_0() {
+    use std::process::{Command, Stdio};
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    let steps = || {
+        let log = fs::read_to_string(at.join("run/log.csv")).unwrap_or_default();
+        log.lines().filter(|l| l.contains(",train,")).count()
+    };
+    let stopped = |args: &str, signal: &str, reader_stays: bool| {
+        let before = steps();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_deepfusion"))
+            .current_dir(at)
+            .args(args.split_whitespace())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        if !reader_stays {
+            // The terminal is gone: nothing can be said any more.
+            drop(child.stderr.take());
+        }
+        while steps() <= before && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        let pid = child.id().to_string();
+        let sent = Command::new("kill").args([signal, &pid]).status().unwrap();
+        assert!(sent.success());
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(130), "{signal}: {said}");
+        assert_eq!(output.stdout, b"", "{signal}");
+        said
+    };
+    let train = format!("train --data sim {SMALL} --steps 100000 --out run");
+    let said = stopped(&train, "-TERM", true);
+    assert!(
+        said.contains("hint: go on with: deepfusion train --out run --resume"),
+        "{said}"
+    );
+    assert!(at.join("run/last.safetensors").is_file());
+    stopped("train --out run --resume", "-HUP", false);
+    let done = steps();
+    ok(
+        at,
+        &format!("train --out run --resume --steps {}", done + 1),
+    );
+    assert_eq!(steps(), done + 1);
+}
+
+/// `nohup` is asked to go on when the terminal closes.
+#[test]
+#[cfg(unix)]
+fn a_hangup_that_was_ignored_stays_ignored() {
+    use std::process::{Command, Stdio};
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    let train = format!("train --data sim {SMALL} --steps 12 --out run");
+    let mut child = Command::new("sh")
+        .current_dir(at)
+        .args(["-c", "trap '' HUP; exec \"$0\" \"$@\""])
+        .arg(env!("CARGO_BIN_EXE_deepfusion"))
+        .args(train.split_whitespace())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let begun = || fs::read_to_string(at.join("run/log.csv")).is_ok_and(|l| l.contains(",train,"));
+    while !begun() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let pid = child.id().to_string();
+    assert!(
+        Command::new("kill")
+            .args(["-HUP", &pid])
+            .status()
+            .unwrap()
+            .success()
+    );
+    assert!(child.wait().unwrap().success());
+}
+
+#[test]
+fn a_run_is_gone_on_with_from_any_folder_and_where_its_data_is_now() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let elsewhere = at.join("elsewhere");
+    fs::create_dir(&elsewhere).unwrap();
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    ok(at, "simulate --out val --frames 6 --seed 4 --scan-every 0");
+    ok(
+        at,
+        &format!("train --data sim --val-data val {SMALL} --steps 1 --out run"),
+    );
+    ok(&elsewhere, "train --out ../run --resume --steps 2");
+
+    fs::rename(at.join("sim"), at.join("moved")).unwrap();
+    let sim = at.join("sim").display().to_string();
+    fails(
+        &elsewhere,
+        "train --out ../run --resume --steps 3",
+        &[&sim, "--data"],
+    );
+    ok(
+        &elsewhere,
+        "train --out ../run --resume --steps 3 --data ../moved",
+    );
+    fs::rename(at.join("val"), at.join("val2")).unwrap();
+    fails(
+        at,
+        "train --out run --resume --steps 4",
+        &["/val:", "--val-data"],
+    );
+    ok(at, "train --out run --resume --steps 4 --val-data val2");
+    ok(&elsewhere, "train --out ../run --resume --steps 5");
+    // What is not the run's is no way to go on with it.
+    fails(
+        at,
+        "train --out run --resume --steps 6 --batch 4",
+        &["`--batch`: 4 contradicts the run, which has 2"],
+    );
+}
+
+/// A file's recordings, and each option in the place of its own part of them.
+#[test]
+fn options_replace_their_own_part_of_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    ok(at, "simulate --out val --frames 6 --seed 4 --scan-every 0");
+    ok(at, "simulate --out more --frames 6 --seed 5 --scan-every 0");
+    ok(
+        at,
+        &format!("train --data sim {SMALL} --steps 1 --out first"),
+    );
+    let data = |run: &str| {
+        let text = fs::read_to_string(at.join(run).join("config.toml")).unwrap();
+        text.parse::<toml::Table>().unwrap()["data"].clone()
+    };
+    let told = |name: &str| toml::Value::from(at.join(name).display().to_string());
+    // Without --data: the file's recordings, validated on what is asked for.
+    ok(
+        at,
+        "train --config first/config.toml --val-data val --out second",
+    );
+    assert_eq!(data("second")["paths"][0], told("sim"));
+    assert_eq!(data("second")["validation"][0], told("val"));
+    // With it: other recordings, and the file's validation.
+    ok(
+        at,
+        "train --config second/config.toml --data more --out third",
+    );
+    assert_eq!(data("third")["paths"][0], told("more"));
+    assert_eq!(data("third")["validation"][0], told("val"));
+    // A split and a camera that the file's recordings do not have are told, not left out.
+    fs::write(at.join("split.txt"), "nowhere/nothing 1 l\n").unwrap();
+    fails(
+        at,
+        "train --config first/config.toml --split split.txt --out fourth",
+        &["split.txt"],
+    );
+    fails(
+        at,
+        "train --config first/config.toml --camera 3 --out fifth",
+        &["camera 3"],
+    );
+    // Recordings beside those of a file's data sets.
+    let config = fs::read_to_string(at.join("first/config.toml")).unwrap();
+    let mut table: toml::Table = config.parse().unwrap();
+    table["data"] = toml::Value::Table(
+        "sets = [{ name = 'road', paths = ['sim'] }]"
+            .parse()
+            .unwrap(),
+    );
+    fs::write(at.join("sets.toml"), table.to_string()).unwrap();
+    for option in ["--data more", "--val-data val", "--split split.txt"] {
+        let name = option.split(' ').next().unwrap();
+        let args = format!("train --config sets.toml {option} --out sixth");
+        let run = run(at, &args);
+        assert_eq!(run.code, 1, "{}", run.stderr);
+        assert!(
+            run.stderr.contains(name) && run.stderr.contains("[[data.sets]]"),
+            "{}",
+            run.stderr
+        );
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 use super::calendar::{date, stamp};
 use super::{Moving, cam_from_scanner, moving_at, points};
-use crate::{Dataset, Error, Result, save_png, write_atomically};
+use crate::{Dataset, Error, Result, save_png, write_unsynced};
 use deepfusion_cloud::PointCloud;
 use deepfusion_geometry::{Intrinsics, Se3};
 use rayon::prelude::*;
@@ -50,6 +50,8 @@ pub fn convert_to_kitti(
         })?;
         folders.push(folder);
     }
+    // All at once: a wait for each of its thousands of files would take longer than writing them.
+    deepfusion_fs::sync_tree(out).map_err(|e| Error::file(out, e))?;
     Ok(folders)
 }
 
@@ -80,7 +82,7 @@ fn write_drive(dataset: &Dataset, folder: &Path, progress: &mut dyn FnMut(usize)
                     xyz,
                     ..PointCloud::default()
                 };
-                write_atomically(&path, |out| -> Result<()> {
+                write_unsynced(&path, |out| -> Result<()> {
                     Ok(cloud.write_kitti_bin(out)?)
                 })?;
             }

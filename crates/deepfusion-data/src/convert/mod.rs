@@ -11,7 +11,7 @@ mod kitti;
 pub use bag::convert_to_bag;
 pub use kitti::convert_to_kitti;
 
-use crate::{Dataset, Error, GtKind, Result, write_atomically};
+use crate::{Dataset, Error, GtKind, Result, write_unsynced};
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix3, Vector3};
 use std::io::Write as _;
@@ -54,7 +54,7 @@ fn prepare(out: &Path) -> Result<()> {
 }
 
 fn write_text(path: &Path, text: &str) -> Result<()> {
-    write_atomically(path, |out| {
+    write_unsynced(path, |out| {
         let written = out.write_all(text.as_bytes());
         written.map_err(|e| Error::file(path, e))
     })

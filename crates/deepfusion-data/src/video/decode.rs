@@ -43,7 +43,7 @@ pub(super) fn ensure(video: &Path, cache: &Path, frames: usize) -> Result<()> {
         if old {
             std::fs::remove_dir_all(cache).map_err(|e| Error::file(cache, e))?;
         }
-        std::fs::rename(&part, cache).map_err(|e| Error::file(cache, e))
+        deepfusion_fs::publish_folder(&part, cache).map_err(|e| Error::file(cache, e))
     });
     if made.is_err() {
         // Best effort: the error that counts is told.

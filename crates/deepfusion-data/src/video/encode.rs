@@ -37,7 +37,7 @@ pub fn write_video(folder: &Path, pictures: &[Shown], name: &str) -> Result<()> 
     aside.write(LIST, &list)?;
     let path = folder.join(name);
     encode(&aside.0, size, &path)?;
-    std::fs::rename(aside.0.join(PART), &path).map_err(|e| Error::file(&path, e))
+    deepfusion_fs::publish(&aside.0.join(PART), &path).map_err(|e| Error::file(&path, e))
 }
 
 /// Whether ffmpeg can be run at all, to know before hours of work.

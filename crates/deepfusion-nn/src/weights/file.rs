@@ -3,10 +3,11 @@
 use std::collections::HashMap;
 use std::fs;
 use std::io::{Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use burn::store::pytorch_reader::{DType as TorchDType, PytorchReader};
 use burn::tensor::{bf16, f16};
+use deepfusion_fs::Partial;
 use safetensors::tensor::{Dtype, Metadata, SafeTensorError, TensorView};
 
 use super::{WeightTensor, Weights};
@@ -138,7 +139,7 @@ fn floats<const N: usize>(bytes: &[u8], convert: impl Fn([u8; N]) -> f32) -> Vec
 }
 
 /// Writes the tensors as f32 to a safetensors file. The file appears under its name only when it is
-/// complete.
+/// complete and on the disk.
 ///
 /// # Errors
 /// [`Error::Io`] naming the file; what was written of it is removed.
@@ -158,29 +159,16 @@ pub fn write_safetensors(path: &Path, weights: &Weights) -> Result<(), Error> {
         views.push((name.as_str(), view));
     }
     let metadata: HashMap<String, String> = weights.metadata.clone().into_iter().collect();
-    let part = part_name(path);
-    safetensors::serialize_to_file(views, Some(metadata), &part)
+    let part = Partial::beside(path);
+    safetensors::serialize_to_file(views, Some(metadata), part.path())
         .map_err(|error| match error {
             SafeTensorError::IoError(source) => io_error(path, "write", source),
             other => format_error(path, other.to_string()),
         })
         .and_then(|()| {
-            // On the disk before it takes the name: a power cut must not leave half a file there.
-            fs::File::open(&part)
-                .and_then(|file| file.sync_all())
-                .and_then(|()| fs::rename(&part, path))
+            part.publish()
                 .map_err(|source| io_error(path, "write", source))
         })
-        .inspect_err(|_| {
-            let _ = fs::remove_file(&part);
-        })
-}
-
-/// A name beside the target, on the same file system, that no other process writes to.
-fn part_name(path: &Path) -> PathBuf {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.tmp", std::process::id()));
-    path.with_file_name(name)
 }
 
 fn io_error(path: &Path, action: &'static str, source: std::io::Error) -> Error {

@@ -12,12 +12,15 @@ use super::entry::Entry;
 use super::summary::{numbers, read_json};
 use crate::{Error, Result};
 
-/// Fields of the sidecar that the page shows as they are.
-const PASSED_ON: [&str; 10] = [
+/// Fields of the sidecar that the page shows as they are; `scale_trusted` is older programs', which had neither of the two
+/// before it.
+const PASSED_ON: [&str; 12] = [
     "unit",
     "model",
     "checkpoint_step",
     "intrinsics_from",
+    "camera_known",
+    "scale",
     "scale_trusted",
     "scale_monitor",
     "focal_factor",

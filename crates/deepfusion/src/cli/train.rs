@@ -11,6 +11,9 @@ use super::Size;
 #[command(
     after_help = "Learns from images and the car's speed alone (and its yaw rate, with --view-motion vehicle). Writes config.toml, log.csv, TensorBoard events, the \
     checkpoints last and best, and sample panels. A config file sets everything; options override it.\n\n\
+    Ctrl-C, and SIGTERM as schedulers send it, save after the step at work and end with code 130. --resume goes on as the run is \
+    configured: --epochs or --steps may make it longer, --data, --val-data and --split say where its recordings are now, and any other \
+    option that contradicts it is an error.\n\n\
     Examples:\n  deepfusion train --data kitti/2011_09_26/2011_09_26_drive_0005_sync --preset tiny\n  \
     deepfusion train --data kitti --preset light --epochs 20 --out runs/light\n  \
     deepfusion train --out runs/light --resume"
@@ -49,9 +52,9 @@ pub struct TrainArgs {
     /// Fixes everything that is random.
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
-    /// Which cameras.
-    #[arg(long, value_name = "2|3|both", default_value = "2")]
-    pub camera: CameraChoice,
+    /// Which cameras [default: 2].
+    #[arg(long, value_name = "2|3|both")]
+    pub camera: Option<CameraChoice>,
     /// Only the frames of this split file (lines "folder index side").
     #[arg(long, value_name = "FILE")]
     pub split: Option<PathBuf>,

@@ -28,8 +28,8 @@ use super::recorder::clock;
 use super::{device, run_report, train};
 use crate::cli::{DemoArgs, EngineArgs};
 use crate::engine;
-use crate::output;
 use crate::progress::{Progress, say};
+use crate::{interrupt, output};
 
 /// Streets that are trained on, each filmed at its own rate: one street alone is learned by heart. At few
 /// frames a second far things move enough to be measured; at many, cars parked beside the lane move
@@ -50,6 +50,9 @@ const STEPS: usize = 1500;
 const SIZE: (usize, usize) = (192, 64);
 /// Far from any seed a user is likely to choose for training.
 const TEST_SEED: u64 = 1_000_003;
+
+/// What is told of one that was stopped.
+const DEMO: &str = "the demo";
 
 /// `deepfusion demo`.
 pub fn run(args: &DemoArgs) -> Result<()> {
@@ -143,7 +146,8 @@ fn learn(mut config: TrainConfig, drives: &[PathBuf], out: &Path, device: &Devic
     let sets = train::open_samples(&config)?;
     let folder = RunFolder::create(out)?;
     let mut trainer = Trainer::create(config, folder, sets, device, Ok)?;
-    train::train(&mut trainer, None)
+    train::train(&mut trainer, None)?;
+    interrupt::check(DEMO)
 }
 
 fn measure(predictor: &Predictor, train: &[Dataset], test: &[Dataset]) -> Result<Evaluated> {
@@ -159,6 +163,7 @@ fn measure(predictor: &Predictor, train: &[Dataset], test: &[Dataset]) -> Result
         &protocol,
         Some(trivial_from_datasets(train, GtKind::Z)?),
         &mut |dataset, frame| {
+            interrupt::check(DEMO)?;
             let image = dataset.load_image(frame)?;
             predict(predictor, &image, &dataset.intrinsics(frame), true)
         },
@@ -212,6 +217,7 @@ fn write_report(
         .into_iter()
         .enumerate()
     {
+        interrupt::check(DEMO)?;
         let image = dataset.load_image(frame)?;
         let k = dataset.intrinsics(frame);
         let depth = predictor.predict(&image, Some(&k), true, true)?;

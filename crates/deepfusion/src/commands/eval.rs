@@ -17,6 +17,7 @@ use super::evaluate::{
     Comparison, Evaluated, Place, Truth, array_places, default_crop, depth_map, evaluate_datasets,
     open_with_camera, trivial_from_arrays, trivial_from_datasets,
 };
+use super::held_out::held_out;
 use super::run_report::{self, Choice};
 use crate::cli::{EvalArgs, PrecisionChoice, PredKind};
 use crate::engine;
@@ -75,7 +76,7 @@ fn from_model(args: &EvalArgs) -> Result<Report> {
         &mut |done, total| progress.set(done, total),
     )?;
     let (folder, _) = RunFolder::open(model)?;
-    let saved = saved(args, &predictor, &folder, &evaluated)?;
+    let saved = saved(args, &predictor, &folder, &datasets, &evaluated)?;
     match saved.write(folder.path()) {
         Ok(path) => say(&format!("kept as {}", path.display())),
         // A run on a disk that cannot be written is measured all the same.
@@ -273,6 +274,7 @@ fn saved(
     args: &EvalArgs,
     predictor: &Predictor,
     folder: &RunFolder,
+    datasets: &[Dataset],
     evaluated: &Evaluated,
 ) -> Result<SavedEvaluation> {
     let file = folder.checkpoint_path(predictor.checkpoint);
@@ -296,6 +298,7 @@ fn saved(
             engine: format!("{} {precision}", predictor.runner().name()),
             set: args.engine.set.clone(),
             focal_correction: !args.no_focal_correction,
+            held_out: held_out(predictor.config(), datasets, &evaluated.places),
             program: format!("deepfusion {}", env!("CARGO_PKG_VERSION")),
             command: run_report::command(),
             time: output::now(),
@@ -327,6 +330,15 @@ fn how_a_model_was_measured(
         ("checkpoint", saved.model.checkpoint.clone()),
         ("its SHA-256", saved.model.sha256.clone()),
         ("engine", m.engine.clone()),
+        (
+            "seen in training",
+            match m.held_out {
+                Some(true) => "no",
+                Some(false) => "yes",
+                None => "not known",
+            }
+            .into(),
+        ),
         (
             "correction for the focal length",
             if m.focal_correction { "on" } else { "off" }.into(),

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use burn::tensor::{Device, Tensor, TensorData};
+use deepfusion_fs::Partial;
 use deepfusion_nn::{DepthNet, InputSize, depth_graph, weights};
 use deepfusion_onnx::check::{PICTURES, deviation, pictures};
 use deepfusion_onnx::runtime::{OrtEngine, find};
@@ -54,8 +55,8 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let partial = partial_file(out, &bytes)?;
     let checks = check(args, &model, &net, partial.path(), &device)?;
     partial
-        .persist(out)
-        .map_err(|e| deepfusion_data::Error::file(out, e.error))?;
+        .publish()
+        .map_err(|e| deepfusion_data::Error::file(out, e))?;
     tell(args, &model, bytes.len(), checks)
 }
 
@@ -78,25 +79,12 @@ fn model_of(config: &TrainConfig, net: &DepthNet, args: &ExportArgs) -> Result<D
     })
 }
 
-/// The bytes in a file beside `out` that is gone unless it is renamed.
-fn partial_file(out: &Path, bytes: &[u8]) -> Result<tempfile::NamedTempFile> {
-    let folder = match out.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".export-").suffix(".partial");
-    // As any other file: what is temporary is private by default.
-    #[cfg(unix)]
-    let readable = std::os::unix::fs::PermissionsExt::from_mode(0o666);
-    #[cfg(unix)]
-    builder.permissions(readable);
-    let failed = |e| deepfusion_data::Error::file(out, e);
-    let mut file = builder.tempfile_in(folder).map_err(failed)?;
-    file.write_all(bytes)
-        .and_then(|()| file.as_file().sync_all())
-        .map_err(failed)?;
-    Ok(file)
+/// The bytes in a file beside `out` that is gone unless it is published.
+fn partial_file(out: &Path, bytes: &[u8]) -> Result<Partial> {
+    let partial = Partial::beside(out);
+    let written = partial.create().and_then(|mut file| file.write_all(bytes));
+    written.map_err(|e| deepfusion_data::Error::file(out, e))?;
+    Ok(partial)
 }
 
 /// Reads the file back and compares it with the network, in every engine there is.

@@ -6,15 +6,16 @@ use deepfusion_nn::InputSize;
 use deepfusion_nn::weights::load_torchvision_resnet;
 use deepfusion_train::{
     CheckpointKind, DataConfig, DataSetConfig, Error, Model, Preset, RunFolder, SampleSet,
-    TrainConfig, Trainer,
+    TrainConfig, TrainSummary, Trainer,
 };
 
-use super::device;
 use super::evaluate::open_datasets;
 use super::outlook::Outlook;
 use super::recorder::{Recorder, clock};
+use super::{device, resume};
 use crate::allocator;
 use crate::cli::{PresetChoice, TrainArgs};
+use crate::error::CliError;
 use crate::progress::say;
 use crate::{interrupt, output};
 
@@ -26,20 +27,14 @@ pub fn run(args: &TrainArgs) -> Result<()> {
         _ => None,
     };
     let mut config = match &resumed {
-        Some(folder) => folder.read_config()?,
+        Some(folder) => resume::with_options(&folder.read_config()?, args)?,
         None => start_config(args)?,
     };
-    // A resumed run may be made longer; all else is as it was.
-    config.steps = args.steps.or(config.steps);
-    if let Some(epochs) = args.epochs {
-        (config.epochs, config.steps, config.min_steps) = (epochs, None, 0);
-    }
-    if !args.data.is_empty() {
-        // A resumed run's sets have factors that new recordings would not have: `validate` refuses both.
-        config.data.paths.clone_from(&args.data);
-    }
     config.validate()?;
-    let sets = open_samples(&config)?;
+    let sets = open_samples(&config).map_err(|error| match &resumed {
+        Some(folder) => resume::where_recordings_are(error, &config, folder.path()),
+        None => error,
+    })?;
     let mut trainer = match resumed {
         Some(folder) => {
             folder.write_config(&config)?;
@@ -48,7 +43,9 @@ pub fn run(args: &TrainArgs) -> Result<()> {
         None => {
             let folder = output::run_folder(args.out.as_deref(), "train")?;
             let folder = RunFolder::create(&folder)?;
-            let init = args.init.as_deref();
+            config.init = args.init.clone().or(config.init);
+            let init = config.init.clone();
+            let init = init.as_deref();
             if let Some(folder) = init.map(run_of).transpose()?.flatten()
                 && config.pose_net.metres_per_unit == 0.0
             {
@@ -64,7 +61,16 @@ pub fn run(args: &TrainArgs) -> Result<()> {
     };
     say(&plan(&trainer));
     let outlook = Outlook::new(trainer.config().clone(), args.device.compute());
-    train(&mut trainer, Some(outlook))?;
+    let summary = train(&mut trainer, Some(outlook))?;
+    if summary.step < summary.steps {
+        let folder = trainer.folder().display();
+        return Err(CliError::Stopped {
+            step: summary.step,
+            steps: summary.steps,
+            go_on: format!("deepfusion train --out {folder} --resume"),
+        }
+        .into());
+    }
     output::print(&format!("{}\n", trainer.folder().display()))
 }
 
@@ -89,8 +95,9 @@ fn plan(trainer: &Trainer) -> String {
     )
 }
 
-/// Runs a trainer with its logs; with an `outlook`, how long it will take is said.
-pub fn train(trainer: &mut Trainer, outlook: Option<Outlook>) -> Result<()> {
+/// Runs a trainer with its logs, to its last step or until it is asked to stop; with an `outlook`, how long it will
+/// take is said.
+pub fn train(trainer: &mut Trainer, outlook: Option<Outlook>) -> Result<TrainSummary> {
     allocator::keep_memory();
     interrupt::catch("stopping after this step; the run is saved");
     let mut recorder = Recorder::open(trainer.folder(), trainer.step(), outlook)?;
@@ -98,7 +105,7 @@ pub fn train(trainer: &mut Trainer, outlook: Option<Outlook>) -> Result<()> {
     recorder.finish()?;
     say(&format!(
         "{} {} of {} steps in {}{}",
-        if summary.stopped {
+        if summary.step < summary.steps {
             "stopped after"
         } else {
             "done:"
@@ -115,7 +122,7 @@ pub fn train(trainer: &mut Trainer, outlook: Option<Outlook>) -> Result<()> {
             String::new()
         }
     ));
-    Ok(())
+    Ok(summary)
 }
 
 fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
@@ -126,6 +133,10 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     if let Some(size) = args.size {
         config.size.width = size.width as usize;
         config.size.height = size.height as usize;
+    }
+    config.steps = args.steps.or(config.steps);
+    if let Some(epochs) = args.epochs {
+        (config.epochs, config.steps, config.min_steps) = (epochs, None, 0);
     }
     config.batch = args.batch.unwrap_or(config.batch);
     config.seed = args.seed.unwrap_or(config.seed);
@@ -139,31 +150,63 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     if let Some(choice) = args.view_motion {
         config.view_motion = choice.into();
     }
-    if args.data.is_empty() {
-        // The file's own recordings, of which at least one is needed.
-        if config.data.paths.is_empty() && config.data.sets.is_empty() {
-            return Err(Error::Config {
-                field: "data",
-                expected: "--data, or data.paths or [[data.sets]] in the config file".into(),
-                found: "none".into(),
-            }
-            .into());
-        }
-        return Ok(config);
-    }
-    config.data = DataConfig {
-        paths: args.data.clone(),
-        validation: args.val_data.clone(),
-        split: args.split.clone(),
-        camera: match args.camera.cameras() {
-            [Camera::Left] => "2",
-            [Camera::Right] => "3",
-            _ => "both",
-        }
-        .into(),
-        sets: Vec::new(),
-    };
+    choose_recordings(&mut config.data, args)?;
     Ok(config)
+}
+
+/// The file's own recordings, each part of which an option replaces where it is given.
+fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), Error> {
+    let given = [
+        ("--data", !args.data.is_empty()),
+        ("--val-data", !args.val_data.is_empty()),
+        ("--split", args.split.is_some()),
+        // The sets' own where each has one; else it is the camera of those that have none.
+        (
+            "--camera",
+            args.camera.is_some() && data.sets.iter().any(|set| !set.camera.is_empty()),
+        ),
+    ];
+    for (field, given) in given {
+        if given && !data.sets.is_empty() {
+            return Err(Error::Config {
+                field,
+                expected: "none beside [[data.sets]] in the config file: each set has its own"
+                    .into(),
+                found: "both".into(),
+            });
+        }
+    }
+    if !args.data.is_empty() {
+        data.paths.clone_from(&args.data);
+    }
+    if !args.val_data.is_empty() {
+        data.validation.clone_from(&args.val_data);
+    }
+    if args.split.is_some() {
+        data.split.clone_from(&args.split);
+    }
+    if let Some(camera) = args.camera {
+        data.camera = camera_word(camera).into();
+    } else if data.camera.is_empty() && data.sets.is_empty() {
+        data.camera = camera_word(CameraChoice::default()).into();
+    }
+    if data.paths.is_empty() && data.sets.is_empty() {
+        return Err(Error::Config {
+            field: "data",
+            expected: "--data, or data.paths or [[data.sets]] in the config file".into(),
+            found: "none".into(),
+        });
+    }
+    Ok(())
+}
+
+/// Cameras as configurations name them.
+pub fn camera_word(camera: CameraChoice) -> &'static str {
+    match camera.cameras() {
+        [Camera::Left] => "2",
+        [Camera::Right] => "3",
+        _ => "both",
+    }
 }
 
 /// The preset of a name on the command line.
@@ -260,9 +303,13 @@ fn warn_of_speed(dataset: &Dataset) {
 
 /// The run that a path is, or is a checkpoint of; `None` of other weights.
 fn run_of(path: &Path) -> Result<Option<(RunFolder, Option<CheckpointKind>)>, Error> {
+    is_run(path).then(|| RunFolder::open(path)).transpose()
+}
+
+/// Whether a path is a run's folder, or in one.
+pub fn is_run(path: &Path) -> bool {
     let in_a_run = |p: &Path| p.join("config.toml").exists();
-    let is_run = path.is_dir() || path.parent().is_some_and(in_a_run);
-    is_run.then(|| RunFolder::open(path)).transpose()
+    path.is_dir() || path.parent().is_some_and(in_a_run)
 }
 
 /// Starts from the networks of a run, or from an ImageNet encoder's weights.

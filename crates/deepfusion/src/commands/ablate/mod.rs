@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use burn::tensor::Device;
-use deepfusion_data::{Camera, CameraChoice, GtKind};
+use deepfusion_data::{CameraChoice, GtKind};
 use deepfusion_eval::{GroundTruth, Protocol, Report};
 use deepfusion_train::{CheckpointKind, RunFolder, TrainConfig, Trainer, ViewMotion};
 use serde::{Deserialize, Serialize};
@@ -20,10 +20,11 @@ use super::eval::predict;
 use super::evaluate::{
     Truth, default_crop, evaluate_datasets, open_datasets, trivial_from_datasets,
 };
-use super::{device, train};
+use super::{device, resume, train};
 use crate::cli::{AblateArgs, DeviceChoice, EngineArgs, PresetChoice};
+use crate::error::CliError;
 use crate::progress::{Progress, say};
-use crate::{engine, output};
+use crate::{engine, interrupt, output};
 
 /// What the table is made of; stored beside it, so that it can be gone on with.
 #[derive(Debug, Serialize, Deserialize)]
@@ -50,6 +51,7 @@ pub fn run(args: &AblateArgs) -> Result<()> {
         plan.seeds = plan.seeds.max(args.seeds.unwrap_or(0) as u64);
         if !args.data.is_empty() {
             plan.config.data.paths.clone_from(&args.data);
+            plan.config.make_absolute();
         }
         (out, plan)
     } else {
@@ -59,7 +61,10 @@ pub fn run(args: &AblateArgs) -> Result<()> {
     // Every row is looked at before the first trains for hours.
     let configs = plan.rows.iter().map(|row| row.config(&plan.config));
     let configs = configs.collect::<Result<Vec<_>, _>>()?;
-    train::open_samples(&configs[0])?;
+    train::open_samples(&configs[0]).map_err(|error| match args.resume {
+        true => resume::where_recordings_are(error, &configs[0], &out),
+        false => error,
+    })?;
     open_eval_data(&plan)?;
     write(&out.join(PLAN), &toml::to_string_pretty(&plan)?)?;
 
@@ -81,14 +86,14 @@ pub fn run(args: &AblateArgs) -> Result<()> {
                 steps: Some(plan.budget),
                 ..config.clone()
             };
-            let Some(result) = one_run(&folder, *row, config, &plan, args.device)? else {
-                say(&format!(
-                    "stopped; go on with: deepfusion ablate --out {} --resume",
-                    out.display()
-                ));
-                return Ok(());
+            let result = match one_run(&folder, *row, config, &plan, args.device)? {
+                Outcome::Done(result) => result,
+                Outcome::Stopped { step, steps } => {
+                    let go_on = format!("deepfusion ablate --out {} --resume", out.display());
+                    return Err(CliError::Stopped { step, steps, go_on }.into());
+                }
             };
-            results.push(result);
+            results.push(*result);
             write_tables(&out, &plan, &results)?;
         }
     }
@@ -128,17 +133,17 @@ fn new_plan(args: &AblateArgs) -> Result<Plan> {
     }
     config.batch = args.batch.unwrap_or(config.batch);
     config.data.paths.clone_from(&args.data);
-    config.data.camera = match args.camera.cameras() {
-        [Camera::Left] => "2",
-        [Camera::Right] => "3",
-        _ => "both",
-    }
-    .into();
+    config.data.camera = train::camera_word(args.camera).into();
+    // Every row begins anew.
+    config.init = None;
+    // It is gone on with from any folder.
+    config.make_absolute();
+    let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
     Ok(Plan {
         budget: args.budget.unwrap_or(0).max(1),
         seeds: args.seeds.unwrap_or(1).max(1) as u64,
         rows: chosen(&args.rows)?,
-        eval_data: args.eval_data.clone(),
+        eval_data: args.eval_data.iter().map(absolute).collect(),
         config,
     })
 }
@@ -176,14 +181,22 @@ fn read_plan(out: &Path) -> Result<Plan> {
     )
 }
 
-/// Trains and measures one run, or as much of it as is not done yet; `None` if it was interrupted.
+/// How a run ended.
+enum Outcome {
+    /// Trained and measured.
+    Done(Box<RunResult>),
+    /// Asked to stop; training or measuring goes on from the step it is at.
+    Stopped { step: usize, steps: usize },
+}
+
+/// Trains and measures one run, or as much of it as is not done yet.
 fn one_run(
     folder: &Path,
     row: Row,
     config: TrainConfig,
     plan: &Plan,
     device: DeviceChoice,
-) -> Result<Option<RunResult>> {
+) -> Result<Outcome> {
     let done = folder.join("result.json");
     if done.exists() {
         let text =
@@ -194,17 +207,20 @@ fn one_run(
                 done.display()
             )
         })?;
-        return Ok(Some(result));
+        return Ok(Outcome::Done(Box::new(result)));
     }
     let run = folder.join("run");
     let parts = config.depth_net.costs(config.size);
     let parameters = parts.iter().map(|part| part.parameters).sum();
     let mut trainer = open_run(&run, config, &device::open(device)?)?;
     let start = Instant::now();
-    let finished = train_to_the_end(&mut trainer)?;
+    if trainer.step() < trainer.steps() {
+        train::train(&mut trainer, None)?;
+    }
     let seconds = spent(folder, start.elapsed().as_secs_f64())?;
-    if !finished {
-        return Ok(None);
+    let (step, steps) = (trainer.step(), trainer.steps());
+    if step < steps || interrupt::asked() {
+        return Ok(Outcome::Stopped { step, steps });
     }
     drop(trainer);
     let result = RunResult {
@@ -215,7 +231,7 @@ fn one_run(
         report: measure(&run, plan, device)?,
     };
     write(&done, &serde_json::to_string_pretty(&result)?)?;
-    Ok(Some(result))
+    Ok(Outcome::Done(Box::new(result)))
 }
 
 /// The run where its last checkpoint stands, or a new one.
@@ -236,14 +252,6 @@ fn open_run(run: &Path, config: TrainConfig, device: &Device) -> Result<Trainer>
         device,
         Ok,
     )?)
-}
-
-/// Whether the last step was reached.
-fn train_to_the_end(trainer: &mut Trainer) -> Result<bool> {
-    if trainer.step() < trainer.steps() {
-        train::train(trainer, None)?;
-    }
-    Ok(trainer.step() >= trainer.steps())
 }
 
 /// Seconds of training so far, these included; kept beside the run for the next time.

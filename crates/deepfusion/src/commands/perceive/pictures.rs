@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use deepfusion_cloud::PointCloud;
-use deepfusion_data::{RgbImage, save_png, write_atomically};
+use deepfusion_data::{RgbImage, save_png, write_unsynced};
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::{
     ConfidenceModel, Evidence, FreeSpace, Perception, Rays, Surroundings, without_flying_pixels,
@@ -141,7 +141,7 @@ impl Picture {
             Self::Image(picture) => save_png(picture, path)?,
             Self::Cloud(cloud) => {
                 let pcd = path.extension().is_some_and(|ending| ending == "pcd");
-                write_atomically::<anyhow::Error>(path, |out| match pcd {
+                write_unsynced::<anyhow::Error>(path, |out| match pcd {
                     true => Ok(cloud.write_pcd(out)?),
                     false => Ok(cloud.write_ply(out)?),
                 })?;
@@ -155,7 +155,7 @@ impl Picture {
 pub fn save_jpeg(image: &RgbImage, path: &Path) -> Result<()> {
     let mut bytes = Vec::new();
     image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 90).encode_image(image)?;
-    write_atomically::<deepfusion_data::Error>(path, |out| {
+    write_unsynced::<deepfusion_data::Error>(path, |out| {
         std::io::Write::write_all(out, &bytes).map_err(|e| deepfusion_data::Error::file(path, e))
     })?;
     Ok(())

@@ -4,7 +4,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use deepfusion_data::write_atomically;
+use deepfusion_data::write_unsynced;
 use deepfusion_perception::{Collision, Surroundings, Target};
 use serde::Serialize;
 
@@ -89,7 +89,7 @@ impl FrameRecord {
     /// As a file of its own.
     pub fn write(&self, path: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self)? + "\n";
-        write_atomically::<deepfusion_data::Error>(path, |out| {
+        write_unsynced::<deepfusion_data::Error>(path, |out| {
             out.write_all(text.as_bytes())
                 .map_err(|e| deepfusion_data::Error::file(path, e))
         })?;
@@ -133,7 +133,7 @@ impl Lines {
 
     /// Puts it in its place.
     pub fn finish(self) -> Result<()> {
-        std::fs::rename(&self.partial, &self.path)
+        deepfusion_fs::publish(&self.partial, &self.path)
             .map_err(|e| deepfusion_data::Error::file(&self.path, e))?;
         Ok(())
     }

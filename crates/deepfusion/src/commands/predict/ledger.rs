@@ -62,7 +62,12 @@ impl<'a> Ledger<'a> {
         }
     }
 
-    /// An image's outputs are written.
+    /// Where the outputs lie.
+    pub fn folder(&self) -> &Path {
+        self.folder
+    }
+
+    /// An image's outputs and sidecar are on the disk.
     pub fn done(&self, image: usize, sidecar: Sidecar) {
         let mut book = self.lock();
         book.done += 1;

@@ -136,10 +136,10 @@ impl Manifest {
     }
 }
 
-/// Held while a shard is worked on, so that nobody else does.
+/// Held while a shard is worked on, so that nobody else does. The system frees it with the process, however that ends; its
+/// empty file stays: who removed it could take it from under another run that has it open and is about to hold it.
 #[derive(Debug)]
 pub struct Lock {
-    path: PathBuf,
     _file: File,
 }
 
@@ -164,13 +164,28 @@ impl Lock {
                 );
             }
         }
-        Ok(Self { path, _file: file })
+        Ok(Self { _file: file })
     }
 }
 
-impl Drop for Lock {
-    fn drop(&mut self) {
-        // What is left of it is an empty file that the next run takes over.
-        let _ = std::fs::remove_file(&self.path);
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run that opened the file while another held it, and gets it after that: a third one must see it held.
+    #[test]
+    fn a_lock_that_was_waited_for_is_seen_by_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = Lock::take(folder.path(), Shard::WHOLE).unwrap();
+        let busy = Lock::take(folder.path(), Shard::WHOLE).unwrap_err();
+        assert!(busy.to_string().contains("at work on shard 1/1"), "{busy}");
+        let file = folder.path().join(".predict-1-of-1.lock");
+        let second = File::open(&file).unwrap();
+        drop(first);
+        second.try_lock().unwrap();
+        let third = Lock::take(folder.path(), Shard::WHOLE).unwrap_err();
+        assert!(third.to_string().contains("at work"), "{third}");
+        drop(second);
+        Lock::take(folder.path(), Shard::WHOLE).unwrap();
     }
 }

@@ -1,6 +1,7 @@
 //! `deepfusion predict`: images to metric depth, in bulk.
 
 pub(super) mod camera;
+mod committer;
 mod features;
 pub(super) mod inputs;
 mod ledger;
@@ -13,9 +14,13 @@ mod video;
 mod watcher;
 
 use anyhow::{Context, Result};
+use deepfusion_compare::{MetricScale, sha256_of_file};
 use deepfusion_data::{LiveFrame, RgbImage, load_rgb};
 use deepfusion_geometry::Intrinsics;
-use deepfusion_train::{Inspector, LayerMaps, Prediction, Predictor, PreparedImage, Preparer};
+use deepfusion_train::{
+    Inspector, LayerMaps, Prediction, Predictor, PreparedImage, Preparer, RunFolder,
+};
+use rayon::prelude::*;
 
 use self::camera::CameraSource;
 use self::inputs::Input;
@@ -42,8 +47,8 @@ pub(super) struct Job<'a> {
     preparer: Preparer,
     made_with: MadeWith,
     step: usize,
-    /// Whether the run learned metres.
-    metric: bool,
+    /// What was measured of the checkpoint's metres.
+    scale: MetricScale,
     /// Where features are to be saved.
     inspector: Option<Inspector>,
 }
@@ -124,7 +129,7 @@ pub fn run(args: &PredictArgs) -> Result<()> {
 fn tell_assumed() {
     tracing::warn!(
         "no intrinsics given: the training camera's field of view is assumed, so the metres are \
-         only as right as that is (scale_trusted: false; give --intrinsics or --calib)"
+         only as right as that is (camera_known: false; give --intrinsics or --calib)"
     );
 }
 
@@ -148,9 +153,16 @@ fn begin<'a>(
     let begun = manifest.begun(&before);
     let mut todo = Vec::new();
     let mut sidecars = vec![None; if command.json { mine.len() } else { 0 }];
-    for (i, input) in mine.iter().enumerate() {
-        let known = begun.contains(&(input.path.as_path(), input.name.as_str()));
-        match resume::finished(job, input, known)? {
+    // Whatever is there is read, to see that it still is what was written.
+    let found: Vec<Result<Option<Sidecar>>> = mine
+        .par_iter()
+        .map(|input| {
+            let known = begun.contains(&(input.path.as_path(), input.name.as_str()));
+            resume::finished(job, input, known)
+        })
+        .collect();
+    for (i, found) in found.into_iter().enumerate() {
+        match found? {
             None => todo.push(i),
             Some(sidecar) => {
                 manifest.images[i].state = manifest::State::Done;
@@ -187,16 +199,22 @@ fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], le
         });
         (loaded, seen)
     };
+    let (to_disk, written) = committer::queue();
     let write = |i: usize, (loaded, seen): (Loaded, Result<Seen>)| {
-        let sidecar = seen.and_then(|seen| job.write(mine[todo[i]], &loaded, &seen));
-        match sidecar {
-            Ok(sidecar) => ledger.done(todo[i], sidecar),
+        match seen.and_then(|seen| job.write_outputs(mine[todo[i]], &loaded, &seen)) {
+            // Fails only where the other thread has panicked, which ends the program below.
+            Ok(sidecar) => drop(to_disk.send((todo[i], sidecar))),
             Err(error) => ledger.stop(error),
         }
     };
     let stop = || interrupt::asked() || ledger.stopped();
     let threads = Threads::for_this_machine();
-    pipeline::run(todo.len(), threads, &stop, &load, infer, &write);
+    std::thread::scope(|scope| {
+        scope.spawn(|| committer::commit(ledger, mine, &written));
+        pipeline::run(todo.len(), threads, &stop, &load, infer, &write);
+        // The committer ends with the last image written.
+        drop(to_disk);
+    });
 }
 
 impl<'a> Job<'a> {
@@ -209,7 +227,7 @@ impl<'a> Job<'a> {
             camera,
             preparer: predictor.preparer(),
             step: predictor.step,
-            metric: predictor.training_camera().is_some() && predictor.config().loss.speed > 0.0,
+            scale: scale_of(args, predictor)?,
             inspector: match outputs.save.contains(&Save::Features) {
                 true => Some(Inspector::load(
                     &args.model,
@@ -277,18 +295,24 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Writes an image's outputs, then its sidecar.
+    /// Writes an image's outputs, then its sidecar, without waiting for the disk.
     pub fn write(&self, input: &Input, loaded: &Loaded, seen: &Seen) -> Result<Sidecar> {
+        let sidecar = self.write_outputs(input, loaded, seen)?;
+        sidecar.write_unsynced(&self.args.out, &input.name)?;
+        Ok(sidecar)
+    }
+
+    /// Writes an image's outputs without waiting for the disk, and gives the sidecar that is to be written once they are on it.
+    fn write_outputs(&self, input: &Input, loaded: &Loaded, seen: &Seen) -> Result<Sidecar> {
         let (args, image, prediction) = (self.args, &loaded.image, &seen.prediction);
         let depth = prediction.depth();
-        let (mut files, mut file_bytes) = (Vec::new(), Vec::new());
+        let mut files = Vec::new();
         for save in &self.outputs.save {
             let file = outputs::file_name(&input.name, *save);
             let path = args.out.join(&file);
             let (camera, maps) = (loaded.camera.as_ref(), (prediction, &depth));
             let far = self.outputs.max_depth_m;
             outputs::write(*save, far, image, camera, maps, &seen.layers, &path)?;
-            file_bytes.push(FileMark::of(&path)?.bytes);
             files.push(file);
         }
         if loaded.live.is_some() {
@@ -296,7 +320,6 @@ impl<'a> Job<'a> {
             let file = format!("{}_image.jpg", input.name);
             let path = args.out.join(&file);
             pictures::save_jpeg(image, &path)?;
-            file_bytes.push(FileMark::of(&path)?.bytes);
             files.push(file);
         }
         let known = depth.data.iter().copied().filter(|d| *d > 0.0);
@@ -305,7 +328,7 @@ impl<'a> Job<'a> {
             Some(_) => "recording",
             None => self.camera.word(),
         };
-        let sidecar = Sidecar {
+        let mut sidecar = Sidecar {
             image: input.path.clone(),
             image_file: loaded.mark,
             size: [image.width(), image.height()],
@@ -314,19 +337,37 @@ impl<'a> Job<'a> {
             checkpoint_step: self.step,
             intrinsics: loaded.camera.map(|k| [k.fx, k.fy, k.cx, k.cy]),
             intrinsics_from: camera_word.into(),
-            scale_trusted: self.metric && matches!(camera_word, "given" | "recording"),
+            camera_known: matches!(camera_word, "given" | "recording"),
+            scale: self.scale,
             focal_factor: prediction.focal_factor,
             window: prediction.window,
             depth_m: known
                 .map(|d| [d, d])
                 .reduce(|ends_so_far, [d, _]| ends(ends_so_far, d)),
             scale_monitor: seen.scale,
-            files,
-            file_bytes,
+            files: Vec::new(),
+            file_bytes: Vec::new(),
+            file_crc32: Vec::new(),
             live: loaded.live,
             made_with: self.made_with.clone(),
         };
-        sidecar.write(&args.out, &input.name)?;
+        for file in files {
+            sidecar.add(&args.out, file)?;
+        }
         Ok(sidecar)
     }
+}
+
+/// What evaluations that the run's folder keeps say of this checkpoint's metres.
+fn scale_of(args: &PredictionArgs, predictor: &Predictor) -> Result<MetricScale> {
+    let (folder, _) = RunFolder::open(&args.model)?;
+    let sha256 = sha256_of_file(&folder.checkpoint_path(predictor.checkpoint))?;
+    let (set, correction) = (args.engine.set.as_deref(), !args.no_focal_correction);
+    Ok(MetricScale::measured(
+        folder.path(),
+        &sha256,
+        set,
+        correction,
+        predictor.step,
+    ))
 }

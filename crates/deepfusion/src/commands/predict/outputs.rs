@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use deepfusion_cloud::PointCloud;
-use deepfusion_data::{RgbImage, save_png, write_atomically, write_depth_png};
+use deepfusion_data::{RgbImage, save_png, write_depth_png, write_unsynced};
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_render::{DepthScale, depth_picture, side_by_side, with_depth_legend};
 use deepfusion_train::{LayerMaps, Prediction};
@@ -29,7 +29,7 @@ pub fn file_name(name: &str, save: Save) -> String {
     format!("{name}{ending}")
 }
 
-/// Writes one output, atomically; `layers` are the network's, where [`Save::Features`] was asked for.
+/// Writes one output, whole or not at all, without waiting for the disk; `layers` are the network's, where [`Save::Features`] was asked for.
 pub fn write(
     save: Save,
     max_depth_m: f64,
@@ -58,7 +58,7 @@ pub fn write(
             let k = camera.ok_or(CliError::NoCamera)?;
             let rgb = Some(image.as_raw().as_slice());
             let cloud = PointCloud::from_depth(depth, k, rgb, max_depth_m as f32)?;
-            write_atomically::<CloudError>(path, |out| match save {
+            write_unsynced::<CloudError>(path, |out| match save {
                 Save::Pcd => Ok(cloud.write_pcd(out)?),
                 _ => Ok(cloud.write_ply(out)?),
             })
@@ -72,7 +72,7 @@ fn write_npy(depth: &DepthMap, path: &Path) -> Result<()> {
     let view = ndarray::ArrayView2::from_shape((depth.height, depth.width), &depth.data)?;
     let mut bytes = Vec::new();
     ndarray_npy::WriteNpyExt::write_npy(&view, &mut bytes)?;
-    write_atomically::<deepfusion_data::Error>(path, |out| {
+    write_unsynced::<deepfusion_data::Error>(path, |out| {
         out.write_all(&bytes)
             .map_err(|e| deepfusion_data::Error::file(path, e))
     })?;

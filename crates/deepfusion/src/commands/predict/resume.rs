@@ -4,6 +4,8 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use anyhow::Result;
+use deepfusion_fs::Partial;
+use serde::de::IgnoredAny;
 
 use super::Job;
 use super::inputs::Input;
@@ -15,7 +17,7 @@ use crate::error::CliError;
 ///
 /// Files that this job did not make, or made of an image that has changed since, are an error, or with `--overwrite` work
 /// to do. `begun` says that a run of this job had the image in its manifest: files without a sidecar are then what it left
-/// when it was killed.
+/// when it was killed. Done means that every output's length and checksum are those in the sidecar.
 pub fn finished(job: &Job, input: &Input, begun: bool) -> Result<Option<Sidecar>> {
     let args = job.args;
     let path = Sidecar::path(&args.out, &input.name);
@@ -29,7 +31,13 @@ pub fn finished(job: &Job, input: &Input, begun: bool) -> Result<Option<Sidecar>
         }
         Err(e) => return Err(deepfusion_data::Error::file(&path, e).into()),
     };
+    if text.iter().all(|byte| *byte == 0) {
+        // What a power cut leaves of a file: nothing of anybody's is lost with it.
+        return Ok(None);
+    }
     let why = match serde_json::from_slice::<Sidecar>(&text) {
+        // Cut off or overwritten by other bytes, and ours.
+        Err(_) if begun && serde_json::from_slice::<IgnoredAny>(&text).is_err() => return Ok(None),
         Err(_) => "and does not say how it was made".to_owned(),
         Ok(sidecar) if sidecar.image != input.path => {
             format!("made from {}", sidecar.image.display())
@@ -40,7 +48,7 @@ pub fn finished(job: &Job, input: &Input, begun: bool) -> Result<Option<Sidecar>
                 format!("and {} has changed since", input.path.display())
             }
             None if sidecar.is_complete(&args.out) => return Ok(Some(sidecar)),
-            // Ours, but a file of it is gone or cut off.
+            // Ours, but a file of it is gone or is not what was written.
             None => return Ok(None),
         },
     };
@@ -64,7 +72,7 @@ fn refuse_files(job: &Job, input: &Input) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Removes the half-written files that a killed run of this shard left (`.NAME.PID-N.partial`).
+/// Removes the half-written files that a killed run of this shard left.
 pub fn remove_partial_files(job: &Job, mine: &[&Input]) -> Result<()> {
     let out = &job.args.out;
     let files_of = |input: &&Input| {
@@ -80,30 +88,9 @@ pub fn remove_partial_files(job: &Job, mine: &[&Input]) -> Result<()> {
     let failed = |e| deepfusion_data::Error::file(out, e);
     for entry in std::fs::read_dir(out).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
-        if partial_of(&path).is_some_and(|file| files.contains(file)) {
+        if Partial::target_of(&path).is_some_and(|file| files.contains(file)) {
             std::fs::remove_file(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
         }
     }
     Ok(())
-}
-
-/// The file that a half-written one would have become.
-fn partial_of(path: &Path) -> Option<&str> {
-    let name = path.file_name()?.to_str()?;
-    let inner = name.strip_prefix('.')?.strip_suffix(".partial")?;
-    let (file, process) = inner.rsplit_once('.')?;
-    process.contains('-').then_some(file)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn half_written_files_are_known_by_their_names() {
-        let of = |name: &'static str| partial_of(Path::new(name));
-        assert_eq!(of("out/.a_depth.png.17-3.partial"), Some("a_depth.png"));
-        assert_eq!(of("out/a_depth.png"), None);
-        assert_eq!(of("out/.a.partial"), None);
-    }
 }

@@ -1,11 +1,14 @@
 //! What stands beside every prediction. It is written last, so that it also says that the rest is there.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use anyhow::Result;
 use clap::ValueEnum;
+use deepfusion_compare::MetricScale;
 use deepfusion_data::{LiveFrame, write_atomically};
+use deepfusion_fs::Content;
 use deepfusion_train::{Predictor, RunFolder};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -35,8 +38,12 @@ pub struct Sidecar {
     pub intrinsics: Option<[f64; 4]>,
     /// `given`, `recording` (its own calibration), `assumed` or `unknown`.
     pub intrinsics_from: String,
-    /// Whether the metres can be trusted: the run learned them, and the camera is known.
-    pub scale_trusted: bool,
+    /// Whether the camera is known, so that depth is right for its focal length: given, or the recording's own.
+    #[serde(default)]
+    pub camera_known: bool,
+    /// What was measured of this checkpoint's metres on recordings that it has not learned from.
+    #[serde(default)]
+    pub scale: MetricScale,
     /// What depth was multiplied by for another focal length than the one trained with.
     pub focal_factor: f64,
     /// x, y, width and height of the part that was looked at; depth is 0 outside.
@@ -50,6 +57,10 @@ pub struct Sidecar {
     pub files: Vec<String>,
     /// The outputs' sizes in bytes, to notice a file that was cut off.
     pub file_bytes: Vec<u64>,
+    /// The outputs' CRC-32 as eight hexadecimal digits, to notice one that a power cut left as zeros. A sidecar of an older
+    /// version has none: what it stands for is made again.
+    #[serde(default)]
+    pub file_crc32: Vec<String>,
     /// Of a live source's frame: when it arrived, and how late its depth was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub live: Option<LiveMark>,
@@ -222,30 +233,79 @@ impl Sidecar {
         folder.join(format!("{name}.json"))
     }
 
-    /// Writes it into the folder, atomically.
-    pub fn write(&self, folder: &Path, name: &str) -> Result<()> {
-        write_json(self, &Self::path(folder, name))
+    /// Adds an output that is there, as it is now.
+    pub fn add(&mut self, folder: &Path, file: String) -> Result<()> {
+        let path = folder.join(&file);
+        let content = Content::of(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+        self.files.push(file);
+        self.file_bytes.push(content.bytes);
+        self.file_crc32.push(format!("{:08x}", content.crc32));
+        Ok(())
     }
 
-    /// Whether every output is there, whole.
+    /// Writes sidecars into the folder, by their names, once all their outputs are on the disk: where one is, there are its
+    /// outputs, whatever happens to the power. Returns when the sidecars are on the disk, too.
+    pub fn write_all<'a>(
+        folder: &Path,
+        group: impl Iterator<Item = (&'a str, &'a Self)>,
+    ) -> Result<()> {
+        let group: Vec<_> = group.collect();
+        let failed = |e| deepfusion_data::Error::file(folder, e);
+        let outputs = group.iter().flat_map(|(_, sidecar)| &sidecar.files);
+        let outputs: Vec<PathBuf> = outputs.map(|file| folder.join(file)).collect();
+        deepfusion_fs::sync_files(&outputs).map_err(failed)?;
+        deepfusion_fs::sync_folder(folder).map_err(failed)?;
+        let mut aside = Vec::new();
+        for (name, sidecar) in group {
+            let (path, text) = (Self::path(folder, name), as_json(sidecar)?);
+            let failed = |e| deepfusion_data::Error::file(&path, e);
+            let filled = deepfusion_fs::write_aside(&path, failed, |out| put(out, &text, &path));
+            aside.push(filled?);
+        }
+        Ok(deepfusion_fs::publish_all(aside).map_err(failed)?)
+    }
+
+    /// Writes it into the folder, whole or not at all, without waiting for the disk: where nothing goes on from it.
+    pub fn write_unsynced(&self, folder: &Path, name: &str) -> Result<()> {
+        let path = Self::path(folder, name);
+        let text = as_json(self)?;
+        Ok(deepfusion_data::write_unsynced(&path, |out| {
+            put(out, &text, &path)
+        })?)
+    }
+
+    /// Whether every output is there with the content that was written.
     pub fn is_complete(&self, folder: &Path) -> bool {
-        self.files.len() == self.file_bytes.len()
-            && self
-                .files
-                .iter()
-                .zip(&self.file_bytes)
-                .all(|(file, bytes)| {
-                    std::fs::metadata(folder.join(file)).is_ok_and(|m| m.len() == *bytes)
+        let files = self.files.len();
+        if (self.file_bytes.len(), self.file_crc32.len()) != (files, files) {
+            return false;
+        }
+        let contents = self.file_bytes.iter().zip(&self.file_crc32);
+        self.files
+            .iter()
+            .zip(contents)
+            .all(|(file, (bytes, crc32))| {
+                u32::from_str_radix(crc32, 16).is_ok_and(|crc32| {
+                    let bytes = *bytes;
+                    Content { bytes, crc32 }.is_of(&folder.join(file))
                 })
+            })
     }
 }
 
 /// Writes a value as indented JSON, atomically.
 pub fn write_json<T: Serialize>(value: &T, path: &Path) -> Result<()> {
+    let text = as_json(value)?;
+    Ok(write_atomically(path, |out| put(out, &text, path))?)
+}
+
+fn as_json<T: Serialize>(value: &T) -> Result<Vec<u8>> {
     let mut text = serde_json::to_vec_pretty(value)?;
     text.push(b'\n');
-    write_atomically::<deepfusion_data::Error>(path, |out| {
-        std::io::Write::write_all(out, &text).map_err(|e| deepfusion_data::Error::file(path, e))
-    })?;
-    Ok(())
+    Ok(text)
+}
+
+fn put(out: &mut impl Write, text: &[u8], path: &Path) -> Result<(), deepfusion_data::Error> {
+    out.write_all(text)
+        .map_err(|e| deepfusion_data::Error::file(path, e))
 }

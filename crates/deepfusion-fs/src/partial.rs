@@ -1,0 +1,246 @@
+use std::collections::BTreeSet;
+use std::collections::hash_map::RandomState;
+use std::ffi::OsString;
+use std::fs::File;
+use std::hash::{BuildHasher, Hasher};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::sync::{folder_of, publish, sync_files, sync_folder};
+
+/// A file's name beside its target, on the same file system, until the file is whole. What bears the name is removed when
+/// this goes out of scope, unless it was published.
+#[derive(Debug)]
+pub struct Partial {
+    temporary: PathBuf,
+    target: PathBuf,
+}
+
+impl Partial {
+    /// For the file that is to be at `target`. Nothing is made yet.
+    #[must_use]
+    pub fn beside(target: &Path) -> Self {
+        // Threads, processes, and machines that share the folder may write the same target: the last rename wins, whole. A
+        // process's number alone would come again after a kill, in a container every time.
+        let chance = RandomState::new().build_hasher().finish();
+        let mut name = OsString::from(".");
+        name.push(target.file_name().unwrap_or_default());
+        name.push(format!(".{}-{chance:016x}.partial", std::process::id()));
+        Self {
+            temporary: target.with_file_name(name),
+            target: target.to_owned(),
+        }
+    }
+
+    /// Where to write.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.temporary
+    }
+
+    /// Makes the file, empty.
+    ///
+    /// # Errors
+    /// What the system says, such as that there is no such folder.
+    pub fn create(&self) -> io::Result<File> {
+        File::create_new(&self.temporary)
+    }
+
+    /// Gives the file its name once its content is on the disk, and returns once the name is, too.
+    ///
+    /// # Errors
+    /// What the system says. Where syncing or renaming failed the target is as it was.
+    pub fn publish(self) -> io::Result<()> {
+        publish(&self.temporary, &self.target)
+    }
+
+    /// Gives the file its name without waiting for the disk: after a power cut its content may be missing.
+    ///
+    /// # Errors
+    /// What the system says; the target is then as it was.
+    pub fn publish_unsynced(self) -> io::Result<()> {
+        std::fs::rename(&self.temporary, &self.target)
+    }
+
+    /// The name of the file that a path would have become, where the path is one of these: a killed program leaves it.
+    #[must_use]
+    pub fn target_of(path: &Path) -> Option<&str> {
+        let name = path.file_name()?.to_str()?;
+        let inner = name.strip_prefix('.')?.strip_suffix(".partial")?;
+        let (file, process) = inner.rsplit_once('.')?;
+        process.contains('-').then_some(file)
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        // Gone already after the rename; nothing can be done about other failures here.
+        let _ = std::fs::remove_file(&self.temporary);
+    }
+}
+
+/// Writes a file aside, syncs it, renames it to `path` and syncs the folder: `path` never holds half a file, also after a
+/// power cut, and once this returns it is there to stay. `failed` makes the caller's error of the system's.
+///
+/// # Errors
+/// What `write` returns, or `failed` of what the system said. The partial file is then gone and `path` is as it was; the last
+/// step, syncing the folder, may fail with the new file in place.
+pub fn write_atomically<E>(
+    path: &Path,
+    failed: impl Fn(io::Error) -> E,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
+) -> Result<(), E> {
+    write_aside(path, &failed, write)?.publish().map_err(failed)
+}
+
+/// As [`write_atomically`] without waiting for the disk: a reader never sees half a file, and after a power cut there may be
+/// one. For many files that another, written after [`crate::sync_files`], says to be done.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn write_unsynced<E>(
+    path: &Path,
+    failed: impl Fn(io::Error) -> E,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
+) -> Result<(), E> {
+    write_aside(path, &failed, write)?
+        .publish_unsynced()
+        .map_err(failed)
+}
+
+/// Writes a file aside, for [`publish_all`] or [`Partial::publish`].
+///
+/// # Errors
+/// What `write` returns, or `failed` of what the system said. The partial file is then gone.
+pub fn write_aside<E>(
+    path: &Path,
+    failed: impl Fn(io::Error) -> E,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
+) -> Result<Partial, E> {
+    let partial = Partial::beside(path);
+    let mut out = BufWriter::new(partial.create().map_err(&failed)?);
+    write(&mut out)?;
+    out.flush().map_err(&failed)?;
+    Ok(partial)
+}
+
+/// Publishes many files at once: waiting for the disk takes hardly longer than for one.
+///
+/// # Errors
+/// What the system says. Where syncing failed no target was touched, where renaming did those before it are in place.
+pub fn publish_all(partials: Vec<Partial>) -> io::Result<()> {
+    sync_files(partials.iter().map(Partial::path))?;
+    let mut folders = BTreeSet::new();
+    for partial in partials {
+        folders.insert(folder_of(&partial.target).to_owned());
+        partial.publish_unsynced()?;
+    }
+    folders.iter().try_for_each(|folder| sync_folder(folder))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(dir: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(dir).unwrap();
+        entries
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect()
+    }
+
+    #[test]
+    fn the_file_appears_whole() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.txt");
+        type Write = fn(&Path) -> io::Result<()>;
+        fn fill(path: &Path, out: &mut BufWriter<File>) -> io::Result<()> {
+            out.write_all(b"new content")?;
+            out.flush()?;
+            assert_eq!(std::fs::read_to_string(path).unwrap(), "old");
+            Ok(())
+        }
+        let synced: Write = |path| write_atomically(path, |e| e, |out| fill(path, out));
+        let unsynced: Write = |path| write_unsynced(path, |e| e, |out| fill(path, out));
+        for write in [synced, unsynced] {
+            std::fs::write(&path, "old").unwrap();
+            write(&path).unwrap();
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), "new content");
+            assert_eq!(names(dir.path()), ["a.txt"]);
+        }
+    }
+
+    #[test]
+    fn a_failure_leaves_nothing_behind() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.txt");
+        let error = write_atomically(
+            &path,
+            |e| e,
+            |out| {
+                out.write_all(b"half")?;
+                Err(io::Error::other("out of ideas"))
+            },
+        )
+        .unwrap_err();
+        assert!(error.to_string().contains("out of ideas"));
+        assert!(names(dir.path()).is_empty());
+        // A folder in the way: the rename fails, and what was written aside goes.
+        std::fs::create_dir(&path).unwrap();
+        std::fs::write(path.join("x"), "x").unwrap();
+        write_atomically(&path, |e| e, |out| out.write_all(b"whole")).unwrap_err();
+        assert_eq!(names(dir.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn no_folder_no_file() {
+        let path = Path::new("no/such/folder/a.txt");
+        let error = write_atomically(path, |e| e, |_| Ok(())).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::NotFound);
+    }
+
+    /// A file in the folder one is in has no folder in its name, which must be synced all the same.
+    #[test]
+    fn a_bare_name_is_of_this_folder() {
+        let path = PathBuf::from(format!("bare-name-{}.txt", std::process::id()));
+        write_atomically(&path, |e| e, |out| out.write_all(b"x")).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"x");
+        std::fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn many_appear_together_or_their_files_aside_go() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::create_dir(dir.path().join("sub")).unwrap();
+        let aside = |name: &str| {
+            let path = dir.path().join(name);
+            write_aside(&path, |e| e, |out| out.write_all(name.as_bytes())).unwrap()
+        };
+        publish_all(vec![aside("a"), aside("sub/b"), aside("c")]).unwrap();
+        for name in ["a", "sub/b", "c"] {
+            let content = std::fs::read(dir.path().join(name)).unwrap();
+            assert_eq!(content, name.as_bytes());
+        }
+        // One whose file is gone: none of the others gets its name.
+        let gone = aside("d");
+        std::fs::remove_file(gone.path()).unwrap();
+        publish_all(vec![aside("e"), gone]).unwrap_err();
+        let mut left = names(dir.path());
+        left.sort();
+        assert_eq!(left, ["a", "c", "sub"]);
+        publish_all(Vec::new()).unwrap();
+    }
+
+    /// What a killed program left must not be in the way of the next one, whatever its process's number.
+    #[test]
+    fn two_of_one_process_never_share_a_name() {
+        let target = Path::new("out/a_depth.png");
+        let (a, b) = (Partial::beside(target), Partial::beside(target));
+        assert_ne!(a.path(), b.path());
+        assert_eq!(Partial::target_of(a.path()), Some("a_depth.png"));
+        assert_eq!(Partial::target_of(target), None);
+        let older = Path::new("out/.a_depth.png.17-3.partial");
+        assert_eq!(Partial::target_of(older), Some("a_depth.png"));
+        assert_eq!(Partial::target_of(Path::new("out/.a.partial")), None);
+    }
+}

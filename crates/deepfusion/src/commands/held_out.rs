@@ -1,0 +1,66 @@
+//! Whether training saw what is measured on.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use deepfusion_data::{Dataset, Frame};
+use deepfusion_train::{RunFolder, SampleSet, TrainConfig};
+
+use super::evaluate::Place;
+use super::train::{is_run, training_recordings};
+
+/// A frame, wherever a copy of its drive lies: the drive's name, the frame's number and the size of its image's file.
+type Seen = (String, u64, u64);
+
+/// Whether none of the frames measured was a target or a source in training, of this run and of those it began from. `None` where
+/// that cannot be told: recordings that are not there any more, or a network that was learned elsewhere.
+pub fn held_out(config: &TrainConfig, datasets: &[Dataset], places: &[Place]) -> Option<bool> {
+    let seen = seen_by(config, &mut HashSet::new())?;
+    let mut measured = places
+        .iter()
+        .map(|Place(number, frame)| &datasets[*number].frames()[*frame]);
+    Some(measured.all(|frame| !seen.contains(&key(frame))))
+}
+
+fn seen_by(config: &TrainConfig, runs: &mut HashSet<std::path::PathBuf>) -> Option<HashSet<Seen>> {
+    let mut config = config.clone();
+    let data = &config.data;
+    let elsewhere =
+        !data.validation.is_empty() || data.sets.iter().any(|s| !s.validation.is_empty());
+    if elsewhere {
+        // Nothing of the training recordings was left out.
+        config.validation_share = 0.0;
+    }
+    let recordings = training_recordings(&config).ok()?;
+    let (train, _, _) = SampleSet::split_sets(&config, recordings, None).ok()?;
+    let mut seen = HashSet::new();
+    for sample in &train.samples {
+        let frames = train.datasets[sample.dataset].frames();
+        seen.insert(key(&frames[sample.snippet.target]));
+        seen.extend(sample.snippet.sources.iter().map(|s| key(&frames[s.frame])));
+    }
+    if let Some(init) = &config.init {
+        seen.extend(seen_before(init, runs)?);
+    }
+    Some(seen)
+}
+
+/// What the weights that a run began from have seen; weights that are no run's are of other pictures (ImageNet's).
+fn seen_before(init: &Path, runs: &mut HashSet<std::path::PathBuf>) -> Option<HashSet<Seen>> {
+    if !init.exists() {
+        return None;
+    }
+    if !is_run(init) {
+        return Some(HashSet::new());
+    }
+    let (folder, _) = RunFolder::open(init).ok()?;
+    if !runs.insert(folder.path().to_owned()) {
+        return Some(HashSet::new());
+    }
+    seen_by(&folder.read_config().ok()?, runs)
+}
+
+fn key(frame: &Frame) -> Seen {
+    let size = std::fs::metadata(frame.image.path()).map_or(0, |meta| meta.len());
+    (frame.drive.clone(), frame.number, size)
+}
