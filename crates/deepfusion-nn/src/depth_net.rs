@@ -10,6 +10,7 @@ use crate::attention::{Attention, AttentionConfig, AttentionMasks, GlobalAggrega
 use crate::decoder::{DecoderConfig, DisparityDecoder};
 use crate::hce::{HceConfig, HierarchicalContext};
 use crate::init::WeightRng;
+use crate::layers::freeze_statistics;
 use crate::resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth};
 
 /// The size of the images a network is given, in pixels.
@@ -206,12 +207,17 @@ impl DepthNetConfig {
         let decoder = self
             .decoder
             .init(refined, stride, head_bias, &mut rng, device)?;
-        Ok(DepthNet {
+        let net = DepthNet {
             encoder,
             hce,
             attention,
             aggregation,
             decoder,
+        };
+        // The encoder has seen to its own; the context encoding has batch norms, too.
+        Ok(match self.encoder.frozen_statistics {
+            true => freeze_statistics(net, true),
+            false => net,
         })
     }
 }

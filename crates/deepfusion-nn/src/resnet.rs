@@ -119,7 +119,8 @@ pub struct ResNetConfig {
     #[serde(default = "default_normalisation")]
     pub normalisation: InputNormalisation,
     /// Whether the batch norms keep their running statistics while training (for batches too small
-    /// to have statistics of their own; needs imported weights).
+    /// to have statistics of their own; needs imported weights). Of a depth network these are all its batch norms,
+    /// the context encoding's too.
     #[serde(default)]
     pub frozen_statistics: bool,
     /// By what the coarsest feature is smaller than the image: 32, or 16. At 16 `layer4` keeps the stride of

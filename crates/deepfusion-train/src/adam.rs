@@ -1,7 +1,8 @@
+use crate::{Error, Model};
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{Gradients, Tensor, TensorData};
 use deepfusion_kernels::{AdamStep, adam, sum_of_squares};
-use deepfusion_nn::weights::{WeightTensor, Weights};
+use deepfusion_nn::weights::{self, WeightTensor, Weights};
 use std::collections::BTreeMap;
 
 /// A parameter's moments.
@@ -179,19 +180,74 @@ impl Adam {
         weights
     }
 
-    /// The optimiser that [`Self::state`] came from, after `steps` steps.
-    #[must_use]
-    pub fn restore(state: Weights, steps: u32) -> Self {
+    /// The optimiser that [`Self::state`] came from, after `steps` steps with this model.
+    ///
+    /// # Errors
+    /// [`Error::Network`] naming the first moment that is not as long as its parameter, has none, or lacks the other
+    /// one beside it.
+    pub fn restore(state: Weights, steps: u32, model: &Model) -> Result<Self, Error> {
+        let lengths = parameter_lengths(model);
+        let Weights {
+            origin, tensors, ..
+        } = state;
         let mut moments: BTreeMap<String, Moments> = BTreeMap::new();
-        for (name, tensor) in state.tensors {
-            if let Some(name) = name.strip_prefix("m.") {
-                moments.entry(name.to_owned()).or_default().first = tensor.values;
-            } else if let Some(name) = name.strip_prefix("v.") {
-                moments.entry(name.to_owned()).or_default().second = tensor.values;
+        for (name, tensor) in tensors {
+            let found = vec![tensor.values.len()];
+            let parameter = name.strip_prefix("m.").or(name.strip_prefix("v."));
+            let known = parameter.and_then(|p| Some((p, *lengths.get(p)?)));
+            let Some((parameter, length)) = known else {
+                return Err(Error::Network(deepfusion_nn::Error::UnexpectedTensor {
+                    origin,
+                    name: format!("adam.{name}"),
+                    found,
+                    others: 0,
+                }));
+            };
+            if found != [length] {
+                return Err(Error::Network(deepfusion_nn::Error::TensorShape {
+                    origin,
+                    name: format!("adam.{name}"),
+                    expected: vec![length],
+                    found,
+                    others: 0,
+                }));
+            }
+            let moments = moments.entry(parameter.to_owned()).or_default();
+            match name.starts_with("m.") {
+                true => moments.first = tensor.values,
+                false => moments.second = tensor.values,
             }
         }
-        Self { moments, steps }
+        for (name, moments) in &moments {
+            let missing = match (moments.first.is_empty(), moments.second.is_empty()) {
+                (true, _) => "m",
+                (_, true) => "v",
+                _ => continue,
+            };
+            return Err(Error::Network(deepfusion_nn::Error::MissingTensor {
+                origin,
+                name: format!("adam.{missing}.{name}"),
+                expected: vec![lengths[name]],
+                others: 0,
+            }));
+        }
+        Ok(Self { moments, steps })
     }
+}
+
+/// How many values each parameter of a model has, by its name among the moments.
+fn parameter_lengths(model: &Model) -> BTreeMap<String, usize> {
+    let mut lengths = BTreeMap::new();
+    let mut note = |prefix: &str, module: Weights| {
+        let named = module.with_prefix(prefix).tensors.into_iter();
+        lengths.extend(named.map(|(name, tensor)| (name, tensor.values.len())));
+    };
+    note("depth.", weights::collect(&model.depth_net));
+    note("pose.", weights::collect(&model.pose_net));
+    if let Some(decoder) = &model.flow_decoder {
+        note("flow.", weights::collect(decoder));
+    }
+    lengths
 }
 
 struct Update<'a> {
@@ -213,9 +269,11 @@ impl ModuleMapper for Update<'_> {
         let Some(gradient) = self.gradients.0.get(&name) else {
             return param;
         };
-        let moments = self.moments.entry(name).or_default();
-        moments.first.resize(gradient.len(), 0.0);
-        moments.second.resize(gradient.len(), 0.0);
+        // A parameter's first step makes its moments; those of a file were held against it when they were read.
+        let moments = self.moments.entry(name).or_insert_with(|| Moments {
+            first: vec![0.0; gradient.len()],
+            second: vec![0.0; gradient.len()],
+        });
         param.map(|tensor| {
             let (shape, device) = (tensor.dims(), tensor.device());
             let mut values = to_vec(tensor.inner());

@@ -6,7 +6,10 @@ use deepfusion_data::{resize_rgb, to_chw};
 use deepfusion_geometry::{DepthRange, Se3};
 use rand::Rng;
 use rayon::prelude::*;
+use std::any::Any;
+use std::cell::Cell;
 use std::collections::HashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex};
 
@@ -83,7 +86,9 @@ struct Maker {
 
 /// Makes batches in order, ahead of the trainer, on its own thread.
 pub struct BatchLoader {
-    batches: Receiver<Result<RawBatch, Error>>,
+    /// `None` says that the last batch was sent. A channel that ends without it has lost its thread.
+    batches: Receiver<Result<Option<RawBatch>, Error>>,
+    ended: Cell<bool>,
     size: (usize, usize),
     /// The pose network's own metres per unit.
     unit_m: f64,
@@ -135,13 +140,16 @@ impl BatchLoader {
         let complaints = sender.clone();
         let make = move |pool: rayon::ThreadPool| {
             for (number, samples) in batches {
-                let batch = pool.install(|| maker.make(number, &samples));
+                let make = || pool.install(|| maker.make(number, &samples));
+                let batch = catch_unwind(AssertUnwindSafe(make))
+                    .unwrap_or_else(|panic| Err(panicked(number, &*panic)));
                 let failed = batch.is_err();
                 // The thread ends when the receiver is dropped: `send` fails then.
-                if sender.send(batch).is_err() || failed {
+                if sender.send(batch.map(Some)).is_err() || failed {
                     return;
                 }
             }
+            sender.send(Ok(None)).ok();
         };
         if let Err(error) = start_thread(make) {
             // The channel is empty and holds more than one; its receiver is still here.
@@ -149,6 +157,7 @@ impl BatchLoader {
         }
         Self {
             batches: receiver,
+            ended: Cell::new(false),
             size: (config.size.height, config.size.width),
             unit_m: config.pose_net.metres_per_unit,
         }
@@ -158,11 +167,22 @@ impl BatchLoader {
     ///
     /// # Errors
     /// [`Error::Data`] for an image that cannot be read or has another size than its camera;
-    /// [`Error::Threads`] where the loader could not start.
+    /// [`Error::Threads`] where the loader could not start; [`Error::Loader`] where its thread has died.
     pub fn next(&self, device: &Device) -> Option<Result<SnippetBatch, Error>> {
-        let raw = match self.batches.recv().ok()? {
-            Ok(raw) => raw,
-            Err(error) => return Some(Err(error)),
+        if self.ended.get() {
+            return None;
+        }
+        let raw = match self.batches.recv() {
+            Ok(Ok(Some(raw))) => raw,
+            Ok(Ok(None)) => {
+                self.ended.set(true);
+                return None;
+            }
+            Ok(Err(error)) => return Some(Err(error)),
+            Err(_) => {
+                let reason = "its thread has ended before the last batch".into();
+                return Some(Err(Error::Loader { reason }));
+            }
         };
         let n = raw.names.len();
         let (height, width) = self.size;
@@ -209,6 +229,16 @@ fn start_thread(make: impl FnOnce(rayon::ThreadPool) + Send + 'static) -> Result
         .spawn(move || make(pool))
         .map_err(|e| failed(e.to_string()))?;
     Ok(())
+}
+
+/// What a panic while a batch was made means to whoever waits for it.
+fn panicked(number: usize, panic: &(dyn Any + Send)) -> Error {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    let text = text.unwrap_or("it does not say why");
+    Error::Loader {
+        reason: format!("batch {number}: {text}"),
+    }
 }
 
 /// One sample's part of a batch.

@@ -7,16 +7,32 @@ use std::path::{Path, PathBuf};
 /// The version of the checkpoint's layout; files of another version are refused.
 pub const CHECKPOINT_VERSION: u32 = 1;
 
+/// Metadata: the lowest value that `best` was chosen by. Files of before are without it: what was chosen by then held
+/// terms that depth cannot change, and is not to be compared with.
+const BEST: &str = "best_selection";
+/// Metadata: what of the networks was ever trained, where that is not all.
+const TRAINED: &str = "trained";
+const ENCODERS: &str = "encoders";
+
 /// Which checkpoint of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CheckpointKind {
     /// Everything needed to go on.
     Last,
-    /// The networks at the lowest validation loss.
+    /// The networks at the lowest held-out loss that depth can change.
     Best,
 }
 
 impl CheckpointKind {
+    /// Its name: the file's without the ending.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Last => "last",
+            Self::Best => "best",
+        }
+    }
+
     fn file(self) -> &'static str {
         match self {
             Self::Last => "last.safetensors",
@@ -30,10 +46,12 @@ impl CheckpointKind {
 pub struct Checkpoint {
     /// Steps done, skipped ones included.
     pub step: usize,
-    /// The lowest validation loss so far.
+    /// The lowest value so far that `best` is chosen by.
     pub best_validation: Option<f64>,
     /// Steps skipped for a gradient that was not finite.
     pub skipped: usize,
+    /// Whether only the encoders were ever trained: imported ImageNet weights.
+    pub encoders_only: bool,
 }
 
 /// A run's folder: `config.toml`, `last.safetensors`, `best.safetensors`, logs and panels.
@@ -150,8 +168,8 @@ impl RunFolder {
     ) -> Result<PathBuf, Error> {
         let mut all = weights::collect(&model.depth_net).with_prefix("depth.");
         all = all.merged(weights::collect(&model.pose_net).with_prefix("pose."));
-        // What training alone needs goes into the checkpoint to go on from.
-        if let (Some(decoder), CheckpointKind::Last) = (&model.flow_decoder, kind) {
+        // Training alone needs it, but whoever starts from `best` trains.
+        if let Some(decoder) = &model.flow_decoder {
             all = all.merged(weights::collect(decoder).with_prefix("flow."));
         }
         if let Some(adam) = adam {
@@ -166,7 +184,10 @@ impl RunFolder {
         note("skipped", state.skipped.to_string());
         if let Some(best) = state.best_validation {
             // All digits: the comparison must go on exactly.
-            note("best_validation", format!("{:016x}", best.to_bits()));
+            note(BEST, format!("{:016x}", best.to_bits()));
+        }
+        if state.encoders_only {
+            note(TRAINED, ENCODERS.into());
         }
         let path = self.checkpoint_path(kind);
         weights::write_safetensors(&path, &all)?;
@@ -176,8 +197,9 @@ impl RunFolder {
     /// The networks, the optimiser where it was saved, and where training stood.
     ///
     /// # Errors
-    /// [`Error::Checkpoint`] for a file of another version, [`Error::Network`] for one of another
-    /// architecture, naming the first tensor that differs.
+    /// [`Error::Checkpoint`] for a file of another version, or one that training cannot go on from because it lacks the
+    /// flow decoder; [`Error::Network`] for one of another architecture or with other moments than its
+    /// parameters', naming the first tensor that differs.
     pub fn load(
         &self,
         kind: CheckpointKind,
@@ -188,28 +210,67 @@ impl RunFolder {
         let all = weights::read(&path)?;
         let state = Checkpoint::of(&path, &all)?;
         let named = |prefix: &str| -> Weights { all.under(prefix) };
-        let blank = Model::new(config, device)?;
-        let depth_net = weights::apply(blank.depth_net, &named("depth."))?;
-        let pose_net = weights::apply(blank.pose_net, &named("pose."))?;
-        // A run that starts from the networks of one without a flow decoder begins with a new one.
-        let flow_weights = named("flow.");
-        let flow_decoder = match blank.flow_decoder {
-            Some(decoder) if !flow_weights.tensors.is_empty() => {
-                Some(weights::apply(decoder, &flow_weights)?)
-            }
-            other => other,
-        };
-        let adam = match all.metadata.get("adam_steps") {
-            Some(_) => {
-                let steps = number(&path, &all, "adam_steps")?;
-                let steps = u32::try_from(steps).unwrap_or(u32::MAX);
-                Some(Adam::restore(named("adam."), steps))
-            }
-            None => None,
-        };
-        let mut model = Model::with_networks(config, depth_net, pose_net, device);
-        model.flow_decoder = flow_decoder;
-        Ok((model, adam, state))
+        let mut model = Model::new(config, device)?;
+        model.depth_net = weights::apply(model.depth_net, &named("depth."))?;
+        model.pose_net = weights::apply(model.pose_net, &named("pose."))?;
+        let new_decoder = take_flow_decoder(&mut model, &named("flow."))?;
+        if !all.metadata.contains_key("adam_steps") {
+            return Ok((model, None, state));
+        }
+        if new_decoder {
+            return Err(Error::Checkpoint {
+                path,
+                reason: "it has no flow decoder, and this configuration trains one".into(),
+                remedy: "start a new run from these weights with --init".into(),
+            });
+        }
+        let steps = number(&path, &all, "adam_steps")?;
+        let steps = u32::try_from(steps).unwrap_or(u32::MAX);
+        let adam = Adam::restore(named("adam."), steps, &model)?;
+        Ok((model, Some(adam), state))
+    }
+
+    /// The networks of a new run that starts from this one's, and what of them starts anew, because the checkpoint
+    /// does not have it. From one whose encoders alone were ever trained, the encoders alone are taken: the rest of
+    /// the network may then be another.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] for a file of another version, [`Error::Network`] for one of another architecture, naming
+    /// the first tensor that differs.
+    pub fn load_networks(
+        &self,
+        kind: CheckpointKind,
+        config: &TrainConfig,
+        device: &Device,
+    ) -> Result<(Model, Vec<&'static str>), Error> {
+        let path = self.checkpoint_path(kind);
+        let named = |prefix: &str| weights::read_under(&path, prefix);
+        let depth = named("depth.")?;
+        let encoders_only = Checkpoint::of(&path, &depth)?.encoders_only;
+        let pose = named("pose.")?;
+        let mut model = Model::new(config, device)?;
+        if encoders_only {
+            let (depth, pose) = (depth.under("encoder."), pose.under("encoder."));
+            model.depth_net.encoder = weights::apply(model.depth_net.encoder, &depth)?;
+            model.pose_net.encoder = weights::apply(model.pose_net.encoder, &pose)?;
+            return Ok((model, vec!["everything but the encoders"]));
+        }
+        model.depth_net = weights::apply(model.depth_net, &depth)?;
+        model.pose_net = weights::apply(model.pose_net, &pose)?;
+        let new_decoder = take_flow_decoder(&mut model, &named("flow.")?)?;
+        Ok((
+            model,
+            Vec::from_iter(new_decoder.then_some("the flow decoder")),
+        ))
+    }
+
+    /// Where training stood at a checkpoint; its tensors are not read.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] for a file of another version, [`Error::Network`] for one that cannot be read.
+    pub fn read_state(&self, kind: CheckpointKind) -> Result<Checkpoint, Error> {
+        let path = self.checkpoint_path(kind);
+        Checkpoint::of(&path, &weights::read_under(&path, "no tensor's name")?)
     }
 
     /// The depth network's weights alone, and where training stood: nothing else of the file is read.
@@ -222,6 +283,19 @@ impl RunFolder {
         let state = Checkpoint::of(&path, &weights)?;
         Ok((weights, state))
     }
+}
+
+/// Gives the model the flow decoder of a checkpoint. Says whether its own, a new one, stays for want of it.
+fn take_flow_decoder(model: &mut Model, saved: &Weights) -> Result<bool, Error> {
+    let Some(decoder) = model.flow_decoder.take() else {
+        return Ok(false);
+    };
+    let missing = saved.tensors.is_empty();
+    model.flow_decoder = Some(match missing {
+        true => decoder,
+        false => weights::apply(decoder, saved)?,
+    });
+    Ok(missing)
 }
 
 /// The configuration and the depth network of a run's folder or a checkpoint in it; the folder means `best` where
@@ -260,9 +334,10 @@ impl Checkpoint {
             skipped: number(path, file, "skipped")?,
             best_validation: file
                 .metadata
-                .get("best_validation")
+                .get(BEST)
                 .and_then(|t| u64::from_str_radix(t, 16).ok())
                 .map(f64::from_bits),
+            encoders_only: file.metadata.get(TRAINED).is_some_and(|t| t == ENCODERS),
         })
     }
 }

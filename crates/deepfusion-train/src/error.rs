@@ -91,6 +91,15 @@ pub enum Error {
         /// What the system says.
         reason: String,
     },
+    /// The loader's thread died.
+    #[error("the loader of images stopped: {reason}")]
+    Loader {
+        /// The batch, counted from 0, and what it died of.
+        reason: String,
+    },
+    /// Samples should be held out, and none are.
+    #[error("no sample is held out to validate on")]
+    NoValidation,
     /// Something that runs networks and cannot run this one.
     #[error("engine `{engine}`: {reason}")]
     Engine {
@@ -166,6 +175,16 @@ impl Error {
             Self::Engine { .. } => Some("`--engine burn` runs every network on every device".into()),
             Self::Threads { .. } => Some(
                 "the system allows this user too few threads or too little memory; see `ulimit -u`"
+                    .into(),
+            ),
+            Self::Loader { .. } => Some(
+                "this is a fault of the program: please report it with the lines above; what was saved is whole, and \
+                 --resume goes on from there"
+                    .into(),
+            ),
+            Self::NoValidation => Some(
+                "give longer drives or --val-data; `validation_share = 0` in a config file trains without validation \
+                 and chooses no `best`"
                     .into(),
             ),
             Self::Data(error) => error.hint(),

@@ -23,7 +23,7 @@ pub enum TrainEvent {
         step: usize,
         /// Steps of the whole run.
         steps: usize,
-        /// The batch's loss.
+        /// The loss of the step's samples, the mean over its batches where several are accumulated.
         losses: LossTerms,
         /// The step size.
         learning_rate: f64,
@@ -43,6 +43,8 @@ pub enum TrainEvent {
         step: usize,
         /// Their loss.
         losses: LossTerms,
+        /// What `best` is chosen by: the part of it that depth can change.
+        selection: f64,
         /// Displacement by speed over displacement by PoseNet.
         scale_ratio: f64,
         /// Whether this is the best so far.

@@ -28,6 +28,7 @@ mod prepare;
 mod preset;
 mod runner;
 mod sampler;
+mod selection;
 mod source;
 mod trainer;
 mod view_synthesis;

@@ -3,6 +3,7 @@
 use crate::config::{Reprojection, ViewMotion};
 use crate::level::{Level, levels, pyramid};
 use crate::losses::{self, FlowView, LossTerms, ReprojectionOutput, RigidView, View, share};
+use crate::model::swap_halves;
 use crate::{CompareAt, ForwardPass, Model, Motion, SnippetBatch, Synthesised, synthesise};
 use burn::tensor::module::avg_pool2d;
 use burn::tensor::ops::AvgPoolOptions;
@@ -88,8 +89,8 @@ impl Model {
         sum.terms.smoothness = sum.add(mean(smooth), settings.smoothness);
         let speed = (settings.speed > 0.0).then(|| self.motion_loss(pass, batch));
         sum.terms.speed = sum.add(speed, schedule.speed_weight);
-        let affine =
-            (settings.affine > 0.0).then(|| self.affine_loss((pass, batch), &finest, &motions));
+        let affine = (settings.affine > 0.0)
+            .then(|| self.affine_loss((pass, batch), &finest, &motions, masks.as_deref()));
         sum.terms.affine = sum.add(affine, settings.affine);
         if !flow_views.is_empty() {
             let flow = self.flow_loss(pass, &flow_views);
@@ -200,28 +201,38 @@ impl Model {
 
     /// The affine invariant loss between each frame's depth and the other's seen from it. Both frames are
     /// targets here: the other depth is that of the batch's other half.
+    ///
+    /// Where a pixel lies in the other frame follows from depth and motion together, and so would tell the one's
+    /// scale from the other's: both stand still here. The translation is left out of the depth seen from here, since
+    /// it moves all of it by the same length, which b takes up.
     fn affine_loss(
         &self,
         (pass, batch): (&ForwardPass, &SnippetBatch),
         finest: &ScaleViews,
         motions: &[Motion],
+        moving: Option<&[Tensor<4, Bool>]>,
     ) -> Tensor<1> {
         let depth = self
             .inverse_depth(pass.disparities[0].clone(), batch)
             .recip();
-        let views = finest.synthesised.iter().zip(motions);
-        mean_of(views, |(view, motion)| {
-            let there = ops::warp(
-                crate::model::swap_halves(depth.clone()),
-                view.coords.clone(),
-            );
+        let views = finest.synthesised.iter().zip(motions).enumerate();
+        mean_of(views, |(index, (view, motion))| {
+            let coords = view.coords.clone().detach();
+            let there = ops::warp(swap_halves(depth.clone().detach()), coords.clone());
+            let target_from_source = Motion {
+                rotation: motion.rotation.clone().detach(),
+                translation: motion.translation.zeros_like(),
+            }
+            .inverse();
             let seen = losses::depth_seen_from_target(
                 there,
-                view.coords.clone(),
-                &motion.inverse(),
+                coords,
+                &target_from_source,
                 &pass.inverse_intrinsics,
             );
-            losses::affine_invariant(depth.clone(), seen, &view.valid)
+            let moving = moving.map(|masks| &masks[index]);
+            let pixels = losses::seen_in_both(&view.coords, &view.valid, moving);
+            losses::affine_invariant(depth.clone(), seen, &pixels)
         })
     }
 

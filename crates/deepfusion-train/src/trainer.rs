@@ -1,5 +1,6 @@
 use crate::losses::speed_weight;
 use crate::model::displacement_ratio;
+use crate::selection::selection;
 use crate::{
     Adam, BatchLoader, BatchLoss, Checkpoint, CheckpointKind, Control, Error, ForwardPass,
     LossTerms, Model, NamedGradients, RunFolder, SamplePanel, SampleSet, Sampler, Schedule,
@@ -39,7 +40,7 @@ pub struct TrainSummary {
     pub steps: usize,
     /// Steps skipped for a gradient that was not finite.
     pub skipped: usize,
-    /// The lowest validation loss.
+    /// The lowest value that `best` is chosen by.
     pub best_validation: Option<f64>,
     /// Wall time of this call, in seconds.
     pub seconds: f64,
@@ -61,7 +62,7 @@ impl Trainer {
     /// taken from the data and stored with it. `init` changes the networks before the first step.
     ///
     /// # Errors
-    /// [`Error::Config`], [`Error::Network`], [`Error::Io`].
+    /// [`Error::Config`], [`Error::NoSamples`], [`Error::NoValidation`], [`Error::Network`], [`Error::Io`].
     pub fn create(
         mut config: TrainConfig,
         folder: RunFolder,
@@ -71,6 +72,7 @@ impl Trainer {
     ) -> Result<Self, Error> {
         config.validate()?;
         config.make_absolute();
+        check_samples(&config, &train, &validation)?;
         if config.pose_net.metres_per_unit == 0.0 {
             config.pose_net.metres_per_unit = config.first_unit(train.mean_displacement_m());
         }
@@ -97,6 +99,7 @@ impl Trainer {
                 step: 0,
                 best_validation: None,
                 skipped: 0,
+                encoders_only: false,
             },
             train,
             validation,
@@ -106,13 +109,14 @@ impl Trainer {
     /// Goes on where the folder's last checkpoint stood: weights, optimiser, schedule and samples.
     ///
     /// # Errors
-    /// As [`RunFolder::load`].
+    /// As [`RunFolder::load`]; [`Error::NoSamples`], [`Error::NoValidation`].
     pub fn resume(
         config: TrainConfig,
         folder: RunFolder,
         (train, validation): (SampleSet, SampleSet),
         device: &Device,
     ) -> Result<Self, Error> {
+        check_samples(&config, &train, &validation)?;
         let device = device.clone().autodiff();
         let (model, adam, state) = folder.load(CheckpointKind::Last, &config, &device)?;
         let adam = adam.ok_or_else(|| Error::Checkpoint {
@@ -173,7 +177,8 @@ impl Trainer {
     ///
     /// # Errors
     /// [`Error::NotFinite`] naming term and frames: the last good checkpoint stays. [`Error::Data`]
-    /// for an image that cannot be read, [`Error::Network`] for a checkpoint that cannot be written.
+    /// for an image that cannot be read, [`Error::Loader`] where the loader has died, [`Error::Network`] for a
+    /// checkpoint that cannot be written.
     pub fn run(
         &mut self,
         listen: &mut dyn FnMut(TrainEvent) -> Control,
@@ -208,14 +213,14 @@ impl Trainer {
             let (mut losses, mut names) = (LossTerms::default(), Vec::new());
             let schedule = self.schedule(steps);
             let mut images = 0;
-            let mut last: Option<(ForwardPass, BatchLoss)> = None;
+            let mut last: Option<(ForwardPass, BatchLoss, String)> = None;
             for _ in 0..accumulate {
                 let batch = next_batch(&loader, &self.device)?;
                 images += batch.len() * (1 + batch.offsets.len());
                 let pass = self.model.forward(&batch);
                 let loss = self.model.loss(&pass, &batch, schedule);
-                losses = loss.terms;
-                if let Some((term, value)) = losses.not_finite() {
+                losses.add(&loss.terms, 1.0 / accumulate as f64);
+                if let Some((term, value)) = loss.terms.not_finite() {
                     return Err(Error::NotFinite {
                         step: self.state.step + 1,
                         term,
@@ -231,8 +236,10 @@ impl Trainer {
                 if let Some(decoder) = &self.model.flow_decoder {
                     gradients.add("flow", decoder, &mut raw, scale);
                 }
+                // The pass's first target is the batch's first sample.
+                let shown = batch.names.first().cloned().unwrap_or_default();
                 names.extend(batch.names);
-                last = Some((pass, loss));
+                last = Some((pass, loss, shown));
             }
             let learning_rate = self.learning_rate(steps);
             let (outcome, step) = self
@@ -294,7 +301,7 @@ impl Trainer {
             let due = self.state.step.is_multiple_of(every) || self.state.step == steps;
             if due || stopped {
                 let shares = [low_view.value(), moving.value()];
-                self.report(listen, last, &names, shares, due)?;
+                self.report(listen, last, shares, due)?;
                 saved = Instant::now();
             } else if self.checkpoint_is_due(saved.elapsed()) {
                 self.save_last(listen)?;
@@ -348,15 +355,12 @@ impl Trainer {
     fn report(
         &mut self,
         listen: &mut dyn FnMut(TrainEvent) -> Control,
-        last: Option<(ForwardPass, BatchLoss)>,
-        names: &[String],
+        last: Option<(ForwardPass, BatchLoss, String)>,
         [valid_share, moving_share]: [f64; 2],
         validate: bool,
     ) -> Result<(), Error> {
         let step = self.state.step;
-        if let (Some((pass, loss)), Some(name)) = (last, names.last()) {
-            let first = names.len() - pass.targets.dims()[0].min(names.len());
-            let name = names.get(first).unwrap_or(name).clone();
+        if let Some((pass, loss, name)) = last {
             let panel = Box::new(SamplePanel::first(&pass, &loss, name));
             listen(TrainEvent::Panel { step, panel });
         }
@@ -378,14 +382,16 @@ impl Trainer {
         if validate && !self.validation.samples.is_empty() {
             let (losses, scale_ratio) =
                 validation_loss(&self.model, &self.config, &self.validation, &self.device)?;
-            let best = losses.total.is_finite()
-                && self.state.best_validation.is_none_or(|b| losses.total < b);
+            let selection = selection(&self.config, &losses);
+            let best =
+                selection.is_finite() && self.state.best_validation.is_none_or(|b| selection < b);
             if best {
-                self.state.best_validation = Some(losses.total);
+                self.state.best_validation = Some(selection);
             }
             listen(TrainEvent::Validated {
                 step,
                 losses,
+                selection,
                 scale_ratio,
                 best,
             });
@@ -415,24 +421,51 @@ impl Trainer {
 
 fn next_batch(loader: &BatchLoader, device: &Device) -> Result<SnippetBatch, Error> {
     loader.next(device).unwrap_or_else(|| {
-        Err(Error::NoSamples {
-            data: "the training data".into(),
-            reason: "the loader stopped".into(),
+        Err(Error::Loader {
+            reason: "it has no further batch".into(),
         })
     })
+}
+
+/// # Errors
+/// [`Error::NoSamples`] without anything to train on, [`Error::NoValidation`] where samples should be held out and
+/// none are.
+fn check_samples(
+    config: &TrainConfig,
+    train: &SampleSet,
+    validation: &SampleSet,
+) -> Result<(), Error> {
+    if train.samples.is_empty() {
+        return Err(no_samples("the training data"));
+    }
+    if validation.samples.is_empty() && config.validation_share > 0.0 {
+        return Err(Error::NoValidation);
+    }
+    Ok(())
+}
+
+fn no_samples(data: &str) -> Error {
+    Error::NoSamples {
+        data: data.into(),
+        reason: "it is empty".into(),
+    }
 }
 
 /// The mean loss over the held-out samples, with λ_v at its full weight and without the flow, which training
 /// alone has; and the ratio of measured to predicted displacement.
 ///
 /// # Errors
-/// [`Error::Data`] for an image that cannot be read.
+/// [`Error::NoSamples`] without samples, [`Error::Data`] for an image that cannot be read, [`Error::Loader`] where
+/// the loader has died.
 pub fn validation_loss(
     model: &Model,
     config: &TrainConfig,
     samples: &SampleSet,
     device: &Device,
 ) -> Result<(LossTerms, f64), Error> {
+    if samples.samples.is_empty() {
+        return Err(no_samples("the held-out data"));
+    }
     let (model, device) = (model.valid(device), device.clone().inner());
     let loader = BatchLoader::validation(config, samples.clone());
     let mut sum = LossTerms::default();
@@ -450,7 +483,6 @@ pub fn validation_loss(
         ratio += n * displacement_ratio(&pass, &batch);
         sum.add(&terms, n);
     }
-    let count = f64::max(count, 1.0);
     let mut terms = LossTerms::default();
     terms.add(&sum, 1.0 / count);
     Ok((terms, ratio / count))

@@ -1,25 +1,16 @@
 //! Against the simulator, which knows the truth.
 
-use burn::tensor::{Device, Tensor, TensorData};
-use deepfusion_data::{Dataset, OpenOptions, to_chw};
-use deepfusion_geometry::Se3;
-use deepfusion_sim::{SimConfig, Simulation, write_kitti};
-use deepfusion_train::{
-    BatchLoader, CheckpointKind, CompareAt, Control, Error, LossTerms, Model, Motion, Preset,
-    Reprojection, RunFolder, SampleSet, Schedule, TrainConfig, TrainEvent, Trainer, ViewMotion,
-    synthesise, validation_loss,
-};
-use std::path::Path;
+mod support;
 
-fn street(frames: usize) -> Simulation {
-    Simulation::new(&SimConfig {
-        seed: 5,
-        frames,
-        scan_every: 0,
-        ..SimConfig::default()
-    })
-    .unwrap()
-}
+use burn::tensor::{Device, Tensor, TensorData};
+use deepfusion_data::to_chw;
+use deepfusion_geometry::Se3;
+use deepfusion_train::{
+    BatchLoader, CheckpointKind, CompareAt, Control, Error, LossTerms, Model, Motion, Reprojection,
+    RunFolder, SampleSet, Schedule, TrainConfig, TrainEvent, Trainer, ViewMotion, synthesise,
+    validation_loss,
+};
+use support::{drive, small, street};
 
 fn matrix(m: &nalgebra::Matrix3<f64>, device: &Device) -> Tensor<3> {
     let values: Vec<f32> = (0..9).map(|i| m[(i / 3, i % 3)] as f32).collect();
@@ -103,26 +94,6 @@ fn the_true_depth_and_motion_reproduce_the_other_frame() {
             still / n
         );
     }
-}
-
-/// A small network on a short drive, in seconds.
-fn small(drive: &Path, steps: usize) -> (TrainConfig, SampleSet, SampleSet) {
-    let mut config = Preset::Tiny.config();
-    (config.size.width, config.size.height) = (96, 64);
-    config.batch = 2;
-    config.steps = Some(steps);
-    config.validate_every = 2;
-    config.depth_net.encoder = config.depth_net.encoder.with_base_width(8);
-    config.depth_net.decoder.widths = [16, 16, 8, 8, 8];
-    config.pose_net.encoder = config.pose_net.encoder.with_base_width(8);
-    let datasets = Dataset::open(drive, &OpenOptions::default()).unwrap();
-    let (train, validation, skipped) = SampleSet::split(&config, datasets, None).unwrap();
-    assert!(skipped.is_empty());
-    (config, train, validation)
-}
-
-fn drive(folder: &Path, frames: usize) -> std::path::PathBuf {
-    write_kitti(&street(frames), folder, &mut |_, _| {}).unwrap()
 }
 
 /// Runs to the end or to `stop`, and gives every step's and validation's losses.

@@ -4,6 +4,9 @@ mod support;
 
 use std::fs;
 
+use burn::tensor::Device;
+use deepfusion_nn::weights;
+use deepfusion_nn::{ResNetConfig, ResNetDepth, WeightRng};
 use serde_json::Value;
 use support::{fails, ok, run};
 
@@ -40,11 +43,14 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
         &["run"],
     );
 
-    // A new run may start from another's networks; its PoseNet goes on to speak of that one's unit.
-    ok(
+    // A new run may start from another's networks; its PoseNet goes on to speak of that one's unit. What that one does
+    // not have is told.
+    let tuned = ok(
         at,
-        &format!("train --data sim {SMALL} --steps 1 --init run --out tuned"),
+        &format!("train --data sim {SMALL} --steps 1 --with flow --init run --out tuned"),
     );
+    let told = "starts from run/best.safetensors; new: the flow decoder";
+    assert!(tuned.stderr.contains(told), "{}", tuned.stderr);
     let unit = |run: &str| {
         let config = fs::read_to_string(at.join(run).join("config.toml")).unwrap();
         let line = config.lines().find(|l| l.starts_with("metres_per_unit"));
@@ -60,6 +66,19 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     assert!(abs_rel > 0.01 && abs_rel < 3.0, "{abs_rel}");
     assert!(report["scale"]["median"].as_f64().unwrap() > 0.2);
     assert!(report["trivial"]["unscaled"]["abs_rel"].is_number());
+    // Which of the run's checkpoints that was: what was validated last, the third step or before.
+    assert_eq!(report["checkpoint"]["name"], "best");
+    assert_eq!(report["checkpoint"]["path"], "run/best.safetensors");
+    let step = report["checkpoint"]["step"].as_u64().unwrap();
+    assert!(log.contains(&format!("\n{step},validation,")), "{log}");
+    let text = ok(at, "eval --model run --data sim").stdout;
+    let first = format!("checkpoint  run/best.safetensors, step {step} (the lowest held-out loss");
+    assert!(text.starts_with(&first), "{text}");
+    let text = ok(at, "eval --model run/last.safetensors --data sim").stdout;
+    assert!(
+        text.starts_with("checkpoint  run/last.safetensors, step 3\n"),
+        "{text}"
+    );
 
     let image = "sim/2026_01_01/2026_01_01_drive_0003_sync/image_02/data/0000000001.png";
     let all = "depth-png,npy,color,side-by-side,ply";
@@ -439,6 +458,27 @@ fn what_cannot_be_trained_on_is_told() {
         fs::write(&path, fields.join(" ")).unwrap();
     }
     fails(at, "train --data sim", &["m/s"]);
+}
+
+/// Imported encoders start a network whose other parts the import does not have. PoseNet's unit is the new data's: the
+/// import has never seen a metre.
+#[test]
+fn imported_encoders_start_a_preset_with_other_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut rng = WeightRng::new(5);
+    let resnet = ResNetConfig::new(ResNetDepth::ResNet18).init(&mut rng, &Device::flex());
+    let resnet = weights::collect(&resnet.unwrap());
+    weights::write_safetensors(&at.join("resnet18.safetensors"), &resnet).unwrap();
+    ok(at, "weights import resnet18.safetensors --out imported");
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    let start = "train --data sim --preset light --size 96x64 --batch 1 --steps 1";
+    let parts = "--with hce,attention,aggregation";
+    let run = ok(at, &format!("{start} {parts} --init imported --out run"));
+    let told = "starts from imported/last.safetensors; new: everything but the encoders";
+    assert!(run.stderr.contains(told), "{}", run.stderr);
+    let config = fs::read_to_string(at.join("run/config.toml")).unwrap();
+    assert!(!config.contains("metres_per_unit = 1.0"), "{config}");
 }
 
 #[test]

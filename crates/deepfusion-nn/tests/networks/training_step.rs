@@ -5,7 +5,7 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_nn::layers::freeze_statistics;
 use deepfusion_nn::weights::{Monodepth2Files, collect, load_monodepth2};
-use deepfusion_nn::{DepthNet, DepthNetConfig, ResNetDepth};
+use deepfusion_nn::{DepthNet, DepthNetConfig, HceConfig, ResNetDepth};
 
 /// The ResNet-18 depth network with the formula's weights.
 fn reference_network(device: &Device) -> DepthNet {
@@ -210,6 +210,30 @@ fn frozen_statistics_stay_while_everything_learns() {
     let net = freeze_statistics(net, false);
     net.forward(images("images", 3, &device));
     assert_ne!(statistics(&net), before);
+}
+
+/// A network configured so keeps every statistic, those of the context encoding too, which are not the encoder's.
+#[test]
+fn a_configuration_freezes_the_batch_norms_of_the_whole_network() {
+    let device = Device::flex().autodiff();
+    let mut config = DepthNetConfig::new(ResNetDepth::ResNet18);
+    config.encoder.base_width = 4;
+    config.decoder.widths = [8, 8, 4, 4, 4];
+    config.hce = Some(HceConfig::default());
+    let moved = |config: &DepthNetConfig| {
+        let net = config.init(&device).unwrap();
+        let before = collect(&net).tensors;
+        net.forward(images("images", 3, &device));
+        let mut moved = collect(&net).tensors;
+        moved.retain(|name, tensor| *tensor != before[name]);
+        moved.into_keys().collect::<Vec<_>>()
+    };
+    let thawed = moved(&config);
+    for part in ["encoder.", "hce."] {
+        assert!(thawed.iter().any(|name| name.starts_with(part)), "{part}");
+    }
+    config.encoder.frozen_statistics = true;
+    assert_eq!(moved(&config), Vec::<String>::new());
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::{BarChart, LearningLog, LineChart, ScatterChart, histogram};
 const CURVE_POINTS: usize = 80;
 
 /// What is written above a curve, per column of `log.csv`; other columns go by their own name.
-const TITLES: [(&str, &str); 12] = [
+const TITLES: [(&str, &str); 13] = [
     ("total", "Total loss"),
     ("reprojection", "Photometric reprojection"),
     ("smoothness", "Smoothness, unweighted"),
@@ -23,6 +23,7 @@ const TITLES: [(&str, &str); 12] = [
     ("moving_share", "Share masked as moving"),
     ("learning_rate", "Learning rate"),
     ("scale_ratio", "Displacement by speed / by PoseNet"),
+    ("selection", "What `best` is chosen by"),
 ];
 
 /// One bin of a reliability plot: what a confidence promised, and what came true.
@@ -209,8 +210,11 @@ fn learning_chart(log: &LearningLog, column: &str, images_a_step: Option<f64>) -
     if column == "learning_rate" {
         return chart.line("training", train);
     }
-    chart = chart.line("training", smoothed(&train, CURVE_POINTS));
-    if validation.iter().any(|p| p.1.is_finite()) {
+    let finite = |points: &[(f64, f64)]| points.iter().any(|p| p.1.is_finite());
+    if finite(&train) {
+        chart = chart.line("training", smoothed(&train, CURVE_POINTS));
+    }
+    if finite(&validation) {
         chart = chart.line("held out", validation);
     }
     match column {

@@ -12,7 +12,24 @@ pub struct CsvLog {
 }
 
 /// The columns after the loss terms.
-const EXTRA: &str = "learning_rate,scale_ratio,images_per_second";
+const EXTRA: &str = "learning_rate,scale_ratio,images_per_second,selection";
+
+/// What a line of the log says.
+#[derive(Debug, Clone, Copy)]
+pub struct CsvRecord<'a> {
+    /// After this step.
+    pub step: usize,
+    /// The loss.
+    pub losses: &'a LossTerms,
+    /// The step size; 0 of a validation.
+    pub learning_rate: f64,
+    /// Displacement by speed over displacement by PoseNet.
+    pub scale_ratio: f64,
+    /// The pace; 0 of a validation.
+    pub images_per_second: f64,
+    /// What `best` is chosen by, of a validation; `None` of a step of training.
+    pub selection: Option<f64>,
+}
 
 fn header() -> String {
     let terms: Vec<_> = LossTerms::default()
@@ -67,23 +84,24 @@ impl CsvLog {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn write(
-        &mut self,
-        step: usize,
-        split: &str,
-        losses: &LossTerms,
-        learning_rate: f64,
-        scale_ratio: f64,
-        images_per_second: f64,
-    ) -> Result<(), Error> {
-        let terms: Vec<_> = losses
+    pub fn write(&mut self, record: &CsvRecord<'_>) -> Result<(), Error> {
+        let terms: Vec<_> = record
+            .losses
             .named()
             .iter()
             .map(|(_, v)| format!("{v:.9}"))
             .collect();
+        let (split, selection) = match record.selection {
+            Some(value) => ("validation", format!("{value:.9}")),
+            None => ("train", String::new()),
+        };
         let line = format!(
-            "{step},{split},{},{learning_rate:e},{scale_ratio:.6},{images_per_second:.3}",
-            terms.join(",")
+            "{},{split},{},{:e},{:.6},{:.3},{selection}",
+            record.step,
+            terms.join(","),
+            record.learning_rate,
+            record.scale_ratio,
+            record.images_per_second
         );
         writeln!(self.file, "{line}").map_err(|e| Error::io(&self.path, "write", e))
     }
@@ -93,6 +111,33 @@ impl CsvLog {
 mod tests {
     use super::*;
 
+    fn record(losses: &LossTerms, step: usize, selection: Option<f64>) -> CsvRecord<'_> {
+        CsvRecord {
+            step,
+            losses,
+            learning_rate: 1e-4,
+            scale_ratio: 1.0,
+            images_per_second: 2.0,
+            selection,
+        }
+    }
+
+    #[test]
+    fn a_validation_says_what_best_is_chosen_by() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        let mut log = CsvLog::open(&path, 0).unwrap();
+        let nothing = LossTerms::default();
+        log.write(&record(&nothing, 1, None)).unwrap();
+        log.write(&record(&nothing, 1, Some(0.125))).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let lines: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+        assert_eq!(lines[0].last(), Some(&"selection"));
+        assert!(lines.iter().all(|l| l.len() == lines[0].len()), "{text}");
+        let ends: Vec<_> = lines.iter().map(|l| (l[1], l[l.len() - 1])).collect();
+        assert_eq!(ends[1..], [("train", ""), ("validation", "0.125000000")]);
+    }
+
     #[test]
     fn a_resumed_log_goes_on_where_the_checkpoint_was() {
         let folder = tempfile::tempdir().unwrap();
@@ -100,7 +145,7 @@ mod tests {
         let write = |from: usize, steps: std::ops::RangeInclusive<usize>| {
             let mut log = CsvLog::open(&path, from).unwrap();
             for step in steps {
-                log.write(step, "train", &LossTerms::default(), 1e-4, 1.0, 2.0)
+                log.write(&record(&LossTerms::default(), step, None))
                     .unwrap();
             }
         };

@@ -3,5 +3,5 @@
 mod csv;
 mod tensorboard;
 
-pub use csv::CsvLog;
+pub use csv::{CsvLog, CsvRecord};
 pub use tensorboard::TensorBoardLog;

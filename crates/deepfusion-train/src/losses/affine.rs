@@ -1,19 +1,25 @@
+use super::flow::{pixel_grid, visible};
 use crate::Motion;
+use crate::model::swap_halves;
 use burn::tensor::{Bool, Int, Tensor};
+use deepfusion_nn::ops;
 
-/// Least spread and residual that count, as a share of the depths themselves: a flat prediction gives
-/// finite gradients, and the loss stays blind to the scale.
+/// Least spread and residual that count, as a share of the depths themselves.
 const FLATNESS: f64 = 1e-2;
 
-/// The affine invariant loss (Eq. 9): a and b by least squares of a·x + b on y over the valid pixels of
-/// each image; mean |a·x + b − y| / (mean |y − median(y)| + ε), averaged over the images. It neither sees
-/// nor moves the scale of either: ε is a hundredth of y's median, and a, b and the median are differentiated
-/// too.
+/// The affine invariant loss (Eq. 9): a and b by least squares of a·x + b on y over the valid pixels of each image;
+/// (mean |a·x + b − y| + ε) / (mean |y − median(y)| + ε), averaged over the images, ε a hundredth of y's median.
+///
+/// It neither sees nor moves the scale of either. y is what x is held against and has no gradient: in a batch that
+/// holds both directions each depth is x once. x counts up to a and b alone, and those are differentiated too.
+///
+/// Nor does it pay to be flat. Equation 9 has ε below alone; two flat depths would then cost nothing. With ε above
+/// as well they cost 1, the most, like any depth that says nothing about the other.
 ///
 /// # Shapes
 /// - `x`, `y`: `[N, 1, H, W]`, depths in metres
 /// - `valid`: `[N, 1, H, W]`
-/// - output: one value; an image without two valid pixels counts as 0
+/// - output: one value; an image without a valid pixel gives a constant
 #[must_use]
 pub fn affine_invariant(x: Tensor<4>, y: Tensor<4>, valid: &Tensor<4, Bool>) -> Tensor<1> {
     let [n, _, height, width] = x.dims();
@@ -23,7 +29,7 @@ pub fn affine_invariant(x: Tensor<4>, y: Tensor<4>, valid: &Tensor<4, Bool>) -> 
     let count = inside.clone().sum_dim(1).clamp_min(1.0);
     // What is outside may be anything, also no number.
     let x = flat(x.mask_fill(outside.clone(), 0.0));
-    let y = flat(y.mask_fill(outside, 0.0));
+    let y = flat(y.detach().mask_fill(outside, 0.0));
     let mean = |t: Tensor<2>| t.sum_dim(1).div(count.clone());
     let (mean_x, mean_y) = (mean(x.clone()), mean(y.clone()));
     // About the means, so that f32 does not lose the spread in the sums.
@@ -35,18 +41,16 @@ pub fn affine_invariant(x: Tensor<4>, y: Tensor<4>, valid: &Tensor<4, Bool>) -> 
     let residual = mean(dx.mul(a).sub(dy).abs());
     let median = medians(&y, &inside);
     let spread = mean(y.sub(median.clone()).mul(inside).abs());
-    residual
-        .div(spread + median.abs().mul_scalar(FLATNESS).add_scalar(1e-6))
-        .mean()
+    let floor = median.abs().mul_scalar(FLATNESS).add_scalar(1e-6);
+    (residual + floor.clone()).div(spread + floor).mean()
 }
 
-/// The median of each row's values inside, N×1, with its gradient; of an even number the upper one of the
-/// middle two. A row without any gives its first value.
+/// The median of each row's values inside, N×1; of an even number the upper one of the middle two. A row without any
+/// gives its first value.
 fn medians(values: &Tensor<2>, inside: &Tensor<2>) -> Tensor<2> {
     let [n, pixels] = values.dims();
     let device = values.device().inner();
-    let read =
-        |t: &Tensor<2>| -> Vec<f32> { t.clone().detach().into_data().iter::<f32>().collect() };
+    let read = |t: &Tensor<2>| -> Vec<f32> { t.clone().into_data().iter::<f32>().collect() };
     let (plain, inside) = (read(values), read(inside));
     let rows = plain.chunks_exact(pixels).zip(inside.chunks_exact(pixels));
     let places: Vec<i64> = rows
@@ -62,6 +66,30 @@ fn medians(values: &Tensor<2>, inside: &Tensor<2>) -> Tensor<2> {
         .collect();
     let places = Tensor::<1, Int>::from_data(places.as_slice(), &device);
     values.clone().gather(1, places.reshape([n, 1]))
+}
+
+/// The pixels whose depths two frames can be held against each other by: in view, not hidden in the other frame (its
+/// own depth and motion bring them back), and not moving by themselves. The batch's halves are each other's frames.
+/// No gradient.
+///
+/// # Shapes
+/// - `coords`: where each pixel lies in the other frame, `[2N, 2, H, W]`, in pixels
+/// - `valid`, `moving`, output: `[2N, 1, H, W]`
+#[must_use]
+pub fn seen_in_both(
+    coords: &Tensor<4>,
+    valid: &Tensor<4, Bool>,
+    moving: Option<&Tensor<4, Bool>>,
+) -> Tensor<4, Bool> {
+    let coords = coords.clone().detach();
+    let [_, _, height, width] = coords.dims();
+    let flow = coords.clone() - pixel_grid([height, width], &coords.device());
+    let returning = ops::warp(swap_halves(flow.clone()), coords);
+    let seen = visible(&flow, &returning, valid);
+    match moving {
+        Some(moving) => seen.bool_and(moving.clone().bool_not()),
+        None => seen,
+    }
 }
 
 /// D₁→₀, the depth of the other frame seen from this one: the other depth map read where each pixel goes,
@@ -91,4 +119,37 @@ pub fn depth_seen_from_target(
     let axis = |i: usize| coords.clone().narrow(1, i, 1).mul(entry(i));
     let forward = target_from_source.translation.clone().narrow(1, 2, 1);
     other_depth_there.mul(axis(0) + axis(1) + entry(2)) + forward.reshape([n, 1, 1, 1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use burn::tensor::Device;
+
+    /// Two frames of a row: nothing goes anywhere, but for one pixel of the first frame that goes where the second
+    /// frame has something else.
+    #[test]
+    fn what_is_hidden_or_moves_is_left_out() {
+        let device = Device::flex();
+        let mask = |values: [[f32; 8]; 2]| {
+            let [a, b] = values;
+            Tensor::<4>::from_data([[[a]], [[b]]], &device).greater_elem(0.5)
+        };
+        let u = [0., 1., 2., 3., 4., 5., 6., 7.];
+        let mut first = u;
+        first[2] = 5.0;
+        let row = [0.0; 8];
+        let coords = Tensor::<4>::from_data([[[first], [row]], [[u], [row]]], &device);
+        let mut valid = [[1.0; 8]; 2];
+        valid[0][7] = 0.0;
+        let mut moving = [[0.0; 8]; 2];
+        moving[1][3] = 1.0;
+        let read = |t: Tensor<4, Bool>| -> Vec<f32> { t.float().into_data().iter().collect() };
+        let seen = read(seen_in_both(&coords, &mask(valid), None));
+        assert_eq!(seen[..8], [1., 1., 0., 1., 1., 1., 1., 0.]);
+        assert_eq!(seen[8..], [1.0; 8]);
+        let still = read(seen_in_both(&coords, &mask(valid), Some(&mask(moving))));
+        assert_eq!(still[..8], seen[..8]);
+        assert_eq!(still[8..], [1., 1., 1., 0., 1., 1., 1., 1.]);
+    }
 }

@@ -52,21 +52,37 @@ pub fn flow_view(
     let coords = ops::flow_coords(flow.clone());
     let image = ops::warp(source.clone(), coords.clone());
     let returning = ops::warp(back.clone(), coords.clone());
-    let round_trip = flow.clone() + returning.clone();
-    let square = |t: &Tensor<4>| t.clone().detach().powi_scalar(2).sum_dim(1);
-    let allowed = (square(flow) + square(&returning))
-        .mul_scalar(0.01)
-        .add_scalar(0.5);
     let in_view = ops::in_view(coords.clone(), [height, width]);
-    let back_again = square(&round_trip).lower(allowed).bool_and(in_view.clone());
-    let wrong = contradictory(&back_again, &in_view);
-    let visible = in_view.bool_and(back_again.bool_or(wrong));
     FlowView {
         error: ops::photometric_error(image, target.clone(), ssim_weight),
         coords,
-        round_trip,
-        visible,
+        round_trip: flow.clone() + returning.clone(),
+        visible: visible(flow, &returning, &in_view),
     }
+}
+
+/// The pixels in view that are not hidden there: going there and back ends at the start,
+/// ‖f + f'‖² < 0.01·(‖f‖² + ‖f'‖²) + 0.5. In an image of which less than half comes back, all that is in view. No
+/// gradient.
+///
+/// # Shapes
+/// - `flow`: f, `[N, 2, H, W]`, pixels of one frame to those of the other
+/// - `returning`: f', the way back, read where f ends, `[N, 2, H, W]`
+/// - `in_view`, output: `[N, 1, H, W]`
+#[must_use]
+pub fn visible(
+    flow: &Tensor<4>,
+    returning: &Tensor<4>,
+    in_view: &Tensor<4, Bool>,
+) -> Tensor<4, Bool> {
+    let square = |t: Tensor<4>| t.detach().powi_scalar(2).sum_dim(1);
+    let allowed = (square(flow.clone()) + square(returning.clone()))
+        .mul_scalar(0.01)
+        .add_scalar(0.5);
+    let round_trip = flow.clone() + returning.clone();
+    let back_again = square(round_trip).lower(allowed).bool_and(in_view.clone());
+    let wrong = contradictory(&back_again, in_view);
+    in_view.clone().bool_and(back_again.bool_or(wrong))
 }
 
 /// The images of which too little of what is in view comes back, N×1×1×1 made as large as the masks.

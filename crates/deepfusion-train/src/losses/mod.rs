@@ -9,9 +9,9 @@ mod reprojection;
 mod smoothness;
 mod speed;
 
-pub use affine::{affine_invariant, depth_seen_from_target};
+pub use affine::{affine_invariant, depth_seen_from_target, seen_in_both};
 pub use agreement::{agreement, both_explain};
-pub use flow::{FlowView, flow, flow_smoothness, flow_view, pixel_grid};
+pub use flow::{FlowView, flow, flow_smoothness, flow_view, pixel_grid, visible};
 pub use mean::{mean_where, share};
 pub use moving::{RigidView, epipolar_distance, moving_pixels};
 pub use reprojection::{ReprojectionOutput, View, reprojection};

@@ -152,7 +152,7 @@ keep("flow/visible", there[3].double())
 # --- the affine invariant loss (Eq. 9) -----------------------------------------------------------------------
 
 x = given("affine/x", rng.uniform(4, 40, (N, 1, H, W)))
-y = given("affine/y", 1.7 * x.detach().numpy() + 3 + rng.uniform(-4, 4, (N, 1, H, W)))
+y = given("affine/y", 1.7 * x.detach().numpy() + 3 + rng.uniform(-4, 4, (N, 1, H, W)), False)
 valid = torch.from_numpy(rng.uniform(size=(N, 1, H, W)) > 0.3)
 tensors["affine/valid"] = valid.double().float().numpy()
 total = 0
@@ -163,8 +163,9 @@ for n in range(N):
     b_ = ys.mean() - a_ * xs.mean()
     # The element in the middle of the sorted values, the upper one of two.
     median = ys.sort().values[len(ys) // 2]
-    total = total + (a_ * xs + b_ - ys).abs().mean() / ((ys - median).abs().mean() + 0.01 * median + 1e-6)
-done("affine", total / N, x=x, y=y)
+    floor = 0.01 * median + 1e-6
+    total = total + ((a_ * xs + b_ - ys).abs().mean() + floor) / ((ys - median).abs().mean() + floor)
+done("affine", total / N, x=x)
 
 # --- the other frame's depth seen from this one ---------------------------------------------------------------
 

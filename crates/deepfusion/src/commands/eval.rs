@@ -1,4 +1,4 @@
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use deepfusion_compare::{
@@ -11,6 +11,7 @@ use deepfusion_eval::{
 use deepfusion_geometry::Intrinsics;
 use deepfusion_render::{HtmlReport, ShownFrame};
 use deepfusion_train::{Predictor, RunFolder};
+use serde::Serialize;
 
 use super::confidence;
 use super::evaluate::{
@@ -29,22 +30,71 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     if let Some(file) = &args.report {
         output::require_folder_of(file)?;
     }
-    let report = match (&args.pred, args.pred_kind, &args.gt) {
+    let (report, checkpoint) = match (&args.pred, args.pred_kind, &args.gt) {
         (Some(predictions), Some(kind), Some(truth)) => {
-            from_arrays(args, predictions, kind, truth)?
+            (from_arrays(args, predictions, kind, truth)?, None)
         }
-        _ => from_model(args)?,
+        _ => {
+            let (report, checkpoint) = from_model(args)?;
+            (report, Some(checkpoint))
+        }
     };
     if args.json {
-        output::print_json(&report)
-    } else {
-        output::print(&report.to_string())
+        return output::print_json(&Printed {
+            checkpoint: checkpoint.as_ref(),
+            report: &report,
+        });
+    }
+    let used = checkpoint.map_or(String::new(), |c| format!("{c}\n\n"));
+    output::print(&format!("{used}{report}"))
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Printed<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    checkpoint: Option<&'a UsedCheckpoint>,
+    #[serde(flatten)]
+    report: &'a Report,
+}
+
+/// The checkpoint that was measured: a run's folder alone does not say which of its two.
+#[derive(Serialize)]
+struct UsedCheckpoint {
+    name: &'static str,
+    path: PathBuf,
+    step: usize,
+    /// Whether the folder was given, and the choice is the program's.
+    #[serde(skip)]
+    chosen: bool,
+}
+
+impl UsedCheckpoint {
+    fn of(predictor: &Predictor, model: &Path, folder: &RunFolder) -> Self {
+        Self {
+            name: predictor.checkpoint.name(),
+            path: folder.checkpoint_path(predictor.checkpoint),
+            step: predictor.step,
+            chosen: model == folder.path(),
+        }
+    }
+}
+
+impl std::fmt::Display for UsedCheckpoint {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { path, step, .. } = self;
+        write!(f, "checkpoint  {}, step {step}", path.display())?;
+        match (self.chosen, self.name) {
+            (true, "best") => write!(f, " (the lowest held-out loss; last is beside it)"),
+            (true, _) => write!(f, " (there is no best)"),
+            (false, _) => Ok(()),
+        }
     }
 }
 
 /// Predicts every frame that has ground truth. An image of another aspect ratio is stretched, so that
 /// all of its ground truth counts.
-fn from_model(args: &EvalArgs) -> Result<Report> {
+fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
     let model = args.model.as_deref().unwrap_or(Path::new("."));
     let predictor = engine::load(model, &args.engine)?;
     let split = args.split.as_deref();
@@ -122,7 +172,8 @@ fn from_model(args: &EvalArgs) -> Result<Report> {
         run_report::training(page, folder.path())?.write(path)?;
         say(&format!("report  {}", path.display()));
     }
-    Ok(evaluated.report)
+    let checkpoint = UsedCheckpoint::of(&predictor, model, &folder);
+    Ok((evaluated.report, checkpoint))
 }
 
 /// The disparity of an image, as the protocol wants it.

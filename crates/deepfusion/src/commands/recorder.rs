@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use deepfusion_render::sample_panel;
-use deepfusion_train::log::{CsvLog, TensorBoardLog};
+use deepfusion_train::log::{CsvLog, CsvRecord, TensorBoardLog};
 use deepfusion_train::{Control, TrainEvent};
 
 use super::outlook::Outlook;
@@ -95,14 +95,14 @@ impl Recorder {
                 scale_ratio,
                 gradient_norm,
             } => {
-                self.csv.write(
+                self.csv.write(&CsvRecord {
                     step,
-                    "train",
-                    &losses,
+                    losses: &losses,
                     learning_rate,
                     scale_ratio,
                     images_per_second,
-                )?;
+                    selection: None,
+                })?;
                 let mut scalars: Vec<_> = losses.named().to_vec();
                 scalars.push(("learning_rate", learning_rate));
                 scalars.push(("scale_ratio", scale_ratio));
@@ -145,12 +145,20 @@ impl Recorder {
             TrainEvent::Validated {
                 step,
                 losses,
+                selection,
                 scale_ratio,
                 best,
             } => {
-                self.csv
-                    .write(step, "validation", &losses, 0.0, scale_ratio, 0.0)?;
-                let named = losses.named();
+                self.csv.write(&CsvRecord {
+                    step,
+                    losses: &losses,
+                    learning_rate: 0.0,
+                    scale_ratio,
+                    images_per_second: 0.0,
+                    selection: Some(selection),
+                })?;
+                let mut named = losses.named().to_vec();
+                named.push(("selection", selection));
                 let tagged: Vec<_> = named
                     .iter()
                     .map(|(n, v)| (format!("validation/{n}"), *v))
@@ -158,11 +166,10 @@ impl Recorder {
                 let tagged: Vec<_> = tagged.iter().map(|(n, v)| (n.as_str(), *v)).collect();
                 self.events.scalars(step, &tagged)?;
                 say(&format!(
-                    "step {step}: held-out loss {:.4} (reprojection {:.4}, speed {:.3} m), scale ratio {scale_ratio:.3}{}",
-                    losses.total,
+                    "step {step}: held out {selection:.4}{} (reprojection {:.4}, speed {:.3} m), scale ratio {scale_ratio:.3}",
+                    if best { ", the best so far" } else { "" },
                     losses.reprojection,
                     losses.speed,
-                    if best { ", the best so far" } else { "" }
                 ));
             }
             TrainEvent::Panel { step, panel } => {

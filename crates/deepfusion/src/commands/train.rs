@@ -46,11 +46,12 @@ pub fn run(args: &TrainArgs) -> Result<()> {
             config.init = args.init.clone().or(config.init);
             let init = config.init.clone();
             let init = init.as_deref();
-            if let Some(folder) = init.map(run_of).transpose()?.flatten()
+            if let Some((folder, kind)) = init.map(run_of).transpose()?.flatten()
                 && config.pose_net.metres_per_unit == 0.0
+                && !folder.read_state(kind)?.encoders_only
             {
                 // Its PoseNet speaks of this unit.
-                config.pose_net.metres_per_unit = folder.0.read_config()?.pose_net.metres_per_unit;
+                config.pose_net.metres_per_unit = folder.read_config()?.pose_net.metres_per_unit;
             }
             let settings = config.clone();
             Trainer::create(config, folder, sets, &device, |model| match init {
@@ -301,9 +302,14 @@ fn warn_of_speed(dataset: &Dataset) {
     }
 }
 
-/// The run that a path is, or is a checkpoint of; `None` of other weights.
-fn run_of(path: &Path) -> Result<Option<(RunFolder, Option<CheckpointKind>)>, Error> {
-    is_run(path).then(|| RunFolder::open(path)).transpose()
+/// The run that a path is, or is a checkpoint of, and which; `None` of other weights.
+fn run_of(path: &Path) -> Result<Option<(RunFolder, CheckpointKind)>, Error> {
+    if !is_run(path) {
+        return Ok(None);
+    }
+    let (folder, kind) = RunFolder::open(path)?;
+    let kind = kind.unwrap_or_else(|| folder.preferred());
+    Ok(Some((folder, kind)))
 }
 
 /// Whether a path is a run's folder, or in one.
@@ -321,8 +327,13 @@ fn initialise(
 ) -> Result<Model, Error> {
     let device = device.clone().autodiff();
     if let Some((folder, kind)) = run_of(path)? {
-        let kind = kind.unwrap_or_else(|| folder.preferred());
-        return Ok(folder.load(kind, config, &device)?.0);
+        let (model, anew) = folder.load_networks(kind, config, &device)?;
+        let from = folder.checkpoint_path(kind);
+        say(&match anew.as_slice() {
+            [] => format!("starts from {}", from.display()),
+            parts => format!("starts from {}; new: {}", from.display(), parts.join(", ")),
+        });
+        return Ok(model);
     }
     let mut model = model;
     model.depth_net.encoder = load_torchvision_resnet(model.depth_net.encoder, path)?;

@@ -12,8 +12,9 @@ use crate::progress::say;
 /// `deepfusion weights import`.
 pub fn import(files: &[PathBuf], out: &Path) -> Result<()> {
     let device = Device::flex();
+    let encoders_only = matches!(files, [file] if !file.is_dir());
     let (config, model) = match files {
-        [file] if !file.is_dir() => from_resnet(file, &device)?,
+        [file] if encoders_only => from_resnet(file, &device)?,
         [folder] => from_monodepth2(&Monodepth2Files::in_folder(folder), &device)?,
         files => from_monodepth2(&named(files), &device)?,
     };
@@ -23,6 +24,7 @@ pub fn import(files: &[PathBuf], out: &Path) -> Result<()> {
         step: 0,
         best_validation: None,
         skipped: 0,
+        encoders_only,
     };
     let path = folder.save(CheckpointKind::Last, &model, None, &state)?;
     say("imported; the scale of imported weights is not metric until they are trained with speeds");

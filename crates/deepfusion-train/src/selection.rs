@@ -1,0 +1,48 @@
+use crate::{LossTerms, TrainConfig, ViewMotion};
+
+/// What `best` is chosen by: the part of a held-out loss that depth can change, at weights that never change.
+///
+/// Photometric error is all of it where the vehicle's sensors give the distance of the views (`distance`, `vehicle`): what
+/// PoseNet learns beside them says nothing about depth, and more of it than of depth would be chosen by. With
+/// `posenet` the views follow PoseNet alone, depth and motion share one scale, and photometric error cannot see it: the
+/// speed term, at its full weight, does.
+///
+/// Smoothness and the affine term are no part of it, though depth changes them: a flat depth has the least of the
+/// one, and neither asks whether the images are explained. Flow and masks are training's alone.
+pub(crate) fn selection(config: &TrainConfig, held_out: &LossTerms) -> f64 {
+    match config.view_motion {
+        ViewMotion::PoseNet => held_out.reprojection + config.loss.speed * held_out.speed,
+        ViewMotion::Distance | ViewMotion::Vehicle => held_out.reprojection,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Preset;
+
+    /// Depth explains the images better, while PoseNet forgets what the vehicle measured.
+    #[test]
+    fn only_what_depth_can_change_decides() {
+        let mut config = Preset::Tiny.config();
+        config.loss.speed = 0.2;
+        let terms = |reprojection, speed| LossTerms {
+            total: reprojection + 0.2 * speed,
+            reprojection,
+            speed,
+            ..LossTerms::default()
+        };
+        let (early, late) = (terms(0.11, 0.05), terms(0.09, 0.5));
+        assert!(late.total > early.total);
+        for motion in [ViewMotion::Distance, ViewMotion::Vehicle] {
+            config.view_motion = motion;
+            assert!(selection(&config, &late) < selection(&config, &early));
+        }
+        // The scale of depth follows PoseNet's there.
+        config.view_motion = ViewMotion::PoseNet;
+        assert!((selection(&config, &late) - (0.09 + 0.2 * 0.5)).abs() < 1e-12);
+        assert!(selection(&config, &late) > selection(&config, &early));
+        config.loss.speed = 0.0;
+        assert_eq!(selection(&config, &late), 0.09);
+    }
+}

@@ -1,0 +1,160 @@
+//! What a run goes on from, and what another one starts from.
+
+mod support;
+
+use burn::tensor::Device;
+use deepfusion_nn::weights::{self, Weights};
+use deepfusion_nn::{DepthNetConfig, PoseNetConfig, ResNetDepth};
+use deepfusion_train::{
+    Checkpoint, CheckpointKind, Control, Error, Model, Preset, RunFolder, TrainConfig, Trainer,
+};
+use std::path::Path;
+use support::{drive, small};
+
+/// A run of two steps with a flow decoder or without, in `name` beside a drive.
+fn trained(at: &Path, name: &str, flow: bool) -> (Trainer, RunFolder) {
+    let (mut config, train, validation) = small(&drive(&at.join(format!("street-{name}")), 10), 2);
+    if flow {
+        config.loss.with("flow").unwrap();
+    }
+    let folder = RunFolder::create(&at.join(name)).unwrap();
+    let sets = (train, validation);
+    let mut trainer = Trainer::create(config, folder.clone(), sets, &Device::flex(), Ok).unwrap();
+    trainer.run(&mut |_| Control::Continue).unwrap();
+    (trainer, folder)
+}
+
+fn flow_decoder(model: &Model) -> Weights {
+    weights::collect(model.flow_decoder.as_ref().unwrap())
+}
+
+#[test]
+fn a_run_starts_from_the_flow_decoder_too_or_says_that_it_is_new() {
+    let folder = tempfile::tempdir().unwrap();
+    let device = Device::flex();
+    let (with, run) = trained(folder.path(), "with", true);
+    assert_eq!(run.preferred(), CheckpointKind::Best);
+    for kind in [CheckpointKind::Best, CheckpointKind::Last] {
+        let (model, anew) = run.load_networks(kind, with.config(), &device).unwrap();
+        assert_eq!(anew, [""; 0]);
+        let new = Model::new(with.config(), &device).unwrap();
+        let (saved, new) = (flow_decoder(&model), flow_decoder(&new));
+        assert!(saved.tensors != new.tensors, "{kind:?}: it has learned");
+        if kind == CheckpointKind::Last {
+            assert!(saved.tensors == flow_decoder(with.model()).tensors);
+        }
+    }
+
+    let (without, run) = trained(folder.path(), "without", false);
+    let (_, anew) = run
+        .load_networks(CheckpointKind::Best, without.config(), &device)
+        .unwrap();
+    assert_eq!(anew, [""; 0], "none is wanted");
+    let (_, anew) = run
+        .load_networks(CheckpointKind::Best, with.config(), &device)
+        .unwrap();
+    assert_eq!(anew, ["the flow decoder"]);
+    // A run that goes on does not do so with another decoder than it had.
+    let error = run
+        .load(CheckpointKind::Last, with.config(), &device)
+        .unwrap_err();
+    assert!(error.to_string().contains("no flow decoder"), "{error}");
+    assert!(error.hint().unwrap().contains("--init"));
+}
+
+#[test]
+fn moments_that_are_not_their_parameters_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let (trainer, run) = trained(folder.path(), "run", false);
+    let path = run.checkpoint_path(CheckpointKind::Last);
+    let whole = weights::read(&path).unwrap();
+    let name = "adam.m.depth.encoder.bn1.weight";
+    let refused = |change: &dyn Fn(&mut Weights)| -> Error {
+        let mut changed = whole.clone();
+        change(&mut changed);
+        weights::write_safetensors(&path, &changed).unwrap();
+        run.load(CheckpointKind::Last, trainer.config(), &Device::flex())
+            .unwrap_err()
+    };
+    for length in [7, 9] {
+        let error = refused(&|w| {
+            let moment = w.tensors.get_mut(name).unwrap();
+            moment.values.resize(length, 0.0);
+            moment.shape = vec![length];
+        });
+        let told = format!("tensor `{name}` has shape [{length}], expected [8]");
+        assert!(error.to_string().contains(&told), "{error}");
+        assert!(error.to_string().contains("last.safetensors"), "{error}");
+    }
+    let error = refused(&|w| {
+        w.tensors.remove(name);
+    });
+    let told = format!("tensor `{name}` [8] is missing");
+    assert!(error.to_string().contains(&told), "{error}");
+    let error = refused(&|w| {
+        let moment = w.tensors.remove(name).unwrap();
+        w.tensors.insert("adam.m.depth.nothing".into(), moment);
+    });
+    assert!(
+        error.to_string().contains("`adam.m.depth.nothing`"),
+        "{error}"
+    );
+    // As it was, it goes on.
+    weights::write_safetensors(&path, &whole).unwrap();
+    run.load(CheckpointKind::Last, trainer.config(), &Device::flex())
+        .unwrap();
+}
+
+/// Imported ResNet-50 encoders start the paper's network, whose last layer is dilated and whose other parts the
+/// import does not have. Narrower here, by nothing but the width.
+#[test]
+fn imported_encoders_start_a_network_with_other_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    let device = Device::flex();
+    let narrow = |mut config: TrainConfig| {
+        (config.size.width, config.size.height) = (96, 64);
+        config.depth_net.encoder = config.depth_net.encoder.with_base_width(4);
+        config.pose_net.encoder = config.pose_net.encoder.with_base_width(4);
+        config.pose_net.metres_per_unit = 1.0;
+        config
+    };
+    let mut imported = Preset::Light.config();
+    imported.depth_net = DepthNetConfig::new(ResNetDepth::ResNet50);
+    imported.pose_net = PoseNetConfig::new(ResNetDepth::ResNet50);
+    imported.seed = 3;
+    let imported = narrow(imported);
+    let theirs = Model::new(&imported, &device).unwrap();
+    let run = RunFolder::create(folder.path()).unwrap();
+    run.write_config(&imported).unwrap();
+    let mut state = Checkpoint {
+        step: 0,
+        best_validation: None,
+        skipped: 0,
+        encoders_only: true,
+    };
+    let kind = CheckpointKind::Last;
+    run.save(kind, &theirs, None, &state).unwrap();
+    assert_eq!(run.read_state(kind).unwrap(), state);
+
+    let paper = narrow(Preset::Paper.config());
+    assert!(paper.depth_net.encoder.is_dilated() && paper.depth_net.hce.is_some());
+    let (ours, anew) = run.load_networks(kind, &paper, &device).unwrap();
+    assert_eq!(anew, ["everything but the encoders"]);
+    let depth = |m: &Model| weights::collect(&m.depth_net.encoder).tensors;
+    let pose = |m: &Model| weights::collect(&m.pose_net.encoder).tensors;
+    assert!(depth(&ours) == depth(&theirs) && pose(&ours) == pose(&theirs));
+    let new = Model::new(&paper, &device).unwrap();
+    assert!(depth(&ours) != depth(&new));
+    let decoder = |m: &Model| weights::collect(&m.depth_net.decoder).tensors;
+    assert!(decoder(&ours) == decoder(&new), "the rest is the seed's");
+    // Another ResNet stays an error.
+    let error = run
+        .load_networks(kind, &narrow(Preset::Light.config()), &device)
+        .unwrap_err();
+    assert!(matches!(error, Error::Network(_)), "{error}");
+
+    // A run that was trained as a whole is taken as a whole.
+    state.encoders_only = false;
+    run.save(kind, &theirs, None, &state).unwrap();
+    assert!(run.load_networks(kind, &paper, &device).is_err());
+}
