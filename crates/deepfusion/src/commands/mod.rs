@@ -14,6 +14,7 @@ mod eval_targets;
 mod evaluate;
 mod export;
 mod export_gt;
+mod held_out;
 mod inspect;
 mod live;
 mod overview;
