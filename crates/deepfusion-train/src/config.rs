@@ -64,9 +64,15 @@ pub struct DataConfig {
     pub paths: Vec<PathBuf>,
     /// Recordings to validate on; none: the held-out end of each drive.
     pub validation: Vec<PathBuf>,
-    /// A split file that selects frames.
+    /// A split file that selects the frames to train on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split: Option<PathBuf>,
+    /// A split file that selects the frames to validate on: of `validation`, or of `paths` where that is empty.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation_split: Option<PathBuf>,
+    /// How far the cameras' clock is ahead of the vehicles', in seconds, instead of what the recordings' own files say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera_ahead_s: Option<f64>,
     /// Which cameras: `2`, `3` or `both`; empty means 2.
     pub camera: String,
     /// Several data sets with cameras, ranges and displacements of their own, instead of `paths`.

@@ -28,6 +28,7 @@ mod prepare;
 mod preset;
 mod runner;
 mod sampler;
+mod shared_frames;
 mod source;
 mod trainer;
 mod view_synthesis;
@@ -56,6 +57,7 @@ pub use preset::Preset;
 
 pub use runner::{BurnRunner, DepthRunner, FusedRunner};
 pub use sampler::Sampler;
+pub use shared_frames::{SharedFrames, shared_frames};
 pub use source::{Sample, SampleSet};
 pub use trainer::{TrainSummary, Trainer, validation_loss};
 pub use view_synthesis::{Synthesised, synthesise};
