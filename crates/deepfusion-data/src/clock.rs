@@ -97,6 +97,11 @@ impl TimeUnit {
     }
 }
 
+/// A time of the camera's clock on the vehicle's, of which the camera's is `ahead_s` seconds ahead.
+pub(crate) fn on_the_vehicles_clock(ns: i64, ahead_s: f64) -> i64 {
+    ns.saturating_sub((ahead_s * 1e9).round() as i64)
+}
+
 /// Seconds from `origin_ns` to `ns`.
 pub(crate) fn seconds(ns: i64, origin_ns: i64) -> f64 {
     (i128::from(ns) - i128::from(origin_ns)) as f64 * 1e-9

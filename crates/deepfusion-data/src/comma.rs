@@ -1,7 +1,7 @@
 //! A comma2k19 segment: `processed_log` and `global_pose` as NumPy arrays without an ending, `video.hevc`.
 
 use crate::calibration::find_camera;
-use crate::clock::seconds;
+use crate::clock::{on_the_vehicles_clock, seconds};
 use crate::config::FolderConfig;
 use crate::folder::{NO_MOUNT, name_of};
 use crate::frame_times::{TimedImage, numbers_by_time};
@@ -85,6 +85,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         image_size: video.size(),
         video: Some(video),
         calibration,
+        camera_ahead_s: config.camera_ahead_s(options),
         speeds: speeds(folder, &config)?,
         cam_from_vehicle: config.cam_from_vehicle(),
         depth: None,
@@ -97,9 +98,14 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
 }
 
 /// A segment without its video.
-pub(crate) fn inspect(folder: &Path) -> Result<Inspection> {
-    let times = frame_times(folder)?;
-    let speeds = speeds(folder, &FolderConfig::read(folder)?)?;
+pub(crate) fn inspect(folder: &Path, options: &OpenOptions) -> Result<Inspection> {
+    let config = FolderConfig::read(folder)?;
+    let camera_ahead_s = config.camera_ahead_s(options);
+    let times: Vec<i64> = frame_times(folder)?
+        .into_iter()
+        .map(|ns| on_the_vehicles_clock(ns, camera_ahead_s))
+        .collect();
+    let speeds = speeds(folder, &config)?;
     let origin = times.first().copied().unwrap_or_default();
     let motion = speeds.as_ref().map(|log| log.motion(origin));
     let (track, yaw_known) = match motion.transpose()? {
@@ -145,6 +151,7 @@ pub(crate) fn inspect(folder: &Path) -> Result<Inspection> {
             distance_m,
             turn_rad,
             duration_s,
+            camera_ahead_s,
             time_offset: None,
             remarks: Vec::new(),
         }],
@@ -185,6 +192,7 @@ fn speeds(folder: &Path, config: &FolderConfig) -> Result<Option<SpeedLog>> {
     }
     let origin = ns.first().copied().unwrap_or_default();
     let at: Vec<f64> = ns.iter().map(|t| seconds(*t, origin)).collect();
+    let values = values.iter().map(|v| v * config.speed_scale()).collect();
     let vehicle = vehicle(folder, config)?;
     let remarks = match &vehicle {
         Some(_) => Vec::new(),

@@ -1,8 +1,8 @@
 //! `dataset.toml`: what a recording's own files do not say.
 
-use crate::{Error, Result};
+use crate::{Error, OpenOptions, Result};
 use deepfusion_geometry::Se3;
-use deepfusion_motion::{Bicycle, ImuConfig, ImuMount, MotionConfig};
+use deepfusion_motion::{Bicycle, ImuConfig, ImuMount, MotionConfig, SPEED_SCALES};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -48,6 +48,9 @@ pub(crate) struct FolderConfig {
     /// The vehicle's geometry.
     #[serde(default)]
     pub(crate) vehicle: Vehicle,
+    /// The camera's clock.
+    #[serde(default)]
+    pub(crate) clock: Clock,
     /// Where the file is.
     #[serde(skip)]
     pub(crate) path: PathBuf,
@@ -85,6 +88,41 @@ pub(crate) struct Vehicle {
     /// Steering wheel's angle over road wheels'.
     steering_ratio: Option<f64>,
     steering_offset_rad: f64,
+    /// True speed over the vehicle's: worn tyres read too fast.
+    pub(crate) speed_scale: Option<f64>,
+}
+
+/// The camera's clock against the vehicle's.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Clock {
+    /// How far the camera's clock is ahead of the vehicle's, in seconds; taken off the images' times.
+    pub(crate) camera_ahead_s: f64,
+}
+
+/// What is wrong with a `vehicle.speed_scale`.
+pub(crate) fn bad_speed_scale(scale: f64) -> String {
+    let (least, most) = (SPEED_SCALES.start(), SPEED_SCALES.end());
+    format!(
+        "vehicle.speed_scale is {scale}, expected {least} to {most} (a unit is converted, not scaled)"
+    )
+}
+
+/// What is wrong with a clock or a scale of the speed, if something is.
+pub(crate) fn check_clock_and_scale(
+    clock: Clock,
+    speed_scale: Option<f64>,
+) -> std::result::Result<(), String> {
+    let scale = speed_scale.unwrap_or(1.0);
+    if !SPEED_SCALES.contains(&scale) {
+        return Err(bad_speed_scale(scale));
+    }
+    match clock.camera_ahead_s {
+        ahead if ahead.is_finite() => Ok(()),
+        ahead => Err(format!(
+            "clock.camera_ahead_s is {ahead}, it is a time in seconds"
+        )),
+    }
 }
 
 /// A TOML file's settings; where there is no such file, those of an empty one.
@@ -128,10 +166,23 @@ impl FolderConfig {
         if let Some(bad) = config.start_s.filter(|v| v.is_nan() || v.abs() > 9e9) {
             return Err(config.error(format!("start_s is {bad}, it is a time in seconds")));
         }
-        Ok(config)
+        match check_clock_and_scale(config.clock, config.vehicle.speed_scale) {
+            Ok(()) => Ok(config),
+            Err(problem) => Err(config.error(problem)),
+        }
     }
 
-    /// How the vehicle's sensors become its motion; `imu` is where the inertial unit is taken to be where nothing says it.
+    /// How far the camera's clock is ahead of the vehicle's, in seconds: as it is given, else as this file says.
+    pub(crate) fn camera_ahead_s(&self, options: &OpenOptions) -> f64 {
+        options.camera_ahead_s.unwrap_or(self.clock.camera_ahead_s)
+    }
+
+    /// True speed over the vehicle's.
+    pub(crate) fn speed_scale(&self) -> f64 {
+        self.vehicle.speed_scale.unwrap_or(1.0)
+    }
+
+    /// How the vehicle's sensors become its motion (the speeds are scaled where they are read); `imu` is where the inertial unit is taken to be where nothing says it.
     pub(crate) fn motion(&self, imu: ImuMount) -> MotionConfig {
         let vehicle = &self.vehicle;
         let place = self.vehicle_from_imu.map(|place| ImuMount {

@@ -27,6 +27,10 @@ pub struct OpenOptions {
     /// fx, fy, cx, cy in pixels of an undistorted image, instead of the recording's own. Not for KITTI
     /// raw, which brings its calibration and refuses it.
     pub intrinsics: Option<[f64; 4]>,
+    /// How far the clock of camera and LiDAR is ahead of the vehicle's, in seconds, instead of what the recording's own
+    /// file says (`clock.camera_ahead_s`). It is taken off the images' times, once, when a recording is opened: every time of
+    /// a [`Dataset`] is one of the vehicle's clock.
+    pub camera_ahead_s: Option<f64>,
 }
 
 /// What every layout has: the parts of a [`Dataset`] that are plain values.
@@ -49,8 +53,10 @@ pub struct DatasetParts {
     pub track: Option<MotionModel>,
     /// Whether the track's yaw rates were measured. Where not, they are 0 and mean nothing.
     pub yaw_known: bool,
-    /// Nanoseconds from which seconds are counted, since 1970 or whatever the recording's clock starts at.
+    /// Nanoseconds from which seconds are counted, on the vehicle's clock: since 1970 or whatever it starts at.
     pub origin_ns: Option<i64>,
+    /// What was taken off the images' times, in seconds: how far the camera's clock is ahead of the vehicle's.
+    pub camera_ahead_s: f64,
     /// The kind of drive, such as `garage`, for a row each in an evaluation.
     pub scenario: Option<String>,
 }
@@ -204,11 +210,18 @@ impl Dataset {
         self.parts.yaw_known
     }
 
-    /// Nanoseconds from which its seconds are counted (since 1970 where the recording's clock says so),
-    /// where it has time stamps.
+    /// Nanoseconds from which its seconds are counted (since 1970 where the recording's clock says so), on the
+    /// vehicle's clock, where it has time stamps.
     #[must_use]
     pub fn origin_ns(&self) -> Option<i64> {
         self.parts.origin_ns
+    }
+
+    /// How far the camera's clock was said to be ahead of the vehicle's, in seconds: by the recording's file or by
+    /// [`OpenOptions::camera_ahead_s`]. It is off the frames' times already.
+    #[must_use]
+    pub fn camera_ahead_s(&self) -> f64 {
+        self.parts.camera_ahead_s
     }
 
     /// The time of a frame number, whether or not there is an image of it, in seconds from the drive's

@@ -52,6 +52,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         images,
         video: None,
         calibration,
+        camera_ahead_s: config.camera_ahead_s(options),
         image_size: size,
         speeds: SpeedLog::read(folder, &config)?,
         cam_from_vehicle: config.cam_from_vehicle(),

@@ -54,7 +54,10 @@ pub struct DriveInspection {
     pub turn_rad: Option<f64>,
     /// Time from the first to the last frame, in seconds.
     pub duration_s: Option<f64>,
-    /// How far the vehicle's clock is ahead of the camera's, by how the pictures moved. Estimated where one drive is
+    /// What was taken off the images' times, in seconds: how far the camera's clock is ahead of the vehicle's, as the
+    /// recording's file or the caller says.
+    pub camera_ahead_s: f64,
+    /// How far the vehicle's clock is then still ahead of the camera's, by how the pictures moved. Estimated where one drive is
     /// looked at and shows it; `None` otherwise.
     pub time_offset: Option<ClockOffset>,
     /// What was taken for granted or looks odd.
@@ -64,7 +67,7 @@ pub struct DriveInspection {
 /// The vehicle's clock less the camera's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ClockOffset {
-    /// What to add to the camera's times to have the vehicle's, in seconds.
+    /// What to add to the camera's times, as they were opened, to have the vehicle's, in seconds.
     pub vehicle_minus_camera_s: f64,
     /// Its standard error, in seconds.
     pub std_error_s: f64,
@@ -116,19 +119,19 @@ pub struct SpeedRange {
 /// # Errors
 /// As [`Dataset::open`]; times and speeds may be missing and are then told as unknown.
 pub fn inspect(path: &Path) -> Result<Inspection> {
-    inspect_with(path, None)
+    inspect_with(path, &OpenOptions::default())
 }
 
-/// [`inspect`] with fx, fy, cx, cy given, as [`OpenOptions::intrinsics`].
+/// [`inspect`] with a camera or a clock offset given; camera and split of the options are not looked at.
 ///
 /// # Errors
 /// As [`inspect`].
-pub fn inspect_with(path: &Path, intrinsics: Option<[f64; 4]>) -> Result<Inspection> {
+pub fn inspect_with(path: &Path, options: &OpenOptions) -> Result<Inspection> {
     let layout = Layout::of(path)?;
     if let Layout::Comma(segment) = &layout
         && !comma::has_video(segment)
     {
-        return comma::inspect(segment);
+        return comma::inspect(segment, options);
     }
     if let Layout::Bags(bags) = &layout
         && let [bag] = bags.as_slice()
@@ -139,8 +142,8 @@ pub fn inspect_with(path: &Path, intrinsics: Option<[f64; 4]>) -> Result<Inspect
     let open = |camera| {
         let options = OpenOptions {
             camera,
-            intrinsics,
-            ..OpenOptions::default()
+            split: None,
+            ..options.clone()
         };
         layout.open(path, &options)
     };
@@ -262,6 +265,7 @@ fn look_at(dataset: &Dataset) -> Result<DriveInspection> {
         distance_m,
         turn_rad,
         duration_s: ends.and_then(|(first, last)| Some(last.time_s? - first.time_s?)),
+        camera_ahead_s: dataset.camera_ahead_s(),
         time_offset: None,
         remarks: dataset.remarks().to_vec(),
     })

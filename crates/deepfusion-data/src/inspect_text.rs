@@ -48,8 +48,15 @@ impl fmt::Display for Inspection {
                 known(drive.turn_rad.map(f64::to_degrees), "degrees")
             )?;
             writeln!(f, "  speed     {}", speed(drive.speed_mps))?;
+            let ms = |seconds: f64| 1e3 * seconds;
+            if drive.camera_ahead_s != 0.0 {
+                writeln!(
+                    f,
+                    "  clocks    camera ahead by {:.0} ms as was said, taken off its times",
+                    ms(drive.camera_ahead_s)
+                )?;
+            }
             if let Some(offset) = drive.time_offset {
-                let ms = |seconds: f64| 1e3 * seconds;
                 writeln!(
                     f,
                     "  clocks    vehicle less camera {:.0} ms, standard error {:.0} ms",

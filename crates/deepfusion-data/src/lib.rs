@@ -52,7 +52,7 @@ pub use agreement::DynamicAgreement;
 pub use bag::{DopplerEgo, ego_velocity, ground_radial};
 pub use calibration::CameraCalibration;
 pub use camera::{Camera, CameraChoice};
-pub use convert::{convert_to_bag, convert_to_kitti};
+pub use convert::{Converted, convert_to_bag, convert_to_kitti};
 pub use dataset::{Dataset, DatasetParts, OpenOptions};
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
 pub use depth_png::{read_depth_png, write_depth_png};
@@ -75,6 +75,6 @@ pub use recording::{CalibrationPlace, DatasetKind, LidarMotion, Recording, ScanT
 pub use resize::{resize_rgb, to_chw, to_network_input};
 pub use snippet::{EgoMotion, Snippet, Source, hold_out};
 pub use speed_check::{SpeedWarning, grey_image, speed_unit_warning};
-pub use split::{Split, SplitEntry};
+pub use split::{Split, SplitCoverage, SplitEntry};
 pub use video::{Shown, can_write_video, shown_for, write_video};
 pub use write::{write_atomically, write_unsynced};

@@ -1,7 +1,7 @@
 //! What folders, videos, comma2k19 segments and RGB-D folders have in common: frames, tables beside
 //! them, depth images.
 
-use crate::clock::seconds;
+use crate::clock::{on_the_vehicles_clock, seconds};
 use crate::depth_images::DepthImages;
 use crate::frame_times::TimedImage;
 use crate::kitti::GtKind;
@@ -43,6 +43,8 @@ pub(crate) struct PlainParts {
     pub(crate) images: Vec<TimedImage>,
     pub(crate) video: Option<VideoFrames>,
     pub(crate) calibration: CameraCalibration,
+    /// How far the camera's clock is ahead of that of the speeds, in seconds.
+    pub(crate) camera_ahead_s: f64,
     /// Of the first image.
     pub(crate) image_size: (u32, u32),
     pub(crate) speeds: Option<SpeedLog>,
@@ -63,6 +65,9 @@ impl PlainParts {
     /// [`Error::Clocks`] where frames and speeds have no time in common, [`Error::CameraFile`],
     /// [`Error::FrameSize`], [`Error::Image`], [`Error::Motion`].
     pub(crate) fn into_dataset(mut self) -> Result<Dataset> {
+        for ns in self.images.iter_mut().filter_map(|i| i.ns.as_mut()) {
+            *ns = on_the_vehicles_clock(*ns, self.camera_ahead_s);
+        }
         let origin_ns = self.images.iter().find_map(|i| i.ns);
         let motion = match (&self.speeds, origin_ns) {
             (Some(log), Some(origin)) => Some(log.motion(origin)?),
@@ -121,6 +126,7 @@ impl PlainParts {
             track,
             yaw_known,
             origin_ns,
+            camera_ahead_s: self.camera_ahead_s,
             scenario: None,
         };
         let dataset = Dataset::new(

@@ -93,6 +93,7 @@ fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         images: colour.into_iter().map(image).collect(),
         video: None,
         calibration,
+        camera_ahead_s: config.camera_ahead_s(options),
         image_size: size,
         speeds: None,
         cam_from_vehicle: config.cam_from_vehicle(),

@@ -59,7 +59,7 @@ impl SpeedLog {
         let mut remarks = Vec::new();
         let ns = times(&table, config, &mut remarks, &name(&path))?;
         let column = table.require(&SPEEDS, "time_s,speed_mps")?;
-        let factor = speed_factor(&table, column, config)?;
+        let factor = speed_factor(&table, column, config)? * config.speed_scale();
         let values = scaled(table.numbers(column)?, factor);
         let mut streams = vec![stream(&path, "speed", &ns)];
         let speeds_mps = Samples { ns, values };

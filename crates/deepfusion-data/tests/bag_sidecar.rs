@@ -390,3 +390,85 @@ fn a_bag_without_a_camera_is_left_out_of_a_folder_and_named() {
     let error = open(&other).unwrap_err().to_string();
     assert!(error.contains("holds images"), "{error}");
 }
+
+#[test]
+fn a_twist_s_speed_is_scaled_like_any_other() {
+    let sidecar = "[vehicle]\nspeed_scale = 0.9\n";
+    // By a twist that turns, which is taken as it is, and by one whose motion is fused.
+    for yaw_rate in [0.2, 0.0] {
+        let drive = Drive::new(sidecar, |bag| {
+            bag.turning_twist("/twist", |_| (10.0, yaw_rate));
+        });
+        near(drive.speed(), 9.0);
+        near(drive.turn_rad(), 0.5 * yaw_rate);
+    }
+    let wrong = Drive::new("[vehicle]\nspeed_scale = 3.6\n", |bag| {
+        bag.twist("/twist", 10.0);
+    });
+    says(
+        &wrong.refusal(),
+        &["drive.toml", "vehicle.speed_scale is 3.6", "0.5 to 2"],
+    );
+}
+
+#[test]
+fn a_steering_angle_without_a_wheelbase_does_not_replace_a_yaw_rate() {
+    let fill = |bag: &mut TinyBag| {
+        bag.turning_twist("/twist", |_| (10.0, 0.2));
+        bag.ackermann("/drive", 10.0, 0.1);
+    };
+    let drive = Drive::new("", fill);
+    assert!(open(&drive.bag).unwrap().yaw_known());
+    near(drive.turn_rad(), 0.5 * 0.2);
+    // With one it tells turns, as it always did.
+    let steered = Drive::new("[vehicle]\nwheelbase_m = 2.5\n", fill);
+    near(steered.turn_rad(), 0.5 * 10.0 * 0.1_f64.tan() / 2.5);
+}
+
+/// Drivers that leave the header's time at 0 put all their messages at one instant, decades before the pictures.
+#[test]
+fn messages_without_a_time_have_that_of_their_recording() {
+    let sidecar = "[vehicle]\nwheelbase_m = 2.5\n";
+    let drive = Drive::new(sidecar, |bag| {
+        bag.without_stamps();
+        bag.turning_twist("/twist", |t| (10.0 + t, 0.0));
+        bag.imu("/imu", 0.4).ackermann("/drive", 0.0, 0.1);
+    });
+    let dataset = open(&drive.bag).unwrap();
+    // The twelfth picture's, 0.48 s on.
+    near(dataset.frames()[12].speed_mps.unwrap(), 10.48);
+    // Gyro and steering agree.
+    assert!(
+        (drive.turn_rad() - 0.5 * 0.4).abs() < 0.02,
+        "{}",
+        drive.turn_rad()
+    );
+    let remarks = dataset.remarks().join("\n");
+    for topic in ["/twist", "/imu", "/drive"] {
+        says(
+            &remarks,
+            &[&format!(
+                "{topic}: 25 messages have no time in their header"
+            )],
+        );
+    }
+    assert!(!remarks.contains("/camera"), "{remarks}");
+    let stamped = Drive::new(sidecar, |bag| {
+        bag.twist("/twist", 10.0).float("/bare", 1.0);
+    });
+    let remarks = open(&stamped.bag).unwrap().remarks().join("\n");
+    assert!(!remarks.contains("no time"), "{remarks}");
+}
+
+/// Of CAN frames, too.
+#[test]
+fn frames_of_the_bus_without_a_time_have_that_of_their_recording() {
+    let drive = Drive::new(INLINE, |bag| {
+        bag.without_stamps().can("/can", &ten_mps());
+    });
+    near(drive.speed(), 10.0);
+    says(
+        &open(&drive.bag).unwrap().remarks().join("\n"),
+        &["/can: 25 messages"],
+    );
+}

@@ -48,6 +48,16 @@ fn without_its_video_a_segment_is_inspected_and_not_opened() {
     };
     assert!((stream("CAN/speed").rate_hz.unwrap() - 100.0).abs() < 1e-6);
     assert!((stream("frame_times").rate_hz.unwrap() - 20.0).abs() < 1e-6);
+    // Frames of a clock that is 0.1 s ahead are of 0.1 s earlier; a scale is one of the speed alone.
+    let config = root.path().join("dataset.toml");
+    fs::write(
+        &config,
+        "clock.camera_ahead_s = 0.1\nvehicle.speed_scale = 0.5\n",
+    )
+    .unwrap();
+    let shifted = inspect(root.path()).unwrap().speed_mps.unwrap();
+    assert!((shifted.max - 0.5 * 8.8).abs() < 1e-9, "{shifted:?}");
+    fs::remove_file(&config).unwrap();
     let text = seen.to_string();
     assert!(
         text.starts_with("comma2k19 segment without images"),

@@ -275,6 +275,13 @@ fn a_split_selects_targets_but_not_their_neighbours() {
         .unwrap()
     };
     let left = open(CameraChoice::Left);
+    // Of five frames, once each; the right camera's and two that are nowhere are not among what was opened.
+    let coverage = split.coverage(&left);
+    assert_eq!((coverage.expected, coverage.found), (5, 2));
+    let first = coverage.first_missing.clone().unwrap();
+    assert_eq!(first, format!("{name} 99 l"));
+    assert!(!coverage.is_complete());
+    assert_eq!(split.coverage(&open(CameraChoice::Both)).found, 3);
     assert_eq!(left[0].frames().len(), 8);
     assert_eq!(left[0].selected(), [2, 5]);
     let pairs = left[0].snippets(&[-1, 1], 0.5).unwrap();

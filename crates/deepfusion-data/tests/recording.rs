@@ -79,6 +79,7 @@ fn dataset(recording: Messages, track: Option<VehicleTrack>) -> Dataset {
         track: track.map(Into::into),
         yaw_known: false,
         origin_ns: None,
+        camera_ahead_s: 0.0,
         scenario: None,
     };
     Dataset::new(parts, Arc::new(recording))

@@ -231,6 +231,7 @@ impl Evaluator {
         };
         Ok(Report {
             n: images.len(),
+            expected: None,
             protocol: ProtocolSummary::from(&self.protocol),
             unscaled,
             median_scaled,

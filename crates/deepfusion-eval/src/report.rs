@@ -8,6 +8,10 @@ use crate::{Crop, GroundTruth, Metrics, Points, Protocol};
 pub struct Report {
     /// How many images were compared.
     pub n: usize,
+    /// How many frames the split lists that was asked for, where one was; below it, this is another benchmark than the
+    /// split's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expected: Option<usize>,
     /// How.
     pub protocol: ProtocolSummary,
     /// Metrics of the predictions as they are: the headline of a metric method.

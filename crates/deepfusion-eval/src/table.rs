@@ -15,13 +15,13 @@ impl fmt::Display for Report {
             GroundTruth::Z => "camera z",
             GroundTruth::Velodyne => "velodyne forward distance",
         };
-        let plural = if self.n == 1 { "" } else { "s" };
+        let images = match (self.expected, self.n) {
+            (Some(expected), n) => format!("{n} of the split's {expected} images"),
+            (None, 1) => "1 image".to_owned(),
+            (None, n) => format!("{n} images"),
+        };
         let (min, cap) = (self.protocol.min_m, self.protocol.cap_m);
-        writeln!(
-            f,
-            "{} image{plural}, {crop}, {min} to {cap} m, ground truth: {gt}",
-            self.n
-        )?;
+        writeln!(f, "{images}, {crop}, {min} to {cap} m, ground truth: {gt}")?;
         writeln!(f)?;
         write!(f, "{:LABEL$}", "")?;
         for name in Metrics::NAMES {

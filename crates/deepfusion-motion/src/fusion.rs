@@ -5,6 +5,7 @@ use crate::vehicle_motion::tilt_between;
 use crate::yaw_error::{KNOWN_BIAS, UNKNOWN_BIAS, yaw_errors};
 use crate::{Bicycle, Error, ImuConfig, ImuSample, ImuTrack, Result, Signal, VehicleMotion};
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 /// Yaw rates below this say nothing about left and right, in rad/s.
 const TURNING_RADPS: f64 = 0.03;
@@ -14,6 +15,9 @@ const ENOUGH_TURNING_S: f64 = 3.0;
 /// Up to this long the accelerometer's share of a distance is the configured one, in seconds. What is left of its bias grows
 /// with the square of time, the wheels' error with time: beyond, its share falls with the square.
 const DRIFTS_S: f64 = 1.0;
+
+/// True speed over the vehicle's that tyres can explain.
+pub const SPEED_SCALES: RangeInclusive<f64> = 0.5..=2.0;
 
 /// What a vehicle's sensors recorded, on one clock.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -109,7 +113,7 @@ impl FusedTrack {
     /// [`Error::YawSigns`] where gyro and steering turn opposite ways.
     pub fn new(sensors: &VehicleSensors, config: &MotionConfig) -> Result<Self> {
         config.fusion.validate()?;
-        if !(0.5..=2.0).contains(&config.speed_scale) {
+        if !SPEED_SCALES.contains(&config.speed_scale) {
             return Err(Error::Config {
                 field: "speed_scale",
                 value: config.speed_scale,

@@ -57,7 +57,9 @@ mod yaw_error;
 
 pub use bicycle::Bicycle;
 pub use error::{Error, Result};
-pub use fusion::{FusedTrack, FusionConfig, MotionConfig, MotionParts, VehicleSensors};
+pub use fusion::{
+    FusedTrack, FusionConfig, MotionConfig, MotionParts, SPEED_SCALES, VehicleSensors,
+};
 pub use identify::{Estimate, Identified, IdentifyConfig, Unidentifiable, Why, identify};
 pub use image_motion::{GreyFrame, ImageMotion, image_motions};
 pub use imu::{

@@ -49,6 +49,15 @@ impl VehicleTrack {
         }
     }
 
+    /// The same with every speed `scale` times what it was: true speed over the vehicle's.
+    #[must_use]
+    pub fn with_speed_scale(self, scale: f64) -> Self {
+        Self {
+            speed_mps: self.speed_mps.map(|v| v * scale),
+            ..self
+        }
+    }
+
     /// Roll (the left side up) and pitch (the nose down) at a time, in radians; `None` where they are not known.
     #[must_use]
     pub fn tilt(&self, time_s: f64) -> Option<[f64; 2]> {

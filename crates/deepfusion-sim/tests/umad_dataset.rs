@@ -256,7 +256,7 @@ fn a_bag_becomes_a_kitti_drive_and_a_bag_again() {
     let first = open(&bag(&simulation, folder.path(), &BagSettings::default()));
     let out = folder.path().join("kitti");
     let drives = convert_to_kitti(std::slice::from_ref(&first), &out, &mut |_, _| {}).unwrap();
-    let second = open(&drives[0]);
+    let second = open(&drives.paths[0]);
     let again = folder.path().join("again.bag");
     convert_to_bag(&second, &again, Compression::Bz2, &mut |_, _| {}).unwrap();
     let third = open(&again);

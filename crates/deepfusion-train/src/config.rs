@@ -64,9 +64,15 @@ pub struct DataConfig {
     pub paths: Vec<PathBuf>,
     /// Recordings to validate on; none: the held-out end of each drive.
     pub validation: Vec<PathBuf>,
-    /// A split file that selects frames.
+    /// A split file that selects the frames to train on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split: Option<PathBuf>,
+    /// A split file that selects the frames to validate on: of `validation`, or of `paths` where that is empty.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation_split: Option<PathBuf>,
+    /// How far the cameras' clock is ahead of the vehicles', in seconds, instead of what the recordings' own files say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera_ahead_s: Option<f64>,
     /// Which cameras: `2`, `3` or `both`; empty means 2.
     pub camera: String,
     /// Several data sets with cameras, ranges and displacements of their own, instead of `paths`.
@@ -166,14 +172,18 @@ impl DataConfig {
             paths,
             validation,
             split,
+            validation_split,
+            camera_ahead_s: _,
             camera: _,
             sets,
         } = self;
         let mut all: Vec<&mut PathBuf> = paths.iter_mut().chain(validation).collect();
         all.extend(split);
+        all.extend(validation_split);
         for set in sets {
             all.extend(set.paths.iter_mut().chain(&mut set.validation));
             all.extend(&mut set.split);
+            all.extend(&mut set.validation_split);
         }
         for path in all {
             *path = absolute(std::mem::take(path));
@@ -418,12 +428,15 @@ mod tests {
             paths: vec!["c".into()],
             validation: vec!["d".into()],
             split: Some("e.txt".into()),
+            validation_split: Some("i.txt".into()),
             ..DataSetConfig::default()
         };
         let mut data = DataConfig {
             paths: vec!["a".into(), "/b".into()],
             validation: vec!["f".into()],
             split: Some("g.txt".into()),
+            validation_split: Some("h.txt".into()),
+            camera_ahead_s: None,
             camera: "both".into(),
             sets: vec![set],
         };
@@ -432,6 +445,8 @@ mod tests {
         assert_eq!(data.paths, [here.join("a"), "/b".into()]);
         assert_eq!(data.validation, [here.join("f")]);
         assert_eq!(data.split, Some(here.join("g.txt")));
+        assert_eq!(data.validation_split, Some(here.join("h.txt")));
+        assert_eq!(data.sets[0].validation_split, Some(here.join("i.txt")));
         assert_eq!(data.sets[0].paths, [here.join("c")]);
         assert_eq!(data.sets[0].validation, [here.join("d")]);
         assert_eq!(data.sets[0].split, Some(here.join("e.txt")));

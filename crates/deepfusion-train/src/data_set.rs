@@ -19,9 +19,16 @@ pub struct DataSetConfig {
     pub paths: Vec<PathBuf>,
     /// Recordings to validate on; none: the held-out end of each drive. Given for all sets or for none.
     pub validation: Vec<PathBuf>,
-    /// A split file that selects frames.
+    /// A split file that selects the frames to train on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split: Option<PathBuf>,
+    /// A split file that selects the frames to validate on: of `validation`, or of `paths` where that is empty. Given,
+    /// or `validation`, for all sets or for none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation_split: Option<PathBuf>,
+    /// How far the cameras' clock is ahead of the vehicles', in seconds; absent: as `data.camera_ahead_s`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera_ahead_s: Option<f64>,
     /// Which cameras: `2`, `3` or `both`; empty means `data.camera`.
     pub camera: String,
     /// The depths that the sigmoid spans; absent: the depth network's.
@@ -33,6 +40,14 @@ pub struct DataSetConfig {
     /// The camera of its first sample, at the size of its images; filled in from the data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trained_with: Option<Intrinsics>,
+}
+
+impl DataSetConfig {
+    /// Whether it has frames of its own to validate on.
+    #[must_use]
+    pub fn validates(&self) -> bool {
+        !self.validation.is_empty() || self.validation_split.is_some()
+    }
 }
 
 impl TrainConfig {
@@ -91,12 +106,24 @@ impl TrainConfig {
                 found,
             })
         };
-        let beside = self.data.paths.iter().chain(&self.data.validation).next();
+        let aheads = sets.iter().filter_map(|s| s.camera_ahead_s);
+        for ahead in aheads.chain(self.data.camera_ahead_s) {
+            if !ahead.is_finite() {
+                return fail(
+                    "data.camera_ahead_s",
+                    "a time in seconds",
+                    ahead.to_string(),
+                );
+            }
+        }
+        let splits = self.data.split.iter().chain(&self.data.validation_split);
+        let own = self.data.paths.iter().chain(&self.data.validation);
+        let beside = own.chain(splits).next();
         if !sets.is_empty() && beside.is_some() {
             let expected = "none beside data.sets: each set has its own";
             return fail("data.paths", expected, "some".into());
         }
-        let validated = sets.iter().filter(|s| !s.validation.is_empty()).count();
+        let validated = sets.iter().filter(|s| s.validates()).count();
         if validated != 0 && validated != sets.len() {
             let found = format!("{validated} of {} sets", sets.len());
             return fail(
@@ -188,7 +215,7 @@ mod tests {
     #[test]
     fn sets_that_mean_nothing_are_refused() {
         type Change = fn(&mut TrainConfig);
-        let cases: [(&str, Change); 6] = [
+        let cases: [(&str, Change); 8] = [
             ("data.sets.name", |c| c.data.sets[1].name = "road".into()),
             ("data.sets.paths", |c| c.data.sets[0].paths.clear()),
             ("data.paths", |c| c.data.paths.push("x".into())),
@@ -203,6 +230,12 @@ mod tests {
             }),
             ("data.sets.validation", |c| {
                 c.data.sets[0].validation.push("x".into());
+            }),
+            ("data.sets.validation", |c| {
+                c.data.sets[0].validation_split = Some("x.txt".into());
+            }),
+            ("data.camera_ahead_s", |c| {
+                c.data.sets[1].camera_ahead_s = Some(f64::NAN);
             }),
         ];
         for (field, change) in cases {

@@ -1,3 +1,4 @@
+use crate::SharedFrames;
 use std::path::PathBuf;
 
 /// What can go wrong while learning.
@@ -60,6 +61,12 @@ pub enum Error {
     NoYawRate {
         /// The drive.
         drive: String,
+    },
+    /// Validation frames that are learned from: their loss would say how well they are known by heart.
+    #[error("validation frames are training frames: {}", told(shared))]
+    SharedFrames {
+        /// The drives with such frames.
+        shared: Vec<SharedFrames>,
     },
     /// A loss that is not a number.
     #[error("step {step}: the loss term `{term}` is {value}; frames {frames}")]
@@ -167,6 +174,11 @@ impl Error {
                  yaw_rate_radps in speed.csv, or imu.csv"
                     .into(),
             ),
+            Self::SharedFrames { .. } => Some(
+                "validate on other drives (--val-data) or other frames (--val-split), or leave both out: the end of each drive \
+                 is held out then"
+                    .into(),
+            ),
             Self::NotFinite { .. } | Self::GradientsNotFinite { .. } => Some(
                 "the last good checkpoint is kept; look at the frames named above, or lower the \
                  learning rate, and continue with --resume"
@@ -199,4 +211,11 @@ impl Error {
             source,
         }
     }
+}
+
+/// Each drive that has such frames, with their number.
+fn told(shared: &[SharedFrames]) -> String {
+    let drives = shared.iter().filter(|s| s.targets > 0);
+    let drives = drives.map(|s| format!("{} of {}", s.targets, s.drive));
+    drives.collect::<Vec<_>>().join(", ")
 }

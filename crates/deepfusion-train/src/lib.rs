@@ -29,6 +29,7 @@ mod preset;
 mod runner;
 mod sampler;
 mod selection;
+mod shared_frames;
 mod source;
 mod trainer;
 mod view_synthesis;
@@ -57,6 +58,7 @@ pub use preset::{Compute, Preset};
 
 pub use runner::{BurnRunner, DepthRunner, FusedRunner};
 pub use sampler::Sampler;
+pub use shared_frames::{SharedFrames, shared_frames};
 pub use source::{Sample, SampleSet};
 pub use trainer::{TrainSummary, Trainer, validation_loss};
 pub use view_synthesis::{Synthesised, synthesise};

@@ -1,4 +1,4 @@
-use crate::{Error, TrainConfig};
+use crate::{Error, TrainConfig, shared_frames};
 use deepfusion_data::{Dataset, Snippet, hold_out};
 use deepfusion_geometry::Intrinsics;
 use std::sync::Arc;
@@ -43,18 +43,16 @@ impl SampleSet {
     /// As [`Self::split`], of recordings with the place of their set in `data.sets`.
     ///
     /// # Errors
-    /// As [`Self::split`]; [`Error::NoSamples`] for a set of which nothing is left to train on.
+    /// As [`Self::split`]; [`Error::NoSamples`] for a set of which nothing is left to train on;
+    /// [`Error::SharedFrames`] where a target of `validation` is one of `train`.
     pub fn split_sets(
         config: &TrainConfig,
         train: Vec<(usize, Dataset)>,
         validation: Option<Vec<(usize, Dataset)>>,
     ) -> Result<(Self, Self, Vec<String>), Error> {
         let mut skipped = Vec::new();
-        let share = if validation.is_some() {
-            0.0
-        } else {
-            config.validation_share
-        };
+        let apart = validation.is_some();
+        let share = if apart { 0.0 } else { config.validation_share };
         let shared = |recordings: Vec<(usize, Dataset)>| {
             let (sets, datasets): (Vec<usize>, Vec<Dataset>) = recordings.into_iter().unzip();
             (Arc::new(sets), Arc::new(datasets))
@@ -82,6 +80,12 @@ impl SampleSet {
             set_of,
             samples,
         };
+        if apart {
+            let shared = shared_frames(&train, &validation);
+            if shared.iter().any(|s| s.targets > 0) {
+                return Err(Error::SharedFrames { shared });
+            }
+        }
         for (i, set) in config.data.sets.iter().enumerate() {
             if !train.samples.iter().any(|s| train.set_of[s.dataset] == i) {
                 return Err(Error::NoSamples {
@@ -116,7 +120,11 @@ impl SampleSet {
                     held.extend(b.into_iter().map(sample));
                 }
                 Err(error) => {
-                    skipped.push(error.to_string());
+                    // Both cameras of a drive, or a drive that is validated on as well, have one reason.
+                    let reason = error.to_string();
+                    if !skipped.contains(&reason) {
+                        skipped.push(reason);
+                    }
                     last = Some(error);
                 }
             }

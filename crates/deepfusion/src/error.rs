@@ -215,6 +215,18 @@ pub enum CliError {
         "`--save video` shows the frames of a recording one after the other, and a shard sees only some"
     )]
     VideoShard,
+    /// A split of which not everything could be used, where everything has to be.
+    #[error("{}: {found} of its {expected} frames {what}", split.display())]
+    Incomplete {
+        /// The split file.
+        split: PathBuf,
+        /// Frames that could be used.
+        found: usize,
+        /// Frames that the file lists.
+        expected: usize,
+        /// What those have that could be.
+        what: &'static str,
+    },
     /// A cloud without a camera.
     #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
     NoCamera,
@@ -293,6 +305,9 @@ impl CliError {
             Self::VideoShard => {
                 Some("save side-by-side in the shards, then run once more with --save video and without --shard".into())
             }
+            Self::Incomplete { .. } => Some(
+                "give the folder that holds every drive that the split names, or leave --strict out to use what is there".into(),
+            ),
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
         }
     }

@@ -124,10 +124,21 @@ fn what_was_noticed_while_opening_is_told_once() {
         "cut in the middle: {frames} frames"
     );
     // The same recording to train and to validate on is one.
-    let trained = ok(
+    let small = "--preset tiny --size 64x64 --batch 2 --steps 1";
+    let refused = run(
         at,
-        "train --data sim --val-data sim --preset tiny --size 64x64 --batch 2 --steps 1 --out run",
+        &format!("train --data sim --val-data sim {small} --out no"),
     );
+    assert_eq!(refused.code, 1, "{}", refused.stderr);
+    assert!(
+        refused
+            .stderr
+            .contains("validation frames are training frames"),
+        "{}",
+        refused.stderr
+    );
+    warned(&refused.stderr);
+    let trained = ok(at, &format!("train --data sim {small} --out run"));
     warned(&trained.stderr);
     let predicted = ok(at, "predict --model run sim/urban_0001.bag --out depth");
     warned(&predicted.stderr);

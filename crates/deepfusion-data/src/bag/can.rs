@@ -1,7 +1,6 @@
 //! Speed and steering out of CAN frames: which signals the file beside a bag names, and what a frame says of them.
 
 use super::config::{BagConfig, SpeedUnit};
-use super::index::nanos;
 use crate::Result;
 use deepfusion_motion::can::{CanFrame, CanId, CanSignal, Dbc};
 use deepfusion_rosbag::msg::Frame;
@@ -111,8 +110,8 @@ impl Can {
         Ok(Self { speed, steering })
     }
 
-    /// What a frame says. Remote requests and error frames carry no values, whatever their bytes.
-    pub(super) fn read(&self, frame: &Frame) -> CanReading {
+    /// What a frame of this time says. Remote requests and error frames carry no values, whatever their bytes.
+    pub(super) fn read(&self, frame: &Frame, time_ns: i64) -> CanReading {
         let id = match frame.is_extended {
             true => Some(CanId::Extended { extended: frame.id }),
             false => u16::try_from(frame.id).ok().map(CanId::Standard),
@@ -120,7 +119,6 @@ impl Can {
         let Some(id) = id.filter(|_| !frame.is_rtr && !frame.is_error) else {
             return CanReading::default();
         };
-        let time_ns = nanos(frame.header.stamp);
         let length = usize::from(frame.dlc).min(frame.data.len());
         let seen = CanFrame {
             time_s: 0.0,

@@ -3,7 +3,7 @@
 use super::can::CanConfig;
 use crate::{Error, Result};
 use deepfusion_geometry::{Intrinsics, Se3};
-use deepfusion_motion::FusionConfig;
+use deepfusion_motion::{FusionConfig, SPEED_SCALES};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -155,6 +155,7 @@ pub(super) enum Sign {
 #[serde(deny_unknown_fields, default)]
 pub(super) struct ClockConfig {
     /// How far the clock of camera and LiDAR is ahead of the vehicle's, in seconds; taken off their stamps.
+    /// [`crate::OpenOptions::camera_ahead_s`] goes before it.
     pub(super) camera_ahead_s: f64,
     /// A scan belongs to a frame if they are no farther apart, in seconds.
     pub(super) scan_within_s: f64,
@@ -207,6 +208,10 @@ impl BagConfig {
             ("clock.scan_within_s", self.clock.scan_within_s, true),
             ("clock.camera_ahead_s", self.clock.camera_ahead_s, false),
         ];
+        let scale = self.vehicle.speed_scale.unwrap_or(1.0);
+        if !SPEED_SCALES.contains(&scale) {
+            return Err(self.wrong(crate::config::bad_speed_scale(scale)));
+        }
         for (key, value, positive) in numbers {
             if !value.is_finite() || (positive && value <= 0.0) {
                 return Err(self.wrong(format!("{key} is {value}")));

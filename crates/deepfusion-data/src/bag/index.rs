@@ -11,6 +11,7 @@ use deepfusion_rosbag::msg::{
 };
 use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
 
 /// A message that is read again when it is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +43,8 @@ pub(super) struct Index {
     pub(super) lost: Vec<String>,
     /// CAN signals that no frame holds, in sentences.
     pub(super) silent: Vec<String>,
+    /// Messages whose header has no time, by topic: the time of recording stands for it.
+    pub(super) unstamped: BTreeMap<String, usize>,
 }
 
 impl Index {
@@ -69,6 +72,9 @@ impl Index {
                 Err(error) => index.lost.push(error.to_string()),
             }
         }
+        // The one place where the vehicle's speeds are scaled, whichever message held them.
+        let scale = config.vehicle.speed_scale.unwrap_or(1.0);
+        index.speed_mps.iter_mut().for_each(|(_, v)| *v *= scale);
         index.silent = can.silent(index.speed_mps.len(), index.steering_rad.len());
         index.images.sort_by_key(|p| p.stamp_ns);
         index.scans.sort_by_key(|p| p.stamp_ns);
@@ -84,12 +90,15 @@ impl Index {
         config: &BagConfig,
         can: &Can,
     ) -> Result<()> {
+        let at_ns = stamp(message);
+        let mut timed = false;
         for role in topics.roles(message.topic()) {
+            timed |= role != Role::CameraInfo;
             match role {
                 Role::Image | Role::Lidar | Role::Dynamic => {
                     let place = Place {
                         recorded: message.time(),
-                        stamp_ns: stamp(message),
+                        stamp_ns: at_ns,
                     };
                     match role {
                         Role::Image => self.images.push(place),
@@ -109,14 +118,10 @@ impl Index {
                         acceleration_mps2: Vector3::new(a.x, a.y, a.z),
                         angular_rate_radps: Vector3::new(w.x, w.y, w.z),
                     };
-                    self.imu.push((nanos(imu.header.stamp), sample));
+                    self.imu.push((at_ns, sample));
                 }
                 Role::Speed => {
-                    let Reading {
-                        at_ns,
-                        speed_mps,
-                        rates,
-                    } = reading(message, config)?;
+                    let Reading { speed_mps, rates } = reading(message, config)?;
                     self.speed_mps.push((at_ns, speed_mps));
                     if let Some([roll, pitch, yaw]) = rates {
                         self.yaw_rate.push((at_ns, yaw));
@@ -124,11 +129,11 @@ impl Index {
                     }
                 }
                 Role::Steering => {
-                    self.steering_rad.push(steering(message)?);
+                    self.steering_rad.push((at_ns, steering(message)?));
                 }
                 Role::Can => {
                     let frame: Frame = message.decode()?;
-                    let said = can.read(&frame);
+                    let said = can.read(&frame, at_ns);
                     self.speed_mps.extend(said.speed_mps);
                     self.steering_rad.extend(said.steering_rad);
                 }
@@ -137,9 +142,13 @@ impl Index {
                     let (p, q) = (odometry.pose.pose.position, odometry.pose.pose.orientation);
                     let place = Vector3::new(p.x, p.y, p.z);
                     let pose = Se3::from_quaternion([q.w, q.x, q.y, q.z], place);
-                    self.truth.push((nanos(odometry.header.stamp), pose));
+                    self.truth.push((at_ns, pose));
                 }
             }
+        }
+        if timed && has_header(message) && message.header_stamp().is_none() {
+            let topic = message.topic().to_owned();
+            *self.unstamped.entry(topic).or_default() += 1;
         }
         Ok(())
     }
@@ -147,7 +156,6 @@ impl Index {
 
 /// What a message about the speed says.
 struct Reading {
-    at_ns: i64,
     speed_mps: f64,
     /// Roll, pitch and yaw rate, in rad/s.
     rates: Option<[f64; 3]>,
@@ -158,7 +166,6 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
     if message.is::<TwistStamped>() {
         let twist: TwistStamped = message.decode()?;
         return Ok(Reading {
-            at_ns: nanos(twist.header.stamp),
             speed_mps: twist.twist.linear.x,
             rates: Some(rates(&twist.twist)),
         });
@@ -166,7 +173,6 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
     if message.is::<AckermannDriveStamped>() {
         let drive: AckermannDriveStamped = message.decode()?;
         return Ok(Reading {
-            at_ns: nanos(drive.header.stamp),
             speed_mps: f64::from(drive.drive.speed),
             rates: None,
         });
@@ -175,7 +181,6 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
         let odometry: Odometry = message.decode()?;
         let twist = odometry.twist.twist;
         return Ok(Reading {
-            at_ns: nanos(odometry.header.stamp),
             speed_mps: twist.linear.x,
             rates: Some(rates(&twist)),
         });
@@ -188,7 +193,6 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
         ))
     })?;
     Ok(Reading {
-        at_ns: nanos(message.time()),
         speed_mps: value * unit.metres_per_second(),
         rates: None,
     })
@@ -198,14 +202,13 @@ fn rates(twist: &Twist) -> [f64; 3] {
     [twist.angular.x, twist.angular.y, twist.angular.z]
 }
 
-/// The steering angle in radians and its time, by whatever message holds it.
-fn steering(message: &Message<'_>) -> Result<(i64, f64)> {
+/// The steering angle in radians, by whatever message holds it.
+fn steering(message: &Message<'_>) -> Result<f64> {
     if message.is::<AckermannDriveStamped>() {
         let drive: AckermannDriveStamped = message.decode()?;
-        let angle = f64::from(drive.drive.steering_angle);
-        return Ok((nanos(drive.header.stamp), angle));
+        return Ok(f64::from(drive.drive.steering_angle));
     }
-    Ok((nanos(message.time()), number(message)?))
+    number(message)
 }
 
 /// A bare number.
@@ -216,9 +219,16 @@ fn number(message: &Message<'_>) -> Result<f64> {
     })
 }
 
-/// The stamp of a message that begins with a header; the time of recording where it is not set.
+/// When a message was measured, in nanoseconds: the stamp of its header; the time of recording where it has no header, or
+/// one that is not set. Taken as they are, unset stamps would put all messages of a topic at one instant.
 pub(super) fn stamp(message: &Message<'_>) -> i64 {
-    nanos(message.header_stamp().unwrap_or(message.time()))
+    let stamp = has_header(message).then(|| message.header_stamp());
+    nanos(stamp.flatten().unwrap_or(message.time()))
+}
+
+/// Whether a message of a type that is read here begins with a header: all but bare numbers do.
+fn has_header(message: &Message<'_>) -> bool {
+    !message.is::<Float32>() && !message.is::<Float64>()
 }
 
 pub(super) fn nanos(time: Time) -> i64 {

@@ -50,6 +50,7 @@ pub(crate) fn without_images(path: &Path) -> Result<Option<Inspection>> {
         distance_m,
         turn_rad: turn(path, &index, &config),
         duration_s,
+        camera_ahead_s: 0.0,
         time_offset: None,
         remarks: remarks_on(bag.as_ref(), &index),
     };

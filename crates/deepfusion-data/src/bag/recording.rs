@@ -8,6 +8,7 @@ use super::profile;
 use super::scan::{Scan, SeenScan};
 use super::topics::{Role, Topics};
 use super::{image, sensors, source};
+use crate::clock::{on_the_vehicles_clock, seconds};
 use crate::kitti::GtKind;
 use crate::recording::{CalibrationPlace, Recording};
 use crate::{
@@ -111,9 +112,13 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         });
     };
     let mut remarks = remarks_on(bag.as_ref(), &index);
-    let ahead_ns = (config.clock.camera_ahead_s * 1e9).round() as i64;
-    let origin_ns = first.stamp_ns - ahead_ns;
-    let seconds = |stamp_ns: i64| (stamp_ns - ahead_ns - origin_ns) as f64 * 1e-9;
+    let camera_ahead_s = options
+        .camera_ahead_s
+        .unwrap_or(config.clock.camera_ahead_s);
+    let origin_ns = on_the_vehicles_clock(first.stamp_ns, camera_ahead_s);
+    // Of camera and LiDAR, which have one clock.
+    let seconds =
+        |stamp_ns: i64| seconds(on_the_vehicles_clock(stamp_ns, camera_ahead_s), origin_ns);
 
     let topic = topics.of(Role::Image).unwrap_or_default();
     let picture = image::decode(bag.as_ref(), &image::message(bag.as_ref(), topic, &first)?)?;
@@ -163,6 +168,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         track: track.clone(),
         yaw_known,
         origin_ns: Some(origin_ns),
+        camera_ahead_s,
         scenario: config.scenario.clone(),
     };
     let cam_from_lidar = match (&config.cam_from_lidar, config.profile.as_deref()) {
@@ -235,6 +241,13 @@ pub(super) fn remarks_on(bag: &dyn MessageSource, index: &Index) -> Vec<String> 
         ));
     }
     remarks.extend(index.silent.iter().cloned());
+    let unstamped = index.unstamped.iter();
+    remarks.extend(unstamped.map(|(topic, messages)| {
+        format!(
+            "{topic}: {messages} messages have no time in their header; that of their recording is taken, which is as late as the \
+             message was on its way"
+        )
+    }));
     remarks
 }
 

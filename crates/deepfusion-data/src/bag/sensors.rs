@@ -30,7 +30,9 @@ pub(super) fn motion(
         return Ok(None);
     }
     let turns = index.yaw_rate.iter().any(|(_, yaw_rate)| *yaw_rate != 0.0);
-    if turns && index.imu.is_empty() && index.steering_rad.is_empty() {
+    // A steering angle without a wheelbase tells no turn: it does not stand in for a yaw rate that was measured.
+    let steered = !index.steering_rad.is_empty() && config.vehicle.wheelbase_m.is_some();
+    if turns && index.imu.is_empty() && !steered {
         return Ok(Some(by_twist(index, origin_ns)));
     }
     let seconds = |ns: i64| (ns - origin_ns) as f64 * 1e-9;
@@ -59,7 +61,8 @@ pub(super) fn motion(
         translation_m: t.translation,
     });
     let motion = MotionConfig {
-        speed_scale: vehicle.speed_scale.unwrap_or(1.0),
+        // The index scaled the speeds already.
+        speed_scale: 1.0,
         bicycle: vehicle.wheelbase_m.map(|wheelbase_m| Bicycle {
             steering_ratio: vehicle.steering_ratio.unwrap_or(1.0),
             steering_offset_rad: vehicle.steering_offset_rad,

@@ -1,4 +1,4 @@
-use super::{cam_from_scanner, moving_at, points};
+use super::{Converted, at_ns, cam_from_scanner, moving_at, points, seconds_to_move};
 use crate::{Dataset, Error, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_rosbag::msg::{
@@ -17,7 +17,8 @@ use std::path::Path;
 const BATCH: usize = 8;
 
 /// Writes a data set as a ROS 1 bag, and beside it the file that says where its sensors are: PNG images, CameraInfo,
-/// speed and yaw rate (TwistStamped) and, where there is depth, point clouds in the camera's place.
+/// speed and yaw rate (TwistStamped) and, where there is depth, point clouds in the camera's place. Times are the vehicle's
+/// clock's, for all sensors.
 ///
 /// # Errors
 /// [`Error::Exists`] where `out` is there already; [`Error::NoTimes`] where a frame has no time; [`Error::Bag`], and
@@ -27,7 +28,7 @@ pub fn convert_to_bag(
     out: &Path,
     compression: Compression,
     progress: &mut dyn FnMut(usize, usize),
-) -> Result<()> {
+) -> Result<Converted> {
     let sidecar = out.with_extension("toml");
     for path in [out, &sidecar] {
         if path.exists() {
@@ -36,11 +37,9 @@ pub fn convert_to_bag(
             });
         }
     }
-    let origin_ns = dataset.origin_ns().unwrap_or_default();
-    let time = |time_s: f64| {
-        let ns = origin_ns + (time_s * 1e9).round() as i64;
-        Time::from_nanos(u64::try_from(ns).unwrap_or_default())
-    };
+    let moved_s = seconds_to_move(std::slice::from_ref(dataset));
+    // No time is below 0 once it is moved.
+    let time = |time_s: f64| Time::from_nanos(at_ns(dataset, time_s, moved_s).max(0) as u64);
     let mut times = Vec::with_capacity(dataset.frames().len());
     for frame in dataset.frames() {
         let time_s = frame.time_s.ok_or_else(|| Error::NoTimes {
@@ -122,7 +121,11 @@ pub fn convert_to_bag(
         progress(done, times.len());
     }
     super::write_text(&sidecar, &describe(dataset))?;
-    Ok(bag.finish()?)
+    bag.finish()?;
+    Ok(Converted {
+        paths: vec![out.to_owned()],
+        moved_s,
+    })
 }
 
 /// A frame, read.

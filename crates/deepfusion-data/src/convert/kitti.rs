@@ -1,5 +1,5 @@
 use super::calendar::{date, stamp};
-use super::{Moving, cam_from_scanner, moving_at, points};
+use super::{Converted, Moving, at_ns, cam_from_scanner, moving_at, points, seconds_to_move};
 use crate::{Dataset, Error, Result, save_png, write_unsynced};
 use deepfusion_cloud::PointCloud;
 use deepfusion_geometry::{Intrinsics, Se3};
@@ -7,8 +7,9 @@ use rayon::prelude::*;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Writes data sets as drives of a KITTI date folder below `out`, which must be new or empty, and returns the drives'
-/// folders. All must have one camera: KITTI's calibration is that of a date.
+/// Writes data sets as drives of a KITTI date folder below `out`, which must be new or empty, and tells the drives'
+/// folders. All must have one camera: KITTI's calibration is that of a date. Times are the vehicle's clock's, for all
+/// sensors.
 ///
 /// `velodyne_points` holds the measured depth as points in the camera's place (what stands still is where it was at the
 /// frame's time), not the scanner's own; `oxts` holds speed, turn and lean, and zeros for what the recording does not
@@ -20,9 +21,9 @@ pub fn convert_to_kitti(
     datasets: &[Dataset],
     out: &Path,
     progress: &mut dyn FnMut(usize, usize),
-) -> Result<Vec<PathBuf>> {
+) -> Result<Converted> {
     let Some(first) = datasets.first() else {
-        return Ok(Vec::new());
+        return Ok(Converted::default());
     };
     let same = |other: &Dataset| {
         other.intrinsics(0) == first.intrinsics(0)
@@ -35,7 +36,8 @@ pub fn convert_to_kitti(
         });
     }
     super::prepare(out)?;
-    let start_ns = first.origin_ns().unwrap_or_default();
+    let moved_s = seconds_to_move(datasets);
+    let start_ns = at_ns(first, 0.0, moved_s);
     let (year, month, day) = date(start_ns.div_euclid(86_400_000_000_000));
     let date_name = format!("{year:04}_{month:02}_{day:02}");
     let date_folder = out.join(&date_name);
@@ -44,7 +46,7 @@ pub fn convert_to_kitti(
     let (mut done, mut folders) = (0, Vec::new());
     for (number, dataset) in datasets.iter().enumerate() {
         let folder = date_folder.join(format!("{date_name}_drive_{:04}_sync", number + 1));
-        write_drive(dataset, &folder, &mut |frames| {
+        write_drive(dataset, &folder, moved_s, &mut |frames| {
             done += frames;
             progress(done, total);
         })?;
@@ -52,13 +54,21 @@ pub fn convert_to_kitti(
     }
     // All at once: a wait for each of its thousands of files would take longer than writing them.
     deepfusion_fs::sync_tree(out).map_err(|e| Error::file(out, e))?;
-    Ok(folders)
+    Ok(Converted {
+        paths: folders,
+        moved_s,
+    })
 }
 
 /// Frames read and written together.
 const BATCH: usize = 8;
 
-fn write_drive(dataset: &Dataset, folder: &Path, progress: &mut dyn FnMut(usize)) -> Result<()> {
+fn write_drive(
+    dataset: &Dataset,
+    folder: &Path,
+    moved_s: i64,
+    progress: &mut dyn FnMut(usize),
+) -> Result<()> {
     let part = |name: &str| -> Result<PathBuf> {
         let path = folder.join(name).join("data");
         std::fs::create_dir_all(&path).map_err(|e| Error::file(&path, e))?;
@@ -97,11 +107,10 @@ fn write_drive(dataset: &Dataset, folder: &Path, progress: &mut dyn FnMut(usize)
     }
     // A line for every number, as KITTI has it: numbers without a frame get the time between their neighbours'.
     let last = dataset.frames().last().map_or(0, |f| f.number);
-    let origin = dataset.origin_ns().unwrap_or_default();
     let mut text = String::new();
     for number in 0..=last {
         let time_s = dataset.time_of(number).or_else(|| between(dataset, number));
-        let ns = origin + (time_s.unwrap_or_default() * 1e9).round() as i64;
+        let ns = at_ns(dataset, time_s.unwrap_or_default(), moved_s);
         let _ = writeln!(text, "{}", stamp(ns));
     }
     if dataset.frames().iter().any(|f| f.time_s.is_some()) {

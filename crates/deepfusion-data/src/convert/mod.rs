@@ -11,11 +11,11 @@ mod kitti;
 pub use bag::convert_to_bag;
 pub use kitti::convert_to_kitti;
 
-use crate::{Dataset, Error, GtKind, Result, write_unsynced};
+use crate::{Dataset, Error, GtKind, MotionModel, Result, write_unsynced};
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix3, Vector3};
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The axes of a scanner (x forward, y left, z up) at the camera's place, seen from the camera.
 fn cam_from_scanner() -> Se3 {
@@ -39,6 +39,43 @@ fn points(dataset: &Dataset, frame: usize) -> Result<Option<Vec<[f32; 3]>>> {
         points.push([point.x as f32, point.y as f32, point.z as f32]);
     }
     Ok(Some(points))
+}
+
+/// Whole seconds by which all times of the recordings have to be moved, so that all are after the beginning of 1970: 0 where
+/// they are. Neither layout can write an earlier one, in a bag 0 means that no time is set, and a clock that counts from its own
+/// start has such times where one sensor started first.
+fn seconds_to_move(datasets: &[Dataset]) -> i64 {
+    let earliest = |dataset: &Dataset| {
+        let frames = dataset.frames().iter().filter_map(|f| f.time_s);
+        let track = dataset
+            .track()
+            .map(MotionModel::times_s)
+            .unwrap_or_default();
+        let first_s = frames.chain(track.first().copied()).reduce(f64::min)?;
+        Some(at_ns(dataset, first_s, 0))
+    };
+    let earliest = datasets.iter().filter_map(earliest).min().unwrap_or(1);
+    // Down to whole seconds: 0 for 1 ns and later, −1 for 0 and for a second before it.
+    (earliest - 1).min(0).div_euclid(NANOS).abs()
+}
+
+/// A time of a recording as nanoseconds since 1970, moved by whole seconds.
+fn at_ns(dataset: &Dataset, time_s: f64, moved_s: i64) -> i64 {
+    let origin_ns = dataset.origin_ns().unwrap_or_default();
+    let ns = origin_ns.saturating_add((time_s * 1e9).round() as i64);
+    ns.saturating_add(moved_s.saturating_mul(NANOS))
+}
+
+const NANOS: i64 = 1_000_000_000;
+
+/// What came of a conversion.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Converted {
+    /// What was written: drives' folders, or a bag.
+    pub paths: Vec<PathBuf>,
+    /// Seconds by which every time was moved, as some were not after the beginning of 1970, and neither layout can write
+    /// those; 0 in general.
+    pub moved_s: i64,
 }
 
 /// Makes the output folder, which must be new or empty.

@@ -36,6 +36,7 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
         Limit::Within(-limit, limit),
     );
     outcome.judge(Severity::Error, figure, || {
+        let camera_ahead_s = survey.dataset.camera_ahead_s() - value;
         let ahead = if value < 0.0 { "ahead of" } else { "behind" };
         (
             format!(
@@ -44,9 +45,9 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
                 1e3 * error
             ),
             format!(
-                "clock.camera_ahead_s = {:.3} in the file beside a bag; for other layouts add {value:+.3} s to the \
-                 frames' time stamps. Better: one clock for all (PTP, trigger)",
-                -value
+                "clock.camera_ahead_s = {camera_ahead_s:.3} in the file beside the recording, or --clock-offset {:.0}. Better: one \
+                 clock for all (PTP, trigger)",
+                1e3 * camera_ahead_s
             ),
         )
     });

@@ -58,6 +58,18 @@ pub struct Finding {
     pub remedy: String,
 }
 
+/// How a check came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// It looked, and what it looked at is in order.
+    Ok,
+    /// It found something.
+    Found,
+    /// It could not look; why is in [`Outcome::skipped`].
+    NotChecked,
+}
+
 /// What one check measured and found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
@@ -103,6 +115,16 @@ impl Figure {
 }
 
 impl Outcome {
+    /// How it came out. A check that measured one thing of two counts as one that looked.
+    #[must_use]
+    pub fn status(&self) -> Status {
+        match (self.findings.is_empty(), &self.skipped) {
+            (false, _) => Status::Found,
+            (true, Some(_)) if self.measured.is_empty() => Status::NotChecked,
+            (true, _) => Status::Ok,
+        }
+    }
+
     /// Of a check that has not measured yet.
     pub(crate) fn new(check: &'static str) -> Self {
         Self {

@@ -29,7 +29,7 @@ mod survey;
 mod timing;
 mod turn;
 
-pub use finding::{Figure, Finding, Limit, Outcome, Severity};
+pub use finding::{Figure, Finding, Limit, Outcome, Severity, Status};
 pub use plots::{DrivePlots, Line};
 
 use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions};
@@ -91,15 +91,49 @@ impl Diagnosis {
     }
 }
 
+/// Every check by its name, in the order in which they are told: those of a drive, and that of both cameras.
+const CHECKS: [&str; 18] = [
+    "opening",
+    "timing",
+    "duplicates",
+    "intrinsics",
+    "standing",
+    "speed",
+    "lidar-speed",
+    "dynamic-points",
+    "steering",
+    "clock",
+    "turn",
+    "heading",
+    "ground",
+    "parallax",
+    "exposure",
+    "blur",
+    "bonnet",
+    "stereo",
+];
+
 /// Examines a recording of any layout; `intrinsics` as [`OpenOptions::intrinsics`]. A recording that cannot be opened
 /// is a finding, not an error.
 #[must_use]
 pub fn doctor(path: &Path, intrinsics: Option<[f64; 4]>) -> Diagnosis {
+    doctor_with(
+        path,
+        &OpenOptions {
+            intrinsics,
+            ..OpenOptions::default()
+        },
+    )
+}
+
+/// [`doctor`] with a camera or a clock offset given; camera and split of the options are not looked at.
+#[must_use]
+pub fn doctor_with(path: &Path, options: &OpenOptions) -> Diagnosis {
     let open = |camera| {
         let options = OpenOptions {
             camera,
-            intrinsics,
-            ..OpenOptions::default()
+            split: None,
+            ..options.clone()
         };
         Dataset::open(path, &options)
     };
@@ -108,24 +142,39 @@ pub fn doctor(path: &Path, intrinsics: Option<[f64; 4]>) -> Diagnosis {
         other => other,
     };
     match datasets {
-        Err(error) => Diagnosis {
-            recording: vec![opening::failed(&error)],
-            drives: Vec::new(),
-        },
-        Ok(datasets) => Diagnosis {
-            recording: vec![stereo::check(path)],
-            drives: datasets.iter().map(examine).collect(),
-        },
+        Err(error) => {
+            let others = CHECKS.iter().filter(|check| **check != opening::CHECK);
+            let skipped =
+                |check: &&'static str| Outcome::skipped(check, "the recording cannot be opened");
+            let recording = std::iter::once(opening::failed(&error)).chain(others.map(skipped));
+            Diagnosis {
+                recording: recording.collect(),
+                drives: Vec::new(),
+            }
+        }
+        Ok(datasets) => {
+            let trains = datasets.iter().any(|d| opening::pairs(d).is_ok());
+            let drives = datasets.iter().map(|d| examine_among(d, trains));
+            Diagnosis {
+                drives: drives.collect(),
+                recording: vec![stereo::check(path, options)],
+            }
+        }
     }
 }
 
 /// Examines one drive.
 #[must_use]
 pub fn examine(dataset: &Dataset) -> DriveDiagnosis {
+    examine_among(dataset, false)
+}
+
+/// Examines a drive of several, of which another one trains or not.
+fn examine_among(dataset: &Dataset, others_train: bool) -> DriveDiagnosis {
     let survey = Survey::of(dataset);
     let pairs = epipolar::pairs(&survey);
     let outcomes = vec![
-        opening::check(&survey),
+        opening::check(&survey, others_train),
         timing::check(dataset),
         duplicates::check(&survey),
         intrinsics::check(&dataset.intrinsics(0)),

@@ -2,11 +2,19 @@
 
 use super::finding::{Outcome, Severity};
 use super::survey::Survey;
-use crate::Error;
+use crate::{Dataset, Error, Result};
 
-const CHECK: &str = "opening";
+pub(super) const CHECK: &str = "opening";
 /// Pairs slower than this do not train (SPEC 3.5).
 const MIN_SPEED_MPS: f64 = 0.5;
+
+/// How many pairs of a drive can train.
+///
+/// # Errors
+/// Where none can, as [`Dataset::snippets`].
+pub(super) fn pairs(dataset: &Dataset) -> Result<usize> {
+    Ok(dataset.snippets(&[1], MIN_SPEED_MPS)?.len())
+}
 
 /// Of a recording that cannot be opened.
 pub(super) fn failed(error: &Error) -> Outcome {
@@ -19,7 +27,8 @@ pub(super) fn failed(error: &Error) -> Outcome {
 }
 
 /// Of one that can: images that cannot be read, no pair to train on, and what was taken for granted.
-pub(super) fn check(survey: &Survey<'_>) -> Outcome {
+/// A drive that merely has nothing to train on is left out where others of its folder have something, as training does.
+pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
     let mut outcome = Outcome::new(CHECK);
     for (number, problem) in &survey.unreadable {
         outcome.find(
@@ -29,16 +38,19 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
             "copy the recording again, or leave the frame out",
         );
     }
-    if let Err(error) = survey.dataset.snippets(&[1], MIN_SPEED_MPS) {
+    if let Err(error) = pairs(survey.dataset) {
         let remedy = error
             .hint()
             .unwrap_or_else(|| "training needs pairs of frames with a known motion".into());
-        outcome.find(
-            Severity::Error,
-            None,
-            format!("no pair of frames can train: {error}"),
-            remedy,
+        let harmless = matches!(
+            error,
+            Error::OneFrame { .. } | Error::Standing { .. } | Error::NoPairs { .. }
         );
+        let (severity, what) = match harmless && others_train {
+            true => (Severity::Warning, "training leaves this drive out"),
+            false => (Severity::Error, "no pair of frames can train"),
+        };
+        outcome.find(severity, None, format!("{what}: {error}"), remedy);
     }
     if survey.dataset.track().is_some() && !survey.dataset.yaw_known() {
         outcome.find(

@@ -14,14 +14,16 @@ const WIDTH: u32 = 320;
 const LEAST_POINTS: usize = 20;
 
 /// Of a recording with `image_02` and `image_03`.
-pub(super) fn check(path: &Path) -> Outcome {
+pub(super) fn check(path: &Path, options: &OpenOptions) -> Outcome {
     const CHECK: &str = "stereo";
     let options = OpenOptions {
         camera: CameraChoice::Both,
-        ..OpenOptions::default()
+        split: None,
+        ..options.clone()
     };
-    let Ok(datasets) = Dataset::open(path, &options) else {
-        return Outcome::skipped(CHECK, "one camera");
+    let datasets = match Dataset::open(path, &options) {
+        Ok(datasets) => datasets,
+        Err(error) => return Outcome::skipped(CHECK, error.to_string()),
     };
     let is = |camera| {
         datasets
@@ -38,7 +40,12 @@ pub(super) fn check(path: &Path) -> Outcome {
         }
     }
     if moved.len() < LEAST_POINTS {
-        return Outcome::skipped(CHECK, "one camera, or no point seen by both");
+        let cameras = [Camera::Left, Camera::Right];
+        let why = match cameras.iter().all(|camera| is(*camera).next().is_some()) {
+            true => "too few points are seen by both cameras",
+            false => "one camera",
+        };
+        return Outcome::skipped(CHECK, why);
     }
     let mut outcome = Outcome::new(CHECK);
     let figure = Figure::new(

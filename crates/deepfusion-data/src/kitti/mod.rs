@@ -2,6 +2,7 @@
 //! with the calibration files in `<date>`.
 
 mod calibration;
+mod config;
 pub(crate) mod layout;
 mod oxts;
 mod oxts_path;

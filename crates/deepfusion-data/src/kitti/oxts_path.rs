@@ -20,7 +20,10 @@ pub(crate) fn oxts_paths(recording: &KittiRecording, dataset: &Dataset) -> Resul
     dataset.ego()?;
     let imu_from_cam = recording.calibration.require_cam_from_imu()?.inverse();
     let origin_ns = dataset.origin_ns().unwrap_or_default();
-    let packets = read_packets(&recording.drive.folder.join("oxts"), origin_ns)?;
+    let mut packets = read_packets(&recording.drive.folder.join("oxts"), origin_ns)?;
+    for (_, packet) in &mut packets {
+        packet.velocity_mps = packet.velocity_mps.map(|v| v * recording.speed_scale);
+    }
     let unit = UnitPath::new(&packets);
     let mut paths = Vec::new();
     for stretch in dataset.stretches() {

@@ -1,5 +1,7 @@
 //! KITTI raw as a [`Recording`].
 
+use crate::clock::on_the_vehicles_clock;
+use crate::kitti::config::DriveConfig;
 use crate::kitti::layout::numbered_files;
 use crate::kitti::{self, Calibration, Drive, GtKind, TimeStamps, read_oxts};
 use crate::recording::{CalibrationPlace, Recording};
@@ -20,6 +22,8 @@ pub(crate) struct KittiRecording {
     pub(crate) drive: Drive,
     pub(crate) calibration: Calibration,
     camera: Camera,
+    /// True speed over the oxts', which the track holds already.
+    pub(crate) speed_scale: f64,
     /// Seconds by frame number, also of frames without an image.
     times_s: Vec<Option<f64>>,
 }
@@ -42,7 +46,8 @@ pub(crate) fn open(path: &Path, drives: &[Drive], options: &OpenOptions) -> Resu
             let numbers = files.iter().map(|f| f.0);
             let selected = selection.of(&drive.split_name(), None, camera, numbers);
             if !selected.is_empty() {
-                datasets.push(open_drive(drive, camera, &files)?.with_selected(selected));
+                let dataset = open_drive(drive, camera, &files, options)?;
+                datasets.push(dataset.with_selected(selected));
             }
         }
     }
@@ -62,19 +67,28 @@ pub(crate) fn open(path: &Path, drives: &[Drive], options: &OpenOptions) -> Resu
     })
 }
 
-fn open_drive(drive: &Drive, camera: Camera, files: &[(u64, PathBuf)]) -> Result<Dataset> {
+fn open_drive(
+    drive: &Drive,
+    camera: Camera,
+    files: &[(u64, PathBuf)],
+    options: &OpenOptions,
+) -> Result<Dataset> {
+    let config = DriveConfig::of(drive, options)?;
     let calibration = Calibration::read(&drive.date_folder, camera)?;
     let folder = drive.folder.join(format!("image_0{}", camera.number()));
     let times = optional(TimeStamps::read(&folder.join("timestamps.txt")))?;
-    // Both clocks count from the camera's first line, so that seconds keep their nanoseconds.
-    let origin_ns = times.as_ref().and_then(TimeStamps::origin_ns);
+    // Both clocks count from the camera's first line, so that seconds keep their nanoseconds: the camera's own from its
+    // first stamp, the oxts' from what that stamp is on their clock.
+    let camera_origin_ns = times.as_ref().and_then(TimeStamps::origin_ns);
+    let origin_ns = camera_origin_ns.map(|ns| on_the_vehicles_clock(ns, config.camera_ahead_s));
     let track = match origin_ns {
         Some(origin) => optional(read_oxts(&drive.folder.join("oxts"), origin))?,
         None => None,
     };
+    let track = track.map(|track| track.with_speed_scale(config.speed_scale));
     let mut frames = Vec::with_capacity(files.len());
     for (number, image) in files {
-        let time_s = match (&times, origin_ns) {
+        let time_s = match (&times, camera_origin_ns) {
             (Some(times), Some(origin)) => times.seconds(*number, origin)?,
             _ => None,
         };
@@ -86,7 +100,7 @@ fn open_drive(drive: &Drive, camera: Camera, files: &[(u64, PathBuf)]) -> Result
             speed_mps: time_s.and_then(|t| track.as_ref()?.speed_at(t)),
         });
     }
-    let times_s = match (&times, origin_ns) {
+    let times_s = match (&times, camera_origin_ns) {
         (Some(times), Some(origin)) => times.all_seconds(origin),
         _ => Vec::new(),
     };
@@ -100,12 +114,14 @@ fn open_drive(drive: &Drive, camera: Camera, files: &[(u64, PathBuf)]) -> Result
         track: track.map(Into::into),
         yaw_known: true,
         origin_ns,
+        camera_ahead_s: config.camera_ahead_s,
         scenario: None,
     };
     let recording = KittiRecording {
         drive: drive.clone(),
         calibration,
         camera,
+        speed_scale: config.speed_scale,
         times_s,
     };
     let dataset = Dataset::new(parts, Arc::new(recording));

@@ -116,6 +116,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         name: stem.into_owned(),
         images: numbers.into_iter().zip(times).map(image).collect(),
         calibration,
+        camera_ahead_s: config.camera_ahead_s(options),
         image_size: video.size(),
         speeds: SpeedLog::read(&folder, &config)?,
         cam_from_vehicle: config.cam_from_vehicle(),

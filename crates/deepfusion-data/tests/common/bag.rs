@@ -1,8 +1,9 @@
 //! A small bag: grey pictures, and whatever a test's vehicle says.
+#![allow(dead_code, reason = "each test binary uses a part of it")]
 
 use deepfusion_rosbag::msg::{
-    AckermannDriveStamped, Float32, Frame, Header, Image, Odometry, Pose, PoseWithCovariance,
-    Twist, TwistStamped, TwistWithCovariance, Vector3,
+    AckermannDriveStamped, Float32, Frame, Header, Image, Imu, Odometry, Pose, PoseWithCovariance,
+    Quaternion, Twist, TwistStamped, TwistWithCovariance, Vector3,
 };
 use deepfusion_rosbag::{BagWriter, RosMessage, Time, WriterOptions};
 use std::borrow::Cow;
@@ -17,8 +18,8 @@ const SIZE: (u32, u32) = (64, 48);
 pub const CAMERA: &str =
     "camera = { fx = 60.0, fy = 60.0, cx = 32.0, cy = 24.0, width = 64, height = 48 }\n";
 
-/// A bag being written, and how many streams it has.
-pub struct TinyBag(BagWriter, u32);
+/// A bag being written, how many streams it has, and whether the headers of the next have a time.
+pub struct TinyBag(BagWriter, u32, bool);
 
 /// Each stream begins this long after the one before: of two values at one time, only one would be read.
 const SHIFT_NS: u32 = 3_000_000;
@@ -29,6 +30,7 @@ impl TinyBag {
         let mut bag = Self(
             BagWriter::create(path, WriterOptions::default()).unwrap(),
             0,
+            true,
         );
         bag.stream(image, |header| Image {
             header,
@@ -43,14 +45,46 @@ impl TinyBag {
     }
 
     pub fn twist(&mut self, topic: &str, speed_mps: f64) -> &mut Self {
+        self.turning_twist(topic, |_| (speed_mps, 0.0))
+    }
+
+    /// Speed in m/s and yaw rate in rad/s by seconds from the bag's first picture.
+    pub fn turning_twist(&mut self, topic: &str, motion: impl Fn(f64) -> (f64, f64)) -> &mut Self {
+        let shift_s = 1e-9 * f64::from(self.1 * SHIFT_NS);
+        let count = std::cell::Cell::new(0_u32);
         self.stream(topic, |header| {
             let mut twist = TwistStamped {
                 header,
                 ..TwistStamped::default()
             };
-            twist.twist.linear.x = speed_mps;
+            let i = count.replace(count.get() + 1);
+            let (speed_mps, yaw_rate) = motion(0.04 * f64::from(i) + shift_s);
+            (twist.twist.linear.x, twist.twist.angular.z) = (speed_mps, yaw_rate);
             twist
         })
+    }
+
+    /// An inertial unit that lies flat and turns to the left, rad/s.
+    pub fn imu(&mut self, topic: &str, yaw_rate: f64) -> &mut Self {
+        let up = |z| Vector3 {
+            z,
+            ..Vector3::default()
+        };
+        self.stream(topic, |header| Imu {
+            header,
+            orientation: Quaternion::default(),
+            orientation_covariance: [0.0; 9],
+            angular_velocity: up(yaw_rate),
+            angular_velocity_covariance: [0.0; 9],
+            linear_acceleration: up(9.81),
+            linear_acceleration_covariance: [0.0; 9],
+        })
+    }
+
+    /// From here on no header says when its message was measured.
+    pub fn without_stamps(&mut self) -> &mut Self {
+        self.2 = false;
+        self
     }
 
     pub fn odometry(&mut self, topic: &str, speed_mps: f64) -> &mut Self {
@@ -117,7 +151,7 @@ impl TinyBag {
                 nsec: i * 40_000_000 + self.1 * SHIFT_NS,
             };
             let header = Header {
-                stamp,
+                stamp: if self.2 { stamp } else { Time::from_nanos(0) },
                 ..Header::default()
             };
             self.0.write(connection, stamp, &make(header)).unwrap();

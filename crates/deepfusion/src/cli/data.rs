@@ -4,6 +4,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use deepfusion_data::{CameraChoice, GtKind};
 use deepfusion_eval::GroundTruth;
 
+use super::values::milliseconds;
 use super::{CameraIntrinsics, CompressionChoice};
 
 /// `deepfusion data …`.
@@ -30,6 +31,9 @@ pub struct InspectArgs {
     /// The camera, where the recording has no calibration, in pixels.
     #[arg(long, value_name = "fx,fy,cx,cy")]
     pub intrinsics: Option<CameraIntrinsics>,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
+    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
+    pub camera_ahead_s: Option<f64>,
     /// Also draw the measured depth on the images that have some.
     #[arg(long)]
     pub overlay: bool,
@@ -61,6 +65,9 @@ pub struct ConvertArgs {
     /// Which camera.
     #[arg(long, value_name = "2|3", default_value = "2")]
     pub camera: CameraChoice,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
+    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
+    pub camera_ahead_s: Option<f64>,
     /// Compression of a bag.
     #[arg(long, value_enum, default_value_t)]
     pub compression: CompressionChoice,
@@ -84,6 +91,9 @@ pub struct ExportGtArgs {
     /// Only the frames of this split file (lines "folder index side").
     #[arg(long, value_name = "FILE")]
     pub split: Option<PathBuf>,
+    /// Fail unless every frame of --split is there and has ground truth.
+    #[arg(long, requires = "split")]
+    pub strict: bool,
     /// Which depth, at which pixel.
     #[arg(long, value_enum, default_value_t)]
     pub gt_depth: GtDepth,
@@ -93,9 +103,15 @@ pub struct ExportGtArgs {
     /// File to write.
     #[arg(long, value_name = "FILE.npz")]
     pub out: PathBuf,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
+    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
+    pub camera_ahead_s: Option<f64>,
     /// Replace the file if it is there.
     #[arg(long)]
     pub overwrite: bool,
+    /// Print what was written as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Conventions of ground-truth depth.

@@ -3,6 +3,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::CameraIntrinsics;
+use super::values::milliseconds;
 
 /// `deepfusion doctor`.
 #[derive(Debug, Args)]
@@ -18,10 +19,13 @@ pub struct DoctorArgs {
     /// The camera of a recording without a calibration, in pixels of its images.
     #[arg(long, value_name = "fx,fy,cx,cy", requires = "path")]
     pub intrinsics: Option<CameraIntrinsics>,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
+    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true, requires = "path")]
+    pub camera_ahead_s: Option<f64>,
     /// Also write a page with plots over time and measured depth on images.
     #[arg(long, value_name = "FILE.html", requires = "path")]
     pub report: Option<PathBuf>,
-    /// Also tell every figure that was measured, and what could not be checked.
+    /// Also tell every figure that was measured.
     #[arg(long, short, requires = "path")]
     pub verbose: bool,
     /// Print as JSON.

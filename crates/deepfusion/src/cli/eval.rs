@@ -4,7 +4,7 @@ use clap::{ArgGroup, Args, ValueEnum};
 use deepfusion_data::CameraChoice;
 use deepfusion_eval::{Crop, Holes, Protocol, Scaling};
 
-use super::values::{positive, scaling};
+use super::values::{milliseconds, positive, scaling};
 use super::{CameraIntrinsics, EngineArgs, GtDepth};
 
 /// `deepfusion eval`.
@@ -40,6 +40,12 @@ pub struct EvalArgs {
     /// The camera of recordings without a calibration, in pixels of their images.
     #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "pred")]
     pub intrinsics: Option<CameraIntrinsics>,
+    /// Fail unless every frame of --split is there and has ground truth.
+    #[arg(long, requires = "split")]
+    pub strict: bool,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
+    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true, conflicts_with = "pred")]
+    pub camera_ahead_s: Option<f64>,
     /// Predicted arrays.
     #[arg(long, value_name = "FILE", requires = "pred_kind", requires = "gt")]
     pub pred: Option<PathBuf>,
@@ -82,8 +88,8 @@ pub struct EvalArgs {
     /// Do not correct depth for another focal length than the one trained on.
     #[arg(long, conflicts_with = "pred")]
     pub no_focal_correction: bool,
-    /// Learn from every second frame how far a pixel's depth can be trusted, and keep that beside the run: `perceive` then
-    /// gives its clouds a confidence, and --report shows whether it holds on the other frames.
+    /// Learn how far a pixel's depth can be trusted, and keep that beside the run: `perceive` then gives its clouds a
+    /// confidence, and --report shows whether it holds on frames not learned from: other drives, or of one drive another part.
     #[arg(long, requires = "model", conflicts_with = "gt")]
     pub calibrate_confidence: bool,
     /// What runs the network.

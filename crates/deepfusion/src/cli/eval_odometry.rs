@@ -4,6 +4,7 @@ use clap::{ArgGroup, Args};
 use deepfusion_data::CameraChoice;
 
 use super::DeviceChoice;
+use super::values::milliseconds;
 
 /// `deepfusion eval-odometry`.
 #[derive(Debug, Args)]
@@ -33,6 +34,9 @@ pub struct EvalOdometryArgs {
         conflicts_with = "pred"
     )]
     pub camera: CameraChoice,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
+    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true, conflicts_with = "pred")]
+    pub camera_ahead_s: Option<f64>,
     /// Predicted poses.
     #[arg(long, value_name = "FILE", requires = "gt")]
     pub pred: Option<PathBuf>,

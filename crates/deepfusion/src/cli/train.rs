@@ -5,6 +5,7 @@ use deepfusion_data::CameraChoice;
 use deepfusion_train::{Compute, TrainConfig, ViewMotion};
 
 use super::Size;
+use super::values::milliseconds;
 
 /// `deepfusion train`.
 #[derive(Debug, Args)]
@@ -55,12 +56,18 @@ pub struct TrainArgs {
     /// Which cameras [default: 2].
     #[arg(long, value_name = "2|3|both")]
     pub camera: Option<CameraChoice>,
-    /// Only the frames of this split file (lines "folder index side").
+    /// Train on the frames of this split file only (lines "folder index side").
     #[arg(long, value_name = "FILE")]
     pub split: Option<PathBuf>,
     /// Recordings to validate on [default: the last tenth of each drive].
     #[arg(long, value_name = "PATH", num_args = 1..)]
     pub val_data: Vec<PathBuf>,
+    /// Validate on the frames of this split file only, of --val-data, or of --data where there is none.
+    #[arg(long, value_name = "FILE")]
+    pub val_split: Option<PathBuf>,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
+    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
+    pub camera_ahead_s: Option<f64>,
     /// Weights to start from: a run, a checkpoint, or a file from weights import.
     #[arg(long, value_name = "WEIGHTS")]
     pub init: Option<PathBuf>,

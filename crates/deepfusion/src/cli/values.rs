@@ -131,6 +131,15 @@ pub fn scaling(text: &str) -> Result<Scaling, String> {
     }
 }
 
+/// Milliseconds as seconds.
+pub fn milliseconds(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|ms: &f64| ms.is_finite())
+        .map(|ms| 1e-3 * ms)
+        .ok_or_else(|| "expected milliseconds, such as -60".into())
+}
+
 /// A number from 0 to 1.
 pub fn share(text: &str) -> Result<f64, String> {
     text.parse()
@@ -217,6 +226,14 @@ mod tests {
             let mut together = parts.concat();
             together.sort_unstable();
             prop_assert_eq!(together, all);
+        }
+    }
+
+    #[test]
+    fn offsets_of_clocks() {
+        assert_eq!(milliseconds("-60"), Ok(-0.06));
+        for bad in ["", "60ms", "nan", "inf"] {
+            assert!(milliseconds(bad).is_err(), "{bad}");
         }
     }
 

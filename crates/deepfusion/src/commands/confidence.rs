@@ -10,6 +10,7 @@ use deepfusion_train::Predictor;
 use image::imageops::flip_horizontal;
 use serde::{Deserialize, Serialize};
 
+use super::division::divide;
 use super::evaluate::{Evaluated, Place, Truth};
 
 /// The file in a run's folder.
@@ -31,6 +32,9 @@ pub struct Confidence {
     pub mirrored: ConfidenceModel,
     /// Frames it was learned from.
     pub frames: usize,
+    /// Frames it was judged by: of other drives, or of another part of the one drive, none of them learned from.
+    #[serde(default)]
+    pub held_out: usize,
     /// Pixels of them.
     pub pixels: usize,
 }
@@ -63,7 +67,8 @@ impl Confidence {
     }
 }
 
-/// Learns from every second evaluated frame, keeps the result beside the run, and tells how it holds on the others.
+/// Learns from one part of the evaluated frames, keeps the result beside the run, and tells how it holds on the other, which
+/// is of other drives or of another part of the drive.
 pub fn calibrate(
     predictor: &Predictor,
     datasets: &[Dataset],
@@ -72,37 +77,57 @@ pub fn calibrate(
     correct_focal: bool,
     run: &Path,
 ) -> Result<Option<Vec<Reliability>>> {
-    let mut samples: [Vec<Sampled>; 2] = [Vec::new(), Vec::new()];
-    for (number, Place(set, frame)) in evaluated.places.iter().enumerate() {
-        let half = number % 2;
-        samples[half].extend(of_frame(
-            predictor,
-            &datasets[*set],
-            *frame,
-            truth,
-            correct_focal,
-        )?);
-    }
-    let [learned, held_out] = &samples;
-    let fit = |flip: bool| ConfidenceModel::fit(&told(learned, flip));
+    let images: Vec<_> = evaluated
+        .places
+        .iter()
+        .map(|p| image(datasets, *p))
+        .collect();
+    let division = divide(&images);
+    let mut sampled = |part: &[usize]| -> Result<Vec<Sampled>> {
+        let mut samples = Vec::new();
+        for Place(set, frame) in part.iter().map(|i| evaluated.places[*i]) {
+            let dataset = &datasets[set];
+            samples.extend(of_frame(predictor, dataset, frame, truth, correct_focal)?);
+        }
+        Ok(samples)
+    };
+    let learned = sampled(&division.learned)?;
+    let held_out = sampled(&division.held_out)?;
+    let fit = |flip: bool| ConfidenceModel::fit(&told(&learned, flip));
     let (Some(single), Some(mirrored)) = (fit(false), fit(true)) else {
         return Ok(None);
     };
     let confidence = Confidence {
         single,
         mirrored,
-        frames: evaluated.places.len().div_ceil(2),
+        frames: division.learned.len(),
+        held_out: division.held_out.len(),
         pixels: learned.len(),
     };
     let path = confidence.write(run)?;
-    crate::progress::say(&format!("confidence learned, kept as {}", path.display()));
+    let judged_by = match (held_out.is_empty(), division.by_drive) {
+        (true, _) => "none left to judge it by".to_owned(),
+        (false, true) => format!("judged by {} of other drives", confidence.held_out),
+        (false, false) => format!("judged by {} of another part", confidence.held_out),
+    };
+    crate::progress::say(&format!(
+        "confidence learned from {} frames, {judged_by}, kept as {}",
+        confidence.frames,
+        path.display()
+    ));
     // One frame has no other half: it is told of itself.
-    let judged = if held_out.is_empty() {
-        learned
-    } else {
-        held_out
+    let judged = match held_out.is_empty() {
+        true => &learned,
+        false => &held_out,
     };
     Ok(Some(mirrored.reliability(&told(judged, true), BINS)))
+}
+
+/// The drive that an image is of, and its frame's number. The drives of a folder of bags share the folder.
+fn image(datasets: &[Dataset], Place(set, frame): Place) -> ((&Path, &str), u64) {
+    let dataset = &datasets[set];
+    let drive = (dataset.folder(), dataset.split_name());
+    (drive, dataset.frames()[frame].number)
 }
 
 /// A pixel's evidence, and its relative error.

@@ -1,10 +1,11 @@
 use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_data::{Dataset, convert_to_bag, convert_to_kitti};
+use deepfusion_data::{Converted, Dataset, OpenOptions, convert_to_bag, convert_to_kitti};
 
-use super::evaluate::open_with_camera;
-use crate::cli::ConvertArgs;
+use super::evaluate::open_recordings;
+use super::remarks;
+use crate::cli::{CameraIntrinsics, ConvertArgs};
 use crate::error::CliError;
 use crate::output;
 use crate::progress::{Progress, say};
@@ -18,7 +19,13 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
         return Err(CliError::NoRos2Writer { path }.into());
     }
     let input = std::slice::from_ref(&args.input);
-    let datasets = open_with_camera(input, None, args.camera, args.intrinsics)?;
+    let options = OpenOptions {
+        camera: args.camera,
+        intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
+        camera_ahead_s: args.camera_ahead_s,
+        ..OpenOptions::default()
+    };
+    let datasets = open_recordings(input, &options)?;
     let mut progress = Progress::new("converting");
     let mut report = |done, total| progress.set(done, total);
     let written = if ends_in("bag") {
@@ -27,19 +34,30 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
             let input = args.input.clone();
             return Err(CliError::SeveralDrives { input, drives }.into());
         };
-        convert_to_bag(dataset, &args.out, args.compression.into(), &mut report)?;
-        vec![args.out.clone()]
+        convert_to_bag(dataset, &args.out, args.compression.into(), &mut report)?
     } else {
         convert_to_kitti(&datasets, &args.out, &mut report)?
     };
     drop(progress);
     datasets.iter().for_each(tell_missing);
+    let Converted { paths, moved_s } = written;
+    if moved_s > 0 {
+        tracing::warn!(
+            "{}: some of its times are not after the beginning of 1970, which neither layout can write: all are written \
+             {moved_s} s later",
+            args.input.display()
+        );
+    }
     let frames: usize = datasets.iter().map(|d| d.frames().len()).sum();
     if args.json {
-        return output::print_json(&serde_json::json!({ "written": written, "frames": frames }));
+        return output::print_json(&serde_json::json!({
+            "written": paths,
+            "frames": frames,
+            "moved_s": moved_s,
+        }));
     }
     say(&format!("{frames} frames written"));
-    for path in &written {
+    for path in &paths {
         output::print(&format!("{}\n", path.display()))?;
     }
     Ok(())
@@ -59,8 +77,8 @@ fn tell_missing(dataset: &Dataset) {
         (false, true) => "no times",
         (false, false) => "no times and no speeds",
     };
-    tracing::warn!(
+    remarks::warn_once(format!(
         "{}: {missing}, so none were written: evaluate and predict on it, training needs both",
         dataset.name()
-    );
+    ));
 }

@@ -4,7 +4,7 @@ use anyhow::Result;
 use deepfusion_compare::{
     FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation, sha256_of_file,
 };
-use deepfusion_data::{CameraChoice, Dataset, GtKind, RgbImage};
+use deepfusion_data::{CameraChoice, Dataset, GtKind, OpenOptions, RgbImage};
 use deepfusion_eval::{
     ArraySet, Crop, Grid, Prediction, Protocol, Report, Sample, TrivialBaseline, match_names,
 };
@@ -15,12 +15,13 @@ use serde::Serialize;
 
 use super::confidence;
 use super::evaluate::{
-    Comparison, Evaluated, Place, Truth, array_places, default_crop, depth_map, evaluate_datasets,
-    open_with_camera, trivial_from_arrays, trivial_from_datasets,
+    Comparison, Evaluated, Place, Truth, array_places, check_used, default_crop, depth_map,
+    evaluate_datasets, expected_frames, open_recordings, read_split, trivial_from_arrays,
+    trivial_from_datasets,
 };
 use super::held_out::held_out;
 use super::run_report::{self, Choice};
-use crate::cli::{EvalArgs, PrecisionChoice, PredKind};
+use crate::cli::{CameraIntrinsics, EvalArgs, PrecisionChoice, PredKind};
 use crate::engine;
 use crate::output;
 use crate::progress::{Progress, say};
@@ -97,8 +98,14 @@ impl std::fmt::Display for UsedCheckpoint {
 fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
     let model = args.model.as_deref().unwrap_or(Path::new("."));
     let predictor = engine::load(model, &args.engine)?;
-    let split = args.split.as_deref();
-    let datasets = open_with_camera(&args.data, split, args.camera, args.intrinsics)?;
+    let options = OpenOptions {
+        camera: args.camera,
+        split: read_split(args.split.as_deref())?,
+        intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
+        camera_ahead_s: args.camera_ahead_s,
+    };
+    let datasets = open_recordings(&args.data, &options)?;
+    let expected = expected_frames(&options, &datasets, args.strict)?;
     let crop = default_crop(&datasets);
     let kind = args.gt_depth.kind();
     let mut truth = match &args.gt {
@@ -117,7 +124,7 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
         let prediction = predict(&predictor, &image, &camera, !args.no_focal_correction)?;
         Ok((image, prediction))
     };
-    let evaluated = evaluate_datasets(
+    let mut evaluated = evaluate_datasets(
         &datasets,
         &mut truth,
         &protocol,
@@ -125,6 +132,8 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
         &mut |dataset, frame| see(dataset, frame).map(|(_, prediction)| prediction),
         &mut |done, total| progress.set(done, total),
     )?;
+    evaluated.report.expected = expected;
+    check_used(&options, &datasets, evaluated.report.n, args.strict)?;
     let (folder, _) = RunFolder::open(model)?;
     let saved = saved(args, &predictor, &folder, &datasets, &evaluated)?;
     match saved.write(folder.path()) {
@@ -300,6 +309,10 @@ fn page(
         true => String::new(),
         false => format!(" on {}", names.join(", ")),
     };
+    let images = match report.expected {
+        Some(expected) => format!("{} of the split's {expected}", report.n),
+        None => report.n.to_string(),
+    };
     let page = HtmlReport::new(name, format!("Depth measured{on}"))
         .facts(&[
             ("Abs Rel, unscaled", &number(report.unscaled.abs_rel)),
@@ -309,7 +322,7 @@ fn page(
                 "within 25 %",
                 &format!("{:.1} %", 100.0 * report.unscaled.a1),
             ),
-            ("images", &report.n.to_string()),
+            ("images", &images),
         ])
         .section("Accuracy");
     let page = run_report::accuracy(page, evaluated);

@@ -2,7 +2,9 @@ use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_data::{Camera, CameraPath, Dataset, DatasetKind, Error, write_atomically};
+use deepfusion_data::{
+    Camera, CameraPath, Dataset, DatasetKind, Error, OpenOptions, write_atomically,
+};
 use deepfusion_eval::odometry::{
     OdometryReport, PoseFile, TrackError, TrackPair, chain, from_first, kitti_text, tum_text,
 };
@@ -11,7 +13,7 @@ use deepfusion_render::TopView;
 use deepfusion_train::PosePredictor;
 
 use super::device;
-use super::evaluate::open_datasets;
+use super::evaluate::open_recordings;
 use crate::allocator;
 use crate::cli::EvalOdometryArgs;
 use crate::output;
@@ -53,7 +55,12 @@ fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
     allocator::keep_memory();
     let model = args.model.as_deref().unwrap_or(Path::new("."));
     let predictor = PosePredictor::load(model, args.set.as_deref(), &device::open(args.device)?)?;
-    let datasets = open_datasets(&args.data, None, args.camera)?;
+    let options = OpenOptions {
+        camera: args.camera,
+        camera_ahead_s: args.camera_ahead_s,
+        ..OpenOptions::default()
+    };
+    let datasets = open_recordings(&args.data, &options)?;
     let mut stretches = Vec::new();
     let (mut exact, mut integrated, mut tracked) = (0, 0, 0);
     for dataset in &datasets {

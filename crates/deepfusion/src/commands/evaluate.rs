@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use deepfusion_data::{
-    CameraChoice, Dataset, DatasetKind, GtKind, OpenOptions, Split, ground_truth_names,
+    CameraChoice, Dataset, DatasetKind, GtKind, OpenOptions, Split, SplitCoverage,
+    ground_truth_names,
 };
 use deepfusion_eval::{
     ArraySet, Crop, DrawnPoint, Evaluator, Grid, GroundTruth, ImageScore, Prediction, Protocol,
@@ -14,7 +15,7 @@ use deepfusion_eval::{
 use deepfusion_geometry::DepthMap;
 
 use super::remarks;
-use crate::cli::CameraIntrinsics;
+use crate::error::CliError;
 
 /// Opens the recordings at several paths, each drive and camera a data set, and tells what was noticed.
 pub fn open_datasets(
@@ -22,26 +23,28 @@ pub fn open_datasets(
     split: Option<&Path>,
     camera: CameraChoice,
 ) -> Result<Vec<Dataset>> {
-    open_with_camera(paths, split, camera, None)
-}
-
-/// [`open_datasets`] with a pinhole camera given for recordings that lack one.
-pub fn open_with_camera(
-    paths: &[PathBuf],
-    split: Option<&Path>,
-    camera: CameraChoice,
-    intrinsics: Option<CameraIntrinsics>,
-) -> Result<Vec<Dataset>> {
     let options = OpenOptions {
         camera,
-        split: split.map(Split::read).transpose()?,
-        intrinsics: intrinsics.map(CameraIntrinsics::numbers),
+        split: read_split(split)?,
+        ..OpenOptions::default()
     };
+    open_recordings(paths, &options)
+}
+
+/// As [`open_datasets`], as the options say; a split of which frames are missing is told, too.
+pub fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
+    let datasets = open_quietly(paths, options)?;
+    remarks::tell(&datasets);
+    tell_of_missing_frames(options, &datasets);
+    Ok(datasets)
+}
+
+/// As [`open_recordings`], without telling anything.
+pub fn open_quietly(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
     let mut datasets = Vec::new();
     for path in paths {
-        datasets.extend(Dataset::open(path, &options)?);
+        datasets.extend(Dataset::open(path, options)?);
     }
-    remarks::tell(&datasets);
     Ok(datasets)
 }
 
@@ -52,6 +55,88 @@ pub fn default_crop(datasets: &[Dataset]) -> Crop {
         true => Crop::Garg,
         false => Crop::None,
     }
+}
+
+/// The split file of a name, read.
+pub fn read_split(path: Option<&Path>) -> Result<Option<Split>> {
+    Ok(path.map(Split::read).transpose()?)
+}
+
+/// Warns where a split names frames that are not there.
+pub fn tell_of_missing_frames(options: &OpenOptions, datasets: &[Dataset]) {
+    let Some(split) = &options.split else { return };
+    let coverage = split.coverage(datasets);
+    if let Some(first) = &coverage.first_missing {
+        let SplitCoverage {
+            expected, found, ..
+        } = coverage;
+        remarks::warn_once(format!(
+            "{}: {found} of its {expected} frames are there ({:.1} %), the first that is not: {first}",
+            split.path.display(),
+            percent(found, expected)
+        ));
+    }
+}
+
+/// How many frames a split asked for, where there was one; an error where not all are there and they must be.
+pub fn expected_frames(
+    options: &OpenOptions,
+    datasets: &[Dataset],
+    strict: bool,
+) -> Result<Option<usize>> {
+    let Some(split) = &options.split else {
+        return Ok(None);
+    };
+    let coverage = split.coverage(datasets);
+    match strict && !coverage.is_complete() {
+        true => Err(CliError::Incomplete {
+            split: split.path.clone(),
+            found: coverage.found,
+            expected: coverage.expected,
+            what: "are in the recordings given",
+        }
+        .into()),
+        false => Ok(Some(coverage.expected)),
+    }
+}
+
+/// Warns where fewer frames were used than the split asked for and the recordings hold: some have no ground truth. An
+/// error where all must be.
+pub fn check_used(
+    options: &OpenOptions,
+    datasets: &[Dataset],
+    used: usize,
+    strict: bool,
+) -> Result<()> {
+    let Some(split) = &options.split else {
+        return Ok(());
+    };
+    let SplitCoverage {
+        expected, found, ..
+    } = split.coverage(datasets);
+    if used >= found {
+        return Ok(());
+    }
+    if strict {
+        return Err(CliError::Incomplete {
+            split: split.path.clone(),
+            found: used,
+            expected,
+            what: "have ground truth",
+        }
+        .into());
+    }
+    remarks::warn_once(format!(
+        "{}: {used} of its {expected} frames have ground truth ({:.1} %), {} more are there without",
+        split.path.display(),
+        percent(used, expected),
+        found - used
+    ));
+    Ok(())
+}
+
+fn percent(part: usize, whole: usize) -> f64 {
+    100.0 * part as f64 / whole.max(1) as f64
 }
 
 /// Where the truth comes from.

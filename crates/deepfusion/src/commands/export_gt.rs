@@ -1,7 +1,7 @@
 use anyhow::Result;
-use deepfusion_data::export_gt;
+use deepfusion_data::{Dataset, OpenOptions, export_gt};
 
-use super::evaluate::open_datasets;
+use super::evaluate::{check_used, expected_frames, open_recordings, read_split};
 use crate::cli::ExportGtArgs;
 use crate::error::CliError;
 use crate::output;
@@ -16,15 +16,48 @@ pub fn run(args: &ExportGtArgs) -> Result<()> {
         }
         .into());
     }
-    let datasets = open_datasets(&args.paths, args.split.as_deref(), args.camera)?;
+    let options = OpenOptions {
+        camera: args.camera,
+        split: read_split(args.split.as_deref())?,
+        camera_ahead_s: args.camera_ahead_s,
+        ..OpenOptions::default()
+    };
+    let datasets = open_recordings(&args.paths, &options)?;
+    let expected = expected_frames(&options, &datasets, args.strict)?;
+    let kind = args.gt_depth.kind();
+    if args.strict {
+        // Known before the file is written: a part of what was asked for would be taken for all of it.
+        let with_truth = |d: &Dataset| {
+            d.selected()
+                .iter()
+                .filter(|f| d.has_ground_truth(**f))
+                .count()
+        };
+        check_used(
+            &options,
+            &datasets,
+            datasets.iter().map(with_truth).sum(),
+            true,
+        )?;
+    }
     let mut progress = Progress::new("reading scans");
-    let written = export_gt(
-        &datasets,
-        args.gt_depth.kind(),
-        &args.out,
-        &mut |done, total| progress.set(done, total),
-    )?;
+    let written = export_gt(&datasets, kind, &args.out, &mut |done, total| {
+        progress.set(done, total)
+    })?;
     drop(progress);
-    say(&format!("{written} frames with ground truth"));
+    check_used(&options, &datasets, written, args.strict)?;
+    if args.json {
+        let file = &args.out;
+        return output::print_json(&match expected {
+            Some(expected) => {
+                serde_json::json!({ "file": file, "frames": written, "expected": expected })
+            }
+            None => serde_json::json!({ "file": file, "frames": written }),
+        });
+    }
+    say(&match expected {
+        Some(expected) => format!("{written} of the split's {expected} frames with ground truth"),
+        None => format!("{written} frames with ground truth"),
+    });
     output::print(&format!("{}\n", args.out.display()))
 }

@@ -7,7 +7,7 @@ use deepfusion_data::{Dataset, Frame};
 use deepfusion_train::{RunFolder, SampleSet, TrainConfig};
 
 use super::evaluate::Place;
-use super::train::{is_run, training_recordings};
+use super::train::{is_run, training_recordings, validates};
 
 /// A frame, wherever a copy of its drive lies: the drive's name, the frame's number and the size of its image's file.
 type Seen = (String, u64, u64);
@@ -24,10 +24,7 @@ pub fn held_out(config: &TrainConfig, datasets: &[Dataset], places: &[Place]) ->
 
 fn seen_by(config: &TrainConfig, runs: &mut HashSet<std::path::PathBuf>) -> Option<HashSet<Seen>> {
     let mut config = config.clone();
-    let data = &config.data;
-    let elsewhere =
-        !data.validation.is_empty() || data.sets.iter().any(|s| !s.validation.is_empty());
-    if elsewhere {
+    if validates(&config) {
         // Nothing of the training recordings was left out.
         config.validation_share = 0.0;
     }

@@ -11,8 +11,12 @@ use crate::progress::{Progress, say};
 
 /// `deepfusion data inspect`.
 pub fn run(args: &InspectArgs) -> Result<()> {
-    let intrinsics = args.intrinsics.map(CameraIntrinsics::numbers);
-    let inspection = inspect_with(&args.path, intrinsics)?;
+    let options = OpenOptions {
+        intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
+        camera_ahead_s: args.camera_ahead_s,
+        ..OpenOptions::default()
+    };
+    let inspection = inspect_with(&args.path, &options)?;
     if args.json {
         output::print_json(&inspection)?;
     } else {
@@ -20,19 +24,15 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     }
     if args.overlay {
         let folder = output::run_folder(args.out.as_deref(), "inspect")?;
-        let pictures = write_overlays(&args.path, intrinsics, &folder)?;
+        let pictures = write_overlays(&args.path, &options, &folder)?;
         say(&format!("{pictures} pictures in {}", folder.display()));
     }
     Ok(())
 }
 
 /// A picture for every frame with ground truth; how many.
-fn write_overlays(path: &Path, intrinsics: Option<[f64; 4]>, folder: &Path) -> Result<usize> {
-    let options = OpenOptions {
-        intrinsics,
-        ..OpenOptions::default()
-    };
-    let datasets = Dataset::open(path, &options)?;
+fn write_overlays(path: &Path, options: &OpenOptions, folder: &Path) -> Result<usize> {
+    let datasets = Dataset::open(path, options)?;
     let names = ground_truth_names(&datasets);
     let total = names.iter().map(Vec::len).sum();
     let (mut done, mut written) = (0, 0);

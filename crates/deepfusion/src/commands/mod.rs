@@ -7,6 +7,7 @@ mod confidence;
 mod convert;
 mod demo;
 pub mod device;
+mod division;
 mod doctor;
 mod eval;
 mod eval_odometry;

@@ -30,6 +30,8 @@ pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> 
         camera,
         split,
         val_data,
+        val_split,
+        camera_ahead_s,
         init,
         view_motion,
         with,
@@ -84,7 +86,17 @@ pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> 
         let found = run.init.as_deref().map_or("none".into(), told);
         same("--init", told(&absolute), found)?;
     }
-    move_recordings(&mut config, data, val_data, split.as_deref())?;
+    if let Some(ahead_s) = camera_ahead_s {
+        let told = |s: f64| format!("{} ms", 1000.0 * s);
+        let found = run.data.camera_ahead_s.map_or("none".into(), told);
+        same("--clock-offset", told(*ahead_s), found)?;
+    }
+    move_recordings(
+        &mut config,
+        data,
+        val_data,
+        [split.as_deref(), val_split.as_deref()],
+    )?;
     config.steps = steps.or(config.steps);
     if let Some(epochs) = epochs {
         (config.epochs, config.steps, config.min_steps) = (*epochs, None, 0);
@@ -97,7 +109,7 @@ fn move_recordings(
     config: &mut TrainConfig,
     data: &[PathBuf],
     val_data: &[PathBuf],
-    split: Option<&Path>,
+    splits: [Option<&Path>; 2],
 ) -> Result<()> {
     let of_sets = "has the data.sets of its config.toml, each with its own".to_owned();
     let sets = !config.data.sets.is_empty();
@@ -117,15 +129,21 @@ fn move_recordings(
         }
         config.data.validation = val_data.to_vec();
     }
-    if let Some(split) = split {
-        if config.data.split.is_none() {
+    let data = &mut config.data;
+    let kept = [
+        ("--split", &mut data.split),
+        ("--val-split", &mut data.validation_split),
+    ];
+    for ((option, kept), split) in kept.into_iter().zip(splits) {
+        let Some(split) = split else { continue };
+        if kept.is_none() {
             let found = match sets {
-                true => of_sets,
-                false => "has no split".into(),
+                true => of_sets.clone(),
+                false => "has none".into(),
             };
-            return contradicts("--split", told(split), found);
+            return contradicts(option, told(split), found);
         }
-        config.data.split = Some(split.to_owned());
+        *kept = Some(split.to_owned());
     }
     config.data.make_absolute();
     Ok(())
@@ -160,6 +178,11 @@ fn take_file(config: &mut TrainConfig, path: &Path, args: &TrainArgs) -> Result<
     }
     if args.split.is_some() {
         asked_data.split.clone_from(&has.split);
+    }
+    if args.val_split.is_some() {
+        asked_data
+            .validation_split
+            .clone_from(&has.validation_split);
     }
     let mut has = config.clone();
     (asked.data.camera, has.data.camera) = (camera_of(&asked), camera_of(&has));
@@ -247,8 +270,11 @@ pub fn where_recordings_are(
         Some("--val-data")
     } else if data.split.iter().any(within) {
         Some("--split")
+    } else if data.validation_split.iter().any(within) {
+        Some("--val-split")
     } else if data.sets.iter().any(|set| {
-        let mut all = set.paths.iter().chain(&set.validation).chain(&set.split);
+        let all = set.paths.iter().chain(&set.validation);
+        let mut all = all.chain(&set.split).chain(&set.validation_split);
         all.any(within)
     }) {
         None
@@ -345,7 +371,9 @@ mod tests {
                 "learned with it",
             ),
             (&["--init", "/w.pth"], "/w.pth", "none"),
-            (&["--split", "/s.txt"], "/s.txt", "no split"),
+            (&["--split", "/s.txt"], "/s.txt", "has none"),
+            (&["--val-split", "/s.txt"], "/s.txt", "has none"),
+            (&["--clock-offset", "60"], "60 ms", "has none"),
             (&["--val-data", "/v"], "/v", "held-out end"),
             (
                 &["--config", &other],

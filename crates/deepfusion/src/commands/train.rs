@@ -1,18 +1,19 @@
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use deepfusion_data::{Camera, CameraChoice, Dataset, speed_unit_warning};
+use deepfusion_data::{Camera, CameraChoice, Dataset, OpenOptions, speed_unit_warning};
 use deepfusion_nn::InputSize;
 use deepfusion_nn::weights::load_torchvision_resnet;
 use deepfusion_train::{
     CheckpointKind, DataConfig, DataSetConfig, Error, Model, Preset, RunFolder, SampleSet,
-    TrainConfig, TrainSummary, Trainer,
+    TrainConfig, TrainSummary, Trainer, shared_frames,
 };
 
-use super::evaluate::open_datasets;
+use super::evaluate::{open_quietly, open_recordings, read_split};
 use super::outlook::Outlook;
 use super::recorder::{Recorder, clock};
-use super::{device, resume};
+use super::{device, remarks, resume};
 use crate::allocator;
 use crate::cli::{PresetChoice, TrainArgs};
 use crate::error::CliError;
@@ -161,10 +162,16 @@ fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), Erro
         ("--data", !args.data.is_empty()),
         ("--val-data", !args.val_data.is_empty()),
         ("--split", args.split.is_some()),
+        ("--val-split", args.val_split.is_some()),
         // The sets' own where each has one; else it is the camera of those that have none.
         (
             "--camera",
             args.camera.is_some() && data.sets.iter().any(|set| !set.camera.is_empty()),
+        ),
+        (
+            "--clock-offset",
+            args.camera_ahead_s.is_some()
+                && data.sets.iter().any(|set| set.camera_ahead_s.is_some()),
         ),
     ];
     for (field, given) in given {
@@ -186,6 +193,10 @@ fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), Erro
     if args.split.is_some() {
         data.split.clone_from(&args.split);
     }
+    if args.val_split.is_some() {
+        data.validation_split.clone_from(&args.val_split);
+    }
+    data.camera_ahead_s = args.camera_ahead_s.or(data.camera_ahead_s);
     if let Some(camera) = args.camera {
         data.camera = camera_word(camera).into();
     } else if data.camera.is_empty() && data.sets.is_empty() {
@@ -224,55 +235,91 @@ pub fn preset(choice: PresetChoice) -> Preset {
 /// The training and validation samples of a configuration; warns of drives that are skipped and of
 /// speeds that cannot be m/s.
 pub fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
-    let train = training_recordings(config)?;
+    let train = open_part(config, Part::Training, true)?;
+    let mut checked = HashSet::new();
     for (_, dataset) in &train {
-        warn_of_speed(dataset);
+        // Both cameras of a drive have one speed.
+        if checked.insert((dataset.folder().to_owned(), dataset.name().to_owned())) {
+            warn_of_speed(dataset);
+        }
     }
-    let validation = validation_recordings(config)?;
+    let validation = match validates(config) {
+        true => Some(open_part(config, Part::Validation, true)?),
+        false => None,
+    };
+    let apart = validation.is_some();
     let (train, validation, skipped) = SampleSet::split_sets(config, train, validation)?;
     for reason in skipped {
-        tracing::warn!("skipped: {reason}");
+        remarks::warn_once(format!("skipped: {reason}"));
+    }
+    if apart {
+        for shared in shared_frames(&train, &validation) {
+            remarks::warn_once(format!(
+                "{}: {} of its validation frames are neighbours of training frames, and were seen as such",
+                shared.drive, shared.sources
+            ));
+        }
     }
     Ok((train, validation))
 }
 
-/// All recordings to train on, with the place of their set in `data.sets`.
+/// All recordings to train on, with the place of their set in `data.sets`. Nothing is told of them: training did.
 pub fn training_recordings(config: &TrainConfig) -> Result<Vec<(usize, Dataset)>> {
-    if config.data.sets.is_empty() {
-        let data = &config.data;
-        let datasets = recordings(&data.paths, data.split.as_deref(), &data.camera)?;
+    open_part(config, Part::Training, false)
+}
+
+/// What recordings are for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Part {
+    Training,
+    Validation,
+}
+
+/// Whether there are recordings or frames to validate on; else the end of each drive is held out.
+pub fn validates(config: &TrainConfig) -> bool {
+    let data = &config.data;
+    let own = !data.validation.is_empty() || data.validation_split.is_some();
+    own || data.sets.iter().any(DataSetConfig::validates)
+}
+
+/// The recordings of one part, with the place of their set in `data.sets`.
+fn open_part(config: &TrainConfig, part: Part, tell: bool) -> Result<Vec<(usize, Dataset)>> {
+    let data = &config.data;
+    if data.sets.is_empty() {
+        let validation = (&data.validation, &data.validation_split);
+        let (paths, split) = of_part(part, (&data.paths, &data.split), validation);
+        let datasets = recordings(paths, split, &data.camera, data.camera_ahead_s, tell)?;
         return Ok(placed(0, datasets));
     }
-    of_sets(config, |set| &set.paths)
-}
-
-/// The recordings to validate on, where they are others.
-fn validation_recordings(config: &TrainConfig) -> Result<Option<Vec<(usize, Dataset)>>> {
-    let data = &config.data;
-    if data.sets.iter().any(|set| !set.validation.is_empty()) {
-        return of_sets(config, |set| &set.validation).map(Some);
-    }
-    if data.validation.is_empty() {
-        return Ok(None);
-    }
-    let datasets = recordings(&data.validation, data.split.as_deref(), &data.camera)?;
-    Ok(Some(placed(0, datasets)))
-}
-
-fn of_sets(
-    config: &TrainConfig,
-    paths: impl Fn(&DataSetConfig) -> &[PathBuf],
-) -> Result<Vec<(usize, Dataset)>> {
     let mut all = Vec::new();
-    for (i, set) in config.data.sets.iter().enumerate() {
+    for (i, set) in data.sets.iter().enumerate() {
+        let validation = (&set.validation, &set.validation_split);
+        let (paths, split) = of_part(part, (&set.paths, &set.split), validation);
         let camera = match set.camera.as_str() {
-            "" => &config.data.camera,
+            "" => &data.camera,
             own => own,
         };
-        let datasets = recordings(paths(set), set.split.as_deref(), camera)?;
-        all.extend(placed(i, datasets));
+        let ahead_s = set.camera_ahead_s.or(data.camera_ahead_s);
+        all.extend(placed(i, recordings(paths, split, camera, ahead_s, tell)?));
     }
     Ok(all)
+}
+
+/// Paths and the split file that selects their frames.
+type Frames<'a> = (&'a Vec<PathBuf>, &'a Option<PathBuf>);
+
+/// Those of one part. A split of training frames says nothing about which to validate on, nor the other way round.
+fn of_part<'a>(
+    part: Part,
+    training: Frames<'a>,
+    validation: Frames<'a>,
+) -> (&'a [PathBuf], Option<&'a Path>) {
+    let (paths, split) = match part {
+        Part::Training => training,
+        Part::Validation if validation.0.is_empty() => (training.0, validation.1),
+        Part::Validation => validation,
+    };
+    (paths, split.as_deref())
 }
 
 /// Each with the place of its set.
@@ -281,7 +328,13 @@ fn placed(set: usize, datasets: Vec<Dataset>) -> Vec<(usize, Dataset)> {
 }
 
 /// The recordings at `paths` of the cameras that a configuration names.
-fn recordings(paths: &[PathBuf], split: Option<&Path>, camera: &str) -> Result<Vec<Dataset>> {
+fn recordings(
+    paths: &[PathBuf],
+    split: Option<&Path>,
+    camera: &str,
+    camera_ahead_s: Option<f64>,
+    tell: bool,
+) -> Result<Vec<Dataset>> {
     let camera: CameraChoice = match camera {
         "" => CameraChoice::default(),
         text => text.parse().map_err(|_| Error::Config {
@@ -290,12 +343,21 @@ fn recordings(paths: &[PathBuf], split: Option<&Path>, camera: &str) -> Result<V
             found: text.into(),
         })?,
     };
-    open_datasets(paths, split, camera)
+    let options = OpenOptions {
+        camera,
+        split: read_split(split)?,
+        camera_ahead_s,
+        ..OpenOptions::default()
+    };
+    match tell {
+        true => open_recordings(paths, &options),
+        false => open_quietly(paths, &options),
+    }
 }
 
 fn warn_of_speed(dataset: &Dataset) {
     match speed_unit_warning(dataset) {
-        Ok(Some(warning)) => tracing::warn!("{}: {warning}", dataset.name()),
+        Ok(Some(warning)) => remarks::warn_once(format!("{}: {warning}", dataset.name())),
         Ok(None) => {}
         // The check is a service: what is really wrong with the images, training will say.
         Err(error) => tracing::debug!("speed check of {}: {error}", dataset.name()),

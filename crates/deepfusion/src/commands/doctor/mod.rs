@@ -1,5 +1,6 @@
 //! `deepfusion doctor`: what is wrong with a recording, or what this machine has.
 
+mod lines;
 mod machine;
 mod report;
 
@@ -7,8 +8,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_data::DatasetKind;
-use deepfusion_data::doctor::{Diagnosis, Severity, doctor};
+use deepfusion_data::doctor::{Diagnosis, Outcome, Severity, doctor_with};
+use deepfusion_data::{DatasetKind, OpenOptions};
 
 use crate::cli::{CameraIntrinsics, DoctorArgs};
 use crate::error::CliError;
@@ -20,19 +21,19 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     let Some(path) = &args.path else {
         return machine::run(args.json);
     };
-    let diagnosis = doctor(path, args.intrinsics.map(CameraIntrinsics::numbers));
+    let options = OpenOptions {
+        intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
+        camera_ahead_s: args.camera_ahead_s,
+        ..OpenOptions::default()
+    };
+    let diagnosis = doctor_with(path, &options);
     if args.json {
         output::print_json(&as_json(&diagnosis))?;
     } else {
         output::print(&told(&diagnosis, args.verbose))?;
     }
     if let Some(file) = &args.report {
-        report::write(
-            path,
-            args.intrinsics.map(CameraIntrinsics::numbers),
-            &diagnosis,
-            file,
-        )?;
+        report::write(path, &options, &diagnosis, file)?;
         say(&format!("report: {}", file.display()));
     }
     let errors = count(&diagnosis, Severity::Error);
@@ -63,7 +64,19 @@ fn as_json(diagnosis: &Diagnosis) -> serde_json::Value {
         .iter()
         .map(|(drive, finding)| serde_json::json!({ "drive": drive, "finding": finding }))
         .collect();
+    let lines: Vec<_> = outcomes(diagnosis)
+        .map(|(drive, outcome)| {
+            serde_json::json!({
+                "drive": drive,
+                "check": outcome.check,
+                "status": outcome.status(),
+                "findings": outcome.findings.len(),
+                "why": outcome.skipped,
+            })
+        })
+        .collect();
     serde_json::json!({
+        "checks": lines,
         "errors": count(diagnosis, Severity::Error),
         "warnings": count(diagnosis, Severity::Warning),
         "findings": findings,
@@ -72,7 +85,14 @@ fn as_json(diagnosis: &Diagnosis) -> serde_json::Value {
     })
 }
 
-/// The findings, the worst first; then what was measured, if asked for.
+/// Every check that was made or could not be, each drive's and then the whole recording's, with the drive it is about.
+fn outcomes(diagnosis: &Diagnosis) -> impl Iterator<Item = (Option<&str>, &Outcome)> {
+    let drives = diagnosis.drives.iter();
+    let drives = drives.flat_map(|d| d.outcomes.iter().map(move |o| (Some(d.name.as_str()), o)));
+    drives.chain(diagnosis.recording.iter().map(|o| (None, o)))
+}
+
+/// A line for each check, the findings, the worst first; then what was measured, if asked for.
 fn told(diagnosis: &Diagnosis, verbose: bool) -> String {
     let mut text = String::new();
     for drive in &diagnosis.drives {
@@ -87,6 +107,10 @@ fn told(diagnosis: &Diagnosis, verbose: bool) -> String {
             drive.name, drive.frames, drive.looked_at
         );
     }
+    if !text.is_empty() {
+        text.push('\n');
+    }
+    text += &lines::of(&outcomes(diagnosis).collect::<Vec<_>>());
     let findings = diagnosis.findings();
     for (drive, finding) in &findings {
         let _ = write!(text, "\n{} [{}]", finding.severity, finding.check);
@@ -118,17 +142,12 @@ fn told(diagnosis: &Diagnosis, verbose: bool) -> String {
     text
 }
 
-/// Every figure, and what could not be measured.
+/// Every figure.
 fn figures(diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
-    let whole = diagnosis.recording.iter();
-    let drives = diagnosis.drives.iter().flat_map(|d| &d.outcomes);
-    for outcome in whole.chain(drives) {
+    for (_, outcome) in outcomes(diagnosis) {
         for figure in &outcome.measured {
             let _ = writeln!(text, "  {:12} {figure}", outcome.check);
-        }
-        if let Some(why) = &outcome.skipped {
-            let _ = writeln!(text, "  {:12} not checked: {why}", outcome.check);
         }
     }
     text

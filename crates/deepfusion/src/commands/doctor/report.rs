@@ -7,13 +7,10 @@ use deepfusion_data::doctor::{Diagnosis, DriveDiagnosis, Line};
 use deepfusion_data::{Camera, CameraChoice, Dataset, GtKind, OpenOptions, overlay};
 use deepfusion_render::{HtmlReport, LineChart, PictureFormat};
 
+use super::lines;
+
 /// Writes the page.
-pub fn write(
-    path: &Path,
-    intrinsics: Option<[f64; 4]>,
-    diagnosis: &Diagnosis,
-    file: &Path,
-) -> Result<()> {
+pub fn write(path: &Path, options: &OpenOptions, diagnosis: &Diagnosis, file: &Path) -> Result<()> {
     let mut report = HtmlReport::new("Doctor", path.display().to_string());
     let findings = diagnosis.findings();
     let rows: Vec<Vec<String>> = findings
@@ -34,9 +31,15 @@ pub fn write(
         true => report.paragraph("None: every figure keeps to its limit."),
         false => report.table(&["finding", "measured", "remedy", "drive", "frame"], &rows),
     };
+    let checks: Vec<_> = super::outcomes(diagnosis).collect();
+    let rows = lines::rows(&checks).into_iter();
+    let rows: Vec<Vec<String>> = rows
+        .map(|(check, how)| vec![check.to_owned(), how])
+        .collect();
+    report = report.section("Checks").table(&["check", ""], &rows);
     for drive in &diagnosis.drives {
         report = plots(report.section(&drive.name), drive);
-        report = pictures(report, path, intrinsics, drive)?;
+        report = pictures(report, path, options, drive)?;
         report = figures(report, drive);
     }
     report.write(file)?;
@@ -67,7 +70,7 @@ fn plots(mut report: HtmlReport, drive: &DriveDiagnosis) -> HtmlReport {
 fn pictures(
     mut report: HtmlReport,
     path: &Path,
-    intrinsics: Option<[f64; 4]>,
+    options: &OpenOptions,
     drive: &DriveDiagnosis,
 ) -> Result<HtmlReport> {
     if drive.plots.with_depth.is_empty() {
@@ -78,8 +81,7 @@ fn pictures(
             true => CameraChoice::Left,
             false => CameraChoice::Right,
         },
-        intrinsics,
-        ..OpenOptions::default()
+        ..options.clone()
     };
     let datasets = Dataset::open(path, &options)?;
     let Some(dataset) = datasets.iter().find(|d| d.name() == drive.name) else {

@@ -1,0 +1,85 @@
+//! Frames that are both learned from and validated on.
+
+use crate::SampleSet;
+use deepfusion_data::FrameImage;
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+/// The validation frames of a drive that training sees.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SharedFrames {
+    /// The drive.
+    pub drive: String,
+    /// How many of its validation targets are targets of training samples, too.
+    pub targets: usize,
+    /// How many more are sources of training samples.
+    pub sources: usize,
+}
+
+/// The validation targets that are frames of training samples, drive by drive in order of names; drives without any are
+/// left out. A frame is one wherever it was opened: its file counts, with links resolved, and its place in it.
+#[must_use]
+pub fn shared_frames(train: &SampleSet, validation: &SampleSet) -> Vec<SharedFrames> {
+    let mut files = Files::default();
+    let mut seen = HashMap::new();
+    for sample in &train.samples {
+        let frames = train.datasets[sample.dataset].frames();
+        let sources = sample.snippet.sources.iter().map(|s| (s.frame, false));
+        for (frame, is_target) in sources.chain([(sample.snippet.target, true)]) {
+            let place = files.place(&frames[frame].image);
+            *seen.entry(place).or_insert(is_target) |= is_target;
+        }
+    }
+    let mut drives: BTreeMap<String, (usize, usize)> = BTreeMap::new();
+    for sample in &validation.samples {
+        let dataset = &validation.datasets[sample.dataset];
+        let place = files.place(&dataset.frames()[sample.snippet.target].image);
+        let Some(is_target) = seen.get(&place) else {
+            continue;
+        };
+        let (targets, sources) = drives.entry(dataset.name().to_owned()).or_default();
+        match is_target {
+            true => *targets += 1,
+            false => *sources += 1,
+        }
+    }
+    let shared = drives.into_iter();
+    shared
+        .map(|(drive, (targets, sources))| SharedFrames {
+            drive,
+            targets,
+            sources,
+        })
+        .collect()
+}
+
+/// Files by a number each, links resolved. A file of many frames is looked up once in a row.
+#[derive(Default)]
+struct Files {
+    numbers: HashMap<PathBuf, usize>,
+    last: Option<(PathBuf, usize)>,
+}
+
+impl Files {
+    /// An image's file, and its place in it.
+    fn place(&mut self, image: &FrameImage) -> (usize, u64) {
+        match image {
+            FrameImage::File(path) => (self.number(path), 0),
+            FrameImage::Within { file, index } => (self.number(file), *index),
+        }
+    }
+
+    fn number(&mut self, path: &Path) -> usize {
+        if let Some((last, number)) = &self.last
+            && last == path
+        {
+            return *number;
+        }
+        // One that is gone meanwhile is told when it is read.
+        let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let next = self.numbers.len();
+        let number = *self.numbers.entry(real).or_insert(next);
+        self.last = Some((path.to_owned(), number));
+        number
+    }
+}

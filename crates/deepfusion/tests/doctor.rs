@@ -1,0 +1,171 @@
+//! What `doctor` prints: a line for each check, whatever came of it.
+
+mod support;
+
+use std::fs;
+
+use support::{fails, json, ok, run};
+
+const CHECKS: [&str; 18] = [
+    "opening",
+    "timing",
+    "duplicates",
+    "intrinsics",
+    "standing",
+    "speed",
+    "lidar-speed",
+    "dynamic-points",
+    "steering",
+    "clock",
+    "turn",
+    "heading",
+    "ground",
+    "parallax",
+    "exposure",
+    "blur",
+    "bonnet",
+    "stereo",
+];
+
+/// The lines of the checks, by name.
+fn lines(text: &str) -> Vec<(&str, &str)> {
+    let lines = text.lines().filter_map(|l| l.strip_prefix("  "));
+    let named = lines.filter_map(|l| Some((l.split_whitespace().next()?, l)));
+    let mut found: Vec<(&str, &str)> = named.filter(|(n, _)| CHECKS.contains(n)).collect();
+    found.dedup();
+    found
+}
+
+#[test]
+fn every_check_has_a_line_that_says_whether_it_was_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out sim --frames 12 --seed 3 --scan-every 0 --size 160x96",
+    );
+    let text = run(at, "doctor sim").stdout;
+    let told = lines(&text);
+    let names: Vec<&str> = told.iter().map(|(name, _)| *name).collect();
+    assert_eq!(names, CHECKS, "{text}");
+    let line = |name: &str| told.iter().find(|(n, _)| *n == name).unwrap().1;
+    assert!(line("timing").ends_with(" ok"), "{text}");
+    // Without a LiDAR nothing says that it is in order.
+    assert!(
+        line("lidar-speed").contains("not checked: no LiDAR"),
+        "{text}"
+    );
+    assert!(line("stereo").contains("not checked: one camera"), "{text}");
+
+    let report = run(at, "doctor sim --json --report page.html").stdout;
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let checks = report["checks"].as_array().unwrap();
+    assert_eq!(checks.len(), CHECKS.len());
+    for check in checks {
+        let why = &check["why"];
+        match check["status"].as_str().unwrap() {
+            "not_checked" => assert!(why.is_string(), "{check}"),
+            "found" => assert!(check["findings"].as_u64().unwrap() > 0, "{check}"),
+            status => assert_eq!(status, "ok", "{check}"),
+        }
+    }
+    let page = fs::read_to_string(at.join("page.html")).unwrap();
+    assert!(page.contains("not checked: no LiDAR"));
+    // What cannot be opened could not be checked either.
+    fs::create_dir(at.join("empty")).unwrap();
+    let text = run(at, "doctor empty").stdout;
+    assert_eq!(lines(&text).len(), CHECKS.len(), "{text}");
+    assert!(
+        text.contains("not checked: the recording cannot be opened"),
+        "{text}"
+    );
+}
+
+/// A folder is as good as its good drives: one that stands and one of a single frame are left out and named.
+#[test]
+fn a_drive_that_cannot_train_does_not_fail_its_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (out, seed) in [("good", 3), ("single", 4), ("standing", 5)] {
+        ok(
+            at,
+            &format!("simulate --out {out} --frames 12 --seed {seed} --scan-every 4 --size 160x96"),
+        );
+    }
+    let all = at.join("all/2026_01_01");
+    fs::create_dir_all(&all).unwrap();
+    for (from, seed) in [("good", 3), ("single", 4), ("standing", 5)] {
+        let date = at.join(from).join("2026_01_01");
+        let name = format!("2026_01_01_drive_{seed:04}_sync");
+        fs::rename(date.join(&name), all.join(&name)).unwrap();
+        for file in fs::read_dir(&date).unwrap() {
+            let file = file.unwrap();
+            if file.path().is_file() {
+                fs::copy(file.path(), all.join(file.file_name())).unwrap();
+            }
+        }
+    }
+    let (single, standing) = ("2026_01_01_drive_0004_sync", "2026_01_01_drive_0005_sync");
+    for file in fs::read_dir(all.join(single).join("image_02/data")).unwrap() {
+        let file = file.unwrap().path();
+        if !file.ends_with("0000000000.png") {
+            fs::remove_file(file).unwrap();
+        }
+    }
+    for file in fs::read_dir(all.join(standing).join("oxts/data")).unwrap() {
+        let file = file.unwrap().path();
+        let text = fs::read_to_string(&file).unwrap();
+        let words = text.split_whitespace().enumerate();
+        let still = words.map(|(i, w)| if (8..11).contains(&i) { "0.0" } else { w });
+        fs::write(&file, still.collect::<Vec<_>>().join(" ")).unwrap();
+    }
+
+    let report: serde_json::Value =
+        serde_json::from_str(&run(at, "doctor all --json").stdout).unwrap();
+    let findings = report["findings"].as_array().unwrap();
+    for drive in [single, standing] {
+        let left_out = findings.iter().find(|f| {
+            let what = f["finding"]["what"].as_str().unwrap();
+            f["drive"] == drive && what.contains("training leaves this drive out")
+        });
+        let left_out = left_out.unwrap_or_else(|| panic!("{drive}: {report:#}"));
+        assert_eq!(left_out["finding"]["severity"], "warning");
+    }
+    let opening = |f: &&serde_json::Value| {
+        f["finding"]["check"] == "opening" && f["finding"]["severity"] == "error"
+    };
+    assert_eq!(findings.iter().filter(opening).count(), 0, "{report:#}");
+    let text = run(at, "doctor all").stdout;
+    assert!(
+        text.contains("ok in 3 of 3") || text.contains("ok in 2 of 3"),
+        "{text}"
+    );
+
+    let trained = ok(
+        at,
+        "train --data all --size 96x64 --batch 2 --steps 1 --out run",
+    );
+    for drive in [single, standing] {
+        let named = trained
+            .stderr
+            .lines()
+            .filter(|l| l.contains("skipped") && l.contains(drive));
+        assert_eq!(named.count(), 1, "{}", trained.stderr);
+    }
+    let measured = json(at, "eval --model run --data all --json");
+    assert_eq!(measured["n"], 7, "three of two drives, and one");
+    ok(at, "eval-odometry --model run --data all --json");
+    // Alone, such a drive has nothing to teach.
+    let alone = run(at, &format!("doctor all/2026_01_01/{single}"));
+    assert_eq!(alone.code, 1);
+    assert!(
+        alone.stdout.contains("no pair of frames can train"),
+        "{}",
+        alone.stdout
+    );
+    fails(
+        at,
+        &format!("train --data all/2026_01_01/{single}"),
+        &[single],
+    );
+}
