@@ -357,7 +357,7 @@ mod tests {
             change(&mut expected);
             assert_eq!(with(options).unwrap(), expected, "{options:?}");
         }
-        let refused: [(&[&str], &str, &str); 12] = [
+        let refused: [(&[&str], &str, &str); 14] = [
             (&["--preset", "light"], "light", "tiny"),
             (&["--size", "640x192"], "640x192", "320x96"),
             (&["--batch", "3"], "3", "4"),
