@@ -34,8 +34,11 @@ mod tests {
 
     #[test]
     fn a_missing_folder_is_named() {
-        for write in [write_atomically::<Error>, write_unsynced::<Error>] {
-            let error = write(Path::new("no/such/folder/a.txt"), |_| Ok(()));
+        let path = Path::new("no/such/folder/a.txt");
+        for error in [
+            write_atomically::<Error>(path, |_| Ok(())),
+            write_unsynced::<Error>(path, |_| Ok(())),
+        ] {
             let message = error.unwrap_err().to_string();
             assert!(message.contains("no/such/folder/a.txt"), "{message}");
         }

@@ -200,7 +200,7 @@ fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], le
         (loaded, seen)
     };
     let (to_disk, written) = committer::queue();
-    let write = |i: usize, (loaded, seen): (Loaded, Result<Seen>)| {
+    let write = move |i: usize, (loaded, seen): (Loaded, Result<Seen>)| {
         match seen.and_then(|seen| job.write_outputs(mine[todo[i]], &loaded, &seen)) {
             // Fails only where the other thread has panicked, which ends the program below.
             Ok(sidecar) => drop(to_disk.send((todo[i], sidecar))),
@@ -213,7 +213,7 @@ fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], le
         scope.spawn(|| committer::commit(ledger, mine, &written));
         pipeline::run(todo.len(), threads, &stop, &load, infer, &write);
         // The committer ends with the last image written.
-        drop(to_disk);
+        drop(write);
     });
 }
 

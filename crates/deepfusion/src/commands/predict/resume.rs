@@ -1,7 +1,6 @@
 //! What of a job is there already, and whether it may stay.
 
 use std::collections::HashSet;
-use std::path::Path;
 
 use anyhow::Result;
 use deepfusion_fs::Partial;
