@@ -2,6 +2,8 @@
 
 use std::ops::{Deref, DerefMut};
 
+use crate::element::Element;
+
 /// A cache line.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
@@ -15,15 +17,27 @@ pub(crate) struct Aligned<T> {
     kind: std::marker::PhantomData<T>,
 }
 
-impl<T: crate::element::Element> Aligned<T> {
-    /// Zeros.
-    pub(crate) fn zeros(len: usize) -> Self {
-        let lines = (len * size_of::<T>()).div_ceil(size_of::<Line>());
-        Self {
-            lines: vec![Line([0; 64]); lines],
+impl<T: Element> Aligned<T> {
+    /// Zeros; `None` where there is no memory for them.
+    pub(crate) fn try_zeros(len: usize) -> Option<Self> {
+        let bytes = len.checked_mul(size_of::<T>())?;
+        let count = bytes.div_ceil(size_of::<Line>());
+        let mut lines = Vec::new();
+        lines.try_reserve_exact(count).ok()?;
+        lines.resize(count, Line([0; 64]));
+        Some(Self {
+            lines,
             len,
             kind: std::marker::PhantomData,
-        }
+        })
+    }
+
+    /// Zeros, as many as follow from what is in memory already.
+    ///
+    /// # Panics
+    /// When there is no memory for them.
+    pub(crate) fn zeros(len: usize) -> Self {
+        Self::try_zeros(len).expect("memory for a network's weights")
     }
 
     /// The same numbers, aligned.
@@ -34,18 +48,33 @@ impl<T: crate::element::Element> Aligned<T> {
     }
 }
 
-impl<T> Deref for Aligned<T> {
+impl<T: Element> Deref for Aligned<T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
-        // SAFETY: the lines have room for `len` numbers of four or two bytes; all bits zero is a number.
+        // SAFETY: the lines have room for `len` numbers, at a multiple of their alignment, and any bits are a number
+        // (the promise of `Element`).
         unsafe { std::slice::from_raw_parts(self.lines.as_ptr().cast(), self.len) }
     }
 }
 
-impl<T> DerefMut for Aligned<T> {
+impl<T: Element> DerefMut for Aligned<T> {
     fn deref_mut(&mut self) -> &mut [T] {
         // SAFETY: as above.
         unsafe { std::slice::from_raw_parts_mut(self.lines.as_mut_ptr().cast(), self.len) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_than_any_memory_holds_is_refused() {
+        assert!(Aligned::<f32>::try_zeros(usize::MAX / 4 + 1).is_none());
+        assert!(Aligned::<f32>::try_zeros(usize::MAX / 4).is_none());
+        let some = Aligned::<f32>::try_zeros(17).unwrap();
+        assert_eq!((some.len(), some.as_ptr().addr() % 64), (17, 0));
+        assert!(some.iter().all(|v| *v == 0.0));
     }
 }

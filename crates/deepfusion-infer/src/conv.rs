@@ -27,6 +27,11 @@ impl Geometry {
         self.input.offset - reach * (self.input.row + self.input.pitch)
     }
 
+    /// Where the first tap of an output pixel lies.
+    pub(crate) fn first_tap(&self, x: usize, y: usize) -> usize {
+        self.corner() + self.stride * (y * self.input.row + x * self.input.pitch)
+    }
+
     /// Whether a tap that lies `k` steps along an axis of `n` pixels ever meets one of them: a wide kernel's
     /// outermost taps may see nothing but a border of zeros.
     fn sees(&self, k: usize, n: usize) -> bool {
@@ -58,6 +63,8 @@ pub(crate) struct Runs {
     pub(crate) offsets: Vec<usize>,
     /// Elements of a run.
     pub(crate) len: usize,
+    /// Elements from a pixel's first to the end of the last run.
+    pub(crate) extent: usize,
     /// For each run and element, which input channel and tap (ky·kernel + kx) it is; none where it only
     /// fills up.
     pub(crate) sources: Vec<Option<(usize, usize)>>,
@@ -65,7 +72,8 @@ pub(crate) struct Runs {
 
 impl Runs {
     /// The runs of a convolution over a view whose first channels are the logical ones named by
-    /// `channel_of` (physical → logical); runs are at most `most` long and multiples of `multiple`.
+    /// `channel_of` (physical → logical); runs are at most `most` long and multiples of `multiple`, of which fewer
+    /// than one only fill up.
     pub(crate) fn new(
         g: &Geometry,
         channel_of: &[Option<usize>],
@@ -77,13 +85,8 @@ impl Runs {
         let neighbours = channels == g.input.pitch && g.dilation == 1;
         let joined = if neighbours { g.kernel } else { 1 };
         let whole = channels * joined;
-        let parts = whole.div_ceil(most);
-        let len = whole.div_ceil(parts).next_multiple_of(multiple);
-        let mut runs = Self {
-            offsets: Vec::new(),
-            len,
-            sources: Vec::new(),
-        };
+        let mut runs = Self::empty(run_length(whole, most, multiple));
+        let len = runs.len;
         for ky in g.tap_rows() {
             for kx in (0..g.kernel).step_by(joined) {
                 if joined == 1 && !g.sees(kx, g.input.width) {
@@ -103,17 +106,13 @@ impl Runs {
                 }
             }
         }
-        runs
+        runs.measured()
     }
 
     /// Runs of `len` channels each, all taps of the same channels together: neighbouring taps see the same
     /// pixels, which then still lie in the first cache.
     pub(crate) fn by_channels(g: &Geometry, channel_of: &[Option<usize>], len: usize) -> Self {
-        let mut runs = Self {
-            offsets: Vec::new(),
-            len,
-            sources: Vec::new(),
-        };
+        let mut runs = Self::empty(len);
         for first in (0..channel_of.len()).step_by(len) {
             for ky in g.tap_rows() {
                 for kx in (0..g.kernel).filter(|kx| g.sees(*kx, g.input.width)) {
@@ -125,8 +124,31 @@ impl Runs {
                 }
             }
         }
-        runs
+        runs.measured()
     }
+
+    fn empty(len: usize) -> Self {
+        Self {
+            offsets: Vec::new(),
+            len,
+            extent: 0,
+            sources: Vec::new(),
+        }
+    }
+
+    fn measured(mut self) -> Self {
+        self.extent = self.offsets.iter().max().map_or(0, |last| last + self.len);
+        self
+    }
+}
+
+/// Elements of each run where `whole` of them are cut into runs of at most `most`: a multiple of `multiple`, and all
+/// runs alike, so that no more is filled up than the last multiple.
+fn run_length(whole: usize, most: usize, multiple: usize) -> usize {
+    let units = whole.div_ceil(multiple);
+    let mut lengths = (1..=(most / multiple).min(units)).rev();
+    let length = lengths.find(|length| units.is_multiple_of(*length));
+    length.unwrap_or(1) * multiple
 }
 
 /// One weight of a convolution, 0 where there is none.
@@ -182,5 +204,27 @@ impl Tasks {
             let pixels = start..(start + self.piece).min(self.pixels);
             task(pixels, group(part)..group(part + 1));
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_alike_and_fill_up_no_more_than_they_must() {
+        assert_eq!(run_length(1536, 160, 1), 128);
+        assert_eq!(run_length(288, 160, 1), 144);
+        assert_eq!(run_length(21, 160, 1), 21);
+        assert_eq!(run_length(21, 320, 2), 22);
+        assert_eq!(run_length(21, usize::MAX, 32), 32);
+        for (whole, most, multiple) in [(672, 160, 1), (2048, 320, 2), (163, 160, 1), (75, 64, 2)] {
+            let len = run_length(whole, most, multiple);
+            assert!(len <= most && len.is_multiple_of(multiple), "{whole}");
+            assert!(
+                whole.next_multiple_of(multiple).is_multiple_of(len),
+                "{whole}"
+            );
+        }
     }
 }

@@ -18,7 +18,7 @@ const PIXELS_AT_ONCE: usize = 480;
 /// A convolution ready to run.
 #[derive(Debug)]
 pub(crate) struct Direct {
-    geometry: Geometry,
+    pub(crate) geometry: Geometry,
     runs: Runs,
     /// For each group of [`GROUP`] output channels: a row of them for every input of every run.
     panels: Aligned<f32>,
@@ -49,7 +49,7 @@ impl Direct {
 
     /// # Safety
     /// `arena` must hold every view of the geometry, its border included, and nobody else may use the
-    /// output meanwhile.
+    /// output meanwhile or write the others.
     pub(crate) unsafe fn run(&self, arena: Shared<f32>) {
         let groups = self.bias.len().div_ceil(GROUP);
         Tasks::new(self.geometry.out.pixels(), PIXELS_AT_ONCE, 6, groups).run(|pixels, groups| {
@@ -68,7 +68,7 @@ impl Direct {
 
 struct Task<'a> {
     conv: &'a Direct,
-    arena: Shared<f32>,
+    arena: Shared<'a, f32>,
     pixels: std::ops::Range<usize>,
     groups: std::ops::Range<usize>,
     places: &'a mut Vec<Pixel>,
@@ -97,16 +97,14 @@ impl WithSimd for Task<'_> {
             let (x, y) = (p % g.out.width, p / g.out.width);
             let count = (g.out.width - x).min(pixels.end - p);
             let input = corner + y * g.stride * g.input.row;
-            // SAFETY: the pixels lie in the views (the promise of `run`).
-            places.extend((x..x + count).map(|x| unsafe {
-                Pixel {
-                    input: arena.at(input + x * g.stride * g.input.pitch),
-                    out: arena.at(g.out.at(x, y)),
-                    residual: match &g.residual {
-                        Some(view) => arena.at(view.at(x, y)),
-                        None => std::ptr::null(),
-                    },
-                }
+            let (extent, pitch) = (conv.runs.extent, g.stride * g.input.pitch);
+            places.extend((x..x + count).map(|x| Pixel {
+                input: arena.at(input + x * pitch, extent),
+                out: arena.at(g.out.at(x, y), columns),
+                residual: match &g.residual {
+                    Some(view) => arena.at(view.at(x, y), columns),
+                    None => std::ptr::null(),
+                },
             }));
             p += count;
         }
@@ -132,12 +130,13 @@ impl WithSimd for Task<'_> {
                     },
                     relu: i == last && g.activation == Activation::Relu,
                 };
-                // SAFETY: the views lie in the arena, the panel has a row for every input.
+                // SAFETY: every pixel's inputs, outputs and residual lie in the arena, as `at` has checked, and nobody
+                // else uses the outputs (the promise of `run`); the panel has a row for every input.
                 unsafe { tiles(simd, &sum, width, places, shift) };
             }
             if !matches!(g.activation, Activation::Identity | Activation::Relu) {
                 for place in places.iter() {
-                    // SAFETY: written just now, by this task alone.
+                    // SAFETY: `width` of its columns, written just now, by this task alone.
                     unsafe { g.activation.apply(simd, place.out.add(first), width) };
                 }
             }

@@ -39,7 +39,8 @@ impl Engine {
     ///
     /// # Errors
     /// [`Error::Size`] where the graph cannot work on such images, [`Error::Graph`] where a residual or a
-    /// mask's operand is a concatenation or the image, [`Error::NoBf16`].
+    /// mask's operand is a concatenation or the image, [`Error::Memory`] where such images' values have no room in
+    /// memory, [`Error::NoBf16`].
     pub fn new(
         graph: Graph,
         width: usize,
@@ -49,9 +50,9 @@ impl Engine {
         graph.check_size(width, height)?;
         graph.check_operands()?;
         let runner = match precision {
-            Precision::F32 => Runner::F32(Typed::new(graph, width, height)),
+            Precision::F32 => Runner::F32(Typed::new(graph, width, height)?),
             Precision::Bf16 if !Self::has_bf16() => return Err(Error::NoBf16),
-            Precision::Bf16 => Runner::Bf16(Typed::new(graph, width, height)),
+            Precision::Bf16 => Runner::Bf16(Typed::new(graph, width, height)?),
         };
         Ok(Self {
             runner,
@@ -129,37 +130,31 @@ pub(crate) struct Typed<E, C> {
     plan: Plan<C>,
     arena: Aligned<E>,
     normalisation: Normalisation,
-    /// Whether the last image held something that is no number. Kernels read on a little and multiply by zero, so
-    /// nothing of it may stay for the next.
-    spoilt: bool,
 }
 
 impl<E: Element, C: ConvForm<E>> Typed<E, C> {
-    pub(crate) fn new(graph: Graph, width: usize, height: usize) -> Self {
+    pub(crate) fn new(graph: Graph, width: usize, height: usize) -> Result<Self, Error> {
         let normalisation = Normalisation {
             mean: graph.mean(),
             std: graph.std(),
         };
-        let plan = Plan::new::<E>(graph, width, height, |conv, geometry, channel_of| {
-            C::new(&conv, geometry, channel_of)
-        });
-        Self {
-            arena: Aligned::zeros(plan.arena),
+        let (plan, arena) = Plan::new(graph, width, height)?;
+        Ok(Self {
             plan,
+            arena,
             normalisation,
-            spoilt: false,
-        }
+        })
     }
 
     pub(crate) fn run(&mut self, image: &[f32], mut after: impl FnMut(&str, &str)) {
-        if self.spoilt {
-            self.arena.fill(E::default());
+        // An image may overflow and leave what is no number: of that nothing is read for the next one.
+        for places in &self.plan.stale {
+            self.arena[places.clone()].fill(E::default());
         }
-        self.spoilt = !all_finite(image);
-        let arena = Shared(self.arena.as_mut_ptr());
+        let arena = Shared::new(&mut self.arena);
         for (name, step) in &self.plan.steps {
-            // SAFETY: the plan's views lie in the arena; steps run one after the other, and the output of
-            // each lies apart from what it reads.
+            // SAFETY: the plan's views lie in the arena, which is borrowed here alone; steps run one after the other,
+            // and the output of each lies apart from what it reads.
             unsafe {
                 match step {
                     Step::Image(to) => self.normalisation.run(image, arena, to),
@@ -200,8 +195,9 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
         let mut out = Vec::with_capacity(places.len() * view.pixels());
         let value = |at: usize| {
             if view.result {
-                // SAFETY: the layout gave the value the room of an f32, at a multiple of its size.
-                unsafe { *self.arena.as_ptr().add(at).cast::<f32>() }
+                let slots = &self.arena[at..at + size_of::<f32>() / size_of::<E>()];
+                // SAFETY: the slice is as large as an f32, of which any bits are one, and need not be aligned.
+                unsafe { slots.as_ptr().cast::<f32>().read_unaligned() }
             } else {
                 self.arena[at].value()
             }
@@ -215,9 +211,10 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
     }
 }
 
-/// Without a branch a value, so that it becomes vector code.
-fn all_finite(values: &[f32]) -> bool {
-    const EXPONENT: u32 = 0x7f80_0000;
-    let broken = |v: &f32| u32::from(v.to_bits() & EXPONENT == EXPONENT);
-    values.iter().fold(0, |any, v| any | broken(v)) == 0
+#[cfg(test)]
+impl<E: Element, C: ConvForm<E>> Typed<E, C> {
+    /// Leaves the arena full of what is no number, as the worst of images might.
+    pub(crate) fn poison(&mut self) {
+        self.arena.fill(E::of(f32::NAN));
+    }
 }

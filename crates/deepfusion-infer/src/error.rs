@@ -25,6 +25,16 @@ pub enum Error {
         /// The smallest side.
         least: usize,
     },
+    /// Images so large that the network's values have no room in memory.
+    #[error(
+        "network input of {width}x{height} pixels: no memory for the network's values at this size"
+    )]
+    Memory {
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+    },
     /// A precision that this processor has no instructions for.
     #[error("bf16 needs a processor with AMX or AVX512-BF16; this one has neither")]
     NoBf16,

@@ -1,7 +1,7 @@
 //! Which form a convolution takes.
 
 use crate::Conv;
-use crate::conv::Geometry;
+use crate::conv::{Geometry, Runs};
 use crate::direct::Direct;
 use crate::element::Bf16;
 use crate::head::Head;
@@ -12,12 +12,21 @@ use crate::winograd::Winograd;
 pub(crate) trait ConvForm<E> {
     fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self;
 
+    /// Elements that it may read behind a buffer's last pixel, whose pixels are `pitch` elements apart.
+    fn overread(pitch: usize) -> usize;
+
     /// What profiles call it.
     fn name(&self) -> &'static str;
 
+    fn geometry(&self) -> &Geometry;
+
+    /// Its runs, if it also reads what none of its inputs stands for: `None` as a source. Each form reads what is told
+    /// here, what its inputs are, and nothing else that its results depend on.
+    fn reads_on(&self) -> Option<(&Geometry, &Runs)>;
+
     /// # Safety
-    /// `arena` must hold every view of the geometry, its border included, and nobody else may use the
-    /// output meanwhile.
+    /// `arena` must hold every view of the geometry, its border and `overread` behind its buffer included; nobody else
+    /// may use the output meanwhile, or write the others.
     unsafe fn run(&self, arena: Shared<E>);
 }
 
@@ -40,12 +49,31 @@ impl ConvForm<f32> for F32Conv {
         }
     }
 
+    /// All are exact.
+    fn overread(_: usize) -> usize {
+        0
+    }
+
     fn name(&self) -> &'static str {
         match self {
             Self::Direct(_) => "direct",
             Self::Winograd(_) => "winograd",
             Self::Head(_) => "head",
         }
+    }
+
+    fn geometry(&self) -> &Geometry {
+        match self {
+            Self::Direct(conv) => &conv.geometry,
+            Self::Winograd(conv) => &conv.geometry,
+            Self::Head(conv) => &conv.geometry,
+        }
+    }
+
+    /// All are exact: the direct form and the head read their inputs alone, Winograd's tiles pixels of the image and
+    /// its border.
+    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
+        None
     }
 
     unsafe fn run(&self, arena: Shared<f32>) {
@@ -85,10 +113,28 @@ impl ConvForm<Bf16> for Bf16Conv {
         }
     }
 
+    fn overread(pitch: usize) -> usize {
+        crate::bf16::Amx::overread(pitch).max(crate::bf16::Dot::overread(pitch))
+    }
+
     fn name(&self) -> &'static str {
         match self {
             Self::Amx(conv) => conv.name(),
             Self::Dot(conv) => conv.name(),
+        }
+    }
+
+    fn geometry(&self) -> &Geometry {
+        match self {
+            Self::Amx(conv) => conv.geometry(),
+            Self::Dot(conv) => conv.geometry(),
+        }
+    }
+
+    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
+        match self {
+            Self::Amx(conv) => conv.reads_on(),
+            Self::Dot(conv) => conv.reads_on(),
         }
     }
 
@@ -121,7 +167,19 @@ impl ConvForm<Bf16> for Bf16Conv {
         unreachable!("the engine asks `available` first")
     }
 
+    fn overread(_: usize) -> usize {
+        0
+    }
+
     fn name(&self) -> &'static str {
+        match *self {}
+    }
+
+    fn geometry(&self) -> &Geometry {
+        match *self {}
+    }
+
+    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
         match *self {}
     }
 

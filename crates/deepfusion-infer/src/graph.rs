@@ -181,7 +181,11 @@ impl Graph {
         let of = |(i, node): (usize, &Node)| match &node.op {
             Op::Conv(conv) => {
                 let (w, h) = self.shapes[i + 1].size(width, height);
-                (conv.weight.len() * w * h) as u64
+                [w, h]
+                    .into_iter()
+                    .fold(conv.weight.len() as u64, |all, side| {
+                        all.saturating_mul(side as u64)
+                    })
             }
             _ => 0,
         };
@@ -191,8 +195,8 @@ impl Graph {
     /// The same in all, in 10⁹ operations of two (GFLOP).
     #[must_use]
     pub fn gflop(&self, width: usize, height: usize) -> f64 {
-        let all: u64 = self.multiply_adds(width, height).iter().sum();
-        all as f64 * 2e-9
+        let all = self.multiply_adds(width, height);
+        all.iter().map(|count| *count as f64).sum::<f64>() * 2e-9
     }
 
     /// That the graph can work on images of this size.

@@ -6,13 +6,12 @@ use rayon::prelude::*;
 use crate::Conv;
 use crate::conv::{Geometry, Runs, weight};
 use crate::dispatch::dispatch;
-use crate::tile::LANES;
 use crate::view::Shared;
 
 /// A convolution to one channel, ready to run.
 #[derive(Debug)]
 pub(crate) struct Head {
-    geometry: Geometry,
+    pub(crate) geometry: Geometry,
     runs: Runs,
     /// One for every input of every run.
     weights: Vec<f32>,
@@ -24,7 +23,7 @@ impl Head {
     /// When there is more than one output channel.
     pub(crate) fn new(conv: &Conv, geometry: Geometry, channel_of: &[Option<usize>]) -> Self {
         assert_eq!(conv.channels_out, 1, "a head has one channel");
-        let runs = Runs::new(&geometry, channel_of, usize::MAX, LANES);
+        let runs = Runs::new(&geometry, channel_of, usize::MAX, 1);
         let weights = runs.sources.iter().map(|s| weight(conv, 0, *s)).collect();
         Self {
             geometry,
@@ -49,7 +48,7 @@ impl Head {
 
 struct Row<'a> {
     head: &'a Head,
-    arena: Shared<f32>,
+    arena: Shared<'a, f32>,
     y: usize,
 }
 
@@ -61,28 +60,32 @@ impl WithSimd for Row<'_> {
         let Self { head, arena, y } = self;
         let g = &head.geometry;
         let corner = g.corner() + y * g.stride * g.input.row;
-        let vectors = head.runs.len / S::F32_LANES;
+        let whole = head.runs.len / S::F32_LANES * S::F32_LANES;
         for x in 0..g.out.width {
-            let mut sum = simd.splat_f32s(0.0);
-            // SAFETY: the views lie in the arena; weights are as many as the runs' inputs.
-            unsafe {
-                let pixel = arena.at(corner + x * g.stride * g.input.pitch);
-                let mut weights = head.weights.as_ptr().cast::<S::f32s>();
-                for &run in &head.runs.offsets {
-                    let input = pixel.add(run).cast::<S::f32s>();
-                    for v in 0..vectors {
-                        let (w, x) = (weights.read_unaligned(), input.add(v).read_unaligned());
-                        weights = weights.add(1);
+            let pixel = arena.at(corner + x * g.stride * g.input.pitch, head.runs.extent);
+            let mut weights = head.weights.as_ptr();
+            let (mut sum, mut rest) = (simd.splat_f32s(0.0), head.bias);
+            for &run in &head.runs.offsets {
+                // SAFETY: the runs lie within their extent, which nobody writes (the promise of `run`); weights are as
+                // many as the runs' inputs.
+                unsafe {
+                    for k in (0..whole).step_by(S::F32_LANES) {
+                        let w = weights.add(k).cast::<S::f32s>().read_unaligned();
+                        let x = pixel.add(run + k).cast::<S::f32s>().read_unaligned();
                         sum = simd.mul_add_f32s(w, x, sum);
                     }
+                    // Of the image or an extent, whose channels are not whole vectors.
+                    for k in whole..head.runs.len {
+                        rest += *weights.add(k) * *pixel.add(run + k);
+                    }
+                    weights = weights.add(head.runs.len);
                 }
-                *arena.at(g.out.at(x, y)) = simd.reduce_sum_f32s(sum) + head.bias;
             }
+            // SAFETY: a pixel of the output, whose row is this task's alone.
+            unsafe { *arena.at(g.out.at(x, y), 1) = simd.reduce_sum_f32s(sum) + rest };
         }
-        // SAFETY: a head's output has one channel a pixel, the row lies in its view.
-        unsafe {
-            g.activation
-                .apply(simd, arena.at(g.out.at(0, y)), g.out.width)
-        };
+        let row = arena.at(g.out.at(0, y), g.out.width);
+        // SAFETY: a head's output has one channel a pixel and no border: that many values of this task's row.
+        unsafe { g.activation.apply(simd, row, g.out.width) };
     }
 }

@@ -4,9 +4,6 @@ use crate::tile::LANES;
 use crate::view::View;
 use crate::{Graph, Op, ValueId, ValueShape};
 
-/// Elements after a buffer's last pixel that a kernel may read and multiply by zero.
-const OVERREAD: usize = 64;
-
 /// A buffer holds one value, or a concatenation with the values that are its parts.
 #[derive(Debug, Clone)]
 pub(crate) struct Buffer {
@@ -64,7 +61,8 @@ impl Layout {
             let buffer = home.buffer;
             let mut first = 0;
             for (part, in_place) in parts(graph, ValueId(value)) {
-                if in_place && homes[part.0].is_none() && !is_concat(graph, part) {
+                let free = homes[part.0].is_none() && !is_concat(graph, part);
+                if in_place && free && !reads_part_of(graph, part, ValueId(value)) {
                     homes[part.0] = Some(Home {
                         buffer,
                         first,
@@ -91,16 +89,30 @@ impl Layout {
         *live = Some((first.min(step), last.max(step)));
     }
 
-    /// Gives every buffer an offset; buffers that are never alive together may share memory. Results lie
-    /// behind them all: a kernel that reads on past a buffer's end, times zero, must not meet the halves of
-    /// an f32, which may be no number. Returns the size of the whole.
-    pub(crate) fn place(&mut self, width: usize, height: usize) -> usize {
+    /// Gives every buffer an offset; buffers that are never alive together may share memory. Each has room behind it
+    /// for what kernels read on: `overread` elements, by the distance of its pixels. Results lie behind them all: what is
+    /// read on, times zero, must not meet the halves of an f32, which may be no number. Returns the size of the whole;
+    /// `None` where that is more than can be counted.
+    pub(crate) fn place(
+        &mut self,
+        width: usize,
+        height: usize,
+        overread: impl Fn(usize) -> usize,
+    ) -> Option<usize> {
         let mut order: Vec<usize> = (0..self.buffers.len()).collect();
-        let size = |b: &Buffer| {
+        let size_of = |b: &Buffer| {
             let (width, height) = b.shape.size(width, height);
-            let side = |n: usize| n + 2 * b.border;
-            (side(width) * side(height) * b.channels + OVERREAD).next_multiple_of(64)
+            let side = |n: usize| n.checked_add(b.border.checked_mul(2)?);
+            let pixels = side(width)?.checked_mul(side(height)?)?;
+            let all = pixels.checked_mul(b.channels)?;
+            let all = all.checked_add(overread(b.channels))?;
+            all.checked_next_multiple_of(64)
         };
+        let sizes: Vec<usize> = self.buffers.iter().map(size_of).collect::<Option<_>>()?;
+        // Side by side they need no more than this; if that can be counted, so can every offset below.
+        sizes
+            .iter()
+            .try_fold(0_usize, |all, s| all.checked_add(*s))?;
         let results: Vec<bool> = (0..self.buffers.len())
             .map(|b| {
                 self.homes
@@ -109,14 +121,14 @@ impl Layout {
             })
             .collect();
         // Large ones first: the small ones fill the gaps.
-        order.sort_by_key(|i| std::cmp::Reverse(size(&self.buffers[*i])));
+        order.sort_by_key(|i| std::cmp::Reverse(sizes[*i]));
         let mut placed: Vec<usize> = Vec::new();
         let mut end = 0;
         for index in order.iter().copied().filter(|i| !results[*i]) {
             let Some(live) = self.buffers[index].live else {
                 continue;
             };
-            let wanted = size(&self.buffers[index]);
+            let wanted = sizes[index];
             let together = |other: &&usize| {
                 let (first, last) = self.buffers[**other].live.unwrap_or((1, 0));
                 first <= live.1 && live.0 <= last
@@ -124,7 +136,7 @@ impl Layout {
             let mut taken: Vec<(usize, usize)> = placed
                 .iter()
                 .filter(together)
-                .map(|i| (self.buffers[*i].offset, size(&self.buffers[*i])))
+                .map(|i| (self.buffers[*i].offset, sizes[*i]))
                 .collect();
             taken.sort_unstable();
             let mut offset = 0;
@@ -138,19 +150,11 @@ impl Layout {
             end = end.max(offset + wanted);
             placed.push(index);
         }
-        end += self.slack();
         for index in order.into_iter().filter(|i| results[*i]) {
             self.buffers[index].offset = end;
-            end += size(&self.buffers[index]);
+            end += sizes[index];
         }
-        end
-    }
-
-    /// Elements after the last buffer that kernels may read, and multiply by zero or drop: whole vectors,
-    /// and pixels that fill up a tile.
-    fn slack(&self) -> usize {
-        let widest = self.buffers.iter().map(|b| b.channels).max().unwrap_or(0);
-        (40 * widest + 1024).next_multiple_of(64)
+        Some(end)
     }
 
     /// Where each logical channel of a value lies in a pixel.
@@ -232,6 +236,15 @@ fn is_result(graph: &Graph, value: ValueId) -> bool {
     let node = value.0.checked_sub(1).map(|i| &graph.nodes()[i].op);
     let plain = matches!(node, Some(Op::Conv(conv)) if conv.residual.is_none());
     plain && graph.shape(value).channels == 1 && !graph.is_read(value)
+}
+
+/// Whether a part of a concatenation is a convolution of another part: in one buffer, what it reads on could be what it
+/// writes.
+fn reads_part_of(graph: &Graph, part: ValueId, concat: ValueId) -> bool {
+    match part.0.checked_sub(1).map(|i| &graph.nodes()[i].op) {
+        Some(Op::Conv(conv)) => parts(graph, concat).iter().any(|p| p.0 == conv.input),
+        _ => false,
+    }
 }
 
 fn is_concat(graph: &Graph, value: ValueId) -> bool {

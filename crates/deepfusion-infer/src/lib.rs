@@ -21,6 +21,7 @@ mod op;
 mod plan;
 mod scratch;
 mod shape;
+mod stale;
 #[cfg(test)]
 mod tests;
 mod tile;

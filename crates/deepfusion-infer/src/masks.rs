@@ -22,7 +22,7 @@ pub(crate) struct Gate {
 
 impl Gate {
     /// # Safety
-    /// The views must lie in the arena, the output apart from the others, and nobody else use it.
+    /// The views must lie in the arena, the output apart from the others, and nobody else use it or write those.
     pub(crate) unsafe fn run<E: Element>(&self, arena: Shared<E>) {
         let shift = if self.residual { 1.0 } else { 0.0 };
         (0..self.out.height).into_par_iter().for_each(|y| {
@@ -33,9 +33,9 @@ impl Gate {
                 out: &self.out,
                 y,
                 apply: |x: usize, value: f32, channel: f32| {
-                    // SAFETY: a pixel of the mask.
-                    let spatial = unsafe { *arena.at(self.spatial.at(x, y)) };
-                    value * (shift + spatial.value() * channel)
+                    // SAFETY: a pixel of the mask, which nobody writes (the caller's promise).
+                    let spatial = unsafe { arena.read(self.spatial.at(x, y), 1) };
+                    value * (shift + spatial[0].value() * channel)
                 },
             });
         });
@@ -66,7 +66,7 @@ pub(crate) unsafe fn add_pixel<E: Element>(
 
 /// A row of an operation on every pixel's channels and those of one pixel.
 struct Row<'a, E, F> {
-    arena: Shared<E>,
+    arena: Shared<'a, E>,
     input: &'a View,
     pixel: &'a View,
     out: &'a View,
@@ -89,15 +89,18 @@ impl<E: Element, F: Fn(usize, f32, f32) -> f32> WithSimd for Row<'_, E, F> {
             apply,
         } = self;
         let count = out.channels;
-        // SAFETY: pixels of the views; the output's row is this task's alone.
-        unsafe {
-            let pixel = std::slice::from_raw_parts(arena.at(pixel.offset), count);
-            for x in 0..out.width {
-                let from = std::slice::from_raw_parts(arena.at(input.at(x, y)), count);
-                let to = std::slice::from_raw_parts_mut(arena.at(out.at(x, y)), count);
-                for ((to, from), pixel) in to.iter_mut().zip(from).zip(pixel) {
-                    *to = E::of(apply(x, from.value(), pixel.value()));
-                }
+        // SAFETY: a pixel's channels, which nobody writes (the promise of `run`).
+        let pixel = unsafe { arena.read(pixel.offset, count) };
+        for x in 0..out.width {
+            // SAFETY: as above; the output's row is this task's alone.
+            let (from, to) = unsafe {
+                (
+                    arena.read(input.at(x, y), count),
+                    arena.write(out.at(x, y), count),
+                )
+            };
+            for ((to, from), pixel) in to.iter_mut().zip(from).zip(pixel) {
+                *to = E::of(apply(x, from.value(), pixel.value()));
             }
         }
     }

@@ -32,7 +32,7 @@ pub(crate) unsafe fn global_mean<E: Element>(arena: Shared<E>, from: &View, to: 
 }
 
 struct Mean<'a, E> {
-    arena: Shared<E>,
+    arena: Shared<'a, E>,
     from: &'a View,
     to: &'a View,
     channels: Range<usize>,
@@ -55,8 +55,8 @@ impl<E: Element> WithSimd for Mean<'_, E> {
             // A row by itself: few roundings of a small number on a large one.
             let mut row = [0.0_f32; AT_ONCE];
             for x in 0..from.width {
-                // SAFETY: channels of a pixel of the view.
-                let pixel = unsafe { slice(arena, from.at(x, y) + channels.start, count) };
+                // SAFETY: channels of a pixel of the view, which nobody writes (the promise of `global_mean`).
+                let pixel = unsafe { arena.read(from.at(x, y) + channels.start, count) };
                 match pixel.as_array::<AT_ONCE>() {
                     // A fixed length becomes vectors without a rest.
                     Some(pixel) => add(&mut row, pixel),
@@ -66,11 +66,8 @@ impl<E: Element> WithSimd for Mean<'_, E> {
             add(&mut sums, &row);
         }
         let share = 1.0 / from.pixels() as f32;
-        // SAFETY: as above; this task alone writes these channels.
-        let out = unsafe {
-            let first = arena.at(to.offset + channels.start);
-            std::slice::from_raw_parts_mut(first, count)
-        };
+        // SAFETY: channels of `to`'s pixel, which are this task's alone.
+        let out = unsafe { arena.write(to.offset + channels.start, count) };
         for (out, sum) in out.iter_mut().zip(sums) {
             *out = E::of(sum * share);
         }
@@ -82,14 +79,6 @@ fn add<E: Element>(sums: &mut [f32], values: &[E]) {
     for (sum, value) in sums.iter_mut().zip(values) {
         *sum += value.value();
     }
-}
-
-/// # Safety
-/// The elements must lie in the arena, and nobody write them meanwhile.
-#[inline(always)]
-unsafe fn slice<'a, E>(arena: Shared<E>, at: usize, len: usize) -> &'a [E] {
-    // SAFETY: the caller's promise.
-    unsafe { std::slice::from_raw_parts(arena.at(at), len) }
 }
 
 /// Each pixel's mean and maximum over the channels at the places `channels`.
@@ -114,7 +103,7 @@ pub(crate) unsafe fn channel_extent<E: Element>(
 }
 
 struct Extent<'a, E> {
-    arena: Shared<E>,
+    arena: Shared<'a, E>,
     from: &'a View,
     channels: &'a [Range<usize>],
     to: &'a View,
@@ -139,8 +128,8 @@ impl<E: Element> WithSimd for Extent<'_, E> {
             let mut sums = [0.0_f32; LANES];
             let mut most = [f32::NEG_INFINITY; LANES];
             for run in channels {
-                // SAFETY: channels of a pixel of the view.
-                let values = unsafe { slice(arena, from.at(x, y) + run.start, run.len()) };
+                // SAFETY: channels of a pixel of the view, which nobody writes (the promise of `channel_extent`).
+                let values = unsafe { arena.read(from.at(x, y) + run.start, run.len()) };
                 let (whole, rest) = values.as_chunks::<LANES>();
                 for values in whole {
                     extend(&mut sums, &mut most, values);
@@ -150,11 +139,8 @@ impl<E: Element> WithSimd for Extent<'_, E> {
             let sum: f32 = sums.iter().sum();
             let most = most.into_iter().fold(f32::NEG_INFINITY, greater);
             // SAFETY: a pixel of `to`, whose row is this task's alone.
-            unsafe {
-                let out = arena.at(to.at(x, y));
-                out.write(E::of(sum * share));
-                out.add(1).write(E::of(most));
-            }
+            let out = unsafe { arena.write(to.at(x, y), 2) };
+            out.copy_from_slice(&[E::of(sum * share), E::of(most)]);
         }
     }
 }

@@ -21,32 +21,41 @@ impl Normalisation {
         let planes: [&[f32]; 3] = std::array::from_fn(|c| &image[c * to.pixels()..][..to.pixels()]);
         (0..to.height).into_par_iter().for_each(|y| {
             let rows = planes.map(|plane| &plane[y * to.width..][..to.width]);
-            // SAFETY: the row lies in the view.
-            let out = unsafe { row_of(arena, to, y) };
-            for (x, out) in out.chunks_exact_mut(to.pitch).enumerate() {
-                for c in 0..3 {
-                    out[c] = E::of((rows[c][x] - self.mean[c]) / self.std[c]);
+            for x in 0..to.width {
+                // SAFETY: a pixel's three channels, which nobody else uses (the caller's promise): not the whole row,
+                // as between them those of other values may lie.
+                let out = unsafe { arena.write(to.at(x, y), 3) };
+                for (c, out) in out.iter_mut().enumerate() {
+                    *out = E::of((rows[c][x] - self.mean[c]) / self.std[c]);
                 }
             }
         });
     }
 }
 
-/// All elements of an image's row, without the border.
-unsafe fn row_of<'a, E: Element>(arena: Shared<E>, view: &View, y: usize) -> &'a mut [E] {
+/// A pixel's channels, of which others may be read at the same time.
+///
+/// # Safety
+/// Nobody may write them while the slice lives.
+#[inline(always)]
+unsafe fn pixel_of<'a, E>(arena: Shared<'a, E>, view: &View, at: usize) -> &'a [E] {
     // SAFETY: the caller's promise.
-    unsafe { std::slice::from_raw_parts_mut(arena.at(view.at(0, y)), view.width * view.pitch) }
+    unsafe { arena.read(at, view.channels) }
 }
 
-/// A pixel's channels.
-unsafe fn pixel_of<'a, E: Element>(arena: Shared<E>, view: &View, at: usize) -> &'a mut [E] {
+/// A pixel's channels, to be written.
+///
+/// # Safety
+/// Nobody else may read or write them while the slice lives.
+#[inline(always)]
+unsafe fn pixel_to<'a, E>(arena: Shared<'a, E>, view: &View, at: usize) -> &'a mut [E] {
     // SAFETY: the caller's promise.
-    unsafe { std::slice::from_raw_parts_mut(arena.at(at), view.channels) }
+    unsafe { arena.write(at, view.channels) }
 }
 
 /// Calls `each` with the place of every border pixel up to `reach` and its place among the image's own by
 /// mirroring.
-fn for_border(view: &View, reach: usize, mut each: impl FnMut(usize, usize)) {
+pub(crate) fn for_border(view: &View, reach: usize, mut each: impl FnMut(usize, usize)) {
     let (w, h, r) = (view.width as isize, view.height as isize, reach as isize);
     let mirror = |i: isize, n: isize| {
         let i = i.abs();
@@ -68,8 +77,8 @@ fn for_border(view: &View, reach: usize, mut each: impl FnMut(usize, usize)) {
 /// The view must lie in the arena and nobody else use it.
 pub(crate) unsafe fn zero_border<E: Element>(arena: Shared<E>, view: &View, reach: usize) {
     for_border(view, reach, |at, _| {
-        // SAFETY: a pixel of the view's border.
-        unsafe { pixel_of(arena, view, at) }.fill(E::default());
+        // SAFETY: a pixel of the view's border, which nobody else uses (the caller's promise).
+        unsafe { pixel_to(arena, view, at) }.fill(E::default());
     });
 }
 
@@ -77,25 +86,25 @@ pub(crate) unsafe fn zero_border<E: Element>(arena: Shared<E>, view: &View, reac
 /// As [`zero_border`].
 pub(crate) unsafe fn reflect_border<E: Element>(arena: Shared<E>, view: &View, reach: usize) {
     for_border(view, reach, |at, from| {
-        // SAFETY: a pixel of the view's border, and one within.
-        unsafe { pixel_of(arena, view, at).copy_from_slice(pixel_of(arena, view, from)) };
+        // SAFETY: a pixel of the view's border and one within, which nobody else uses (the caller's promise).
+        unsafe { pixel_to(arena, view, at).copy_from_slice(pixel_of(arena, view, from)) };
     });
 }
 
 /// The maximum over 3×3 pixels at stride 2; pixels beyond the edge do not count.
 ///
 /// # Safety
-/// The views must lie in the arena, apart from each other, and nobody else use `to`.
+/// The views must lie in the arena, apart from each other, and nobody else use `to` or write `from`.
 pub(crate) unsafe fn max_pool<E: Element>(arena: Shared<E>, from: &View, to: &View) {
     (0..to.height).into_par_iter().for_each(|y| {
         for x in 0..to.width {
-            // SAFETY: pixels of the views.
-            let out = unsafe { pixel_of(arena, to, to.at(x, y)) };
+            // SAFETY: a pixel of `to`, whose row is this task's alone.
+            let out = unsafe { pixel_to(arena, to, to.at(x, y)) };
             let within = |i: usize, n: usize| (2 * i).saturating_sub(1)..(2 * i + 2).min(n);
             let mut first = true;
             for i in within(y, from.height) {
                 for j in within(x, from.width) {
-                    // SAFETY: as above.
+                    // SAFETY: a pixel of `from`, which other tasks read as well and nobody writes.
                     let pixel = unsafe { pixel_of(arena, from, from.at(j, i)) };
                     if first {
                         out.copy_from_slice(pixel);
@@ -121,11 +130,11 @@ pub(crate) unsafe fn max_pool<E: Element>(arena: Shared<E>, from: &View, to: &Vi
 pub(crate) unsafe fn upsample<E: Element>(arena: Shared<E>, from: &View, to: &View) {
     (0..from.height).into_par_iter().for_each(|y| {
         for x in 0..from.width {
-            // SAFETY: pixels of the views.
-            unsafe {
-                let pixel = pixel_of(arena, from, from.at(x, y));
-                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                    pixel_of(arena, from, to.at(2 * x + dx, 2 * y + dy)).copy_from_slice(pixel);
+            for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                // SAFETY: a pixel of `from`, which nobody writes, and one of `to`, in two rows of this task alone.
+                unsafe {
+                    let pixel = pixel_of(arena, from, from.at(x, y));
+                    pixel_to(arena, from, to.at(2 * x + dx, 2 * y + dy)).copy_from_slice(pixel);
                 }
             }
         }
@@ -139,13 +148,10 @@ pub(crate) unsafe fn upsample<E: Element>(arena: Shared<E>, from: &View, to: &Vi
 pub(crate) unsafe fn copy<E: Element>(arena: Shared<E>, from: &View, to: &View) {
     (0..from.height).into_par_iter().for_each(|y| {
         for x in 0..from.width {
-            // SAFETY: pixels of the views.
+            // SAFETY: a pixel of `from`, which nobody writes, and one of `to`, whose row is this task's alone.
             unsafe {
-                pixel_of(arena, from, to.at(x, y)).copy_from_slice(pixel_of(
-                    arena,
-                    from,
-                    from.at(x, y),
-                ));
+                let pixel = pixel_of(arena, from, from.at(x, y));
+                pixel_to(arena, from, to.at(x, y)).copy_from_slice(pixel);
             }
         }
     });

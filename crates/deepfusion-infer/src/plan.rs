@@ -2,11 +2,15 @@
 
 use std::ops::Range;
 
+use crate::aligned::Aligned;
 use crate::conv::Geometry;
+use crate::element::Element;
+use crate::forms::ConvForm;
 use crate::layout::{Layout, parts};
 use crate::masks::Gate;
+use crate::stale::stale;
 use crate::view::View;
-use crate::{Border, Conv, Graph, Node, Op, ValueId};
+use crate::{Border, Error, Graph, Node, Op, ValueId};
 
 /// What a step does; the engine gives each convolution its form.
 #[derive(Debug)]
@@ -36,24 +40,32 @@ pub(crate) enum Step<C> {
 pub(crate) struct Plan<C> {
     /// With their names.
     pub(crate) steps: Vec<(String, Step<C>)>,
-    /// Elements of the block of memory.
-    pub(crate) arena: usize,
+    /// What is read of the arena before it is written, to be cleared before each image.
+    pub(crate) stale: Vec<Range<usize>>,
     /// Where the outputs lie, and for each of their channels its place in a pixel.
     pub(crate) outputs: Vec<(View, Vec<usize>)>,
 }
 
 impl<C> Plan<C> {
-    /// Lays the graph out for images of this size (which the graph must accept); `init` gives each
-    /// convolution its form and may drop its weights.
-    pub(crate) fn new<E>(
+    /// Lays the graph out for images of this size (which the graph must accept) in an arena; each convolution takes its
+    /// form, and its weights are dropped.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] where there is no room for the values of such images.
+    pub(crate) fn new<E: Element>(
         graph: Graph,
         width: usize,
         height: usize,
-        mut init: impl FnMut(Conv, Geometry, &[Option<usize>]) -> C,
-    ) -> Self {
+    ) -> Result<(Self, Aligned<E>), Error>
+    where
+        C: ConvForm<E>,
+    {
         let mut layout = Layout::new(&graph, size_of::<f32>() / size_of::<E>());
         let outline = outline(&mut layout, &graph);
-        let arena = layout.place(width, height);
+        let arena = layout.place(width, height, C::overread);
+        // Before all else that is as large as an image.
+        let arena = arena.and_then(Aligned::try_zeros);
+        let arena = arena.ok_or(Error::Memory { width, height })?;
         let view = |value: ValueId| layout.view(value, width, height);
         let outputs = graph.outputs().iter();
         let outputs = outputs.map(|v| (view(*v), layout.places(*v))).collect();
@@ -123,16 +135,17 @@ impl<C> Plan<C> {
                     activation: conv.activation,
                 };
                 let channels = &layout.homes[conv.input.0].channel_of;
-                Step::Conv(init(*conv, geometry, channels))
+                Step::Conv(C::new(&conv, geometry, channels))
             }
         };
         let steps = outline.into_iter().map(&mut step_of);
-        let steps = names.into_iter().zip(steps).collect();
-        Self {
+        let steps: Vec<_> = names.into_iter().zip(steps).collect();
+        let plan = Self {
+            stale: stale(&steps, arena.len()),
             steps,
-            arena,
             outputs,
-        }
+        };
+        Ok((plan, arena))
     }
 }
 

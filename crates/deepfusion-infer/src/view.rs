@@ -1,5 +1,7 @@
 //! Where values lie: images with their channels together (H×W×C), inside one block of memory.
 
+use std::marker::PhantomData;
+
 /// An image's place in the arena: pixel (x, y), channel c lies at `offset + y·row + x·pitch + c`.
 ///
 /// A border of `border` pixels lies around it, before and after each row too, so that a kernel may reach
@@ -46,21 +48,95 @@ impl View {
     }
 }
 
-/// A pointer that threads share; each writes where no other reads or writes.
-#[derive(Clone, Copy)]
-pub(crate) struct Shared<T>(pub(crate) *mut T);
+/// The arena as the threads of a step share it: each writes where no other reads or writes.
+///
+/// It borrows the arena for as long as it lives. Every access is checked to lie in the arena; that accesses of
+/// different threads do not collide is what the unsafe ones ask of their callers.
+pub(crate) struct Shared<'a, T> {
+    first: *mut T,
+    len: usize,
+    arena: PhantomData<&'a mut [T]>,
+}
 
-// SAFETY: whoever dereferences it answers for what is read and written.
-unsafe impl<T> Send for Shared<T> {}
+impl<T> Clone for Shared<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Shared<'_, T> {}
+
+// SAFETY: it is a `&mut [T]` handed out in parts; what is read and written through it is for the callers of its unsafe
+// functions to keep apart.
+unsafe impl<T: Send + Sync> Send for Shared<'_, T> {}
 // SAFETY: as above.
-unsafe impl<T> Sync for Shared<T> {}
+unsafe impl<T: Send + Sync> Sync for Shared<'_, T> {}
 
-impl<T> Shared<T> {
-    /// # Safety
-    /// `offset` must lie in the block.
+impl<'a, T> Shared<'a, T> {
+    pub(crate) fn new(arena: &'a mut [T]) -> Self {
+        Self {
+            first: arena.as_mut_ptr(),
+            len: arena.len(),
+            arena: PhantomData,
+        }
+    }
+
+    /// A pointer to `len` elements from `offset` on, all of the arena.
+    ///
+    /// # Panics
+    /// When they are not.
     #[inline(always)]
-    pub(crate) unsafe fn at(self, offset: usize) -> *mut T {
-        // SAFETY: the caller's promise.
-        unsafe { self.0.add(offset) }
+    pub(crate) fn at(self, offset: usize, len: usize) -> *mut T {
+        let inside = offset <= self.len && len <= self.len - offset;
+        assert!(inside, "a view beyond the arena");
+        // SAFETY: no farther than the arena's end, as was just checked.
+        unsafe { self.first.add(offset) }
+    }
+
+    /// `len` elements from `offset` on.
+    ///
+    /// # Safety
+    /// Nobody may write them while the slice lives.
+    ///
+    /// # Panics
+    /// As [`Self::at`].
+    #[inline(always)]
+    pub(crate) unsafe fn read(self, offset: usize, len: usize) -> &'a [T] {
+        // SAFETY: they lie in the arena, which is borrowed for `'a`; that nobody writes them is the caller's promise.
+        unsafe { std::slice::from_raw_parts(self.at(offset, len), len) }
+    }
+
+    /// The same to be written.
+    ///
+    /// # Safety
+    /// Nobody else may read or write them while the slice lives.
+    ///
+    /// # Panics
+    /// As [`Self::at`].
+    #[inline(always)]
+    pub(crate) unsafe fn write(self, offset: usize, len: usize) -> &'a mut [T] {
+        // SAFETY: they lie in the arena, which is borrowed for `'a`; that nobody else uses them is the caller's promise.
+        unsafe { std::slice::from_raw_parts_mut(self.at(offset, len), len) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_beyond_the_arena_is_not_handed_out() {
+        let mut numbers = [1.0_f32, 2.0, 3.0];
+        let arena = Shared::new(&mut numbers);
+        // SAFETY: one thread, one slice at a time.
+        unsafe {
+            arena.write(1, 2)[1] = 5.0;
+            assert_eq!(arena.read(0, 3), [1.0, 2.0, 5.0]);
+        }
+        assert_eq!(arena.at(3, 0).addr(), arena.at(0, 3).addr() + 12);
+        for (offset, len) in [(0, 4), (3, 1), (4, 0), (usize::MAX, 2), (2, usize::MAX)] {
+            let beyond = std::panic::AssertUnwindSafe(|| arena.at(offset, len));
+            assert!(std::panic::catch_unwind(beyond).is_err(), "{offset} {len}");
+        }
     }
 }

@@ -42,7 +42,7 @@ const G: [[f64; 3]; IN] = [
 /// A convolution ready to run.
 #[derive(Debug)]
 pub(crate) struct Winograd {
-    geometry: Geometry,
+    pub(crate) geometry: Geometry,
     /// Physical input channels, cut into parts of at most [`CHANNELS_AT_ONCE`].
     parts: Vec<std::ops::Range<usize>>,
     /// For each part, each of the 36 products and each group of [`GROUP`] output channels: a row of them
@@ -200,7 +200,7 @@ impl Tiles {
 
 struct Task<'a> {
     conv: &'a Winograd,
-    arena: Shared<f32>,
+    arena: Shared<'a, f32>,
     tiles: std::ops::Range<usize>,
     /// Of each tile, 36 × channels.
     inputs: &'a mut [f32],
@@ -232,8 +232,8 @@ impl WithSimd for Task<'_> {
                 ..conv.geometry.input
             };
             for (t, tile) in range.clone().enumerate() {
-                let to = inputs[t * AREA * size..].as_mut_ptr();
-                // SAFETY: the input lies in the arena; the scratch holds `count` tiles.
+                let to = &mut inputs[t * AREA * size..][..AREA * size];
+                // SAFETY: nobody writes the input (the promise of `run`).
                 unsafe { transform_input(simd, arena, &input, places.of(tile), to) };
             }
             rows.clear();
@@ -258,14 +258,14 @@ impl WithSimd for Task<'_> {
                         start: if i == 0 { Start::Zero } else { Start::Out },
                         relu: false,
                     };
-                    // SAFETY: inputs, products and panel have these extents.
+                    // SAFETY: inputs and products hold `count` tiles, the panel a row for every channel.
                     unsafe { tiles(simd, &sum, width, rows, shift) };
                 }
             }
         }
         for (t, tile) in range.enumerate() {
-            let from = products[t * AREA * columns..].as_ptr();
-            // SAFETY: the output lies in the arena, each tile of it belongs to one task.
+            let from = &products[t * AREA * columns..][..AREA * columns];
+            // SAFETY: each tile of the output belongs to one task.
             unsafe { conv.transform_output(simd, arena, from, places.of(tile)) };
         }
     }
@@ -310,27 +310,35 @@ fn output_axis<S: Simd>(simd: S, m: [S::f32s; IN]) -> [S::f32s; OUT] {
 
 /// Bᵀ d B for all channels of a tile whose outputs start at (x, y); product (i, j) of channel c goes to
 /// `to[(i·6 + j)·channels + c]`.
+///
+/// # Safety
+/// Nobody may write the view meanwhile; its channels must be whole vectors.
 #[inline(always)]
 unsafe fn transform_input<S: Simd>(
     simd: S,
     arena: Shared<f32>,
     view: &View,
     Place { x, y, step }: Place,
-    to: *mut f32,
+    to: &mut [f32],
 ) {
+    assert_eq!(to.len(), AREA * view.channels, "a tile's products");
+    let to = to.as_mut_ptr();
     // What lies beyond the border only reaches outputs beyond the image.
     let column = |i: usize| (x + i * step).min(view.width - 1 + 2 * step) * view.pitch;
     let row = |i: usize| (y + i * step).min(view.height - 1 + 2 * step) * view.row;
     let corner = view.offset - step * (view.row + view.pitch);
     let columns: [usize; IN] = std::array::from_fn(column);
+    // The last pixel's last channel included: rows and columns only grow.
+    let from = arena.at(corner, row(IN - 1) + columns[IN - 1] + view.channels);
     for c in (0..view.channels).step_by(S::F32_LANES) {
         let zero = simd.splat_f32s(0.0);
         let mut half = [[zero; IN]; IN];
-        // SAFETY: the caller's promise.
+        // SAFETY: what is read lies in the arena, as was just checked, and nobody writes it (the caller's promise);
+        // `to` has a value for every product of every channel.
         unsafe {
             for j in 0..IN {
                 let d = std::array::from_fn(|i| {
-                    let at = arena.at(corner + row(i) + columns[j] + c);
+                    let at = from.add(row(i) + columns[j] + c);
                     at.cast::<S::f32s>().read_unaligned()
                 });
                 let d = input_axis(simd, d);
@@ -352,23 +360,39 @@ unsafe fn transform_input<S: Simd>(
 
 impl Winograd {
     /// Aᵀ m A with bias, residual and activation, for the pixels of the tile that are in the image.
+    ///
+    /// # Safety
+    /// Nobody else may use those pixels of the output, or write those of the residual.
     #[inline(always)]
     unsafe fn transform_output<S: Simd>(
         &self,
         simd: S,
         arena: Shared<f32>,
-        from: *const f32,
+        from: &[f32],
         Place { x, y, step }: Place,
     ) {
         let g = &self.geometry;
         let columns = self.bias.len();
+        assert_eq!(from.len(), AREA * columns, "a tile's products");
+        let from = from.as_ptr();
         let within = |first: usize, side: usize| OUT.min(side.saturating_sub(first).div_ceil(step));
         let across = within(x, g.out.width);
         let down = within(y, g.out.height);
+        if across == 0 || down == 0 {
+            return;
+        }
+        // From the tile's first pixel to the last channel of its last one.
+        let tile = |view: &View| {
+            let (right, below) = ((across - 1) * step, (down - 1) * step);
+            let reach = below * view.row + right * view.pitch;
+            arena.at(view.at(x, y), reach + columns)
+        };
+        let (out, residual) = (tile(&g.out), g.residual.as_ref().map(|r| (r, tile(r))));
         let zero = simd.splat_f32s(0.0);
         for c in (0..columns).step_by(S::F32_LANES) {
             let mut half = [[zero; IN]; OUT];
-            // SAFETY: the caller's promise.
+            // SAFETY: the products have a value for every product of every column, the bias one a column; the tile's
+            // pixels lie in the arena, as was just checked, and nobody else uses them (the caller's promise).
             unsafe {
                 let bias = self.bias.as_ptr().add(c).cast::<S::f32s>().read_unaligned();
                 for j in 0..IN {
@@ -385,13 +409,13 @@ impl Winograd {
                     let values = output_axis(simd, half[i]);
                     for j in 0..across {
                         let mut value = simd.add_f32s(values[j], bias);
-                        if let Some(residual) = &g.residual {
-                            let r = arena.at(residual.at(x + j * step, y + i * step) + c);
-                            value = simd.add_f32s(value, r.cast::<S::f32s>().read_unaligned());
+                        let at = |view: &View| step * (i * view.row + j * view.pitch) + c;
+                        if let Some((view, r)) = residual {
+                            let r = r.add(at(view)).cast::<S::f32s>();
+                            value = simd.add_f32s(value, r.read_unaligned());
                         }
-                        let out = arena.at(g.out.at(x + j * step, y + i * step) + c);
                         let value = g.activation.of(simd, value);
-                        out.cast::<S::f32s>().write_unaligned(value);
+                        out.add(at(&g.out)).cast::<S::f32s>().write_unaligned(value);
                     }
                 }
             }

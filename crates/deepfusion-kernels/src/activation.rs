@@ -1,4 +1,7 @@
-use crate::lanes::sum;
+use crate::{
+    lanes::sum,
+    slot::{Slot, filled, room},
+};
 use rayon::prelude::*;
 
 /// Values handled by one task.
@@ -43,15 +46,17 @@ pub(crate) fn exp_negative(v: f32) -> f32 {
 ///
 /// # Panics
 /// When the lengths differ.
-pub fn elu(x: &[f32], out: &mut [f32]) {
+pub fn elu(x: &[f32], out: &mut [impl Slot]) {
     assert_eq!(x.len(), out.len(), "output length");
-    out.par_chunks_mut(CHUNK)
+    room(out)
+        .par_chunks_mut(CHUNK)
         .zip(x.par_chunks(CHUNK))
         .for_each(|(out, x)| {
-            for (y, &x) in out.iter_mut().zip(x) {
+            let elu = |x: &f32| {
                 let negative = exp_negative(x.min(0.0)) - 1.0;
-                *y = if x > 0.0 { x } else { negative };
-            }
+                if *x > 0.0 { *x } else { negative }
+            };
+            filled(out, x.iter().map(elu));
         });
 }
 
@@ -59,16 +64,15 @@ pub fn elu(x: &[f32], out: &mut [f32]) {
 ///
 /// # Panics
 /// When the lengths differ.
-pub fn elu_backward(y: &[f32], grad_out: &[f32], grad_x: &mut [f32]) {
+pub fn elu_backward(y: &[f32], grad_out: &[f32], grad_x: &mut [impl Slot]) {
     assert_eq!(y.len(), grad_out.len(), "output gradient length");
     assert_eq!(y.len(), grad_x.len(), "input gradient length");
-    grad_x
+    room(grad_x)
         .par_chunks_mut(CHUNK)
         .zip(y.par_chunks(CHUNK).zip(grad_out.par_chunks(CHUNK)))
         .for_each(|(gx, (y, g))| {
-            for ((gx, &y), &g) in gx.iter_mut().zip(y).zip(g) {
-                *gx = g * (y.min(0.0) + 1.0);
-            }
+            let gradient = |(y, g): (&f32, &f32)| g * (y.min(0.0) + 1.0);
+            filled(gx, y.iter().zip(g).map(gradient));
         });
 }
 

@@ -6,8 +6,10 @@
 use crate::{
     lanes::{sum, sum_product},
     send_ptr::SharedMut,
+    slot::{Slot, filled, room},
 };
 use rayon::prelude::*;
+use std::mem::MaybeUninit;
 
 /// What the backward pass needs of the forward pass, and what the running statistics are made of.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,7 +53,7 @@ pub fn batch_norm(
     area: usize,
     epsilon: f32,
     relu: bool,
-    out: &mut [f32],
+    out: &mut [impl Slot],
 ) -> BatchNormSaved {
     let channels = gamma.len();
     let batch = planes(x.len(), channels, area);
@@ -59,7 +61,7 @@ pub fn batch_norm(
     assert_eq!(out.len(), x.len(), "output length");
     let plane = |n: usize, c: usize| (n * channels + c) * area;
     let count = (batch * area) as f32;
-    let to = SharedMut::new(out);
+    let to = SharedMut::new(room(out));
     let (mean, variance) = (0..channels)
         .into_par_iter()
         .map(|c| {
@@ -83,11 +85,10 @@ pub fn batch_norm(
     BatchNormSaved { mean, variance }
 }
 
-fn apply(x: &[f32], mean: f32, scale: f32, beta: f32, relu: bool, out: &mut [f32]) {
+fn apply(x: &[f32], mean: f32, scale: f32, beta: f32, relu: bool, out: &mut [MaybeUninit<f32>]) {
     let floor = if relu { 0.0 } else { f32::NEG_INFINITY };
-    for (y, x) in out.iter_mut().zip(x) {
-        *y = ((x - mean) * scale + beta).max(floor);
-    }
+    let normalised = |x: &f32| ((x - mean) * scale + beta).max(floor);
+    filled(out, x.iter().map(normalised));
 }
 
 /// Normalises with given statistics (inference, or frozen during training).
@@ -105,11 +106,13 @@ pub fn batch_norm_inference(
     area: usize,
     epsilon: f32,
     relu: bool,
-    out: &mut [f32],
+    out: &mut [impl Slot],
 ) {
     let channels = gamma.len();
     planes(x.len(), channels, area);
-    out.par_chunks_mut(area)
+    assert_eq!(out.len(), x.len(), "output length");
+    room(out)
+        .par_chunks_mut(area)
         .zip(x.par_chunks(area))
         .enumerate()
         .for_each(|(i, (out, x))| {
@@ -136,7 +139,7 @@ pub fn batch_norm_backward(
     area: usize,
     epsilon: f32,
     relu: bool,
-    grad_x: &mut [f32],
+    grad_x: &mut [impl Slot],
 ) -> (Vec<f32>, Vec<f32>) {
     let channels = gamma.len();
     let batch = planes(x.len(), channels, area);
@@ -144,7 +147,7 @@ pub fn batch_norm_backward(
     assert_eq!(grad_x.len(), x.len(), "input gradient length");
     let plane = |n: usize, c: usize| (n * channels + c) * area;
     let count = (batch * area) as f32;
-    let to = SharedMut::new(grad_x);
+    let to = SharedMut::new(room(grad_x));
     (0..channels)
         .into_par_iter()
         .map(|c| {
@@ -155,14 +158,15 @@ pub fn batch_norm_backward(
                 // SAFETY: each channel's planes are written by its own task.
                 let masked = unsafe { to.slice(plane(n, c), area) };
                 let (x, g) = (&x[plane(n, c)..][..area], &grad_out[plane(n, c)..][..area]);
-                if relu {
-                    for ((m, x), g) in masked.iter_mut().zip(x).zip(g) {
+                let masked = if relu {
+                    let mask = |(x, g): (&f32, &f32)| {
                         let y = (x - mean) * scale + beta[c];
-                        *m = if y > 0.0 { *g } else { 0.0 };
-                    }
+                        if y > 0.0 { *g } else { 0.0 }
+                    };
+                    filled(masked, x.iter().zip(g).map(mask))
                 } else {
-                    masked.copy_from_slice(g);
-                }
+                    masked.write_copy_of_slice(g)
+                };
                 let total = sum(masked);
                 grad_beta += total;
                 grad_gx += sum_product(masked, x) - mean * total;
@@ -171,8 +175,8 @@ pub fn batch_norm_backward(
             let slope = grad_gamma * inverse_std / count;
             let offset = grad_beta / count;
             for n in 0..batch {
-                // SAFETY: as above.
-                let gx = unsafe { to.slice(plane(n, c), area) };
+                // SAFETY: as above, and this task has just filled them.
+                let gx = unsafe { to.slice(plane(n, c), area).assume_init_mut() };
                 for (gx, x) in gx.iter_mut().zip(&x[plane(n, c)..][..area]) {
                     *gx = scale * (*gx - offset - (x - mean) * slope);
                 }

@@ -15,6 +15,8 @@ mod photometric;
 mod project;
 mod scratch;
 mod send_ptr;
+mod sizes;
+mod slot;
 mod smoothness;
 mod upsample;
 mod warp;
@@ -32,6 +34,7 @@ pub use correlation::{
 };
 pub use photometric::{PhotometricShape, photometric_error, photometric_error_backward};
 pub use project::{MIN_DEPTH_M, NOWHERE, ProjectGradients, in_view, project, project_backward};
+pub use slot::Slot;
 pub use smoothness::{SmoothnessShape, smoothness, smoothness_backward};
 pub use upsample::{upsample_concat, upsample_concat_backward};
 pub use warp::{WarpFloat, WarpShape, warp, warp_backward_coords, warp_backward_image};

@@ -1,6 +1,9 @@
 //! Nearest ×2 enlargement joined with a skip feature: the decoder's step between scales.
 
+use crate::sizes::product;
+use crate::slot::{Slot, filled, room};
 use rayon::prelude::*;
+use std::mem::MaybeUninit;
 
 /// out = [nearest×2(`x`); `skip`], along the channels.
 ///
@@ -15,13 +18,19 @@ pub fn upsample_concat(
     batch: usize,
     channels: usize,
     width: usize,
-    out: &mut [f32],
+    out: &mut [impl Slot],
 ) {
+    assert_eq!(
+        (x.len() % batch, skip.len() % batch),
+        (0, 0),
+        "whole images"
+    );
     let (small, skip_image) = (x.len() / batch, skip.len() / batch);
-    assert_eq!(small % (channels * width), 0, "whole planes");
+    assert_eq!(small % product([channels, width]), 0, "whole planes");
     assert_eq!(out.len(), 4 * x.len() + skip.len(), "output length");
     let area = small / channels;
-    out.par_chunks_mut(4 * small + skip_image)
+    room(out)
+        .par_chunks_mut(4 * small + skip_image)
         .zip(x.par_chunks(small))
         .enumerate()
         .for_each(|(n, (out, x))| {
@@ -33,12 +42,12 @@ pub fn upsample_concat(
                     for (rows, row) in out.chunks_exact_mut(4 * width).zip(x.chunks_exact(width)) {
                         let (top, bottom) = rows.split_at_mut(2 * width);
                         for (pair, v) in top.as_chunks_mut::<2>().0.iter_mut().zip(row) {
-                            *pair = [*v, *v];
+                            *pair = [MaybeUninit::new(*v); 2];
                         }
                         bottom.copy_from_slice(top);
                     }
                 });
-            rest.copy_from_slice(&skip[n * skip_image..(n + 1) * skip_image]);
+            rest.write_copy_of_slice(&skip[n * skip_image..][..skip_image]);
         });
 }
 
@@ -54,18 +63,23 @@ pub fn upsample_concat_backward(
     batch: usize,
     channels: usize,
     width: usize,
-    grad_x: &mut [f32],
-    grad_skip: &mut [f32],
+    grad_x: &mut [impl Slot],
+    grad_skip: &mut [impl Slot],
 ) {
+    assert_eq!(
+        (grad_x.len() % batch, grad_skip.len() % batch),
+        (0, 0),
+        "whole images"
+    );
     let (small, skip_image) = (grad_x.len() / batch, grad_skip.len() / batch);
-    assert_eq!(small % (channels * width), 0, "whole planes");
+    assert_eq!(small % product([channels, width]), 0, "whole planes");
     assert_eq!(
         grad_out.len(),
         4 * grad_x.len() + grad_skip.len(),
         "output gradient length"
     );
     let image = 4 * small + skip_image;
-    grad_x
+    room(grad_x)
         .par_chunks_mut(small)
         .zip(grad_out.par_chunks(image))
         .for_each(|(grad_x, grad)| {
@@ -75,16 +89,16 @@ pub fn upsample_concat_backward(
                 .for_each(|(to, rows)| {
                     let (top, bottom) = rows.split_at(2 * width);
                     let pairs = top.as_chunks::<2>().0.iter().zip(bottom.as_chunks::<2>().0);
-                    for (to, (t, b)) in to.iter_mut().zip(pairs) {
-                        *to = t[0] + t[1] + b[0] + b[1];
-                    }
+                    filled(to, pairs.map(|(t, b)| t[0] + t[1] + b[0] + b[1]));
                 });
         });
     if skip_image > 0 {
-        grad_skip
+        room(grad_skip)
             .par_chunks_mut(skip_image)
             .zip(grad_out.par_chunks(image))
-            .for_each(|(to, grad)| to.copy_from_slice(&grad[4 * small..]));
+            .for_each(|(to, grad)| {
+                to.write_copy_of_slice(&grad[4 * small..]);
+            });
     }
 }
 

@@ -3,6 +3,7 @@
 //! Coordinates address pixel centres at integers; outside the image the border pixel counts. Where a
 //! coordinate was moved to the border, the output does not depend on it and its gradient is zero.
 
+use crate::sizes::product;
 use num_traits::Float;
 use pulp::Arch;
 use rayon::prelude::*;
@@ -66,7 +67,7 @@ struct Samples<T> {
 
 impl WarpShape {
     fn in_area(&self) -> usize {
-        self.in_height * self.in_width
+        product([self.in_height, self.in_width])
     }
 
     /// From a neighbour to the one to its right, and to the one below.
@@ -104,10 +105,13 @@ impl WarpShape {
             self.in_width.max(self.in_height) <= 1 << 24,
             "pixels of a side"
         );
-        assert_eq!(image % (self.channels * self.in_area()), 0, "whole images");
-        let batch = image / (self.channels * self.in_area());
-        assert_eq!(coords, batch * 2 * self.out_area, "two coordinates a pixel");
-        assert_eq!(out, batch * self.channels * self.out_area, "output length");
+        let size = product([self.channels, self.in_area()]);
+        assert_eq!(image % size, 0, "whole images");
+        let batch = image / size;
+        let coordinates = product([batch, 2, self.out_area]);
+        assert_eq!(coords, coordinates, "two coordinates a pixel");
+        let values = product([batch, self.channels, self.out_area]);
+        assert_eq!(out, values, "output length");
     }
 }
 

@@ -11,7 +11,7 @@ pub const CAR: [f32; 2] = [4.4, 1.8];
 /// Length and width of the smallest car, metres.
 const SHORTEST: [f32; 2] = [3.2, 1.45];
 /// Up to this extent in metres something is taken for a person or a thing of that size, even where a part is hidden.
-const SMALL: f32 = 1.0;
+pub const SMALL: f32 = 1.0;
 /// Extent from which on a side that is seen says how long it is, metres.
 const MEASURED: f32 = 0.6;
 /// Less than this of something, in metres, says nothing about the rest.

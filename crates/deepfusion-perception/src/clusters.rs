@@ -14,6 +14,14 @@ pub struct Run {
     pub to: u32,
 }
 
+impl Run {
+    /// Its pixels in an image of this width, row by row.
+    pub(crate) fn pixels(&self, width: usize) -> std::ops::Range<usize> {
+        let row = self.v as usize * width;
+        row + self.from as usize..row + self.to as usize
+    }
+}
+
 /// Obstacle pixels that belong together.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Cluster {

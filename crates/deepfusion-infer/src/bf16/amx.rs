@@ -125,8 +125,22 @@ impl ConvForm<Bf16> for Amx {
         }
     }
 
+    /// Fifteen pixels that fill up a strip, at stride 2, and a row of inputs.
+    fn overread(pitch: usize) -> usize {
+        2 * PIXELS * pitch + INPUTS
+    }
+
     fn name(&self) -> &'static str {
         "amx"
+    }
+
+    fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
+        let all = self.runs.sources.iter().all(Option::is_some);
+        (!all).then_some((&self.geometry, &self.runs))
     }
 
     /// # Safety
@@ -137,13 +151,14 @@ impl ConvForm<Bf16> for Amx {
             let strips = &self.strips[strips];
             with_scratch(|scratch| {
                 let sums = scratch.first.take(strips.len().div_ceil(2) * SUMS);
-                // SAFETY: the processor has the registers, the views lie in the arena (the caller's promise).
+                // SAFETY: the processor has the unit and nobody else uses the output (the caller's promise), whose
+                // strips belong to one task each; the tiles are configured first.
                 unsafe {
                     configure();
                     for group in groups {
                         self.group(arena, group, strips, sums);
                     }
-                    asm!("tilerelease", options(nostack));
+                    release();
                 }
             });
         });
@@ -152,6 +167,9 @@ impl ConvForm<Bf16> for Amx {
 
 impl Amx {
     /// All of a task's strips, for one group of output channels.
+    ///
+    /// # Safety
+    /// As [`ConvForm::run`]; the strips must be this thread's alone, and the tiles configured.
     unsafe fn group(
         &self,
         arena: Shared<Bf16>,
@@ -164,21 +182,22 @@ impl Amx {
         let panel = &self.panels[first * self.runs.sources.len()..];
         let at_once = (INPUTS_AT_ONCE / self.runs.len).max(1);
         let last = self.runs.offsets.len().div_ceil(at_once) - 1;
-        let stride = self.geometry.stride * self.geometry.input.pitch * size_of::<Bf16>();
+        let stride = self.geometry.stride * self.geometry.input.pitch;
+        let extent = (PIXELS - 1) * stride + self.runs.extent;
         for (i, runs) in self.runs.offsets.chunks(at_once).enumerate() {
             for (pair, sums) in strips.chunks(2).zip(scratch.chunks_exact_mut(SUMS)) {
                 let product = Product {
                     // An odd strip is computed twice and written once.
                     inputs: [&pair[0], pair.last().unwrap_or(&pair[0])]
-                        // SAFETY: the views lie in the arena.
-                        .map(|strip| unsafe { arena.at(strip.input).cast_const() }),
-                    stride,
+                        .map(|strip| arena.at(strip.input, extent).cast_const()),
+                    stride: stride * size_of::<Bf16>(),
                     runs,
                     len: self.runs.len,
-                    panel: panel[i * at_once * self.runs.len * width..].as_ptr(),
+                    panel: &panel[i * at_once * self.runs.len * width..],
                     add: i > 0,
                 };
-                // SAFETY: the runs lie in the arena, the panel has a tile for each of their parts.
+                // SAFETY: sixteen pixels of the runs lie in the arena, as `at` has checked; the tiles are configured
+                // (the caller's promise).
                 unsafe {
                     if width == GROUP {
                         product.two_by_two(sums);
@@ -187,7 +206,7 @@ impl Amx {
                     }
                 }
                 if i == last {
-                    // SAFETY: the processor has the instructions; the output is this task's alone.
+                    // SAFETY: what has the unit has the instructions; the output is this thread's alone.
                     unsafe { self.finish(arena, pair, sums, first, width) };
                 }
             }
@@ -195,7 +214,7 @@ impl Amx {
     }
 
     /// # Safety
-    /// The output must be this thread's alone.
+    /// The output must be this thread's alone; the processor must have the instructions.
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     unsafe fn finish(
         &self,
@@ -209,7 +228,7 @@ impl Amx {
         for (i, strip) in strips.iter().enumerate() {
             let tiles = &sums[2 * i * TILE_SUMS..];
             if self.geometry.out.result {
-                // SAFETY: the caller's promise.
+                // SAFETY: the strip's pixels are this thread's alone (the caller's promise).
                 unsafe { finish.results(&strip.places, |p| tiles[p * LANES]) };
                 continue;
             }
@@ -219,7 +238,7 @@ impl Amx {
             {
                 for (place, sums) in strip.places.iter().zip(tile.as_chunks::<LANES>().0) {
                     if let Some(place) = *place {
-                        // SAFETY: as above.
+                        // SAFETY: sixteen sums; the rest as above.
                         unsafe { finish.channels(place, c, sums.as_ptr()) };
                     }
                 }
@@ -256,7 +275,14 @@ fn strips(g: &Geometry) -> Vec<Strip> {
     .collect()
 }
 
-/// Eight tiles of 16 rows of 64 bytes.
+/// Makes this thread's tile registers eight tiles of 16 rows of 64 bytes, until [`release`].
+///
+/// That is the one thing that lasts from an `asm!` block to the next. It may: the compiler knows of no configuration
+/// and gives out no tile registers, nothing else in this program uses the unit, and the system keeps it for each
+/// thread. Configuring for every product would clear all registers every time.
+///
+/// # Safety
+/// The processor must have the unit.
 unsafe fn configure() {
     #[repr(align(64))]
     struct Palette([u8; 64]);
@@ -266,8 +292,31 @@ unsafe fn configure() {
         palette.0[16 + 2 * tile] = 64;
         palette.0[48 + tile] = 16;
     }
-    // SAFETY: 64 bytes that describe a valid palette.
-    unsafe { asm!("ldtilecfg [{}]", in(reg) &raw const palette.0, options(nostack)) };
+    // SAFETY: 64 bytes that describe a valid palette; all registers are cleared, and declared so.
+    unsafe {
+        asm!(
+            "ldtilecfg [{}]", in(reg) &raw const palette.0,
+            out("tmm0") _, out("tmm1") _, out("tmm2") _, out("tmm3") _,
+            out("tmm4") _, out("tmm5") _, out("tmm6") _, out("tmm7") _,
+            options(nostack, readonly, preserves_flags),
+        );
+    }
+}
+
+/// Gives the registers back, so that the system need not keep them any more.
+///
+/// # Safety
+/// As [`configure`].
+unsafe fn release() {
+    // SAFETY: all registers are cleared, and declared so; no memory is touched.
+    unsafe {
+        asm!(
+            "tilerelease",
+            out("tmm0") _, out("tmm1") _, out("tmm2") _, out("tmm3") _,
+            out("tmm4") _, out("tmm5") _, out("tmm6") _, out("tmm7") _,
+            options(nostack, nomem, preserves_flags),
+        );
+    }
 }
 
 /// Two strips' inputs times one group's weights.
@@ -277,65 +326,90 @@ struct Product<'a> {
     stride: usize,
     runs: &'a [usize],
     len: usize,
-    panel: *const Bf16,
+    /// One or two tiles for each [`INPUTS`] of each run.
+    panel: &'a [Bf16],
     /// Whether the sums go on from what they are.
     add: bool,
 }
 
 impl Product<'_> {
-    /// Two tiles of channels.
+    /// That the panel reaches as far as the runs, with so many tiles of channels, and that there are sums for all of
+    /// them. Returns the tiles of inputs in a run.
+    fn checked(&self, tiles: usize, sums: &[f32]) -> usize {
+        let rows = self.len / INPUTS;
+        assert!(rows > 0 && rows * INPUTS == self.len && !self.runs.is_empty());
+        assert!(self.panel.len() >= self.runs.len() * rows * tiles * TILE);
+        assert!(sums.len() >= SUMS);
+        rows
+    }
+
+    /// Two tiles of channels. One block from the first load to the last store: the sums are in no register that the
+    /// compiler does not know of in between.
     ///
     /// # Safety
-    /// The runs of sixteen pixels must be readable, the panel as long as the runs, the tiles configured.
+    /// The runs of sixteen pixels must be readable, the tiles configured.
     #[inline(always)]
     unsafe fn two_by_two(&self, sums: &mut [f32]) {
-        let sums = sums.as_mut_ptr();
-        let mut panel = self.panel;
-        // SAFETY: the caller's promise. Nothing else in this program uses the tile registers.
+        let rows = self.checked(2, sums);
+        // SAFETY: sums and panel are long enough, as was just checked; what the runs read is the caller's promise. The
+        // registers that are written are declared.
         unsafe {
-            if self.add {
-                asm!(
-                    "tileloadd tmm0, [{c} + {s}]",
-                    "tileloadd tmm1, [{c} + {s} + 1024]",
-                    "tileloadd tmm2, [{c} + {s} + 2048]",
-                    "tileloadd tmm3, [{c} + {s} + 3072]",
-                    c = in(reg) sums, s = in(reg) 64_usize, options(nostack, readonly),
-                );
-            } else {
-                asm!(
-                    "tilezero tmm0",
-                    "tilezero tmm1",
-                    "tilezero tmm2",
-                    "tilezero tmm3"
-                );
-            }
-            for &run in self.runs {
-                for k in (run..run + self.len).step_by(INPUTS) {
-                    asm!(
-                        "tileloadd tmm6, [{b0} + {sb}]",
-                        "tileloadd tmm4, [{a0} + {sa}]",
-                        "tileloadd tmm5, [{a1} + {sa}]",
-                        "tileloadd tmm7, [{b0} + {sb} + 1024]",
-                        "tdpbf16ps tmm0, tmm4, tmm6",
-                        "tdpbf16ps tmm2, tmm5, tmm6",
-                        "tdpbf16ps tmm1, tmm4, tmm7",
-                        "tdpbf16ps tmm3, tmm5, tmm7",
-                        a0 = in(reg) self.inputs[0].add(k),
-                        a1 = in(reg) self.inputs[1].add(k),
-                        sa = in(reg) self.stride,
-                        b0 = in(reg) panel,
-                        sb = in(reg) 64_usize,
-                        options(nostack, readonly),
-                    );
-                    panel = panel.add(2 * TILE);
-                }
-            }
             asm!(
-                "tilestored [{c} + {s}], tmm0",
-                "tilestored [{c} + {s} + 1024], tmm1",
-                "tilestored [{c} + {s} + 2048], tmm2",
-                "tilestored [{c} + {s} + 3072], tmm3",
-                c = in(reg) sums, s = in(reg) 64_usize, options(nostack),
+                "test {left}, {left}",
+                "jz 2f",
+                "tileloadd tmm0, [{c} + {s}*1]",
+                "tileloadd tmm1, [{c} + {s}*1 + 1024]",
+                "tileloadd tmm2, [{c} + {s}*1 + 2048]",
+                "tileloadd tmm3, [{c} + {s}*1 + 3072]",
+                "jmp 3f",
+                "2:",
+                "tilezero tmm0",
+                "tilezero tmm1",
+                "tilezero tmm2",
+                "tilezero tmm3",
+                // A run.
+                "3:",
+                "mov {p0}, [{run}]",
+                "lea {p1}, [{a1} + {p0}*2]",
+                "lea {p0}, [{a0} + {p0}*2]",
+                "add {run}, 8",
+                "mov {left}, {rows}",
+                // Thirty-two inputs of it.
+                "4:",
+                "tileloadd tmm6, [{b} + {s}*1]",
+                "tileloadd tmm4, [{p0} + {sa}*1]",
+                "tileloadd tmm5, [{p1} + {sa}*1]",
+                "tileloadd tmm7, [{b} + {s}*1 + 1024]",
+                "add {p0}, 64",
+                "add {p1}, 64",
+                "add {b}, 2048",
+                "tdpbf16ps tmm0, tmm4, tmm6",
+                "tdpbf16ps tmm2, tmm5, tmm6",
+                "tdpbf16ps tmm1, tmm4, tmm7",
+                "tdpbf16ps tmm3, tmm5, tmm7",
+                "dec {left}",
+                "jnz 4b",
+                "cmp {run}, {end}",
+                "jne 3b",
+                "tilestored [{c} + {s}*1], tmm0",
+                "tilestored [{c} + {s}*1 + 1024], tmm1",
+                "tilestored [{c} + {s}*1 + 2048], tmm2",
+                "tilestored [{c} + {s}*1 + 3072], tmm3",
+                c = in(reg) sums.as_mut_ptr(),
+                s = in(reg) 64_usize,
+                a0 = in(reg) self.inputs[0],
+                a1 = in(reg) self.inputs[1],
+                sa = in(reg) self.stride,
+                rows = in(reg) rows,
+                end = in(reg) self.runs.as_ptr_range().end,
+                run = inout(reg) self.runs.as_ptr() => _,
+                b = inout(reg) self.panel.as_ptr() => _,
+                left = inout(reg) usize::from(self.add) => _,
+                p0 = out(reg) _,
+                p1 = out(reg) _,
+                out("tmm0") _, out("tmm1") _, out("tmm2") _, out("tmm3") _,
+                out("tmm4") _, out("tmm5") _, out("tmm6") _, out("tmm7") _,
+                options(nostack),
             );
         }
     }
@@ -346,41 +420,53 @@ impl Product<'_> {
     /// As [`Self::two_by_two`].
     #[inline(always)]
     unsafe fn two_by_one(&self, sums: &mut [f32]) {
-        let sums = sums.as_mut_ptr();
-        let mut panel = self.panel;
+        let rows = self.checked(1, sums);
         // SAFETY: as there.
         unsafe {
-            if self.add {
-                asm!(
-                    "tileloadd tmm0, [{c} + {s}]",
-                    "tileloadd tmm2, [{c} + {s} + 2048]",
-                    c = in(reg) sums, s = in(reg) 64_usize, options(nostack, readonly),
-                );
-            } else {
-                asm!("tilezero tmm0", "tilezero tmm2");
-            }
-            for &run in self.runs {
-                for k in (run..run + self.len).step_by(INPUTS) {
-                    asm!(
-                        "tileloadd tmm6, [{b0} + {sb}]",
-                        "tileloadd tmm4, [{a0} + {sa}]",
-                        "tileloadd tmm5, [{a1} + {sa}]",
-                        "tdpbf16ps tmm0, tmm4, tmm6",
-                        "tdpbf16ps tmm2, tmm5, tmm6",
-                        a0 = in(reg) self.inputs[0].add(k),
-                        a1 = in(reg) self.inputs[1].add(k),
-                        sa = in(reg) self.stride,
-                        b0 = in(reg) panel,
-                        sb = in(reg) 64_usize,
-                        options(nostack, readonly),
-                    );
-                    panel = panel.add(TILE);
-                }
-            }
             asm!(
-                "tilestored [{c} + {s}], tmm0",
-                "tilestored [{c} + {s} + 2048], tmm2",
-                c = in(reg) sums, s = in(reg) 64_usize, options(nostack),
+                "test {left}, {left}",
+                "jz 2f",
+                "tileloadd tmm0, [{c} + {s}*1]",
+                "tileloadd tmm2, [{c} + {s}*1 + 2048]",
+                "jmp 3f",
+                "2:",
+                "tilezero tmm0",
+                "tilezero tmm2",
+                "3:",
+                "mov {p0}, [{run}]",
+                "lea {p1}, [{a1} + {p0}*2]",
+                "lea {p0}, [{a0} + {p0}*2]",
+                "add {run}, 8",
+                "mov {left}, {rows}",
+                "4:",
+                "tileloadd tmm6, [{b} + {s}*1]",
+                "tileloadd tmm4, [{p0} + {sa}*1]",
+                "tileloadd tmm5, [{p1} + {sa}*1]",
+                "add {p0}, 64",
+                "add {p1}, 64",
+                "add {b}, 1024",
+                "tdpbf16ps tmm0, tmm4, tmm6",
+                "tdpbf16ps tmm2, tmm5, tmm6",
+                "dec {left}",
+                "jnz 4b",
+                "cmp {run}, {end}",
+                "jne 3b",
+                "tilestored [{c} + {s}*1], tmm0",
+                "tilestored [{c} + {s}*1 + 2048], tmm2",
+                c = in(reg) sums.as_mut_ptr(),
+                s = in(reg) 64_usize,
+                a0 = in(reg) self.inputs[0],
+                a1 = in(reg) self.inputs[1],
+                sa = in(reg) self.stride,
+                rows = in(reg) rows,
+                end = in(reg) self.runs.as_ptr_range().end,
+                run = inout(reg) self.runs.as_ptr() => _,
+                b = inout(reg) self.panel.as_ptr() => _,
+                left = inout(reg) usize::from(self.add) => _,
+                p0 = out(reg) _,
+                p1 = out(reg) _,
+                out("tmm0") _, out("tmm2") _, out("tmm4") _, out("tmm5") _, out("tmm6") _,
+                options(nostack),
             );
         }
     }

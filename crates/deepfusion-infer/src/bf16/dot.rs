@@ -53,8 +53,22 @@ impl ConvForm<Bf16> for Dot {
         }
     }
 
+    /// The second of a pair of which there is one.
+    fn overread(_: usize) -> usize {
+        1
+    }
+
     fn name(&self) -> &'static str {
         "dot"
+    }
+
+    fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    fn reads_on(&self) -> Option<(&Geometry, &Runs)> {
+        let all = self.runs.sources.iter().all(Option::is_some);
+        (!all).then_some((&self.geometry, &self.runs))
     }
 
     /// # Safety
@@ -68,7 +82,7 @@ impl ConvForm<Bf16> for Dot {
                         .first
                         .take(pixels.len().next_multiple_of(ROWS) * GROUP);
                     for group in groups {
-                        // SAFETY: the caller's promise.
+                        // SAFETY: the caller's promise; each pixel and group belongs to one task.
                         unsafe {
                             self.sum(arena, group, pixels.clone(), sums);
                             self.finish(arena, group, pixels.clone(), sums);
@@ -83,9 +97,8 @@ impl ConvForm<Bf16> for Dot {
 impl Dot {
     /// Where a pixel's first tap lies.
     fn input(&self, pixel: usize) -> usize {
-        let g = &self.geometry;
-        let (x, y) = (pixel % g.out.width, pixel / g.out.width);
-        g.corner() + g.stride * (y * g.input.row + x * g.input.pitch)
+        let width = self.geometry.out.width;
+        self.geometry.first_tap(pixel % width, pixel / width)
     }
 
     fn width(&self, group: usize) -> usize {
@@ -93,6 +106,9 @@ impl Dot {
     }
 
     /// The sums of all pixels, [`GROUP`] values each.
+    ///
+    /// # Safety
+    /// As [`ConvForm::run`]; the processor must have the instructions.
     #[target_feature(enable = "avx512f,avx512bf16")]
     unsafe fn sum(
         &self,
@@ -110,8 +126,7 @@ impl Dot {
                 // Too few pixels are filled up with the last; nobody reads those sums.
                 let rows: [*const Bf16; ROWS] = std::array::from_fn(|r| {
                     let pixel = (start + r).min(pixels.end - 1);
-                    // SAFETY: the views lie in the arena.
-                    unsafe { arena.at(self.input(pixel)).cast_const() }
+                    arena.at(self.input(pixel), self.runs.extent).cast_const()
                 });
                 for column in (0..width).step_by(2 * LANES) {
                     let tile = Tile {
@@ -123,7 +138,9 @@ impl Dot {
                         add: i > 0,
                         sums: sums[column..].as_mut_ptr(),
                     };
-                    // SAFETY: runs, panel and sums have these extents.
+                    // SAFETY: the runs lie within their extent, which is in the arena and which nobody writes (the
+                    // promise of `run`), but where the runs read on; the panel has a row for every pair of inputs,
+                    // the sums room for every pixel. The processor has the instructions.
                     unsafe {
                         if width - column >= 2 * LANES {
                             tile.run::<2>();
@@ -136,6 +153,8 @@ impl Dot {
         }
     }
 
+    /// # Safety
+    /// As [`Self::sum`], and the pixels of the output must be this thread's alone.
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     unsafe fn finish(
         &self,
@@ -154,7 +173,7 @@ impl Dot {
                     Some(first + i).filter(inside).map(place)
                 });
                 let sum = |i: usize| sums.get((first + i - pixels.start) * GROUP).copied();
-                // SAFETY: the caller's promise.
+                // SAFETY: the pixels are this thread's alone (the caller's promise).
                 unsafe { finish.results(&places, |i| sum(i).unwrap_or(0.0)) };
             }
             return;
@@ -162,8 +181,9 @@ impl Dot {
         let places = pixels.map(place);
         for (place, sums) in places.zip(sums.chunks(GROUP)) {
             for c in (0..self.width(group)).step_by(LANES) {
-                // SAFETY: as above.
-                unsafe { finish.channels(place, group * GROUP + c, sums[c..].as_ptr()) };
+                let sums = &sums[c..][..LANES];
+                // SAFETY: sixteen sums; the rest as above, and the processor has the instructions.
+                unsafe { finish.channels(place, group * GROUP + c, sums.as_ptr()) };
             }
         }
     }
@@ -185,12 +205,14 @@ struct Tile<'a> {
 
 impl Tile<'_> {
     /// # Safety
-    /// The runs must be readable, the panel as long as they are, the sums writable.
+    /// The runs must be readable, the panel as long as they are, the sums writable; the processor must have the
+    /// instructions.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bf16")]
     unsafe fn run<const V: usize>(self) {
         let mut sums = [[_mm512_setzero_ps(); V]; ROWS];
-        // SAFETY: the caller's promise.
+        // SAFETY: what is read and written is the caller's promise. A pair of bf16 is 32 bits; a vector of pairs and one
+        // of integers are the same bits.
         unsafe {
             if self.add {
                 for r in 0..ROWS {

@@ -52,13 +52,13 @@ struct Finish<'a> {
     simd: V4,
     geometry: &'a Geometry,
     bias: &'a [f32],
-    arena: Shared<Bf16>,
+    arena: Shared<'a, Bf16>,
 }
 
 impl<'a> Finish<'a> {
     /// # Panics
     /// Without AVX-512; [`has_dot`] must hold.
-    fn new(geometry: &'a Geometry, bias: &'a [f32], arena: Shared<Bf16>) -> Self {
+    fn new(geometry: &'a Geometry, bias: &'a [f32], arena: Shared<'a, Bf16>) -> Self {
         let simd = V4::try_new();
         Self {
             simd: simd.expect("AVX512-BF16 comes with AVX-512; the engine asked for it"),
@@ -71,17 +71,19 @@ impl<'a> Finish<'a> {
     /// Sixteen channels from `c` on.
     ///
     /// # Safety
-    /// The place's pixel must lie in the arena and be this thread's alone; `sums` holds 16 values;
+    /// The place's pixel must be this thread's alone, and nobody write its residual; `sums` holds 16 values;
     /// [`has_dot`] must hold.
     #[inline]
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
     unsafe fn channels(&self, place: Place, c: usize, sums: *const f32) {
-        // SAFETY: the caller's promise; the bias has a value for each channel.
+        let bias = &self.bias[c..][..LANES];
+        // SAFETY: sixteen values of the bias and, as `at` checks, of the arena; the rest is the caller's promise.
+        // Vectors of one size are arrays of the same numbers, whoever names them.
         unsafe {
-            let bias = _mm512_loadu_ps(self.bias.as_ptr().add(c));
+            let bias = _mm512_loadu_ps(bias.as_ptr());
             let mut sum = _mm512_add_ps(_mm512_loadu_ps(sums), bias);
             if self.geometry.residual.is_some() {
-                let bits = _mm256_loadu_si256(self.arena.at(place.residual + c).cast());
+                let bits = _mm256_loadu_si256(self.arena.at(place.residual + c, LANES).cast());
                 let bits = _mm512_slli_epi32::<16>(_mm512_cvtepu16_epi32(bits));
                 sum = _mm512_add_ps(sum, _mm512_castsi512_ps(bits));
             }
@@ -89,7 +91,7 @@ impl<'a> Finish<'a> {
             let value = self.geometry.activation.of(self.simd, sum);
             let value = transmute::<pulp::f32x16, __m512>(value);
             let rounded = transmute::<__m256bh, __m256i>(_mm512_cvtneps_pbh(value));
-            _mm256_storeu_si256(self.arena.at(place.out + c).cast(), rounded);
+            _mm256_storeu_si256(self.arena.at(place.out + c, LANES).cast(), rounded);
         }
     }
 
@@ -103,13 +105,15 @@ impl<'a> Finish<'a> {
             *value = sums(p) + self.bias[0];
         }
         let activation: Activation = self.geometry.activation;
-        // SAFETY: sixteen values; the output lies in the arena, with room for an f32 a pixel.
-        unsafe {
-            activation.apply(self.simd, values.as_mut_ptr(), LANES);
-            for (place, value) in places.iter().zip(values) {
-                if let Some(place) = place {
-                    self.arena.at(place.out).cast::<f32>().write(value);
-                }
+        // SAFETY: sixteen values.
+        unsafe { activation.apply(self.simd, values.as_mut_ptr(), LANES) };
+        for (place, value) in places.iter().zip(values) {
+            if let Some(place) = place {
+                let slots = self
+                    .arena
+                    .at(place.out, size_of::<f32>() / size_of::<Bf16>());
+                // SAFETY: the layout gave the pixel the room of an f32, which is this thread's alone.
+                unsafe { slots.cast::<f32>().write_unaligned(value) };
             }
         }
     }

@@ -99,6 +99,18 @@ fn network(seed: u64, p: &Parts) -> Graph {
     b.graph
 }
 
+/// Of all of them, small.
+pub(super) fn small_network() -> Graph {
+    let parts = Parts {
+        widths: [8, 16, 16],
+        rates: vec![3],
+        global: true,
+        residual: true,
+        dilation: 1,
+    };
+    network(9, &parts)
+}
+
 fn check(graph: &Graph, width: usize, height: usize, seed: u64) -> Result<(), TestCaseError> {
     let image = noise_image(seed, width, height);
     let values = run(graph, &image, height, width);
@@ -172,14 +184,7 @@ fn large_dilated_convolutions_take_the_winograd_form_and_agree_too() {
 
 #[test]
 fn what_is_no_number_reaches_the_output_and_not_the_next_image() {
-    let parts = Parts {
-        widths: [8, 16, 16],
-        rates: vec![3],
-        global: true,
-        residual: true,
-        dilation: 1,
-    };
-    let graph = network(9, &parts);
+    let graph = small_network();
     let mut engine = Engine::new(graph.clone(), 64, 64, Precision::F32).unwrap();
     engine.run(&vec![f32::NAN; 3 * 64 * 64]);
     assert!(engine.output(0).iter().all(|v| v.is_nan()));

@@ -3,6 +3,8 @@
 mod attention;
 mod build;
 mod oracle;
+mod plain;
+mod remains;
 
 use proptest::prelude::*;
 
@@ -58,7 +60,7 @@ fn network(seed: u64, widths: [usize; 4], bottleneck: bool, stem: usize) -> Grap
 
 /// The first output of an engine whose convolutions all take one form.
 fn output_of<E: Element, C: ConvForm<E>>(graph: Graph, image: &[f32], width: usize) -> Vec<f32> {
-    let mut engine = Typed::<E, C>::new(graph, width, image.len() / 3 / width);
+    let mut engine = Typed::<E, C>::new(graph, width, image.len() / 3 / width).unwrap();
     engine.run(image, |_, _| {});
     engine.output(0)
 }
@@ -285,6 +287,16 @@ fn what_cannot_be_laid_out_is_refused() {
         ..conv
     };
     assert!(graph.push("c", Op::Conv(Box::new(huge))).is_err());
+}
+
+#[test]
+fn images_for_which_no_memory_is_large_enough_are_refused() {
+    for side in [1 << 29, 1 << 33, 1 << 62] {
+        let graph = network(7, [8, 8, 8, 8], true, 7);
+        let error = Engine::new(graph, side, side, Precision::F32).unwrap_err();
+        let (width, height) = (side, side);
+        assert_eq!(error, crate::Error::Memory { width, height });
+    }
 }
 
 #[test]

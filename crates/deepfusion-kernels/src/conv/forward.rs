@@ -3,8 +3,13 @@ use super::{
     lattice::{Lattice, Tile, tiles},
     product::{TapProduct, padded},
 };
-use crate::{scratch::with_scratch, send_ptr::SharedMut};
+use crate::{
+    scratch::with_scratch,
+    send_ptr::SharedMut,
+    slot::{Slot, filled, room},
+};
 use rayon::prelude::*;
+use std::mem::MaybeUninit;
 use std::ops::Range;
 
 /// Tasks below which the output channels of a tile are shared out too, so that no core waits.
@@ -30,7 +35,13 @@ pub(super) fn tasks(tiles: &[Tile], channels: usize) -> Vec<(Tile, Range<usize>)
 ///
 /// # Panics
 /// When a length does not fit `shape`, or reflection padding is as large as the image.
-pub fn conv2d(shape: &ConvShape, x: &[f32], weight: &[f32], bias: Option<&[f32]>, out: &mut [f32]) {
+pub fn conv2d(
+    shape: &ConvShape,
+    x: &[f32],
+    weight: &[f32],
+    bias: Option<&[f32]>,
+    out: &mut [impl Slot],
+) {
     shape.check();
     assert_eq!(x.len(), shape.in_len(), "input length");
     assert_eq!(weight.len(), shape.weight_len(), "weight length");
@@ -45,7 +56,7 @@ pub fn conv2d(shape: &ConvShape, x: &[f32], weight: &[f32], bias: Option<&[f32]>
     let row_floats = shape.in_channels * shape.stride * (shape.in_width + 2 * shape.padding)
         + shape.out_channels * (shape.out_width() + 2);
     let tiles = tiles(shape.batch, 0, shape.out_height(), row_floats);
-    let out = SharedMut::new(out);
+    let out = SharedMut::new(room(out));
     tasks(&tiles, shape.out_channels)
         .into_par_iter()
         .for_each(|(tile, channels)| forward_tile(shape, tile, channels, x, weight, bias, &out));
@@ -58,7 +69,7 @@ fn forward_tile(
     x: &[f32],
     weight: &[f32],
     bias: Option<&[f32]>,
-    out: &SharedMut<f32>,
+    out: &SharedMut<MaybeUninit<f32>>,
 ) {
     let lattice = Lattice::new(shape.window(), tile);
     let (columns, taps) = (padded(lattice.columns()), shape.taps());
@@ -86,9 +97,7 @@ fn forward_tile(
                     // SAFETY: a row of this task's tile and channels.
                     let to = unsafe { out.slice(plane + (tile.first_row + row) * width, width) };
                     let from = &result[lattice.column(image, row)..][..width];
-                    for (to, from) in to.iter_mut().zip(from) {
-                        *to = from + bias;
-                    }
+                    filled(to, from.iter().map(|from| from + bias));
                 }
             }
         }

@@ -4,8 +4,13 @@ use super::{
     lattice::{Lattice, Tile, Window, inside, tiles},
     product::{TapProduct, padded},
 };
-use crate::{scratch::with_scratch, send_ptr::SharedMut};
+use crate::{
+    scratch::with_scratch,
+    send_ptr::SharedMut,
+    slot::{Slot, room},
+};
 use rayon::prelude::*;
+use std::mem::MaybeUninit;
 use std::ops::Range;
 
 /// The padded input rows and columns of one residue by the stride: a convolution of ∂Y at stride 1 with
@@ -30,8 +35,9 @@ pub fn conv2d_backward_input(
     shape: &ConvShape,
     weight: &[f32],
     grad_out: &[f32],
-    grad_x: &mut [f32],
+    grad_x: &mut [impl Slot],
 ) {
+    let grad_x = room(grad_x);
     shape.check();
     assert_eq!(weight.len(), shape.weight_len(), "weight length");
     assert_eq!(grad_out.len(), shape.out_len(), "output gradient length");
@@ -41,7 +47,8 @@ pub fn conv2d_backward_input(
     }
     // Elsewhere every value is written exactly once.
     if shape.stride > 1 || shape.reflect || grad_out.is_empty() {
-        grad_x.par_chunks_mut(1 << 16).for_each(|c| c.fill(0.0));
+        let zero = MaybeUninit::new(0.0);
+        grad_x.par_chunks_mut(1 << 16).for_each(|c| c.fill(zero));
     }
     if grad_out.is_empty() {
         return;
@@ -53,7 +60,13 @@ pub fn conv2d_backward_input(
     });
 }
 
-fn backward_input(shape: &ConvShape, phases: &[Phase], grad_out: &[f32], grad_x: &mut [f32]) {
+/// With reflection, what it adds to must have been cleared.
+fn backward_input(
+    shape: &ConvShape,
+    phases: &[Phase],
+    grad_out: &[f32],
+    grad_x: &mut [MaybeUninit<f32>],
+) {
     let (s, margin) = (shape.stride, margin(shape));
     let window = gradient_window(shape, margin);
     // Rows of a phase; without reflection those that lie wholly in the padding are left out.
@@ -180,7 +193,7 @@ fn gradient_tile(
     channels: Range<usize>,
     phases: &[Phase],
     grad_out: &[f32],
-    to: &SharedMut<f32>,
+    to: &SharedMut<MaybeUninit<f32>>,
 ) {
     let lattice = Lattice::new(window, tile);
     let columns = padded(lattice.columns());
@@ -225,7 +238,7 @@ fn scatter(
     phase: &Phase,
     channel: usize,
     result: &[f32],
-    to: &SharedMut<f32>,
+    to: &SharedMut<MaybeUninit<f32>>,
 ) {
     let (s, p) = (shape.stride, margin(shape));
     let (height, width) = (shape.in_height, shape.in_width);
@@ -250,20 +263,22 @@ fn scatter(
             let start = first * s + phase.right;
             let body = &from[first..last];
             if shape.reflect {
+                // SAFETY: with reflection everything was cleared at first.
+                let to = unsafe { to.assume_init_mut() };
                 for x in (0..first).chain(last..count) {
                     if let Some(at) = inside(x * s + phase.right, p, width, true) {
                         to[at] += from[x];
                     }
                 }
-            }
-            if body.is_empty() {
-                continue;
-            }
-            let to = to[start - p..].iter_mut().step_by(s).zip(body);
-            if shape.reflect {
-                to.for_each(|(to, from)| *to += *from);
-            } else {
-                to.for_each(|(to, from)| *to = *from);
+                if !body.is_empty() {
+                    let to = to[start - p..].iter_mut().step_by(s);
+                    to.zip(body).for_each(|(to, from)| *to += *from);
+                }
+            } else if !body.is_empty() {
+                let to = to[start - p..].iter_mut().step_by(s);
+                to.zip(body).for_each(|(to, from)| {
+                    to.write(*from);
+                });
             }
         }
     }

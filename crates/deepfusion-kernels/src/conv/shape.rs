@@ -1,4 +1,5 @@
 use super::lattice::{Lattice, Window};
+use crate::sizes::product;
 use std::ops::Range;
 
 /// The sizes of a convolution. Images are N×C×H×W, weights O×C×kh×kw.
@@ -42,26 +43,31 @@ impl ConvShape {
     }
 
     fn out_size(&self, size: usize, kernel: usize) -> usize {
-        (size + 2 * self.padding)
-            .checked_sub(self.dilation * (kernel - 1) + 1)
+        let padded = self.padding.checked_mul(2);
+        let padded = padded.and_then(|p| size.checked_add(p));
+        let padded = padded.expect("an image with its padding can be counted");
+        let reach = product([self.dilation, kernel - 1]);
+        padded
+            .checked_sub(reach)
+            .and_then(|rest| rest.checked_sub(1))
             .map_or(0, |span| span / self.stride + 1)
     }
 
     /// Weights of one output channel: K = C·kh·kw.
     pub(crate) fn taps(&self) -> usize {
-        self.in_channels * self.kernel_area()
+        product([self.in_channels, self.kernel_height, self.kernel_width])
     }
 
     pub(crate) fn kernel_area(&self) -> usize {
-        self.kernel_height * self.kernel_width
+        product([self.kernel_height, self.kernel_width])
     }
 
     pub(crate) fn out_area(&self) -> usize {
-        self.out_height() * self.out_width()
+        product([self.out_height(), self.out_width()])
     }
 
     pub(crate) fn in_area(&self) -> usize {
-        self.in_height * self.in_width
+        product([self.in_height, self.in_width])
     }
 
     /// Distance between the first and the last tap, down and right.
@@ -100,27 +106,39 @@ impl ConvShape {
     }
 
     /// Number of input values.
+    ///
+    /// # Panics
+    /// When it is more than can be counted.
     #[must_use]
     pub fn in_len(&self) -> usize {
-        self.batch * self.in_channels * self.in_area()
+        product([self.batch, self.in_channels, self.in_area()])
     }
 
     /// Number of output values.
+    ///
+    /// # Panics
+    /// As [`Self::in_len`].
     #[must_use]
     pub fn out_len(&self) -> usize {
-        self.batch * self.out_channels * self.out_area()
+        product([self.batch, self.out_channels, self.out_area()])
     }
 
     /// Number of weights.
+    ///
+    /// # Panics
+    /// As [`Self::in_len`].
     #[must_use]
     pub fn weight_len(&self) -> usize {
-        self.out_channels * self.taps()
+        product([self.out_channels, self.taps()])
     }
 
     /// Multiply-adds of the forward pass; each gradient costs as many.
+    ///
+    /// # Panics
+    /// As [`Self::in_len`].
     #[must_use]
     pub fn multiply_adds(&self) -> usize {
-        self.batch * self.out_area() * self.weight_len()
+        product([self.batch, self.out_area(), self.weight_len()])
     }
 
     /// # Panics

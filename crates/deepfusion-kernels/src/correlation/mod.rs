@@ -9,6 +9,7 @@ mod tests;
 
 use crate::scratch::with_scratch;
 use crate::send_ptr::SharedMut;
+use crate::sizes::product;
 use product::{DisplacementSums, LANES, RowCorrelation};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -38,11 +39,11 @@ impl CorrelationShape {
     /// Channels of the output, (2r + 1)².
     #[must_use]
     pub fn displacements(&self) -> usize {
-        self.side() * self.side()
+        product([self.side(), self.side()])
     }
 
     fn area(&self) -> usize {
-        self.height * self.width
+        product([self.height, self.width])
     }
 
     /// From one padded row to the next: whole vectors, and zeros on both sides.
@@ -52,15 +53,16 @@ impl CorrelationShape {
 
     /// From one padded plane to the next.
     fn plane(&self) -> usize {
-        self.height * self.stride()
+        product([self.height, self.stride()])
     }
 
     /// The images of a batch.
     fn batch(&self, image: usize, out: usize) -> usize {
-        assert!(self.channels * self.area() > 0, "images have pixels");
-        assert_eq!(image % (self.channels * self.area()), 0, "whole images");
-        let batch = image / (self.channels * self.area());
-        let expected = batch * self.displacements() * self.area();
+        let size = product([self.channels, self.area()]);
+        assert!(size > 0, "images have pixels");
+        assert_eq!(image % size, 0, "whole images");
+        let batch = image / size;
+        let expected = product([batch, self.displacements(), self.area()]);
         assert_eq!(out, expected, "one output a displacement and pixel");
         batch
     }
@@ -68,7 +70,7 @@ impl CorrelationShape {
     /// Lends `work` a copy of the planes with `radius` zeros before each row and at least as many behind it.
     fn padded<R>(&self, planes: &[f32], work: impl FnOnce(&[f32]) -> R) -> R {
         let (stride, radius) = (self.stride(), self.radius);
-        with_scratch(planes.len() / self.width * stride, |to| {
+        with_scratch(product([planes.len() / self.width, stride]), |to| {
             to.par_chunks_mut(stride)
                 .zip(planes.par_chunks(self.width))
                 .with_min_len(ROWS_AT_ONCE)

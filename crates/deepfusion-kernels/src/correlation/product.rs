@@ -20,7 +20,7 @@ pub(super) struct RowCorrelation<'a> {
     /// The padded second image from the row on.
     pub(super) second: &'a [f32],
     /// No other task writes the pairs' output rows.
-    pub(super) out: SharedMut<f32>,
+    pub(super) out: SharedMut<'a, f32>,
 }
 
 /// One row of a gradient, all channels: `out[c][x] = (1/C) Σ_taps grad[tap.0 + x] · other[c][tap.1 + x]`.
@@ -33,7 +33,7 @@ pub(super) struct DisplacementSums<'a> {
     /// The padded planes of the image that the gradient is multiplied with.
     pub(super) other: &'a [f32],
     /// No other task writes this row.
-    pub(super) out: SharedMut<f32>,
+    pub(super) out: SharedMut<'a, f32>,
     /// Where the row starts in the first channel's plane.
     pub(super) start: usize,
 }

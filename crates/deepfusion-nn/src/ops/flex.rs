@@ -8,6 +8,7 @@ use burn::tensor::TensorData;
 use deepfusion_kernels::{
     self as kernels, ConvShape, CorrelationShape, PhotometricShape, SmoothnessShape, WarpShape,
 };
+use std::mem::MaybeUninit;
 
 type Float = FloatTensor<Flex>;
 
@@ -30,15 +31,31 @@ fn dims<const D: usize>(tensor: &Float) -> [usize; D] {
     tensor.shape().dims()
 }
 
-/// Memory for an operation's result: the kernels overwrite all of it, and clearing it first took a
-/// fourteenth of a training step.
-#[allow(clippy::uninit_vec)]
-fn unwritten(len: usize) -> Vec<f32> {
+/// Memory for an operation's result, cleared: for small results, and kernels that need it so.
+fn zeros(sizes: &[usize]) -> Vec<f32> {
+    vec![0.0; count(sizes)]
+}
+
+/// An operation's result as `write` leaves it. For the large ones: clearing them first took a fourteenth of a training
+/// step.
+///
+/// # Safety
+/// `write` must write every value it is given room for.
+unsafe fn written<R>(
+    len: usize,
+    write: impl FnOnce(&mut [MaybeUninit<f32>]) -> R,
+) -> (Vec<f32>, R) {
     let mut values = Vec::with_capacity(len);
-    // SAFETY: the capacity is there, any bits are a float, and every kernel writes each value before
-    // anything reads it: their tests hand them buffers full of rubbish.
+    let result = write(&mut values.spare_capacity_mut()[..len]);
+    // SAFETY: the capacity is there, and so many values were written (the caller's promise).
     unsafe { values.set_len(len) };
-    values
+    (values, result)
+}
+
+/// How many values a tensor of these sizes holds.
+fn count(sizes: &[usize]) -> usize {
+    let all = sizes.iter().try_fold(1_usize, |all, n| all.checked_mul(*n));
+    all.expect("sizes of a tensor, which is in memory or as large as one that is")
 }
 
 fn tensor<const D: usize>(values: Vec<f32>, shape: [usize; D]) -> Float {
@@ -124,9 +141,13 @@ impl KernelOps for Flex {
     ) -> Float {
         let shape = conv_shape(dims(&x), dims(&weight), options);
         let (x, weight, bias) = (Values::of(x), Values::of(weight), Values::of(bias));
-        let mut out = unwritten(shape.out_len());
         let bias = has_bias.then(|| bias.slice());
-        kernels::conv2d(&shape, x.slice(), weight.slice(), bias, &mut out);
+        // SAFETY: a kernel that takes a `Slot` writes every value.
+        let (out, ()) = unsafe {
+            written(shape.out_len(), |out| {
+                kernels::conv2d(&shape, x.slice(), weight.slice(), bias, out);
+            })
+        };
         let sizes = [
             shape.batch,
             shape.out_channels,
@@ -145,16 +166,20 @@ impl KernelOps for Flex {
     ) -> (Float, Float, Float) {
         let sizes: [usize; 4] = dims(&x);
         let (x, gamma, beta) = (Values::of(x), Values::of(gamma), Values::of(beta));
-        let mut out = unwritten(x.slice().len());
-        let saved = kernels::batch_norm(
-            x.slice(),
-            gamma.slice(),
-            beta.slice(),
-            sizes[2] * sizes[3],
-            single(epsilon),
-            relu,
-            &mut out,
-        );
+        // SAFETY: a kernel that takes a `Slot` writes every value.
+        let (out, saved) = unsafe {
+            written(x.slice().len(), |out| {
+                kernels::batch_norm(
+                    x.slice(),
+                    gamma.slice(),
+                    beta.slice(),
+                    sizes[2] * sizes[3],
+                    single(epsilon),
+                    relu,
+                    out,
+                )
+            })
+        };
         let channels = [sizes[1]];
         (
             tensor(out, sizes),
@@ -166,8 +191,8 @@ impl KernelOps for Flex {
     fn kernel_elu(x: Float) -> Float {
         let sizes: [usize; 4] = dims(&x);
         let x = Values::of(x);
-        let mut out = unwritten(x.slice().len());
-        kernels::elu(x.slice(), &mut out);
+        // SAFETY: a kernel that takes a `Slot` writes every value.
+        let (out, ()) = unsafe { written(x.slice().len(), |out| kernels::elu(x.slice(), out)) };
         tensor(out, sizes)
     }
 
@@ -176,15 +201,19 @@ impl KernelOps for Flex {
         let [_, skips, _, _] = dims(&skip);
         let (x, skip) = (Values::of(x), Values::of(skip));
         let sizes = [batch, channels + skips, 2 * height, 2 * width];
-        let mut out = unwritten(sizes.iter().product());
-        kernels::upsample_concat(x.slice(), skip.slice(), batch, channels, width, &mut out);
+        // SAFETY: a kernel that takes a `Slot` writes every value.
+        let (out, ()) = unsafe {
+            written(count(&sizes), |out| {
+                kernels::upsample_concat(x.slice(), skip.slice(), batch, channels, width, out);
+            })
+        };
         tensor(out, sizes)
     }
 
     fn kernel_warp(image: Float, coords: Float) -> Float {
         let (sizes, shape) = warp_shape(&image, &coords);
         let (image, coords) = (Values::of(image), Values::of(coords));
-        let mut out = unwritten(sizes.iter().product());
+        let mut out = zeros(&sizes);
         kernels::warp(&shape, image.slice(), coords.slice(), &mut out);
         tensor(out, sizes)
     }
@@ -194,7 +223,7 @@ impl KernelOps for Flex {
         let shape = correlation_shape(sizes, radius);
         let (first, second) = (Values::of(first), Values::of(second));
         let sizes = [sizes[0], shape.displacements(), sizes[2], sizes[3]];
-        let mut out = unwritten(sizes.iter().product());
+        let mut out = zeros(&sizes);
         kernels::local_correlation(&shape, first.slice(), second.slice(), &mut out);
         tensor(out, sizes)
     }
@@ -203,7 +232,7 @@ impl KernelOps for Flex {
         let [batch, _, height, width] = dims(&inverse_depth);
         let (depth, homography) = (Values::of(inverse_depth), Values::of(homography));
         let shift = Values::of(shift);
-        let mut out = unwritten(2 * batch * height * width);
+        let mut out = zeros(&[2, batch, height, width]);
         kernels::project(
             (height, width),
             depth.slice(),
@@ -218,7 +247,7 @@ impl KernelOps for Flex {
         let [batch, _, out_height, out_width] = dims(&coords);
         let coords = Values::of(coords);
         let area = out_height * out_width;
-        let mut out = unwritten(batch * area);
+        let mut out = zeros(&[batch, area]);
         kernels::in_view((height, width), coords.slice(), area, &mut out);
         tensor(out, [batch, 1, out_height, out_width])
     }
@@ -233,7 +262,7 @@ impl KernelOps for Flex {
     fn kernel_photometric(a: Float, b: Float, alpha: f64) -> Float {
         let ([batch, _, height, width], shape) = photometric_shape(&a, alpha);
         let (a, b) = (Values::of(a), Values::of(b));
-        let mut out = unwritten(batch * height * width);
+        let mut out = zeros(&[batch, height, width]);
         kernels::photometric_error(&shape, a.slice(), b.slice(), &mut out);
         tensor(out, [batch, 1, height, width])
     }

@@ -5,6 +5,7 @@
 //! way. What stands on such a line is parted by its gaps, and each part is a car of usual size, square to the row. Cars
 //! are remembered, so that a row that was passed goes on ahead.
 
+mod alone;
 mod car;
 mod follow;
 mod known;
@@ -15,6 +16,7 @@ mod scene;
 
 use crate::rows::Turn;
 use crate::{Detection, Ground, Obstacles, PerceptionConfig, Rays};
+use alone::stands_alone;
 use deepfusion_geometry::Se3;
 use follow::follow;
 use known::{Known, distance, heading, meet, on_ground, parked};
@@ -22,6 +24,11 @@ use nalgebra::Vector3;
 use parts::Standing;
 use row::{Heading, Parked, Row};
 
+/// From this share of a detection's pixels, or of the smaller footprint, in a car of a row, it is a part of that car; that
+/// it is one is likelier than that something else of a car's size stands there.
+const PART: f32 = 0.2;
+/// From this share of the smaller footprint in something else on, a car of a row is that.
+const SAME: f32 = 0.4;
 /// Within this distance of where something moves it is that, metres.
 const MOVING_M: f32 = 1.5;
 /// Half of a row's depth, metres.
@@ -79,8 +86,8 @@ impl Parking {
         angle.map_or(Turn::ahead(), |angle| Turn::new(angle, 1.0))
     }
 
-    /// Puts the cars of rows in the place of what was found there, but for what moves (in the world) and what is known by
-    /// name. Without a pose nothing is remembered, and no row believed.
+    /// Puts the cars of rows in the place of their parts, which were found one by one. All else stays as it is: what moves (in
+    /// the world), what is known by name, what stands in a row by itself, and what none of its cars explains. Without a pose nothing is remembered, and no row believed.
     pub fn complete(
         &mut self,
         detections: Vec<Detection>,
@@ -112,18 +119,56 @@ impl Parking {
         if !rows.is_empty() {
             let driving = kept.iter().filter(|d| moves(d));
             let lane: Vec<Heading> = driving.filter_map(|d| heading(&d.place)).collect();
-            let standing = Standing::find(&view, &kept);
+            let (alone, others): (Vec<_>, Vec<_>) =
+                open.into_iter().partition(|d| stands_alone(d, &view));
+            open = others;
+            let standing = Standing::find(&view, kept.iter().chain(&alone));
             let (rows, found) = follow_all(rows, &lane, &standing, &view);
-            open.retain(|d| !rows.iter().any(|row| row.holds(d.place.middle)));
+            let parts = Parts::of(&found, &view);
+            let in_row = |d: &Detection| rows.iter().any(|row| row.holds(d.place.middle));
+            open.retain(|d| !(in_row(d) && parts.explain(d)));
             for car in found {
-                let taken = |other: &Detection| other.place.overlap(&car.place) > 0.4;
+                let taken = |other: &Detection| other.place.overlap(&car.place) > SAME;
                 if !kept.iter().chain(&open).any(taken) {
                     open.push(car);
                 }
             }
+            kept.extend(alone);
         }
         kept.extend(open);
         kept
+    }
+}
+
+/// What the cars of rows explain: where they stand, and what is seen of them.
+struct Parts<'a> {
+    cars: &'a [Detection],
+    pixels: Vec<bool>,
+    width: usize,
+}
+
+impl<'a> Parts<'a> {
+    fn of(cars: &'a [Detection], view: &View) -> Self {
+        let width = view.rays.x.len();
+        let mut pixels = vec![false; view.depth.len()];
+        for run in cars.iter().flat_map(|car| &car.runs) {
+            pixels[run.pixels(width)].fill(true);
+        }
+        Self {
+            cars,
+            pixels,
+            width,
+        }
+    }
+
+    /// Whether a detection is a part of one of the cars.
+    fn explain(&self, detection: &Detection) -> bool {
+        let within = |car: &Detection| car.place.overlap(&detection.place) > PART;
+        let own = detection.runs.iter().flat_map(|run| {
+            let pixels = &self.pixels[run.pixels(self.width)];
+            pixels.iter().filter(|own| **own)
+        });
+        self.cars.iter().any(within) || own.count() as f32 > PART * detection.pixels as f32
     }
 }
 
@@ -162,7 +207,7 @@ mod tests {
     use super::*;
     use crate::GroundBox;
     use crate::instances::Kind;
-    use scene::Scene;
+    use scene::{Scene, person};
 
     /// A car of a row 6 m to the right, square to the lane.
     fn car(forward: f32) -> GroundBox {
@@ -222,31 +267,69 @@ mod tests {
 
     #[test]
     fn a_row_is_believed_once_its_cars_were_seen_again_and_only_with_a_pose() {
-        // Nothing stands where the row goes on: what was found there is no car.
-        let scene = Scene::of(&[]);
+        let scene = Scene::of(&[car(17.0)]);
         let pose = Se3::identity();
-        let left = |looks: usize, pose: Option<&Se3>| {
-            let mut parking = passed(&scene, looks, pose);
+        // A strip of the next car, taken for something else.
+        let mut strip = car(17.4);
+        strip.angle = 1.2;
+        strip.seen = [0.1, 0.2];
+        let looked_at = |mut parking: Parking, pose: Option<&Se3>| {
             parking.recall(scene.view().ground, pose);
-            let seen = vec![detection(car(17.0))];
-            parking.complete(seen, &[], scene.view(), pose).len()
+            let seen = vec![detection(strip)];
+            let found = parking.complete(seen, &[], scene.view(), pose);
+            assert_eq!(found.len(), 1, "{found:?}");
+            found[0].place != strip
         };
-        assert_eq!(left(2, Some(&pose)), 0);
-        assert_eq!(left(1, Some(&pose)), 1);
-        assert_eq!(left(5, None), 1);
+        let believed =
+            |looks: usize, pose: Option<&Se3>| looked_at(passed(&scene, looks, pose), pose);
+        assert!(believed(2, Some(&pose)));
+        assert!(!believed(1, Some(&pose)));
+        assert!(!believed(5, None));
         let mut parking = passed(&scene, 5, Some(&pose));
         parking.forget();
+        assert!(!looked_at(parking, Some(&pose)));
+    }
+
+    #[test]
+    fn what_no_car_of_a_row_explains_stays() {
+        let scene = Scene::of(&[]);
+        let pose = Se3::identity();
+        let mut parking = passed(&scene, 2, Some(&pose));
         parking.recall(scene.view().ground, Some(&pose));
+        // On the row's line, where nothing tells of a car.
         let seen = vec![detection(car(17.0))];
-        assert_eq!(
-            parking.complete(seen, &[], scene.view(), Some(&pose)).len(),
-            1
-        );
+        let found = parking.complete(seen.clone(), &[], scene.view(), Some(&pose));
+        assert_eq!(found, seen);
+    }
+
+    #[test]
+    fn who_stands_in_a_row_or_before_a_car_of_it_stays() {
+        let cars = [8.0, 11.0, 14.0].map(car);
+        // Beyond the last car; between two; before the bonnet of one, at whose place the row has a car.
+        for middle in [[4.0, 19.0], [3.5, 12.5], [3.3, 13.9]] {
+            let standing = person(middle);
+            let scene = Scene::of(&[cars[0], cars[1], cars[2], standing]);
+            let pose = Se3::identity();
+            let mut parking = passed(&scene, 2, Some(&pose));
+            parking.recall(scene.view().ground, Some(&pose));
+            let mut seen: Vec<_> = cars.map(|car| scene.detection(car)).into();
+            let who = scene.detection(standing);
+            seen.push(who.clone());
+            let found = parking.complete(seen, &[], scene.view(), Some(&pose));
+            assert!(found.contains(&who), "{middle:?}: {found:?}");
+            // And it is no car, nor does it hide one.
+            let at = |forward: f32| {
+                let near = |d: &&Detection| distance(d.place.middle, [6.0, forward]) < 0.6;
+                found.iter().filter(near).count()
+            };
+            assert_eq!([8.0, 11.0, 14.0].map(at), [1; 3], "{middle:?}: {found:?}");
+            assert_eq!(found.len(), 4, "{middle:?}: {found:?}");
+        }
     }
 
     #[test]
     fn what_moves_and_what_is_known_by_name_stays_as_it_is() {
-        let scene = Scene::of(&[]);
+        let scene = Scene::of(&[car(17.0)]);
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
         parking.recall(scene.view().ground, Some(&pose));
@@ -255,10 +338,13 @@ mod tests {
             class: "truck".into(),
             score: 0.9,
         });
-        let seen = vec![detection(car(5.0)), named.clone(), detection(car(11.0))];
+        let seen = vec![detection(car(17.0)), named.clone(), detection(car(11.0))];
         let there = scene.view().ground.place([6.0, 11.3, 0.0]).map(f64::from);
         let kept = parking.complete(seen, &[there.into()], scene.view(), Some(&pose));
-        assert_eq!(kept, [named, detection(car(11.0))]);
+        assert_eq!(kept[..2], [named, detection(car(11.0))]);
+        // The row's own in the place of the third.
+        assert_eq!(kept.len(), 3, "{kept:?}");
+        assert!(kept[2].pixels != 500, "{kept:?}");
     }
 
     #[test]

@@ -58,12 +58,11 @@ pub struct Standing {
 
 impl Standing {
     /// In an image, but for the pixels of what is known not to be parked.
-    pub fn find(view: &View, others: &[Detection]) -> Self {
+    pub fn find<'a>(view: &View, others: impl Iterator<Item = &'a Detection>) -> Self {
         let width = view.rays.x.len();
         let mut taken = vec![false; view.depth.len()];
-        for run in others.iter().flat_map(|detection| &detection.runs) {
-            let row = run.v as usize * width;
-            taken[row + run.from as usize..row + run.to as usize].fill(true);
+        for run in others.flat_map(|detection| &detection.runs) {
+            taken[run.pixels(width)].fill(true);
         }
         let mut points = Vec::new();
         let mut tall = vec![false; CELLS[0] * CELLS[1]];

@@ -2,7 +2,7 @@
 
 use super::View;
 use crate::obstacles::NONE;
-use crate::{Ground, GroundBox, Obstacles, PerceptionConfig, Rays};
+use crate::{Detection, Ground, GroundBox, Obstacles, PerceptionConfig, Rays, Run};
 use deepfusion_geometry::Intrinsics;
 
 /// Height of the camera over the ground, metres.
@@ -49,6 +49,29 @@ impl Scene {
         scene
     }
 
+    /// One of the boxes as it is found, with the pixels that show it.
+    pub fn detection(&self, place: GroundBox) -> Detection {
+        let width = self.rays.x.len();
+        let shows = |pixel: &usize| {
+            let (x, y) = (self.rays.x[pixel % width], self.rays.y[pixel / width]);
+            hit(&place, x, y).is_some_and(|z| z == self.depth[*pixel])
+        };
+        let pixels = (0..self.depth.len()).filter(shows).map(|pixel| Run {
+            v: (pixel / width) as u32,
+            from: (pixel % width) as u32,
+            to: (pixel % width) as u32 + 1,
+        });
+        let runs: Vec<Run> = pixels.collect();
+        Detection {
+            place,
+            pixels: runs.len(),
+            bounds: [0; 4],
+            runs,
+            confidence: 0.5,
+            kind: None,
+        }
+    }
+
     /// What is seen.
     pub fn view(&self) -> View<'_> {
         View {
@@ -58,6 +81,18 @@ impl Scene {
             ground: &self.ground,
             config: &self.config,
         }
+    }
+}
+
+/// Somebody who stands there: right, forward in metres.
+pub fn person(middle: [f32; 2]) -> GroundBox {
+    GroundBox {
+        middle,
+        angle: 0.0,
+        footprint: [0.5, 0.5],
+        heights: [0.0, 1.75],
+        seen: [1.0, 1.0],
+        anchor: middle,
     }
 }
 

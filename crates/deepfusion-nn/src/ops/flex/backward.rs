@@ -2,8 +2,8 @@
 
 use super::super::kernel::{ConvOptions, KernelBackward};
 use super::{
-    Float, Values, conv_shape, correlation_shape, dims, photometric_shape, single,
-    smoothness_shape, tensor, unwritten, warp_shape,
+    Float, Values, conv_shape, correlation_shape, count, dims, photometric_shape, single,
+    smoothness_shape, tensor, warp_shape, written, zeros,
 };
 use burn::backend::Flex;
 use deepfusion_kernels::{self as kernels, BatchNormSaved};
@@ -13,8 +13,12 @@ impl KernelBackward for Flex {
         let sizes: [usize; 4] = dims(&x);
         let shape = conv_shape(sizes, dims(&weight), options);
         let (weight, grad) = (Values::of(weight), Values::of(grad));
-        let mut out = unwritten(shape.in_len());
-        kernels::conv2d_backward_input(&shape, weight.slice(), grad.slice(), &mut out);
+        // SAFETY: a kernel that takes a `Slot` writes every value.
+        let (out, ()) = unsafe {
+            written(shape.in_len(), |out| {
+                kernels::conv2d_backward_input(&shape, weight.slice(), grad.slice(), out);
+            })
+        };
         tensor(out, sizes)
     }
 
@@ -22,7 +26,7 @@ impl KernelBackward for Flex {
         let sizes: [usize; 4] = dims(&weight);
         let shape = conv_shape(dims(&x), sizes, options);
         let (x, grad) = (Values::of(x), Values::of(grad));
-        let mut out = unwritten(shape.weight_len());
+        let mut out = zeros(&sizes);
         kernels::conv2d_backward_weight(&shape, x.slice(), grad.slice(), &mut out);
         tensor(out, sizes)
     }
@@ -30,7 +34,7 @@ impl KernelBackward for Flex {
     fn conv2d_grad_bias(grad: Float) -> Float {
         let [batch, channels, height, width] = dims(&grad);
         let grad = Values::of(grad);
-        let mut out = unwritten(channels);
+        let mut out = zeros(&[channels]);
         kernels::channel_sums(grad.slice(), batch, height * width, &mut out);
         tensor(out, [channels])
     }
@@ -50,18 +54,22 @@ impl KernelBackward for Flex {
             mean: mean.slice().to_vec(),
             variance: variance.slice().to_vec(),
         };
-        let mut grad_x = unwritten(x.slice().len());
-        let (grad_gamma, grad_beta) = kernels::batch_norm_backward(
-            x.slice(),
-            gamma.slice(),
-            beta.slice(),
-            &saved,
-            grad.slice(),
-            sizes[2] * sizes[3],
-            single(epsilon),
-            relu,
-            &mut grad_x,
-        );
+        // SAFETY: a kernel that takes a `Slot` writes every value.
+        let (grad_x, (grad_gamma, grad_beta)) = unsafe {
+            written(x.slice().len(), |grad_x| {
+                kernels::batch_norm_backward(
+                    x.slice(),
+                    gamma.slice(),
+                    beta.slice(),
+                    &saved,
+                    grad.slice(),
+                    sizes[2] * sizes[3],
+                    single(epsilon),
+                    relu,
+                    grad_x,
+                )
+            })
+        };
         let channels = [sizes[1]];
         [
             tensor(grad_x, sizes),
@@ -73,8 +81,12 @@ impl KernelBackward for Flex {
     fn elu_grad(output: Float, grad: Float) -> Float {
         let sizes: [usize; 4] = dims(&output);
         let (output, grad) = (Values::of(output), Values::of(grad));
-        let mut out = unwritten(grad.slice().len());
-        kernels::elu_backward(output.slice(), grad.slice(), &mut out);
+        // SAFETY: a kernel that takes a `Slot` writes every value.
+        let (out, ()) = unsafe {
+            written(grad.slice().len(), |out| {
+                kernels::elu_backward(output.slice(), grad.slice(), out);
+            })
+        };
         tensor(out, sizes)
     }
 
@@ -83,16 +95,21 @@ impl KernelBackward for Flex {
         let x_sizes = [batch, channels, height / 2, width / 2];
         let skip_sizes = [batch, all - channels, height, width];
         let grad = Values::of(grad);
-        let mut grad_x = unwritten(x_sizes.iter().product());
-        let mut grad_skip = unwritten(skip_sizes.iter().product());
-        kernels::upsample_concat_backward(
-            grad.slice(),
-            batch,
-            channels,
-            width / 2,
-            &mut grad_x,
-            &mut grad_skip,
-        );
+        // SAFETY: a kernel that takes a `Slot` writes every value, here of both.
+        let (grad_x, (grad_skip, ())) = unsafe {
+            written(count(&x_sizes), |grad_x| {
+                written(count(&skip_sizes), |grad_skip| {
+                    kernels::upsample_concat_backward(
+                        grad.slice(),
+                        batch,
+                        channels,
+                        width / 2,
+                        grad_x,
+                        grad_skip,
+                    );
+                })
+            })
+        };
         [tensor(grad_x, x_sizes), tensor(grad_skip, skip_sizes)]
     }
 
@@ -100,7 +117,7 @@ impl KernelBackward for Flex {
         let sizes: [usize; 4] = dims(&image);
         let (_, shape) = warp_shape(&image, &coords);
         let (coords, grad) = (Values::of(coords), Values::of(grad));
-        let mut out = unwritten(sizes.iter().product());
+        let mut out = zeros(&sizes);
         kernels::warp_backward_image(&shape, coords.slice(), grad.slice(), &mut out);
         tensor(out, sizes)
     }
@@ -109,7 +126,7 @@ impl KernelBackward for Flex {
         let sizes: [usize; 4] = dims(&coords);
         let (_, shape) = warp_shape(&image, &coords);
         let (image, coords, grad) = (Values::of(image), Values::of(coords), Values::of(grad));
-        let mut out = unwritten(sizes.iter().product());
+        let mut out = zeros(&sizes);
         kernels::warp_backward_coords(
             &shape,
             image.slice(),
@@ -124,7 +141,7 @@ impl KernelBackward for Flex {
         let sizes: [usize; 4] = dims(&second);
         let shape = correlation_shape(sizes, radius);
         let (second, grad) = (Values::of(second), Values::of(grad));
-        let mut out = unwritten(sizes.iter().product());
+        let mut out = zeros(&sizes);
         let (second, grad) = (second.slice(), grad.slice());
         kernels::local_correlation_backward_first(&shape, second, grad, &mut out);
         tensor(out, sizes)
@@ -134,7 +151,7 @@ impl KernelBackward for Flex {
         let sizes: [usize; 4] = dims(&first);
         let shape = correlation_shape(sizes, radius);
         let (first, grad) = (Values::of(first), Values::of(grad));
-        let mut out = unwritten(sizes.iter().product());
+        let mut out = zeros(&sizes);
         let (first, grad) = (first.slice(), grad.slice());
         kernels::local_correlation_backward_second(&shape, first, grad, &mut out);
         tensor(out, sizes)
@@ -149,7 +166,7 @@ impl KernelBackward for Flex {
         let sizes: [usize; 4] = dims(&inverse_depth);
         let (depth, homography) = (Values::of(inverse_depth), Values::of(homography));
         let (shift, grad) = (Values::of(shift), Values::of(grad));
-        let mut grad_depth = unwritten(sizes.iter().product());
+        let mut grad_depth = zeros(&sizes);
         let gradients = kernels::project_backward(
             (sizes[2], sizes[3]),
             depth.slice(),
@@ -170,7 +187,7 @@ impl KernelBackward for Flex {
         let shape = smoothness_shape(&image);
         let (disparity, image) = (Values::of(disparity), Values::of(image));
         let grad = Values::of(grad).slice()[0];
-        let mut out = unwritten(sizes.iter().product());
+        let mut out = zeros(&sizes);
         kernels::smoothness_backward(&shape, disparity.slice(), image.slice(), grad, &mut out);
         tensor(out, sizes)
     }
@@ -178,7 +195,7 @@ impl KernelBackward for Flex {
     fn photometric_grad(a: Float, b: Float, grad: Float, alpha: f64) -> Float {
         let (sizes, shape) = photometric_shape(&a, alpha);
         let (a, b, grad) = (Values::of(a), Values::of(b), Values::of(grad));
-        let mut out = unwritten(a.slice().len());
+        let mut out = zeros(&sizes);
         kernels::photometric_error_backward(&shape, a.slice(), b.slice(), grad.slice(), &mut out);
         tensor(out, sizes)
     }

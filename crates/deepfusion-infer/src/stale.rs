@@ -1,0 +1,99 @@
+//! What kernels read before anything was written there for the image at hand.
+//!
+//! Where its inputs do not fill a whole run, a bf16 kernel reads on and multiplies by zero. What stands there may be
+//! left from the image before, and zero times what is no number is none: an image that overflowed would be seen in the
+//! next. So those places, and they alone, are cleared before each image.
+
+use std::ops::Range;
+
+use crate::conv::{Geometry, Runs};
+use crate::element::Element;
+use crate::forms::ConvForm;
+use crate::movement::for_border;
+use crate::plan::Step;
+use crate::view::View;
+
+/// The places of an arena that the steps read before they write them.
+pub(crate) fn stale<E: Element, C: ConvForm<E>>(
+    steps: &[(String, Step<C>)],
+    arena: usize,
+) -> Vec<Range<usize>> {
+    let reads_on = |step: &Step<C>| matches!(step, Step::Conv(conv) if conv.reads_on().is_some());
+    if !steps.iter().any(|(_, step)| reads_on(step)) {
+        return Vec::new();
+    }
+    let mut places = vec![Place::Untouched; arena];
+    for (_, step) in steps {
+        if let Step::Conv(conv) = step
+            && let Some((geometry, runs)) = conv.reads_on()
+        {
+            idle(geometry, runs, |at| {
+                if places[at] == Place::Untouched {
+                    places[at] = Place::Stale;
+                }
+            });
+        }
+        written(step, |at, count| {
+            for place in &mut places[at..at + count] {
+                if *place == Place::Untouched {
+                    *place = Place::Written;
+                }
+            }
+        });
+    }
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for (at, _) in places.iter().enumerate().filter(|p| *p.1 == Place::Stale) {
+        match ranges.last_mut() {
+            Some(range) if range.end == at => range.end += 1,
+            _ => ranges.push(at..at + 1),
+        }
+    }
+    ranges
+}
+
+/// What happened to an element first.
+#[derive(Clone, Copy, PartialEq)]
+enum Place {
+    Untouched,
+    Written,
+    Stale,
+}
+
+/// Calls `read` for everything that a convolution multiplies by zero because no input stands for it.
+fn idle(g: &Geometry, runs: &Runs, mut read: impl FnMut(usize)) {
+    let inputs = runs.offsets.iter().zip(runs.sources.chunks(runs.len));
+    let taps: Vec<usize> = inputs
+        .flat_map(|(run, sources)| {
+            let idle = sources.iter().enumerate().filter(|(_, s)| s.is_none());
+            idle.map(move |(k, _)| run + k)
+        })
+        .collect();
+    for y in 0..g.out.height {
+        for x in 0..g.out.width {
+            let pixel = g.first_tap(x, y);
+            taps.iter().for_each(|tap| read(pixel + tap));
+        }
+    }
+}
+
+/// Calls `write` with the place and count of all that a step writes.
+fn written<E: Element, C: ConvForm<E>>(step: &Step<C>, mut write: impl FnMut(usize, usize)) {
+    let mut all = |view: &View, channels: usize| {
+        for y in 0..view.height {
+            (0..view.width).for_each(|x| write(view.at(x, y), channels));
+        }
+    };
+    match step {
+        Step::Image(to) => all(to, 3),
+        Step::Border { view, reach, .. } => {
+            for_border(view, *reach, |at, _| write(at, view.channels));
+        }
+        Step::Conv(conv) => all(&conv.geometry().out, conv.geometry().out.channels),
+        Step::MaxPool(_, to) | Step::GlobalMean(_, to) | Step::AddPixel(_, _, to) => {
+            all(to, to.channels);
+        }
+        Step::Upsample(from, to) | Step::Copy(from, to) => all(to, from.channels),
+        Step::ChannelExtent(_, _, to) => all(to, 2),
+        Step::Gate(gate) => all(&gate.out, gate.out.channels),
+    }
+}

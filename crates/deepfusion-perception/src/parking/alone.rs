@@ -1,0 +1,71 @@
+//! What stands in a row by itself: a person, a pillar's base, a trolley. No car is as small that is seen from one side to
+//! the other.
+
+use super::View;
+use crate::Detection;
+use crate::box_fit::SMALL;
+use crate::obstacles::NONE;
+
+/// So many columns beside a thing it is looked at what is there.
+const BESIDE: u32 = 2;
+
+/// Whether a detection is small and nothing nearer hides how it goes on, on either side: then it is no part of a car.
+pub fn stands_alone(detection: &Detection, view: &View) -> bool {
+    let small = detection.place.footprint.iter().all(|side| *side <= SMALL);
+    small && is_open(detection, view)
+}
+
+/// Whether it ends on both sides where it is seen to end: what is beside it lies farther back, in most of its rows.
+fn is_open(detection: &Detection, view: &View) -> bool {
+    let width = view.rays.x.len() as u32;
+    let (mut rows, mut closed) = (0, [0; 2]);
+    for row in detection.runs.chunk_by(|a, b| a.v == b.v) {
+        let first = row.iter().map(|run| run.from).min().unwrap_or(0);
+        let last = row.iter().map(|run| run.to).max().unwrap_or(1) - 1;
+        rows += 1;
+        let left = (first, first.checked_sub(BESIDE));
+        let right = (last, Some(last + BESIDE).filter(|u| *u < width));
+        for (closed, (edge, beside)) in closed.iter_mut().zip([left, right]) {
+            let pixel = |u: u32| (row[0].v * width + u) as usize;
+            let goes_on = beside.is_none_or(|u| may_go_on(pixel(edge), pixel(u), view));
+            *closed += usize::from(goes_on);
+        }
+    }
+    rows > 0 && closed.iter().all(|closed| 3 * closed <= rows)
+}
+
+/// Whether what is seen in a pixel may go on at another: something nearer stands there, or an obstacle as far away.
+fn may_go_on(from: usize, at: usize, view: &View) -> bool {
+    let (here, there) = (view.depth[from], view.depth[at]);
+    let step = 0.4 + 0.01 * here;
+    let obstacle = view.obstacles.height[at] != NONE;
+    there > 0.0 && (there < here - step || obstacle && there < here + step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parking::scene::{Scene, person};
+
+    #[test]
+    fn what_is_hidden_on_a_side_or_large_does_not_stand_alone() {
+        let small = person([0.0, 12.0]);
+        let mut beside = person([-0.7, 10.0]);
+        let alone = |boxes: &[_]| {
+            let scene = Scene::of(boxes);
+            stands_alone(&scene.detection(boxes[0]), &scene.view())
+        };
+        assert!(alone(&[small]));
+        // Farther away, what stands beside it hides nothing.
+        assert!(alone(&[small, person([-0.5, 14.0])]));
+        beside.footprint = [1.0, 1.0];
+        assert!(!alone(&[small, beside]), "hidden on the left");
+        assert!(
+            !alone(&[small, person([0.5, 12.0])]),
+            "goes on to the right"
+        );
+        let mut large = small;
+        large.footprint = [1.8, 0.5];
+        assert!(!alone(&[large]));
+    }
+}
