@@ -27,7 +27,7 @@ pub enum Error {
     },
     /// Images so large that the network's values have no room in memory.
     #[error(
-        "network input of {width}x{height} pixels: no memory for the network's values at this size"
+        "network input of {width}x{height} pixels: no memory for its values at this size; choose a smaller one"
     )]
     Memory {
         /// Width in pixels.
