@@ -44,6 +44,8 @@ fn files(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
     let mut names: Vec<String> = entries
         .map(|e| e.unwrap().file_name().into_string().unwrap())
+        // The lock's file stays for good.
+        .filter(|name| !name.ends_with(".lock"))
         .collect();
     names.sort();
     names
