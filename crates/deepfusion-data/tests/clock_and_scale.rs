@@ -32,14 +32,18 @@ struct Drive {
     path: PathBuf,
     /// Beside it, where it says nothing yet.
     config: PathBuf,
-    /// Of frame 5, on the vehicle's clock if the two clocks are one, in seconds.
-    frame_5_s: f64,
+    /// A frame with speeds about it, whichever clock is ahead.
+    frame: usize,
+    /// When that was, on the vehicle's clock if the two clocks are one, in seconds.
+    at_s: f64,
     _folder: TempDir,
 }
 
 impl Drive {
     fn speed(&self, options: &OpenOptions) -> f64 {
-        open(&self.path, options).frames()[5].speed_mps.unwrap()
+        open(&self.path, options).frames()[self.frame]
+            .speed_mps
+            .unwrap()
     }
 }
 
@@ -74,21 +78,24 @@ fn drives() -> Vec<Drive> {
             layout: "KITTI",
             config: drive.join("dataset.toml"),
             path: drive,
-            frame_5_s: 0.345 + 5.0 * 0.103,
+            frame: 5,
+            at_s: 0.345 + 5.0 * 0.103,
             _folder: kitti,
         },
         Drive {
             layout: "folder",
             path: images.path().to_owned(),
             config: images.path().join("dataset.toml"),
-            frame_5_s: 0.345 + 5.0 * 0.103,
+            frame: 5,
+            at_s: 0.345 + 5.0 * 0.103,
             _folder: images,
         },
         Drive {
             layout: "bag",
             config: path.with_extension("toml"),
             path,
-            frame_5_s: 5.0 * 0.04,
+            frame: 15,
+            at_s: 15.0 * 0.04,
             _folder: bagged,
         },
     ]
@@ -109,7 +116,7 @@ fn near(found: f64, expected: f64, of: &str) {
 #[test]
 fn clock_and_scale_are_taken_out_once_in_every_layout() {
     for drive in drives() {
-        let (of, t) = (drive.layout, drive.frame_5_s);
+        let (of, t) = (drive.layout, drive.at_s);
         let default = OpenOptions::default();
         let ahead = |seconds| OpenOptions {
             camera_ahead_s: Some(seconds),
@@ -129,7 +136,7 @@ fn clock_and_scale_are_taken_out_once_in_every_layout() {
         near(dataset.camera_ahead_s(), AHEAD_S, of);
         // Motion follows, and frames stay as far apart as they were.
         let frames = dataset.frames();
-        let [from, to] = [4, 5].map(|i| frames[i].time_s.unwrap());
+        let [from, to] = [1, 0].map(|before| frames[drive.frame - before].time_s.unwrap());
         let motion = dataset.track().unwrap().motion(from, to).unwrap();
         let middle = SCALE * speed_mps(t - AHEAD_S - 0.5 * (to - from));
         near(motion.distance_m, middle * (to - from), of);
@@ -147,7 +154,7 @@ fn what_was_taken_out_is_not_taken_out_again_after_a_conversion() {
     for drive in drives() {
         write_config(&drive, BOTH);
         let first = open(&drive.path, &OpenOptions::default());
-        let expected = first.frames()[5].speed_mps.unwrap();
+        let expected = first.frames()[drive.frame].speed_mps.unwrap();
         let out = tempfile::tempdir().unwrap();
         let kitti = out.path().join("kitti");
         let one = std::slice::from_ref(&first);
@@ -157,7 +164,7 @@ fn what_was_taken_out_is_not_taken_out_again_after_a_conversion() {
         for path in [&folders.paths[0], &bag] {
             let again = open(path, &OpenOptions::default());
             near(again.camera_ahead_s(), 0.0, drive.layout);
-            let speed = again.frames()[5].speed_mps.unwrap();
+            let speed = again.frames()[drive.frame].speed_mps.unwrap();
             assert!(
                 (speed - expected).abs() < 1e-3,
                 "{}: {speed}, {expected}",
