@@ -123,6 +123,12 @@ impl Model {
         )
     }
 
+    /// The run's configuration, with what was taken from the data.
+    #[must_use]
+    pub fn config(&self) -> &TrainConfig {
+        &self.config
+    }
+
     /// The depths that the disparities mean.
     #[must_use]
     pub fn range(&self) -> DepthRange {

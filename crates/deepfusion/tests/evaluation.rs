@@ -169,7 +169,7 @@ fn several_data_sets_are_learned_together() {
     fails(
         at,
         "train --data road --config both.toml --resume --out both",
-        &["data.paths"],
+        &["--data", "data.sets"],
     );
     let scale = |set: &str| {
         let report = json(

@@ -54,9 +54,8 @@ pub fn run(args: &TrainArgs) -> Result<()> {
                 // Its PoseNet speaks of this unit.
                 config.pose_net.metres_per_unit = folder.read_config()?.pose_net.metres_per_unit;
             }
-            let settings = config.clone();
             Trainer::create(config, folder, sets, &device, |model| match init {
-                Some(path) => initialise(model, path, &settings, &device),
+                Some(path) => initialise(model, path, &device),
                 None => Ok(model),
             })?
         }
@@ -381,15 +380,10 @@ pub fn is_run(path: &Path) -> bool {
 }
 
 /// Starts from the networks of a run, or from an ImageNet encoder's weights.
-fn initialise(
-    model: Model,
-    path: &Path,
-    config: &TrainConfig,
-    device: &burn::tensor::Device,
-) -> Result<Model, Error> {
+fn initialise(model: Model, path: &Path, device: &burn::tensor::Device) -> Result<Model, Error> {
     let device = device.clone().autodiff();
     if let Some((folder, kind)) = run_of(path)? {
-        let (model, anew) = folder.load_networks(kind, config, &device)?;
+        let (model, anew) = folder.load_networks(kind, model.config(), &device)?;
         let from = folder.checkpoint_path(kind);
         say(&match anew.as_slice() {
             [] => format!("starts from {}", from.display()),
