@@ -80,10 +80,10 @@ fn runs_are_reported_kept_and_compared() {
     // What was kept is what was printed.
     let saved = kept(&at.join("a"));
     assert_eq!(saved.len(), 1);
-    let mut printed = report.clone();
-    let checkpoint = printed.as_object_mut().unwrap().remove("checkpoint");
-    assert_eq!(checkpoint.unwrap()["name"], saved[0]["model"]["checkpoint"]);
-    assert_eq!(saved[0]["report"], printed);
+    let mut measured = report.clone();
+    let checkpoint = measured.as_object_mut().unwrap().remove("checkpoint");
+    assert_eq!(checkpoint.unwrap()["name"], "best");
+    assert_eq!(saved[0]["report"], measured);
     assert_eq!(saved[0]["images"].as_array().unwrap().len(), 6);
     assert_eq!(saved[0]["model"]["sha256"].as_str().unwrap().len(), 64);
     ok(at, "eval --model a --data sim --points 500");

@@ -87,9 +87,9 @@ pub struct TrainArgs {
 pub enum PresetChoice {
     /// ResNet-18 at half width, 320×96: useful on two cores in minutes.
     Tiny,
-    /// ResNet-18, 640×192; on a processor 320×96.
+    /// ResNet-18, 640×192; trained on a processor 320×96.
     Light,
-    /// ResNet-50, 640×192, batch 12; on a processor 320×96, batch 4.
+    /// ResNet-50, 640×192, batch 12; trained on a processor 320×96, batch 4.
     Resnet50,
     /// The paper's network: ResNet-50 with context and attention; sizes as resnet50.
     Paper,
