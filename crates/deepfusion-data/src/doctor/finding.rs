@@ -66,7 +66,7 @@ pub enum Status {
     Ok,
     /// It found something.
     Found,
-    /// It could not look; why is in [`Outcome::skipped`].
+    /// It could not look; why is in the `skipped` of its outcome.
     NotChecked,
 }
 
