@@ -5,6 +5,7 @@ use crate::imu::{self, BodyMotion, ImuReading};
 use crate::light::GroundLight;
 use crate::motion::Drive;
 use crate::oxts::OxtsReading;
+use crate::render::Cores;
 use crate::rig::{Rig, kitti_like_intrinsics, umad_like_intrinsics};
 use crate::road::Road;
 use crate::scene::{SceneObject, World};
@@ -68,7 +69,7 @@ impl Simulation {
         let drive = Drive::simulate(&mut rng, &road, duration_s, config.scene.pace());
         road.truncate(drive.progress(duration_s).0 + LEAD_OUT);
         let world = World::furnish(road, config.seed, config.scene);
-        let light = GroundLight::bake(&world);
+        let light = GroundLight::bake(&world, Cores::All);
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x7AFF_1C00);
         let traffic = Traffic::new(&mut rng, &world, &drive, duration_s, config.moving_cars);
         let (width, height) = (config.width, config.height);

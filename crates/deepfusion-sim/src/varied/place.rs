@@ -1,0 +1,98 @@
+//! A world of the endless mode: a short stretch of street, its traffic, its sun.
+
+use super::EndlessConfig;
+use super::draw::{generator, weighted};
+use crate::config::Scene;
+use crate::light::GroundLight;
+use crate::motion::Drive;
+use crate::primitive::V3;
+use crate::render::Cores;
+use crate::road::Road;
+use crate::scene::World;
+use crate::traffic::Traffic;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+/// The street begins this far behind the first camera and ends this far beyond the last, metres.
+const BEHIND: f64 = 110.0;
+const AHEAD: f64 = 190.0;
+
+/// Traffic is simulated for so long, seconds; cameras stand along the way that a car drives meanwhile.
+const DURATION_S: f64 = 9.0;
+
+/// A built world.
+pub struct Place {
+    /// The street and what stands on it.
+    pub world: World,
+    /// Light on its ground.
+    pub light: GroundLight,
+    /// What moves.
+    pub traffic: Traffic,
+    /// Cameras are placed from 0 to here, metres along the street.
+    pub length: f64,
+}
+
+impl Place {
+    /// Builds world `number` of a stream.
+    pub fn build(config: &EndlessConfig, number: u64) -> Self {
+        let mut rng = generator(config.seed, number, 0x90D);
+        let scene = scene(&mut rng, config.daylight);
+        let seed: u64 = rng.random();
+        let longest = 14.0 * (DURATION_S + 3.0);
+        let mut road = Road::generate(&mut rng, -BEHIND, longest + AHEAD);
+        let drive = Drive::simulate(&mut rng, &road, DURATION_S, scene.pace());
+        let length = drive.progress(DURATION_S).0;
+        road.truncate(length + AHEAD);
+        let mut world = World::furnish(road, seed, scene);
+        world.sun = sun(&mut rng);
+        let light = GroundLight::bake(&world, Cores::One);
+        let cars = match scene {
+            Scene::Garage => rng.random_range(0..3),
+            Scene::Park => rng.random_range(0..5),
+            _ => rng.random_range(0..13),
+        };
+        let traffic = Traffic::new(&mut rng, &world, &drive, DURATION_S, cars);
+        Self {
+            world,
+            light,
+            traffic,
+            length,
+        }
+    }
+
+    /// A time of its traffic, seconds.
+    pub fn time(rng: &mut ChaCha8Rng) -> f64 {
+        rng.random_range(0.0..DURATION_S)
+    }
+}
+
+/// By daylight mostly streets, then shopping streets and parks; else garages and nights, half and half.
+fn scene(rng: &mut ChaCha8Rng, daylight: f64) -> Scene {
+    if rng.random_bool(daylight) {
+        weighted(
+            rng,
+            &[
+                (0.5, Scene::Urban),
+                (0.25, Scene::Commercial),
+                (0.25, Scene::Park),
+            ],
+        )
+    } else {
+        weighted(rng, &[(0.5, Scene::Garage), (0.5, Scene::Night)])
+    }
+}
+
+/// Towards the sun: any azimuth; in a quarter of the worlds low (3° to 17°), else 17° to 65° high.
+fn sun(rng: &mut ChaCha8Rng) -> V3 {
+    let azimuth: f32 = rng.random_range(0.0..std::f32::consts::TAU);
+    let elevation: f32 = if rng.random_bool(0.25) {
+        rng.random_range(0.06..0.3)
+    } else {
+        rng.random_range(0.3..1.13)
+    };
+    V3::new(
+        azimuth.cos() * elevation.cos(),
+        azimuth.sin() * elevation.cos(),
+        elevation.sin(),
+    )
+}
