@@ -20,10 +20,12 @@ pub struct AdamStep {
     pub correction2: f32,
     /// The gradient is multiplied by this first.
     pub gradient_scale: f32,
+    /// λ of AdamW: p ← p − α·λ·p beside Adam's own step; 0: Adam.
+    pub weight_decay: f32,
 }
 
 /// One step of Adam in a single pass: m ← β₁m + (1 − β₁)g, v ← β₂v + (1 − β₂)g²,
-/// p ← p − α·(m/c₁)/(√(v/c₂) + ε) (Kingma and Ba, Algorithm 1).
+/// p ← (1 − αλ)·p − α·(m/c₁)/(√(v/c₂) + ε) (Kingma and Ba, Algorithm 1; λ by Loshchilov and Hutter).
 ///
 /// # Panics
 /// When the lengths differ.
@@ -40,6 +42,7 @@ pub fn adam(
         "parameter, gradient and moments have the same length"
     );
     let s = *step;
+    let keep = 1.0 - s.learning_rate * s.weight_decay;
     parameter
         .par_chunks_mut(CHUNK)
         .zip(gradient.par_chunks(CHUNK))
@@ -55,7 +58,7 @@ pub fn adam(
                 *m = s.beta1 * *m + (1.0 - s.beta1) * g;
                 *v = s.beta2 * *v + (1.0 - s.beta2) * g * g;
                 let root = (*v / s.correction2).sqrt() + s.epsilon;
-                *p -= s.learning_rate * (*m / s.correction1) / root;
+                *p = *p * keep - s.learning_rate * (*m / s.correction1) / root;
             }
         });
 }
@@ -96,12 +99,35 @@ mod tests {
             correction1: 0.1,
             correction2: 0.001,
             gradient_scale: 1.0,
+            weight_decay: 0.0,
         };
         adam(&step, &mut p, &[3.0, -0.02], &mut m, &mut v);
         assert!(
             (p[0] - 0.9).abs() < 1e-5 && (p[1] - 2.1).abs() < 1e-5,
             "{p:?}"
         );
+    }
+
+    /// Without a gradient a parameter shrinks by αλ, whatever its size, and the moments stay.
+    #[test]
+    fn weights_decay_apart_from_the_gradient() {
+        let (mut p, mut m, mut v) = ([1.0_f32, -200.0], [0.0; 2], [0.0; 2]);
+        let step = AdamStep {
+            learning_rate: 0.1,
+            beta1: 0.9,
+            beta2: 0.999,
+            epsilon: 1e-8,
+            correction1: 0.1,
+            correction2: 0.001,
+            gradient_scale: 1.0,
+            weight_decay: 0.5,
+        };
+        adam(&step, &mut p, &[0.0; 2], &mut m, &mut v);
+        assert!(
+            (p[0] - 0.95).abs() < 1e-6 && (p[1] + 190.0).abs() < 1e-4,
+            "{p:?}"
+        );
+        assert_eq!((m, v), ([0.0; 2], [0.0; 2]));
     }
 
     #[test]

@@ -7,6 +7,7 @@ mod captioned;
 mod charts;
 mod cloud_view;
 mod colour;
+mod depth_panel;
 mod depth_picture;
 mod error;
 mod error_picture;
@@ -24,6 +25,7 @@ pub use captioned::{Tile, model_sheet, sheet};
 pub use charts::{BarChart, LineChart, ScatterChart, Series, Svg, histogram};
 pub use cloud_view::{CloudView, render_cloud};
 pub use colour::{ColourMap, DepthScale};
+pub use depth_panel::{DepthPanel, depth_panel};
 pub use depth_picture::{
     depth_legend, depth_picture, disparity_picture, side_by_side, with_depth_legend,
 };

@@ -84,7 +84,7 @@ pub fn sample_panel(panel: &SamplePanel<'_>) -> Result<RgbImage> {
 }
 
 /// 3×H×W numbers in [0, 1] as a picture.
-fn picture_from_chw(
+pub(crate) fn picture_from_chw(
     what: &'static str,
     chw: &[f32],
     (width, height): (u32, u32),

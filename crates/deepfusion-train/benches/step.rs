@@ -72,7 +72,7 @@ fn depth_net_step(criterion: &mut Criterion) {
                 let mut raw = loss_of(&net, x.clone()).backward();
                 let mut gradients = NamedGradients::default();
                 gradients.add("depth", &net, &mut raw, 1.0);
-                let (_, step) = adam.begin(&gradients, LEARNING_RATE, CLIP_NORM);
+                let (_, step) = adam.begin(&gradients, LEARNING_RATE, CLIP_NORM, 0.0);
                 let step = step.expect("the gradient is finite");
                 net = adam.apply(&step, "depth", net.clone(), &gradients);
             });
@@ -145,7 +145,7 @@ fn training_step(criterion: &mut Criterion, name: &str, mut config: TrainConfig)
             if let Some(decoder) = &model.flow_decoder {
                 gradients.add("flow", decoder, &mut raw, 1.0);
             }
-            let (_, step) = adam.begin(&gradients, LEARNING_RATE, CLIP_NORM);
+            let (_, step) = adam.begin(&gradients, LEARNING_RATE, CLIP_NORM, 0.0);
             let step = step.expect("the gradient is finite");
             let Model {
                 depth_net,

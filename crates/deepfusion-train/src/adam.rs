@@ -113,13 +113,15 @@ impl Adam {
     }
 
     /// Prepares a step: the factor that clips the gradient to `clip_norm` (0: no limit), or that
-    /// nothing should move.
+    /// nothing should move. `weight_decay` is decoupled (AdamW, Loshchilov and Hutter) and is of matrices and kernels alone:
+    /// biases and the weights of norms are free.
     #[must_use]
     pub fn begin(
         &mut self,
         gradients: &NamedGradients,
         learning_rate: f64,
         clip_norm: f64,
+        weight_decay: f64,
     ) -> (StepOutcome, Option<AdamStep>) {
         let norm = gradients.norm();
         if !norm.is_finite() {
@@ -140,6 +142,7 @@ impl Adam {
             correction1: (1.0 - beta1.powi(self.steps as i32)) as f32,
             correction2: (1.0 - beta2.powi(self.steps as i32)) as f32,
             gradient_scale: scale as f32,
+            weight_decay: weight_decay as f32,
         };
         let outcome = StepOutcome::Done {
             gradient_norm: norm,
@@ -278,7 +281,11 @@ impl ModuleMapper for Update<'_> {
             let (shape, device) = (tensor.dims(), tensor.device());
             let mut values = to_vec(tensor.inner());
             let Moments { first, second } = moments;
-            adam(self.step, &mut values, gradient, first, second);
+            let step = AdamStep {
+                weight_decay: if D > 1 { self.step.weight_decay } else { 0.0 },
+                ..*self.step
+            };
+            adam(&step, &mut values, gradient, first, second);
             Tensor::from_data(TensorData::new(values, shape), &device).require_grad()
         })
     }

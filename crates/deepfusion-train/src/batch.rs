@@ -1,24 +1,18 @@
+use crate::loader::Ahead;
 use crate::{
-    BatchFactors, Error, Jitter, Motion, SampleSet, Sampler, TrainConfig, sampler::stream,
+    BatchFactors, Error, Jitter, Motion, SampleFactors, SampleSet, Sampler, TrainConfig,
+    sampler::stream,
 };
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_data::{resize_rgb, to_chw};
-use deepfusion_geometry::{DepthRange, Se3};
+use deepfusion_geometry::Se3;
 use rand::Rng;
 use rayon::prelude::*;
-use std::any::Any;
-use std::cell::Cell;
 use std::collections::HashMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex};
 
 /// Bytes of resized images that are kept, so that a small drive is decoded once and not every epoch.
 const CACHE_BYTES: usize = 2 << 30;
-/// Threads that decode and resize.
-const MAX_THREADS: usize = 4;
-/// Batches made ahead of the trainer.
-const AHEAD: usize = 3;
 
 /// A batch of B samples with F frames each: the target, then its sources.
 #[derive(Debug, Clone)]
@@ -68,8 +62,8 @@ struct RawBatch {
     translation: Vec<Vec<f32>>,
     offsets: Vec<i32>,
     names: Vec<String>,
-    /// Range and metres per unit of each sample's set; empty where the run has none.
-    factors: Vec<(DepthRange, f64)>,
+    /// What each sample's outputs mean; empty where that is the same for all.
+    factors: Vec<SampleFactors>,
 }
 
 /// Resized images, H×W×3 bytes, by data set and frame.
@@ -86,9 +80,7 @@ struct Maker {
 
 /// Makes batches in order, ahead of the trainer, on its own thread.
 pub struct BatchLoader {
-    /// `None` says that the last batch was sent. A channel that ends without it has lost its thread.
-    batches: Receiver<Result<Option<RawBatch>, Error>>,
-    ended: Cell<bool>,
+    batches: Ahead<RawBatch>,
     size: (usize, usize),
     /// The pose network's own metres per unit.
     unit_m: f64,
@@ -130,34 +122,16 @@ impl BatchLoader {
         augment: bool,
         batches: impl Iterator<Item = (usize, Vec<usize>)> + Send + 'static,
     ) -> Self {
-        let (sender, receiver) = sync_channel(AHEAD);
         let maker = Maker {
             config: config.clone(),
             set,
             augment,
             cache: Mutex::default(),
         };
-        let complaints = sender.clone();
-        let make = move |pool: rayon::ThreadPool| {
-            for (number, samples) in batches {
-                let make = || pool.install(|| maker.make(number, &samples));
-                let batch = catch_unwind(AssertUnwindSafe(make))
-                    .unwrap_or_else(|panic| Err(panicked(number, &*panic)));
-                let failed = batch.is_err();
-                // The thread ends when the receiver is dropped: `send` fails then.
-                if sender.send(batch.map(Some)).is_err() || failed {
-                    return;
-                }
-            }
-            sender.send(Ok(None)).ok();
-        };
-        if let Err(error) = start_thread(make) {
-            // The channel is empty and holds more than one; its receiver is still here.
-            complaints.send(Err(error)).ok();
-        }
         Self {
-            batches: receiver,
-            ended: Cell::new(false),
+            batches: Ahead::start(batches, move |number, samples: &Vec<usize>| {
+                maker.make(number, samples)
+            }),
             size: (config.size.height, config.size.width),
             unit_m: config.pose_net.metres_per_unit,
         }
@@ -169,20 +143,9 @@ impl BatchLoader {
     /// [`Error::Data`] for an image that cannot be read or has another size than its camera;
     /// [`Error::Threads`] where the loader could not start; [`Error::Loader`] where its thread has died.
     pub fn next(&self, device: &Device) -> Option<Result<SnippetBatch, Error>> {
-        if self.ended.get() {
-            return None;
-        }
-        let raw = match self.batches.recv() {
-            Ok(Ok(Some(raw))) => raw,
-            Ok(Ok(None)) => {
-                self.ended.set(true);
-                return None;
-            }
-            Ok(Err(error)) => return Some(Err(error)),
-            Err(_) => {
-                let reason = "its thread has ended before the last batch".into();
-                return Some(Err(Error::Loader { reason }));
-            }
+        let raw = match self.batches.next()? {
+            Ok(raw) => raw,
+            Err(error) => return Some(Err(error)),
         };
         let n = raw.names.len();
         let (height, width) = self.size;
@@ -212,32 +175,6 @@ impl BatchLoader {
             factors: (!raw.factors.is_empty())
                 .then(|| BatchFactors::new(&raw.factors, self.unit_m, device)),
         }))
-    }
-}
-
-/// Runs `make` on a thread with a pool of its own. The shared pool will not do: the trainer waits for a
-/// batch on one of its threads, which could be the only one.
-fn start_thread(make: impl FnOnce(rayon::ThreadPool) + Send + 'static) -> Result<(), Error> {
-    let failed = |reason: String| Error::Threads { reason };
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads.min(MAX_THREADS))
-        .build()
-        .map_err(|e| failed(e.to_string()))?;
-    std::thread::Builder::new()
-        .name("batches".into())
-        .spawn(move || make(pool))
-        .map_err(|e| failed(e.to_string()))?;
-    Ok(())
-}
-
-/// What a panic while a batch was made means to whoever waits for it.
-fn panicked(number: usize, panic: &(dyn Any + Send)) -> Error {
-    let text = panic.downcast_ref::<String>().map(String::as_str);
-    let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-    let text = text.unwrap_or("it does not say why");
-    Error::Loader {
-        reason: format!("batch {number}: {text}"),
     }
 }
 
@@ -288,16 +225,18 @@ impl Maker {
                 .collect(),
             offsets: self.config.frames.clone(),
             names: samples.iter().map(|s| self.set.name(*s)).collect(),
-            factors: match self.config.data.sets.len() {
-                0 => Vec::new(),
-                _ => samples.iter().map(|s| self.factors(*s)).collect(),
+            factors: match self.config.has_factors() {
+                false => Vec::new(),
+                true => samples.iter().map(|s| self.factors(*s)).collect(),
             },
         })
     }
 
-    fn factors(&self, sample: usize) -> (DepthRange, f64) {
-        let dataset = self.set.samples[sample].dataset;
-        self.config.factors(self.set.set_of[dataset])
+    fn factors(&self, sample: usize) -> SampleFactors {
+        let sample = &self.set.samples[sample];
+        let camera = self.set.datasets[sample.dataset].intrinsics(sample.snippet.target);
+        let set = self.set.set_of[sample.dataset];
+        self.config.sample_factors(set, &camera)
     }
 
     fn item(&self, sample: usize, draw: usize) -> Result<Item, Error> {

@@ -1,4 +1,4 @@
-use crate::{DataSetConfig, Error, LossConfig, Preset};
+use crate::{DataSetConfig, Error, Learn, LossConfig, Preset};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_nn::{
     AttentionConfig, AttentionForm, DepthNetConfig, FlowDecoderConfig, HceConfig, InputSize,
@@ -54,6 +54,20 @@ pub struct Augmentation {
     pub brightness: f32,
     /// Largest change of hue, in turns.
     pub hue: f32,
+    /// How much smaller than the image the part may be that is cut from it, of images whose depth is known; 1: all of it.
+    #[serde(default = "no_zoom")]
+    pub zoom: f32,
+}
+
+/// How the step size changes over a run, after its rise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LearningRateSchedule {
+    /// A tenth from `learning_rate_drop` on.
+    #[default]
+    Drop,
+    /// Half a cosine from `learning_rate` to a hundredth of it.
+    Cosine,
 }
 
 /// Where a run's images come from; a resumed run finds them again by this.
@@ -75,6 +89,9 @@ pub struct DataConfig {
     pub camera_ahead_s: Option<f64>,
     /// Which cameras: `2`, `3` or `both`; empty means 2.
     pub camera: String,
+    /// What is learned from.
+    #[serde(skip_serializing_if = "Learn::is_own_motion")]
+    pub learn: Learn,
     /// Several data sets with cameras, ranges and displacements of their own, instead of `paths`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<DataSetConfig>,
@@ -101,6 +118,9 @@ pub struct TrainConfig {
     pub reversed_pose: ReversedPose,
     /// Samples a step.
     pub batch: usize,
+    /// Samples of known depth a step, beside those of video where there are both; 0: as many as `batch`.
+    #[serde(default)]
+    pub depth_batch: usize,
     /// Batches whose gradients are averaged before a step of the optimiser.
     pub accumulate: usize,
     /// Passes over the data; `steps` overrides it.
@@ -115,8 +135,14 @@ pub struct TrainConfig {
     pub learning_rate: f64,
     /// Steps over which the step size rises from 0: large first steps can flatten the depth for good.
     pub learning_rate_warmup_steps: usize,
-    /// Share of the run after which the step size is divided by ten.
+    /// How it falls.
+    #[serde(default)]
+    pub learning_rate_schedule: LearningRateSchedule,
+    /// Share of the run after which the step size is divided by ten, where it falls by `drop`.
     pub learning_rate_drop: f64,
+    /// Share of each weight, not of biases and norms, that a step of size 1 takes away beside Adam's own (AdamW).
+    #[serde(default)]
+    pub weight_decay: f64,
     /// Largest norm of the gradient; longer ones are shortened to it. 0: no limit.
     pub clip_norm: f64,
     /// Decides everything random.
@@ -142,6 +168,11 @@ pub struct TrainConfig {
     /// The camera trained with, at network size; filled in from the data. Several cameras: the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Intrinsics>,
+    /// f_c, the focal length in pixels of the network's input to which all cameras are brought (Metric3D): the network
+    /// says depth × f_c/f_y, so that what looks the same in pixels is the same to it whatever the lens. Absent: it says
+    /// the depth of the camera it is trained with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub canonical_focal_px: Option<f64>,
     /// The recordings.
     #[serde(default)]
     pub data: DataConfig,
@@ -157,6 +188,10 @@ pub struct TrainConfig {
     /// The flow decoder, which training alone has, and only where `loss.flow.weight` is above 0.
     #[serde(default)]
     pub flow_decoder: FlowDecoderConfig,
+}
+
+fn no_zoom() -> f32 {
+    1.0
 }
 
 /// What a kill or a power cut costs at most.
@@ -175,6 +210,7 @@ impl DataConfig {
             validation_split,
             camera_ahead_s: _,
             camera: _,
+            learn: _,
             sets,
         } = self;
         let mut all: Vec<&mut PathBuf> = paths.iter_mut().chain(validation).collect();
@@ -304,6 +340,22 @@ impl TrainConfig {
         self.steps.unwrap_or(of_epochs.max(self.min_steps))
     }
 
+    /// What is learned from a data set, by its place in `data.sets`.
+    #[must_use]
+    pub fn learn(&self, set: usize) -> Learn {
+        let own = self.data.sets.get(set).map(|set| set.learn);
+        own.unwrap_or(self.data.learn)
+    }
+
+    /// Samples of known depth a step.
+    #[must_use]
+    pub fn depth_batch(&self) -> usize {
+        match self.depth_batch {
+            0 => self.batch,
+            own => own,
+        }
+    }
+
     /// Whether anything in training reads how the vehicle turned, not only how far it went.
     #[must_use]
     pub fn reads_rotation(&self) -> bool {
@@ -343,6 +395,11 @@ impl TrainConfig {
         if !(self.learning_rate > 0.0 && self.learning_rate.is_finite()) {
             return fail("learning_rate", "above 0", self.learning_rate.to_string());
         }
+        if let Some(focal) = self.canonical_focal_px
+            && !(focal > 0.0 && focal.is_finite())
+        {
+            return fail("canonical_focal_px", "above 0", focal.to_string());
+        }
         if !(0.0..=1.0).contains(&self.learning_rate_drop) {
             let found = self.learning_rate_drop.to_string();
             return fail("learning_rate_drop", "0 to 1", found);
@@ -356,6 +413,7 @@ impl TrainConfig {
         }
         let weights = [
             ("clip_norm", self.clip_norm),
+            ("weight_decay", self.weight_decay),
             ("min_speed_mps", self.min_speed_mps),
             ("checkpoint_minutes", self.checkpoint_minutes),
             ("frame_distance_m", self.frame_distance_m),
@@ -365,6 +423,10 @@ impl TrainConfig {
             if !(weight >= 0.0 && weight.is_finite()) {
                 return fail(field, "0 or more", weight.to_string());
             }
+        }
+        let zoom = self.augmentation.zoom;
+        if !(1.0..=8.0).contains(&zoom) {
+            return fail("augmentation.zoom", "1 to 8", zoom.to_string());
         }
         for (field, share) in [
             ("augmentation.jitter", self.augmentation.jitter),
@@ -438,6 +500,7 @@ mod tests {
             validation_split: Some("h.txt".into()),
             camera_ahead_s: None,
             camera: "both".into(),
+            learn: Learn::default(),
             sets: vec![set],
         };
         data.make_absolute();

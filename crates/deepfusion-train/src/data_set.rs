@@ -5,6 +5,63 @@ use deepfusion_geometry::{DepthRange, Intrinsics};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
+/// What is learned from a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Learn {
+    /// Depth from its own motion: views of one frame synthesised from another.
+    #[default]
+    #[serde(rename = "self")]
+    OwnMotion,
+    /// The depth that was recorded with it, of images one by one: no speed is needed.
+    Depth,
+    /// Both.
+    Both,
+}
+
+impl Learn {
+    /// Whether pairs of frames are learned from.
+    #[must_use]
+    pub fn from_motion(self) -> bool {
+        self != Self::Depth
+    }
+
+    /// Whether known depth is learned from.
+    #[must_use]
+    pub fn from_depth(self) -> bool {
+        self != Self::OwnMotion
+    }
+
+    pub(crate) fn is_own_motion(&self) -> bool {
+        *self == Self::OwnMotion
+    }
+}
+
+/// Views of simulated worlds that are rendered while they are learned from, each another one, without a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SimulatedConfig {
+    /// Chooses the worlds.
+    pub seed: u64,
+    /// Views that count as a pass over the data.
+    pub views: usize,
+    /// Views of other worlds to validate on, the same each time.
+    pub validation_views: usize,
+    /// Views of a world before it makes room for another.
+    pub views_per_world: usize,
+}
+
+impl Default for SimulatedConfig {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            views: 4000,
+            validation_views: 64,
+            views_per_world: 24,
+        }
+    }
+}
+
 /// One of the data sets that a run learns from together (`[[data.sets]]` in a configuration file).
 ///
 /// The networks' raw outputs stay near one for each of them: the sigmoid spans the set's own range of depths,
@@ -31,6 +88,12 @@ pub struct DataSetConfig {
     pub camera_ahead_s: Option<f64>,
     /// Which cameras: `2`, `3` or `both`; empty means `data.camera`.
     pub camera: String,
+    /// What is learned from it.
+    #[serde(skip_serializing_if = "Learn::is_own_motion")]
+    pub learn: Learn,
+    /// Simulated views instead of recordings; `learn` is `depth` then, and there are no `paths`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub simulated: Option<SimulatedConfig>,
     /// The depths that the sigmoid spans; absent: the depth network's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range: Option<DepthRange>,
@@ -123,9 +186,13 @@ impl TrainConfig {
             let expected = "none beside data.sets: each set has its own";
             return fail("data.paths", expected, "some".into());
         }
-        let validated = sets.iter().filter(|s| s.validates()).count();
-        if validated != 0 && validated != sets.len() {
-            let found = format!("{validated} of {} sets", sets.len());
+        let recorded = || sets.iter().filter(|s| s.simulated.is_none());
+        let (validated, all) = (
+            recorded().filter(|s| s.validates()).count(),
+            recorded().count(),
+        );
+        if validated != 0 && validated != all {
+            let found = format!("{validated} of {all} sets");
             return fail(
                 "data.sets.validation",
                 "given for all sets or for none",
@@ -137,7 +204,25 @@ impl TrainConfig {
                 let found = format!("'{}'", set.name);
                 return fail("data.sets.name", "a name of its own", found);
             }
-            if set.paths.is_empty() {
+            if let Some(simulated) = &set.simulated {
+                if set.learn != Learn::Depth {
+                    let found = format!("another in {}", set.name);
+                    let expected = "\"depth\" for simulated views, which have no neighbours";
+                    return fail("data.sets.learn", expected, found);
+                }
+                if !set.paths.is_empty() || set.validates() {
+                    let found = format!("some in {}", set.name);
+                    return fail("data.sets.paths", "none beside simulated views", found);
+                }
+                if simulated.views == 0 {
+                    return fail("data.sets.simulated.views", "at least 1", "0".into());
+                }
+                if simulated.views_per_world == 0 {
+                    let field = "data.sets.simulated.views_per_world";
+                    return fail(field, "at least 1", "0".into());
+                }
+            }
+            if set.paths.is_empty() && set.simulated.is_none() {
                 return fail(
                     "data.sets.paths",
                     "at least one",

@@ -62,6 +62,12 @@ pub enum Error {
         /// The drive.
         drive: String,
     },
+    /// A recording to learn depth from that has none.
+    #[error("{drive}: no frame has depth, and `learn` asks for it")]
+    NoDepth {
+        /// The drive.
+        drive: String,
+    },
     /// Validation frames that are learned from: their loss would say how well they are known by heart.
     #[error("validation frames are training frames: {}", told(shared))]
     SharedFrames {
@@ -118,6 +124,9 @@ pub enum Error {
     /// The recording.
     #[error(transparent)]
     Data(#[from] deepfusion_data::Error),
+    /// The simulator, of which views are learned from.
+    #[error(transparent)]
+    Simulator(#[from] deepfusion_sim::Error),
     /// The networks or their weights.
     #[error(transparent)]
     Network(#[from] deepfusion_nn::Error),
@@ -174,6 +183,11 @@ impl Error {
                  yaw_rate_radps in speed.csv, or imu.csv"
                     .into(),
             ),
+            Self::NoDepth { .. } => Some(
+                "learn = \"self\" needs no depth but a speed; RGB-D folders, drives with LiDAR scans and simulated drives \
+                 have depth"
+                    .into(),
+            ),
             Self::SharedFrames { .. } => Some(
                 "validate on other drives (--val-data) or other frames (--val-split), or leave both out: the end of each drive \
                  is held out then"
@@ -200,6 +214,7 @@ impl Error {
                     .into(),
             ),
             Self::Data(error) => error.hint(),
+            Self::Simulator(error) => error.hint(),
             Self::Network(error) => error.hint(),
         }
     }

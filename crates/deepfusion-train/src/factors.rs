@@ -1,30 +1,65 @@
-use crate::Motion;
+use crate::{Motion, TrainConfig};
 use burn::tensor::{Device, Tensor};
-use deepfusion_geometry::DepthRange;
+use deepfusion_geometry::{DepthRange, Intrinsics};
 
-/// What turns the networks' raw outputs into metres, for each sample of a batch whose data sets differ in it.
+/// What the networks' raw outputs mean of one sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SampleFactors {
+    /// The depths that the sigmoid spans, before `focal`.
+    pub range: DepthRange,
+    /// Metres of translation per unit of the pose network's output.
+    pub metres_per_unit: f64,
+    /// What depth is multiplied by for the sample's camera, f_y/f_c; 1 without a canonical focal length.
+    pub focal: f64,
+}
+
+impl TrainConfig {
+    /// Whether the networks' outputs mean something else from sample to sample.
+    #[must_use]
+    pub fn has_factors(&self) -> bool {
+        !self.data.sets.is_empty() || self.canonical_focal_px.is_some()
+    }
+
+    /// What the outputs mean of a sample of a set, by its place in `data.sets`, seen by `camera` (at any size).
+    #[must_use]
+    pub fn sample_factors(&self, set: usize, camera: &Intrinsics) -> SampleFactors {
+        let (range, metres_per_unit) = self.factors(set);
+        let (width, height) = (self.size.width as u32, self.size.height as u32);
+        let fy = camera.resized(width, height).fy;
+        SampleFactors {
+            range,
+            metres_per_unit,
+            focal: self
+                .canonical_focal_px
+                .map_or(1.0, |canonical| fy / canonical),
+        }
+    }
+}
+
+/// What turns the networks' raw outputs into metres, for each sample of a batch whose samples differ in it.
 #[derive(Debug, Clone)]
 pub struct BatchFactors {
     /// The set's metres per unit of translation over the pose network's own, B.
     pub translation: Tensor<1>,
-    /// 1/D_max, B, in 1/m.
+    /// 1/D_max, B, in 1/m; D_max of the sample's own camera.
     pub nearest_zero: Tensor<1>,
     /// 1/D_min − 1/D_max, B, in 1/m.
     pub span: Tensor<1>,
 }
 
 impl BatchFactors {
-    /// Of the samples' ranges and metres per unit; `unit_m` is the pose network's own.
+    /// Of the samples; `unit_m` is the pose network's own metres per unit.
     #[must_use]
-    pub fn new(samples: &[(DepthRange, f64)], unit_m: f64, device: &Device) -> Self {
-        let tensor = |value: &dyn Fn(&(DepthRange, f64)) -> f64| {
+    pub fn new(samples: &[SampleFactors], unit_m: f64, device: &Device) -> Self {
+        let tensor = |value: &dyn Fn(&SampleFactors) -> f64| {
             let values: Vec<f32> = samples.iter().map(|s| value(s) as f32).collect();
             Tensor::<1>::from_data(values.as_slice(), device)
         };
+        let span = |s: &SampleFactors| 1.0 / s.range.min_m - 1.0 / s.range.max_m;
         Self {
-            translation: tensor(&|s| s.1 / unit_m),
-            nearest_zero: tensor(&|s| 1.0 / s.0.max_m),
-            span: tensor(&|s| 1.0 / s.0.min_m - 1.0 / s.0.max_m),
+            translation: tensor(&|s| s.metres_per_unit / unit_m),
+            nearest_zero: tensor(&|s| 1.0 / (s.range.max_m * s.focal)),
+            span: tensor(&|s| span(s) / s.focal),
         }
     }
 
@@ -78,14 +113,19 @@ mod tests {
     #[test]
     fn every_sample_has_its_own_metres() {
         let device = Device::flex();
-        let samples = [(ROAD, 1.2), (GARAGE, 0.1)];
+        let sample = |range, metres_per_unit, focal| SampleFactors {
+            range,
+            metres_per_unit,
+            focal,
+        };
+        let samples = [sample(ROAD, 1.2, 1.0), sample(GARAGE, 0.1, 2.0)];
         let factors = BatchFactors::new(&samples, 0.6, &device);
         let sigmoid = [0.0_f32, 1.0, 0.25, 0.5, 0.1, 0.9, 0.0, 1.0];
         let tensor = Tensor::from_data(TensorData::new(sigmoid.to_vec(), [4, 1, 1, 2]), &device);
         let found: Vec<f32> = factors.inverse_depth(tensor).into_data().iter().collect();
         for (i, (found, sigmoid)) in found.iter().zip(sigmoid).enumerate() {
-            let range = samples[(i / 2) % 2].0;
-            let expected = range.disparity(f64::from(sigmoid));
+            let SampleFactors { range, focal, .. } = samples[(i / 2) % 2];
+            let expected = range.disparity(f64::from(sigmoid)) / focal;
             assert!(
                 (f64::from(*found) - expected).abs() < 1e-6 * expected,
                 "{i}"
@@ -102,7 +142,7 @@ mod tests {
             .iter()
             .collect();
         for (i, z) in scaled.chunks(3).map(|t| t[2]).enumerate() {
-            let metres = samples[i % 2].1;
+            let metres = samples[i % 2].metres_per_unit;
             assert!((f64::from(z) + metres).abs() < 1e-6, "{z} and {metres}");
         }
     }

@@ -42,6 +42,28 @@ pub struct LossConfig {
     /// The pixels that move by themselves.
     #[serde(default)]
     pub moving: MovingConfig,
+    /// Known depth, of the data sets that are learned from by it.
+    #[serde(default)]
+    pub depth: DepthLossConfig,
+}
+
+/// The loss on known depth (SPEC 7.1). It has an effect only where a data set says `learn = "depth"` or `"both"`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DepthLossConfig {
+    /// Weight of the whole beside the terms that are learned from video.
+    pub weight: f64,
+    /// λ_g of the differences between neighbours, which make edges sharp.
+    pub gradient: f64,
+}
+
+impl Default for DepthLossConfig {
+    fn default() -> Self {
+        Self {
+            weight: 1.0,
+            gradient: 0.5,
+        }
+    }
 }
 
 /// The terms of the optical flow (Eq. 16–20), all of them inside L_flow but for the agreement.
@@ -198,6 +220,8 @@ impl LossConfig {
             ("loss.moving.margin", self.moving.margin),
             ("loss.moving.min_flow_px", self.moving.min_flow_px),
             ("loss.moving.min_epipolar_px", self.moving.min_epipolar_px),
+            ("loss.depth.weight", self.depth.weight),
+            ("loss.depth.gradient", self.depth.gradient),
             (
                 "loss.moving.min_parallax_ratio",
                 self.moving.min_parallax_ratio,

@@ -4,7 +4,9 @@ use crate::config::{Reprojection, ViewMotion};
 use crate::level::{Level, levels, pyramid};
 use crate::losses::{self, FlowView, LossTerms, ReprojectionOutput, RigidView, View, share};
 use crate::model::swap_halves;
-use crate::{CompareAt, ForwardPass, Model, Motion, SnippetBatch, Synthesised, synthesise};
+use crate::{
+    CompareAt, DepthBatch, ForwardPass, Model, Motion, SnippetBatch, Synthesised, synthesise,
+};
 use burn::tensor::module::avg_pool2d;
 use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Bool, Tensor};
@@ -32,6 +34,19 @@ pub struct BatchLoss {
     pub warped: Tensor<4>,
     /// The pixels of the first view that move by themselves, T×1×H×W, where they were looked for.
     pub moving: Option<Tensor<4, Bool>>,
+}
+
+/// What a batch of known depth taught.
+#[derive(Debug, Clone)]
+pub struct DepthPass {
+    /// What is minimised, one value.
+    pub total: Tensor<1>,
+    /// Its terms.
+    pub terms: LossTerms,
+    /// True over predicted depth, the geometric mean over the pixels: 1 when the scale is metric.
+    pub scale_ratio: f64,
+    /// Inverse depth at the finest scale, B×1×H×W in 1/m.
+    pub inverse_depth: Tensor<4>,
 }
 
 /// The views of one scale.
@@ -108,6 +123,32 @@ impl Model {
             finest: output,
             warped,
             moving: masks.and_then(|masks| masks.into_iter().next()),
+        }
+    }
+
+    /// The loss of images whose depth is known, and what the network says of them.
+    #[must_use]
+    pub fn learn_depth(&self, batch: &DepthBatch) -> DepthPass {
+        let disparities = self.depth_net.forward(batch.network.clone());
+        let full_size = |(scale, disparity): (usize, &Tensor<4>)| {
+            let disparity = match scale {
+                0 => disparity.clone(),
+                _ => self.enlarge[scale].apply(disparity.clone()),
+            };
+            batch.factors.inverse_depth(disparity)
+        };
+        let inverse: Vec<_> = disparities.iter().enumerate().map(full_size).collect();
+        let settings = &self.config.loss.depth;
+        let found = losses::depth(&inverse, &batch.truth, settings);
+        let mut sum = Sum::default();
+        sum.terms.depth = sum.add(Some(found.loss), settings.weight);
+        let total = sum.total.expect("it was added");
+        sum.terms.total = number(&total);
+        DepthPass {
+            total,
+            terms: sum.terms,
+            scale_ratio: (-number(&found.bias)).exp(),
+            inverse_depth: inverse[0].clone().detach(),
         }
     }
 

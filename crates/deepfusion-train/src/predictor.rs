@@ -148,6 +148,7 @@ impl Predictor {
             width: self.config.size.width,
             height: self.config.size.height,
             training_camera: self.config.camera,
+            canonical_focal_px: self.config.canonical_focal_px,
         }
     }
 

@@ -14,6 +14,8 @@ pub struct Preparer {
     pub height: usize,
     /// The camera the network learned with, at the size of its images; `None` for imported weights.
     pub training_camera: Option<Intrinsics>,
+    /// The focal length in pixels that the network's depth is of, where it learned with many cameras.
+    pub canonical_focal_px: Option<f64>,
 }
 
 /// An image as the network takes it.
@@ -42,11 +44,8 @@ impl Preparer {
         crop: bool,
     ) -> PreparedImage {
         let window = self.window(image, camera, crop);
-        let focal_factor = if focal_correction {
-            self.focal_factor(camera, window)
-        } else {
-            1.0
-        };
+        let camera_that_counts = camera.filter(|_| focal_correction);
+        let focal_factor = self.focal_factor(camera_that_counts, window);
         let (width, height) = (self.width as u32, self.height as u32);
         PreparedImage {
             input: to_network_input(image, window, width, height),
@@ -56,15 +55,16 @@ impl Preparer {
         }
     }
 
-    /// What depth must be multiplied by for an image of another camera, f_y(test)/f_y(train), both at
-    /// network size (SPEC 5).
+    /// What depth must be multiplied by for an image of this camera, at network size: f_y(test)/f_y(train) (SPEC 5), or
+    /// f_y(test)/f_c of a network with a canonical focal length. An unknown camera is taken for the one trained with.
     fn focal_factor(&self, camera: Option<&Intrinsics>, window: [u32; 4]) -> f64 {
         let fy = |k: &Intrinsics| k.resized(self.width as u32, self.height as u32).fy;
-        match (camera, self.training_camera) {
-            (Some(test), Some(train)) => {
-                let [x, y, w, h] = window;
-                fy(&test.cropped(x, y, w, h)) / fy(&train)
-            }
+        let [x, y, w, h] = window;
+        let test = camera.map(|k| fy(&k.cropped(x, y, w, h)));
+        let train = self.training_camera.as_ref().map(fy);
+        let reference = self.canonical_focal_px.or(train);
+        match (test.or(train), reference) {
+            (Some(test), Some(reference)) => test / reference,
             _ => 1.0,
         }
     }

@@ -1,7 +1,8 @@
 use crate::config::{
-    Augmentation, DataConfig, Reprojection, ReversedPose, TrainConfig, ViewMotion,
+    Augmentation, DataConfig, LearningRateSchedule, Reprojection, ReversedPose, TrainConfig,
+    ViewMotion,
 };
-use crate::loss_config::{CompareAt, FlowLossConfig, LossConfig, MovingConfig};
+use crate::loss_config::{CompareAt, DepthLossConfig, FlowLossConfig, LossConfig, MovingConfig};
 use deepfusion_nn::{
     DecoderConfig, DepthNetConfig, FlowDecoderConfig, InputSize, PoseNetConfig, ResNetConfig,
     ResNetDepth,
@@ -77,13 +78,16 @@ impl Preset {
             reprojection: Reprojection::Bidirectional,
             reversed_pose: ReversedPose::Predicted,
             batch: 12,
+            depth_batch: 0,
             accumulate: 1,
             epochs: 20,
             steps: None,
             min_steps: MIN_STEPS,
             learning_rate: 1e-4,
             learning_rate_warmup_steps: 0,
+            learning_rate_schedule: LearningRateSchedule::Drop,
             learning_rate_drop: 0.75,
+            weight_decay: 0.0,
             clip_norm: 10.0,
             seed: 0,
             init: None,
@@ -94,6 +98,7 @@ impl Preset {
             start_moving: false,
             view_motion: ViewMotion::PoseNet,
             camera: None,
+            canonical_focal_px: None,
             data: DataConfig::default(),
             loss: LossConfig {
                 ssim_weight: 0.85,
@@ -106,12 +111,14 @@ impl Preset {
                 affine: 0.0,
                 flow: FlowLossConfig::default(),
                 moving: MovingConfig::default(),
+                depth: DepthLossConfig::default(),
             },
             augmentation: Augmentation {
                 flip: true,
                 jitter: 0.5,
                 brightness: 0.2,
                 hue: 0.1,
+                zoom: 1.0,
             },
             depth_net: DepthNetConfig::new(depth),
             pose_net: PoseNetConfig {

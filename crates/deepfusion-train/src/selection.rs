@@ -9,11 +9,14 @@ use crate::{LossTerms, TrainConfig, ViewMotion};
 ///
 /// Smoothness and the affine term are no part of it, though depth changes them: a flat depth has the least of the
 /// one, and neither asks whether the images are explained. Flow and masks are training's alone.
+///
+/// Known depth is all of it where it is learned from, and stands beside the rest at its own weight.
 pub(crate) fn selection(config: &TrainConfig, held_out: &LossTerms) -> f64 {
-    match config.view_motion {
+    let views = match config.view_motion {
         ViewMotion::PoseNet => held_out.reprojection + config.loss.speed * held_out.speed,
         ViewMotion::Distance | ViewMotion::Vehicle => held_out.reprojection,
-    }
+    };
+    views + config.loss.depth.weight * held_out.depth
 }
 
 #[cfg(test)]

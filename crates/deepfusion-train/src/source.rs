@@ -1,4 +1,4 @@
-use crate::{Error, TrainConfig, shared_frames};
+use crate::{DepthSet, Error, Learn, TrainConfig, shared_frames};
 use deepfusion_data::{Dataset, Snippet, hold_out};
 use deepfusion_geometry::Intrinsics;
 use std::sync::Arc;
@@ -19,8 +19,10 @@ pub struct SampleSet {
     pub datasets: Arc<Vec<Dataset>>,
     /// The place in `data.sets` of each recording; 0 where the run has no sets.
     pub set_of: Arc<Vec<usize>>,
-    /// The samples.
+    /// The samples of video.
     pub samples: Vec<Sample>,
+    /// What is learned from by its known depth.
+    pub depth: DepthSet,
 }
 
 impl SampleSet {
@@ -58,27 +60,38 @@ impl SampleSet {
             (Arc::new(sets), Arc::new(datasets))
         };
         let (set_of, train) = shared(train);
-        let (samples, held_out) = Self::gather(config, &train, share, &mut skipped)?;
+        let (samples, held_out) = Self::gather(config, (&train, &set_of), share, &mut skipped)?;
+        let (depth, mut held_depth) = DepthSet::split(config, &train, &set_of, share)?;
         let validation = match validation {
             Some(datasets) => {
                 let (set_of, datasets) = shared(datasets);
-                let (samples, _) = Self::gather(config, &datasets, 0.0, &mut skipped)?;
+                let both: (&[Dataset], &[usize]) = (&datasets, &set_of);
+                let (samples, _) = Self::gather(config, both, 0.0, &mut skipped)?;
+                let (all, _) = DepthSet::split(config, &datasets, &set_of, 0.0)?;
+                held_depth = DepthSet {
+                    // Those of training's worlds are not for validation.
+                    simulated: held_depth.simulated,
+                    ..all
+                };
                 Self {
                     datasets,
                     set_of,
                     samples,
+                    depth: held_depth,
                 }
             }
             None => Self {
                 datasets: Arc::clone(&train),
                 set_of: Arc::clone(&set_of),
                 samples: held_out,
+                depth: held_depth,
             },
         };
         let train = Self {
             datasets: train,
             set_of,
             samples,
+            depth,
         };
         if apart {
             let shared = shared_frames(&train, &validation);
@@ -87,7 +100,9 @@ impl SampleSet {
             }
         }
         for (i, set) in config.data.sets.iter().enumerate() {
-            if !train.samples.iter().any(|s| train.set_of[s.dataset] == i) {
+            let motion = || train.samples.iter().any(|s| train.set_of[s.dataset] == i);
+            // A set that has no depth was refused already.
+            if set.learn.from_motion() && !motion() {
                 return Err(Error::NoSamples {
                     data: format!("data set {}", set.name),
                     reason: skipped.last().cloned().unwrap_or_default(),
@@ -99,13 +114,17 @@ impl SampleSet {
 
     fn gather(
         config: &TrainConfig,
-        datasets: &[Dataset],
+        (datasets, set_of): (&[Dataset], &[usize]),
         share: f64,
         skipped: &mut Vec<String>,
     ) -> Result<(Vec<Sample>, Vec<Sample>), Error> {
         let (mut train, mut held) = (Vec::new(), Vec::new());
         let mut last = None;
+        let learns = |dataset: &usize| config.learn(set_of[*dataset]);
         for (dataset, recording) in datasets.iter().enumerate() {
+            if learns(&dataset) == Learn::Depth {
+                continue;
+            }
             let distance = config.frame_distance_m;
             match recording.snippets_apart(&config.frames, distance, config.min_speed_mps) {
                 Ok(_) if config.reads_rotation() && !recording.yaw_known() => {
@@ -129,7 +148,9 @@ impl SampleSet {
                 }
             }
         }
-        match (train.is_empty(), last) {
+        let depth_alone =
+            (0..config.data.sets.len().max(1)).all(|s| !config.learn(s).from_motion());
+        match (train.is_empty() && !depth_alone, last) {
             (false, _) => Ok((train, held)),
             (true, Some(error)) => Err(error.into()),
             (true, None) => Err(Error::NoSamples {
@@ -154,14 +175,21 @@ impl SampleSet {
             datasets: Arc::clone(&self.datasets),
             set_of: Arc::clone(&self.set_of),
             samples: self.samples.iter().filter(own).cloned().collect(),
+            depth: self.depth.of_set(set),
         }
     }
 
     /// The camera of the first sample, at the image's own size.
     #[must_use]
     pub fn camera(&self) -> Option<Intrinsics> {
-        let sample = self.samples.first()?;
-        Some(self.datasets[sample.dataset].intrinsics(sample.snippet.target))
+        let of = |sample: &Sample| self.datasets[sample.dataset].intrinsics(sample.snippet.target);
+        self.samples.first().map(of).or_else(|| self.depth.camera())
+    }
+
+    /// Whether there is nothing to learn from.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.samples.is_empty() && self.depth.is_empty()
     }
 
     /// Drive and frame numbers of a sample, for messages.

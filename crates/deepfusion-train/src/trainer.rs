@@ -2,16 +2,18 @@ use crate::losses::speed_weight;
 use crate::model::displacement_ratio;
 use crate::selection::selection;
 use crate::{
-    Adam, BatchLoader, BatchLoss, Checkpoint, CheckpointKind, Control, Error, ForwardPass,
-    LossTerms, Model, NamedGradients, RunFolder, SamplePanel, SampleSet, Sampler, Schedule,
-    SnippetBatch, StepOutcome, TrainConfig, TrainEvent,
+    Adam, BatchLoader, BatchLoss, Checkpoint, CheckpointKind, Control, DepthBatch, DepthLoader,
+    DepthPass, Error, ForwardPass, LearningRateSchedule, LossTerms, Model, NamedGradients,
+    RunFolder, SamplePanel, SampleSet, Sampler, Schedule, StepOutcome, TrainConfig, TrainEvent,
 };
-use burn::tensor::Device;
+use burn::tensor::{Device, Tensor};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Skipped steps in a row after which training gives up.
 const MAX_SKIPPED: usize = 20;
+/// Share of the learning rate that a cosine ends at.
+const COSINE_END: f64 = 0.01;
 /// Steps that the pace and the scale ratio are averaged over.
 const SMOOTHING: f64 = 20.0;
 /// Below this share of pixels in view the geometry has come apart (SPEC 2).
@@ -74,12 +76,12 @@ impl Trainer {
         config.make_absolute();
         check_samples(&config, &train, &validation)?;
         if config.pose_net.metres_per_unit == 0.0 {
-            config.pose_net.metres_per_unit = config.first_unit(train.mean_displacement_m());
+            config.pose_net.metres_per_unit = first_unit(&config, &train);
         }
         config.camera = train.camera();
         for i in 0..config.data.sets.len() {
             let own = train.of_set(i);
-            let unit = config.first_unit(own.mean_displacement_m());
+            let unit = first_unit(&config, &own);
             let set = &mut config.data.sets[i];
             if set.metres_per_unit == 0.0 {
                 set.metres_per_unit = unit;
@@ -142,11 +144,15 @@ impl Trainer {
         self.config.steps_of(self.epoch_steps())
     }
 
-    /// Steps of the optimiser in a pass over the data.
+    /// Steps of the optimiser in a pass over the data: over its video, where there is any.
     #[must_use]
     pub fn epoch_steps(&self) -> usize {
-        let sampler = Sampler::new(self.train.samples.len(), self.config.batch, 0);
-        sampler.batches_per_epoch().div_ceil(self.config.accumulate)
+        let (samples, batch) = match self.train.samples.len() {
+            0 => (self.train.depth.len(), self.config.depth_batch()),
+            samples => (samples, self.config.batch),
+        };
+        let batches = Sampler::new(samples, batch, 0).batches_per_epoch();
+        batches.div_ceil(self.config.accumulate)
     }
 
     /// Steps done so far.
@@ -189,16 +195,12 @@ impl Trainer {
             every => every,
         };
         let accumulate = self.config.accumulate;
-        let loader = BatchLoader::training(
-            &self.config,
-            self.train.clone(),
-            self.state.step * accumulate,
-        );
+        let loaders = Loaders::training(&self.config, &self.train, self.state.step * accumulate);
         listen(TrainEvent::Started {
             from_step: self.state.step,
             steps,
-            samples: self.train.samples.len(),
-            validation_samples: self.validation.samples.len(),
+            samples: self.train.samples.len() + self.train.depth.len(),
+            validation_samples: self.validation.samples.len() + self.validation.depth.len(),
             mean_displacement_m: self.train.mean_displacement_m(),
         });
         let start = Instant::now();
@@ -213,38 +215,46 @@ impl Trainer {
             let (mut losses, mut names) = (LossTerms::default(), Vec::new());
             let schedule = self.schedule(steps);
             let mut images = 0;
-            let mut last: Option<(ForwardPass, BatchLoss, String)> = None;
+            let mut panel = None;
+            let scale = 1.0 / accumulate as f64;
             for _ in 0..accumulate {
-                let batch = next_batch(&loader, &self.device)?;
-                images += batch.len() * (1 + batch.offsets.len());
-                let pass = self.model.forward(&batch);
-                let loss = self.model.loss(&pass, &batch, schedule);
-                losses.add(&loss.terms, 1.0 / accumulate as f64);
-                if let Some((term, value)) = loss.terms.not_finite() {
-                    return Err(Error::NotFinite {
-                        step: self.state.step + 1,
-                        term,
-                        value,
-                        frames: batch.names.join(", "),
-                    });
+                if let Some(loader) = &loaders.video {
+                    let batch = next(|| loader.next(&self.device))?;
+                    images += batch.len() * (1 + batch.offsets.len());
+                    let pass = self.model.forward(&batch);
+                    let loss = self.model.loss(&pass, &batch, schedule);
+                    self.check_finite(&loss.terms, &batch.names)?;
+                    losses.add(&loss.terms, scale);
+                    low_view.add(loss.terms.valid_share);
+                    moving.add(loss.terms.moving_share);
+                    ratio.add(displacement_ratio(&pass, &batch));
+                    self.add_gradients(&mut gradients, &loss.total, scale);
+                    // The pass's first target is the batch's first sample.
+                    let shown = batch.names.first().cloned().unwrap_or_default();
+                    names.extend(batch.names);
+                    panel = Some(Shown::View(Box::new((pass, loss, shown))));
                 }
-                ratio.add(displacement_ratio(&pass, &batch));
-                let mut raw = loss.total.backward();
-                let scale = 1.0 / accumulate as f32;
-                gradients.add("depth", &self.model.depth_net, &mut raw, scale);
-                gradients.add("pose", &self.model.pose_net, &mut raw, scale);
-                if let Some(decoder) = &self.model.flow_decoder {
-                    gradients.add("flow", decoder, &mut raw, scale);
+                if let Some(loader) = &loaders.depth {
+                    let batch = next(|| loader.next(&self.device))?;
+                    images += batch.len();
+                    let pass = self.model.learn_depth(&batch);
+                    self.check_finite(&pass.terms, &batch.names)?;
+                    losses.add(&pass.terms, scale);
+                    if loaders.video.is_none() {
+                        ratio.add(pass.scale_ratio);
+                    }
+                    self.add_gradients(&mut gradients, &pass.total, scale);
+                    names.extend(batch.names.iter().cloned());
+                    panel = panel.or(Some(Shown::Depth(Box::new((pass, batch)))));
                 }
-                // The pass's first target is the batch's first sample.
-                let shown = batch.names.first().cloned().unwrap_or_default();
-                names.extend(batch.names);
-                last = Some((pass, loss, shown));
             }
             let learning_rate = self.learning_rate(steps);
-            let (outcome, step) = self
-                .adam
-                .begin(&gradients, learning_rate, self.config.clip_norm);
+            let (outcome, step) = self.adam.begin(
+                &gradients,
+                learning_rate,
+                self.config.clip_norm,
+                self.config.weight_decay,
+            );
             if let Some(step) = step {
                 let Model {
                     depth_net,
@@ -284,8 +294,6 @@ impl Trainer {
                     f64::NAN
                 }
             };
-            low_view.add(losses.valid_share);
-            moving.add(losses.moving_share);
             pace.step(images);
             let control = listen(TrainEvent::Step {
                 step: self.state.step,
@@ -301,7 +309,7 @@ impl Trainer {
             let due = self.state.step.is_multiple_of(every) || self.state.step == steps;
             if due || stopped {
                 let shares = [low_view.value(), moving.value()];
-                self.report(listen, last, shares, due)?;
+                self.report(listen, panel, shares, due)?;
                 saved = Instant::now();
             } else if self.checkpoint_is_due(saved.elapsed()) {
                 self.save_last(listen)?;
@@ -340,30 +348,58 @@ impl Trainer {
     }
 
     fn learning_rate(&self, steps: usize) -> f64 {
-        let drop = self.config.learning_rate_drop * steps as f64;
-        let factor = if (self.state.step as f64) < drop {
-            1.0
-        } else {
-            0.1
+        let done = self.state.step as f64 / steps as f64;
+        let factor = match self.config.learning_rate_schedule {
+            LearningRateSchedule::Drop if done < self.config.learning_rate_drop => 1.0,
+            LearningRateSchedule::Drop => 0.1,
+            LearningRateSchedule::Cosine => {
+                let end = COSINE_END;
+                end + (1.0 - end) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos())
+            }
         };
         let warmup = self.config.learning_rate_warmup_steps.max(1) as f64;
         let rise = ((self.state.step + 1) as f64 / warmup).min(1.0);
         self.config.learning_rate * rise * factor
     }
 
+    /// # Errors
+    /// [`Error::NotFinite`] naming the first term that is not a number.
+    fn check_finite(&self, terms: &LossTerms, names: &[String]) -> Result<(), Error> {
+        match terms.not_finite() {
+            None => Ok(()),
+            Some((term, value)) => Err(Error::NotFinite {
+                step: self.state.step + 1,
+                term,
+                value,
+                frames: names.join(", "),
+            }),
+        }
+    }
+
+    /// Adds a loss' gradients, `scale` times.
+    fn add_gradients(&self, gradients: &mut NamedGradients, total: &Tensor<1>, scale: f64) {
+        let (mut raw, scale) = (total.backward(), scale as f32);
+        gradients.add("depth", &self.model.depth_net, &mut raw, scale);
+        gradients.add("pose", &self.model.pose_net, &mut raw, scale);
+        if let Some(decoder) = &self.model.flow_decoder {
+            gradients.add("flow", decoder, &mut raw, scale);
+        }
+    }
+
     /// Panel, validation and checkpoints.
     fn report(
         &mut self,
         listen: &mut dyn FnMut(TrainEvent) -> Control,
-        last: Option<(ForwardPass, BatchLoss, String)>,
+        shown: Option<Shown>,
         [valid_share, moving_share]: [f64; 2],
         validate: bool,
     ) -> Result<(), Error> {
         let step = self.state.step;
-        if let Some((pass, loss, name)) = last {
-            let panel = Box::new(SamplePanel::first(&pass, &loss, name));
+        if let Some(shown) = shown {
+            let panel = Box::new(shown.panel());
             listen(TrainEvent::Panel { step, panel });
         }
+        // Without video both are NaN, and are no reason to warn.
         if valid_share < MIN_VALID_SHARE {
             let message = format!(
                 "only {:.0} % of the pixels are in view of the other frame: depth or motion has come apart",
@@ -379,7 +415,7 @@ impl Trainer {
             );
             listen(TrainEvent::Warning { step, message });
         }
-        if validate && !self.validation.samples.is_empty() {
+        if validate && !self.validation.is_empty() {
             let (losses, scale_ratio) =
                 validation_loss(&self.model, &self.config, &self.validation, &self.device)?;
             let selection = selection(&self.config, &losses);
@@ -419,12 +455,56 @@ impl Trainer {
     }
 }
 
-fn next_batch(loader: &BatchLoader, device: &Device) -> Result<SnippetBatch, Error> {
-    loader.next(device).unwrap_or_else(|| {
+/// The loaders of what there is to learn from.
+struct Loaders {
+    video: Option<BatchLoader>,
+    depth: Option<DepthLoader>,
+}
+
+impl Loaders {
+    fn training(config: &TrainConfig, set: &SampleSet, first: usize) -> Self {
+        let video = !set.samples.is_empty();
+        Self {
+            video: video.then(|| BatchLoader::training(config, set.clone(), first)),
+            depth: (!set.depth.is_empty())
+                .then(|| DepthLoader::training(config, set.depth.clone(), first)),
+        }
+    }
+}
+
+/// What a panel is drawn of.
+enum Shown {
+    View(Box<(ForwardPass, BatchLoss, String)>),
+    Depth(Box<(DepthPass, DepthBatch)>),
+}
+
+impl Shown {
+    fn panel(self) -> SamplePanel {
+        match self {
+            Self::View(parts) => {
+                let (pass, loss, name) = *parts;
+                SamplePanel::first(&pass, &loss, name)
+            }
+            Self::Depth(parts) => SamplePanel::of_depth(&parts.0, &parts.1),
+        }
+    }
+}
+
+/// A batch of a loader that never ends.
+fn next<T>(batch: impl FnOnce() -> Option<Result<T, Error>>) -> Result<T, Error> {
+    batch().unwrap_or_else(|| {
         Err(Error::Loader {
             reason: "it has no further batch".into(),
         })
     })
+}
+
+/// The metres of a unit of PoseNet's translation; where there is no video it says nothing, and 1 will do.
+fn first_unit(config: &TrainConfig, set: &SampleSet) -> f64 {
+    match set.samples.is_empty() {
+        true => 1.0,
+        false => config.first_unit(set.mean_displacement_m()),
+    }
 }
 
 /// # Errors
@@ -435,10 +515,10 @@ fn check_samples(
     train: &SampleSet,
     validation: &SampleSet,
 ) -> Result<(), Error> {
-    if train.samples.is_empty() {
+    if train.is_empty() {
         return Err(no_samples("the training data"));
     }
-    if validation.samples.is_empty() && config.validation_share > 0.0 {
+    if validation.is_empty() && config.validation_share > 0.0 {
         return Err(Error::NoValidation);
     }
     Ok(())
@@ -463,29 +543,57 @@ pub fn validation_loss(
     samples: &SampleSet,
     device: &Device,
 ) -> Result<(LossTerms, f64), Error> {
-    if samples.samples.is_empty() {
+    if samples.is_empty() {
         return Err(no_samples("the held-out data"));
     }
     let (model, device) = (model.valid(device), device.clone().inner());
-    let loader = BatchLoader::validation(config, samples.clone());
-    let mut sum = LossTerms::default();
-    let (mut count, mut ratio) = (0.0, 0.0);
-    while let Some(batch) = loader.next(&device) {
-        let batch = batch?;
-        let pass = model.forward(&batch);
+    let mut terms = LossTerms::default();
+    let mut scale_ratio = None;
+    if !samples.samples.is_empty() {
+        let mut mean = Mean::default();
+        let loader = BatchLoader::validation(config, samples.clone());
         let schedule = Schedule {
             speed_weight: config.loss.speed,
             masks_active: false,
         };
-        let terms = model.loss(&pass, &batch, schedule).terms;
-        let n = batch.len() as f64;
-        count += n;
-        ratio += n * displacement_ratio(&pass, &batch);
-        sum.add(&terms, n);
+        while let Some(batch) = loader.next(&device) {
+            let batch = batch?;
+            let pass = model.forward(&batch);
+            let terms = model.loss(&pass, &batch, schedule).terms;
+            mean.add(batch.len(), &terms, displacement_ratio(&pass, &batch));
+        }
+        scale_ratio = Some(mean.ratio / mean.count);
+        terms.add(&mean.terms, 1.0 / mean.count);
     }
-    let mut terms = LossTerms::default();
-    terms.add(&sum, 1.0 / count);
-    Ok((terms, ratio / count))
+    if !samples.depth.is_empty() {
+        let mut mean = Mean::default();
+        let loader = DepthLoader::validation(config, samples.depth.clone());
+        while let Some(batch) = loader.next(&device) {
+            let batch = batch?;
+            let pass = model.learn_depth(&batch);
+            mean.add(batch.len(), &pass.terms, pass.scale_ratio.ln());
+        }
+        scale_ratio.get_or_insert((mean.ratio / mean.count).exp());
+        terms.add(&mean.terms, 1.0 / mean.count);
+    }
+    Ok((terms, scale_ratio.unwrap_or(f64::NAN)))
+}
+
+/// Sums over the batches of a validation.
+#[derive(Default)]
+struct Mean {
+    terms: LossTerms,
+    ratio: f64,
+    count: f64,
+}
+
+impl Mean {
+    fn add(&mut self, images: usize, terms: &LossTerms, ratio: f64) {
+        let n = images as f64;
+        self.count += n;
+        self.ratio += n * ratio;
+        self.terms.add(terms, n);
+    }
 }
 
 /// An exponential mean that starts at its first value.

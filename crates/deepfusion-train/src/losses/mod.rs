@@ -2,6 +2,7 @@
 
 mod affine;
 mod agreement;
+mod depth;
 mod flow;
 mod mean;
 mod moving;
@@ -11,6 +12,7 @@ mod speed;
 
 pub use affine::{affine_invariant, depth_seen_from_target, seen_in_both};
 pub use agreement::{agreement, both_explain};
+pub use depth::{DepthLoss, DepthTruth, depth, log_depth_error};
 pub use flow::{FlowView, flow, flow_smoothness, flow_view, pixel_grid, visible};
 pub use mean::{mean_where, share};
 pub use moving::{RigidView, epipolar_distance, moving_pixels};
@@ -36,6 +38,8 @@ pub struct LossTerms {
     pub flow: f64,
     /// Distance of the rigid flow from the flow where both explain the pixel, in pixels, unweighted.
     pub agreement: f64,
+    /// L_depth of known depth, unweighted.
+    pub depth: f64,
     /// Share of pixels that the warp finds in view, at full resolution.
     pub valid_share: f64,
     /// Share of pixels that the warped source explains best (the rest are masked).
@@ -47,7 +51,7 @@ pub struct LossTerms {
 impl LossTerms {
     /// Names and values, in the order of `log.csv`.
     #[must_use]
-    pub fn named(&self) -> [(&'static str, f64); 10] {
+    pub fn named(&self) -> [(&'static str, f64); 11] {
         [
             ("total", self.total),
             ("reprojection", self.reprojection),
@@ -56,6 +60,7 @@ impl LossTerms {
             ("affine", self.affine),
             ("flow", self.flow),
             ("agreement", self.agreement),
+            ("depth", self.depth),
             ("valid_share", self.valid_share),
             ("explained_share", self.explained_share),
             ("moving_share", self.moving_share),
@@ -71,6 +76,7 @@ impl LossTerms {
         self.affine += weight * other.affine;
         self.flow += weight * other.flow;
         self.agreement += weight * other.agreement;
+        self.depth += weight * other.depth;
         self.valid_share += weight * other.valid_share;
         self.explained_share += weight * other.explained_share;
         self.moving_share += weight * other.moving_share;

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
-use deepfusion_render::sample_panel;
+use deepfusion_data::RgbImage;
+use deepfusion_render::{DepthPanel, depth_panel, sample_panel};
 use deepfusion_train::log::{CsvLog, CsvRecord, TensorBoardLog};
-use deepfusion_train::{Control, TrainEvent};
+use deepfusion_train::{Control, Lesson, LossTerms, SamplePanel, TrainEvent};
 
 use super::outlook::Outlook;
 use crate::interrupt;
@@ -113,19 +114,10 @@ impl Recorder {
                     .collect();
                 let tagged: Vec<_> = tagged.iter().map(|(n, v)| (n.as_str(), *v)).collect();
                 self.events.scalars(step, &tagged)?;
-                let flow = if losses.flow > 0.0 {
-                    let moving = 100.0 * losses.moving_share;
-                    format!(", flow {:.4}, moving {moving:.1} %", losses.flow)
-                } else {
-                    String::new()
-                };
                 let line = format!(
-                    "loss {:.4} (reprojection {:.4}, smoothness {:.4}, speed {:.3} m{flow}), scale ratio \
-                     {scale_ratio:.3}, {images_per_second:.1} images/s, {} left",
+                    "loss {:.4} ({}), scale ratio {scale_ratio:.3}, {images_per_second:.1} images/s, {} left",
                     losses.total,
-                    losses.reprojection,
-                    losses.smoothness,
-                    losses.speed,
+                    terms_of_a_step(&losses),
                     clock(remaining_s)
                 );
                 self.progress.note(&line);
@@ -166,24 +158,13 @@ impl Recorder {
                 let tagged: Vec<_> = tagged.iter().map(|(n, v)| (n.as_str(), *v)).collect();
                 self.events.scalars(step, &tagged)?;
                 say(&format!(
-                    "step {step}: held out {selection:.4}{} (reprojection {:.4}, speed {:.3} m), scale ratio {scale_ratio:.3}",
+                    "step {step}: held out {selection:.4}{} ({}), scale ratio {scale_ratio:.3}",
                     if best { ", the best so far" } else { "" },
-                    losses.reprojection,
-                    losses.speed,
+                    held_out_terms(&losses),
                 ));
             }
             TrainEvent::Panel { step, panel } => {
-                let picture = sample_panel(&deepfusion_render::SamplePanel {
-                    width: panel.width as u32,
-                    height: panel.height as u32,
-                    image: &panel.image,
-                    disparity: &panel.disparity,
-                    warped: &panel.warped,
-                    error: &panel.error,
-                    mask: &panel.mask,
-                    flow: panel.flow.as_deref(),
-                    moving: panel.moving.as_deref(),
-                })?;
+                let picture = drawn(&panel)?;
                 deepfusion_data::save_png(&picture, &self.panels.join(format!("{step:06}.png")))?;
             }
             TrainEvent::Saved { .. } => {}
@@ -192,6 +173,73 @@ impl Recorder {
             }
         }
         Ok(())
+    }
+}
+
+/// The terms of what a step learned from.
+fn terms_of_a_step(losses: &LossTerms) -> String {
+    let mut terms = Vec::new();
+    if losses.reprojection > 0.0 {
+        terms.push(format!(
+            "reprojection {:.4}, smoothness {:.4}, speed {:.3} m",
+            losses.reprojection, losses.smoothness, losses.speed
+        ));
+    }
+    if losses.flow > 0.0 {
+        let moving = 100.0 * losses.moving_share;
+        terms.push(format!("flow {:.4}, moving {moving:.1} %", losses.flow));
+    }
+    if losses.depth > 0.0 {
+        terms.push(format!("depth {:.4}", losses.depth));
+    }
+    terms.join(", ")
+}
+
+/// What was learned from, of the held-out samples.
+fn held_out_terms(losses: &LossTerms) -> String {
+    let mut terms = Vec::new();
+    if losses.reprojection > 0.0 {
+        terms.push(format!(
+            "reprojection {:.4}, speed {:.3} m",
+            losses.reprojection, losses.speed
+        ));
+    }
+    if losses.depth > 0.0 {
+        terms.push(format!("depth {:.4}", losses.depth));
+    }
+    terms.join(", ")
+}
+
+/// The picture of a panel.
+fn drawn(panel: &SamplePanel) -> deepfusion_render::Result<RgbImage> {
+    let (width, height) = (panel.width as u32, panel.height as u32);
+    let (image, disparity) = (&panel.image[..], &panel.disparity[..]);
+    match &panel.lesson {
+        Lesson::View {
+            warped,
+            error,
+            mask,
+            flow,
+            moving,
+        } => sample_panel(&deepfusion_render::SamplePanel {
+            width,
+            height,
+            image,
+            disparity,
+            warped,
+            error,
+            mask,
+            flow: flow.as_deref(),
+            moving: moving.as_deref(),
+        }),
+        Lesson::Depth { truth, error } => depth_panel(&DepthPanel {
+            width,
+            height,
+            image,
+            disparity,
+            truth,
+            error,
+        }),
     }
 }
 

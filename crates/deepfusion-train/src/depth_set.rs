@@ -1,0 +1,293 @@
+//! What known depth is learned from: frames of recordings that have it, and views rendered for it.
+
+use crate::sampler::stream;
+use crate::{Error, Sampler, TrainConfig};
+use deepfusion_data::{Dataset, GtKind, RgbImage};
+use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_sim::{Endless, EndlessConfig};
+use rand::Rng;
+use std::sync::Arc;
+
+/// Worlds to validate on are those of other seeds than any that training sees.
+const VALIDATION_SEED: u64 = 0xDEE9_F051_0000_0000;
+
+/// Focal length over width of the images: 26 mm on 36 mm of film.
+const TYPICAL_FOCAL: f64 = 0.72;
+
+/// A frame of a recording that has depth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DepthFrame {
+    /// Index in [`DepthSet::datasets`].
+    pub dataset: usize,
+    /// Index of the frame.
+    pub frame: usize,
+}
+
+/// Views of simulated worlds.
+#[derive(Clone)]
+pub struct SimulatedViews {
+    /// Name of the data set.
+    pub name: String,
+    /// Place in `data.sets`.
+    pub set: usize,
+    /// Views that count as a pass.
+    pub views: usize,
+    /// What renders them.
+    pub endless: Arc<Endless>,
+}
+
+impl std::fmt::Debug for SimulatedViews {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("SimulatedViews")
+            .field("name", &self.name)
+            .field("views", &self.views)
+            .finish_non_exhaustive()
+    }
+}
+
+/// One image whose depth is known.
+#[derive(Debug, Clone)]
+pub struct DepthView {
+    /// The image.
+    pub image: RgbImage,
+    /// Its depth (camera z, m), of the same size; 0: none.
+    pub depth: DepthMap,
+    /// Its camera.
+    pub camera: Intrinsics,
+    /// Whether no depth means the sky, rather than that nothing is known.
+    pub sky: bool,
+    /// Place in `data.sets`.
+    pub set: usize,
+    /// Drive and frame, or set and view.
+    pub name: String,
+}
+
+/// Which view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Pick {
+    /// A frame of a recording, by its place in [`DepthSet::frames`].
+    Frame(usize),
+    /// A view of [`DepthSet::simulated`], by its place there and its number.
+    View(usize, u64),
+}
+
+/// Everything with known depth that a run learns from, or validates on.
+#[derive(Debug, Clone, Default)]
+pub struct DepthSet {
+    /// The recordings.
+    pub datasets: Arc<Vec<Dataset>>,
+    /// The place in `data.sets` of each.
+    pub set_of: Arc<Vec<usize>>,
+    /// Their frames with depth.
+    pub frames: Vec<DepthFrame>,
+    /// The simulated views.
+    pub simulated: Vec<SimulatedViews>,
+}
+
+impl DepthSet {
+    /// The frames with depth of the recordings that `learn` says it of: those to train on, and the last `share` of each
+    /// drive; and the simulated views, for each.
+    ///
+    /// # Errors
+    /// [`Error::NoDepth`] for a drive that has none; [`Error::Simulator`].
+    pub fn split(
+        config: &TrainConfig,
+        datasets: &Arc<Vec<Dataset>>,
+        set_of: &Arc<Vec<usize>>,
+        share: f64,
+    ) -> Result<(Self, Self), Error> {
+        let (mut train, mut held) = (Vec::new(), Vec::new());
+        for (dataset, recording) in datasets.iter().enumerate() {
+            if !config.learn(set_of[dataset]).from_depth() {
+                continue;
+            }
+            let selected = recording.selected().iter().copied();
+            let own: Vec<DepthFrame> = selected
+                .filter(|frame| recording.has_ground_truth(*frame))
+                .map(|frame| DepthFrame { dataset, frame })
+                .collect();
+            if own.is_empty() {
+                return Err(Error::NoDepth {
+                    drive: recording.name().to_owned(),
+                });
+            }
+            let last = (own.len() as f64 * share).ceil() as usize;
+            let (a, b) = own.split_at(own.len() - last.min(own.len() - 1));
+            train.extend_from_slice(a);
+            held.extend_from_slice(b);
+        }
+        let set = |frames, simulated| Self {
+            datasets: Arc::clone(datasets),
+            set_of: Arc::clone(set_of),
+            frames,
+            simulated,
+        };
+        let (views, validation_views) = simulated(config)?;
+        Ok((set(train, views), set(held, validation_views)))
+    }
+
+    /// Views in a pass.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.frames.len() + self.simulated.iter().map(|s| s.views).sum::<usize>()
+    }
+
+    /// Whether there is nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// All views of a pass in order, for validation.
+    pub(crate) fn all(&self) -> Vec<Pick> {
+        let frames = (0..self.frames.len()).map(Pick::Frame);
+        let views = self.simulated.iter().enumerate();
+        let views =
+            views.flat_map(|(i, s)| (0..s.views as u64).map(move |view| Pick::View(i, view)));
+        frames.chain(views).collect()
+    }
+
+    /// What training sees as its `draw`-th view: of each set as often as it has views. Simulated views are taken in the
+    /// order of their numbers, since neighbours share a world; frames in a new order each epoch.
+    pub(crate) fn pick(&self, seed: u64, draw: usize) -> Pick {
+        let mut place = stream(seed, 2, draw).random_range(0..self.len().max(1));
+        if place < self.frames.len() {
+            let order = Sampler::new(self.frames.len(), 1, seed);
+            return Pick::Frame(order.batch(draw)[0]);
+        }
+        place -= self.frames.len();
+        for (i, simulated) in self.simulated.iter().enumerate() {
+            if place < simulated.views {
+                return Pick::View(i, draw as u64);
+            }
+            place -= simulated.views;
+        }
+        Pick::Frame(0)
+    }
+
+    /// A view.
+    ///
+    /// # Errors
+    /// [`Error::Data`] where an image or its depth cannot be read; [`Error::NoDepth`] where it is gone since.
+    pub(crate) fn view(&self, pick: Pick) -> Result<DepthView, Error> {
+        match pick {
+            Pick::Frame(index) => self.frame(self.frames[index]),
+            Pick::View(index, number) => {
+                let source = &self.simulated[index];
+                let view = source.endless.view(number);
+                Ok(DepthView {
+                    image: view.rgb,
+                    depth: view.depth,
+                    camera: view.intrinsics,
+                    sky: true,
+                    set: source.set,
+                    name: format!("{}/{number}", source.name),
+                })
+            }
+        }
+    }
+
+    fn frame(&self, DepthFrame { dataset, frame }: DepthFrame) -> Result<DepthView, Error> {
+        let recording = &self.datasets[dataset];
+        let truth = recording.ground_truth(frame, GtKind::Z)?;
+        let depth = truth.ok_or_else(|| Error::NoDepth {
+            drive: recording.name().to_owned(),
+        })?;
+        let Frame { drive, number } = Frame::of(recording, frame);
+        Ok(DepthView {
+            image: recording.load_image(frame)?,
+            depth,
+            camera: recording.intrinsics(frame),
+            sky: false,
+            set: self.set_of[dataset],
+            name: format!("{drive}/{number:010}"),
+        })
+    }
+
+    /// A camera of it at the size of its images: the first recording's, else the simulator's typical one.
+    #[must_use]
+    pub fn camera(&self) -> Option<Intrinsics> {
+        let recorded = self.frames.first();
+        let of_frame = |f: &DepthFrame| self.datasets[f.dataset].intrinsics(f.frame);
+        let simulated = || {
+            self.simulated
+                .first()
+                .map(|s| typical_camera(s.endless.config()))
+        };
+        recorded.map(of_frame).or_else(simulated)
+    }
+
+    /// Its part of one set of `data.sets`.
+    #[must_use]
+    pub fn of_set(&self, set: usize) -> Self {
+        let own = |f: &&DepthFrame| self.set_of[f.dataset] == set;
+        let views = self.simulated.iter().filter(|s| s.set == set);
+        Self {
+            datasets: Arc::clone(&self.datasets),
+            set_of: Arc::clone(&self.set_of),
+            frames: self.frames.iter().filter(own).copied().collect(),
+            simulated: views.cloned().collect(),
+        }
+    }
+}
+
+/// A lens as most phones have it, 69° wide: what is assumed of a camera that is not known.
+fn typical_camera(config: &EndlessConfig) -> Intrinsics {
+    let (width, height) = (config.width, config.height);
+    let focal = TYPICAL_FOCAL * f64::from(width);
+    Intrinsics {
+        fx: focal,
+        fy: focal,
+        cx: (f64::from(width) - 1.0) / 2.0,
+        cy: (f64::from(height) - 1.0) / 2.0,
+        width,
+        height,
+    }
+}
+
+/// Name and number of a frame.
+struct Frame<'a> {
+    drive: &'a str,
+    number: u64,
+}
+
+impl<'a> Frame<'a> {
+    fn of(recording: &'a Dataset, frame: usize) -> Self {
+        let frame = &recording.frames()[frame];
+        Self {
+            drive: &frame.drive,
+            number: frame.number,
+        }
+    }
+}
+
+/// The simulated views of a configuration's sets, to train and to validate on.
+fn simulated(config: &TrainConfig) -> Result<(Vec<SimulatedViews>, Vec<SimulatedViews>), Error> {
+    let (mut train, mut held) = (Vec::new(), Vec::new());
+    for (set, of) in config.data.sets.iter().enumerate() {
+        let Some(simulated) = &of.simulated else {
+            continue;
+        };
+        let views = |seed, views| -> Result<SimulatedViews, Error> {
+            let endless = Endless::new(EndlessConfig {
+                seed,
+                width: config.size.width as u32,
+                height: config.size.height as u32,
+                views_per_world: simulated.views_per_world,
+                ..EndlessConfig::default()
+            })?;
+            Ok(SimulatedViews {
+                name: of.name.clone(),
+                set,
+                views,
+                endless: Arc::new(endless),
+            })
+        };
+        train.push(views(simulated.seed, simulated.views)?);
+        if simulated.validation_views > 0 {
+            let seed = simulated.seed ^ VALIDATION_SEED;
+            held.push(views(seed, simulated.validation_views)?);
+        }
+    }
+    Ok((train, held))
+}

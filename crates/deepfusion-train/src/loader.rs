@@ -1,0 +1,99 @@
+//! Batches made ahead of the trainer, on a thread of their own.
+
+use crate::Error;
+use std::any::Any;
+use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{Receiver, sync_channel};
+
+/// Threads that decode, resize and render.
+const MAX_THREADS: usize = 4;
+/// Batches made ahead of the trainer.
+const AHEAD: usize = 3;
+
+/// What a loader's thread makes, in order.
+pub(crate) struct Ahead<T> {
+    /// `None` says that the last one was sent. A channel that ends without it has lost its thread.
+    made: Receiver<Result<Option<T>, Error>>,
+    ended: Cell<bool>,
+}
+
+impl<T: Send + 'static> Ahead<T> {
+    /// Makes one of each of the plans, with a number that only counts them in messages.
+    pub(crate) fn start<P: Send + Sync + 'static>(
+        plans: impl Iterator<Item = (usize, P)> + Send + 'static,
+        make: impl Fn(usize, &P) -> Result<T, Error> + Send + Sync + 'static,
+    ) -> Self {
+        let (sender, receiver) = sync_channel(AHEAD);
+        let complaints = sender.clone();
+        let run = move |pool: rayon::ThreadPool| {
+            for (number, plan) in plans {
+                let make = || pool.install(|| make(number, &plan));
+                let one = catch_unwind(AssertUnwindSafe(make))
+                    .unwrap_or_else(|panic| Err(panicked(number, &*panic)));
+                let failed = one.is_err();
+                // The thread ends when the receiver is dropped: `send` fails then.
+                if sender.send(one.map(Some)).is_err() || failed {
+                    return;
+                }
+            }
+            sender.send(Ok(None)).ok();
+        };
+        if let Err(error) = start_thread(run) {
+            // The channel is empty and holds more than one; its receiver is still here.
+            complaints.send(Err(error)).ok();
+        }
+        Self {
+            made: receiver,
+            ended: Cell::new(false),
+        }
+    }
+
+    /// The next one; `None` after the last.
+    ///
+    /// # Errors
+    /// What making it said; [`Error::Threads`] where the thread could not start; [`Error::Loader`] where it has died.
+    pub(crate) fn next(&self) -> Option<Result<T, Error>> {
+        if self.ended.get() {
+            return None;
+        }
+        match self.made.recv() {
+            Ok(Ok(Some(one))) => Some(Ok(one)),
+            Ok(Ok(None)) => {
+                self.ended.set(true);
+                None
+            }
+            Ok(Err(error)) => Some(Err(error)),
+            Err(_) => {
+                let reason = "its thread has ended before the last batch".into();
+                Some(Err(Error::Loader { reason }))
+            }
+        }
+    }
+}
+
+/// Runs `make` on a thread with a pool of its own. The shared pool will not do: the trainer waits for a
+/// batch on one of its threads, which could be the only one.
+fn start_thread(make: impl FnOnce(rayon::ThreadPool) + Send + 'static) -> Result<(), Error> {
+    let failed = |reason: String| Error::Threads { reason };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.min(MAX_THREADS))
+        .build()
+        .map_err(|e| failed(e.to_string()))?;
+    std::thread::Builder::new()
+        .name("batches".into())
+        .spawn(move || make(pool))
+        .map_err(|e| failed(e.to_string()))?;
+    Ok(())
+}
+
+/// What a panic while a batch was made means to whoever waits for it.
+fn panicked(number: usize, panic: &(dyn Any + Send)) -> Error {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    let text = text.unwrap_or("it does not say why");
+    Error::Loader {
+        reason: format!("batch {number}: {text}"),
+    }
+}
