@@ -1,12 +1,12 @@
-//! The terms of the loss against PyTorch (`reference/losses.py`) and against finite differences.
+//! The terms of the loss against PyTorch (`reference/losses.py`, `reference/depth.py`) and against finite differences.
 
 use burn::tensor::{Bool, Device, Tensor, TensorData};
 use deepfusion_nn::weights::{self, Weights};
 use deepfusion_train::losses::{
-    RigidView, affine_invariant, agreement, depth_seen_from_target, epipolar_distance, flow,
+    DepthTruth, RigidView, affine_invariant, agreement, depth_seen_from_target, epipolar_distance, flow,
     flow_view, moving_pixels,
 };
-use deepfusion_train::{FlowLossConfig, Motion, MovingConfig, Synthesised};
+use deepfusion_train::{DepthLossConfig, FlowLossConfig, Motion, MovingConfig, Synthesised};
 use std::path::Path;
 
 const SSIM_WEIGHT: f64 = 0.85;
@@ -19,9 +19,13 @@ struct Reference {
 
 impl Reference {
     fn read() -> Self {
+        Self::of("losses.safetensors")
+    }
+
+    fn of(file: &str) -> Self {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference");
         Self {
-            tensors: weights::read(&folder.join("losses.safetensors")).unwrap(),
+            tensors: weights::read(&folder.join(file)).unwrap(),
             device: Device::flex().autodiff(),
         }
     }
@@ -388,4 +392,41 @@ fn gradients_equal_finite_differences() {
         seen.powi_scalar(2).mean()
     };
     check("seen", "seen/depth", &seen, 1e-1);
+}
+
+/// Known depth, pixels that are only known to be far, and unknown ones; four scales.
+#[test]
+fn the_loss_on_known_depth_equals_pytorchs() {
+    let reference = Reference::of("depth.safetensors");
+    let names: Vec<String> = (0..4).map(|s| format!("inverse{s}")).collect();
+    let inverse: Vec<Tensor<4>> = names
+        .iter()
+        .map(|name| {
+            reference
+                .tensor::<4>(&format!("depth/{name}"))
+                .require_grad()
+        })
+        .collect();
+    let truth = DepthTruth {
+        log_depth: reference.tensor("depth/log_depth"),
+        known: reference.tensor("depth/known"),
+        far: reference.tensor("depth/far"),
+    };
+    let config = DepthLossConfig {
+        weight: 1.0,
+        gradient: 0.5,
+    };
+    let found = deepfusion_train::losses::depth(&inverse, &truth, &config);
+    for (part, value) in [
+        ("error", &found.error),
+        ("gradient", &found.gradient),
+        ("bias", &found.bias),
+    ] {
+        let value = value.clone().into_scalar::<f32>();
+        let expected = reference.values(&format!("depth/{part}"))[0];
+        // Sums of 480 terms of order 1, of either sign in the bias.
+        assert!((value - expected).abs() < 2e-6, "{part}: {value} {expected}");
+    }
+    let inputs: Vec<(&str, Tensor<4>)> = names.iter().map(String::as_str).zip(inverse).collect();
+    reference.check("depth", found.loss, &inputs);
 }

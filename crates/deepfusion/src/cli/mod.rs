@@ -36,7 +36,7 @@ pub use live::LiveArgs;
 pub use perceive::{PerceiveArgs, PerceiveSave};
 pub use predict::{BenchArgs, PredictArgs, Save, WeightsCommand};
 pub use prediction::{Outputs, PredictionArgs};
-pub use train::{DeviceChoice, PresetChoice, TrainArgs, ViewMotionChoice};
+pub use train::{DeviceChoice, LearnChoice, PresetChoice, TrainArgs, ViewMotionChoice};
 pub use values::{CameraIntrinsics, Shard, Size};
 pub use view::ViewArgs;
 

@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use deepfusion_data::CameraChoice;
-use deepfusion_train::{Compute, TrainConfig, ViewMotion};
+use deepfusion_train::{Compute, Learn, TrainConfig, ViewMotion};
 
 use super::Size;
 use super::values::milliseconds;
@@ -10,7 +10,8 @@ use super::values::milliseconds;
 /// `deepfusion train`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Learns from images and the car's speed alone (and its yaw rate, with --view-motion vehicle). Writes config.toml, log.csv, TensorBoard events, the \
+    after_help = "Learns from images and the car's speed alone (and its yaw rate, with --view-motion vehicle), or from recorded depth \
+    (--learn depth). Writes config.toml, log.csv, TensorBoard events, the \
     checkpoints last and best, and sample panels. A config file sets everything; options override it.\n\n\
     Ctrl-C, and SIGTERM as schedulers send it, save after the step at work and end with code 130. --resume goes on as the run is \
     configured: --epochs or --steps may make it longer, --data, --val-data and --split say where its recordings are now, and any other \
@@ -53,6 +54,9 @@ pub struct TrainArgs {
     /// Fixes everything that is random.
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
+    /// What is learned from: the drive's own motion, the depth recorded with it (RGB-D, scans), or both [default: self].
+    #[arg(long, value_enum, value_name = "LESSON")]
+    pub learn: Option<LearnChoice>,
     /// Which cameras [default: 2].
     #[arg(long, value_name = "2|3|both")]
     pub camera: Option<CameraChoice>,
@@ -97,6 +101,18 @@ pub enum PresetChoice {
     Monodepth2,
 }
 
+/// What a recording is learned from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LearnChoice {
+    /// Its own motion: views of one frame from another; needs a speed.
+    #[value(name = "self")]
+    OwnMotion,
+    /// Its depth: RGB-D images or a LiDAR's scans; needs no speed.
+    Depth,
+    /// Both.
+    Both,
+}
+
 /// Whose motion the views are synthesised with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ViewMotionChoice {
@@ -106,6 +122,16 @@ pub enum ViewMotionChoice {
     Distance,
     /// The vehicle's, from speed and yaw rate.
     Vehicle,
+}
+
+impl From<LearnChoice> for Learn {
+    fn from(choice: LearnChoice) -> Self {
+        match choice {
+            LearnChoice::OwnMotion => Self::OwnMotion,
+            LearnChoice::Depth => Self::Depth,
+            LearnChoice::Both => Self::Both,
+        }
+    }
 }
 
 impl From<ViewMotionChoice> for ViewMotion {

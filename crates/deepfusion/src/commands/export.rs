@@ -75,7 +75,14 @@ fn model_of(config: &TrainConfig, net: &DepthNet, args: &ExportArgs) -> Result<D
         range: config.depth_net.range,
         width: size.width,
         height: size.height,
-        trained_with: camera.map(|k| FocalLength { fx: k.fx, fy: k.fy }),
+        trained_with: match config.canonical_focal_px {
+            // The camera that its depth is of.
+            Some(focal) => Some(FocalLength {
+                fx: focal,
+                fy: focal,
+            }),
+            None => camera.map(|k| FocalLength { fx: k.fx, fy: k.fy }),
+        },
     })
 }
 

@@ -36,6 +36,9 @@ fn seen_by(config: &TrainConfig, runs: &mut HashSet<std::path::PathBuf>) -> Opti
         seen.insert(key(&frames[sample.snippet.target]));
         seen.extend(sample.snippet.sources.iter().map(|s| key(&frames[s.frame])));
     }
+    for frame in &train.depth.frames {
+        seen.insert(key(&train.datasets[frame.dataset].frames()[frame.frame]));
+    }
     if let Some(init) = &config.init {
         seen.extend(seen_before(init, runs)?);
     }

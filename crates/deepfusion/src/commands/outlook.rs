@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use deepfusion_nn::InputSize;
-use deepfusion_train::{Compute, Preset, Reprojection, TrainConfig};
+use deepfusion_train::{Compute, Learn, Preset, Reprojection, TrainConfig};
 
 use super::recorder::clock;
 
@@ -104,7 +104,16 @@ fn work(config: &TrainConfig) -> u64 {
         Reprojection::Bidirectional => 1 + sources,
         Reprojection::Minimum => 1,
     };
-    (config.batch * config.accumulate) as u64 * (depths * depth + sources * pose)
+    let sets = 0..config.data.sets.len().max(1);
+    let learned = |from: fn(Learn) -> bool| sets.clone().any(|set| from(config.learn(set)));
+    let mut step = 0;
+    if learned(Learn::from_motion) {
+        step += config.batch as u64 * (depths * depth + sources * pose);
+    }
+    if learned(Learn::from_depth) {
+        step += config.depth_batch() as u64 * depth;
+    }
+    config.accumulate as u64 * step
 }
 
 fn seconds(pace: f64) -> String {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::ValueEnum;
-use deepfusion_train::{TrainConfig, ViewMotion};
+use deepfusion_train::{Learn, TrainConfig, ViewMotion};
 
 use super::train;
 use crate::cli::TrainArgs;
@@ -27,6 +27,7 @@ pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> 
         size,
         batch,
         seed,
+        learn,
         camera,
         split,
         val_data,
@@ -57,6 +58,15 @@ pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> 
     }
     if let Some(seed) = seed {
         same("--seed", seed.to_string(), run.seed.to_string())?;
+    }
+    if let Some(learn) = learn {
+        let word = |learn| match learn {
+            Learn::OwnMotion => "self".to_owned(),
+            Learn::Depth => "depth".to_owned(),
+            Learn::Both => "both".to_owned(),
+        };
+        let asked = word(Learn::from(*learn));
+        same("--learn", asked, word(run.data.learn))?;
     }
     if let Some(camera) = camera {
         let found = camera_of(&config);
@@ -327,12 +337,13 @@ mod tests {
         // What it has already is no contradiction, and what can apply is used.
         assert_eq!(with(&[]).unwrap(), run);
         type Change = fn(&mut TrainConfig);
-        let used: [(&[&str], Change); 15] = [
+        let used: [(&[&str], Change); 16] = [
             (&["--device", "cpu"], |_| {}),
             (&["--preset", "tiny"], |_| {}),
             (&["--size", "320x96"], |_| {}),
             (&["--batch", "4"], |_| {}),
             (&["--seed", "0"], |_| {}),
+            (&["--learn", "self"], |_| {}),
             (&["--camera", "2"], |_| {}),
             (&["--view-motion", "distance"], |_| {}),
             (&["--with", "smoothness"], |_| {}),
@@ -357,11 +368,12 @@ mod tests {
             change(&mut expected);
             assert_eq!(with(options).unwrap(), expected, "{options:?}");
         }
-        let refused: [(&[&str], &str, &str); 14] = [
+        let refused: [(&[&str], &str, &str); 15] = [
             (&["--preset", "light"], "light", "tiny"),
             (&["--size", "640x192"], "640x192", "320x96"),
             (&["--batch", "3"], "3", "4"),
             (&["--seed", "7"], "7", "0"),
+            (&["--learn", "both"], "both", "self"),
             (&["--camera", "both"], "both", "2"),
             (&["--view-motion", "vehicle"], "vehicle", "distance"),
             (&["--with", "hce"], "hce", "learned without it"),

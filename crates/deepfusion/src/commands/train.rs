@@ -6,7 +6,7 @@ use deepfusion_data::{Camera, CameraChoice, Dataset, OpenOptions, speed_unit_war
 use deepfusion_nn::InputSize;
 use deepfusion_nn::weights::load_torchvision_resnet;
 use deepfusion_train::{
-    CheckpointKind, DataConfig, DataSetConfig, Error, Model, Preset, RunFolder, SampleSet,
+    CheckpointKind, DataConfig, DataSetConfig, Error, Learn, Model, Preset, RunFolder, SampleSet,
     TrainConfig, TrainSummary, Trainer, shared_frames,
 };
 
@@ -89,10 +89,25 @@ fn plan(trainer: &Trainer) -> String {
         None => format!("{} epochs", config.epochs),
         Some(steps) => format!("{steps} steps"),
     };
+    let sets = 0..config.data.sets.len().max(1);
+    let learned = |from: fn(Learn) -> bool| sets.clone().any(|set| from(config.learn(set)));
+    let batches = [
+        (learned(Learn::from_motion), config.batch, "of video"),
+        (
+            learned(Learn::from_depth),
+            config.depth_batch(),
+            "of known depth",
+        ),
+    ];
+    let samples = batches
+        .iter()
+        .filter(|(learned, ..)| *learned)
+        .map(|(_, batch, kind)| format!("{} {kind}", batch * config.accumulate));
+    let samples: Vec<String> = samples.collect();
     format!(
-        "{}: images of {width}x{height}, {} samples a step, {steps}",
+        "{}: images of {width}x{height}, {} a step, {steps}",
         config.preset,
-        config.batch * config.accumulate
+        samples.join(" and ")
     )
 }
 
@@ -167,6 +182,7 @@ fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), Erro
             "--camera",
             args.camera.is_some() && data.sets.iter().any(|set| !set.camera.is_empty()),
         ),
+        ("--learn", args.learn.is_some()),
         (
             "--clock-offset",
             args.camera_ahead_s.is_some()
@@ -196,6 +212,7 @@ fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), Erro
         data.validation_split.clone_from(&args.val_split);
     }
     data.camera_ahead_s = args.camera_ahead_s.or(data.camera_ahead_s);
+    data.learn = args.learn.map_or(data.learn, Into::into);
     if let Some(camera) = args.camera {
         data.camera = camera_word(camera).into();
     } else if data.camera.is_empty() && data.sets.is_empty() {

@@ -1,0 +1,250 @@
+//! Learning from known depth: of simulated views, of recordings, and beside a video's own motion.
+
+mod support;
+
+use burn::tensor::Device;
+use deepfusion_data::{Dataset, OpenOptions};
+use deepfusion_sim::{SimConfig, Simulation, write_kitti};
+use deepfusion_train::{
+    Control, DataSetConfig, DepthBatch, DepthLoader, Error, Learn, Lesson, LossTerms, Preset,
+    RunFolder, SampleSet, SimulatedConfig, TrainConfig, TrainEvent, Trainer, validation_loss,
+};
+use std::path::{Path, PathBuf};
+use support::drive;
+
+/// A small network that learns from simulated views.
+fn streets(steps: usize) -> TrainConfig {
+    let mut config = Preset::Tiny.config();
+    (config.size.width, config.size.height) = (96, 64);
+    config.batch = 2;
+    config.steps = Some(steps);
+    config.validate_every = steps;
+    config.learning_rate_warmup_steps = 0;
+    config.canonical_focal_px = Some(60.0);
+    config.depth_net.encoder = config.depth_net.encoder.with_base_width(8);
+    config.depth_net.decoder.widths = [16, 16, 8, 8, 8];
+    config.pose_net.encoder = config.pose_net.encoder.with_base_width(8);
+    config.data.sets = vec![DataSetConfig {
+        name: "streets".into(),
+        learn: Learn::Depth,
+        simulated: Some(SimulatedConfig {
+            seed: 3,
+            views: 40,
+            validation_views: 6,
+            views_per_world: 8,
+        }),
+        ..DataSetConfig::default()
+    }];
+    config
+}
+
+/// With a recording beside the simulated views, or alone.
+fn with_recording(config: &mut TrainConfig, paths: Vec<PathBuf>, learn: Learn) {
+    config.data.sets.push(DataSetConfig {
+        name: "drive".into(),
+        paths,
+        learn,
+        ..DataSetConfig::default()
+    });
+}
+
+fn samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet), Error> {
+    config.validate()?;
+    let mut recordings = Vec::new();
+    for (set, of) in config.data.sets.iter().enumerate() {
+        for path in &of.paths {
+            let opened = Dataset::open(path, &OpenOptions::default())?;
+            recordings.extend(opened.into_iter().map(|d| (set, d)));
+        }
+    }
+    let (train, validation, skipped) = SampleSet::split_sets(config, recordings, None)?;
+    assert_eq!(skipped, Vec::<String>::new());
+    Ok((train, validation))
+}
+
+fn trainer(config: &TrainConfig, at: &Path) -> Trainer {
+    let sets = samples(config).unwrap();
+    let folder = RunFolder::create(at).unwrap();
+    Trainer::create(config.clone(), folder, sets, &Device::flex(), Ok).unwrap()
+}
+
+/// The losses of the steps, and the last panel's lesson.
+fn run(trainer: &mut Trainer, until: Option<usize>) -> (Vec<LossTerms>, Option<Lesson>) {
+    let (mut steps, mut lesson) = (Vec::new(), None);
+    let mut listen = |event| {
+        match event {
+            TrainEvent::Step { losses, step, .. } => {
+                steps.push(losses);
+                if Some(step) == until {
+                    return Control::Stop;
+                }
+            }
+            TrainEvent::Panel { panel, .. } => lesson = Some(panel.lesson),
+            TrainEvent::Warning { message, .. } => panic!("{message}"),
+            _ => {}
+        }
+        Control::Continue
+    };
+    trainer.run(&mut listen).unwrap();
+    (steps, lesson)
+}
+
+/// The held-out error falls by a third within some steps, and a run that was stopped goes on as if it had not been.
+#[test]
+fn simulated_views_teach_depth_and_resume_exactly() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = streets(40);
+    let mut whole = trainer(&config, &folder.path().join("whole"));
+    let (_, validation) = samples(&config).unwrap();
+    let held_out = |trainer: &Trainer| {
+        let device = Device::flex().autodiff();
+        let (model, config) = (trainer.model(), trainer.config());
+        validation_loss(model, config, &validation, &device).unwrap()
+    };
+    let (before, _) = held_out(&whole);
+    let (steps, lesson) = run(&mut whole, None);
+    let (after, scale_ratio) = held_out(&whole);
+    assert!(
+        after.depth < 0.67 * before.depth,
+        "{} to {}",
+        before.depth,
+        after.depth
+    );
+    assert!((0.5..2.0).contains(&scale_ratio), "{scale_ratio}");
+    assert!(steps.iter().all(|l| l.reprojection == 0.0 && l.depth == l.total));
+    let Some(Lesson::Depth { truth, error }) = lesson else {
+        panic!("{lesson:?}");
+    };
+    assert!(truth.iter().any(|d| *d > 0.0) && error.iter().any(|e| *e != 0.0));
+    let camera = whole.config().camera.unwrap();
+    assert_eq!((camera.width, camera.height), (96, 64));
+
+    let parts = folder.path().join("parts");
+    let (mut begun, _) = run(&mut trainer(&config, &parts), Some(7));
+    let (run_folder, _) = RunFolder::open(&parts).unwrap();
+    let stored = run_folder.read_config().unwrap();
+    let sets = samples(&stored).unwrap();
+    let mut resumed = Trainer::resume(stored, run_folder, sets, &Device::flex()).unwrap();
+    begun.extend(run(&mut resumed, Some(12)).0);
+    assert_eq!(begun, steps[..12]);
+}
+
+fn batches(config: &TrainConfig, set: &SampleSet) -> Vec<DepthBatch> {
+    let loader = DepthLoader::validation(config, set.depth.clone());
+    let next = || loader.next(&Device::flex());
+    std::iter::from_fn(next).map(Result::unwrap).collect()
+}
+
+/// A drive's scans are learned from where it says so, its motion where it says that; both where both.
+#[test]
+fn a_drive_is_learned_from_as_its_set_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulation = Simulation::new(&SimConfig {
+        seed: 5,
+        frames: 8,
+        scan_every: 2,
+        ..SimConfig::default()
+    });
+    let scanned = folder.path().join("scanned");
+    let scanned = write_kitti(&simulation.unwrap(), &scanned, &mut |_, _| {}).unwrap();
+    for (learn, motion, depth) in [
+        (Learn::OwnMotion, true, false),
+        (Learn::Depth, false, true),
+        (Learn::Both, true, true),
+    ] {
+        let mut config = streets(1);
+        config.data.sets.clear();
+        with_recording(&mut config, vec![scanned.clone()], learn);
+        let (train, validation) = samples(&config).unwrap();
+        assert_eq!(train.samples.is_empty(), !motion, "{learn:?}");
+        assert_eq!(train.depth.is_empty(), !depth, "{learn:?}");
+        assert_eq!(validation.is_empty(), false);
+        if !depth {
+            continue;
+        }
+        // Four scans, the last held out.
+        assert_eq!((train.depth.len(), validation.depth.len()), (3, 1));
+        for batch in batches(&config, &train) {
+            let known = batch.truth.known.clone().mean().into_scalar::<f32>();
+            assert!(known > 0.02 && known < 0.9, "a scan: {known}");
+            let far = batch.truth.far.clone().sum().into_scalar::<f32>();
+            assert!(far < 0.05 * 96.0 * 64.0 * batch.len() as f32, "no sky");
+        }
+        let at = folder.path().join(format!("{learn:?}"));
+        let (steps, _) = run(&mut trainer(&config, &at), None);
+        assert!(steps[0].depth > 0.0);
+        assert_eq!(steps[0].reprojection > 0.0, motion);
+    }
+    // Without scans there is nothing to learn from, and that is said before the run begins.
+    let mut config = streets(1);
+    let bare = drive(&folder.path().join("bare"), 4);
+    with_recording(&mut config, vec![bare], Learn::Depth);
+    let error = samples(&config).unwrap_err();
+    assert!(matches!(error, Error::NoDepth { .. }), "{error}");
+    assert!(error.hint().unwrap().contains("learn = \"self\""));
+}
+
+/// Simulated depth and a real drive's motion in one step: both gradients arrive, and each is logged.
+#[test]
+fn depth_and_motion_are_learned_in_one_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = streets(3);
+    config.depth_batch = 1;
+    let drive = drive(&folder.path().join("street"), 8);
+    with_recording(&mut config, vec![drive], Learn::OwnMotion);
+    let mut trainer = trainer(&config, &folder.path().join("run"));
+    let (steps, _) = run(&mut trainer, None);
+    assert_eq!(steps.len(), 3);
+    for losses in steps {
+        assert!(losses.depth > 0.0 && losses.reprojection > 0.0 && losses.speed > 0.0);
+        assert!(losses.total > losses.depth);
+    }
+}
+
+/// What looks the same through twice the lens is twice as far: the truth that the network is asked for, divided by what its
+/// output means, is the same.
+#[test]
+fn a_longer_lens_sees_the_same_as_farther() {
+    let config = streets(1);
+    let (train, _) = samples(&config).unwrap();
+    let seen = batches(&config, &train);
+    let range = config.depth_net.range;
+    for batch in seen.iter().take(3) {
+        let span: Vec<f32> = batch.factors.span.clone().into_data().iter().collect();
+        let spans = 1.0 / range.min_m - 1.0 / range.max_m;
+        for (i, (span, view)) in span.iter().zip(&batch.names).enumerate() {
+            let number = view.rsplit('/').next().unwrap().parse().unwrap();
+            let view = train.depth.simulated[0].endless.view(number);
+            let focal = view.intrinsics.fy / 60.0;
+            assert!((f64::from(*span) * focal - spans).abs() < 1e-4 * spans);
+            // What the sigmoid says of a pixel is canonical: depth × f_c/f_y.
+            let known: Vec<f32> = batch.truth.known.clone().into_data().iter().collect();
+            let logs: Vec<f32> = batch.truth.log_depth.clone().into_data().iter().collect();
+            let at = i * 96 * 64;
+            let pixel = (0..96 * 64).find(|p| known[at + p] > 0.0).unwrap();
+            let depth = view.depth.data[pixel];
+            assert!((logs[at + pixel] - depth.ln()).abs() < 1e-5);
+        }
+    }
+}
+
+#[test]
+fn sets_that_cannot_be_learned_from_so_are_refused_by_field() {
+    type Change = fn(&mut TrainConfig);
+    let cases: [(&str, Change); 6] = [
+        ("data.sets.learn", |c| c.data.sets[0].learn = Learn::Both),
+        ("data.sets.paths", |c| c.data.sets[0].paths.push("x".into())),
+        ("data.sets.simulated.views", |c| {
+            c.data.sets[0].simulated.as_mut().unwrap().views = 0;
+        }),
+        ("canonical_focal_px", |c| c.canonical_focal_px = Some(0.0)),
+        ("augmentation.zoom", |c| c.augmentation.zoom = 0.5),
+        ("loss.depth.gradient", |c| c.loss.depth.gradient = f64::NAN),
+    ];
+    for (field, change) in cases {
+        let mut config = streets(1);
+        change(&mut config);
+        let error = config.validate().unwrap_err().to_string();
+        assert!(error.contains(&format!("`{field}`")), "{error}");
+    }
+}
