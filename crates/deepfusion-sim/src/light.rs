@@ -223,41 +223,130 @@ fn bake_chunk(world: &World, casters: &[Caster], feet: &[Foot], from: f32, cells
             f.s + reach > from && f.s - reach < to
         })
         .collect();
+    // A block of cells asks only what can reach it: the others would leave its cells as they are.
+    let (mut casters, mut around) = (Vec::new(), Vec::new());
+    for top in (0..CHUNK).step_by(BLOCK) {
+        for left in (0..ACROSS).step_by(BLOCK) {
+            let block = Block::at(world, from, top, left);
+            casters.clear();
+            casters.extend(near.iter().filter(|c| block.may_be_shaded(c, &world.sun)));
+            around.clear();
+            around.extend(feet.iter().filter(|f| block.may_be_near(f)));
+            for row in top..(top + BLOCK).min(CHUNK) {
+                let frame = Frame::at(world, from, row);
+                for column in left..(left + BLOCK).min(ACROSS) {
+                    cells[row * ACROSS + column] =
+                        bake_cell(world, &casters, &around, frame.place(column));
+                }
+            }
+        }
+    }
+}
+
+/// Cells along each side of a block.
+const BLOCK: usize = 16;
+
+/// A row of cells: the centreline there and the direction across it.
+struct Frame {
+    x: f64,
+    y: f64,
+    across: (f64, f64),
+}
+
+impl Frame {
+    fn at(world: &World, from: f32, row: usize) -> Self {
+        let s = from + (row as f32 + 0.5) * CELL;
+        let (x, y, heading, _) = world.road.centre(f64::from(s));
+        Self {
+            x,
+            y,
+            across: (-heading.sin(), heading.cos()),
+        }
+    }
+
+    /// The middle of a cell.
+    fn place(&self, column: usize) -> (f64, f64) {
+        let lateral = f64::from((column as f32 + 0.5) * CELL - REACH);
+        (
+            self.x + lateral * self.across.0,
+            self.y + lateral * self.across.1,
+        )
+    }
+}
+
+/// A circle around a block of cells.
+struct Block {
+    middle: (f64, f64),
+    radius: f32,
+}
+
+impl Block {
+    fn at(world: &World, from: f32, top: usize, left: usize) -> Self {
+        let (bottom, right) = ((top + BLOCK).min(CHUNK) - 1, (left + BLOCK).min(ACROSS) - 1);
+        let (first, last) = (Frame::at(world, from, top), Frame::at(world, from, bottom));
+        let corners = [
+            first.place(left),
+            first.place(right),
+            last.place(left),
+            last.place(right),
+        ];
+        let mean = |pick: fn(&(f64, f64)) -> f64| corners.iter().map(pick).sum::<f64>() / 4.0;
+        let middle = (mean(|c| c.0), mean(|c| c.1));
+        let away = |c: &(f64, f64)| (c.0 - middle.0).hypot(c.1 - middle.1) as f32;
+        // Rows between the first and the last bulge by less than this in the narrowest bend.
+        let radius = corners.iter().map(away).fold(0.0, f32::max) + 0.2;
+        Self { middle, radius }
+    }
+
+    /// Whether one of its cells may pass the circle of a caster, on the sun's side.
+    fn may_be_shaded(&self, caster: &Caster, sun: &V3) -> bool {
+        let flat = sun.x.hypot(sun.y);
+        let (dx, dy) = (
+            (caster.middle.0 - self.middle.0) as f32,
+            (caster.middle.1 - self.middle.1) as f32,
+        );
+        let along = (dx * sun.x + dy * sun.y) / flat;
+        let across = (dx * sun.y - dy * sun.x) / flat;
+        let reach = caster.radius + self.radius;
+        across.abs() <= reach && along >= -reach && along <= LONGEST + reach
+    }
+
+    /// Whether a foot may reach one of its cells.
+    fn may_be_near(&self, foot: &Foot) -> bool {
+        let (dx, dy) = (
+            (foot.middle.0 - self.middle.0) as f32,
+            (foot.middle.1 - self.middle.1) as f32,
+        );
+        let reach = foot.half[0] + foot.half[1] + 4.0 * foot.range + self.radius;
+        dx.abs() <= reach && dy.abs() <= reach
+    }
+}
+
+/// Shares of the sun and of the sky that a place on the ground sees.
+fn bake_cell(world: &World, casters: &[&Caster], feet: &[&Foot], (x, y): (f64, f64)) -> [u8; 2] {
     let sun = world.sun;
     let flat = sun.x.hypot(sun.y);
-    let mut across = (0.0, 0.0, 0.0, 0.0);
-    for (index, cell) in cells.iter_mut().enumerate() {
-        if index % ACROSS == 0 {
-            let s = from + ((index / ACROSS) as f32 + 0.5) * CELL;
-            let (x, y, heading, _) = world.road.centre(f64::from(s));
-            across = (x, y, -heading.sin(), heading.cos());
+    let ground = Vector3::new(x, y, f64::from(KERB_HEIGHT));
+    let shaded = casters.iter().any(|caster| {
+        // The ray's foot passes the caster's circle, on the sun's side.
+        let (dx, dy) = ((caster.middle.0 - x) as f32, (caster.middle.1 - y) as f32);
+        let along = (dx * sun.x + dy * sun.y) / flat;
+        let across = (dx * sun.y - dy * sun.x) / flat;
+        if across.abs() > caster.radius || along < -caster.radius || along > LONGEST + caster.radius
+        {
+            return false;
         }
-        let lateral = f64::from(((index % ACROSS) as f32 + 0.5) * CELL - REACH);
-        let (x, y) = (across.0 + lateral * across.2, across.1 + lateral * across.3);
-        let ground = Vector3::new(x, y, f64::from(KERB_HEIGHT));
-        let shaded = near.iter().any(|caster| {
-            // The ray's foot passes the caster's circle, on the sun's side.
-            let (dx, dy) = ((caster.middle.0 - x) as f32, (caster.middle.1 - y) as f32);
-            let along = (dx * sun.x + dy * sun.y) / flat;
-            let across = (dx * sun.y - dy * sun.x) / flat;
-            if across.abs() > caster.radius
-                || along < -caster.radius
-                || along > LONGEST + caster.radius
-            {
-                return false;
-            }
-            let o = caster.primitive.local_point(&ground);
-            // Within a solid's own foot there is no entry; the other face counts then.
-            let d = caster.primitive.local_of(&sun);
-            enter(&caster.primitive.shape, &world.hulls, &o, &d, 1e4).is_some()
-                || inside_foot(&caster.primitive.shape, &o)
-        });
-        let mut sky = 1.0f32;
-        for foot in &feet {
-            sky *= foot.open_at(x, y);
-        }
-        *cell = [if shaded { 0 } else { 255 }, (sky * 255.0) as u8];
+        let o = caster.primitive.local_point(&ground);
+        // Within a solid's own foot there is no entry; the other face counts then.
+        let d = caster.primitive.local_of(&sun);
+        enter(&caster.primitive.shape, &world.hulls, &o, &d, 1e4).is_some()
+            || inside_foot(&caster.primitive.shape, &o)
+    });
+    let mut sky = 1.0f32;
+    for foot in feet {
+        sky *= foot.open_at(x, y);
     }
+    [if shaded { 0 } else { 255 }, (sky * 255.0) as u8]
 }
 
 fn inside_foot(shape: &Shape, o: &V3) -> bool {

@@ -22,7 +22,7 @@ pub const FIELDS: (f64, f64) = (35.0 * PI / 180.0, 110.0 * PI / 180.0);
 const CLEARANCE: f64 = 0.35;
 
 /// Solids within this distance decide whether a place is too cramped, metres.
-const NEARBY: f64 = 8.0;
+const NEARBY: f64 = 14.0;
 
 /// Tries before a camera goes where cars drive.
 const TRIES: usize = 40;
@@ -111,8 +111,8 @@ enum Kind {
     Beside,
 }
 
-/// Street coordinates and a heading.
-fn spot(rng: &mut ChaCha8Rng, place: &Place) -> (f64, f64, f64) {
+/// Street coordinates, a heading, and how far the view ahead must be free, metres.
+fn spot(rng: &mut ChaCha8Rng, place: &Place) -> ((f64, f64, f64), f32) {
     let kind = weighted(
         rng,
         &[
@@ -127,7 +127,12 @@ fn spot(rng: &mut ChaCha8Rng, place: &Place) -> (f64, f64, f64) {
     let back = rng.random_bool(0.3);
     let lane = if back { 1.65 } else { -1.65 } + normal(rng, 0.0, 0.4, 2.5);
     let along = if back { PI } else { 0.0 };
-    match kind {
+    // Drivers keep their distance, though not always.
+    let ahead = match kind {
+        Kind::Driving => rng.random_range(3.0..14.0),
+        _ => 1.2,
+    };
+    let spot = match kind {
         Kind::Driving => (s, lane, along + normal(rng, 0.0, 0.05, 3.0)),
         Kind::Turning => (s, lane, along + rng.random_range(-1.2..1.2)),
         Kind::Sideways => (s, lane, rng.random_range(-PI..PI)),
@@ -144,7 +149,8 @@ fn spot(rng: &mut ChaCha8Rng, place: &Place) -> (f64, f64, f64) {
             };
             (s, rng.random_range(-widest..widest), turn)
         }
-    }
+    };
+    (spot, ahead)
 }
 
 /// Draws a free place for a camera: not within a solid nor close to one, and not with most of its view within
@@ -153,8 +159,9 @@ pub fn stand(rng: &mut ChaCha8Rng, place: &Place, moving: &[Primitive], k: &Intr
     let height = height(rng);
     let (pitch, roll) = tilt(rng, height);
     for _ in 0..TRIES {
-        let stand = pose(place, spot(rng, place), (height, pitch, roll));
-        if is_free(place, moving, &stand.world_from_cam, k) {
+        let (spot, ahead) = spot(rng, place);
+        let stand = pose(place, spot, (height, pitch, roll));
+        if is_free(place, moving, &stand.world_from_cam, k, ahead) {
             return stand;
         }
     }
@@ -188,7 +195,13 @@ fn pose(
     }
 }
 
-fn is_free(place: &Place, moving: &[Primitive], world_from_cam: &Se3, k: &Intrinsics) -> bool {
+fn is_free(
+    place: &Place,
+    moving: &[Primitive],
+    world_from_cam: &Se3,
+    k: &Intrinsics,
+    ahead: f32,
+) -> bool {
     let world = &place.world;
     let eye = world_from_cam.translation();
     let near: Vec<&Primitive> = world
@@ -216,10 +229,11 @@ fn is_free(place: &Place, moving: &[Primitive], world_from_cam: &Se3, k: &Intrin
     if near.iter().any(within) {
         return false;
     }
-    // Rays over the picture: at most a quarter of them may end within 1.2 m, and as many must go on for 4 m.
+    // Rays over the picture: at most a quarter of them may end within 1.2 m, as many must go on for 4 m, and those in
+    // the middle for the distance ahead.
     let (mut close, mut far, mut all) = (0, 0, 0);
     for row in [0.15, 0.4, 0.65] {
-        for column in 0..7 {
+        for column in 0..7i32 {
             let u = f64::from(k.width) * (f64::from(column) + 0.5) / 7.0;
             let ray = k.back_project(u, f64::from(k.height) * row, 1.0);
             let d: V3 = world_from_cam.rotate(&ray).map(|x| x as f32);
@@ -227,9 +241,12 @@ fn is_free(place: &Place, moving: &[Primitive], world_from_cam: &Se3, k: &Intrin
                 .iter()
                 .filter_map(|solid| {
                     let (o, d) = (solid.local_point(&eye), solid.local_of(&d));
-                    enter(&solid.shape, &world.hulls, &o, &d, 4.0).map(|entry| entry.t)
+                    enter(&solid.shape, &world.hulls, &o, &d, NEARBY as f32).map(|entry| entry.t)
                 })
                 .fold(f32::INFINITY, f32::min);
+            if (2..5).contains(&column) && t < ahead {
+                return false;
+            }
             all += 1;
             close += usize::from(t < 1.2);
             far += usize::from(t >= 4.0);

@@ -29,8 +29,8 @@ pub enum Weather {
     Night,
 }
 
-/// Draws the weather: by day 42 % clear, 20 % cloudy, 33 % overcast, 5 % fog. Haze (visibility of 0.5 to 20 km) in two of
-/// three pictures; the ground is wet in a third of those without sun and in one of ten others.
+/// Draws the weather: by day 42 % clear, 20 % cloudy, 33 % overcast, 5 % fog. Haze (visibility of 0.8 to 20 km) in half of
+/// the pictures; the ground is wet in a third of those without sun and in one of ten others.
 pub fn draw(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {
     match world.scene {
         Scene::Garage => (Weather::Indoor, indoor(rng, world)),
@@ -106,6 +106,8 @@ fn day(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {
     let mut air = match weather {
         Weather::Overcast | Weather::Fog => {
             let level = rng.random_range(0.5..1.3f32) * day;
+            // Between houses less of the sky is seen than there is: it is brighter than what it lights.
+            let bright = rng.random_range(1.2..2.6);
             // A sun that still shows a little through a thin cover.
             let through = if rng.random_bool(0.3) {
                 rng.random_range(0.02..0.2f32)
@@ -118,7 +120,7 @@ fn day(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {
                     zenith: grey * rng.random_range(0.7..1.2),
                     clouds: rng.random_range(-1.0..1.0),
                 },
-                tint: Rgb::new(1.0, 1.0, 1.0) * level,
+                tint: Rgb::new(1.0, 1.0, 1.0) * (level * bright),
                 glow: None,
                 light: (sun * through, grey * level),
                 fog: None,
@@ -148,7 +150,7 @@ fn day(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {
                 }),
                 light: (
                     sun * (1.0 - 0.35 * clouds.max(0.0)),
-                    ambient * (day * rng.random_range(0.45..1.0)),
+                    ambient * (day * rng.random_range(0.3..0.9)),
                 ),
                 fog: None,
                 wet: wetness(rng, 0.1),

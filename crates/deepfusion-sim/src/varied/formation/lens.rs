@@ -21,16 +21,16 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// Softness: a bell of 0.25 to 0.8 pixels in most, up to 1.8 in one of eight. One of twelve is smeared by 1.5 to
-    /// 6 pixels, mostly sideways, as cameras turn.
+    /// Softness: none in half of them, as in pictures that were made smaller; a bell of 0.25 to 0.6 pixels in three of
+    /// eight, of up to 1.6 in one of eight. One of twenty is smeared by 1.5 to 6 pixels, mostly sideways, as cameras turn.
     pub fn draw(rng: &mut ChaCha8Rng) -> Self {
         Self {
             blur: match rng.random_range(0..8) {
-                0..=1 => 0.0,
-                2..=6 => scale(rng, 0.25, 0.8),
-                _ => scale(rng, 0.8, 1.8),
+                0..=3 => 0.0,
+                4..=6 => scale(rng, 0.25, 0.6),
+                _ => scale(rng, 0.6, 1.6),
             },
-            shake: sometimes(rng, 0.08, None, |rng| {
+            shake: sometimes(rng, 0.05, None, |rng| {
                 let direction = if rng.random_bool(0.7) {
                     rng.random_range(-0.3..0.3)
                 } else {
@@ -43,7 +43,7 @@ impl Lens {
                 [strength, -strength * rng.random_range(0.2..1.0)]
             }),
             vignette: sometimes(rng, 0.6, 0.0, |rng| rng.random_range(0.03..0.45)),
-            veil: sometimes(rng, 0.2, 0.0, |rng| scale(rng, 0.02, 0.25)),
+            veil: sometimes(rng, 0.2, 0.0, |rng| scale(rng, 0.02, 0.2)),
         }
     }
 

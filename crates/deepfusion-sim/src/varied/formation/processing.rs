@@ -49,10 +49,10 @@ impl Processing {
             }),
             saturation: normal(rng, 0.95, 0.25, 2.5) as f32,
             gamma: normal(rng, 2.15, 0.2, 2.5) as f32,
-            contrast: normal(rng, 0.45, 0.4, 2.0).max(-0.2) as f32,
+            contrast: normal(rng, 0.75, 0.5, 2.0).clamp(-0.2, 1.7) as f32,
             shoulder: sometimes(rng, 0.6, 1.0, |rng| rng.random_range(0.4..0.9)),
-            black: sometimes(rng, 0.3, 0.0, |rng| rng.random_range(0.0..0.07)),
-            sharpen: sometimes(rng, 0.4, None, |rng| {
+            black: sometimes(rng, 0.2, 0.0, |rng| rng.random_range(0.0..0.07)),
+            sharpen: sometimes(rng, 0.6, None, |rng| {
                 Some((rng.random_range(0.2..1.3), rng.random_range(0.5..1.3)))
             }),
             levels: sometimes(rng, 0.03, 256.0, |rng| rng.random_range(40.0..128.0)),
