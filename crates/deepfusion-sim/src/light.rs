@@ -1,7 +1,7 @@
 //! Shadows of the sun and of the sky on the ground, baked along the street.
 
 use crate::primitive::{Primitive, Shape, V3, enter};
-use crate::road::{KERB_HEIGHT, StreetPoint};
+use crate::road::StreetPoint;
 use crate::scene::{ObjectClass, SceneObject, World};
 use crate::texture::noise::length;
 use nalgebra::Vector3;
@@ -40,6 +40,8 @@ struct Caster {
     reach: f32,
     middle: (f64, f64),
     radius: f32,
+    /// How long its shadow is at most.
+    length: f32,
 }
 
 /// The foot of something that keeps the sky off the ground beside it.
@@ -167,6 +169,7 @@ fn casters(world: &World) -> Vec<Caster> {
                 reach: 1.8 * (radius + length) + 2.0,
                 middle: (primitive.position[0], primitive.position[1]),
                 radius,
+                length,
             })
         })
         .collect()
@@ -183,6 +186,10 @@ impl Foot {
             ObjectClass::Fence => (0.45, 0.6, 1.0),
             ObjectClass::Tree => (0.3, 1.2, 0.3),
             ObjectClass::Pole => (0.35, 0.25, 0.7),
+            ObjectClass::Van | ObjectClass::Truck | ObjectClass::Tram => (0.85, 0.5, 1.0),
+            ObjectClass::Cyclist | ObjectClass::Bicycle => (0.4, 0.3, 0.8),
+            ObjectClass::Pedestrian => (0.45, 0.25, 0.7),
+            ObjectClass::Misc => (0.5, 0.3, 0.9),
         };
         Self {
             middle: (t.x, t.y),
@@ -215,30 +222,109 @@ impl Foot {
 
 fn bake_chunk(world: &World, casters: &[Caster], feet: &[Foot], from: f32, cells: &mut [[u8; 2]]) {
     let to = from + CHUNK as f32 * CELL;
-    let near: Vec<&Caster> = casters
-        .iter()
-        .filter(|c| c.s + c.reach > from && c.s - c.reach < to)
-        .collect();
-    let feet: Vec<&Foot> = feet
-        .iter()
-        .filter(|f| {
-            let reach = 1.8 * f.half[0].hypot(f.half[1]) + 8.0;
-            f.s + reach > from && f.s - reach < to
+    let rows: Vec<Row> = (0..CHUNK)
+        .map(|row| {
+            let s = from + (row as f32 + 0.5) * CELL;
+            let (x, y, heading, _) = world.road.centre(f64::from(s));
+            Row {
+                x,
+                y,
+                across: (-heading.sin(), heading.cos()),
+            }
         })
         .collect();
-    let sun = world.sun;
-    let flat = sun.x.hypot(sun.y);
-    let mut across = (0.0, 0.0, 0.0, 0.0);
-    for (index, cell) in cells.iter_mut().enumerate() {
-        if index % ACROSS == 0 {
-            let s = from + ((index / ACROSS) as f32 + 0.5) * CELL;
-            let (x, y, heading, _) = world.road.centre(f64::from(s));
-            across = (x, y, -heading.sin(), heading.cos());
+    let mut shaded = vec![false; cells.len()];
+    let near = casters
+        .iter()
+        .filter(|c| c.s + c.reach > from && c.s - c.reach < to);
+    for caster in near {
+        for (row, shaded) in rows.iter().zip(shaded.chunks_mut(ACROSS)) {
+            row.shade(world, caster, shaded);
         }
-        let lateral = f64::from(((index % ACROSS) as f32 + 0.5) * CELL - REACH);
-        let (x, y) = (across.0 + lateral * across.2, across.1 + lateral * across.3);
-        let ground = Vector3::new(x, y, f64::from(KERB_HEIGHT));
-        let shaded = near.iter().any(|caster| {
+    }
+    let mut sky = vec![1.0f32; cells.len()];
+    for foot in feet {
+        let reach = 1.8 * foot.half[0].hypot(foot.half[1]) + 8.0;
+        if foot.s + reach <= from || foot.s - reach >= to {
+            continue;
+        }
+        for (row, sky) in rows.iter().zip(sky.chunks_mut(ACROSS)) {
+            row.close(foot, sky);
+        }
+    }
+    for ((cell, shaded), sky) in cells.iter_mut().zip(shaded).zip(sky) {
+        *cell = [if shaded { 0 } else { 255 }, (sky * 255.0) as u8];
+    }
+}
+
+/// One row of cells across the street.
+struct Row {
+    x: f64,
+    y: f64,
+    across: (f64, f64),
+}
+
+impl Row {
+    /// The middle of a cell.
+    #[inline]
+    fn place(&self, column: usize) -> (f64, f64) {
+        let lateral = f64::from((column as f32 + 0.5) * CELL - REACH);
+        (
+            self.x + lateral * self.across.0,
+            self.y + lateral * self.across.1,
+        )
+    }
+
+    /// The cells whose laterals are in all of these ranges, each given as value + slope · lateral within bounds.
+    fn columns(&self, ranges: [[f64; 4]; 2]) -> std::ops::Range<usize> {
+        let (mut low, mut high) = (-f64::from(REACH), f64::from(REACH));
+        for [value, slope, least, most] in ranges {
+            if slope.abs() < 1e-9 {
+                if value < least || value > most {
+                    return 0..0;
+                }
+                continue;
+            }
+            let (a, b) = ((least - value) / slope, (most - value) / slope);
+            low = low.max(a.min(b));
+            high = high.min(a.max(b));
+        }
+        if low > high {
+            return 0..0;
+        }
+        // One more on each side: the exact test follows.
+        let column = |lateral: f64| (lateral + f64::from(REACH)) / f64::from(CELL);
+        let first = (column(low) - 1.5).max(0.0) as usize;
+        first..((column(high) + 1.5) as usize).min(ACROSS)
+    }
+
+    /// Marks what a caster keeps the sun from.
+    fn shade(&self, world: &World, caster: &Caster, shaded: &mut [bool]) {
+        let sun = world.sun;
+        let flat = sun.x.hypot(sun.y);
+        let towards = (f64::from(sun.x / flat), f64::from(sun.y / flat));
+        let (dx, dy) = (caster.middle.0 - self.x, caster.middle.1 - self.y);
+        let (nx, ny) = self.across;
+        let radius = f64::from(caster.radius) + 0.05;
+        let columns = self.columns([
+            [
+                dx * towards.1 - dy * towards.0,
+                ny * towards.0 - nx * towards.1,
+                -radius,
+                radius,
+            ],
+            [
+                dx * towards.0 + dy * towards.1,
+                -(nx * towards.0 + ny * towards.1),
+                -radius,
+                f64::from(caster.length) + radius + 0.5,
+            ],
+        ]);
+        for column in columns {
+            if shaded[column] {
+                continue;
+            }
+            let (x, y) = self.place(column);
             // The ray's foot passes the caster's circle, on the sun's side.
             let (dx, dy) = ((caster.middle.0 - x) as f32, (caster.middle.1 - y) as f32);
             let along = (dx * sun.x + dy * sun.y) / flat;
@@ -247,19 +333,29 @@ fn bake_chunk(world: &World, casters: &[Caster], feet: &[Foot], from: f32, cells
                 || along < -caster.radius
                 || along > LONGEST + caster.radius
             {
-                return false;
+                continue;
             }
+            let ground = Vector3::new(x, y, f64::from(world.road.kerb));
             let o = caster.primitive.local_point(&ground);
             // Within a solid's own foot there is no entry; the other face counts then.
             let d = caster.primitive.local_of(&sun);
-            enter(&caster.primitive.shape, &world.hulls, &o, &d, 1e4).is_some()
-                || inside_foot(&caster.primitive.shape, &o)
-        });
-        let mut sky = 1.0f32;
-        for foot in &feet {
-            sky *= foot.open_at(x, y);
+            shaded[column] = enter(&caster.primitive.shape, &world.hulls, &o, &d, 1e4).is_some()
+                || inside_foot(&caster.primitive.shape, &o);
         }
-        *cell = [if shaded { 0 } else { 255 }, (sky * 255.0) as u8];
+    }
+
+    /// Takes from the sky what a foot takes.
+    fn close(&self, foot: &Foot, sky: &mut [f32]) {
+        let reach = f64::from(foot.half[0] + foot.half[1] + 4.0 * foot.range);
+        let (dx, dy) = (foot.middle.0 - self.x, foot.middle.1 - self.y);
+        let columns = self.columns([
+            [dx, -self.across.0, -reach, reach],
+            [dy, -self.across.1, -reach, reach],
+        ]);
+        for column in columns {
+            let (x, y) = self.place(column);
+            sky[column] *= foot.open_at(x, y);
+        }
     }
 }
 
