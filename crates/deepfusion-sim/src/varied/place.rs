@@ -8,7 +8,7 @@ use crate::motion::Drive;
 use crate::primitive::V3;
 use crate::render::Cores;
 use crate::road::Road;
-use crate::scene::World;
+use crate::scene::{Variety, World};
 use crate::traffic::Traffic;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -43,7 +43,8 @@ impl Place {
         let drive = Drive::simulate(&mut rng, &road, DURATION_S, scene.pace());
         let length = drive.progress(DURATION_S).0;
         road.truncate(length + AHEAD);
-        let mut world = World::furnish(road, seed, scene);
+        let variety = Variety::draw(&mut rng);
+        let mut world = World::furnish_varied(road, seed, scene, &variety);
         world.sun = sun(&mut rng);
         let light = GroundLight::bake(&world, Cores::One);
         let cars = match scene {
@@ -66,15 +67,17 @@ impl Place {
     }
 }
 
-/// By daylight mostly streets, then shopping streets and parks; else garages and nights, half and half.
+/// By daylight mostly streets, then shopping streets, parks and roads in the open; else garages and nights, half and half.
 fn scene(rng: &mut ChaCha8Rng, daylight: f64) -> Scene {
     if rng.random_bool(daylight) {
         weighted(
             rng,
             &[
-                (0.5, Scene::Urban),
-                (0.25, Scene::Commercial),
-                (0.25, Scene::Park),
+                (0.45, Scene::Urban),
+                (0.22, Scene::Commercial),
+                (0.13, Scene::Park),
+                (0.1, Scene::Country),
+                (0.1, Scene::Motorway),
             ],
         )
     } else {
