@@ -11,6 +11,9 @@ use rand_chacha::ChaCha8Rng;
 /// Where the lanes are, metres left of the centreline.
 const LANE: f64 = 1.65;
 
+/// Vehicles up to this length need no more room than [`GAP`] gives, metres.
+const LONG: f64 = 5.0;
+
 /// Distance kept between two cars of one lane, metres.
 const GAP: f64 = 13.0;
 
@@ -76,7 +79,40 @@ impl Traffic {
                 }
             })
             .collect();
-        Self { cars }
+        let mut traffic = Self { cars };
+        traffic.settle(world, with);
+        traffic
+    }
+
+    /// Makes room for long vehicles, and drives on the world's own lanes where it has any. Changes nothing for cars on
+    /// a plain street.
+    fn settle(&mut self, world: &World, pace: f64) {
+        if !world.rooms.is_empty() {
+            self.cars.clear();
+        }
+        let others: Vec<_> = world
+            .lanes
+            .iter()
+            .filter(|lane| (lane.lateral + LANE).abs() > 1.0)
+            .collect();
+        let (mut ahead, mut towards) = (0.0, 0.0);
+        for (number, car) in self.cars.iter_mut().enumerate() {
+            let longer = (0.5 * (f64::from(world.models[car.model].size[0]) - LONG)).max(0.0);
+            let shift = if car.speed > 0.0 {
+                &mut ahead
+            } else {
+                &mut towards
+            };
+            car.s += *shift + longer;
+            *shift += 2.0 * longer;
+            if car.speed < 0.0 && !world.lanes.is_empty() {
+                let lane = others.get(number % others.len().max(1));
+                car.lateral = lane.map_or(2.0 * LANE + 1.0, |lane| lane.lateral);
+                if lane.is_none_or(|lane| lane.forward) {
+                    car.speed = 1.1 * pace;
+                }
+            }
+        }
     }
 
     /// Dense traffic around a camera that is `s` metres along a varied world's street at time 0 and drives on at
