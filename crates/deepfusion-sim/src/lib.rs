@@ -42,6 +42,7 @@ mod texture;
 mod tracklets;
 mod traffic;
 mod umad;
+mod varied;
 mod velodyne;
 
 pub use can::{SpeedReading, SteeringReading, WHEELBASE_M};
@@ -55,3 +56,4 @@ pub use rig::Rig;
 pub use scene::{ObjectClass, SceneObject, Variety};
 pub use simulation::{SimFrame, Simulation};
 pub use umad::{BagSettings, topic, write_bag};
+pub use varied::{Endless, EndlessConfig, View, Weather};

@@ -1,11 +1,11 @@
 //! Shadows of the sun and of the sky on the ground, baked along the street.
 
 use crate::primitive::{Primitive, Shape, V3, enter};
+use crate::render::Cores;
 use crate::road::StreetPoint;
 use crate::scene::{ObjectClass, SceneObject, World};
 use crate::texture::noise::length;
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 /// Size of a cell along the street and across it, metres.
 const CELL: f32 = 0.16;
@@ -56,19 +56,16 @@ pub struct Foot {
 
 impl GroundLight {
     /// Bakes the light of everything that stands still.
-    pub fn bake(world: &World) -> Self {
+    pub fn bake(world: &World, cores: Cores) -> Self {
         let (start, end) = (world.road.start as f32, world.road.end() as f32);
         let rows = (((end - start) / CELL).ceil() as usize).next_multiple_of(CHUNK);
         let casters = casters(world);
         let feet: Vec<Foot> = world.objects.iter().map(|o| Foot::of(world, o)).collect();
         let mut cells = vec![[255u8; 2]; rows * ACROSS];
-        cells
-            .par_chunks_mut(CHUNK * ACROSS)
-            .enumerate()
-            .for_each(|(chunk, cells)| {
-                let from = start + (chunk * CHUNK) as f32 * CELL;
-                bake_chunk(world, &casters, &feet, from, cells);
-            });
+        cores.split(&mut cells, CHUNK * ACROSS, |chunk, cells| {
+            let from = start + (chunk * CHUNK) as f32 * CELL;
+            bake_chunk(world, &casters, &feet, from, cells);
+        });
         let coarse = shrink(&cells, rows);
         Self {
             start,

@@ -2,7 +2,7 @@
 
 use crate::light::GroundLight;
 use crate::primitive::{Primitive, V3};
-use crate::render::{Eye, FrameSolid, Shader, Surface, gather};
+use crate::render::{Air, Eye, FrameSolid, Shader, Surface, gather};
 use crate::scene::World;
 use crate::texture::noise::hash;
 use deepfusion_geometry::Se3;
@@ -15,6 +15,7 @@ const SECTORS: usize = 240;
 pub struct Scanner<'a> {
     eye: Eye<'a>,
     light: &'a GroundLight,
+    air: Air,
     /// Angle that a ray stands for, radians.
     pixel: f32,
     /// Candidates of each sector, nearest first.
@@ -94,6 +95,7 @@ impl<'a> Scanner<'a> {
                 solids: solids.into_iter().map(|s| s.0).collect(),
             },
             light,
+            air: Air::of(world),
             pixel,
             lists,
             world_from_sensor: world_from_sensor.rotation().map(|x| x as f32),
@@ -114,6 +116,7 @@ impl<'a> Scanner<'a> {
         let shader = Shader {
             eye: &self.eye,
             light: self.light,
+            air: &self.air,
             pixel: self.pixel,
             samples: 1.0,
             moving: &[],

@@ -2,7 +2,6 @@
 
 use crate::motion::Drive;
 use crate::primitive::Primitive;
-use crate::road::Road;
 use crate::scene::{SceneObject, World, upright};
 use nalgebra::Vector3;
 use rand::Rng;
@@ -152,7 +151,7 @@ impl Traffic {
                 };
                 let long = f64::from(world.models[car.model].size[0]);
                 let clear = !own || at - 0.5 * long > s + nearest;
-                if clear && rng.random_bool(0.25 + 0.7 * density) && traffic.fits(world, &car) {
+                if clear && rng.random_bool(0.25 + 0.7 * density) && fits(world, &car, at) {
                     traffic.cars.push(car);
                 }
                 at += long + gap * rng.random_range(0.5..1.8);
@@ -161,51 +160,23 @@ impl Traffic {
         traffic
     }
 
-    /// Whether a car at time 0 stands in nothing that stands still.
-    fn fits(&self, world: &World, car: &MovingCar) -> bool {
-        let (x, y, heading) = world.road.world(car.s, car.lateral);
-        let size = world.models[car.model].size.map(f64::from);
-        let half = [0.5 * size[0] + 0.3, 0.5 * size[1] + 0.15];
-        let road = &world.road;
-        let on_road = [-half[0], half[0]].iter().all(|along| {
-            let (x, y, _) = road.world(car.s + along, car.lateral);
-            let p = road.locate(x, y);
-            f64::from(road.kerb_distance(&p)) < -half[1] + 0.15
-        });
-        on_road
-            && !world.objects.iter().any(|object| {
-                let t = object.world_from_object.translation();
-                let (dx, dy) = (t.x - x, t.y - y);
-                let reach = object.size[0].hypot(object.size[1]) * 0.5 + half[0] + 1.0;
-                // Crowns and arms hang over the road.
-                let low = object.size[2] < 2.6 || object.class.is_traffic();
-                if !low || dx.hypot(dy) > reach {
-                    return false;
-                }
-                let (sin, cos) = heading.sin_cos();
-                let forward = object.world_from_object.rotate(&Vector3::x());
-                let turned = (forward.x * cos + forward.y * sin).abs().min(1.0);
-                let across = (1.0 - turned * turned).sqrt();
-                let other = [0.5 * object.size[0], 0.5 * object.size[1]];
-                let along = other[0] * turned + other[1] * across;
-                let aside = other[1] * turned + other[0] * across;
-                (cos * dx + sin * dy).abs() < half[0] + along
-                    && (cos * dy - sin * dx).abs() < half[1] + aside
-            })
-    }
-
     /// The cars that are on the street at a time.
     fn present<'a>(
         &'a self,
-        road: &'a Road,
+        world: &'a World,
         time_s: f64,
     ) -> impl Iterator<Item = (usize, &'a MovingCar, [f64; 3], f64)> {
         self.cars
             .iter()
             .enumerate()
             .filter_map(move |(index, car)| {
+                let road = &world.road;
                 let s = car.s + car.speed * time_s;
                 if s < road.start + 5.0 || s > road.end() - 5.0 {
+                    return None;
+                }
+                // Varied streets are narrow in places: whoever meets a parked car there has turned off before.
+                if !world.crowd.is_empty() && !fits(world, car, s) {
                     return None;
                 }
                 let (x, y, heading) = road.world(s, car.lateral);
@@ -220,7 +191,7 @@ impl Traffic {
 
     /// Their solids at a time.
     pub fn solids(&self, world: &World, time_s: f64) -> Vec<Primitive> {
-        self.present(&world.road, time_s)
+        self.present(world, time_s)
             .flat_map(|(_, car, base, heading)| {
                 world.models[car.model].solids(base, heading, car.seed, true)
             })
@@ -229,7 +200,7 @@ impl Traffic {
 
     /// Their boxes and velocities at a time.
     pub fn objects(&self, world: &World, time_s: f64) -> Vec<SceneObject> {
-        self.present(&world.road, time_s)
+        self.present(world, time_s)
             .map(|(index, car, base, heading)| {
                 let size = world.models[car.model].size.map(f64::from);
                 // Constant speed along the centreline, so faster on the outside of a bend.
@@ -247,4 +218,37 @@ impl Traffic {
             })
             .collect()
     }
+}
+
+/// Whether a car at `s` metres along the street is on its carriageway and in nothing that stands still.
+fn fits(world: &World, car: &MovingCar, s: f64) -> bool {
+    let (x, y, heading) = world.road.world(s, car.lateral);
+    let size = world.models[car.model].size.map(f64::from);
+    let half = [0.5 * size[0] + 0.3, 0.5 * size[1] + 0.15];
+    let road = &world.road;
+    let on_road = [-half[0], half[0]].iter().all(|along| {
+        let (x, y, _) = road.world(s + along, car.lateral);
+        let p = road.locate(x, y);
+        f64::from(road.kerb_distance(&p)) < -half[1] + 0.15
+    });
+    on_road
+        && !world.objects.iter().any(|object| {
+            let t = object.world_from_object.translation();
+            let (dx, dy) = (t.x - x, t.y - y);
+            let reach = object.size[0].hypot(object.size[1]) * 0.5 + half[0] + 1.0;
+            // Crowns and arms hang over the road.
+            let low = object.size[2] < 2.6 || object.class.is_traffic();
+            if !low || dx.hypot(dy) > reach {
+                return false;
+            }
+            let (sin, cos) = heading.sin_cos();
+            let forward = object.world_from_object.rotate(&Vector3::x());
+            let turned = (forward.x * cos + forward.y * sin).abs().min(1.0);
+            let across = (1.0 - turned * turned).sqrt();
+            let other = [0.5 * object.size[0], 0.5 * object.size[1]];
+            let along = other[0] * turned + other[1] * across;
+            let aside = other[1] * turned + other[0] * across;
+            (cos * dx + sin * dy).abs() < half[0] + along
+                && (cos * dy - sin * dx).abs() < half[1] + aside
+        })
 }

@@ -1,13 +1,16 @@
 //! The camera: rays through a frame's solids and the ground, shaded and antialiased.
 
+mod air;
 mod shade;
 mod tiles;
 
 use crate::light::{Foot, GroundLight};
-use crate::primitive::{Primitive, Shape, V3, enter};
+use crate::primitive::{FACE_LEAVES, Primitive, Shape, V3, enter};
 use crate::road::StreetPoint;
 use crate::scene::SceneObject;
 use crate::scene::World;
+use crate::texture::Rgb;
+pub use air::{Air, Fog, Glow};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use image::RgbImage;
 use nalgebra::Vector3;
@@ -38,6 +41,19 @@ pub enum Surface {
     Beside,
 }
 
+impl Surface {
+    /// Whether it is the same surface; all leaves of a lobe are one.
+    #[inline]
+    pub fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Solid(a, face), Self::Solid(b, other)) => {
+                a == b && (face == other || *face.min(other) >= FACE_LEAVES)
+            }
+            _ => self == other,
+        }
+    }
+}
+
 /// Where a ray ends: `t` in units of its direction.
 #[derive(Debug, Clone, Copy)]
 pub struct Hit {
@@ -57,7 +73,7 @@ pub struct FrameSolid {
     pub nearest: f32,
 }
 
-/// The solids around a place on the street, and those that move.
+/// The solids around a place on the street (ahead and behind it along the street), and those that move.
 pub fn gather(world: &World, moving: &[Primitive], eye: &Vector3<f64>) -> Vec<Primitive> {
     let s = world.road.locate(eye.x, eye.y).s;
     let from = world.along.partition_point(|a| *a < s - BEHIND);
@@ -163,6 +179,35 @@ pub struct Picture {
     pub moving: Vec<bool>,
 }
 
+/// What a camera sees before any camera makes an image of it.
+pub struct Exposure {
+    /// Linear light, row by row.
+    pub light: Vec<Rgb>,
+    /// What the rays of the pixels' centres meet.
+    pub hits: Vec<Hit>,
+    /// Camera z in metres, 0 for the sky.
+    pub depth: DepthMap,
+    /// Pixels of things that move.
+    pub moving: Vec<bool>,
+}
+
+/// What is to be rendered.
+#[derive(Clone, Copy)]
+pub struct Shot<'a> {
+    /// The world.
+    pub world: &'a World,
+    /// Light on its ground.
+    pub light: &'a GroundLight,
+    /// Sky, sun and what is between them and the camera.
+    pub air: &'a Air,
+    /// The boxes of what moves.
+    pub cars: &'a [SceneObject],
+    /// World (z up) from the camera (x right, y down, z forward), metres.
+    pub world_from_cam: &'a Se3,
+    /// The camera.
+    pub intrinsics: &'a Intrinsics,
+}
+
 /// Renders what a camera sees; `moving` are the solids of the moving `cars`.
 pub fn render(
     world: &World,
@@ -172,15 +217,81 @@ pub fn render(
     world_from_cam: &Se3,
     k: &Intrinsics,
 ) -> Picture {
-    let position = world_from_cam.translation();
-    let solids = gather(world, moving, &position);
-    let (tiles, solids) = Tiles::bin(world, solids, world_from_cam, k);
+    let air = Air::of(world);
+    let shot = Shot {
+        world,
+        light,
+        air: &air,
+        cars,
+        world_from_cam,
+        intrinsics: k,
+    };
+    let solids = gather(world, moving, &world_from_cam.translation());
+    let exposure = expose(&shot, solids, Cores::All, Edges::EachRay);
+    Picture {
+        rgb: encode(&exposure.light, k.width, k.height),
+        depth: exposure.depth,
+        moving: exposure.moving,
+    }
+}
+
+/// The image of a steady camera, without any of a real one's faults.
+pub fn encode(light: &[Rgb], width: u32, height: u32) -> RgbImage {
+    let bytes = light.iter().flat_map(encode_srgb).collect();
+    // The buffer has 3 · width · height bytes by construction.
+    RgbImage::from_raw(width, height, bytes).unwrap_or_else(|| RgbImage::new(width, height))
+}
+
+/// On how many cores to work.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cores {
+    /// On this thread, for callers that have many of their own.
+    One,
+    /// On all of rayon's.
+    All,
+}
+
+impl Cores {
+    /// Calls `work` with the number and the items of each piece of `size` items.
+    pub fn split<T: Send>(
+        self,
+        items: &mut [T],
+        size: usize,
+        work: impl Fn(usize, &mut [T]) + Send + Sync,
+    ) {
+        match self {
+            Self::One => {
+                for (number, piece) in items.chunks_mut(size).enumerate() {
+                    work(number, piece);
+                }
+            }
+            Self::All => items
+                .par_chunks_mut(size)
+                .enumerate()
+                .for_each(|(number, piece)| work(number, piece)),
+        }
+    }
+}
+
+/// How a pixel that sees several surfaces gets its colour from the four rays through it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Edges {
+    /// Every ray is shaded.
+    EachRay,
+    /// Every surface is shaded once: twice as fast, and as smooth at edges.
+    EachSurface,
+}
+
+/// The light that falls on each pixel, and the exact depth.
+pub fn expose(shot: &Shot, solids: Vec<Primitive>, cores: Cores, edges: Edges) -> Exposure {
+    let (world, k) = (shot.world, shot.intrinsics);
+    let (tiles, solids) = Tiles::bin(world, solids, shot.world_from_cam, k);
     let eye = Eye {
         world,
-        position,
+        position: shot.world_from_cam.translation(),
         solids,
     };
-    let camera = Camera::new(world_from_cam, k);
+    let camera = Camera::new(shot.world_from_cam, k);
     let (width, height) = (k.width as usize, k.height as usize);
     let mut hits = vec![
         Hit {
@@ -189,21 +300,20 @@ pub fn render(
         };
         width * height
     ];
-    hits.par_chunks_mut(width * TILE)
-        .enumerate()
-        .for_each(|(band, hits)| {
-            for (row, hits) in hits.chunks_mut(width).enumerate() {
-                let v = band * TILE + row;
-                for (u, hit) in hits.iter_mut().enumerate() {
-                    let d = camera.ray(u as f32, v as f32);
-                    *hit = eye.trace(tiles.at(u, v), &d);
-                }
+    cores.split(&mut hits, width * TILE, |band, hits| {
+        for (row, hits) in hits.chunks_mut(width).enumerate() {
+            let v = band * TILE + row;
+            for (u, hit) in hits.iter_mut().enumerate() {
+                let d = camera.ray(u as f32, v as f32);
+                *hit = eye.trace(tiles.at(u, v), &d);
             }
-        });
-    let feet: Vec<Foot> = cars.iter().map(|car| Foot::of(world, car)).collect();
+        }
+    });
+    let feet: Vec<Foot> = shot.cars.iter().map(|car| Foot::of(world, car)).collect();
     let shader = Shader {
         eye: &eye,
-        light,
+        light: shot.light,
+        air: shot.air,
         pixel: camera.pixel,
         samples: 3.0,
         moving: &feet,
@@ -214,35 +324,34 @@ pub fn render(
         samples: 2.0,
         ..shader
     };
-    let mut colours = vec![0u8; 3 * width * height];
-    colours
-        .par_chunks_mut(3 * width)
-        .enumerate()
-        .for_each(|(v, row)| {
-            for u in 0..width {
-                let hit = &hits[v * width + u];
-                let colour = if on_edge(&hits, width, height, u, v) {
-                    // Four rays on a rotated grid; the depth stays that of the centre.
-                    let offsets = [
-                        (-0.125, -0.375),
-                        (0.375, -0.125),
-                        (0.125, 0.375),
-                        (-0.375, 0.125),
-                    ];
-                    let sum: V3 = offsets
-                        .iter()
-                        .map(|(du, dv)| {
-                            let d = camera.ray(u as f32 + du, v as f32 + dv);
-                            part.colour(&eye.trace(tiles.at(u, v), &d), &d)
-                        })
-                        .sum();
-                    sum * 0.25
-                } else {
-                    shader.colour(hit, &camera.ray(u as f32, v as f32))
-                };
-                row[3 * u..3 * u + 3].copy_from_slice(&encode_srgb(&colour));
-            }
-        });
+    let mut colours = vec![Rgb::zeros(); width * height];
+    cores.split(&mut colours, width, |v, row| {
+        for (u, colour) in row.iter_mut().enumerate() {
+            let hit = &hits[v * width + u];
+            *colour = if !on_edge(&hits, width, height, u, v) {
+                shader.colour(hit, &camera.ray(u as f32, v as f32))
+            } else {
+                // Four rays on a rotated grid; the depth stays that of the centre.
+                let rays = [
+                    (-0.125, -0.375),
+                    (0.375, -0.125),
+                    (0.125, 0.375),
+                    (-0.375, 0.125),
+                ]
+                .map(|(du, dv)| {
+                    let d = camera.ray(u as f32 + du, v as f32 + dv);
+                    (eye.trace(tiles.at(u, v), &d), d)
+                });
+                match edges {
+                    Edges::EachRay => {
+                        let sum: V3 = rays.iter().map(|(hit, d)| part.colour(hit, d)).sum();
+                        sum * 0.25
+                    }
+                    Edges::EachSurface => by_surface(&part, &rays),
+                }
+            };
+        }
+    });
     let depth = hits
         .iter()
         .map(|hit| if hit.t.is_finite() { hit.t } else { 0.0 });
@@ -250,17 +359,29 @@ pub fn render(
         Surface::Solid(index, _) => eye.solids[index as usize].primitive.moving,
         _ => false,
     };
-    Picture {
+    Exposure {
         depth: DepthMap {
             width,
             height,
             data: depth.collect(),
         },
         moving: hits.iter().map(is_moving).collect(),
-        // The buffer has 3 · width · height bytes by construction.
-        rgb: RgbImage::from_raw(k.width, k.height, colours)
-            .unwrap_or_else(|| RgbImage::new(k.width, k.height)),
+        light: colours,
+        hits,
     }
+}
+
+/// The mean of rays of one pixel, each surface shaded once, where the first ray meets it.
+fn by_surface(shader: &Shader, rays: &[(Hit, V3); 4]) -> Rgb {
+    let mut sum = Rgb::zeros();
+    for (i, (hit, d)) in rays.iter().enumerate() {
+        let same = |other: &&(Hit, V3)| other.0.surface.is_like(&hit.surface);
+        if !rays[..i].iter().any(|other| same(&other)) {
+            let share = 0.25 * rays[i..].iter().filter(same).count() as f32;
+            sum += shader.colour(hit, d) * share;
+        }
+    }
+    sum
 }
 
 /// Whether a pixel or one of its four neighbours sees another surface.
@@ -268,7 +389,7 @@ pub fn render(
 fn on_edge(hits: &[Hit], width: usize, height: usize, u: usize, v: usize) -> bool {
     let here = hits[v * width + u];
     let differs = |other: &Hit| {
-        other.surface != here.surface
+        !other.surface.is_like(&here.surface)
             // A solid can hide itself, as an ellipsoid does not but a hull's edge would.
             || (here.t.is_finite() && (other.t - here.t).abs() > 0.2 * here.t.min(other.t)
                 && matches!(here.surface, Surface::Solid(..)))
@@ -280,7 +401,7 @@ fn on_edge(hits: &[Hit], width: usize, height: usize, u: usize, v: usize) -> boo
 }
 
 /// The rays of a pinhole camera, in world axes.
-struct Camera {
+pub struct Camera {
     columns: [V3; 3],
     inverse: [f32; 4],
     /// Width of a pixel at depth 1.
@@ -288,7 +409,8 @@ struct Camera {
 }
 
 impl Camera {
-    fn new(world_from_cam: &Se3, k: &Intrinsics) -> Self {
+    /// The rays of a camera at a pose.
+    pub fn new(world_from_cam: &Se3, k: &Intrinsics) -> Self {
         let rotation = world_from_cam.rotation();
         let column = |i: usize| rotation.column(i).map(|x| x as f32).into_owned();
         Self {
@@ -305,7 +427,7 @@ impl Camera {
 
     /// The ray of a pixel, with camera z = 1: its parameter is the depth.
     #[inline]
-    fn ray(&self, u: f32, v: f32) -> V3 {
+    pub fn ray(&self, u: f32, v: f32) -> V3 {
         let x = u * self.inverse[0] + self.inverse[1];
         let y = v * self.inverse[2] + self.inverse[3];
         self.columns[0] * x + self.columns[1] * y + self.columns[2]

@@ -1,6 +1,6 @@
 //! From a hit to a colour: texture, sun, sky.
 
-use super::{Eye, Hit, Surface};
+use super::{Air, Eye, Hit, Surface};
 use crate::light::{Foot, GroundLight};
 use crate::primitive::{V3, normal_at};
 use crate::texture::ground::{self, GroundPatch};
@@ -18,6 +18,8 @@ pub struct Shader<'a> {
     pub eye: &'a Eye<'a>,
     /// Light on the ground.
     pub light: &'a GroundLight,
+    /// Sky, sun and what is between them and the eye.
+    pub air: &'a Air,
     /// Width of a pixel (or of what a ray stands for) at t = 1, metres.
     pub pixel: f32,
     /// At most this many samples along the longer side of a ray's footprint.
@@ -30,12 +32,12 @@ impl Shader<'_> {
     /// Linear colour of a hit of the ray along `d`.
     #[inline]
     pub fn colour(&self, hit: &Hit, d: &V3) -> Rgb {
-        let world = self.eye.world;
-        match hit.surface {
-            Surface::Sky => world.sky.radiance(&world.noise, d),
+        let colour = match hit.surface {
+            Surface::Sky => return self.air.radiance(&self.eye.world.noise, d),
             Surface::Solid(index, face) => self.solid(hit.t, d, index, face),
             Surface::Road | Surface::Beside | Surface::Kerb => self.ground(hit, d),
-        }
+        };
+        self.air.through(colour, d, hit.t)
     }
 
     /// Albedo alone, for a scanner.
@@ -79,7 +81,7 @@ impl Shader<'_> {
     fn solid(&self, t: f32, d: &V3, index: u32, face: u8) -> Rgb {
         let world = self.eye.world;
         let (albedo, normal) = self.solid_albedo(t, d, index, face);
-        let (sun, sky) = world.light;
+        let (sun, sky) = self.air.light;
         let lit = normal.dot(&world.sun).max(0.0);
         // The lower half of the sky is ground, which is darker; near it the sky is shut off.
         let height = self.eye.position.z as f32 + d.z * t;
@@ -166,7 +168,10 @@ impl Shader<'_> {
     #[inline]
     fn ground(&self, hit: &Hit, d: &V3) -> Rgb {
         let world = self.eye.world;
-        let (albedo, mut sun, mut sky) = self.ground_albedo(hit, d);
+        let (mut albedo, mut sun, mut sky) = self.ground_albedo(hit, d);
+        if self.air.wet > 0.0 {
+            albedo *= self.air.soaked();
+        }
         if !self.moving.is_empty() {
             let at = self.eye.position + (d * hit.t).map(f64::from);
             for foot in self.moving {
@@ -176,7 +181,7 @@ impl Shader<'_> {
                 sun *= (1.4 * open - 0.4).max(0.0);
             }
         }
-        let (sun_light, sky_light) = world.light;
+        let (sun_light, sky_light) = self.air.light;
         let (facing, open) = if hit.surface == Surface::Kerb {
             (0.5, 0.7)
         } else {

@@ -174,6 +174,7 @@ impl ObjectClass {
 
 impl World {
     /// Furnishes `road` for the drive of `seed`.
+    #[cfg(test)]
     pub fn furnish(road: Road, seed: u64, scene: Scene) -> Self {
         Self::furnish_varied(road, seed, scene, &Variety::none())
     }

@@ -297,11 +297,12 @@ fn light(site: &mut Site, room: &Room) {
             z: room.height - 0.1,
             heading: [0.0, FRAC_PI_2][site.rng.random_range(0..2)],
         };
+        // Nobody runs into a lamp.
+        let longest = room.height - 2.4;
         match site.rng.random_range(0..3) {
             0 => site.block(&spot, [1.2, 0.15, 0.08], kit.pale),
-            1 => site.block(&spot, [0.6, 0.6, 0.05], kit.pale),
-            _ => {
-                let drop = site.draw(0.3, 0.9).min(room.height - 2.0);
+            2 if longest > 0.1 => {
+                let drop = site.draw(0.3, 0.9).min(longest);
                 let ball = spot.spot(0.0, 0.0, -drop, 0.0);
                 site.rod(
                     spot.at(0.0, 0.0, 0.0),
@@ -312,6 +313,7 @@ fn light(site: &mut Site, room: &Room) {
                 let shade = site.any(&kit.cloth);
                 site.ball(&ball, [0.2, 0.2, 0.14], shade);
             }
+            _ => site.block(&spot, [0.6, 0.6, 0.05], kit.pale),
         }
         let place = spot.at(0.0, 0.0, -0.35);
         site.world.lamps.add(x as f32, place, colour);

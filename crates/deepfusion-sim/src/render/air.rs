@@ -1,0 +1,129 @@
+//! The light of a picture: sky, sun, and what is between the things and the camera.
+
+use crate::primitive::V3;
+use crate::scene::World;
+use crate::texture::Rgb;
+use crate::texture::noise::Noise;
+use crate::texture::sky::Sky;
+
+/// The weather and the hour of one picture. It changes colours only: where a ray ends does not hang on it.
+#[derive(Debug, Clone, Copy)]
+pub struct Air {
+    /// The sky's gradient and clouds.
+    pub sky: Sky,
+    /// Multiplies the sky's radiance.
+    pub tint: Rgb,
+    /// The brightness around the sun, where it is seen.
+    pub glow: Option<Glow>,
+    /// Irradiance of the sun (on a surface that faces it) and of the sky.
+    pub light: (Rgb, Rgb),
+    /// What scatters light on the way to the camera.
+    pub fog: Option<Fog>,
+    /// How wet the ground is, 0 to 1: water fills the pores and darkens what soaks it up.
+    pub wet: f32,
+}
+
+/// The sun's disc and its aureole.
+#[derive(Debug, Clone, Copy)]
+pub struct Glow {
+    /// Towards the sun, unit length, world axes.
+    pub sun: V3,
+    /// Radiance at its middle.
+    pub strength: Rgb,
+}
+
+/// Homogeneous fog or haze (Koschmieder): what is at range r keeps e^(−extinction · r) of its light, and the
+/// rest is the fog's own.
+#[derive(Debug, Clone, Copy)]
+pub struct Fog {
+    /// Extinction, 1/m.
+    pub extinction: f32,
+    /// Its radiance.
+    pub colour: Rgb,
+    /// Its thickness above the ground, metres: how much of the sky it covers.
+    pub height: f32,
+}
+
+impl Air {
+    /// A world's own light, in clear air.
+    pub fn of(world: &World) -> Self {
+        Self {
+            sky: world.sky,
+            tint: Rgb::new(1.0, 1.0, 1.0),
+            glow: None,
+            light: world.light,
+            fog: None,
+            wet: 0.0,
+        }
+    }
+
+    /// The sky's radiance from a direction, of any length.
+    pub fn radiance(&self, noise: &Noise, d: &V3) -> Rgb {
+        let mut sky = self.sky.radiance(noise, d).component_mul(&self.tint);
+        if let Some(glow) = &self.glow {
+            sky += glow.radiance(d, self.sky.clouds);
+        }
+        match &self.fog {
+            None => sky,
+            Some(fog) => {
+                let up = (d.z / d.norm()).max(0.02);
+                fog.over(sky, fog.height / up)
+            }
+        }
+    }
+
+    /// Light of a surface at `t` along `d` (metres for a ray of unit length), as it reaches the camera.
+    #[inline]
+    pub fn through(&self, colour: Rgb, d: &V3, t: f32) -> Rgb {
+        match &self.fog {
+            None => colour,
+            Some(fog) => fog.over(colour, t * d.norm()),
+        }
+    }
+
+    /// What wetness leaves of the albedo of the ground.
+    #[inline]
+    pub fn soaked(&self) -> f32 {
+        1.0 - 0.5 * self.wet
+    }
+}
+
+impl Glow {
+    /// The disc is drawn larger than it is, as lenses do; clouds take it away.
+    fn radiance(&self, d: &V3, clouds: f32) -> Rgb {
+        let cos = (self.sun.dot(d) / d.norm()).max(0.0);
+        let wide = cos.powi(12);
+        let near = cos.powi(220);
+        let disc = if cos > 0.9995 { 1.0 } else { 0.0 };
+        let clear = (1.0 - clouds.max(0.0)).max(0.0);
+        self.strength * (0.04 * wide + clear * (0.3 * near + disc))
+    }
+}
+
+impl Fog {
+    /// A colour seen through `range` metres of it.
+    #[inline]
+    fn over(&self, colour: Rgb, range: f32) -> Rgb {
+        let kept = (-self.extinction * range).exp();
+        colour * kept + self.colour * (1.0 - kept)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fog_takes_what_is_far_and_leaves_what_is_near() {
+        let fog = Fog {
+            extinction: 0.01,
+            colour: Rgb::new(0.8, 0.8, 0.8),
+            height: 100.0,
+        };
+        let black = Rgb::zeros();
+        assert!(fog.over(black, 0.0).x == 0.0);
+        let half = fog.over(black, 100.0 * std::f32::consts::LN_2);
+        assert!((half.x - 0.4).abs() < 1e-5);
+        assert!((fog.over(black, 1e5).x - 0.8).abs() < 1e-5);
+    }
+}

@@ -1,0 +1,110 @@
+//! Built things that several threads share, a bounded number of them.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// Keeps the `capacity` most recently used things. The lock is not held while one is built: threads that want
+/// others go on, and those that want the same one wait for it.
+pub struct Cache<T> {
+    capacity: usize,
+    entries: Mutex<Entries<T>>,
+}
+
+struct Entries<T> {
+    clock: u64,
+    /// When it was last asked for, and the thing once it is built.
+    of: HashMap<u64, (u64, Arc<OnceLock<Arc<T>>>)>,
+}
+
+impl<T> Cache<T> {
+    /// A cache of at least one thing.
+    pub fn new(capacity: usize) -> Self {
+        Self {
+            capacity: capacity.max(1),
+            entries: Mutex::new(Entries {
+                clock: 0,
+                of: HashMap::new(),
+            }),
+        }
+    }
+
+    /// The thing of a key, built where it is not there.
+    pub fn get(&self, key: u64, build: impl FnOnce() -> T) -> Arc<T> {
+        let cell = {
+            // The map is never left half changed, so a panic elsewhere does not spoil it.
+            let mut entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
+            entries.clock += 1;
+            let now = entries.clock;
+            if !entries.of.contains_key(&key) && entries.of.len() >= self.capacity {
+                let oldest = entries.of.iter().min_by_key(|(_, entry)| entry.0);
+                if let Some(oldest) = oldest.map(|(key, _)| *key) {
+                    entries.of.remove(&oldest);
+                }
+            }
+            let entry = entries.of.entry(key).or_default();
+            entry.0 = now;
+            entry.1.clone()
+        };
+        cell.get_or_init(|| Arc::new(build())).clone()
+    }
+
+    /// How many things it holds.
+    #[cfg(test)]
+    pub fn len(&self) -> usize {
+        self.entries
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .of
+            .len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Barrier;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    #[test]
+    fn it_stays_small_and_forgets_what_was_not_asked_for() {
+        let cache = Cache::new(3);
+        let built = AtomicUsize::new(0);
+        let get = |key: u64| {
+            let value = cache.get(key, || {
+                built.fetch_add(1, Ordering::Relaxed);
+                key * 10
+            });
+            assert_eq!(*value, key * 10);
+            assert!(cache.len() <= 3);
+        };
+        (0..3).for_each(get);
+        get(0);
+        get(3);
+        assert_eq!(built.load(Ordering::Relaxed), 4);
+        get(0);
+        assert_eq!(built.load(Ordering::Relaxed), 4, "0 was used last but one");
+        get(1);
+        assert_eq!(built.load(Ordering::Relaxed), 5, "1 made room for 3");
+        (10..200).for_each(get);
+    }
+
+    #[test]
+    fn one_thing_is_built_once_and_others_beside_it() {
+        let cache = Cache::new(4);
+        let built = AtomicUsize::new(0);
+        // Both builders must be inside at the same time: a lock held while building would deadlock here.
+        let meet = Barrier::new(2);
+        std::thread::scope(|scope| {
+            for key in [1, 2, 1, 2] {
+                let (cache, built, meet) = (&cache, &built, &meet);
+                scope.spawn(move || {
+                    cache.get(key, || {
+                        built.fetch_add(1, Ordering::Relaxed);
+                        meet.wait();
+                    });
+                });
+            }
+        });
+        assert_eq!(built.load(Ordering::Relaxed), 2);
+    }
+}

@@ -1,0 +1,321 @@
+//! Where a view is taken from, and with which lens.
+
+use super::draw::{normal, weighted};
+use super::place::Place;
+use crate::config::Scene;
+use crate::motion::rotation;
+use crate::primitive::{Primitive, V3, enter};
+use deepfusion_geometry::{Intrinsics, Se3};
+use nalgebra::{Matrix3, Vector3};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::{PI, TAU};
+
+/// Least and greatest height of a camera above its ground, metres.
+pub const HEIGHTS: (f64, f64) = (0.3, 2.5);
+
+/// Least and greatest horizontal field of view, radians.
+pub const FIELDS: (f64, f64) = (35.0 * PI / 180.0, 110.0 * PI / 180.0);
+
+/// A camera keeps this far from every solid's box, metres.
+const CLEARANCE: f64 = 0.35;
+
+/// Solids within this distance decide whether a place is too cramped, metres.
+const NEARBY: f64 = 14.0;
+
+/// Tries before a camera goes where cars drive.
+const TRIES: usize = 40;
+
+/// The camera's place in a world.
+#[derive(Debug, Clone, Copy)]
+pub struct Stand {
+    /// World (z up) from the camera.
+    pub world_from_cam: Se3,
+    /// Height above the ground below it, metres.
+    pub height: f64,
+    /// Whether the traffic had to give way: no free place was found among it.
+    pub alone: bool,
+}
+
+/// Draws a lens. Horizontal field of view: 70 % normal around 78° (deviation 8°, 64° to 92°), the rest uniform from
+/// 35° to 60° or from 90° to 110°. fy is fx, within 1 % in two of three cameras and within 3 % in the others. The
+/// principal point is off the middle by normal draws of 1.5 % of the width and 5 % of the height; in one of five by
+/// up to 20 % of the height, as where a picture was cut from a taller one.
+pub fn intrinsics(rng: &mut ChaCha8Rng, width: u32, height: u32) -> Intrinsics {
+    let field = match rng.random_range(0..20) {
+        0..=13 => normal(rng, 78.0, 8.0, 1.78),
+        14..=16 => rng.random_range(35.0..60.0),
+        _ => rng.random_range(90.0..110.0),
+    }
+    .to_radians()
+    .clamp(FIELDS.0, FIELDS.1);
+    let (w, h) = (f64::from(width), f64::from(height));
+    let fx = 0.5 * w / (0.5 * field).tan();
+    let unequal = if rng.random_bool(0.67) {
+        normal(rng, 0.0, 0.004, 2.5)
+    } else {
+        rng.random_range(-0.03..0.03)
+    };
+    let row = if rng.random_bool(0.2) {
+        rng.random_range(-0.2..0.2)
+    } else {
+        normal(rng, 0.0, 0.05, 3.0)
+    };
+    Intrinsics {
+        fx,
+        fy: fx * (1.0 + unequal),
+        cx: 0.5 * (w - 1.0) + w * normal(rng, 0.0, 0.015, 3.0),
+        cy: 0.5 * (h - 1.0) + h * row,
+        width,
+        height,
+    }
+}
+
+/// Height above the ground, metres: 60 % as on cars (normal, 1.55 ± 0.15), 25 % lower (robots), 15 % higher.
+fn height(rng: &mut ChaCha8Rng) -> f64 {
+    match rng.random_range(0..20) {
+        0..=11 => normal(rng, 1.55, 0.15, 2.3),
+        12..=16 => rng.random_range(HEIGHTS.0..1.2),
+        _ => rng.random_range(1.8..HEIGHTS.1),
+    }
+}
+
+/// Pitch, positive downwards, and roll, radians. Mostly a vehicle's (2.2° and 0.9° of deviation); at times anything
+/// up to 15° (from below 0.9 m of height mostly upwards) and 10°.
+fn tilt(rng: &mut ChaCha8Rng, height: f64) -> (f64, f64) {
+    let pitch = if rng.random_bool(if height < 0.9 { 0.4 } else { 0.12 }) {
+        let down = if height < 0.9 { 8.0 } else { 15.0 };
+        rng.random_range(-15.0..down)
+    } else {
+        normal(rng, 0.0, 2.2, 2.7)
+    };
+    let roll = if rng.random_bool(0.07) {
+        rng.random_range(-10.0..10.0)
+    } else {
+        normal(rng, 0.0, 0.9, 3.3)
+    };
+    (f64::to_radians(pitch), f64::to_radians(roll))
+}
+
+/// How a camera relates to the street.
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    /// On its lane, looking where it drives.
+    Driving,
+    /// On the road, turned by up to 70°.
+    Turning,
+    /// On the road, looking anywhere.
+    Sideways,
+    /// Up to 13 m from the middle of the street, looking anywhere, mostly along it.
+    Beside,
+}
+
+/// Street coordinates, a heading, and how far the view ahead must be free, metres.
+fn spot(rng: &mut ChaCha8Rng, place: &Place) -> ((f64, f64, f64), f32) {
+    let kind = weighted(
+        rng,
+        &[
+            (0.6, Kind::Driving),
+            (0.13, Kind::Turning),
+            (0.1, Kind::Sideways),
+            (0.17, Kind::Beside),
+        ],
+    );
+    let s = rng.random_range(0.0..place.length);
+    if !place.world.rooms.is_empty() {
+        return (in_room(rng, place, s), 0.8);
+    }
+    // On either lane, with the traffic of that lane.
+    let back = rng.random_bool(0.3);
+    let lane = if back { 1.65 } else { -1.65 } + normal(rng, 0.0, 0.4, 2.5);
+    let along = if back { PI } else { 0.0 };
+    // Drivers keep their distance, though not always.
+    let ahead = match kind {
+        Kind::Driving => rng.random_range(3.0..14.0),
+        _ => 1.2,
+    };
+    let spot = match kind {
+        Kind::Driving => (s, lane, along + normal(rng, 0.0, 0.05, 3.0)),
+        Kind::Turning => (s, lane, along + rng.random_range(-1.2..1.2)),
+        Kind::Sideways => (s, lane, rng.random_range(-PI..PI)),
+        Kind::Beside => {
+            let widest = if place.world.scene == Scene::Garage {
+                8.0
+            } else {
+                13.0
+            };
+            let turn = if rng.random_bool(0.6) {
+                along + normal(rng, 0.0, 0.25, 2.5)
+            } else {
+                rng.random_range(0.0..TAU)
+            };
+            (s, rng.random_range(-widest..widest), turn)
+        }
+    };
+    (spot, ahead)
+}
+
+/// A place in the room at `s` or near it, looking anywhere.
+fn in_room(rng: &mut ChaCha8Rng, place: &Place, s: f64) -> (f64, f64, f64) {
+    let rooms = &place.world.rooms;
+    let number = rooms.partition_point(|room| room.high[0] < s);
+    let room = &rooms[number.min(rooms.len() - 1)];
+    // The road of rooms is straight, along the world's x axis.
+    let x = rng.random_range(room.low[0]..room.high[0]);
+    let y = rng.random_range(room.low[1]..room.high[1]);
+    (x, y, rng.random_range(0.0..TAU))
+}
+
+/// Draws a free place for a camera: not within a solid nor close to one, and not with most of its view within
+/// arm's length of one.
+pub fn stand(rng: &mut ChaCha8Rng, place: &Place, moving: &[Primitive], k: &Intrinsics) -> Stand {
+    let height = height(rng);
+    let (mut pitch, roll) = tilt(rng, height);
+    if !place.world.rooms.is_empty() {
+        // Held by hand, or by a robot that looks at its floor.
+        pitch += normal(rng, 0.12, 0.2, 1.8);
+    }
+    for _ in 0..TRIES {
+        let (spot, ahead) = spot(rng, place);
+        let stand = pose(place, spot, (height, pitch, roll));
+        if is_free(place, moving, &stand.world_from_cam, k, ahead) {
+            return stand;
+        }
+    }
+    // A lane is free of everything that stands, and from here on of what moves.
+    let s = rng.random_range(0.0..place.length);
+    Stand {
+        alone: true,
+        ..pose(place, (s, -1.65, 0.0), (height, pitch, roll))
+    }
+}
+
+fn pose(
+    place: &Place,
+    (s, lateral, turn): (f64, f64, f64),
+    (height, pitch, roll): (f64, f64, f64),
+) -> Stand {
+    let road = &place.world.road;
+    let (x, y, heading) = road.world(s, lateral);
+    let ground = if road.kerb_distance(&road.locate(x, y)) < 0.0 {
+        0.0
+    } else {
+        f64::from(road.kerb)
+    };
+    // Camera axes (right, down, forward) in the vehicle's (forward, left, up).
+    let axes = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+    let rotation = rotation(heading + turn, pitch, roll) * axes;
+    Stand {
+        world_from_cam: Se3::from_parts(&rotation, Vector3::new(x, y, ground + height)),
+        height,
+        alone: false,
+    }
+}
+
+fn is_free(
+    place: &Place,
+    moving: &[Primitive],
+    world_from_cam: &Se3,
+    k: &Intrinsics,
+    ahead: f32,
+) -> bool {
+    let world = &place.world;
+    let eye = world_from_cam.translation();
+    let near: Vec<&Primitive> = world
+        .primitives
+        .iter()
+        .chain(moving)
+        .filter(|solid| {
+            let (half_x, half_y, low, high) = solid.bounds(&world.hulls);
+            let reach = f64::from(half_x.hypot(half_y)) + NEARBY;
+            let (dx, dy) = (solid.position[0] - eye.x, solid.position[1] - eye.y);
+            let below = solid.position[2] + f64::from(low) - NEARBY;
+            let above = solid.position[2] + f64::from(high) + NEARBY;
+            dx * dx + dy * dy < reach * reach && eye.z > below && eye.z < above
+        })
+        .collect();
+    let within = |solid: &&Primitive| {
+        let (half_x, half_y, low, high) = solid.bounds(&world.hulls);
+        let p = solid.local_point(&eye);
+        let clear = CLEARANCE as f32;
+        p.x.abs() < half_x + clear
+            && p.y.abs() < half_y + clear
+            && p.z > low - clear
+            && p.z < high + clear
+    };
+    if near.iter().any(within) {
+        return false;
+    }
+    let indoors = !world.rooms.is_empty();
+    let (arm, open) = if indoors { (0.5, 1.6) } else { (1.2, 4.0) };
+    // Rays over the picture: at most a quarter of them may end within 1.2 m, as many must go on for 4 m (in rooms
+    // 0.5 m and 1.6 m), and those in the middle for the distance ahead.
+    let (mut close, mut far, mut all) = (0, 0, 0);
+    for row in [0.15, 0.4, 0.65] {
+        for column in 0..7i32 {
+            let u = f64::from(k.width) * (f64::from(column) + 0.5) / 7.0;
+            let ray = k.back_project(u, f64::from(k.height) * row, 1.0);
+            let d: V3 = world_from_cam.rotate(&ray).map(|x| x as f32);
+            let t = near
+                .iter()
+                .filter_map(|solid| {
+                    let (o, d) = (solid.local_point(&eye), solid.local_of(&d));
+                    enter(&solid.shape, &world.hulls, &o, &d, NEARBY as f32).map(|entry| entry.t)
+                })
+                .fold(f32::INFINITY, f32::min);
+            if (2..5).contains(&column) && t < ahead {
+                return false;
+            }
+            all += 1;
+            close += usize::from(t < arm);
+            far += usize::from(t >= open);
+        }
+    }
+    4 * close <= all && 4 * far >= all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::varied::draw::generator;
+
+    #[test]
+    fn lenses_are_within_their_bounds_and_dense_where_cars_have_theirs() {
+        let mut rng = generator(1, 1, 1);
+        let (mut usual, mut like_kitti) = (0, 0);
+        for _ in 0..5000 {
+            let k = intrinsics(&mut rng, 640, 192);
+            assert_eq!(k.implausible(), None);
+            let field = 2.0 * (320.0 / k.fx).atan();
+            assert!(field > FIELDS.0 - 1e-9 && field < FIELDS.1 + 1e-9);
+            assert!((k.fy / k.fx - 1.0).abs() <= 0.03);
+            assert!((k.cx - 319.5).abs() < 0.05 * 640.0 && (k.cy - 95.5).abs() <= 0.2 * 192.0);
+            usual += usize::from(field > 60f64.to_radians() && field < 90f64.to_radians());
+            // KITTI's camera 2 at this size: fx 371.8, fy 369.4, cx 313.9, cy 88.3.
+            like_kitti += usize::from(
+                (k.fx / 371.8 - 1.0).abs() < 0.1
+                    && (k.fy / 369.4 - 1.0).abs() < 0.1
+                    && (k.cx - 313.9).abs() < 10.0
+                    && (k.cy - 88.3).abs() < 10.0,
+            );
+        }
+        assert!((2900..3400).contains(&usual), "{usual}");
+        assert!(like_kitti > 380, "{like_kitti}");
+    }
+
+    #[test]
+    fn heights_and_tilts_are_within_their_bounds() {
+        let mut rng = generator(1, 2, 1);
+        let (mut usual, mut level) = (0, 0);
+        for _ in 0..5000 {
+            let height = height(&mut rng);
+            assert!((HEIGHTS.0..=HEIGHTS.1).contains(&height));
+            usual += usize::from((1.2..=1.8).contains(&height));
+            let (pitch, roll) = tilt(&mut rng, height);
+            assert!(pitch.abs() <= 0.262 && roll.abs() <= 0.175);
+            level += usize::from(pitch.abs() < 0.105 && roll.abs() < 0.053);
+        }
+        assert!((2700..3400).contains(&usual), "{usual}");
+        assert!(level > 3600, "{level}");
+    }
+}

@@ -1,0 +1,156 @@
+//! What an endless stream of views is made from.
+
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// Settings of [`crate::Endless`]. Equal settings give equal views, byte for byte.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EndlessConfig {
+    /// Chooses every world, camera, weather and image.
+    pub seed: u64,
+    /// Width of the pictures, in pixels.
+    pub width: u32,
+    /// Height of the pictures, in pixels.
+    pub height: u32,
+    /// Views taken of one world before the next one is built.
+    pub views_per_world: usize,
+    /// Worlds in use at a time: so many consecutive views are of different ones.
+    pub worlds_at_once: usize,
+    /// Share of the views that a grey camera took.
+    pub grey: f64,
+    /// Share of the views by daylight in the open; the rest are of garages and of nights.
+    pub daylight: f64,
+    /// Share of the worlds that are varied (see [`crate::Variety`]); the others are as [`crate::Simulation`]'s.
+    pub variety: f64,
+    /// Whether the camera's image formation (exposure, noise, blur, JPEG and so on) is applied. Without it the
+    /// pictures are as [`crate::Simulation`]'s, in varied light.
+    pub formation: bool,
+}
+
+impl Default for EndlessConfig {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            width: 640,
+            height: 192,
+            views_per_world: 24,
+            worlds_at_once: 16,
+            grey: 0.15,
+            daylight: 0.8,
+            variety: 0.9,
+            formation: true,
+        }
+    }
+}
+
+impl EndlessConfig {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::Config`] names the first field that is out of range.
+    pub fn validate(&self) -> Result<()> {
+        let check = |ok: bool, field, value: String, expected| {
+            if ok {
+                Ok(())
+            } else {
+                Err(Error::Config {
+                    field,
+                    value,
+                    expected,
+                })
+            }
+        };
+        let size = 16..=4096;
+        check(
+            size.contains(&self.width),
+            "width",
+            self.width.to_string(),
+            "16 to 4096",
+        )?;
+        check(
+            size.contains(&self.height),
+            "height",
+            self.height.to_string(),
+            "16 to 4096",
+        )?;
+        check(
+            (1..=100_000).contains(&self.views_per_world),
+            "views_per_world",
+            self.views_per_world.to_string(),
+            "1 to 100000",
+        )?;
+        check(
+            (1..=256).contains(&self.worlds_at_once),
+            "worlds_at_once",
+            self.worlds_at_once.to_string(),
+            "1 to 256",
+        )?;
+        for (field, share) in [
+            ("grey", self.grey),
+            ("daylight", self.daylight),
+            ("variety", self.variety),
+        ] {
+            check(
+                (0.0..=1.0).contains(&share),
+                field,
+                share.to_string(),
+                "0 to 1",
+            )?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bad_field_is_named() {
+        let base = EndlessConfig::default;
+        let bad = [
+            (EndlessConfig { width: 8, ..base() }, "width"),
+            (
+                EndlessConfig {
+                    height: 5000,
+                    ..base()
+                },
+                "height",
+            ),
+            (
+                EndlessConfig {
+                    views_per_world: 0,
+                    ..base()
+                },
+                "views_per_world",
+            ),
+            (
+                EndlessConfig {
+                    worlds_at_once: 300,
+                    ..base()
+                },
+                "worlds_at_once",
+            ),
+            (
+                EndlessConfig {
+                    grey: 1.5,
+                    ..base()
+                },
+                "grey",
+            ),
+            (
+                EndlessConfig {
+                    daylight: f64::NAN,
+                    ..base()
+                },
+                "daylight",
+            ),
+        ];
+        for (config, name) in bad {
+            let error = config.validate().unwrap_err();
+            assert!(error.to_string().contains(&format!("`{name}`")), "{error}");
+        }
+        assert!(base().validate().is_ok());
+    }
+}

@@ -1,0 +1,171 @@
+//! The endless mode: views of ever new streets by ever new cameras, for a network that learns depth from them.
+//!
+//! What a view shows hangs on the settings and its index alone, so loaders may ask for any view, from any thread,
+//! in any order. The depth is exact whatever is done to the colours.
+
+mod cache;
+mod camera;
+mod config;
+mod draw;
+mod formation;
+mod place;
+mod schedule;
+mod weather;
+mod wet;
+
+use crate::Result;
+use crate::config::Scene;
+use crate::render::{self, Cores, Edges, Shot};
+use cache::Cache;
+pub use config::EndlessConfig;
+use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use draw::generator;
+use formation::{Brightness, Formation};
+use image::RgbImage;
+use place::Place;
+use rand::Rng;
+use schedule::Schedule;
+pub use weather::Weather;
+
+/// Worlds kept beyond those in use: as many threads may be behind or ahead of the others.
+const SPARE_WORLDS: usize = 6;
+
+/// One view, with what is true about it.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// H×W 8-bit RGB; three equal channels where the camera is grey.
+    pub rgb: RgbImage,
+    /// Exact camera z of each pixel's centre, metres; 0 = sky.
+    pub depth: DepthMap,
+    /// The camera, in pixels of the picture.
+    pub intrinsics: Intrinsics,
+    /// H·W flags, row by row: the pixel's centre sees something that moves.
+    pub moving: Vec<bool>,
+    /// Camera (x right, y down, z forward) to world (z up), metres.
+    pub world_from_cam: Se3,
+    /// Number of the world; views with the same number are of the same street.
+    pub world: u64,
+    /// The kind of place.
+    pub scene: Scene,
+    /// The weather.
+    pub weather: Weather,
+    /// Height of the camera above the ground below it, metres.
+    pub height_m: f64,
+    /// Whether the camera is grey.
+    pub grey: bool,
+}
+
+/// An endless stream of views.
+///
+/// `W = worlds_at_once` worlds are in use at a time, and consecutive views are of different ones. At most
+/// `W + 6` built worlds are kept, of about 2 MB each.
+pub struct Endless {
+    config: EndlessConfig,
+    schedule: Schedule,
+    places: Cache<Place>,
+}
+
+impl Endless {
+    /// A stream; nothing is built yet.
+    ///
+    /// # Errors
+    /// [`crate::Error::Config`] where a setting is out of range.
+    pub fn new(config: EndlessConfig) -> Result<Self> {
+        config.validate()?;
+        Ok(Self {
+            schedule: Schedule::new(config.worlds_at_once, config.views_per_world),
+            places: Cache::new(config.worlds_at_once + SPARE_WORLDS),
+            config,
+        })
+    }
+
+    /// What the stream is made from.
+    #[must_use]
+    pub fn config(&self) -> &EndlessConfig {
+        &self.config
+    }
+
+    /// View number `index`, the same at every call, from any thread, in any order. Works on the calling thread
+    /// alone; where its world is not built yet, that is done first.
+    #[must_use]
+    pub fn view(&self, index: u64) -> View {
+        let config = &self.config;
+        let world_number = self.schedule.turn(index).world;
+        let place = self
+            .places
+            .get(world_number, || Place::build(config, world_number));
+        let world = &place.world;
+
+        let mut rng = generator(config.seed, index, 0xCA4E_4A);
+        let time_s = Place::time(&mut rng);
+        let mut moving = place.traffic.solids(world, time_s);
+        let mut cars = place.traffic.objects(world, time_s);
+        let intrinsics = camera::intrinsics(&mut rng, config.width, config.height);
+        let stand = camera::stand(&mut rng, &place, &moving, &intrinsics);
+        if stand.alone {
+            moving.clear();
+            cars.clear();
+        }
+
+        let mut rng = generator(config.seed, index, 0x5EA);
+        let (weather, air) = weather::draw(&mut rng, world);
+        let shot = Shot {
+            world,
+            light: &place.light,
+            air: &air,
+            cars: &cars,
+            world_from_cam: &stand.world_from_cam,
+            intrinsics: &intrinsics,
+        };
+        let all = world.primitives.iter().chain(&world.far).chain(&moving);
+        let solids = all.copied().collect();
+        let mut exposure = render::expose(&shot, solids, Cores::One, Edges::EachSurface);
+        wet::reflect(&shot, &mut exposure);
+
+        let mut rng = generator(config.seed, index, 0xF11);
+        let brightness = match weather {
+            Weather::Night | Weather::Indoor => Brightness::Dark,
+            _ => Brightness::Day,
+        };
+        let formation = Formation::draw(&mut rng, brightness, config.grey);
+        let (width, height) = (config.width as usize, config.height as usize);
+        let rgb = if config.formation {
+            formation.image(&exposure.light, width, height, rng.random())
+        } else {
+            render::encode(&exposure.light, config.width, config.height)
+        };
+        View {
+            rgb,
+            depth: exposure.depth,
+            intrinsics,
+            moving: exposure.moving,
+            world_from_cam: stand.world_from_cam,
+            world: world_number,
+            scene: world.scene,
+            weather,
+            height_m: stand.height,
+            grey: config.formation && formation.is_grey(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_of_worlds_in_memory_is_bounded() -> Result<()> {
+        let endless = Endless::new(EndlessConfig {
+            width: 64,
+            height: 32,
+            worlds_at_once: 2,
+            views_per_world: 1,
+            ..EndlessConfig::default()
+        })?;
+        for index in 0..14 {
+            assert_eq!(endless.view(index).world, index);
+            assert!(endless.places.len() <= 2 + SPARE_WORLDS);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,77 @@
+//! Which world a view is of.
+
+/// Views take turns over `worlds` slots, so that as many consecutive ones are of different worlds. Each slot's
+/// world is replaced after `views` views; the slots' replacements are spread evenly over time, so that never two
+/// worlds have to be built at once.
+#[derive(Debug, Clone, Copy)]
+pub struct Schedule {
+    worlds: u64,
+    views: u64,
+}
+
+/// A view of a world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Turn {
+    /// Number of the world, from 0.
+    pub world: u64,
+    /// Number of the view among those of its world.
+    pub view: u64,
+}
+
+impl Schedule {
+    /// `worlds` at a time and `views` of each, both at least 1.
+    pub fn new(worlds: usize, views: usize) -> Self {
+        Self {
+            worlds: (worlds as u64).max(1),
+            views: (views as u64).max(1),
+        }
+    }
+
+    /// The world and the view of an index.
+    pub fn turn(&self, index: u64) -> Turn {
+        let (slot, round) = (index % self.worlds, index / self.worlds);
+        let shifted = round + slot * self.views / self.worlds;
+        Turn {
+            world: shifted / self.views * self.worlds + slot,
+            view: shifted % self.views,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::{HashMap, HashSet};
+
+    #[test]
+    fn neighbours_are_of_different_worlds_and_each_world_has_its_views() {
+        let schedule = Schedule::new(16, 24);
+        let turns: Vec<Turn> = (0..16 * 24 * 5).map(|i| schedule.turn(i)).collect();
+        for window in turns.windows(16) {
+            let worlds: HashSet<u64> = window.iter().map(|t| t.world).collect();
+            assert_eq!(worlds.len(), 16);
+        }
+        let mut seen: HashMap<u64, Vec<u64>> = HashMap::new();
+        for turn in &turns {
+            seen.entry(turn.world).or_default().push(turn.view);
+        }
+        let whole = seen.values().filter(|views| views.len() == 24).count();
+        assert!(whole >= 16 * 4);
+        for views in seen.values() {
+            let distinct: HashSet<&u64> = views.iter().collect();
+            assert_eq!(distinct.len(), views.len());
+        }
+    }
+
+    #[test]
+    fn worlds_change_one_after_another() {
+        let schedule = Schedule::new(16, 24);
+        let mut known: HashSet<u64> = (0..64).map(|i| schedule.turn(i).world).collect();
+        for start in (64..64 + 16 * 48).step_by(16) {
+            let new = (start..start + 16)
+                .filter(|i| known.insert(schedule.turn(*i).world))
+                .count();
+            assert!(new <= 1, "{new} new worlds from view {start}");
+        }
+    }
+}

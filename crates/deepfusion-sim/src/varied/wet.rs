@@ -1,0 +1,92 @@
+//! Wet ground mirrors what is above it.
+
+use crate::primitive::V3;
+use crate::render::{Camera, Exposure, Shot, Surface};
+use crate::texture::Rgb;
+use crate::texture::noise::smoothstep;
+
+/// Reflectance of water at a right angle.
+const STRAIGHT: f32 = 0.02;
+
+/// A rough wet road mirrors less than still water at grazing angles.
+const GRAZING: f32 = 0.55;
+
+/// Adds to the ground of a wet street what it mirrors: the picture's own colour in the mirrored direction, as if what
+/// is mirrored were far away, and the sky's where that is not in the picture. Depth is not touched.
+pub fn reflect(shot: &Shot, exposure: &mut Exposure) {
+    let wet = shot.air.wet;
+    if wet <= 0.0 {
+        return;
+    }
+    let k = shot.intrinsics;
+    let (width, height) = (k.width as usize, k.height as usize);
+    let camera = Camera::new(shot.world_from_cam, k);
+    let cam_from_world = shot.world_from_cam.rotation().transpose().map(|x| x as f32);
+    let eye = shot.world_from_cam.translation();
+    let source = exposure.light.clone();
+    for v in 0..height {
+        for u in 0..width {
+            let index = v * width + u;
+            let hit = exposure.hits[index];
+            if !matches!(hit.surface, Surface::Road | Surface::Beside) {
+                continue;
+            }
+            let d = camera.ray(u as f32, v as f32);
+            let place = (eye.x as f32 + d.x * hit.t, eye.y as f32 + d.y * hit.t);
+            // Puddles and films: where water stands, in the ground's own coordinates.
+            let minor = hit.t / k.fx as f32;
+            let stands = shot
+                .world
+                .noise
+                .fractal(place.0 + 31.0, place.1, 3.1, 3, 0.5, minor);
+            let film = 0.25 + 0.75 * smoothstep(0.5 - wet, 1.1 - wet, stands);
+            let length = d.norm();
+            let steep = (-d.z / length).clamp(0.0, 1.0);
+            let mirror = STRAIGHT + (GRAZING - STRAIGHT) * (1.0 - steep).powi(5);
+            let up = V3::new(d.x, d.y, -d.z);
+            let seen = mirrored(
+                &source,
+                &exposure.hits,
+                (width, height),
+                &(cam_from_world * up),
+                k,
+            )
+            .unwrap_or_else(|| shot.air.radiance(&shot.world.noise, &up));
+            let kept = shot
+                .air
+                .fog
+                .map_or(1.0, |fog| (-fog.extinction * hit.t * length).exp());
+            exposure.light[index] += seen * (mirror * film * wet * kept);
+        }
+    }
+}
+
+/// The picture's colour in a direction (camera axes), smeared upwards and downwards as a rough mirror does; none where
+/// that is ground or outside.
+fn mirrored(
+    light: &[Rgb],
+    hits: &[crate::render::Hit],
+    (width, height): (usize, usize),
+    d: &V3,
+    k: &deepfusion_geometry::Intrinsics,
+) -> Option<Rgb> {
+    if d.z <= 1e-3 {
+        return None;
+    }
+    let u = k.fx as f32 * d.x / d.z + k.cx as f32;
+    let v = k.fy as f32 * d.y / d.z + k.cy as f32;
+    if !(u > -0.5 && v > -0.5 && u < width as f32 - 0.5 && v < height as f32 - 0.5) {
+        return None;
+    }
+    let column = (u + 0.5) as usize;
+    let (mut sum, mut count) = (Rgb::zeros(), 0.0);
+    for shift in [-3.0, -1.5, 0.0, 1.5, 3.0] {
+        let row = (v + shift + 0.5).clamp(0.0, height as f32 - 1.0) as usize;
+        let index = row * width + column;
+        if matches!(hits[index].surface, Surface::Sky | Surface::Solid(..)) {
+            sum += light[index];
+            count += 1.0;
+        }
+    }
+    (count > 0.0).then(|| sum / count)
+}
