@@ -1,7 +1,8 @@
-//! One frame at 640×192 and one scan, on all cores: `cargo bench -p deepfusion-sim`.
+//! One frame at 640×192 and one scan, on all cores, and views of the endless mode, on one:
+//! `cargo bench -p deepfusion-sim`.
 
 use criterion::Criterion;
-use deepfusion_sim::{SimConfig, Simulation};
+use deepfusion_sim::{Endless, EndlessConfig, SimConfig, Simulation};
 use std::hint::black_box;
 
 fn frames(c: &mut Criterion) {
@@ -33,8 +34,55 @@ fn frames(c: &mut Criterion) {
     group.finish();
 }
 
+fn views(c: &mut Criterion) {
+    let mut group = c.benchmark_group("endless");
+    group.sample_size(20);
+    for (width, height) in [(320, 96), (640, 192)] {
+        let config = EndlessConfig {
+            width,
+            height,
+            views_per_world: 1000,
+            ..EndlessConfig::default()
+        };
+        let Ok(endless) = Endless::new(config) else {
+            return;
+        };
+        // Every world is built before anything is measured.
+        for index in 0..16 {
+            let _ = endless.view(index);
+        }
+        let mut number = 0;
+        group.bench_function(format!("view {width}x{height}"), |b| {
+            b.iter(|| {
+                number = (number + 1) % 1000;
+                black_box(endless.view(number))
+            });
+        });
+    }
+    let config = EndlessConfig {
+        width: 16,
+        height: 16,
+        worlds_at_once: 1,
+        views_per_world: 1,
+        ..EndlessConfig::default()
+    };
+    let Ok(endless) = Endless::new(config) else {
+        return;
+    };
+    // Every view is of a new world, and has few pixels.
+    let mut number = 0;
+    group.bench_function("world", |b| {
+        b.iter(|| {
+            number += 1;
+            black_box(endless.view(number))
+        });
+    });
+    group.finish();
+}
+
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
     frames(&mut criterion);
+    views(&mut criterion);
     criterion.final_summary();
 }

@@ -4,7 +4,7 @@
 //! there only where a clump of leaves is; clumps are balls at random places of two grids, with ragged edges. So
 //! crowns have irregular outlines, let the sky through, and every leaf that is drawn has its own exact depth.
 
-use crate::primitive::{Entry, FACE_ROUND, V3};
+use crate::primitive::{Entry, FACE_LEAVES, V3};
 use crate::texture::noise::{hash, unit};
 
 /// Radii of the shells, as shares of the lobe's.
@@ -32,7 +32,7 @@ pub struct Crown {
 /// Number of the shell that a face of a crown belongs to, from the outside.
 #[inline]
 pub fn shell_of(face: u8) -> u8 {
-    (face.saturating_sub(FACE_ROUND)) % SHELLS.len() as u8
+    (face.saturating_sub(FACE_LEAVES)) % SHELLS.len() as u8
 }
 
 /// The clump of leaves at a point of a lobe (its axes): a hash that is the clump's own, if one is there.
@@ -108,12 +108,12 @@ impl Crown {
             if t >= limit {
                 return None;
             }
-            if let Some(entry) = seen(t, number, FACE_ROUND + number as u8) {
+            if let Some(entry) = seen(t, number, FACE_LEAVES + number as u8) {
                 return Some(entry);
             }
         }
         for (number, shell) in SHELLS[..crossed].iter().enumerate().rev() {
-            let face = FACE_ROUND + (SHELLS.len() + number) as u8;
+            let face = FACE_LEAVES + (SHELLS.len() + number) as u8;
             if let Some(entry) = seen(middle + half(*shell), number, face) {
                 return Some(entry);
             }

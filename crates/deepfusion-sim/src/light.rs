@@ -146,6 +146,10 @@ fn shrink(cells: &[[u8; 2]], rows: usize) -> Vec<[u8; 2]> {
 }
 
 fn casters(world: &World) -> Vec<Caster> {
+    if !world.rooms.is_empty() {
+        // No sun shines into rooms.
+        return Vec::new();
+    }
     let slope = world.sun.x.hypot(world.sun.y) / world.sun.z;
     world
         .primitives

@@ -11,6 +11,8 @@ pub type V3 = Vector3<f32>;
 pub const FACE_TOP: u8 = 4;
 /// A curved surface.
 pub const FACE_ROUND: u8 = 6;
+/// The shells of a crown are this face and those after it; no hull has so many.
+pub const FACE_LEAVES: u8 = 100;
 
 /// A convex solid bounded by planes n·p ≤ d in its own axes.
 #[derive(Debug, Clone)]

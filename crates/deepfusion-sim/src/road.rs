@@ -87,7 +87,29 @@ impl Road {
     /// A random centreline from `start` to at least `end` (metres), without widths yet.
     pub fn generate(rng: &mut ChaCha8Rng, start: f64, end: f64) -> Self {
         let count = ((end - start) / STEP).ceil() as usize + 2;
-        let curvature = curvature_profile(rng, count);
+        Self::curved(&curvature_profile(rng, count), start)
+    }
+
+    /// A straight centreline from `start` to at least `end` (metres), without widths yet.
+    pub fn straight(start: f64, end: f64) -> Self {
+        let count = ((end - start) / STEP).ceil() as usize + 2;
+        Self::curved(&vec![0.0; count], start)
+    }
+
+    /// The same, of gentle bends: as a motorway or a country road, with radii of 150 to 1500 m.
+    pub fn gentle(rng: &mut ChaCha8Rng, start: f64, end: f64) -> Self {
+        let count = ((end - start) / STEP).ceil() as usize + 2;
+        let scale: f64 = rng.random_range(0.08..0.4);
+        let profile: Vec<f64> = curvature_profile(rng, count)
+            .into_iter()
+            .map(|k| k * scale)
+            .collect();
+        Self::curved(&profile, start)
+    }
+
+    /// A centreline of these curvatures.
+    fn curved(curvature: &[f64], start: f64) -> Self {
+        let count = curvature.len();
         let mut samples = Vec::with_capacity(count);
         let mut here = RoadSample::default();
         for (i, k) in curvature.iter().enumerate() {

@@ -1,5 +1,5 @@
 use crate::can::{SPEED_RATE_HZ, STEERING_RATE_HZ, SpeedReading, SteeringReading};
-use crate::config::{Sensors, SimConfig};
+use crate::config::{Scene, Sensors, SimConfig};
 use crate::fmcw::{self, FmcwScan, MovingSolids, VELOCITY_STEP_S};
 use crate::imu::{self, BodyMotion, ImuReading};
 use crate::light::GroundLight;
@@ -73,7 +73,13 @@ impl Simulation {
         let times = frame_times(&mut rng, config);
         let duration_s = times[times.len() - 1];
         let longest = 14.0 * (duration_s + 3.0);
-        let mut road = Road::generate(&mut rng, -LEAD_IN, longest + LEAD_OUT);
+        let mut road = match config.scene {
+            Scene::Motorway | Scene::Country => {
+                Road::gentle(&mut rng, -LEAD_IN, longest + LEAD_OUT)
+            }
+            Scene::Indoor => Road::straight(-LEAD_IN, longest + LEAD_OUT),
+            _ => Road::generate(&mut rng, -LEAD_IN, longest + LEAD_OUT),
+        };
         let drive = Drive::simulate(&mut rng, &road, duration_s, config.scene.pace());
         road.truncate(drive.progress(duration_s).0 + LEAD_OUT);
         let world = World::furnish_varied(road, config.seed, config.scene, variety);

@@ -2,7 +2,6 @@
 
 use crate::motion::Drive;
 use crate::primitive::Primitive;
-use crate::road::Road;
 use crate::scene::{SceneObject, World, upright};
 use nalgebra::Vector3;
 use rand::Rng;
@@ -10,6 +9,9 @@ use rand_chacha::ChaCha8Rng;
 
 /// Where the lanes are, metres left of the centreline.
 const LANE: f64 = 1.65;
+
+/// Vehicles up to this length need no more room than [`GAP`] gives, metres.
+const LONG: f64 = 5.0;
 
 /// Distance kept between two cars of one lane, metres.
 const GAP: f64 = 13.0;
@@ -76,7 +78,40 @@ impl Traffic {
                 }
             })
             .collect();
-        Self { cars }
+        let mut traffic = Self { cars };
+        traffic.settle(world, with);
+        traffic
+    }
+
+    /// Makes room for long vehicles, and drives on the world's own lanes where it has any. Changes nothing for cars on
+    /// a plain street.
+    fn settle(&mut self, world: &World, pace: f64) {
+        if !world.rooms.is_empty() {
+            self.cars.clear();
+        }
+        let others: Vec<_> = world
+            .lanes
+            .iter()
+            .filter(|lane| (lane.lateral + LANE).abs() > 1.0)
+            .collect();
+        let (mut ahead, mut towards) = (0.0, 0.0);
+        for (number, car) in self.cars.iter_mut().enumerate() {
+            let longer = (0.5 * (f64::from(world.models[car.model].size[0]) - LONG)).max(0.0);
+            let shift = if car.speed > 0.0 {
+                &mut ahead
+            } else {
+                &mut towards
+            };
+            car.s += *shift + longer;
+            *shift += 2.0 * longer;
+            if car.speed < 0.0 && !world.lanes.is_empty() {
+                let lane = others.get(number % others.len().max(1));
+                car.lateral = lane.map_or(2.0 * LANE + 1.0, |lane| lane.lateral);
+                if lane.is_none_or(|lane| lane.forward) {
+                    car.speed = 1.1 * pace;
+                }
+            }
+        }
     }
 
     /// Dense traffic around a camera that is `s` metres along a varied world's street at time 0 and drives on at
@@ -116,7 +151,7 @@ impl Traffic {
                 };
                 let long = f64::from(world.models[car.model].size[0]);
                 let clear = !own || at - 0.5 * long > s + nearest;
-                if clear && rng.random_bool(0.25 + 0.7 * density) && traffic.fits(world, &car) {
+                if clear && rng.random_bool(0.25 + 0.7 * density) && fits(world, &car, at) {
                     traffic.cars.push(car);
                 }
                 at += long + gap * rng.random_range(0.5..1.8);
@@ -125,51 +160,23 @@ impl Traffic {
         traffic
     }
 
-    /// Whether a car at time 0 stands in nothing that stands still.
-    fn fits(&self, world: &World, car: &MovingCar) -> bool {
-        let (x, y, heading) = world.road.world(car.s, car.lateral);
-        let size = world.models[car.model].size.map(f64::from);
-        let half = [0.5 * size[0] + 0.3, 0.5 * size[1] + 0.15];
-        let road = &world.road;
-        let on_road = [-half[0], half[0]].iter().all(|along| {
-            let (x, y, _) = road.world(car.s + along, car.lateral);
-            let p = road.locate(x, y);
-            f64::from(road.kerb_distance(&p)) < -half[1] + 0.15
-        });
-        on_road
-            && !world.objects.iter().any(|object| {
-                let t = object.world_from_object.translation();
-                let (dx, dy) = (t.x - x, t.y - y);
-                let reach = object.size[0].hypot(object.size[1]) * 0.5 + half[0] + 1.0;
-                // Crowns and arms hang over the road.
-                let low = object.size[2] < 2.6 || object.class.is_traffic();
-                if !low || dx.hypot(dy) > reach {
-                    return false;
-                }
-                let (sin, cos) = heading.sin_cos();
-                let forward = object.world_from_object.rotate(&Vector3::x());
-                let turned = (forward.x * cos + forward.y * sin).abs().min(1.0);
-                let across = (1.0 - turned * turned).sqrt();
-                let other = [0.5 * object.size[0], 0.5 * object.size[1]];
-                let along = other[0] * turned + other[1] * across;
-                let aside = other[1] * turned + other[0] * across;
-                (cos * dx + sin * dy).abs() < half[0] + along
-                    && (cos * dy - sin * dx).abs() < half[1] + aside
-            })
-    }
-
     /// The cars that are on the street at a time.
     fn present<'a>(
         &'a self,
-        road: &'a Road,
+        world: &'a World,
         time_s: f64,
     ) -> impl Iterator<Item = (usize, &'a MovingCar, [f64; 3], f64)> {
         self.cars
             .iter()
             .enumerate()
             .filter_map(move |(index, car)| {
+                let road = &world.road;
                 let s = car.s + car.speed * time_s;
                 if s < road.start + 5.0 || s > road.end() - 5.0 {
+                    return None;
+                }
+                // Varied streets are narrow in places: whoever meets a parked car there has turned off before.
+                if !world.crowd.is_empty() && !fits(world, car, s) {
                     return None;
                 }
                 let (x, y, heading) = road.world(s, car.lateral);
@@ -184,7 +191,7 @@ impl Traffic {
 
     /// Their solids at a time.
     pub fn solids(&self, world: &World, time_s: f64) -> Vec<Primitive> {
-        self.present(&world.road, time_s)
+        self.present(world, time_s)
             .flat_map(|(_, car, base, heading)| {
                 world.models[car.model].solids(base, heading, car.seed, true)
             })
@@ -193,7 +200,7 @@ impl Traffic {
 
     /// Their boxes and velocities at a time.
     pub fn objects(&self, world: &World, time_s: f64) -> Vec<SceneObject> {
-        self.present(&world.road, time_s)
+        self.present(world, time_s)
             .map(|(index, car, base, heading)| {
                 let size = world.models[car.model].size.map(f64::from);
                 // Constant speed along the centreline, so faster on the outside of a bend.
@@ -211,4 +218,37 @@ impl Traffic {
             })
             .collect()
     }
+}
+
+/// Whether a car at `s` metres along the street is on its carriageway and in nothing that stands still.
+fn fits(world: &World, car: &MovingCar, s: f64) -> bool {
+    let (x, y, heading) = world.road.world(s, car.lateral);
+    let size = world.models[car.model].size.map(f64::from);
+    let half = [0.5 * size[0] + 0.3, 0.5 * size[1] + 0.15];
+    let road = &world.road;
+    let on_road = [-half[0], half[0]].iter().all(|along| {
+        let (x, y, _) = road.world(s + along, car.lateral);
+        let p = road.locate(x, y);
+        f64::from(road.kerb_distance(&p)) < -half[1] + 0.15
+    });
+    on_road
+        && !world.objects.iter().any(|object| {
+            let t = object.world_from_object.translation();
+            let (dx, dy) = (t.x - x, t.y - y);
+            let reach = object.size[0].hypot(object.size[1]) * 0.5 + half[0] + 1.0;
+            // Crowns and arms hang over the road.
+            let low = object.size[2] < 2.6 || object.class.is_traffic();
+            if !low || dx.hypot(dy) > reach {
+                return false;
+            }
+            let (sin, cos) = heading.sin_cos();
+            let forward = object.world_from_object.rotate(&Vector3::x());
+            let turned = (forward.x * cos + forward.y * sin).abs().min(1.0);
+            let across = (1.0 - turned * turned).sqrt();
+            let other = [0.5 * object.size[0], 0.5 * object.size[1]];
+            let along = other[0] * turned + other[1] * across;
+            let aside = other[1] * turned + other[0] * across;
+            (cos * dx + sin * dy).abs() < half[0] + along
+                && (cos * dy - sin * dx).abs() < half[1] + aside
+        })
 }

@@ -5,7 +5,7 @@ mod shade;
 mod tiles;
 
 use crate::light::{Foot, GroundLight};
-use crate::primitive::{Primitive, Shape, V3, enter};
+use crate::primitive::{FACE_LEAVES, Primitive, Shape, V3, enter};
 use crate::road::StreetPoint;
 use crate::scene::SceneObject;
 use crate::scene::World;
@@ -39,6 +39,19 @@ pub enum Surface {
     Kerb,
     /// Ground beside the road.
     Beside,
+}
+
+impl Surface {
+    /// Whether it is the same surface; all leaves of a lobe are one.
+    #[inline]
+    pub fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Solid(a, face), Self::Solid(b, other)) => {
+                a == b && (face == other || *face.min(other) >= FACE_LEAVES)
+            }
+            _ => self == other,
+        }
+    }
 }
 
 /// Where a ray ends: `t` in units of its direction.
@@ -214,7 +227,7 @@ pub fn render(
         intrinsics: k,
     };
     let solids = gather(world, moving, &world_from_cam.translation());
-    let exposure = expose(&shot, solids, Cores::All);
+    let exposure = expose(&shot, solids, Cores::All, Edges::EachRay);
     Picture {
         rgb: encode(&exposure.light, k.width, k.height),
         depth: exposure.depth,
@@ -260,8 +273,17 @@ impl Cores {
     }
 }
 
+/// How a pixel that sees several surfaces gets its colour from the four rays through it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Edges {
+    /// Every ray is shaded.
+    EachRay,
+    /// Every surface is shaded once: twice as fast, and as smooth at edges.
+    EachSurface,
+}
+
 /// The light that falls on each pixel, and the exact depth.
-pub fn expose(shot: &Shot, solids: Vec<Primitive>, cores: Cores) -> Exposure {
+pub fn expose(shot: &Shot, solids: Vec<Primitive>, cores: Cores, edges: Edges) -> Exposure {
     let (world, k) = (shot.world, shot.intrinsics);
     let (tiles, solids) = Tiles::bin(world, solids, shot.world_from_cam, k);
     let eye = Eye {
@@ -306,24 +328,27 @@ pub fn expose(shot: &Shot, solids: Vec<Primitive>, cores: Cores) -> Exposure {
     cores.split(&mut colours, width, |v, row| {
         for (u, colour) in row.iter_mut().enumerate() {
             let hit = &hits[v * width + u];
-            *colour = if on_edge(&hits, width, height, u, v) {
+            *colour = if !on_edge(&hits, width, height, u, v) {
+                shader.colour(hit, &camera.ray(u as f32, v as f32))
+            } else {
                 // Four rays on a rotated grid; the depth stays that of the centre.
-                let offsets = [
+                let rays = [
                     (-0.125, -0.375),
                     (0.375, -0.125),
                     (0.125, 0.375),
                     (-0.375, 0.125),
-                ];
-                let sum: V3 = offsets
-                    .iter()
-                    .map(|(du, dv)| {
-                        let d = camera.ray(u as f32 + du, v as f32 + dv);
-                        part.colour(&eye.trace(tiles.at(u, v), &d), &d)
-                    })
-                    .sum();
-                sum * 0.25
-            } else {
-                shader.colour(hit, &camera.ray(u as f32, v as f32))
+                ]
+                .map(|(du, dv)| {
+                    let d = camera.ray(u as f32 + du, v as f32 + dv);
+                    (eye.trace(tiles.at(u, v), &d), d)
+                });
+                match edges {
+                    Edges::EachRay => {
+                        let sum: V3 = rays.iter().map(|(hit, d)| part.colour(hit, d)).sum();
+                        sum * 0.25
+                    }
+                    Edges::EachSurface => by_surface(&part, &rays),
+                }
             };
         }
     });
@@ -346,12 +371,25 @@ pub fn expose(shot: &Shot, solids: Vec<Primitive>, cores: Cores) -> Exposure {
     }
 }
 
+/// The mean of rays of one pixel, each surface shaded once, where the first ray meets it.
+fn by_surface(shader: &Shader, rays: &[(Hit, V3); 4]) -> Rgb {
+    let mut sum = Rgb::zeros();
+    for (i, (hit, d)) in rays.iter().enumerate() {
+        let same = |other: &&(Hit, V3)| other.0.surface.is_like(&hit.surface);
+        if !rays[..i].iter().any(|other| same(&other)) {
+            let share = 0.25 * rays[i..].iter().filter(same).count() as f32;
+            sum += shader.colour(hit, d) * share;
+        }
+    }
+    sum
+}
+
 /// Whether a pixel or one of its four neighbours sees another surface.
 #[inline]
 fn on_edge(hits: &[Hit], width: usize, height: usize, u: usize, v: usize) -> bool {
     let here = hits[v * width + u];
     let differs = |other: &Hit| {
-        other.surface != here.surface
+        !other.surface.is_like(&here.surface)
             // A solid can hide itself, as an ellipsoid does not but a hull's edge would.
             || (here.t.is_finite() && (other.t - here.t).abs() > 0.2 * here.t.min(other.t)
                 && matches!(here.surface, Surface::Solid(..)))

@@ -95,6 +95,8 @@ pub struct World {
     pub models: Vec<cars::CarModel>,
     /// Where traffic drives in a varied world: see [`World::lanes`].
     pub lanes: Vec<Lane>,
+    /// Rooms of an indoor world.
+    pub rooms: Vec<Room>,
     /// Models of people on foot and on wheels, of varied worlds.
     pub crowd: Vec<cars::CarModel>,
     /// The random table of every texture.
@@ -111,6 +113,18 @@ pub struct World {
     pub scene: Scene,
     /// The drive's seed, folded.
     pub seed: u32,
+}
+
+/// A room: a rectangle along the world's axes, and the height of its ceiling. A camera may be anywhere in it where
+/// nothing else is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Room {
+    /// Least x and y, metres.
+    pub low: [f64; 2],
+    /// Greatest x and y, metres.
+    pub high: [f64; 2],
+    /// Metres.
+    pub height: f64,
 }
 
 /// Where vehicles drive.
@@ -160,6 +174,7 @@ impl ObjectClass {
 
 impl World {
     /// Furnishes `road` for the drive of `seed`.
+    #[cfg(test)]
     pub fn furnish(road: Road, seed: u64, scene: Scene) -> Self {
         Self::furnish_varied(road, seed, scene, &Variety::none())
     }
@@ -188,6 +203,7 @@ impl World {
             objects: Vec::new(),
             models: Vec::new(),
             lanes: Vec::new(),
+            rooms: Vec::new(),
             crowd: Vec::new(),
             noise: Noise::new(seed),
             sky: Sky {

@@ -6,6 +6,7 @@
 
 mod country;
 mod houses;
+mod indoor;
 mod land;
 mod looks;
 mod models;
@@ -13,9 +14,12 @@ mod motorway;
 mod people;
 mod plants;
 mod props;
+mod rooms;
 mod site;
 mod street;
 mod sweep;
+#[cfg(test)]
+mod tests;
 
 use super::World;
 use crate::config::Scene;
@@ -115,7 +119,13 @@ pub(super) fn furnish(world: &mut World, rng: &mut ChaCha8Rng, variety: &Variety
     match scene {
         Scene::Motorway => motorway::furnish(&mut site),
         Scene::Country => country::furnish(&mut site),
-        Scene::Garage => super::garage::furnish(site.world, site.rng),
+        Scene::Indoor => indoor::furnish(&mut site),
+        Scene::Garage => {
+            // Whatever is too long for a bay or too high for the ceiling stays out.
+            let fits = |m: &super::cars::CarModel| m.size[0] < 5.1 && m.size[2] < 2.2;
+            site.world.models.retain(fits);
+            super::garage::furnish(site.world, site.rng);
+        }
         _ => street::furnish(&mut site),
     }
     if !matches!(scene, Scene::Indoor | Scene::Garage) {

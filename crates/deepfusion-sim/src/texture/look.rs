@@ -75,6 +75,8 @@ pub struct Look {
     pub cracks: f32,
     /// Share of cells of 0.4 m with a fallen leaf: on the road, beside it.
     pub leaves: [f32; 2],
+    /// A floor, without anything that only roads have.
+    pub indoors: bool,
     /// A second carriageway beyond the kerb on the left: its edges, metres from the kerb; equal: none.
     pub second: [f32; 2],
 }
@@ -138,6 +140,9 @@ impl Look {
     /// The carriageway.
     pub fn carriageway(&self, noise: &Noise, p: &GroundPatch, seed: u32) -> Rgb {
         let mut colour = self.road.albedo(noise, p, seed);
+        if self.indoors {
+            return colour;
+        }
         if self.road.kind == Kind::Asphalt {
             colour *= self.worn(noise, p, seed);
         }

@@ -5,7 +5,6 @@ use super::place::Place;
 use crate::config::Scene;
 use crate::motion::rotation;
 use crate::primitive::{Primitive, V3, enter};
-use crate::road::KERB_HEIGHT;
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix3, Vector3};
 use rand::Rng;
@@ -38,13 +37,13 @@ pub struct Stand {
     pub alone: bool,
 }
 
-/// Draws a lens. Horizontal field of view: 70 % normal around 76° (deviation 9°, 60° to 92°), the rest uniform from
+/// Draws a lens. Horizontal field of view: 70 % normal around 78° (deviation 8°, 64° to 92°), the rest uniform from
 /// 35° to 60° or from 90° to 110°. fy is fx, within 1 % in two of three cameras and within 3 % in the others. The
 /// principal point is off the middle by normal draws of 1.5 % of the width and 5 % of the height; in one of five by
 /// up to 20 % of the height, as where a picture was cut from a taller one.
 pub fn intrinsics(rng: &mut ChaCha8Rng, width: u32, height: u32) -> Intrinsics {
     let field = match rng.random_range(0..20) {
-        0..=13 => normal(rng, 76.0, 9.0, 1.78),
+        0..=13 => normal(rng, 78.0, 8.0, 1.78),
         14..=16 => rng.random_range(35.0..60.0),
         _ => rng.random_range(90.0..110.0),
     }
@@ -123,6 +122,9 @@ fn spot(rng: &mut ChaCha8Rng, place: &Place) -> ((f64, f64, f64), f32) {
         ],
     );
     let s = rng.random_range(0.0..place.length);
+    if !place.world.rooms.is_empty() {
+        return (in_room(rng, place, s), 0.8);
+    }
     // On either lane, with the traffic of that lane.
     let back = rng.random_bool(0.3);
     let lane = if back { 1.65 } else { -1.65 } + normal(rng, 0.0, 0.4, 2.5);
@@ -153,11 +155,26 @@ fn spot(rng: &mut ChaCha8Rng, place: &Place) -> ((f64, f64, f64), f32) {
     (spot, ahead)
 }
 
+/// A place in the room at `s` or near it, looking anywhere.
+fn in_room(rng: &mut ChaCha8Rng, place: &Place, s: f64) -> (f64, f64, f64) {
+    let rooms = &place.world.rooms;
+    let number = rooms.partition_point(|room| room.high[0] < s);
+    let room = &rooms[number.min(rooms.len() - 1)];
+    // The road of rooms is straight, along the world's x axis.
+    let x = rng.random_range(room.low[0]..room.high[0]);
+    let y = rng.random_range(room.low[1]..room.high[1]);
+    (x, y, rng.random_range(0.0..TAU))
+}
+
 /// Draws a free place for a camera: not within a solid nor close to one, and not with most of its view within
 /// arm's length of one.
 pub fn stand(rng: &mut ChaCha8Rng, place: &Place, moving: &[Primitive], k: &Intrinsics) -> Stand {
     let height = height(rng);
-    let (pitch, roll) = tilt(rng, height);
+    let (mut pitch, roll) = tilt(rng, height);
+    if !place.world.rooms.is_empty() {
+        // Held by hand, or by a robot that looks at its floor.
+        pitch += normal(rng, 0.12, 0.2, 1.8);
+    }
     for _ in 0..TRIES {
         let (spot, ahead) = spot(rng, place);
         let stand = pose(place, spot, (height, pitch, roll));
@@ -183,7 +200,7 @@ fn pose(
     let ground = if road.kerb_distance(&road.locate(x, y)) < 0.0 {
         0.0
     } else {
-        f64::from(KERB_HEIGHT)
+        f64::from(road.kerb)
     };
     // Camera axes (right, down, forward) in the vehicle's (forward, left, up).
     let axes = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
@@ -229,8 +246,10 @@ fn is_free(
     if near.iter().any(within) {
         return false;
     }
-    // Rays over the picture: at most a quarter of them may end within 1.2 m, as many must go on for 4 m, and those in
-    // the middle for the distance ahead.
+    let indoors = !world.rooms.is_empty();
+    let (arm, open) = if indoors { (0.5, 1.6) } else { (1.2, 4.0) };
+    // Rays over the picture: at most a quarter of them may end within 1.2 m, as many must go on for 4 m (in rooms
+    // 0.5 m and 1.6 m), and those in the middle for the distance ahead.
     let (mut close, mut far, mut all) = (0, 0, 0);
     for row in [0.15, 0.4, 0.65] {
         for column in 0..7i32 {
@@ -248,9 +267,55 @@ fn is_free(
                 return false;
             }
             all += 1;
-            close += usize::from(t < 1.2);
-            far += usize::from(t >= 4.0);
+            close += usize::from(t < arm);
+            far += usize::from(t >= open);
         }
     }
     4 * close <= all && 4 * far >= all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::varied::draw::generator;
+
+    #[test]
+    fn lenses_are_within_their_bounds_and_dense_where_cars_have_theirs() {
+        let mut rng = generator(1, 1, 1);
+        let (mut usual, mut like_kitti) = (0, 0);
+        for _ in 0..5000 {
+            let k = intrinsics(&mut rng, 640, 192);
+            assert_eq!(k.implausible(), None);
+            let field = 2.0 * (320.0 / k.fx).atan();
+            assert!(field > FIELDS.0 - 1e-9 && field < FIELDS.1 + 1e-9);
+            assert!((k.fy / k.fx - 1.0).abs() <= 0.03);
+            assert!((k.cx - 319.5).abs() < 0.05 * 640.0 && (k.cy - 95.5).abs() <= 0.2 * 192.0);
+            usual += usize::from(field > 60f64.to_radians() && field < 90f64.to_radians());
+            // KITTI's camera 2 at this size: fx 371.8, fy 369.4, cx 313.9, cy 88.3.
+            like_kitti += usize::from(
+                (k.fx / 371.8 - 1.0).abs() < 0.1
+                    && (k.fy / 369.4 - 1.0).abs() < 0.1
+                    && (k.cx - 313.9).abs() < 10.0
+                    && (k.cy - 88.3).abs() < 10.0,
+            );
+        }
+        assert!((2900..3400).contains(&usual), "{usual}");
+        assert!(like_kitti > 380, "{like_kitti}");
+    }
+
+    #[test]
+    fn heights_and_tilts_are_within_their_bounds() {
+        let mut rng = generator(1, 2, 1);
+        let (mut usual, mut level) = (0, 0);
+        for _ in 0..5000 {
+            let height = height(&mut rng);
+            assert!((HEIGHTS.0..=HEIGHTS.1).contains(&height));
+            usual += usize::from((1.2..=1.8).contains(&height));
+            let (pitch, roll) = tilt(&mut rng, height);
+            assert!(pitch.abs() <= 0.262 && roll.abs() <= 0.175);
+            level += usize::from(pitch.abs() < 0.105 && roll.abs() < 0.053);
+        }
+        assert!((2700..3400).contains(&usual), "{usual}");
+        assert!(level > 3600, "{level}");
+    }
 }

@@ -21,6 +21,8 @@ pub struct EndlessConfig {
     pub grey: f64,
     /// Share of the views by daylight in the open; the rest are of garages and of nights.
     pub daylight: f64,
+    /// Share of the worlds that are varied (see [`crate::Variety`]); the others are as [`crate::Simulation`]'s.
+    pub variety: f64,
     /// Whether the camera's image formation (exposure, noise, blur, JPEG and so on) is applied. Without it the
     /// pictures are as [`crate::Simulation`]'s, in varied light.
     pub formation: bool,
@@ -36,6 +38,7 @@ impl Default for EndlessConfig {
             worlds_at_once: 16,
             grey: 0.15,
             daylight: 0.8,
+            variety: 0.9,
             formation: true,
         }
     }
@@ -83,7 +86,11 @@ impl EndlessConfig {
             self.worlds_at_once.to_string(),
             "1 to 256",
         )?;
-        for (field, share) in [("grey", self.grey), ("daylight", self.daylight)] {
+        for (field, share) in [
+            ("grey", self.grey),
+            ("daylight", self.daylight),
+            ("variety", self.variety),
+        ] {
             check(
                 (0.0..=1.0).contains(&share),
                 field,

@@ -15,7 +15,7 @@ mod wet;
 
 use crate::Result;
 use crate::config::Scene;
-use crate::render::{self, Cores, Shot};
+use crate::render::{self, Cores, Edges, Shot};
 use cache::Cache;
 pub use config::EndlessConfig;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
@@ -117,8 +117,9 @@ impl Endless {
             world_from_cam: &stand.world_from_cam,
             intrinsics: &intrinsics,
         };
-        let solids = world.primitives.iter().chain(&moving).copied().collect();
-        let mut exposure = render::expose(&shot, solids, Cores::One);
+        let all = world.primitives.iter().chain(&world.far).chain(&moving);
+        let solids = all.copied().collect();
+        let mut exposure = render::expose(&shot, solids, Cores::One, Edges::EachSurface);
         wet::reflect(&shot, &mut exposure);
 
         let mut rng = generator(config.seed, index, 0xF11);
@@ -145,5 +146,26 @@ impl Endless {
             height_m: stand.height,
             grey: config.formation && formation.is_grey(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_of_worlds_in_memory_is_bounded() -> Result<()> {
+        let endless = Endless::new(EndlessConfig {
+            width: 64,
+            height: 32,
+            worlds_at_once: 2,
+            views_per_world: 1,
+            ..EndlessConfig::default()
+        })?;
+        for index in 0..14 {
+            assert_eq!(endless.view(index).world, index);
+            assert!(endless.places.len() <= 2 + SPARE_WORLDS);
+        }
+        Ok(())
     }
 }

@@ -36,14 +36,23 @@ impl Place {
     /// Builds world `number` of a stream.
     pub fn build(config: &EndlessConfig, number: u64) -> Self {
         let mut rng = generator(config.seed, number, 0x90D);
-        let scene = scene(&mut rng, config.daylight);
+        let varied = rng.random_bool(config.variety);
+        let scene = scene(&mut rng, config.daylight, varied);
+        let variety = if varied {
+            Variety::draw(&mut rng)
+        } else {
+            Variety::none()
+        };
         let seed: u64 = rng.random();
         let longest = 14.0 * (DURATION_S + 3.0);
-        let mut road = Road::generate(&mut rng, -BEHIND, longest + AHEAD);
+        let mut road = match scene {
+            Scene::Indoor => Road::straight(-0.5 * BEHIND, longest + AHEAD),
+            Scene::Motorway | Scene::Country => Road::gentle(&mut rng, -BEHIND, longest + AHEAD),
+            _ => Road::generate(&mut rng, -BEHIND, longest + AHEAD),
+        };
         let drive = Drive::simulate(&mut rng, &road, DURATION_S, scene.pace());
         let length = drive.progress(DURATION_S).0;
-        road.truncate(length + AHEAD);
-        let variety = Variety::draw(&mut rng);
+        road.truncate(length + if scene == Scene::Indoor { 40.0 } else { AHEAD });
         let mut world = World::furnish_varied(road, seed, scene, &variety);
         world.sun = sun(&mut rng);
         let light = GroundLight::bake(&world, Cores::One);
@@ -52,7 +61,16 @@ impl Place {
             Scene::Park => rng.random_range(0..5),
             _ => rng.random_range(0..13),
         };
-        let traffic = Traffic::new(&mut rng, &world, &drive, DURATION_S, cars);
+        let traffic = if varied && !matches!(scene, Scene::Garage | Scene::Indoor) {
+            let density = match scene {
+                Scene::Park => rng.random_range(0.0..0.3),
+                _ => rng.random_range(0.0..1.0),
+            };
+            let start = (-40.0, length / DURATION_S, 0.0);
+            Traffic::around(&mut rng, &world, start, density)
+        } else {
+            Traffic::new(&mut rng, &world, &drive, DURATION_S, cars)
+        };
         Self {
             world,
             light,
@@ -67,17 +85,39 @@ impl Place {
     }
 }
 
-/// By daylight mostly streets, then shopping streets, parks and roads in the open; else garages and nights, half and half.
-fn scene(rng: &mut ChaCha8Rng, daylight: f64) -> Scene {
+/// By daylight mostly streets, then shopping streets and parks, and in varied worlds country roads and motorways;
+/// else rooms (in varied worlds), garages and nights.
+fn scene(rng: &mut ChaCha8Rng, daylight: f64, varied: bool) -> Scene {
+    if varied {
+        return if rng.random_bool(daylight) {
+            weighted(
+                rng,
+                &[
+                    (0.46, Scene::Urban),
+                    (0.15, Scene::Commercial),
+                    (0.13, Scene::Park),
+                    (0.16, Scene::Country),
+                    (0.1, Scene::Motorway),
+                ],
+            )
+        } else {
+            weighted(
+                rng,
+                &[
+                    (0.65, Scene::Indoor),
+                    (0.15, Scene::Garage),
+                    (0.2, Scene::Night),
+                ],
+            )
+        };
+    }
     if rng.random_bool(daylight) {
         weighted(
             rng,
             &[
-                (0.45, Scene::Urban),
-                (0.22, Scene::Commercial),
-                (0.13, Scene::Park),
-                (0.1, Scene::Country),
-                (0.1, Scene::Motorway),
+                (0.5, Scene::Urban),
+                (0.25, Scene::Commercial),
+                (0.25, Scene::Park),
             ],
         )
     } else {

@@ -174,6 +174,7 @@ impl Site<'_> {
                 self.rng.random_range(0.0f32..1.0).powi(2) * 0.6,
             ],
             second: [0.0; 2],
+            indoors: false,
         }
     }
 

@@ -43,6 +43,13 @@ impl Site<'_> {
         } else {
             (7.0 + 3.2 * radius).min(19.0) as usize
         };
+        // Behind the houses fewer and larger lobes do.
+        let away = self.world.road.locate(spot.x, spot.y).lateral.abs();
+        let (count, larger) = if away > 22.0 {
+            (count / 2 + 1, 1.3)
+        } else {
+            (count, 1.0)
+        };
         let twist = self.draw(0.0, TAU);
         for i in 0..count {
             // Spread evenly over an upright ellipsoid, a few inside it.
@@ -55,7 +62,7 @@ impl Site<'_> {
                 radius * flat * angle.sin(),
                 middle + half * up * self.draw(0.45, 0.72),
             ];
-            let size = self.draw(0.36, 0.58) * if few { 1.15 } else { 1.0 };
+            let size = larger * self.draw(0.36, 0.58) * if few { 1.15 } else { 1.0 };
             let (a, b) = (radius * size, radius * size * self.draw(0.75, 1.1));
             let c = (half * size * self.draw(0.7, 1.05)).min(1.25 * a);
             let at = spot.at(place[0], place[1], place[2]);

@@ -383,7 +383,11 @@ impl Row<'_, '_> {
             let mut spot = self.spot(s, out);
             spot.heading += self.site.draw(-0.5, 0.5);
             let size = [self.site.draw(8.0, 26.0), self.site.draw(8.0, 14.0)];
-            let leafy = 0.25 + 0.5 * self.site.variety.trees;
+            let leafy = if self.site.world.scene == Scene::Park {
+                0.85
+            } else {
+                0.25 + 0.5 * self.site.variety.trees
+            };
             if self.site.chance(leafy) {
                 if self.site.is_clear(&spot, [2.0, 2.0], 3.0) {
                     let (h, r) = (self.site.draw(7.0, 18.0), self.site.draw(2.5, 5.5));

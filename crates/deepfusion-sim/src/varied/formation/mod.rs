@@ -148,6 +148,6 @@ mod tests {
             }
         }
         assert!((35..90).contains(&grey), "{grey}");
-        assert!(clipped > 20, "some are overexposed: {clipped}");
+        assert!(clipped > 8, "some are overexposed: {clipped}");
     }
 }

@@ -131,8 +131,10 @@ impl Processing {
                     x
                 };
                 let value = x.powf(1.0 / self.gamma);
-                let curve = value * value * (3.0 - 2.0 * value);
-                let toned = value + self.contrast * (curve - value);
+                // Up to 1 a share of the curve, beyond that a share of the curve of the curve: it always rises.
+                let bend = |x: f32, share: f32| x + share * (x * x * (3.0 - 2.0 * x) - x);
+                let once = bend(value, self.contrast.min(1.0));
+                let toned = bend(once, (self.contrast - 1.0).max(0.0));
                 self.black + (1.0 - self.black) * toned
             })
             .collect()

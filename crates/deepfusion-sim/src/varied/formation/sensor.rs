@@ -36,7 +36,7 @@ impl Sensor {
     /// to grains. Two of three take glare off the dark parts.
     pub fn draw(rng: &mut ChaCha8Rng, brightness: Brightness) -> Self {
         let error = if rng.random_bool(0.14) {
-            stops(rng, 1.2, 1.5)
+            stops(rng, 0.9, 1.3)
         } else {
             stops(rng, 0.38, 2.5)
         };

@@ -1,0 +1,257 @@
+//! The promises of the endless mode: a view hangs on the settings and its index alone, and its depth is exact
+//! whatever the weather and the camera do to its colours.
+
+use deepfusion_sim::{Endless, EndlessConfig, View};
+use nalgebra::Vector3;
+use std::collections::HashSet;
+
+fn small() -> EndlessConfig {
+    EndlessConfig {
+        width: 160,
+        height: 48,
+        ..EndlessConfig::default()
+    }
+}
+
+fn endless(config: EndlessConfig) -> Endless {
+    Endless::new(config).expect("a valid configuration")
+}
+
+fn assert_same(a: &View, b: &View) {
+    assert_eq!(a.rgb.as_raw(), b.rgb.as_raw());
+    assert_eq!(a.depth, b.depth);
+    assert_eq!(a.intrinsics, b.intrinsics);
+    assert_eq!(a.moving, b.moving);
+    assert_eq!(a.world_from_cam, b.world_from_cam);
+}
+
+#[test]
+fn a_view_is_the_same_in_any_order_and_from_any_thread() {
+    let config = EndlessConfig {
+        worlds_at_once: 4,
+        views_per_world: 3,
+        ..small()
+    };
+    let numbers: Vec<u64> = (0..20).chain([1_000_003, 7]).collect();
+    let stream = endless(config.clone());
+    let expected: Vec<View> = numbers.iter().map(|i| stream.view(*i)).collect();
+    // Backwards, from an instance whose cache is too small to help.
+    let other = endless(config);
+    for (number, view) in numbers.iter().zip(&expected).rev() {
+        assert_same(&other.view(*number), view);
+    }
+    // From four threads at once, each in its own order.
+    let third = endless(other.config().clone());
+    std::thread::scope(|scope| {
+        for offset in 0..4 {
+            let (third, numbers, expected) = (&third, &numbers, &expected);
+            scope.spawn(move || {
+                for i in 0..numbers.len() {
+                    let i = (i * 7 + offset * 5) % numbers.len();
+                    assert_same(&third.view(numbers[i]), &expected[i]);
+                }
+            });
+        }
+    });
+}
+
+#[test]
+fn the_seed_and_the_index_change_the_view() {
+    let (a, b) = (
+        endless(small()),
+        endless(EndlessConfig { seed: 2, ..small() }),
+    );
+    assert_ne!(a.view(3).rgb.as_raw(), a.view(4).rgb.as_raw());
+    assert_ne!(a.view(3).depth, b.view(3).depth);
+}
+
+#[test]
+fn eight_neighbours_show_eight_worlds() {
+    let stream = endless(EndlessConfig {
+        worlds_at_once: 8,
+        views_per_world: 4,
+        ..small()
+    });
+    let worlds: Vec<u64> = (0..40).map(|i| stream.view(i).world).collect();
+    for window in worlds.windows(8) {
+        assert_eq!(window.iter().collect::<HashSet<_>>().len(), 8);
+    }
+}
+
+/// Nothing lies below the ground or beyond it, and where a ray goes down the ground ends it.
+#[test]
+fn depth_is_the_ground_s_where_nothing_stands() {
+    let stream = endless(small());
+    let (mut on_ground, mut level, mut all) = (0usize, 0usize, 0usize);
+    for index in 0..96 {
+        let view = stream.view(index);
+        let eye = view.world_from_cam.translation();
+        assert!(view.depth.data.iter().all(|d| d.is_finite() && *d >= 0.0));
+        for (i, depth) in view.depth.data.iter().enumerate() {
+            let (u, v) = ((i % 160) as f64, (i / 160) as f64);
+            let ray = view
+                .world_from_cam
+                .rotate(&view.intrinsics.back_project(u, v, 1.0));
+            let depth = f64::from(*depth);
+            let point = eye + ray * depth;
+            all += 1;
+            if ray.z < -0.01 {
+                level += 1;
+                // Depth of the road's plane and, nearer, that of the pavements'.
+                let (road, pavement) = (-eye.z / ray.z, (0.13 - eye.z) / ray.z);
+                let tolerance = 1e-4 * road + 1e-3;
+                assert!(
+                    depth > 0.0 && depth < road + tolerance,
+                    "view {index}: {depth} beyond {road}"
+                );
+                on_ground += usize::from(
+                    (depth - road).abs() < tolerance || (depth - pavement).abs() < tolerance,
+                );
+            }
+            if depth > 0.0 {
+                assert!(
+                    point.z > -0.01 - 1e-4 * depth,
+                    "view {index}: {point} is below the ground"
+                );
+            }
+        }
+    }
+    println!("{on_ground} of {level} descending rays of {all} end on the ground");
+    assert!(on_ground * 3 > level, "{on_ground} of {level}");
+}
+
+/// What one view sees, another one of the same world does not see through.
+#[test]
+fn two_views_of_a_world_agree() {
+    let stream = endless(EndlessConfig {
+        worlds_at_once: 1,
+        views_per_world: 12,
+        ..small()
+    });
+    let (mut agree, mut contradict, mut pairs) = (0usize, 0usize, 0usize);
+    for world in 0..4 {
+        let views: Vec<View> = (0..12).map(|i| stream.view(world * 12 + i)).collect();
+        for a in &views {
+            for b in &views {
+                if std::ptr::eq(a, b) {
+                    continue;
+                }
+                assert_eq!(a.world, b.world);
+                let (same, through) = compare(a, b);
+                pairs += usize::from(same > 100);
+                agree += same;
+                contradict += through;
+            }
+        }
+    }
+    println!("{pairs} pairs overlap, {agree} pixels agree, {contradict} contradict");
+    assert!(pairs > 20 && agree > 50_000, "{pairs} {agree}");
+    assert!(contradict * 100 < agree, "{contradict} of {agree}");
+}
+
+/// Pixels of `a` that `b` sees at the same depth, and those that `b` sees through. What `b` hides is neither.
+fn compare(a: &View, b: &View) -> (usize, usize) {
+    let b_from_a = b.world_from_cam.inverse() * a.world_from_cam;
+    let (w, h) = (a.depth.width as i64, a.depth.height as i64);
+    let (mut same, mut through) = (0, 0);
+    for (i, depth) in a.depth.data.iter().enumerate() {
+        // The traffic is elsewhere in the other view.
+        if *depth <= 0.0 || *depth > 60.0 || a.moving[i] {
+            continue;
+        }
+        let (u, v) = (i as i64 % w, i as i64 / w);
+        let point: Vector3<f64> = b_from_a.transform(&a.intrinsics.back_project(
+            u as f64,
+            v as f64,
+            f64::from(*depth),
+        ));
+        let Some(pixel) = b.intrinsics.project(&point) else {
+            continue;
+        };
+        let (x, y) = (pixel.x.round() as i64, pixel.y.round() as i64);
+        if point.z < 0.3 || x < 2 || y < 2 || x >= w - 2 || y >= h - 2 {
+            continue;
+        }
+        // Thin and slanted things cover other pixels of the other picture: the nearest around it counts.
+        let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x + dx, y + dy)));
+        let depths = around.map(|(x, y)| f64::from(b.depth.data[(y * w + x) as usize]));
+        let (mut nearest, mut farthest) = (f64::INFINITY, 0.0f64);
+        for d in depths {
+            let d = if d > 0.0 { d } else { f64::INFINITY };
+            (nearest, farthest) = (nearest.min(d), farthest.max(d));
+        }
+        if point.z < 0.95 * nearest - 0.1 {
+            through += 1;
+        } else if point.z < 1.05 * farthest + 0.1 {
+            same += 1;
+        }
+    }
+    (same, through)
+}
+
+#[test]
+fn weather_and_camera_never_touch_the_depth() {
+    let formed = endless(small());
+    let plain = endless(EndlessConfig {
+        formation: false,
+        ..small()
+    });
+    let mut foggy = 0;
+    for index in 0..48 {
+        let (a, b) = (formed.view(index), plain.view(index));
+        assert_eq!(a.depth, b.depth);
+        assert_eq!(a.moving, b.moving);
+        assert_ne!(a.rgb.as_raw(), b.rgb.as_raw());
+        foggy += usize::from(a.weather == deepfusion_sim::Weather::Fog);
+    }
+    println!("{foggy} of 48 views in fog");
+}
+
+#[test]
+fn views_are_of_many_kinds_and_none_is_stuck() {
+    let stream = endless(small());
+    let (mut scenes, mut weathers) = (HashSet::new(), HashSet::new());
+    let (mut grey, mut moving) = (0, 0);
+    for index in 0..240 {
+        let view = stream.view(index);
+        let field = 2.0 * (80.0 / view.intrinsics.fx).atan().to_degrees();
+        assert!((34.9..110.1).contains(&field), "{field}");
+        assert!((view.intrinsics.fy / view.intrinsics.fx - 1.0).abs() <= 0.0301);
+        assert_eq!(view.intrinsics.implausible(), None);
+        assert!((0.3..=2.5).contains(&view.height_m), "{}", view.height_m);
+        let mut known: Vec<f32> = view
+            .depth
+            .data
+            .iter()
+            .copied()
+            .filter(|d| *d > 0.0)
+            .collect();
+        known.sort_by(f32::total_cmp);
+        assert!(
+            known[0] > 0.15,
+            "view {index} touches something: {}",
+            known[0]
+        );
+        let far = known[known.len() * 9 / 10];
+        assert!(far > 1.5, "view {index} faces a wall at {far} m");
+        scenes.insert(view.scene.name());
+        weathers.insert(format!("{:?}", view.weather));
+        grey += usize::from(view.grey);
+        moving += usize::from(view.moving.contains(&true));
+    }
+    assert_eq!(scenes.len(), 5, "{scenes:?}");
+    assert_eq!(weathers.len(), 6, "{weathers:?}");
+    assert!((15..65).contains(&grey), "{grey}");
+    assert!(moving > 40, "{moving}");
+}
+
+#[test]
+fn a_bad_setting_is_named() {
+    let error = Endless::new(EndlessConfig {
+        height: 3,
+        ..small()
+    })
+    .err();
+    let error = error.expect("three rows are too few").to_string();
+    assert!(error.contains("`height`") && error.contains('3'), "{error}");
+}
