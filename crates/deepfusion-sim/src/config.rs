@@ -17,6 +17,12 @@ pub enum Scene {
     Commercial,
     /// The urban street by night, under its lamps.
     Night,
+    /// A carriageway of several lanes, guard rails, embankments. Varied worlds only.
+    Motorway,
+    /// A road without pavements between fields, trees and banks. Varied worlds only.
+    Country,
+    /// Rooms and corridors. Varied worlds only.
+    Indoor,
 }
 
 impl Scene {
@@ -29,6 +35,18 @@ impl Scene {
         Self::Night,
     ];
 
+    /// The scenes of varied worlds: UMAD's five and those that only varied worlds have.
+    pub const EVERY: [Self; 8] = [
+        Self::Urban,
+        Self::Park,
+        Self::Garage,
+        Self::Commercial,
+        Self::Night,
+        Self::Motorway,
+        Self::Country,
+        Self::Indoor,
+    ];
+
     /// Its name, as `--scene` takes it.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -38,13 +56,16 @@ impl Scene {
             Self::Garage => "garage",
             Self::Commercial => "commercial",
             Self::Night => "night",
+            Self::Motorway => "motorway",
+            Self::Country => "country",
+            Self::Indoor => "indoor",
         }
     }
 
     /// How fast it is driven through, as a share of what a street allows.
     pub(crate) fn pace(self) -> f64 {
         match self {
-            Self::Garage => 0.3,
+            Self::Garage | Self::Indoor => 0.3,
             Self::Park => 0.6,
             _ => 1.0,
         }

@@ -23,6 +23,7 @@
 
 mod can;
 mod config;
+mod crown;
 mod error;
 mod fmcw;
 mod imu;
@@ -52,7 +53,7 @@ pub use imu::ImuReading;
 pub use kitti::write_kitti;
 pub use oxts::OxtsReading;
 pub use rig::Rig;
-pub use scene::{ObjectClass, SceneObject};
+pub use scene::{ObjectClass, SceneObject, Variety};
 pub use simulation::{SimFrame, Simulation};
 pub use umad::{BagSettings, topic, write_bag};
 pub use varied::{Endless, EndlessConfig, View, Weather};

@@ -2,7 +2,7 @@
 
 use crate::primitive::{Primitive, Shape, V3, enter};
 use crate::render::Cores;
-use crate::road::{KERB_HEIGHT, StreetPoint};
+use crate::road::StreetPoint;
 use crate::scene::{ObjectClass, SceneObject, World};
 use crate::texture::noise::length;
 use nalgebra::Vector3;
@@ -40,6 +40,8 @@ struct Caster {
     reach: f32,
     middle: (f64, f64),
     radius: f32,
+    /// How long its shadow is at most.
+    length: f32,
 }
 
 /// The foot of something that keeps the sky off the ground beside it.
@@ -164,6 +166,7 @@ fn casters(world: &World) -> Vec<Caster> {
                 reach: 1.8 * (radius + length) + 2.0,
                 middle: (primitive.position[0], primitive.position[1]),
                 radius,
+                length,
             })
         })
         .collect()
@@ -180,6 +183,10 @@ impl Foot {
             ObjectClass::Fence => (0.45, 0.6, 1.0),
             ObjectClass::Tree => (0.3, 1.2, 0.3),
             ObjectClass::Pole => (0.35, 0.25, 0.7),
+            ObjectClass::Van | ObjectClass::Truck | ObjectClass::Tram => (0.85, 0.5, 1.0),
+            ObjectClass::Cyclist | ObjectClass::Bicycle => (0.4, 0.3, 0.8),
+            ObjectClass::Pedestrian => (0.45, 0.25, 0.7),
+            ObjectClass::Misc => (0.5, 0.3, 0.9),
         };
         Self {
             middle: (t.x, t.y),
@@ -212,59 +219,51 @@ impl Foot {
 
 fn bake_chunk(world: &World, casters: &[Caster], feet: &[Foot], from: f32, cells: &mut [[u8; 2]]) {
     let to = from + CHUNK as f32 * CELL;
-    let near: Vec<&Caster> = casters
-        .iter()
-        .filter(|c| c.s + c.reach > from && c.s - c.reach < to)
-        .collect();
-    let feet: Vec<&Foot> = feet
-        .iter()
-        .filter(|f| {
-            let reach = 1.8 * f.half[0].hypot(f.half[1]) + 8.0;
-            f.s + reach > from && f.s - reach < to
+    let rows: Vec<Row> = (0..CHUNK)
+        .map(|row| {
+            let s = from + (row as f32 + 0.5) * CELL;
+            let (x, y, heading, _) = world.road.centre(f64::from(s));
+            Row {
+                x,
+                y,
+                across: (-heading.sin(), heading.cos()),
+            }
         })
         .collect();
-    // A block of cells asks only what can reach it: the others would leave its cells as they are.
-    let (mut casters, mut around) = (Vec::new(), Vec::new());
-    for top in (0..CHUNK).step_by(BLOCK) {
-        for left in (0..ACROSS).step_by(BLOCK) {
-            let block = Block::at(world, from, top, left);
-            casters.clear();
-            casters.extend(near.iter().filter(|c| block.may_be_shaded(c, &world.sun)));
-            around.clear();
-            around.extend(feet.iter().filter(|f| block.may_be_near(f)));
-            for row in top..(top + BLOCK).min(CHUNK) {
-                let frame = Frame::at(world, from, row);
-                for column in left..(left + BLOCK).min(ACROSS) {
-                    cells[row * ACROSS + column] =
-                        bake_cell(world, &casters, &around, frame.place(column));
-                }
-            }
+    let mut shaded = vec![false; cells.len()];
+    let near = casters
+        .iter()
+        .filter(|c| c.s + c.reach > from && c.s - c.reach < to);
+    for caster in near {
+        for (row, shaded) in rows.iter().zip(shaded.chunks_mut(ACROSS)) {
+            row.shade(world, caster, shaded);
         }
+    }
+    let mut sky = vec![1.0f32; cells.len()];
+    for foot in feet {
+        let reach = 1.8 * foot.half[0].hypot(foot.half[1]) + 8.0;
+        if foot.s + reach <= from || foot.s - reach >= to {
+            continue;
+        }
+        for (row, sky) in rows.iter().zip(sky.chunks_mut(ACROSS)) {
+            row.close(foot, sky);
+        }
+    }
+    for ((cell, shaded), sky) in cells.iter_mut().zip(shaded).zip(sky) {
+        *cell = [if shaded { 0 } else { 255 }, (sky * 255.0) as u8];
     }
 }
 
-/// Cells along each side of a block.
-const BLOCK: usize = 16;
-
-/// A row of cells: the centreline there and the direction across it.
-struct Frame {
+/// One row of cells across the street.
+struct Row {
     x: f64,
     y: f64,
     across: (f64, f64),
 }
 
-impl Frame {
-    fn at(world: &World, from: f32, row: usize) -> Self {
-        let s = from + (row as f32 + 0.5) * CELL;
-        let (x, y, heading, _) = world.road.centre(f64::from(s));
-        Self {
-            x,
-            y,
-            across: (-heading.sin(), heading.cos()),
-        }
-    }
-
+impl Row {
     /// The middle of a cell.
+    #[inline]
     fn place(&self, column: usize) -> (f64, f64) {
         let lateral = f64::from((column as f32 + 0.5) * CELL - REACH);
         (
@@ -272,81 +271,89 @@ impl Frame {
             self.y + lateral * self.across.1,
         )
     }
-}
 
-/// A circle around a block of cells.
-struct Block {
-    middle: (f64, f64),
-    radius: f32,
-}
-
-impl Block {
-    fn at(world: &World, from: f32, top: usize, left: usize) -> Self {
-        let (bottom, right) = ((top + BLOCK).min(CHUNK) - 1, (left + BLOCK).min(ACROSS) - 1);
-        let (first, last) = (Frame::at(world, from, top), Frame::at(world, from, bottom));
-        let corners = [
-            first.place(left),
-            first.place(right),
-            last.place(left),
-            last.place(right),
-        ];
-        let mean = |pick: fn(&(f64, f64)) -> f64| corners.iter().map(pick).sum::<f64>() / 4.0;
-        let middle = (mean(|c| c.0), mean(|c| c.1));
-        let away = |c: &(f64, f64)| (c.0 - middle.0).hypot(c.1 - middle.1) as f32;
-        // Rows between the first and the last bulge by less than this in the narrowest bend.
-        let radius = corners.iter().map(away).fold(0.0, f32::max) + 0.2;
-        Self { middle, radius }
-    }
-
-    /// Whether one of its cells may pass the circle of a caster, on the sun's side.
-    fn may_be_shaded(&self, caster: &Caster, sun: &V3) -> bool {
-        let flat = sun.x.hypot(sun.y);
-        let (dx, dy) = (
-            (caster.middle.0 - self.middle.0) as f32,
-            (caster.middle.1 - self.middle.1) as f32,
-        );
-        let along = (dx * sun.x + dy * sun.y) / flat;
-        let across = (dx * sun.y - dy * sun.x) / flat;
-        let reach = caster.radius + self.radius;
-        across.abs() <= reach && along >= -reach && along <= LONGEST + reach
-    }
-
-    /// Whether a foot may reach one of its cells.
-    fn may_be_near(&self, foot: &Foot) -> bool {
-        let (dx, dy) = (
-            (foot.middle.0 - self.middle.0) as f32,
-            (foot.middle.1 - self.middle.1) as f32,
-        );
-        let reach = foot.half[0] + foot.half[1] + 4.0 * foot.range + self.radius;
-        dx.abs() <= reach && dy.abs() <= reach
-    }
-}
-
-/// Shares of the sun and of the sky that a place on the ground sees.
-fn bake_cell(world: &World, casters: &[&Caster], feet: &[&Foot], (x, y): (f64, f64)) -> [u8; 2] {
-    let sun = world.sun;
-    let flat = sun.x.hypot(sun.y);
-    let ground = Vector3::new(x, y, f64::from(KERB_HEIGHT));
-    let shaded = casters.iter().any(|caster| {
-        // The ray's foot passes the caster's circle, on the sun's side.
-        let (dx, dy) = ((caster.middle.0 - x) as f32, (caster.middle.1 - y) as f32);
-        let along = (dx * sun.x + dy * sun.y) / flat;
-        let across = (dx * sun.y - dy * sun.x) / flat;
-        if across.abs() > caster.radius || along < -caster.radius || along > LONGEST + caster.radius
-        {
-            return false;
+    /// The cells whose laterals are in all of these ranges, each given as value + slope · lateral within bounds.
+    fn columns(&self, ranges: [[f64; 4]; 2]) -> std::ops::Range<usize> {
+        let (mut low, mut high) = (-f64::from(REACH), f64::from(REACH));
+        for [value, slope, least, most] in ranges {
+            if slope.abs() < 1e-9 {
+                if value < least || value > most {
+                    return 0..0;
+                }
+                continue;
+            }
+            let (a, b) = ((least - value) / slope, (most - value) / slope);
+            low = low.max(a.min(b));
+            high = high.min(a.max(b));
         }
-        let o = caster.primitive.local_point(&ground);
-        // Within a solid's own foot there is no entry; the other face counts then.
-        let d = caster.primitive.local_of(&sun);
-        enter(&caster.primitive.shape, &world.hulls, &o, &d, 1e4).is_some()
-            || inside_foot(&caster.primitive.shape, &o)
-    });
-    let mut sky = 1.0f32;
-    for foot in feet {
-        sky *= foot.open_at(x, y);
+        if low > high {
+            return 0..0;
+        }
+        // One more on each side: the exact test follows.
+        let column = |lateral: f64| (lateral + f64::from(REACH)) / f64::from(CELL);
+        let first = (column(low) - 1.5).max(0.0) as usize;
+        first..((column(high) + 1.5) as usize).min(ACROSS)
     }
-    [if shaded { 0 } else { 255 }, (sky * 255.0) as u8]
+
+    /// Marks what a caster keeps the sun from.
+    fn shade(&self, world: &World, caster: &Caster, shaded: &mut [bool]) {
+        let sun = world.sun;
+        let flat = sun.x.hypot(sun.y);
+        let towards = (f64::from(sun.x / flat), f64::from(sun.y / flat));
+        let (dx, dy) = (caster.middle.0 - self.x, caster.middle.1 - self.y);
+        let (nx, ny) = self.across;
+        let radius = f64::from(caster.radius) + 0.05;
+        let columns = self.columns([
+            [
+                dx * towards.1 - dy * towards.0,
+                ny * towards.0 - nx * towards.1,
+                -radius,
+                radius,
+            ],
+            [
+                dx * towards.0 + dy * towards.1,
+                -(nx * towards.0 + ny * towards.1),
+                -radius,
+                f64::from(caster.length) + radius + 0.5,
+            ],
+        ]);
+        for column in columns {
+            if shaded[column] {
+                continue;
+            }
+            let (x, y) = self.place(column);
+            // The ray's foot passes the caster's circle, on the sun's side.
+            let (dx, dy) = ((caster.middle.0 - x) as f32, (caster.middle.1 - y) as f32);
+            let along = (dx * sun.x + dy * sun.y) / flat;
+            let across = (dx * sun.y - dy * sun.x) / flat;
+            if across.abs() > caster.radius
+                || along < -caster.radius
+                || along > LONGEST + caster.radius
+            {
+                continue;
+            }
+            let ground = Vector3::new(x, y, f64::from(world.road.kerb));
+            let o = caster.primitive.local_point(&ground);
+            // Within a solid's own foot there is no entry; the other face counts then.
+            let d = caster.primitive.local_of(&sun);
+            shaded[column] = enter(&caster.primitive.shape, &world.hulls, &o, &d, 1e4).is_some()
+                || inside_foot(&caster.primitive.shape, &o);
+        }
+    }
+
+    /// Takes from the sky what a foot takes.
+    fn close(&self, foot: &Foot, sky: &mut [f32]) {
+        let reach = f64::from(foot.half[0] + foot.half[1] + 4.0 * foot.range);
+        let (dx, dy) = (foot.middle.0 - self.x, foot.middle.1 - self.y);
+        let columns = self.columns([
+            [dx, -self.across.0, -reach, reach],
+            [dy, -self.across.1, -reach, reach],
+        ]);
+        for column in columns {
+            let (x, y) = self.place(column);
+            sky[column] *= foot.open_at(x, y);
+        }
+    }
 }
 
 fn inside_foot(shape: &Shape, o: &V3) -> bool {

@@ -1,5 +1,6 @@
 //! The solids everything above the ground is made of, and where a ray enters them.
 
+use crate::crown::Crown;
 use nalgebra::Vector3;
 
 /// Short name for the renderer's vectors.
@@ -53,6 +54,15 @@ pub enum Shape {
     },
     /// Index of a [`Hull`] of the scene.
     Hull(u32),
+    /// A round-ended rod around the origin: a limb, a branch, a rail.
+    Capsule {
+        /// From the origin to the middle of the end's ball; the other end is opposite.
+        half_axis: [f32; 3],
+        /// Radius.
+        radius: f32,
+    },
+    /// A lobe of leaves around the origin, with holes.
+    Crown(Crown),
 }
 
 /// A placed solid.
@@ -118,6 +128,18 @@ impl Primitive {
             Shape::Wheel { radius, half_width } => (radius, half_width, -radius, radius),
             Shape::Ellipsoid { radii: [x, y, z] } => (x, y, -z, z),
             Shape::Hull(index) => hulls[index as usize].bounds,
+            Shape::Capsule {
+                half_axis: [x, y, z],
+                radius,
+            } => (
+                x.abs() + radius,
+                y.abs() + radius,
+                -z.abs() - radius,
+                z.abs() + radius,
+            ),
+            Shape::Crown(Crown {
+                radii: [x, y, z], ..
+            }) => (x, y, -z, z),
         }
     }
 }
@@ -135,6 +157,8 @@ pub fn enter(shape: &Shape, hulls: &[Hull], o: &V3, d: &V3, limit: f32) -> Optio
         Shape::Wheel { radius, half_width } => enter_wheel(radius, half_width, o, d, limit),
         Shape::Ellipsoid { radii } => enter_ellipsoid(radii, o, d, limit),
         Shape::Hull(index) => enter_hull(&hulls[index as usize], o, d, limit),
+        Shape::Capsule { half_axis, radius } => enter_capsule(half_axis, radius, o, d, limit),
+        Shape::Crown(ref crown) => crown.enter(o, d, limit),
     }
 }
 
@@ -258,6 +282,53 @@ fn enter_hull(hull: &Hull, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
     (face != u8::MAX && near < limit).then_some(Entry { t: near, face })
 }
 
+#[inline]
+fn enter_capsule(half_axis: [f32; 3], radius: f32, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
+    // Seen from the ray's point nearest to the middle, where nothing large cancels.
+    let square = d.norm_squared();
+    let shift = -o.dot(d) / square;
+    let o = o + d * shift;
+    let half = V3::from(half_axis);
+    let reach = half.norm() + radius;
+    if o.norm_squared() > reach * reach {
+        return None;
+    }
+    let found = |t: f32| {
+        let t = t + shift;
+        (t > 0.0 && t < limit).then_some(Entry {
+            t,
+            face: FACE_ROUND,
+        })
+    };
+    // The round side: distance to the axis equals the radius, between the ends.
+    let axis = half.normalize();
+    let (od, dd) = (o - axis * axis.dot(&o), d - axis * axis.dot(d));
+    let (a, b) = (dd.norm_squared(), od.dot(&dd));
+    if a > 1e-9 * square {
+        let root = b * b - a * (od.norm_squared() - radius * radius);
+        if root <= 0.0 {
+            return None;
+        }
+        let t = (-b - root.sqrt()) / a;
+        let along = axis.dot(&(o + d * t));
+        if along.abs() <= half.norm() {
+            return found(t);
+        }
+    }
+    // The balls at the ends: the one the ray meets first.
+    let ball = |centre: V3| {
+        let from = o - centre;
+        let b = from.dot(d);
+        let root = b * b - square * (from.norm_squared() - radius * radius);
+        if root > 0.0 {
+            (-b - root.sqrt()) / square
+        } else {
+            f32::INFINITY
+        }
+    };
+    found(ball(half).min(ball(-half)))
+}
+
 /// Outward normal of the surface at a point (the solid's axes).
 #[inline]
 pub fn normal_at(shape: &Shape, hulls: &[Hull], p: &V3, face: u8) -> V3 {
@@ -274,6 +345,13 @@ pub fn normal_at(shape: &Shape, hulls: &[Hull], p: &V3, face: u8) -> V3 {
         (Shape::Ellipsoid { radii: [a, b, c] }, _) => {
             V3::new(p.x / (a * a), p.y / (b * b), p.z / (c * c)).normalize()
         }
+        (Shape::Capsule { half_axis, .. }, _) => {
+            let half = V3::from(*half_axis);
+            let along = (half.dot(p) / half.norm_squared()).clamp(-1.0, 1.0);
+            let out = p - half * along;
+            out / out.norm().max(1e-6)
+        }
+        (Shape::Crown(crown), _) => crown.normal(p),
         (Shape::Box { .. }, _) => V3::z(),
     }
 }
@@ -325,6 +403,13 @@ mod tests {
                 .iter()
                 .map(|(n, d)| n.dot(p) - d)
                 .fold(f32::MIN, f32::max),
+            Shape::Capsule { half_axis, radius } => {
+                let half = V3::from(half_axis);
+                let along = (half.dot(p) / half.norm_squared()).clamp(-1.0, 1.0);
+                (p - half * along).norm() - radius
+            }
+            // Its holes have a test of their own.
+            Shape::Crown(_) => f32::MIN,
         }
     }
 
@@ -334,7 +419,7 @@ mod tests {
         /// upright cylinder has no bottom).
         #[test]
         fn a_ray_enters_where_the_solid_begins(
-            which in 0usize..5, angle in 0.0..std::f32::consts::TAU, distance in 4.0..30.0f32,
+            which in 0usize..6, angle in 0.0..std::f32::consts::TAU, distance in 4.0..30.0f32,
             up in 0.2..4.0f32, aim_x in -1.2..1.2f32, aim_y in -1.2..1.2f32, aim_z in 0.05..1.6f32,
         ) {
             let shape = [
@@ -343,6 +428,7 @@ mod tests {
                 Shape::Wheel { radius: 0.9, half_width: 0.4 },
                 Shape::Ellipsoid { radii: [1.0, 0.6, 1.4] },
                 Shape::Hull(0),
+                Shape::Capsule { half_axis: [0.5, 0.2, 0.7], radius: 0.3 },
             ][which];
             let hulls = hulls();
             let o = V3::new(distance * angle.cos(), distance * angle.sin(), up.max(aim_z));

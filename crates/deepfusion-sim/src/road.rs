@@ -73,6 +73,8 @@ pub struct StreetPoint {
 pub struct Road {
     /// `s` of the first sample, metres (negative: the street begins behind the start).
     pub start: f64,
+    /// Height of everything beside the carriageway above it, metres.
+    pub kerb: f32,
     samples: Vec<RoadSample>,
     /// Unit tangents and curvature again, in f32 and packed for the renderer.
     packed: Vec<[f32; 5]>,
@@ -113,6 +115,7 @@ impl Road {
         }
         let mut road = Self {
             start,
+            kerb: KERB_HEIGHT,
             samples,
             packed: Vec::new(),
             side_streets: Vec::new(),

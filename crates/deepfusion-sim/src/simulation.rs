@@ -8,7 +8,7 @@ use crate::oxts::OxtsReading;
 use crate::render::Cores;
 use crate::rig::{Rig, kitti_like_intrinsics, umad_like_intrinsics};
 use crate::road::Road;
-use crate::scene::{SceneObject, World};
+use crate::scene::{SceneObject, Variety, World};
 use crate::texture::noise::hash;
 use crate::traffic::Traffic;
 use crate::{Result, render, velodyne};
@@ -60,6 +60,14 @@ impl Simulation {
     /// # Errors
     /// [`crate::Error::Config`] where a setting is out of range.
     pub fn new(config: &SimConfig) -> Result<Self> {
+        Self::varied(config, &Variety::none())
+    }
+
+    /// The same through a varied world; with [`Variety::none`] it is [`Simulation::new`].
+    ///
+    /// # Errors
+    /// [`crate::Error::Config`] where a setting is out of range.
+    pub fn varied(config: &SimConfig, variety: &Variety) -> Result<Self> {
         config.validate()?;
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
         let times = frame_times(&mut rng, config);
@@ -68,7 +76,7 @@ impl Simulation {
         let mut road = Road::generate(&mut rng, -LEAD_IN, longest + LEAD_OUT);
         let drive = Drive::simulate(&mut rng, &road, duration_s, config.scene.pace());
         road.truncate(drive.progress(duration_s).0 + LEAD_OUT);
-        let world = World::furnish(road, config.seed, config.scene);
+        let world = World::furnish_varied(road, config.seed, config.scene, variety);
         let light = GroundLight::bake(&world, Cores::All);
         let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x7AFF_1C00);
         let traffic = Traffic::new(&mut rng, &world, &drive, duration_s, config.moving_cars);

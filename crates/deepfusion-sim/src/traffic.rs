@@ -3,7 +3,7 @@
 use crate::motion::Drive;
 use crate::primitive::Primitive;
 use crate::road::Road;
-use crate::scene::{ObjectClass, SceneObject, World, upright};
+use crate::scene::{SceneObject, World, upright};
 use nalgebra::Vector3;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -79,6 +79,85 @@ impl Traffic {
         Self { cars }
     }
 
+    /// Dense traffic around a camera that is `s` metres along a varied world's street at time 0 and drives on at
+    /// `speed` m/s: vehicles ahead in its lane, at least `nearest` metres away, others that come towards it, people
+    /// who cross, bicycles at the edge. Nothing stands in parked cars. `density` in [0, 1].
+    pub fn around(
+        rng: &mut ChaCha8Rng,
+        world: &World,
+        (s, speed, nearest): (f64, f64, f64),
+        density: f64,
+    ) -> Self {
+        let mut traffic = Self { cars: Vec::new() };
+        let lanes = world.lanes();
+        for lane in lanes {
+            let forward = lane.forward;
+            let own = forward && (lane.lateral + LANE).abs() < 1.0;
+            let pace = speed.max(3.0) * rng.random_range(0.75..1.1);
+            // The same speed in the camera's lane keeps the distance.
+            let pace = match (forward, own) {
+                (true, true) => speed,
+                (true, false) => pace * rng.random_range(1.0..1.3),
+                (false, _) => -pace,
+            };
+            let gap = 9.0 + 40.0 * (1.0 - density) * rng.random_range(0.5..1.5);
+            let mut at = s + if own {
+                nearest + 4.0 + gap * rng.random_range(0.0..1.6)
+            } else {
+                rng.random_range(-15.0..15.0)
+            };
+            while at < s + 160.0 {
+                let car = MovingCar {
+                    model: rng.random_range(0..world.models.len()),
+                    seed: rng.random(),
+                    s: at,
+                    speed: pace,
+                    lateral: lane.lateral + rng.random_range(-0.25..0.25),
+                };
+                let long = f64::from(world.models[car.model].size[0]);
+                let clear = !own || at - 0.5 * long > s + nearest;
+                if clear && rng.random_bool(0.25 + 0.7 * density) && traffic.fits(world, &car) {
+                    traffic.cars.push(car);
+                }
+                at += long + gap * rng.random_range(0.5..1.8);
+            }
+        }
+        traffic
+    }
+
+    /// Whether a car at time 0 stands in nothing that stands still.
+    fn fits(&self, world: &World, car: &MovingCar) -> bool {
+        let (x, y, heading) = world.road.world(car.s, car.lateral);
+        let size = world.models[car.model].size.map(f64::from);
+        let half = [0.5 * size[0] + 0.3, 0.5 * size[1] + 0.15];
+        let road = &world.road;
+        let on_road = [-half[0], half[0]].iter().all(|along| {
+            let (x, y, _) = road.world(car.s + along, car.lateral);
+            let p = road.locate(x, y);
+            f64::from(road.kerb_distance(&p)) < -half[1] + 0.15
+        });
+        on_road
+            && !world.objects.iter().any(|object| {
+                let t = object.world_from_object.translation();
+                let (dx, dy) = (t.x - x, t.y - y);
+                let reach = object.size[0].hypot(object.size[1]) * 0.5 + half[0] + 1.0;
+                // Crowns and arms hang over the road.
+                let low = object.size[2] < 2.6 || object.class.is_traffic();
+                if !low || dx.hypot(dy) > reach {
+                    return false;
+                }
+                let (sin, cos) = heading.sin_cos();
+                let forward = object.world_from_object.rotate(&Vector3::x());
+                let turned = (forward.x * cos + forward.y * sin).abs().min(1.0);
+                let across = (1.0 - turned * turned).sqrt();
+                let other = [0.5 * object.size[0], 0.5 * object.size[1]];
+                let along = other[0] * turned + other[1] * across;
+                let aside = other[1] * turned + other[0] * across;
+                (cos * dx + sin * dy).abs() < half[0] + along
+                    && (cos * dy - sin * dx).abs() < half[1] + aside
+            })
+    }
+
     /// The cars that are on the street at a time.
     fn present<'a>(
         &'a self,
@@ -124,7 +203,7 @@ impl Traffic {
                 SceneObject {
                     // After everything that stands.
                     id: (world.objects.len() + index) as u64,
-                    class: ObjectClass::Car,
+                    class: world.models[car.model].class,
                     world_from_object: upright(base, heading, size[2]),
                     size,
                     velocity: Vector3::new(heading.cos(), heading.sin(), 0.0) * speed,

@@ -6,7 +6,7 @@ mod tiles;
 
 use crate::light::{Foot, GroundLight};
 use crate::primitive::{Primitive, Shape, V3, enter};
-use crate::road::{KERB_HEIGHT, StreetPoint};
+use crate::road::StreetPoint;
 use crate::scene::SceneObject;
 use crate::scene::World;
 use crate::texture::Rgb;
@@ -67,6 +67,7 @@ pub fn gather(world: &World, moving: &[Primitive], eye: &Vector3<f64>) -> Vec<Pr
     let to = world.along.partition_point(|a| *a < s + AHEAD);
     world.primitives[from..to]
         .iter()
+        .chain(&world.far)
         .chain(moving)
         .copied()
         .collect()
@@ -127,7 +128,7 @@ impl Eye<'_> {
     fn ground(&self, d: &V3, limit: f32) -> (f32, Surface) {
         let road = &self.world.road;
         let height = self.position.z as f32;
-        let t_upper = (KERB_HEIGHT - height) / d.z;
+        let t_upper = (road.kerb - height) / d.z;
         if t_upper >= limit || t_upper <= 0.0 || t_upper > FARTHEST_GROUND {
             return (f32::INFINITY, Surface::Sky);
         }

@@ -3,7 +3,6 @@
 use super::{Air, Eye, Hit, Surface};
 use crate::light::{Foot, GroundLight};
 use crate::primitive::{V3, normal_at};
-use crate::road::KERB_HEIGHT;
 use crate::texture::ground::{self, GroundPatch};
 use crate::texture::noise::hash;
 use crate::texture::{Patch, Rgb};
@@ -146,7 +145,13 @@ impl Shader<'_> {
                     let seed = hash(number as i32, 1, world.seed);
                     ground::road(&world.noise, &patch, layout, seed)
                 }
-                Surface::Kerb => ground::kerb(&world.noise, &patch, height.clamp(0.0, KERB_HEIGHT)),
+                Surface::Kerb => {
+                    let height = height.clamp(0.0, world.road.kerb);
+                    match &layout.look {
+                        Some(look) => look.kerb(&world.noise, &patch, height),
+                        None => ground::kerb(&world.noise, &patch, height),
+                    }
+                }
                 _ => {
                     let side = usize::from(p.lateral > 0.0);
                     let (verge, pavement) = (sample.verge[side], sample.pavement[side]);

@@ -131,6 +131,7 @@ pub fn build(world: &mut World, rng: &mut ChaCha8Rng, plot: &Plot, style: Style)
         },
         ledges: rng.random_bool(0.45),
         grime: rng.random_range(0.2..1.0),
+        skin: None,
     };
     let pitch = facade.pitch;
     let accent = facade.accent;

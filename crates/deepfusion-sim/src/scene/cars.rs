@@ -10,11 +10,13 @@ use rand_chacha::ChaCha8Rng;
 /// One model of car in one colour.
 #[derive(Debug, Clone)]
 pub struct CarModel {
+    /// What it is.
+    pub class: ObjectClass,
     /// Length, width, height, metres.
     pub size: [f32; 3],
     /// Shape, place in the car's axes (x forward, y left, origin on the ground below the middle)
     /// and material of each part.
-    parts: Vec<(Shape, [f64; 3], u32)>,
+    pub(super) parts: Vec<(Shape, [f64; 3], u32)>,
 }
 
 impl CarModel {
@@ -40,18 +42,19 @@ impl CarModel {
 }
 
 /// Proportions of a body.
-struct Body {
-    size: [f32; 3],
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Body {
+    pub(super) size: [f32; 3],
     /// Height of the waist above the road.
-    waist: f32,
+    pub(super) waist: f32,
     /// Where the cabin ends at the waist and at the roof, from the middle: front and rear.
-    cabin: [f32; 2],
-    roof: [f32; 2],
+    pub(super) cabin: [f32; 2],
+    pub(super) roof: [f32; 2],
     /// Length of the bonnet's slope and its drop.
-    bonnet: [f32; 2],
+    pub(super) bonnet: [f32; 2],
 }
 
-const BODIES: [Body; 5] = [
+pub(super) const BODIES: [Body; 5] = [
     // A small car.
     Body {
         size: [3.8, 1.68, 1.5],
@@ -127,7 +130,7 @@ pub fn models(world: &mut World, rng: &mut ChaCha8Rng) -> Vec<CarModel> {
     models
 }
 
-fn model(
+pub(super) fn model(
     world: &mut World,
     body: &Body,
     lower: u32,
@@ -161,6 +164,7 @@ fn model(
         parts.push((wheel, place, tyre));
     }
     CarModel {
+        class: ObjectClass::Car,
         size: body.size,
         parts,
     }
@@ -172,7 +176,7 @@ fn slope(a: [f32; 2], b: [f32; 2]) -> (V3, f32) {
     (normal, normal.x * a[0] + normal.z * a[1])
 }
 
-fn lower_hull(body: &Body) -> Hull {
+pub(super) fn lower_hull(body: &Body) -> Hull {
     let (half, wide, top) = (0.5 * body.size[0], 0.5 * body.size[1], body.waist - FLOOR);
     let [length, drop] = body.bonnet;
     let sides = V3::new(0.0, 0.97, -0.243).normalize();
@@ -199,7 +203,7 @@ fn lower_hull(body: &Body) -> Hull {
     }
 }
 
-fn upper_hull(body: &Body) -> Hull {
+pub(super) fn upper_hull(body: &Body) -> Hull {
     let (wide, top) = (0.5 * body.size[1] - 0.03, body.size[2] - body.waist);
     let lean = (0.17f32 / top).atan();
     let (sin, cos) = lean.sin_cos();

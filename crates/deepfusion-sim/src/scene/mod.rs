@@ -7,6 +7,9 @@ mod garage;
 mod greenery;
 mod lamps;
 mod layout;
+mod variety;
+
+pub use variety::Variety;
 
 use crate::config::Scene;
 use crate::primitive::{Hull, Primitive, Shape, V3};
@@ -37,6 +40,20 @@ pub enum ObjectClass {
     Building,
     /// A hedge, a fence or a garden wall.
     Fence,
+    /// A van.
+    Van,
+    /// A lorry or a bus.
+    Truck,
+    /// A tram.
+    Tram,
+    /// Someone on foot.
+    Pedestrian,
+    /// Someone on a bicycle or a motorbike.
+    Cyclist,
+    /// A bicycle or a motorbike that nobody sits on.
+    Bicycle,
+    /// Anything else: furniture, goods, rails, banks.
+    Misc,
 }
 
 /// Something on the street, with its exact box.
@@ -64,6 +81,8 @@ pub struct World {
     pub stretch_of: Vec<u16>,
     /// Solids, in order of `s`.
     pub primitives: Vec<Primitive>,
+    /// Solids too large to be found by their `s`: hills, halls, bridges. A camera looks for them everywhere.
+    pub far: Vec<Primitive>,
     /// Metres along the street of each solid, and its reach around that.
     pub along: Vec<f32>,
     /// Convex solids that primitives refer to.
@@ -74,6 +93,10 @@ pub struct World {
     pub objects: Vec<SceneObject>,
     /// The models of cars, for the moving ones.
     pub models: Vec<cars::CarModel>,
+    /// Where traffic drives in a varied world: see [`World::lanes`].
+    pub lanes: Vec<Lane>,
+    /// Models of people on foot and on wheels, of varied worlds.
+    pub crowd: Vec<cars::CarModel>,
     /// The random table of every texture.
     pub noise: Noise,
     /// The sky.
@@ -90,7 +113,31 @@ pub struct World {
     pub seed: u32,
 }
 
+/// Where vehicles drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lane {
+    /// Metres left of the centreline.
+    pub lateral: f64,
+    /// As the camera drives, not against it.
+    pub forward: bool,
+}
+
 impl ObjectClass {
+    /// Whether it is a vehicle or someone who moves.
+    #[must_use]
+    pub fn is_traffic(self) -> bool {
+        matches!(
+            self,
+            Self::Car
+                | Self::Van
+                | Self::Truck
+                | Self::Tram
+                | Self::Pedestrian
+                | Self::Cyclist
+                | Self::Bicycle
+        )
+    }
+
     /// Its name in a file of tracklets: KITTI's for cars, capitalised like it for the others.
     #[must_use]
     pub fn label(self) -> &'static str {
@@ -100,13 +147,20 @@ impl ObjectClass {
             Self::Tree => "Tree",
             Self::Building => "Building",
             Self::Fence => "Fence",
+            Self::Van => "Van",
+            Self::Truck => "Truck",
+            Self::Tram => "Tram",
+            Self::Pedestrian => "Pedestrian",
+            Self::Cyclist => "Cyclist",
+            Self::Bicycle => "Bicycle",
+            Self::Misc => "Misc",
         }
     }
 }
 
 impl World {
-    /// Furnishes `road` for the drive of `seed`.
-    pub fn furnish(road: Road, seed: u64, scene: Scene) -> Self {
+    /// Furnishes `road` for the drive of `seed` with as much variety as is asked for.
+    pub fn furnish_varied(road: Road, seed: u64, scene: Scene, variety: &Variety) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5EED_57AE_E700_0001);
         let azimuth: f32 = rng.random_range(0.0..std::f32::consts::TAU);
         let elevation: f32 = rng.random_range(0.5..1.0);
@@ -122,11 +176,14 @@ impl World {
             stretches: Vec::new(),
             stretch_of: Vec::new(),
             primitives: Vec::new(),
+            far: Vec::new(),
             along: Vec::new(),
             hulls: Vec::new(),
             materials: Vec::new(),
             objects: Vec::new(),
             models: Vec::new(),
+            lanes: Vec::new(),
+            crowd: Vec::new(),
             noise: Noise::new(seed),
             sky: Sky {
                 horizon: Rgb::new(0.72, 0.8, 0.88),
@@ -143,14 +200,28 @@ impl World {
             seed: (seed ^ (seed >> 32)) as u32,
         };
         world.dim();
-        world.models = cars::models(&mut world, &mut rng);
-        match scene {
-            Scene::Garage => garage::furnish(&mut world, &mut rng),
-            _ => layout::furnish(&mut world, &mut rng),
+        if variety.is_varied() {
+            variety::furnish(&mut world, &mut rng, variety);
+        } else {
+            world.models = cars::models(&mut world, &mut rng);
+            match scene {
+                Scene::Garage => garage::furnish(&mut world, &mut rng),
+                _ => layout::furnish(&mut world, &mut rng),
+            }
         }
         world.sort();
         world.lamps.sort();
         world
+    }
+
+    /// Where traffic drives: the camera's own lane and the one beside it, unless the world has more.
+    pub fn lanes(&self) -> Vec<Lane> {
+        if !self.lanes.is_empty() {
+            return self.lanes.clone();
+        }
+        [(-1.65, true), (1.65, false)]
+            .map(|(lateral, forward)| Lane { lateral, forward })
+            .to_vec()
     }
 
     /// Takes the day away where there is none.
@@ -163,6 +234,7 @@ impl World {
                 self.light = (Rgb::new(0.02, 0.022, 0.03), Rgb::new(0.035, 0.038, 0.05));
             }
             Scene::Garage => self.light = (Rgb::zeros(), Rgb::new(0.09, 0.09, 0.086)),
+            Scene::Indoor => self.light = (Rgb::zeros(), Rgb::new(0.3, 0.29, 0.27)),
             _ => {}
         }
     }

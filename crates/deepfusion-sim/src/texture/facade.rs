@@ -1,6 +1,7 @@
 //! Walls with windows, doors, shops, shutters and dirt; tiled roofs.
 
 use super::noise::{Noise, band, bands, beyond, hash, unit};
+use super::pattern::Pattern;
 use super::{Patch, Rgb, mix, vary};
 use crate::primitive::FACE_TOP;
 
@@ -44,6 +45,8 @@ pub struct Facade {
     pub ledges: bool,
     /// How dirty it is, 0 to 1.
     pub grime: f32,
+    /// What the walls are clad with, in the place of `wall` and `colour`.
+    pub skin: Option<Pattern>,
 }
 
 impl Facade {
@@ -92,6 +95,9 @@ impl Facade {
         seed: u32,
     ) -> Rgb {
         let (x, y) = (u + shift, v + 0.37 * shift);
+        if let Some(skin) = &self.skin {
+            return self.trimmed(skin.at(noise, [u, v], [fu, fv], v, size, seed), v, fv);
+        }
         let grain = noise.fractal(x, y, 2.3, 6, 0.82, size);
         let base = match self.wall {
             Wall::Plaster => {
@@ -111,6 +117,18 @@ impl Facade {
         }
         let plinth = 1.0 - beyond(v, 0.65, fv);
         mix(&colour, &(vary(&self.trim, grain, 0.4) * 0.5), 0.8 * plinth)
+    }
+
+    /// Ledges and plinth on a clad wall.
+    #[inline]
+    fn trimmed(&self, mut colour: Rgb, v: f32, fv: f32) -> Rgb {
+        if self.ledges {
+            let line = bands(v, self.floor, 0.0, 0.16, fv);
+            let shade = bands(v + 0.1, self.floor, 0.0, 0.1, fv);
+            colour = mix(&colour, &self.trim, 0.85 * line) * (1.0 - 0.5 * shade);
+        }
+        let plinth = 1.0 - beyond(v, 0.65, fv);
+        mix(&colour, &(self.trim * 0.45), 0.6 * self.grime * plinth)
     }
 
     #[inline]

@@ -1,6 +1,7 @@
 //! Asphalt, markings, kerbs, pavements, grass.
 
 use super::facade::courses;
+use super::look::Look;
 use super::noise::{Noise, band, bands, beyond, hash, length, lerp, smoothstep, unit};
 use super::{Rgb, mix, vary};
 
@@ -42,6 +43,8 @@ pub struct Stretch {
     pub beyond: [Beyond; 2],
     /// How the pavement is laid: right, left.
     pub paving: [Paving; 2],
+    /// The ground of a varied world, in the place of all of the above.
+    pub look: Option<Look>,
 }
 
 /// Ground beyond the pavement.
@@ -70,6 +73,9 @@ pub enum Paving {
 
 /// The carriageway.
 pub fn road(noise: &Noise, p: &GroundPatch, stretch: &Stretch, seed: u32) -> Rgb {
+    if let Some(look) = &stretch.look {
+        return look.carriageway(noise, p, seed);
+    }
     let mut tone = stretch.asphalt;
     // Whole stretches were laid at different times; patches were mended.
     tone *= 1.0 + 0.18 * noise.wave(p.x, p.y, 23.0, p.size);
@@ -167,8 +173,9 @@ fn markings(noise: &Noise, p: &GroundPatch, stretch: &Stretch) -> f32 {
     paint * kept * beyond(-p.kerb, 0.1, fl)
 }
 
+/// A manhole's lid, here and there.
 #[inline]
-fn manhole(noise: &Noise, p: &GroundPatch, colour: &Rgb, seed: u32) -> Rgb {
+pub fn manhole(noise: &Noise, p: &GroundPatch, colour: &Rgb, seed: u32) -> Rgb {
     let (cs, cl) = ((p.s / 11.0).floor(), (p.lateral / 2.9).floor());
     let code = hash(cs as i32, cl as i32, seed ^ 0xAB);
     if unit(code, 0) > 0.33 || p.size > 0.3 {
@@ -191,7 +198,7 @@ fn manhole(noise: &Noise, p: &GroundPatch, colour: &Rgb, seed: u32) -> Rgb {
 
 /// Fallen leaves and litter: at most one in each cell of 0.4 m.
 #[inline]
-fn leaves(p: &GroundPatch, colour: &Rgb, density: f32, seed: u32) -> Rgb {
+pub fn leaves(p: &GroundPatch, colour: &Rgb, density: f32, seed: u32) -> Rgb {
     const CELL: f32 = 0.4;
     let seen = (1.5 - p.size / 0.09).clamp(0.0, 1.0);
     if seen <= 0.0 {
@@ -239,6 +246,9 @@ pub fn beside(
     pavement: f32,
     seed: u32,
 ) -> Rgb {
+    if let Some(look) = &stretch.look {
+        return look.beside(noise, p, verge, pavement, seed);
+    }
     let side = usize::from(p.lateral > 0.0);
     let fl = p.extent[1];
     let grain = noise.fractal(p.x - 13.0, p.y, 1.2, 6, 0.9, p.size);

@@ -2,8 +2,11 @@
 
 pub mod facade;
 pub mod ground;
+pub mod leaves;
+pub mod look;
 pub mod noise;
 pub mod objects;
+pub mod pattern;
 pub mod sky;
 
 use crate::primitive::V3;
@@ -53,6 +56,10 @@ pub enum Material {
     Tyre,
     /// A sign or a poster: two colours in large shapes.
     Sign(Rgb, Rgb),
+    /// Leaves of a lobe of a crown.
+    Leaves(leaves::Leaves),
+    /// A random surface.
+    Pattern(Box<pattern::Pattern>),
 }
 
 impl Material {
@@ -69,6 +76,8 @@ impl Material {
             Self::Paint(paint) => paint.albedo(noise, patch),
             Self::Tyre => objects::tyre(noise, patch),
             Self::Sign(a, b) => objects::sign(noise, patch, a, b),
+            Self::Leaves(leaves) => leaves.albedo(noise, patch),
+            Self::Pattern(pattern) => pattern.albedo(noise, patch),
         }
     }
 }

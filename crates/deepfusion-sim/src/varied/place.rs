@@ -8,7 +8,7 @@ use crate::motion::Drive;
 use crate::primitive::V3;
 use crate::render::Cores;
 use crate::road::Road;
-use crate::scene::World;
+use crate::scene::{Variety, World};
 use crate::traffic::Traffic;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -17,8 +17,11 @@ use rand_chacha::ChaCha8Rng;
 const BEHIND: f64 = 110.0;
 const AHEAD: f64 = 190.0;
 
-/// Traffic is simulated for so long, seconds; cameras stand along the way that a car drives meanwhile.
+/// Cameras stand along the way that a car drives in this time, seconds.
 const DURATION_S: f64 = 9.0;
+
+/// Share of the worlds that are not varied.
+const PLAIN: f64 = 0.12;
 
 /// A built world.
 pub struct Place {
@@ -26,8 +29,8 @@ pub struct Place {
     pub world: World,
     /// Light on its ground.
     pub light: GroundLight,
-    /// What moves.
-    pub traffic: Traffic,
+    /// How dense its traffic is at most, in [0, 1]; none where nothing drives.
+    density: f64,
     /// Cameras are placed from 0 to here, metres along the street.
     pub length: f64,
 }
@@ -43,38 +46,43 @@ impl Place {
         let drive = Drive::simulate(&mut rng, &road, DURATION_S, scene.pace());
         let length = drive.progress(DURATION_S).0;
         road.truncate(length + AHEAD);
-        let mut world = World::furnish(road, seed, scene);
+        // Some worlds are the plain ones of `simulate`, where there is one of this kind.
+        let variety = if Scene::ALL.contains(&scene) && rng.random_bool(PLAIN) {
+            Variety::none()
+        } else {
+            Variety::draw(&mut rng)
+        };
+        let mut world = World::furnish_varied(road, seed, scene, &variety);
         world.sun = sun(&mut rng);
         let light = GroundLight::bake(&world, Cores::One);
-        let cars = match scene {
-            Scene::Garage => rng.random_range(0..3),
-            Scene::Park => rng.random_range(0..5),
-            _ => rng.random_range(0..13),
-        };
-        let traffic = Traffic::new(&mut rng, &world, &drive, DURATION_S, cars);
         Self {
             world,
             light,
-            traffic,
+            density: rng.random(),
             length,
         }
     }
 
-    /// A time of its traffic, seconds.
-    pub fn time(rng: &mut ChaCha8Rng) -> f64 {
-        rng.random_range(0.0..DURATION_S)
+    /// The traffic around a place on the street, metres along it. `nearest`: how far ahead of it the lane is free.
+    pub fn traffic(&self, rng: &mut ChaCha8Rng, s: f64, nearest: f64) -> Traffic {
+        let speed = 9.0 * self.world.scene.pace();
+        let density = self.density * rng.random_range(0.0..1.0);
+        Traffic::around(rng, &self.world, (s, speed, nearest), density)
     }
 }
 
-/// By daylight mostly streets, then shopping streets and parks; else garages and nights, half and half.
+/// By daylight mostly streets, then shopping streets, parks, country roads and motorways; else garages and nights,
+/// half and half.
 fn scene(rng: &mut ChaCha8Rng, daylight: f64) -> Scene {
     if rng.random_bool(daylight) {
         weighted(
             rng,
             &[
-                (0.5, Scene::Urban),
-                (0.25, Scene::Commercial),
-                (0.25, Scene::Park),
+                (0.42, Scene::Urban),
+                (0.18, Scene::Commercial),
+                (0.14, Scene::Park),
+                (0.15, Scene::Country),
+                (0.11, Scene::Motorway),
             ],
         )
     } else {

@@ -33,7 +33,7 @@ pub enum Weather {
 /// the pictures; the ground is wet in a third of those without sun and in one of ten others.
 pub fn draw(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {
     match world.scene {
-        Scene::Garage => (Weather::Indoor, indoor(rng, world)),
+        Scene::Garage | Scene::Indoor => (Weather::Indoor, indoor(rng, world)),
         Scene::Night => (Weather::Night, night(rng, world)),
         _ => day(rng, world),
     }
