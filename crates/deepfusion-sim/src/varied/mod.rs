@@ -96,7 +96,7 @@ impl Endless {
             .get(world_number, || Place::build(config, world_number));
         let world = &place.world;
 
-        let mut rng = generator(config.seed, index, 0xCA4E_4A);
+        let mut rng = generator(config.seed, index, 0x00CA_4E4A);
         let anchor = rng.random_range(0.0..place.length);
         let nearest = rng.random_range(3.0..40.0);
         let traffic = place.traffic(&mut rng, anchor, nearest);
