@@ -310,6 +310,19 @@ impl Dataset {
         self.recording.ground_truth(&self.frames()[frame], kind)
     }
 
+    /// Exact depth of every pixel of a frame, where the recording has it beside its scans, as the simulator's drives do:
+    /// H×W at the image's size, camera z in metres, infinite where nothing is within 255 m (the sky). `None` where there is
+    /// no such depth; that of an RGB-D folder is its [`Self::ground_truth`].
+    ///
+    /// # Errors
+    /// [`Error::Image`] for a depth image that cannot be read, [`Error::Size`] for one of another size than the images.
+    ///
+    /// # Panics
+    /// If there is no frame of that index.
+    pub fn dense_depth(&self, frame: usize) -> Result<Option<DepthMap>> {
+        self.recording.dense_depth(&self.frames()[frame])
+    }
+
     /// [`Self::ground_truth`] and, where a LiDAR measured them, the velocities of what is seen at each pixel with depth
     /// (H×W, m/s over ground along the LiDAR's ray, NaN where unknown).
     ///

@@ -20,7 +20,7 @@ const REACH: u64 = 5;
 /// that a projected point was rounded by.
 const MARGIN_M: f64 = 0.1;
 /// Masks of the simulator's drives, one PNG a frame beside the images: 255 on what moves.
-const MASKS: &str = "moving_02";
+pub(crate) const MASKS: &str = "moving_02";
 
 /// Where moving labels come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

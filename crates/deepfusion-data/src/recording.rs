@@ -89,6 +89,14 @@ pub trait Recording: fmt::Debug + Send + Sync {
         Ok(None)
     }
 
+    /// Depth of every pixel, where the recording knows it beside its scans: [`Dataset::dense_depth`].
+    ///
+    /// # Errors
+    /// Where it is there and cannot be read.
+    fn dense_depth(&self, _frame: &Frame) -> Result<Option<DepthMap>> {
+        Ok(None)
+    }
+
     /// [`Self::ground_truth`] with the velocities that were measured beside it.
     ///
     /// # Errors

@@ -153,6 +153,34 @@ fn masks_are_read_and_must_fit() {
     assert!(error.to_string().contains("60x19"), "{error}");
 }
 
+#[test]
+fn exact_depth_is_the_simulators_and_its_sky_is_infinite() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = drive_at(folder.path(), 10.0);
+    let depths = drive.join("proj_depth/groundtruth/image_02");
+    fs::create_dir_all(&depths).unwrap();
+    let gray = |width, height| {
+        let depth = |x: u32, y: u32| if y < 4 { 0 } else { 256 * (x + 1) as u16 };
+        image::ImageBuffer::from_fn(width, height, |x, y| image::Luma([depth(x, y)]))
+    };
+    gray(62, 19).save(depths.join("0000000005.png")).unwrap();
+    gray(60, 19).save(depths.join("0000000006.png")).unwrap();
+    // Without the simulator's masks it may be KITTI's annotation, where 0 is unknown.
+    assert!(open(&drive).dense_depth(5).unwrap().is_none());
+    fs::create_dir_all(drive.join("moving_02")).unwrap();
+    let dataset = open(&drive);
+    let depth = dataset.dense_depth(5).unwrap().unwrap();
+    assert_eq!((depth.width, depth.height), (62, 19));
+    assert_eq!(depth.data[3 * 62 + 7], f32::INFINITY);
+    assert_eq!(depth.data[4 * 62 + 7], 8.0);
+    assert!(dataset.dense_depth(4).unwrap().is_none());
+    let error = dataset.dense_depth(6).unwrap_err().to_string();
+    assert!(
+        error.contains("the exact depth is 60x19, the image 62x19"),
+        "{error}"
+    );
+}
+
 /// KITTI's drive 0005: a van and a cyclist ahead all the way, parked cars in its second half.
 #[test]
 fn traffic_of_a_real_drive() {

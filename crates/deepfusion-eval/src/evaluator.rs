@@ -8,7 +8,7 @@ use crate::points::{DrawnPoint, Points};
 use crate::report::{FixedScaled, ProtocolSummary, RangeBin, Report, Scale};
 use crate::resample::{Axis, sample};
 use crate::statistics::{Reservoir, bootstrap_mean_ci95, mean, median, standard_deviation};
-use crate::{Error, Grid, Holes, Prediction, Protocol, Result, Scaling};
+use crate::{Error, Grid, Holes, ImageSharpness, Prediction, Protocol, Result, Scaling, Sharpness};
 
 /// Borders of the range bins, in metres (SPEC 5).
 const RANGES_M: [u32; 5] = [0, 10, 20, 40, 80];
@@ -26,6 +26,9 @@ pub struct Sample<'a> {
     pub moving: Option<&'a [bool]>,
     /// The camera at the ground truth's size: the point statistics then are distances in space, else along z.
     pub intrinsics: Option<&'a Intrinsics>,
+    /// Dense depth in metres, where there is such beside a sparse ground truth: 0 = unknown, infinity = sky. Only how sharp
+    /// the prediction is follows from it; `None` takes the ground truth itself, where that is dense.
+    pub dense: Option<&'a Grid>,
 }
 
 /// What one image scored.
@@ -47,6 +50,8 @@ pub struct ImageScore {
     pub still: Option<Metrics>,
     /// Unscaled metrics of those that do, where known.
     pub moving: Option<Metrics>,
+    /// How sharp the prediction is, where dense truth is known.
+    pub sharpness: Option<ImageSharpness>,
 }
 
 /// Compares predictions with ground truth, image by image, and sums up.
@@ -117,6 +122,7 @@ impl Evaluator {
             ground_truth,
             moving: None,
             intrinsics: None,
+            dense: None,
         })
     }
 
@@ -172,6 +178,11 @@ impl Evaluator {
             ratio,
             still: part(false),
             moving: part(true),
+            sharpness: ImageSharpness::of(
+                image.dense.unwrap_or(truth),
+                image.prediction,
+                &self.protocol,
+            ),
         };
         for (bin, edges) in RANGES_M.windows(2).enumerate() {
             let inside = |p: &Pixel| p.gt >= f64::from(edges[0]) && p.gt < f64::from(edges[1]);
@@ -245,6 +256,7 @@ impl Evaluator {
             hole_rate_moving: mean(&self.moving_hole_rates),
             missing_rate: (self.protocol.holes == Holes::Skip)
                 .then(|| self.missing as f64 / self.masked.max(1) as f64),
+            sharpness: Sharpness::mean(images.iter().filter_map(|i| i.sharpness.as_ref())),
             points: self.point_statistics(),
             trivial: None,
             scenarios: Vec::new(),

@@ -3,10 +3,12 @@
 //! The way of an image: a [`Prediction`] (depth or disparity, any size) and a ground truth [`Grid`] go into
 //! [`Evaluator::add`]; [`Evaluator::report`] gives the [`Report`], whose JSON is the one scripts rely on and whose
 //! `Display` is the table for people. [`TrivialBaseline`] makes the row that any useful network must beat: the mean
-//! depth of each pixel over the training scans. Paths of the camera are compared in [`odometry`].
+//! depth of each pixel over the training scans. Where truth is dense, [`Sharpness`] says how sharp boundaries are. Paths of
+//! the camera are compared in [`odometry`].
 //!
 //! # Conventions
-//! Depth is camera z in metres; ground truth 0 (or NaN, or negative) means none. Disparity is 1/depth in 1/m. Arrays are
+//! Depth is camera z in metres; ground truth 0 (or NaN, or negative) means none, infinity what is
+//! beyond every range. Disparity is 1/depth in 1/m. Arrays are
 //! H×W, row by row. All arithmetic is in `f64`, whatever the files hold.
 
 mod array_set;
@@ -20,6 +22,7 @@ mod points;
 mod protocol;
 mod report;
 mod resample;
+mod sharpness;
 mod statistics;
 mod table;
 mod trivial;
@@ -32,5 +35,6 @@ pub use metrics::Metrics;
 pub use points::{DrawnPoint, PointErrors, PointRange, Points};
 pub use protocol::{Crop, GroundTruth, Holes, Protocol, Scaling};
 pub use report::{FixedScaled, ProtocolSummary, RangeBin, Report, Scale, ScenarioRow, TrivialRow};
+pub use sharpness::{BoundaryError, ImageSharpness, Sharpness};
 pub use statistics::median;
 pub use trivial::TrivialBaseline;

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use crate::{Crop, GroundTruth, Metrics, Points, Protocol};
+use crate::{Crop, GroundTruth, Metrics, Points, Protocol, Sharpness};
 
 /// What an evaluation says. Serialises to the JSON that scripts rely on: field names are fixed, parts that do not apply
 /// are absent, and a number that does not exist is `null`, never NaN.
@@ -44,6 +44,9 @@ pub struct Report {
     /// Share of the ground truth without prediction, where predictions may be absent; pooled over pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missing_rate: Option<f64>,
+    /// How sharp the predictions are, where truth is dense; median-scaled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sharpness: Option<Sharpness>,
     /// Distances of randomly drawn points from the truth, where asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points: Option<Points>,

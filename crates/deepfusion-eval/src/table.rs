@@ -1,6 +1,6 @@
 use std::fmt;
 
-use crate::{Crop, GroundTruth, Metrics, PointErrors, Points, Report};
+use crate::{Crop, GroundTruth, Metrics, PointErrors, Points, Report, Sharpness};
 
 const LABEL: usize = 22;
 
@@ -123,8 +123,37 @@ impl Report {
                 100.0 * rate
             )?;
         }
-        Ok(())
+        self.sharpness
+            .as_ref()
+            .map_or(Ok(()), |s| sharp_lines(f, s))
     }
+}
+
+/// What truth without a boundary leaves open is not printed.
+fn sharp_lines(f: &mut fmt::Formatter<'_>, sharpness: &Sharpness) -> fmt::Result {
+    let images = |n: usize| match n {
+        1 => "1 image".to_owned(),
+        n => format!("{n} images"),
+    };
+    if let (Some(accuracy), Some(completeness)) = (
+        sharpness.boundary_accuracy_px,
+        sharpness.boundary_completeness_px,
+    ) {
+        writeln!(
+            f,
+            "edges   {accuracy:.2} px from the true ones (accuracy), {completeness:.2} px with those missed (completeness); {}",
+            images(sharpness.boundary_images)
+        )?;
+    }
+    if let Some(share) = sharpness.flying_share {
+        writeln!(
+            f,
+            "flying  {:.1} % of the pixels at depth jumps lie between the two sides; {}",
+            100.0 * share,
+            images(sharpness.flying_images)
+        )?;
+    }
+    Ok(())
 }
 
 /// Distances of drawn points: all, then by range.

@@ -49,6 +49,7 @@ fn evaluated(reference: &Value, points: usize, points_seed: u64) -> Evaluator {
             ground_truth: &grid(&reference["size"], &image["ground_truth"]),
             moving: None,
             intrinsics: Some(&k),
+            dense: None,
         };
         evaluator.add_sample(&sample).unwrap();
     }

@@ -90,6 +90,7 @@ fn static_and_moving_pixels_make_up_the_image() {
         ground_truth: &truth,
         moving: Some(&moving),
         intrinsics: None,
+        dense: None,
     };
     evaluator.add_sample(&sample).unwrap();
     let report = evaluator.report().unwrap();
@@ -197,6 +198,7 @@ fn drawn_points_measure_distances_in_space() {
         ground_truth: &truth,
         moving: None,
         intrinsics: Some(&k),
+        dense: None,
     };
     evaluator.add_sample(&sample).unwrap();
     let in_space = evaluator.report().unwrap().points.unwrap();

@@ -4,17 +4,21 @@ use crate::clock::on_the_vehicles_clock;
 use crate::kitti::config::DriveConfig;
 use crate::kitti::layout::numbered_files;
 use crate::kitti::{self, Calibration, Drive, GtKind, TimeStamps, read_oxts};
+use crate::moving::MASKS;
 use crate::recording::{CalibrationPlace, Recording};
 use crate::selection::Selection;
 use crate::{
     Camera, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame, FrameImage, MovingLabels,
-    OpenOptions, Result, Stream, load_rgb,
+    OpenOptions, Result, Stream, load_rgb, read_depth_png,
 };
 use deepfusion_cloud::PointCloud;
 use deepfusion_geometry::DepthMap;
 use image::RgbImage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// Exact depth of the simulator's drives, one 16-bit PNG a frame.
+const DEPTHS: &str = "proj_depth/groundtruth/image_02";
 
 /// One camera of one drive.
 #[derive(Debug)]
@@ -212,6 +216,32 @@ impl Recording for KittiRecording {
             (k.width as usize, k.height as usize),
             kind,
         )))
+    }
+
+    fn dense_depth(&self, frame: &Frame) -> Result<Option<DepthMap>> {
+        // Only the simulator's masks tell its drives from KITTI's own, whose annotated depth may lie in the same place: there 0
+        // is a pixel that no scan has met, here the sky.
+        if self.camera.number() != 2 || !self.drive.folder.join(MASKS).is_dir() {
+            return Ok(None);
+        }
+        let name = format!("{DEPTHS}/{:010}.png", frame.number);
+        let path = self.drive.folder.join(name);
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let mut depth = read_depth_png(&path)?;
+        let k = self.calibration.intrinsics;
+        let found = (depth.width as u32, depth.height as u32);
+        if found != (k.width, k.height) {
+            return Err(Error::Size {
+                what: "the exact depth",
+                found,
+                image: (k.width, k.height),
+            });
+        }
+        let sky = depth.data.iter_mut().filter(|d| **d == 0.0);
+        sky.for_each(|d| *d = f32::INFINITY);
+        Ok(Some(depth))
     }
 
     fn moving_labels(&self, dataset: &Dataset) -> Result<Option<MovingLabels>> {

@@ -1,6 +1,6 @@
 use std::fmt::Write as _;
 
-use deepfusion_eval::{Crop, GroundTruth, Metrics, Report};
+use deepfusion_eval::{Crop, GroundTruth, Metrics, Report, Sharpness};
 
 use super::escape;
 
@@ -192,6 +192,30 @@ fn metric_rows(report: &Report) -> Vec<Vec<String>> {
     rows
 }
 
+/// What truth without a boundary leaves open has no row.
+fn sharp_rows(sharpness: &Sharpness) -> Vec<Vec<String>> {
+    let px = |v: f64| format!("{v:.2} px");
+    let percent = |v: f64| format!("{:.1} %", 100.0 * v);
+    let row = |label: &str, value: Option<String>| value.map(|v| vec![label.to_owned(), v]);
+    [
+        row(
+            "depth boundaries: how far from the true ones (accuracy)",
+            sharpness.boundary_accuracy_px.map(px),
+        ),
+        row(
+            "depth boundaries: the same with those missed, each 10 px (completeness)",
+            sharpness.boundary_completeness_px.map(px),
+        ),
+        row(
+            "flying pixels: at depth jumps, between the two sides",
+            sharpness.flying_share.map(percent),
+        ),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
 fn scale_table(report: &Report) -> String {
     let scale = &report.scale;
     let interval = scale.bias_ci95.map_or_else(
@@ -225,6 +249,7 @@ fn scale_table(report: &Report) -> String {
             format!("{:.2} %{moving}", 100.0 * rate),
         ]);
     }
+    rows.extend(report.sharpness.iter().flat_map(sharp_rows));
     if let Some(rate) = report.missing_rate {
         rows.push(vec![
             "ground truth without prediction".into(),

@@ -234,6 +234,7 @@ fn from_arrays(
             ground_truth: &known.read(*depth)?,
             moving: None,
             intrinsics: None,
+            dense: None,
         })?;
         if counted {
             places.push(Place(*prediction, *depth));

@@ -300,6 +300,7 @@ pub fn evaluate_datasets(
             let known = truth.of(dataset, frame, arrays.get(name).copied())?;
             if let Some(ground_truth) = known {
                 let prediction = predict(dataset, frame)?;
+                let dense = dataset.dense_depth(frame)?.map(|depth| Grid::from(&depth));
                 let k = dataset.intrinsics(frame);
                 let same_size = (k.width as usize, k.height as usize)
                     == (ground_truth.width(), ground_truth.height());
@@ -316,6 +317,7 @@ pub fn evaluate_datasets(
                     ground_truth: &ground_truth,
                     moving: moving.as_deref(),
                     intrinsics: same_size.then_some(&k),
+                    dense: dense.as_ref(),
                 };
                 if comparison.add(&sample)? {
                     places.push(Place(number, frame));
