@@ -239,7 +239,7 @@ fn views_are_of_many_kinds_and_none_is_stuck() {
         grey += usize::from(view.grey);
         moving += usize::from(view.moving.contains(&true));
     }
-    assert_eq!(scenes.len(), 7, "{scenes:?}");
+    assert_eq!(scenes.len(), 5, "{scenes:?}");
     assert_eq!(weathers.len(), 6, "{weathers:?}");
     assert!((15..65).contains(&grey), "{grey}");
     assert!(moving > 40, "{moving}");

@@ -1,6 +1,5 @@
 use crate::{Adam, Error, Model, TrainConfig};
 use burn::tensor::Device;
-use deepfusion_nn::DepthNet;
 use deepfusion_nn::weights::{self, Weights};
 use std::path::{Path, PathBuf};
 
@@ -296,24 +295,6 @@ fn take_flow_decoder(model: &mut Model, saved: &Weights) -> Result<bool, Error> 
         false => weights::apply(decoder, saved)?,
     });
     Ok(missing)
-}
-
-/// The configuration and the depth network of a run's folder or a checkpoint in it; the folder means `best` where
-/// there is one. `set` names one of the data sets it learned from, where it learned several.
-///
-/// # Errors
-/// As [`RunFolder::open`], [`RunFolder::load_depth_weights`] and [`TrainConfig::for_set`]; [`Error::Network`] for
-/// weights of another architecture.
-pub fn load_depth_net(
-    path: &Path,
-    set: Option<&str>,
-    device: &Device,
-) -> Result<(TrainConfig, DepthNet), Error> {
-    let (folder, kind) = RunFolder::open(path)?;
-    let config = folder.read_config()?.for_set(set)?;
-    let (weights, _) = folder.load_depth_weights(kind.unwrap_or_else(|| folder.preferred()))?;
-    let net = weights::apply(config.depth_net.init(device)?, &weights)?;
-    Ok((config, net))
 }
 
 impl Checkpoint {

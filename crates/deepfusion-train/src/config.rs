@@ -147,9 +147,12 @@ pub struct TrainConfig {
     pub clip_norm: f64,
     /// Decides everything random.
     pub seed: u64,
-    /// The weights to begin from, as `--init` takes them.
+    /// The weights to begin from, as `--init` takes them: a path, or with `init_sha256` the name of a network that the program carries.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub init: Option<PathBuf>,
+    /// SHA-256 of the embedded network's weights, so that a repeated run notices that it would begin from others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub init_sha256: Option<String>,
     /// Pairs slower than this are dropped, in m/s.
     pub min_speed_mps: f64,
     /// Share of each drive's end that is held out for validation.
@@ -233,10 +236,12 @@ fn absolute(path: PathBuf) -> PathBuf {
 }
 
 impl TrainConfig {
-    /// Makes every path absolute.
+    /// Makes every path absolute. The name of an embedded network is none.
     pub fn make_absolute(&mut self) {
         self.data.make_absolute();
-        self.init = self.init.take().map(absolute);
+        if self.init_sha256.is_none() {
+            self.init = self.init.take().map(absolute);
+        }
     }
 
     /// The names that [`Self::with`] and [`Self::without`] take: parts of the depth network, then the terms
@@ -513,6 +518,23 @@ mod tests {
         assert_eq!(data.sets[0].paths, [here.join("c")]);
         assert_eq!(data.sets[0].validation, [here.join("d")]);
         assert_eq!(data.sets[0].split, Some(here.join("e.txt")));
+    }
+
+    /// A run is moved with its paths; what the program carries has none.
+    #[test]
+    fn the_name_of_an_embedded_network_stays() {
+        let mut config = Preset::Tiny.config();
+        config.init = Some("street".into());
+        let mut path = config.clone();
+        path.make_absolute();
+        let here = std::env::current_dir().unwrap();
+        assert_eq!(path.init, Some(here.join("street")));
+        config.init_sha256 = Some("ab".repeat(32));
+        let mut name = config.clone();
+        name.make_absolute();
+        assert_eq!(name, config);
+        let text = config.to_toml().unwrap();
+        assert_eq!(toml::from_str::<TrainConfig>(&text).unwrap(), config);
     }
 
     /// A run from before the key was there is read as one that has it.

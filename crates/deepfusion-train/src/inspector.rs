@@ -1,11 +1,9 @@
 //! What a trained network sees on the way to depth: the paper's Fig. 5.
 
-use std::path::Path;
-
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_nn::{DepthNet, InputSize};
 
-use crate::{Error, load_depth_net};
+use crate::{Error, StoredNetwork};
 
 /// A map over the image, as coarse as the layer it comes from.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +27,7 @@ pub struct LayerMaps {
     pub attention: Option<(FeatureMap, [f32; 2])>,
 }
 
-/// Shows what a run's depth network computes within. It runs in Burn, beside whatever engine predicts.
+/// Shows what a depth network computes within. It runs in Burn, beside whatever engine predicts.
 #[derive(Debug)]
 pub struct Inspector {
     net: DepthNet,
@@ -38,15 +36,14 @@ pub struct Inspector {
 }
 
 impl Inspector {
-    /// That of a run's folder or a checkpoint in it; `set` as in [`load_depth_net`].
+    /// For a network, on a device.
     ///
     /// # Errors
-    /// As [`load_depth_net`].
-    pub fn load(path: &Path, set: Option<&str>, device: &Device) -> Result<Self, Error> {
-        let (config, net) = load_depth_net(path, set, device)?;
+    /// As [`StoredNetwork::build`].
+    pub fn new(network: &StoredNetwork, device: &Device) -> Result<Self, Error> {
         Ok(Self {
-            net,
-            size: config.size,
+            net: network.build(device)?,
+            size: network.config.size,
             device: device.clone(),
         })
     }

@@ -35,6 +35,7 @@ mod sampler;
 mod selection;
 mod shared_frames;
 mod source;
+mod stored;
 mod trainer;
 mod view_synthesis;
 mod window;
@@ -42,7 +43,7 @@ mod window;
 pub use adam::{Adam, NamedGradients, StepOutcome};
 pub use augment::Jitter;
 pub use batch::{BatchLoader, SnippetBatch};
-pub use checkpoint::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder, load_depth_net};
+pub use checkpoint::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder};
 pub use config::{
     Augmentation, DataConfig, LearningRateSchedule, Reprojection, ReversedPose, TrainConfig,
     ViewMotion,
@@ -70,5 +71,6 @@ pub use runner::{BurnRunner, DepthRunner, FusedRunner};
 pub use sampler::Sampler;
 pub use shared_frames::{SharedFrames, shared_frames};
 pub use source::{Sample, SampleSet};
+pub use stored::StoredNetwork;
 pub use trainer::{TrainSummary, Trainer, validation_loss};
 pub use view_synthesis::{Synthesised, synthesise};

@@ -1,8 +1,7 @@
-use crate::{CheckpointKind, DepthRunner, Error, PreparedImage, Preparer, RunFolder, TrainConfig};
+use crate::{DepthRunner, Error, PreparedImage, Preparer, StoredNetwork, TrainConfig};
 use deepfusion_data::RgbImage;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_nn::weights::Weights;
-use std::path::Path;
 use std::sync::Arc;
 
 /// A trained depth network, ready for images.
@@ -10,8 +9,6 @@ use std::sync::Arc;
 pub struct Predictor {
     config: TrainConfig,
     runner: Arc<dyn DepthRunner>,
-    /// Which checkpoint it was loaded from.
-    pub checkpoint: CheckpointKind,
     /// Steps it was trained for.
     pub step: usize,
 }
@@ -84,36 +81,23 @@ impl Prediction {
 }
 
 impl Predictor {
-    /// Loads a run's folder or a checkpoint in it; the folder means `best` where there is one. `runner` makes
-    /// what runs the network of its configuration and weights.
+    /// Of a network wherever it is stored; `runner` makes what runs it of its configuration and weights.
     ///
     /// # Errors
-    /// As [`RunFolder::open`] and [`RunFolder::load_depth_weights`], and the runner's own.
-    pub fn load<E: From<Error>>(
-        path: &Path,
+    /// The runner's own.
+    pub fn of<E>(
+        network: StoredNetwork,
         runner: impl FnOnce(&TrainConfig, Weights) -> Result<Arc<dyn DepthRunner>, E>,
     ) -> Result<Self, E> {
-        Self::load_for(path, None, runner)
-    }
-
-    /// As [`Self::load`], with the metres of one of the data sets that the run learned from.
-    ///
-    /// # Errors
-    /// As [`Self::load`] and [`TrainConfig::for_set`].
-    pub fn load_for<E: From<Error>>(
-        path: &Path,
-        set: Option<&str>,
-        runner: impl FnOnce(&TrainConfig, Weights) -> Result<Arc<dyn DepthRunner>, E>,
-    ) -> Result<Self, E> {
-        let (folder, kind) = RunFolder::open(path)?;
-        let config = folder.read_config()?.for_set(set)?;
-        let checkpoint = kind.unwrap_or_else(|| folder.preferred());
-        let (weights, state) = folder.load_depth_weights(checkpoint)?;
+        let StoredNetwork {
+            config,
+            weights,
+            step,
+        } = network;
         Ok(Self {
             runner: runner(&config, weights)?,
             config,
-            checkpoint,
-            step: state.step,
+            step,
         })
     }
 

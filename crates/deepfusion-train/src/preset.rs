@@ -91,6 +91,7 @@ impl Preset {
             clip_norm: 10.0,
             seed: 0,
             init: None,
+            init_sha256: None,
             min_speed_mps: 0.5,
             validation_share: 0.1,
             validate_every: 0,

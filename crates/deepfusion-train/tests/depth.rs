@@ -111,7 +111,11 @@ fn simulated_views_teach_depth_and_resume_exactly() {
         after.depth
     );
     assert!((0.5..2.0).contains(&scale_ratio), "{scale_ratio}");
-    assert!(steps.iter().all(|l| l.reprojection == 0.0 && l.depth == l.total));
+    assert!(
+        steps
+            .iter()
+            .all(|l| l.reprojection == 0.0 && l.depth == l.total)
+    );
     let Some(Lesson::Depth { truth, error }) = lesson else {
         panic!("{lesson:?}");
     };

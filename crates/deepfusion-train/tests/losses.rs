@@ -3,8 +3,8 @@
 use burn::tensor::{Bool, Device, Tensor, TensorData};
 use deepfusion_nn::weights::{self, Weights};
 use deepfusion_train::losses::{
-    DepthTruth, RigidView, affine_invariant, agreement, depth_seen_from_target, epipolar_distance, flow,
-    flow_view, moving_pixels,
+    DepthTruth, RigidView, affine_invariant, agreement, depth_seen_from_target, epipolar_distance,
+    flow, flow_view, moving_pixels,
 };
 use deepfusion_train::{DepthLossConfig, FlowLossConfig, Motion, MovingConfig, Synthesised};
 use std::path::Path;
@@ -425,7 +425,10 @@ fn the_loss_on_known_depth_equals_pytorchs() {
         let value = value.clone().into_scalar::<f32>();
         let expected = reference.values(&format!("depth/{part}"))[0];
         // Sums of 480 terms of order 1, of either sign in the bias.
-        assert!((value - expected).abs() < 2e-6, "{part}: {value} {expected}");
+        assert!(
+            (value - expected).abs() < 2e-6,
+            "{part}: {value} {expected}"
+        );
     }
     let inputs: Vec<(&str, Tensor<4>)> = names.iter().map(String::as_str).zip(inverse).collect();
     reference.check("depth", found.loss, &inputs);

@@ -14,11 +14,12 @@ use crate::allocator;
 use crate::cli::{DeviceChoice, EngineArgs, EngineChoice, PrecisionChoice};
 use crate::commands::device;
 use crate::error::CliError;
+use crate::model::ModelSource;
 
-/// Loads a run with the engine asked for.
-pub fn load(model: &std::path::Path, args: &EngineArgs) -> Result<Predictor> {
-    let set = args.set.as_deref();
-    Predictor::load_for(model, set, |config, weights| runner(args, config, weights))
+/// Loads a network with the engine asked for.
+pub fn load(model: &ModelSource, args: &EngineArgs) -> Result<Predictor> {
+    let network = model.load(args.set.as_deref())?;
+    Predictor::of(network, |config, weights| runner(args, config, weights))
 }
 
 /// The engine asked for, with a network of this configuration and these weights.

@@ -36,6 +36,55 @@ pub enum CliError {
         /// What was given.
         input: String,
     },
+    /// No network named, and none embedded.
+    #[error("no `--model` is given, and this build has no embedded network to take instead")]
+    NoModelGiven,
+    /// Neither a path nor an embedded network's name.
+    #[error("{}: no such file or folder, and no embedded network has this name", model.display())]
+    NoSuchModel {
+        /// What was given.
+        model: PathBuf,
+        /// The names there are.
+        known: Vec<&'static str>,
+    },
+    /// Something that is kept in a run's folder, of a network that has none.
+    #[error("{option}: `{model}` has no run's folder to keep it in")]
+    NoRunFolder {
+        /// What was asked for.
+        option: &'static str,
+        /// The network's name.
+        model: String,
+    },
+    /// Poses of a network for depth alone.
+    #[error("`{model}` is a depth network alone: it has no pose network")]
+    NoPoseNet {
+        /// Its name.
+        model: String,
+    },
+    /// Encoders without a depth network.
+    #[error("{}: only its encoders were ever trained: there is no depth to pack", path.display())]
+    NothingToPack {
+        /// The checkpoint.
+        path: PathBuf,
+    },
+    /// A packed network where a run is needed.
+    #[error("{}: is packed already", path.display())]
+    PackedAlready {
+        /// What was given.
+        path: PathBuf,
+    },
+    /// An embedded network that is not the one a configuration began from.
+    #[error(
+        "the embedded network `{name}` is another one than this configuration began from: SHA-256 {found}, not {expected}"
+    )]
+    OtherStart {
+        /// Its name.
+        name: String,
+        /// Of the weights in this build.
+        found: String,
+        /// In the configuration.
+        expected: String,
+    },
     /// A file where a run's folder is needed.
     #[error("{}: pictures need a run's folder, and this is a file", path.display())]
     NoModel {
@@ -246,6 +295,27 @@ impl CliError {
             Self::NoImages { .. } => Some(
                 "give images, a folder of them, or a pattern such as 'drive/*.png'; a recording is given by its own folder or file".into(),
             ),
+            Self::NoModelGiven => Some(
+                "train one (deepfusion train --data DRIVE), then give its folder: --model RUN".into(),
+            ),
+            Self::NoSuchModel { known, .. } => Some(match known.as_slice() {
+                [] => "give the folder that `train`, `demo` or `weights import` wrote; this build has no embedded network: \
+                       train one with deepfusion train --data DRIVE"
+                    .into(),
+                known => format!(
+                    "give the folder that `train`, `demo` or `weights import` wrote, or an embedded network: {}",
+                    known.join(", ")
+                ),
+            }),
+            Self::NoRunFolder { .. } => Some(
+                "train on from it (deepfusion train --data DRIVE --init NAME), and give that run's folder".into(),
+            ),
+            Self::NoPoseNet { .. } => Some("give the folder of a run that `train` wrote".into()),
+            Self::NothingToPack { .. } => Some("train from it first: deepfusion train --data DRIVE --init RUN".into()),
+            Self::PackedAlready { .. } => Some("give the folder of the run that it was packed from".into()),
+            Self::OtherStart { .. } => Some(
+                "take the version of the program that made the run, or remove init_sha256 from the file to begin from this one".into(),
+            ),
             Self::NoModel { .. } => Some("give run folders alone, or leave out --pictures".into()),
             Self::SeveralDrives { .. } => Some("convert them one by one: give a drive's own folder".into()),
             Self::NoRos2Writer { .. } => {
@@ -342,7 +412,7 @@ pub fn told(problem: &anyhow::Error) -> String {
     text
 }
 
-/// Prints a failure on stderr; the exit code is 1, or [`interrupt::EXIT_CODE`] for work that was asked to stop.
+/// Prints a failure on stderr; the exit code is 1, [`interrupt::EXIT_CODE`] for work that was asked to stop, or 2 for a missing argument.
 pub fn report(problem: &anyhow::Error) -> ExitCode {
     const ERROR: Style = AnsiColor::Red.on_default().bold();
     const HINT: Style = AnsiColor::Cyan.on_default().bold();
@@ -360,10 +430,21 @@ pub fn report(problem: &anyhow::Error) -> ExitCode {
     text += &format!("{HINT}hint:{HINT:#} {hint}\n");
     // Where nobody reads it any more, the code still tells.
     let _ = anstream::stderr().write_all(text.as_bytes());
-    match was_stopped(problem) {
-        true => ExitCode::from(interrupt::EXIT_CODE),
-        false => ExitCode::FAILURE,
+    if was_stopped(problem) {
+        ExitCode::from(interrupt::EXIT_CODE)
+    } else if lacks_an_argument(problem) {
+        ExitCode::from(WRONG_ARGUMENTS)
+    } else {
+        ExitCode::FAILURE
     }
+}
+
+/// The exit code of wrong arguments, clap's.
+const WRONG_ARGUMENTS: u8 = 2;
+
+/// Whether an argument is missing that clap could not miss: whether it is needed depends on what is embedded.
+fn lacks_an_argument(problem: &anyhow::Error) -> bool {
+    matches!(problem.downcast_ref(), Some(CliError::NoModelGiven))
 }
 
 /// Whether nothing failed, but the work was asked to stop.
@@ -429,6 +510,7 @@ pub fn hint_of(problem: &anyhow::Error) -> Option<String> {
             deepfusion_render::Error,
             deepfusion_sim::Error,
             deepfusion_view::Error,
+            deepfusion_weights::Error,
         );
         None
     })

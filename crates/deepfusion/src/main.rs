@@ -6,6 +6,7 @@ mod commands;
 mod engine;
 mod error;
 mod interrupt;
+mod model;
 mod output;
 mod pipeline;
 mod progress;

@@ -102,6 +102,13 @@ pub fn now() -> String {
     stamp(seconds)
 }
 
+/// The day of a time (UTC), such as `2026-01-31`.
+pub fn day(time: SystemTime) -> String {
+    let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let stamp = stamp(seconds);
+    format!("{}-{}-{}", &stamp[..4], &stamp[4..6], &stamp[6..8])
+}
+
 /// Seconds since 1970 as `YYYYMMDD-HHMMSS`, UTC, by counting days through the 400-year cycle of the calendar.
 fn stamp(seconds: u64) -> String {
     let (days, rest) = (seconds / 86_400, seconds % 86_400);
@@ -143,6 +150,8 @@ mod tests {
         ] {
             assert_eq!(stamp(seconds), expected);
         }
+        let leap_day = UNIX_EPOCH + std::time::Duration::from_secs(951_827_696);
+        assert_eq!(day(leap_day), "2000-02-29");
     }
 
     #[test]

@@ -38,7 +38,7 @@ fn bags_are_trained_on_and_measured_by_scenario() {
 
     ok(
         at,
-        "train --data urban garage --preset tiny --size 64x64 --batch 2 --steps 3 --out run",
+        "train --data urban garage --preset tiny --size 64x64 --batch 2 --steps 3 --init none --out run",
     );
     let report = json(
         at,
@@ -124,7 +124,7 @@ fn what_was_noticed_while_opening_is_told_once() {
         "cut in the middle: {frames} frames"
     );
     // The same recording to train and to validate on is one.
-    let small = "--preset tiny --size 64x64 --batch 2 --steps 1";
+    let small = "--preset tiny --size 64x64 --batch 2 --steps 1 --init none";
     let refused = run(
         at,
         &format!("train --data sim --val-data sim {small} --out no"),
@@ -258,7 +258,7 @@ fn what_is_wrong_with_a_bag_is_said() {
         std::fs::write(&sidecar, text).unwrap();
         let run = run(
             at,
-            "train --data sim --preset tiny --size 64x64 --steps 1 --out no",
+            "train --data sim --preset tiny --size 64x64 --steps 1 --init none --out no",
         );
         assert_eq!(run.code, 1, "{}", run.stderr);
         assert!(run.stderr.contains("hint:"), "{}", run.stderr);
@@ -290,7 +290,7 @@ fn what_is_wrong_with_a_bag_is_said() {
     );
     let empty = run(
         at,
-        "train --data sim --preset tiny --size 64x64 --steps 1 --out no",
+        "train --data sim --preset tiny --size 64x64 --steps 1 --init none --out no",
     );
     assert_eq!(empty.code, 1);
     assert!(

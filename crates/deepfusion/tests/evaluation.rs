@@ -20,7 +20,7 @@ fn a_model_is_measured_on_traffic_and_along_the_road() {
     );
     ok(
         at,
-        "train --data sim --size 96x64 --batch 2 --steps 2 --out run",
+        "train --data sim --size 96x64 --batch 2 --steps 2 --init none --out run",
     );
 
     let report = json(at, "eval --model run --data sim --crop none --json");
@@ -135,7 +135,7 @@ fn several_data_sets_are_learned_together() {
     );
     ok(
         at,
-        "train --data road --size 96x64 --batch 2 --steps 1 --out first",
+        "train --data road --size 96x64 --batch 2 --steps 1 --init none --out first",
     );
     let mut config = TrainConfig::read(&at.join("first/config.toml")).unwrap();
     config.pose_net.metres_per_unit = 0.0;

@@ -15,7 +15,7 @@ fn a_run_becomes_a_file_that_is_its_network() {
     let at = folder.path();
     for args in [
         "simulate --out sim --frames 8 --seed 3 --scan-every 0",
-        "train --data sim --size 96x64 --batch 2 --steps 1 --out run",
+        "train --data sim --size 96x64 --batch 2 --steps 1 --init none --out run",
     ] {
         let done = run(at, args);
         assert_eq!(done.code, 0, "{args}: {}", done.stderr);

@@ -36,7 +36,7 @@ fn a_run_with_every_part_of_the_network() {
     );
     ok(
         at,
-        "train --data sim --size 96x64 --batch 2 --steps 1 --out plain",
+        "train --data sim --size 96x64 --batch 2 --steps 1 --init none --out plain",
     );
     let config = fs::read_to_string(at.join("plain/config.toml")).unwrap();
     fs::write(at.join("parts.toml"), with_parts(&config)).unwrap();

@@ -32,7 +32,7 @@ fn train(folder: &Path) {
     );
     ok(
         folder,
-        "train --data sim --size 96x64 --batch 2 --steps 1 --out run",
+        "train --data sim --size 96x64 --batch 2 --steps 1 --init none --out run",
     );
 }
 

@@ -8,7 +8,7 @@ use std::path::Path;
 use support::{fails, json, ok, run};
 
 const DRIVE: &str = "2026_01_01/2026_01_01_drive_0003_sync";
-const SMALL: &str = "--size 96x64 --batch 2 --steps 1";
+const SMALL: &str = "--size 96x64 --batch 2 --steps 1 --init none";
 
 /// A split of these frames of the drive, and of as many of a drive that is not there.
 fn write_split(at: &Path, name: &str, numbers: impl Iterator<Item = u32>, elsewhere: u32) {

@@ -30,6 +30,7 @@ fn help_texts() {
         "export",
         "weights",
         "weights import",
+        "weights pack",
         "weights list",
         "bench",
     ] {
@@ -71,7 +72,7 @@ fn wrong_arguments_end_with_2_and_suggest_the_near_one() {
         ),
         (&["eval", "--pred", "p.npz", "--gt", "g.npz"], "--pred-kind"),
         (&["eval", "--pred", "p.npz", "--pred-kind", "depth"], "--gt"),
-        (&["eval"], "--model <RUN>|--pred <FILE>"),
+        (&["eval"], "--data <PATH>"),
         (
             &[
                 "eval",

@@ -10,7 +10,7 @@ use deepfusion_nn::{ResNetConfig, ResNetDepth, WeightRng};
 use serde_json::Value;
 use support::{fails, ok, run};
 
-const SMALL: &str = "--size 96x64 --batch 2";
+const SMALL: &str = "--size 96x64 --batch 2 --init none";
 
 #[test]
 fn a_drive_is_learned_resumed_evaluated_and_predicted() {
@@ -47,7 +47,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     // not have is told.
     let tuned = ok(
         at,
-        &format!("train --data sim {SMALL} --steps 1 --with flow --init run --out tuned"),
+        "train --data sim --size 96x64 --batch 2 --steps 1 --with flow --init run --out tuned",
     );
     let told = "starts from run/best.safetensors; new: the flow decoder";
     assert!(tuned.stderr.contains(told), "{}", tuned.stderr);

@@ -67,11 +67,36 @@ fn is_pytorch(path: &Path) -> Result<bool, Error> {
     Err(format_error(path, seen))
 }
 
+/// The float tensors of a safetensors file that is in memory; `origin` is what error messages call it.
+///
+/// # Errors
+/// [`Error::Format`] for bytes that are no such file.
+pub fn read_bytes(origin: &str, bytes: &[u8]) -> Result<Weights, Error> {
+    let length = bytes.len() as u64;
+    safetensors_of(std::io::Cursor::new(bytes), length, Path::new(origin), "")
+}
+
 fn read_safetensors(path: &Path, prefix: &str) -> Result<Weights, Error> {
+    let file = fs::File::open(path).map_err(|source| io_error(path, "open", source))?;
+    let length = file
+        .metadata()
+        .map_err(|source| io_error(path, "read", source))?
+        .len();
+    safetensors_of(file, length, path, prefix)
+}
+
+/// Of `length` bytes; `path` is what error messages call them.
+fn safetensors_of(
+    mut file: impl Read + Seek,
+    length: u64,
+    path: &Path,
+    prefix: &str,
+) -> Result<Weights, Error> {
     let failed = |source| io_error(path, "read", source);
     let cut_off = || format_error(path, "the file ends within its header or its tensors");
-    let mut file = fs::File::open(path).map_err(|source| io_error(path, "open", source))?;
-    let length = file.metadata().map_err(failed)?.len();
+    if length < 8 {
+        return Err(cut_off());
+    }
     let mut start = [0_u8; 8];
     file.read_exact(&mut start).map_err(failed)?;
     let data = u64::from_le_bytes(start).saturating_add(8);

@@ -12,7 +12,7 @@ mod torchvision;
 
 use std::collections::BTreeMap;
 
-pub use file::{read, read_under, write_safetensors};
+pub use file::{read, read_bytes, read_under, write_safetensors};
 pub use module::{apply, collect};
 pub use monodepth2::{Monodepth2, Monodepth2Files, load_monodepth2};
 pub use torchvision::{detect_resnet, load_torchvision_resnet};

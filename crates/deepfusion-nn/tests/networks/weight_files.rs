@@ -43,6 +43,14 @@ fn a_network_survives_the_way_through_a_file_to_the_last_bit() {
     let read = weights::read(&path).unwrap();
     assert!(read.tensors == saved.tensors);
     assert_eq!(read.metadata["format"], "1");
+    let bytes = fs::read(&path).unwrap();
+    let in_memory = weights::read_bytes("in memory", &bytes).unwrap();
+    assert!(in_memory.tensors == saved.tensors);
+    assert_eq!(in_memory.origin, "in memory");
+    for length in [0, 7, 8, 100, bytes.len() - 1] {
+        let error = weights::read_bytes("in memory", &bytes[..length]).unwrap_err();
+        assert!(error.to_string().contains("in memory"), "{error}");
+    }
     assert_eq!(read.value_count(), net.num_params());
 
     let loaded = weights::apply(tiny(2), &read).unwrap();

@@ -173,15 +173,12 @@ impl ObjectClass {
 }
 
 impl World {
-<<<<<<< HEAD
     /// Furnishes `road` for the drive of `seed`.
     #[cfg(test)]
     pub fn furnish(road: Road, seed: u64, scene: Scene) -> Self {
         Self::furnish_varied(road, seed, scene, &Variety::none())
     }
 
-=======
->>>>>>> h-camera
     /// Furnishes `road` for the drive of `seed` with as much variety as is asked for.
     pub fn furnish_varied(road: Road, seed: u64, scene: Scene, variety: &Variety) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5EED_57AE_E700_0001);

@@ -110,9 +110,8 @@ enum Kind {
     Beside,
 }
 
-/// Street coordinates, a heading, and how far the view ahead must be free, metres. `anchor` is where the traffic's own
-/// car drives.
-fn spot(rng: &mut ChaCha8Rng, place: &Place, anchor: f64) -> ((f64, f64, f64), f32) {
+/// Street coordinates, a heading, and how far the view ahead must be free, metres.
+fn spot(rng: &mut ChaCha8Rng, place: &Place) -> ((f64, f64, f64), f32) {
     let kind = weighted(
         rng,
         &[
@@ -122,7 +121,6 @@ fn spot(rng: &mut ChaCha8Rng, place: &Place, anchor: f64) -> ((f64, f64, f64), f
             (0.17, Kind::Beside),
         ],
     );
-<<<<<<< HEAD
     let s = rng.random_range(0.0..place.length);
     if !place.world.rooms.is_empty() {
         return (in_room(rng, place, s), 0.8);
@@ -131,18 +129,6 @@ fn spot(rng: &mut ChaCha8Rng, place: &Place, anchor: f64) -> ((f64, f64, f64), f
     let back = rng.random_bool(0.3);
     let lane = if back { 1.65 } else { -1.65 } + normal(rng, 0.0, 0.4, 2.5);
     let along = if back { PI } else { 0.0 };
-=======
-    // On any lane, with the traffic of that lane: at the anchor or among the cars before it.
-    let lanes = place.world.lanes();
-    let on = lanes[rng.random_range(0..lanes.len())];
-    let s = if matches!(kind, Kind::Driving) && on.forward && rng.random_bool(0.7) {
-        anchor
-    } else {
-        anchor + rng.random_range(-10.0..110.0)
-    };
-    let lane = on.lateral + normal(rng, 0.0, 0.35, 2.5);
-    let along = if on.forward { 0.0 } else { PI };
->>>>>>> h-camera
     // Drivers keep their distance, though not always.
     let ahead = match kind {
         Kind::Driving => rng.random_range(3.0..14.0),
@@ -169,7 +155,6 @@ fn spot(rng: &mut ChaCha8Rng, place: &Place, anchor: f64) -> ((f64, f64, f64), f
     (spot, ahead)
 }
 
-<<<<<<< HEAD
 /// A place in the room at `s` or near it, looking anywhere.
 fn in_room(rng: &mut ChaCha8Rng, place: &Place, s: f64) -> (f64, f64, f64) {
     let rooms = &place.world.rooms;
@@ -184,16 +169,6 @@ fn in_room(rng: &mut ChaCha8Rng, place: &Place, s: f64) -> (f64, f64, f64) {
 /// Draws a free place for a camera: not within a solid nor close to one, and not with most of its view within
 /// arm's length of one.
 pub fn stand(rng: &mut ChaCha8Rng, place: &Place, moving: &[Primitive], k: &Intrinsics) -> Stand {
-=======
-/// Draws a free place for a camera among the traffic around `anchor`, metres along the street: not within a solid nor
-/// close to one, and not with most of its view within arm's length of one.
-pub fn stand(
-    rng: &mut ChaCha8Rng,
-    place: &Place,
-    (moving, anchor): (&[Primitive], f64),
-    k: &Intrinsics,
-) -> Stand {
->>>>>>> h-camera
     let height = height(rng);
     let (mut pitch, roll) = tilt(rng, height);
     if !place.world.rooms.is_empty() {
@@ -201,18 +176,17 @@ pub fn stand(
         pitch += normal(rng, 0.12, 0.2, 1.8);
     }
     for _ in 0..TRIES {
-        let (spot, ahead) = spot(rng, place, anchor);
+        let (spot, ahead) = spot(rng, place);
         let stand = pose(place, spot, (height, pitch, roll));
         if is_free(place, moving, &stand.world_from_cam, k, ahead) {
             return stand;
         }
     }
     // A lane is free of everything that stands, and from here on of what moves.
-    let lane = place.world.lanes().into_iter().find(|lane| lane.forward);
-    let lateral = lane.map_or(-1.65, |lane| lane.lateral);
+    let s = rng.random_range(0.0..place.length);
     Stand {
         alone: true,
-        ..pose(place, (anchor, lateral, 0.0), (height, pitch, roll))
+        ..pose(place, (s, -1.65, 0.0), (height, pitch, roll))
     }
 }
 
@@ -250,7 +224,6 @@ fn is_free(
     let near: Vec<&Primitive> = world
         .primitives
         .iter()
-        .chain(&world.far)
         .chain(moving)
         .filter(|solid| {
             let (half_x, half_y, low, high) = solid.bounds(&world.hulls);

@@ -10,21 +10,21 @@ use super::{CameraIntrinsics, EngineArgs, GtDepth};
 /// `deepfusion eval`.
 #[derive(Debug, Args)]
 #[command(
-    group(ArgGroup::new("what").required(true).args(["model", "pred"])),
+    group(ArgGroup::new("what").args(["model", "pred"])),
     after_help = "Metrics are means over images, unscaled and median-scaled, both always; static and moving pixels apart where \
     the simulator's masks or KITTI's tracklets tell. Array files: .npz (matched by \
-    name) or N×H×W .npy (in split order), float32 or float64, any size: predictions are resized as disparity. With --model, the result \
-    is kept in RUN/eval, where `compare` finds it.\n\n\
+    name) or N×H×W .npy (in split order), float32 or float64, any size: predictions are resized as disparity. The result \
+    of a run is kept in RUN/eval, where `compare` finds it.\n\n\
     Examples:\n  deepfusion eval --model runs/train-1 --data kitti --split eigen/test_files.txt\n  \
     deepfusion eval --pred depth.npz --pred-kind depth --gt gt.npz --crop garg --json\n  \
     deepfusion eval --model runs/train-1 --data street --points 10000 --report street.html"
 )]
 pub struct EvalArgs {
-    /// A run folder or a checkpoint in it.
-    #[arg(long, value_name = "RUN", requires = "data")]
+    /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street].
+    #[arg(long, value_name = "RUN|NAME", requires = "data")]
     pub model: Option<PathBuf>,
     /// Recordings to evaluate on: KITTI drives or roots, image folders, videos, RGB-D folders.
-    #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pred")]
+    #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pred", required_unless_present = "pred")]
     pub data: Vec<PathBuf>,
     /// Only the frames of this split file (lines "folder index side").
     #[arg(long, value_name = "FILE", conflicts_with = "pred")]

@@ -17,8 +17,8 @@ pub struct EvalTargetsArgs {
     /// Drives with labelled boxes.
     #[arg(long, required = true, num_args = 1.., value_name = "PATH")]
     pub data: Vec<PathBuf>,
-    /// Depth predicted by a run: its folder or a checkpoint in it.
-    #[arg(long, value_name = "RUN")]
+    /// Depth predicted by a run (its folder or a checkpoint in it), or by an embedded network of this name.
+    #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
     /// Depth that was measured.
     #[arg(long, value_enum)]

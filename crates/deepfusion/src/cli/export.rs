@@ -14,9 +14,9 @@ use super::Size;
     deepfusion export --model runs/train-1 --out small.onnx --size 320x96"
 )]
 pub struct ExportArgs {
-    /// A run folder or a checkpoint in it.
-    #[arg(long, value_name = "RUN")]
-    pub model: PathBuf,
+    /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street].
+    #[arg(long, value_name = "RUN|NAME")]
+    pub model: Option<PathBuf>,
     /// Which of the data sets that the run learned from its metres are of, where it learned several.
     #[arg(long, value_name = "NAME")]
     pub set: Option<String>,

@@ -17,6 +17,7 @@ mod prediction;
 mod train;
 mod values;
 mod view;
+mod weights;
 
 use std::path::PathBuf;
 
@@ -34,11 +35,12 @@ pub use export::ExportArgs;
 pub use instances::InstanceArgs;
 pub use live::LiveArgs;
 pub use perceive::{PerceiveArgs, PerceiveSave};
-pub use predict::{BenchArgs, PredictArgs, Save, WeightsCommand};
+pub use predict::{BenchArgs, PredictArgs, Save};
 pub use prediction::{Outputs, PredictionArgs};
 pub use train::{DeviceChoice, LearnChoice, PresetChoice, TrainArgs, ViewMotionChoice};
 pub use values::{CameraIntrinsics, Shard, Size};
 pub use view::ViewArgs;
+pub use weights::{PackArgs, WeightsCommand};
 
 /// Metric depth from one camera and a speed signal.
 #[derive(Debug, Parser)]
@@ -89,7 +91,7 @@ pub enum Command {
     View(ViewArgs),
     /// A trained network as an ONNX file, checked before it is kept.
     Export(ExportArgs),
-    /// Bring in weights of other programs.
+    /// Embedded networks, and weights of other programs.
     #[command(subcommand)]
     Weights(WeightsCommand),
     /// Measure speed: milliseconds per stage, frames a second, memory.

@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use clap::{ArgGroup, Args, Subcommand, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 
 use super::values::positive;
 use super::{EngineArgs, Outputs, PredictionArgs, PresetChoice, Shard, Size};
@@ -98,30 +98,6 @@ impl Save {
     }
 }
 
-/// `deepfusion weights …`.
-#[derive(Debug, Subcommand)]
-pub enum WeightsCommand {
-    /// Make a run of weights of torchvision's ResNet or of Monodepth2 (.pth, .safetensors).
-    #[command(
-        after_help = "Examples:\n  deepfusion weights import encoder.pth depth.pth pose_encoder.pth pose.pth --out runs/monodepth2\n  \
-        deepfusion weights import resnet18-5c106cde.pth --out runs/imagenet18"
-    )]
-    Import {
-        /// The files: one of a ResNet, or Monodepth2's encoder, depth, pose_encoder and pose.
-        #[arg(required = true, value_name = "FILE")]
-        files: Vec<PathBuf>,
-        /// Folder of the run to make.
-        #[arg(long, value_name = "RUN")]
-        out: PathBuf,
-    },
-    /// Which weights can be imported, what they give and under which terms.
-    List {
-        /// Print as JSON.
-        #[arg(long)]
-        json: bool,
-    },
-}
-
 /// `deepfusion bench`.
 #[derive(Debug, Args)]
 #[command(
@@ -129,10 +105,10 @@ pub enum WeightsCommand {
     after_help = "Example:\n  deepfusion bench --preset light --size 640x192"
 )]
 pub struct BenchArgs {
-    /// A run folder or a checkpoint in it.
-    #[arg(long, value_name = "RUN")]
+    /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street, where embedded].
+    #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
-    /// A preset's network with random weights [default: tiny].
+    /// A preset's network with random weights [default with --size, and where no network is embedded: tiny].
     #[arg(long, value_enum)]
     pub preset: Option<PresetChoice>,
     /// Size of a preset's input [default: the preset's own].

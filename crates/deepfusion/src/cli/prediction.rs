@@ -10,9 +10,9 @@ use super::{CameraIntrinsics, EngineArgs, LiveArgs, Save};
 /// Which images, through which network, to where: what `predict` and `perceive` have in common.
 #[derive(Debug, Clone, Args)]
 pub struct PredictionArgs {
-    /// A run folder or a checkpoint in it.
-    #[arg(long, value_name = "RUN")]
-    pub model: PathBuf,
+    /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street].
+    #[arg(long, value_name = "RUN|NAME")]
+    pub model: Option<PathBuf>,
     /// Images, folders of images, globs, or recordings: a KITTI drive, a bag, a video, an RGB-D folder, a folder with
     /// dataset.toml. Of recordings the camera is known, and lenses are undone. Or one live source.
     #[arg(required = true, value_name = "INPUT")]

@@ -72,7 +72,8 @@ pub struct TrainArgs {
     /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
     #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
     pub camera_ahead_s: Option<f64>,
-    /// Weights to start from: a run, a checkpoint, or a file from weights import.
+    /// Weights to start from: a run, a checkpoint, a ResNet's file, the name of an embedded network (`weights list`), or none
+    /// [default: the embedded network of the preset's layers, if any; with --config what the file says].
     #[arg(long, value_name = "WEIGHTS")]
     pub init: Option<PathBuf>,
     /// Whose motion the views are synthesised with [default: the preset's].

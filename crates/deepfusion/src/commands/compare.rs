@@ -16,6 +16,7 @@ use super::{eval, run_report};
 use crate::cli::{CompareArgs, TableFormat};
 use crate::engine;
 use crate::error::CliError;
+use crate::model::ModelSource;
 use crate::output;
 use crate::progress::{Progress, say};
 
@@ -114,7 +115,7 @@ fn pictures(args: &CompareArgs, recording: &Path) -> Result<Vec<Vec<Tile>>> {
     }
     let mut progress = Progress::new("predicting");
     for (done, run) in args.runs.iter().enumerate() {
-        let predictor = engine::load(run, &args.engine)?;
+        let predictor = engine::load(&ModelSource::named(run)?, &args.engine)?;
         for (row, (number, frame)) in rows.iter_mut().zip(&frames) {
             let dataset = &datasets[*number];
             let image = dataset.load_image(*frame)?;

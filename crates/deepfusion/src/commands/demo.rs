@@ -28,6 +28,7 @@ use super::recorder::clock;
 use super::{device, run_report, train};
 use crate::cli::{DemoArgs, EngineArgs};
 use crate::engine;
+use crate::model::ModelSource;
 use crate::progress::{Progress, say};
 use crate::{interrupt, output};
 
@@ -102,6 +103,7 @@ pub fn run(args: &DemoArgs) -> Result<()> {
 
     say("3/4 measuring on the street never seen");
     let checkpoint = model.join("last.safetensors");
+    let checkpoint = ModelSource::named(&checkpoint)?;
     let predictor = engine::load(&checkpoint, &EngineArgs::on(args.device))?;
     let train_sets = open_datasets(&train_drives, None, CameraChoice::default())?;
     let test_sets = Dataset::open(&test_drive, &OpenOptions::default())?;

@@ -1,16 +1,14 @@
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_compare::{
-    FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation, sha256_of_file,
-};
+use deepfusion_compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
 use deepfusion_data::{CameraChoice, Dataset, GtKind, OpenOptions, RgbImage};
 use deepfusion_eval::{
     ArraySet, Crop, Grid, Prediction, Protocol, Report, Sample, TrivialBaseline, match_names,
 };
 use deepfusion_geometry::Intrinsics;
 use deepfusion_render::{HtmlReport, ShownFrame};
-use deepfusion_train::{Predictor, RunFolder};
+use deepfusion_train::Predictor;
 use serde::Serialize;
 
 use super::confidence;
@@ -19,10 +17,13 @@ use super::evaluate::{
     evaluate_datasets, expected_frames, open_recordings, read_split, trivial_from_arrays,
     trivial_from_datasets,
 };
-use super::held_out::held_out;
+use super::held_out::{held_out, unseen};
 use super::run_report::{self, Choice};
+use super::used_checkpoint::UsedCheckpoint;
 use crate::cli::{CameraIntrinsics, EvalArgs, PrecisionChoice, PredKind};
 use crate::engine;
+use crate::error::CliError;
+use crate::model::ModelSource;
 use crate::output;
 use crate::progress::{Progress, say};
 
@@ -59,45 +60,15 @@ struct Printed<'a> {
     report: &'a Report,
 }
 
-/// The checkpoint that was measured: a run's folder alone does not say which of its two.
-#[derive(Serialize)]
-struct UsedCheckpoint {
-    name: &'static str,
-    path: PathBuf,
-    step: usize,
-    /// Whether the folder was given, and the choice is the program's.
-    #[serde(skip)]
-    chosen: bool,
-}
-
-impl UsedCheckpoint {
-    fn of(predictor: &Predictor, model: &Path, folder: &RunFolder) -> Self {
-        Self {
-            name: predictor.checkpoint.name(),
-            path: folder.checkpoint_path(predictor.checkpoint),
-            step: predictor.step,
-            chosen: model == folder.path(),
-        }
-    }
-}
-
-impl std::fmt::Display for UsedCheckpoint {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { path, step, .. } = self;
-        write!(f, "checkpoint  {}, step {step}", path.display())?;
-        match (self.chosen, self.name) {
-            (true, "best") => write!(f, " (the lowest held-out loss; last is beside it)"),
-            (true, _) => write!(f, " (there is no best)"),
-            (false, _) => Ok(()),
-        }
-    }
-}
-
 /// Predicts every frame that has ground truth. An image of another aspect ratio is stretched, so that
 /// all of its ground truth counts.
 fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
-    let model = args.model.as_deref().unwrap_or(Path::new("."));
-    let predictor = engine::load(model, &args.engine)?;
+    let model = ModelSource::of(args.model.as_deref())?;
+    if args.calibrate_confidence && model.folder().is_none() {
+        let (option, model) = ("--calibrate-confidence", model.name());
+        return Err(CliError::NoRunFolder { option, model }.into());
+    }
+    let predictor = engine::load(&model, &args.engine)?;
     let options = OpenOptions {
         camera: args.camera,
         split: read_split(args.split.as_deref())?,
@@ -134,23 +105,26 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
     )?;
     evaluated.report.expected = expected;
     check_used(&options, &datasets, evaluated.report.n, args.strict)?;
-    let (folder, _) = RunFolder::open(model)?;
-    let saved = saved(args, &predictor, &folder, &datasets, &evaluated)?;
-    match saved.write(folder.path()) {
-        Ok(path) => say(&format!("kept as {}", path.display())),
+    let saved = saved(args, &predictor, &model, &datasets, &evaluated)?;
+    match model.folder().map(|folder| saved.write(folder)) {
+        Some(Ok(path)) => say(&format!("kept as {}", path.display())),
         // A run on a disk that cannot be written is measured all the same.
-        Err(error) => tracing::warn!("the result is not kept beside the run: {error}"),
+        Some(Err(error)) => tracing::warn!("the result is not kept beside the run: {error}"),
+        None => say(&format!(
+            "not kept: `{}` has no run's folder; --json prints what `compare` reads",
+            model.name()
+        )),
     }
-    let reliability = match args.calibrate_confidence {
-        true => confidence::calibrate(
+    let reliability = match (args.calibrate_confidence, model.folder()) {
+        (true, Some(folder)) => confidence::calibrate(
             &predictor,
             &datasets,
             &mut truth,
             &evaluated,
             !args.no_focal_correction,
-            folder.path(),
+            folder,
         )?,
-        false => None,
+        _ => None,
     };
     if let Some(path) = &args.report {
         let names = deepfusion_data::ground_truth_names(&datasets);
@@ -173,15 +147,17 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
             }))
         })?;
         let how = how_a_model_was_measured(args, &protocol, &saved);
-        let name = output::name_of(folder.path());
-        let mut page = page(args, &name, &evaluated, &shown, &how)?;
+        let mut page = page(args, &model.name(), &evaluated, &shown, &how)?;
         if let Some(bins) = reliability {
             page = run_report::reliability(page, &bins);
         }
-        run_report::training(page, folder.path())?.write(path)?;
+        if let Some(folder) = model.folder() {
+            page = run_report::training(page, folder)?;
+        }
+        page.write(path)?;
         say(&format!("report  {}", path.display()));
     }
-    let checkpoint = UsedCheckpoint::of(&predictor, model, &folder);
+    let checkpoint = UsedCheckpoint::of(&predictor, &model);
     Ok((evaluated.report, checkpoint))
 }
 
@@ -334,15 +310,14 @@ fn page(
         .command(&run_report::command()))
 }
 
-/// The evaluation as it is kept beside the run.
+/// The evaluation as it is kept beside a run.
 fn saved(
     args: &EvalArgs,
     predictor: &Predictor,
-    folder: &RunFolder,
+    model: &ModelSource,
     datasets: &[Dataset],
     evaluated: &Evaluated,
 ) -> Result<SavedEvaluation> {
-    let file = folder.checkpoint_path(predictor.checkpoint);
     let absolute = |p: &std::path::PathBuf| std::path::absolute(p).unwrap_or_else(|_| p.clone());
     let precision = match args.engine.precision {
         PrecisionChoice::F32 => "f32",
@@ -363,14 +338,26 @@ fn saved(
             engine: format!("{} {precision}", predictor.runner().name()),
             set: args.engine.set.clone(),
             focal_correction: !args.no_focal_correction,
-            held_out: held_out(predictor.config(), datasets, &evaluated.places),
+            held_out: match model {
+                ModelSource::Run { .. } => {
+                    held_out(predictor.config(), datasets, &evaluated.places)
+                }
+                ModelSource::Packed { network, .. } => {
+                    unseen(&network.card, datasets).then_some(true)
+                }
+            },
             program: format!("deepfusion {}", env!("CARGO_PKG_VERSION")),
             command: run_report::command(),
             time: output::now(),
         },
         model: ModelFile {
-            sha256: sha256_of_file(&file)?,
-            checkpoint: output::name_of(&file),
+            sha256: model.sha256()?,
+            checkpoint: match model {
+                ModelSource::Run { folder, kind, .. } => {
+                    output::name_of(&folder.checkpoint_path(*kind))
+                }
+                ModelSource::Packed { network, .. } => network.card.name.clone(),
+            },
         },
         report: evaluated.report.clone(),
         images: evaluated.images.iter().map(FrameScore::from).collect(),

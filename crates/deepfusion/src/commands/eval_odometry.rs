@@ -16,6 +16,8 @@ use super::device;
 use super::evaluate::open_recordings;
 use crate::allocator;
 use crate::cli::EvalOdometryArgs;
+use crate::error::CliError;
+use crate::model::ModelSource;
 use crate::output;
 use crate::progress::Progress;
 
@@ -54,6 +56,10 @@ pub fn run(args: &EvalOdometryArgs) -> Result<()> {
 fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
     allocator::keep_memory();
     let model = args.model.as_deref().unwrap_or(Path::new("."));
+    if let source @ ModelSource::Packed { .. } = ModelSource::named(model)? {
+        let model = source.name();
+        return Err(CliError::NoPoseNet { model }.into());
+    }
     let predictor = PosePredictor::load(model, args.set.as_deref(), &device::open(args.device)?)?;
     let options = OpenOptions {
         camera: args.camera,

@@ -9,11 +9,12 @@ use deepfusion_nn::{DepthNet, InputSize, depth_graph, weights};
 use deepfusion_onnx::check::{PICTURES, deviation, pictures};
 use deepfusion_onnx::runtime::{OrtEngine, find};
 use deepfusion_onnx::{DepthMaps, DepthModel, FocalLength, OPSET, read, reference, write};
-use deepfusion_train::{TrainConfig, load_depth_net};
+use deepfusion_train::TrainConfig;
 use serde::Serialize;
 
 use crate::cli::ExportArgs;
 use crate::error::CliError;
+use crate::model::ModelSource;
 use crate::output;
 use crate::progress::say;
 
@@ -49,8 +50,9 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         .into());
     }
     let device = Device::flex();
-    let (config, net) = load_depth_net(&args.model, args.set.as_deref(), &device)?;
-    let model = model_of(&config, &net, args)?;
+    let network = ModelSource::of(args.model.as_deref())?.load(args.set.as_deref())?;
+    let net = network.build(&device)?;
+    let model = model_of(&network.config, &net, args)?;
     let bytes = write(&model)?;
     let partial = partial_file(out, &bytes)?;
     let checks = check(args, &model, &net, partial.path(), &device)?;

@@ -3,11 +3,14 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use deepfusion_data::{Dataset, Frame};
+use deepfusion_data::{Dataset, DatasetKind, Frame};
 use deepfusion_train::{RunFolder, SampleSet, TrainConfig};
+use deepfusion_weights::{Card, Shipped};
 
 use super::evaluate::Place;
-use super::train::{is_run, training_recordings, validates};
+use super::start::is_run;
+use super::train::{training_recordings, validates};
+use crate::model;
 
 /// A frame, wherever a copy of its drive lies: the drive's name, the frame's number and the size of its image's file.
 type Seen = (String, u64, u64);
@@ -15,14 +18,30 @@ type Seen = (String, u64, u64);
 /// Whether none of the frames measured was a target or a source in training, of this run and of those it began from. `None` where
 /// that cannot be told: recordings that are not there any more, or a network that was learned elsewhere.
 pub fn held_out(config: &TrainConfig, datasets: &[Dataset], places: &[Place]) -> Option<bool> {
-    let seen = seen_by(config, &mut HashSet::new())?;
+    let seen = seen_by(config, datasets, &mut HashSet::new())?;
     let mut measured = places
         .iter()
         .map(|Place(number, frame)| &datasets[*number].frames()[*frame]);
     Some(measured.all(|frame| !seen.contains(&key(frame))))
 }
 
-fn seen_by(config: &TrainConfig, runs: &mut HashSet<std::path::PathBuf>) -> Option<HashSet<Seen>> {
+/// Whether a packed network cannot have seen these recordings. What it saw is gone, but for its kind: one that saw simulated drives
+/// alone saw no recording that is surely real.
+pub fn unseen(card: &Card, datasets: &[Dataset]) -> bool {
+    /// Exact poses, which no real drive has.
+    const SIMULATED: &str = "poses.txt";
+    let surely_real = |dataset: &Dataset| {
+        dataset.kind() != DatasetKind::Bag && !dataset.folder().join(SIMULATED).exists()
+    };
+    card.simulated_only && datasets.iter().all(surely_real)
+}
+
+/// What a run saw, and those it began from; `datasets` are what is measured on.
+fn seen_by(
+    config: &TrainConfig,
+    datasets: &[Dataset],
+    runs: &mut HashSet<std::path::PathBuf>,
+) -> Option<HashSet<Seen>> {
     let mut config = config.clone();
     if validates(&config) {
         // Nothing of the training recordings was left out.
@@ -40,13 +59,31 @@ fn seen_by(config: &TrainConfig, runs: &mut HashSet<std::path::PathBuf>) -> Opti
         seen.insert(key(&train.datasets[frame.dataset].frames()[frame.frame]));
     }
     if let Some(init) = &config.init {
-        seen.extend(seen_before(init, runs)?);
+        let packed = match &config.init_sha256 {
+            Some(sha256) => {
+                let network = model::embedded(init).ok()??;
+                // Another one of the name tells nothing of the one it began from.
+                (network.card.sha256 == *sha256).then_some(())?;
+                Some(*network)
+            }
+            None if Shipped::is_at(init) => Some(Shipped::read(init).ok()?),
+            None => None,
+        };
+        match packed {
+            Some(network) if unseen(&network.card, datasets) => {}
+            Some(_) => return None,
+            None => seen.extend(seen_before(init, datasets, runs)?),
+        }
     }
     Some(seen)
 }
 
 /// What the weights that a run began from have seen; weights that are no run's are of other pictures (ImageNet's).
-fn seen_before(init: &Path, runs: &mut HashSet<std::path::PathBuf>) -> Option<HashSet<Seen>> {
+fn seen_before(
+    init: &Path,
+    datasets: &[Dataset],
+    runs: &mut HashSet<std::path::PathBuf>,
+) -> Option<HashSet<Seen>> {
     if !init.exists() {
         return None;
     }
@@ -57,7 +94,7 @@ fn seen_before(init: &Path, runs: &mut HashSet<std::path::PathBuf>) -> Option<Ha
     if !runs.insert(folder.path().to_owned()) {
         return Some(HashSet::new());
     }
-    seen_by(&folder.read_config().ok()?, runs)
+    seen_by(&folder.read_config().ok()?, datasets, runs)
 }
 
 fn key(frame: &Frame) -> Seen {

@@ -28,7 +28,9 @@ mod resume;
 mod run_report;
 mod scene;
 mod simulate;
+mod start;
 mod train;
+mod used_checkpoint;
 mod view;
 mod view_rerun;
 mod weights;
@@ -59,8 +61,11 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Perceive(args) => perceive::run(&args),
         Command::View(args) => view::run(&args),
         Command::Export(args) => export::run(&args),
-        Command::Weights(WeightsCommand::Import { files, out }) => weights::import(&files, &out),
-        Command::Weights(WeightsCommand::List { json }) => weights::list(json),
+        Command::Weights(WeightsCommand::Import { files, out }) => {
+            weights::import::run(&files, &out)
+        }
+        Command::Weights(WeightsCommand::Pack(args)) => weights::pack::run(&args),
+        Command::Weights(WeightsCommand::List { json }) => weights::list::run(json),
         Command::Bench(args) => bench::run(&args),
     }
 }

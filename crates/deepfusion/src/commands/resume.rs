@@ -7,7 +7,7 @@ use anyhow::Result;
 use clap::ValueEnum;
 use deepfusion_train::{Learn, TrainConfig, ViewMotion};
 
-use super::train;
+use super::{start, train};
 use crate::cli::TrainArgs;
 use crate::error::CliError;
 
@@ -91,10 +91,14 @@ pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> 
             return contradicts("--without", term.clone(), "is learned with it".into());
         }
     }
-    if let Some(path) = init {
-        let absolute = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+    if let Some(asked) = init {
+        // `none`, and the names of embedded networks, are no paths.
+        let asked = match (start::is_none(asked), &run.init_sha256) {
+            (true, _) | (false, Some(_)) => asked.clone(),
+            (false, None) => std::path::absolute(asked).unwrap_or_else(|_| asked.clone()),
+        };
         let found = run.init.as_deref().map_or("none".into(), told);
-        same("--init", told(&absolute), found)?;
+        same("--init", told(&asked), found)?;
     }
     if let Some(ahead_s) = camera_ahead_s {
         let told = |s: f64| format!("{} ms", 1000.0 * s);
@@ -170,6 +174,7 @@ fn take_file(config: &mut TrainConfig, path: &Path, args: &TrainArgs) -> Result<
     asked.data.make_absolute();
     asked.camera = config.camera;
     asked.init.clone_from(&config.init);
+    asked.init_sha256.clone_from(&config.init_sha256);
     if asked.pose_net.metres_per_unit == 0.0 {
         asked.pose_net.metres_per_unit = config.pose_net.metres_per_unit;
     }
@@ -337,8 +342,9 @@ mod tests {
         // What it has already is no contradiction, and what can apply is used.
         assert_eq!(with(&[]).unwrap(), run);
         type Change = fn(&mut TrainConfig);
-        let used: [(&[&str], Change); 16] = [
+        let used: [(&[&str], Change); 17] = [
             (&["--device", "cpu"], |_| {}),
+            (&["--init", "none"], |_| {}),
             (&["--preset", "tiny"], |_| {}),
             (&["--size", "320x96"], |_| {}),
             (&["--batch", "4"], |_| {}),
@@ -411,6 +417,26 @@ mod tests {
             let known =
                 ["--out", "--resume"].contains(&option.as_str()) || told.contains(&option.as_str());
             assert!(known, "{option}: what becomes of it with --resume?");
+        }
+    }
+
+    /// A name is compared as it is, whatever folder the command is given in.
+    #[test]
+    fn the_embedded_network_that_a_run_began_from_is_no_contradiction() {
+        let mut run = a_run();
+        (run.init, run.init_sha256) = (Some("street".into()), Some("ab".repeat(32)));
+        assert_eq!(
+            with_options(&run, &asked(&["--init", "street"])).unwrap(),
+            run
+        );
+        assert_eq!(with_options(&run, &asked(&[])).unwrap(), run);
+        for other in ["none", "tiny", "/runs/street"] {
+            let error = with_options(&run, &asked(&["--init", other])).unwrap_err();
+            let error = error.to_string();
+            assert!(
+                error.contains(other) && error.contains("has street"),
+                "{error}"
+            );
         }
     }
 

@@ -4,15 +4,15 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use deepfusion_data::{Camera, CameraChoice, Dataset, OpenOptions, speed_unit_warning};
 use deepfusion_nn::InputSize;
-use deepfusion_nn::weights::load_torchvision_resnet;
 use deepfusion_train::{
-    CheckpointKind, DataConfig, DataSetConfig, Error, Learn, Model, Preset, RunFolder, SampleSet,
-    TrainConfig, TrainSummary, Trainer, shared_frames,
+    DataConfig, DataSetConfig, Error, Learn, Preset, RunFolder, SampleSet, TrainConfig,
+    TrainSummary, Trainer, shared_frames,
 };
 
 use super::evaluate::{open_quietly, open_recordings, read_split};
 use super::outlook::Outlook;
 use super::recorder::{Recorder, clock};
+use super::start::Start;
 use super::{device, remarks, resume};
 use crate::allocator;
 use crate::cli::{PresetChoice, TrainArgs};
@@ -42,21 +42,12 @@ pub fn run(args: &TrainArgs) -> Result<()> {
             Trainer::resume(config, folder, sets, &device)?
         }
         None => {
+            let start = Start::of(args, &config)?;
+            start.record_in(&mut config)?;
             let folder = output::run_folder(args.out.as_deref(), "train")?;
             let folder = RunFolder::create(&folder)?;
-            config.init = args.init.clone().or(config.init);
-            let init = config.init.clone();
-            let init = init.as_deref();
-            if let Some((folder, kind)) = init.map(run_of).transpose()?.flatten()
-                && config.pose_net.metres_per_unit == 0.0
-                && !folder.read_state(kind)?.encoders_only
-            {
-                // Its PoseNet speaks of this unit.
-                config.pose_net.metres_per_unit = folder.read_config()?.pose_net.metres_per_unit;
-            }
-            Trainer::create(config, folder, sets, &device, |model| match init {
-                Some(path) => initialise(model, path, &device),
-                None => Ok(model),
+            Trainer::create(config, folder, sets, &device, |model| {
+                start.initialise(model, &device)
             })?
         }
     };
@@ -378,38 +369,4 @@ fn warn_of_speed(dataset: &Dataset) {
         // The check is a service: what is really wrong with the images, training will say.
         Err(error) => tracing::debug!("speed check of {}: {error}", dataset.name()),
     }
-}
-
-/// The run that a path is, or is a checkpoint of, and which; `None` of other weights.
-fn run_of(path: &Path) -> Result<Option<(RunFolder, CheckpointKind)>, Error> {
-    if !is_run(path) {
-        return Ok(None);
-    }
-    let (folder, kind) = RunFolder::open(path)?;
-    let kind = kind.unwrap_or_else(|| folder.preferred());
-    Ok(Some((folder, kind)))
-}
-
-/// Whether a path is a run's folder, or in one.
-pub fn is_run(path: &Path) -> bool {
-    let in_a_run = |p: &Path| p.join("config.toml").exists();
-    path.is_dir() || path.parent().is_some_and(in_a_run)
-}
-
-/// Starts from the networks of a run, or from an ImageNet encoder's weights.
-fn initialise(model: Model, path: &Path, device: &burn::tensor::Device) -> Result<Model, Error> {
-    let device = device.clone().autodiff();
-    if let Some((folder, kind)) = run_of(path)? {
-        let (model, anew) = folder.load_networks(kind, model.config(), &device)?;
-        let from = folder.checkpoint_path(kind);
-        say(&match anew.as_slice() {
-            [] => format!("starts from {}", from.display()),
-            parts => format!("starts from {}; new: {}", from.display(), parts.join(", ")),
-        });
-        return Ok(model);
-    }
-    let mut model = model;
-    model.depth_net.encoder = load_torchvision_resnet(model.depth_net.encoder, path)?;
-    model.pose_net.encoder = load_torchvision_resnet(model.pose_net.encoder, path)?;
-    Ok(model)
 }

@@ -23,6 +23,7 @@ use super::evaluate::{
 use super::{device, resume, train};
 use crate::cli::{AblateArgs, DeviceChoice, EngineArgs, PresetChoice};
 use crate::error::CliError;
+use crate::model::ModelSource;
 use crate::progress::{Progress, say};
 use crate::{engine, interrupt, output};
 
@@ -135,7 +136,7 @@ fn new_plan(args: &AblateArgs) -> Result<Plan> {
     config.data.paths.clone_from(&args.data);
     config.data.camera = train::camera_word(args.camera).into();
     // Every row begins anew.
-    config.init = None;
+    (config.init, config.init_sha256) = (None, None);
     // It is gone on with from any folder.
     config.make_absolute();
     let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
@@ -265,7 +266,8 @@ fn spent(folder: &Path, seconds: f64) -> Result<f64> {
 
 /// The run's last checkpoint, measured like `eval` does: equal budgets are compared, and not choices of a checkpoint.
 fn measure(run: &Path, plan: &Plan, device: DeviceChoice) -> Result<Report> {
-    let predictor = engine::load(&run.join("last.safetensors"), &EngineArgs::on(device))?;
+    let checkpoint = ModelSource::named(&run.join("last.safetensors"))?;
+    let predictor = engine::load(&checkpoint, &EngineArgs::on(device))?;
     let (train_sets, eval_sets) = open_eval_data(plan)?;
     let protocol = Protocol {
         crop: default_crop(&eval_sets),

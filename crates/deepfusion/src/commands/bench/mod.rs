@@ -22,6 +22,7 @@ use serde::Serialize;
 use self::modules::{Module, Modules};
 use super::{device, train::preset};
 use crate::cli::{BenchArgs, PresetChoice};
+use crate::model::ModelSource;
 use crate::pipeline::{self, Threads};
 use crate::{engine, output};
 
@@ -149,10 +150,17 @@ fn profile_table(steps: &[(String, f64)]) -> String {
 
 /// The network asked for: its name, its configuration and what runs it.
 fn network(args: &BenchArgs) -> Result<(String, TrainConfig, Arc<dyn DepthRunner>)> {
-    if let Some(path) = &args.model {
-        let predictor = engine::load(path, &args.engine)?;
+    let model = match (&args.model, args.preset, args.size) {
+        (Some(model), ..) => Some(ModelSource::named(model)?),
+        (None, None, None) => ModelSource::embedded_default()?,
+        // The size is a preset's.
+        (None, ..) => None,
+    };
+    if let Some(model) = model {
+        let predictor = engine::load(&model, &args.engine)?;
         let config = predictor.config().clone();
-        return Ok((path.display().to_string(), config, predictor.into_runner()));
+        let name = model.given().display().to_string();
+        return Ok((name, config, predictor.into_runner()));
     }
     let preset = preset(args.preset.unwrap_or(PresetChoice::Tiny));
     let mut config = preset.config();

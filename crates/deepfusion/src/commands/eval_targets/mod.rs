@@ -25,6 +25,7 @@ use super::remarks;
 use super::scene::{MotionTracker, working_depth};
 use crate::cli::{EvalTargetsArgs, TargetDepth};
 use crate::error::CliError;
+use crate::model::ModelSource;
 use crate::progress::Progress;
 use crate::{engine, output};
 
@@ -55,7 +56,10 @@ enum Source {
 impl Source {
     fn of(args: &EvalTargetsArgs) -> Result<Self> {
         Ok(match (args.depth, &args.model) {
-            (None, Some(model)) => Self::Network(Box::new(engine::load(model, &args.engine)?)),
+            (None, Some(model)) => {
+                let model = ModelSource::named(model)?;
+                Self::Network(Box::new(engine::load(&model, &args.engine)?))
+            }
             (Some(TargetDepth::Lidar), _) => Self::Lidar,
             // One of the two is asked for by the command line.
             (Some(TargetDepth::Truth), _) | (None, None) => Self::Truth,

@@ -6,7 +6,7 @@ use anyhow::Result;
 use deepfusion_perception::{
     ConfidenceModel, Perception, PerceptionConfig, VehicleShape, time_to_collision,
 };
-use deepfusion_train::{Predictor, PreparedImage, RunFolder};
+use deepfusion_train::{Predictor, PreparedImage};
 
 use super::instances::Spotter;
 use super::pictures::{self, Picture};
@@ -17,6 +17,7 @@ use crate::commands::predict::inputs::Input;
 use crate::commands::predict::{Loaded, Seen};
 use crate::commands::scene::{Motion, ScaleWatch, working_depth};
 use crate::error::CliError;
+use crate::model::ModelSource;
 
 /// A frame that is loaded, and when that began.
 pub struct Begun {
@@ -50,18 +51,22 @@ impl<'a> Eyes<'a> {
     /// Open, nothing seen yet.
     pub fn open(
         args: &'a PerceiveArgs,
+        model: &ModelSource,
         predictor: &'a Predictor,
         config: PerceptionConfig,
     ) -> Result<Self> {
         let prediction = &args.prediction;
-        let (run, _) = RunFolder::open(&prediction.model)?;
+        let confidence = match model.folder() {
+            Some(run) => Confidence::read(run)?,
+            None => None,
+        };
         Ok(Self {
             args,
             predictor,
             perception: Perception::new(config),
             watch: ScaleWatch::of(prediction),
             spotter: Spotter::of(&args.masks, prediction.engine.ort_lib.as_deref())?,
-            confidence: Confidence::read(run.path())?.map(|c| c.single),
+            confidence: confidence.map(|c| c.single),
         })
     }
 

@@ -21,6 +21,7 @@ use super::predict::inputs::{self, Input};
 use super::scene::{MotionTracker, ScaleWatch};
 use crate::cli::{PerceiveArgs, PredictionArgs};
 use crate::error::{CliError, hint_of, told};
+use crate::model::ModelSource;
 use crate::pipeline::{self, Threads};
 use crate::progress::say;
 use crate::{engine, interrupt, output};
@@ -29,6 +30,7 @@ use crate::{engine, interrupt, output};
 pub fn run(args: &PerceiveArgs) -> Result<()> {
     let prediction = &args.prediction;
     let out = &prediction.out;
+    let model = ModelSource::of(prediction.model.as_deref())?;
     let source = sources::source(&prediction.inputs, &prediction.live)?;
     let all = match (&source, args.speed) {
         (Some(_), _) => Vec::new(),
@@ -40,13 +42,14 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
     if let Some(far) = args.max_depth {
         config.max_depth_m = far as f32;
     }
-    let predictor = engine::load(&prediction.model, &prediction.engine)?;
+    let predictor = engine::load(&model, &prediction.engine)?;
     let job = Job::new(
         prediction,
         args.outputs(f64::from(config.max_depth_m)),
+        &model,
         &predictor,
     )?;
-    let eyes = Eyes::open(args, &predictor, config)?;
+    let eyes = Eyes::open(args, &model, &predictor, config)?;
     std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
     if source.is_some() {
         sources::make_room(out, prediction.overwrite)?;

@@ -12,18 +12,19 @@ use crate::cli::{PredictArgs, Shard};
 use crate::commands::live::{self, Feed, LiveMark};
 use crate::commands::scene::ScaleWatch;
 use crate::error::CliError;
+use crate::model::ModelSource;
 use crate::progress::say;
 use crate::{engine, interrupt, output};
 
 /// `deepfusion predict` of a live source: no manifest, for there is nothing to go on with.
-pub fn run(args: &PredictArgs, address: &Address) -> Result<()> {
+pub fn run(args: &PredictArgs, model: &ModelSource, address: &Address) -> Result<()> {
     let (prediction, out) = (&args.prediction, &args.prediction.out);
     if args.shard != Shard::WHOLE {
         return Err(CliError::LiveShard.into());
     }
     ScaleWatch::check(prediction, Some(address), &[])?;
-    let predictor = engine::load(&prediction.model, &prediction.engine)?;
-    let job = Job::new(prediction, args.outputs(), &predictor)?;
+    let predictor = engine::load(model, &prediction.engine)?;
+    let job = Job::new(prediction, args.outputs(), model, &predictor)?;
     if args.save.iter().any(|save| save.is_cloud()) && matches!(job.camera, CameraSource::Unknown) {
         return Err(CliError::NoCamera.into());
     }

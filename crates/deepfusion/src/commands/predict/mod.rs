@@ -14,12 +14,10 @@ mod video;
 mod watcher;
 
 use anyhow::{Context, Result};
-use deepfusion_compare::{MetricScale, sha256_of_file};
+use deepfusion_compare::MetricScale;
 use deepfusion_data::{LiveFrame, RgbImage, load_rgb};
 use deepfusion_geometry::Intrinsics;
-use deepfusion_train::{
-    Inspector, LayerMaps, Prediction, Predictor, PreparedImage, Preparer, RunFolder,
-};
+use deepfusion_train::{Inspector, LayerMaps, Prediction, Predictor, PreparedImage, Preparer};
 use rayon::prelude::*;
 
 use self::camera::CameraSource;
@@ -35,6 +33,7 @@ use super::{device, live as sources};
 use crate::cli::{Outputs, PredictArgs, PredictionArgs, Save, Shard};
 use crate::engine;
 use crate::error::CliError;
+use crate::model::ModelSource;
 use crate::pipeline::{self, Threads};
 use crate::progress::say;
 use crate::{interrupt, output};
@@ -42,6 +41,7 @@ use crate::{interrupt, output};
 /// What is the same for all images of a run.
 pub(super) struct Job<'a> {
     args: &'a PredictionArgs,
+    model: &'a ModelSource,
     outputs: Outputs,
     camera: CameraSource,
     preparer: Preparer,
@@ -78,8 +78,9 @@ pub fn run(args: &PredictArgs) -> Result<()> {
     } = args;
     let out = &prediction.out;
     video::check(args)?;
+    let model = ModelSource::of(prediction.model.as_deref())?;
     if let Some(address) = sources::source(&prediction.inputs, &prediction.live)? {
-        return live::run(args, &address);
+        return live::run(args, &model, &address);
     }
     let all = inputs::find(&prediction.inputs, &prediction.open_options())?;
     ScaleWatch::check(prediction, None, &all)?;
@@ -87,8 +88,8 @@ pub fn run(args: &PredictArgs) -> Result<()> {
         return Err(CliError::CorrectShard.into());
     }
     let mine: Vec<&Input> = shard.part_of(&all).collect();
-    let predictor = engine::load(&prediction.model, &prediction.engine)?;
-    let job = Job::new(prediction, args.outputs(), &predictor)?;
+    let predictor = engine::load(&model, &prediction.engine)?;
+    let job = Job::new(prediction, args.outputs(), &model, &predictor)?;
     let camera_known = !matches!(job.camera, CameraSource::Unknown);
     if args.save.iter().any(|save| save.is_cloud())
         && !(camera_known || all.iter().all(|input| input.frame.is_some()))
@@ -219,19 +220,25 @@ fn predict(job: &Job, predictor: &Predictor, mine: &[&Input], todo: &[usize], le
 
 impl<'a> Job<'a> {
     /// The work that the arguments ask of a network.
-    pub fn new(args: &'a PredictionArgs, outputs: Outputs, predictor: &Predictor) -> Result<Self> {
+    pub fn new(
+        args: &'a PredictionArgs,
+        outputs: Outputs,
+        model: &'a ModelSource,
+        predictor: &Predictor,
+    ) -> Result<Self> {
         let camera = CameraSource::new(args, predictor.training_camera())?;
+        let set = args.engine.set.as_deref();
         Ok(Self {
             args,
-            made_with: MadeWith::new(args, &outputs, predictor, &camera)?,
+            model,
+            made_with: MadeWith::new(args, &outputs, model, predictor, &camera)?,
             camera,
             preparer: predictor.preparer(),
             step: predictor.step,
-            scale: scale_of(args, predictor)?,
+            scale: model.scale(set, !args.no_focal_correction, predictor.step)?,
             inspector: match outputs.save.contains(&Save::Features) {
-                true => Some(Inspector::load(
-                    &args.model,
-                    args.engine.set.as_deref(),
+                true => Some(Inspector::new(
+                    &model.load(set)?,
                     &device::open(args.engine.device)?,
                 )?),
                 false => None,
@@ -333,7 +340,8 @@ impl<'a> Job<'a> {
             image_file: loaded.mark,
             size: [image.width(), image.height()],
             unit: "metres along the camera's axis (z)".into(),
-            model: args.model.clone(),
+            model: self.model.given().to_owned(),
+            model_sha256: self.model.packed_sha256().map(str::to_owned),
             checkpoint_step: self.step,
             intrinsics: loaded.camera.map(|k| [k.fx, k.fy, k.cx, k.cy]),
             intrinsics_from: camera_word.into(),
@@ -356,18 +364,4 @@ impl<'a> Job<'a> {
         }
         Ok(sidecar)
     }
-}
-
-/// What evaluations that the run's folder keeps say of this checkpoint's metres.
-fn scale_of(args: &PredictionArgs, predictor: &Predictor) -> Result<MetricScale> {
-    let (folder, _) = RunFolder::open(&args.model)?;
-    let sha256 = sha256_of_file(&folder.checkpoint_path(predictor.checkpoint))?;
-    let (set, correction) = (args.engine.set.as_deref(), !args.no_focal_correction);
-    Ok(MetricScale::measured(
-        folder.path(),
-        &sha256,
-        set,
-        correction,
-        predictor.step,
-    ))
 }

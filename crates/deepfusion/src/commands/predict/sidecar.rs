@@ -9,15 +9,15 @@ use clap::ValueEnum;
 use deepfusion_compare::MetricScale;
 use deepfusion_data::{LiveFrame, write_atomically};
 use deepfusion_fs::Content;
-use deepfusion_train::{Predictor, RunFolder};
+use deepfusion_train::Predictor;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use super::super::device;
 use super::super::live::LiveMark;
 use super::super::scene::Scale;
 use super::camera::CameraSource;
 use crate::cli::{Outputs, PredictionArgs, Save};
+use crate::model::ModelSource;
 
 /// A prediction's description.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,8 +30,11 @@ pub struct Sidecar {
     pub size: [u32; 2],
     /// What the depths are.
     pub unit: String,
-    /// The run or checkpoint given.
+    /// The run or checkpoint given, or the embedded network's name.
     pub model: PathBuf,
+    /// SHA-256 of an embedded or packed network's weights: a name alone does not say which version of it this was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_sha256: Option<String>,
     /// Steps the checkpoint was trained for.
     pub checkpoint_step: usize,
     /// fx, fy, cx, cy in pixels of the input.
@@ -105,7 +108,7 @@ impl FileMark {
 pub struct MadeWith {
     /// The program's version.
     pub version: String,
-    /// SHA-256 of the run's configuration and checkpoint.
+    /// SHA-256 of the network's configuration and weights.
     pub weights: String,
     /// What ran the network: `--engine`, `--precision`.
     pub engine: String,
@@ -131,28 +134,17 @@ pub struct MadeWith {
 }
 
 impl MadeWith {
-    /// For these arguments and this checkpoint.
+    /// For these arguments and this network.
     pub fn new(
         args: &PredictionArgs,
         outputs: &Outputs,
+        model: &ModelSource,
         predictor: &Predictor,
         camera: &CameraSource,
     ) -> Result<Self> {
-        let (folder, _) = RunFolder::open(&args.model)?;
-        let mut hash = Sha256::new();
-        for path in [
-            folder.config_path(),
-            folder.checkpoint_path(predictor.checkpoint),
-        ] {
-            // In pieces: a checkpoint may be larger than what predicting takes.
-            let mut file =
-                std::fs::File::open(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
-            std::io::copy(&mut file, &mut hash)
-                .map_err(|e| deepfusion_data::Error::file(&path, e))?;
-        }
         Ok(Self {
             version: env!("CARGO_PKG_VERSION").into(),
-            weights: format!("{:x}", hash.finalize()),
+            weights: model.content_sha256()?,
             engine: format!(
                 "{} on {}",
                 predictor.runner().name(),

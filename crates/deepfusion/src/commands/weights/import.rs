@@ -10,7 +10,7 @@ use crate::output;
 use crate::progress::say;
 
 /// `deepfusion weights import`.
-pub fn import(files: &[PathBuf], out: &Path) -> Result<()> {
+pub fn run(files: &[PathBuf], out: &Path) -> Result<()> {
     let device = Device::flex();
     let encoders_only = matches!(files, [file] if !file.is_dir());
     let (config, model) = match files {
@@ -79,7 +79,7 @@ fn from_resnet(file: &Path, device: &Device) -> Result<(TrainConfig, Model)> {
 }
 
 /// What can be imported: name, files, what it gives, terms.
-const KNOWN: [[&str; 4]; 3] = [
+pub const KNOWN: [[&str; 4]; 3] = [
     [
         "torchvision ResNet-18, 34, 50, 101",
         "resnet*.pth or .safetensors",
@@ -99,21 +99,3 @@ const KNOWN: [[&str; 4]; 3] = [
         "yours",
     ],
 ];
-
-/// `deepfusion weights list`.
-pub fn list(json: bool) -> Result<()> {
-    if json {
-        let rows: Vec<_> = KNOWN
-            .iter()
-            .map(|[name, files, gives, terms]| {
-                serde_json::json!({"name": name, "files": files, "gives": gives, "terms": terms})
-            })
-            .collect();
-        return output::print_json(&rows);
-    }
-    let mut text = String::new();
-    for [name, files, gives, terms] in KNOWN {
-        text += &format!("{name}\n  files  {files}\n  gives  {gives}\n  terms  {terms}\n");
-    }
-    output::print(&text)
-}

@@ -1,0 +1,189 @@
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+
+/// The version of the pair of files; others are refused.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// What a packed network is and what it was made from: the content of `NAME.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Card {
+    /// [`FORMAT_VERSION`].
+    pub format_version: u32,
+    /// What `--model` calls it.
+    pub name: String,
+    /// SHA-256 of `NAME.safetensors`, in hexadecimal.
+    pub sha256: String,
+    /// That file's length.
+    pub bytes: u64,
+    /// Parameters of the depth network that were learned.
+    pub parameters: u64,
+    /// Steps it was trained for.
+    pub steps: usize,
+    /// Which checkpoint of its run it is: `best` or `last`.
+    pub checkpoint: String,
+    /// The day that checkpoint was written, `2026-01-31`, UTC.
+    pub date: String,
+    /// The recordings it learned from, by name.
+    pub data: Vec<String>,
+    /// Whether no real image was among them.
+    pub simulated_only: bool,
+    /// How to make it again: a file of `recipes/`, or a command.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recipe: Option<String>,
+    /// Under which terms it may be used.
+    pub licence: String,
+    /// In which numbers the tensors are kept.
+    pub numbers: String,
+    /// Largest |packed − original| / original of the depths of a picture: what the shorter numbers cost.
+    pub depth_difference: f64,
+    /// What else there is to say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+    /// What was measured of the checkpoint before it was packed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub figures: Vec<Figure>,
+    /// The run's configuration, without the places of its recordings.
+    pub config: toml::Table,
+}
+
+/// An evaluation in a few numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Figure {
+    /// The recordings measured on, by name.
+    pub data: String,
+    /// Images.
+    pub images: usize,
+    /// Whether training saw none of them; absent where that is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<bool>,
+    /// Mean |prediction − truth| / truth, in metres as they are.
+    pub abs_rel: f64,
+    /// The same after each image was scaled to the truth's median.
+    pub abs_rel_scaled: f64,
+    /// Median over images of median(truth) / median(prediction): 1 is metric.
+    pub scale: f64,
+    /// Share of pixels within 25 %.
+    pub a1: f64,
+}
+
+impl Card {
+    /// The preset its run started from, as its configuration names it.
+    #[must_use]
+    pub fn preset(&self) -> &str {
+        let preset = self.config.get("preset").and_then(|p| p.as_str());
+        preset.unwrap_or("unknown")
+    }
+
+    /// Width and height of the images it takes, in pixels, as its configuration says.
+    #[must_use]
+    pub fn size(&self) -> Option<[i64; 2]> {
+        let size = self.config.get("size")?;
+        let side = |name: &str| size.get(name).and_then(toml::Value::as_integer);
+        Some([side("width")?, side("height")?])
+    }
+
+    /// The card as TOML. Equal cards give equal texts.
+    ///
+    /// # Errors
+    /// [`Error::Card`] for a value that TOML cannot hold.
+    pub fn to_toml(&self) -> Result<String, Error> {
+        let text = toml::to_string_pretty(self).map_err(|e| Error::Card {
+            origin: self.name.clone(),
+            reason: e.to_string(),
+        })?;
+        let weights = format!("{}.safetensors", self.name);
+        Ok(format!(
+            "# What {weights} is and what it was made from. Written by `deepfusion weights pack`.\n{text}"
+        ))
+    }
+
+    /// Reads a card; `origin` is what an error calls it.
+    ///
+    /// # Errors
+    /// [`Error::Version`] for one of another version, [`Error::Card`] for a text that is no card.
+    pub fn parse(origin: &str, text: &str) -> Result<Self, Error> {
+        let failed = |e: toml::de::Error| Error::Card {
+            origin: origin.to_owned(),
+            reason: e.to_string(),
+        };
+        // The version first: what else is in another version's card is not known.
+        let table: toml::Table = text.parse().map_err(failed)?;
+        let version = table
+            .get("format_version")
+            .and_then(toml::Value::as_integer);
+        if version.is_some_and(|version| version != i64::from(FORMAT_VERSION)) {
+            return Err(Error::Version {
+                origin: origin.to_owned(),
+                found: version.unwrap_or_default(),
+            });
+        }
+        table.try_into().map_err(failed)
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn card(name: &str) -> Card {
+        Card {
+            format_version: FORMAT_VERSION,
+            name: name.into(),
+            sha256: "ab".repeat(32),
+            bytes: 10,
+            parameters: 4,
+            steps: 60_000,
+            checkpoint: "best".into(),
+            date: "2026-01-31".into(),
+            data: vec!["street-1".into(), "street-2".into()],
+            simulated_only: true,
+            recipe: Some("recipes/street.toml".into()),
+            licence: "MIT OR Apache-2.0".into(),
+            numbers: "bf16".into(),
+            depth_difference: 0.003,
+            note: None,
+            figures: vec![Figure {
+                data: "street-3".into(),
+                images: 25,
+                held_out: Some(true),
+                abs_rel: 0.07,
+                abs_rel_scaled: 0.06,
+                scale: 1.01,
+                a1: 0.95,
+            }],
+            config: "preset = 'light'\nsize = { width = 640, height = 192 }"
+                .parse()
+                .unwrap(),
+        }
+    }
+
+    #[test]
+    fn a_card_survives_its_text() {
+        let card = card("street");
+        let text = card.to_toml().unwrap();
+        assert!(text.starts_with("# What street.safetensors is"), "{text}");
+        assert_eq!(Card::parse("street.toml", &text).unwrap(), card);
+        assert_eq!(card.to_toml().unwrap(), text);
+        assert_eq!((card.preset(), card.size()), ("light", Some([640, 192])));
+    }
+
+    /// What cannot be read names the card, and another version says so before anything else is complained of.
+    #[test]
+    fn what_is_no_card_is_named() {
+        let told = |text: &str| Card::parse("street.toml", text).unwrap_err().to_string();
+        let newer = told("format_version = 7\nnew = 'thing'");
+        assert!(
+            newer.contains("street.toml") && newer.contains("version 7"),
+            "{newer}"
+        );
+        for text in ["", "name = 3", "not toml", "format_version = 1"] {
+            assert!(told(text).contains("street.toml"), "{text}");
+        }
+        let text = card("street").to_toml().unwrap();
+        let unknown = text.replacen("steps", "stepz", 1);
+        assert!(told(&unknown).contains("stepz"));
+    }
+}

@@ -1,0 +1,23 @@
+//! Trained depth networks inside the program.
+//!
+//! A packed network is two files: `NAME.safetensors`, the tensors of a depth network under their paths ([`pack`]), and `NAME.toml`, its
+//! [`Card`]: the configuration that builds it, and what it was made from. Every such pair in this crate's folder `weights/` is embedded
+//! ([`all`], [`find`]); there may be none. A pair on the disk is read as well ([`Shipped::read`]).
+
+mod card;
+mod error;
+#[cfg_attr(
+    not(test),
+    allow(
+        dead_code,
+        reason = "the build script scans, the library only checks names"
+    )
+)]
+mod scan;
+mod shipped;
+mod tensors;
+
+pub use card::{Card, FORMAT_VERSION, Figure};
+pub use error::Error;
+pub use shipped::{DEFAULT, MAX_BYTES, Shipped, all, find, names};
+pub use tensors::{NUMBERS, Tensor, pack};

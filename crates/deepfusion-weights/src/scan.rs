@@ -1,0 +1,109 @@
+//! Which networks lie in a folder, and the Rust text that embeds them. The build script and the crate's tests share this file: it uses
+//! the standard library alone.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The two files of a network.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pair {
+    /// What `--model` calls it: the files' name without the ending.
+    pub name: String,
+    /// `NAME.toml`.
+    pub card: PathBuf,
+    /// `NAME.safetensors`.
+    pub weights: PathBuf,
+}
+
+/// Whether a network may be called so: letters a to z, digits and dashes, a letter first. `none` is what `--init none` means.
+pub fn is_name(name: &str) -> bool {
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    name.starts_with(|c: char| c.is_ascii_lowercase()) && name.chars().all(plain) && name != "none"
+}
+
+/// The networks in a folder, by name; none where there is no such folder. Hidden files and those of other endings are not looked at.
+///
+/// # Errors
+/// Says in a line which file lacks its other half or has a name that is none, or why the folder cannot be read.
+pub fn scan(folder: &Path) -> Result<Vec<Pair>, String> {
+    if !folder.exists() {
+        return Ok(Vec::new());
+    }
+    let failed = |e: std::io::Error| format!("{}: {e}", folder.display());
+    // By name: the card, the weights.
+    let mut found: BTreeMap<String, [Option<PathBuf>; 2]> = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let ending = path.extension().and_then(|e| e.to_str());
+        let half = match ending {
+            Some("toml") => 0,
+            Some("safetensors") => 1,
+            _ => continue,
+        };
+        let name = path
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        if name.starts_with('.') {
+            continue;
+        }
+        if !is_name(&name) {
+            return Err(format!(
+                "{}: a network's name is letters a to z, digits and dashes, a letter first, and not `none`",
+                path.display()
+            ));
+        }
+        found.entry(name).or_default()[half] = Some(path);
+    }
+    let pair = |(name, halves): (String, [Option<PathBuf>; 2])| match halves {
+        [Some(card), Some(weights)] => Ok(Pair {
+            name,
+            card,
+            weights,
+        }),
+        [card, _] => Err(format!(
+            "{}: {name}.{} has no {name}.{} beside it",
+            folder.display(),
+            if card.is_some() {
+                "toml"
+            } else {
+                "safetensors"
+            },
+            if card.is_some() {
+                "safetensors"
+            } else {
+                "toml"
+            },
+        )),
+    };
+    found.into_iter().map(pair).collect()
+}
+
+/// A Rust expression: `&[Embedded { … }, …]` with the content of every file.
+///
+/// # Errors
+/// Where a path is not absolute, or no Unicode: `include_bytes!` could not name it.
+pub fn list(pairs: &[Pair]) -> Result<String, String> {
+    let quoted = |path: &Path| match path.to_str() {
+        Some(text) if path.is_absolute() => Ok(format!("{text:?}")),
+        _ => Err(format!(
+            "{}: not an absolute path in Unicode",
+            path.display()
+        )),
+    };
+    let mut text = "&[\n".to_owned();
+    for Pair {
+        name,
+        card,
+        weights,
+    } in pairs
+    {
+        let (card, weights) = (quoted(card)?, quoted(weights)?);
+        text += &format!(
+            "    Embedded {{ name: {name:?}, card: include_str!({card}), weights: include_bytes!({weights}) }},\n"
+        );
+    }
+    text += "]\n";
+    Ok(text)
+}
