@@ -115,8 +115,8 @@ impl Traffic {
     }
 
     /// Dense traffic around a camera that is `s` metres along a varied world's street at time 0 and drives on at
-    /// `speed` m/s: vehicles ahead in its lane, at least `nearest` metres away, others that come towards it, people
-    /// who cross, bicycles at the edge. Nothing stands in parked cars. `density` in [0, 1].
+    /// `speed` m/s: vehicles ahead in its lane, at least `nearest` metres away, others beside it and towards it.
+    /// Nothing stands in parked cars. `density` in [0, 1].
     pub fn around(
         rng: &mut ChaCha8Rng,
         world: &World,
@@ -124,6 +124,9 @@ impl Traffic {
         density: f64,
     ) -> Self {
         let mut traffic = Self { cars: Vec::new() };
+        if !world.rooms.is_empty() {
+            return traffic;
+        }
         let lanes = world.lanes();
         for lane in lanes {
             let forward = lane.forward;

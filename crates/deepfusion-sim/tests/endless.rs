@@ -233,13 +233,18 @@ fn views_are_of_many_kinds_and_none_is_stuck() {
             known[0]
         );
         let far = known[known.len() * 9 / 10];
-        assert!(far > 1.5, "view {index} faces a wall at {far} m");
+        let least = if view.scene.name() == "indoor" {
+            0.5
+        } else {
+            1.5
+        };
+        assert!(far > least, "view {index} faces a wall at {far} m");
         scenes.insert(view.scene.name());
         weathers.insert(format!("{:?}", view.weather));
         grey += usize::from(view.grey);
         moving += usize::from(view.moving.contains(&true));
     }
-    assert_eq!(scenes.len(), 5, "{scenes:?}");
+    assert_eq!(scenes.len(), 8, "{scenes:?}");
     assert_eq!(weathers.len(), 6, "{weathers:?}");
     assert!((15..65).contains(&grey), "{grey}");
     assert!(moving > 40, "{moving}");

@@ -128,7 +128,9 @@ pub(super) fn furnish(world: &mut World, rng: &mut ChaCha8Rng, variety: &Variety
         }
         _ => street::furnish(&mut site),
     }
-    if !matches!(scene, Scene::Indoor | Scene::Garage) {
-        sweep::clear_the_lane(world);
+    match scene {
+        Scene::Garage => {}
+        Scene::Indoor => sweep::clear(world, &sweep::ROOMS),
+        _ => sweep::clear(world, &sweep::ROAD),
     }
 }

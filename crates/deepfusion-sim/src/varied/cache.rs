@@ -10,10 +10,13 @@ pub struct Cache<T> {
     entries: Mutex<Entries<T>>,
 }
 
+/// The thing, once it is built.
+type Cell<T> = Arc<OnceLock<Arc<T>>>;
+
 struct Entries<T> {
     clock: u64,
-    /// When it was last asked for, and the thing once it is built.
-    of: HashMap<u64, (u64, Arc<OnceLock<Arc<T>>>)>,
+    /// When it was last asked for, and the thing.
+    of: HashMap<u64, (u64, Cell<T>)>,
 }
 
 impl<T> Cache<T> {

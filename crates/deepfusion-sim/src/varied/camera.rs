@@ -110,8 +110,9 @@ enum Kind {
     Beside,
 }
 
-/// Street coordinates, a heading, and how far the view ahead must be free, metres.
-fn spot(rng: &mut ChaCha8Rng, place: &Place) -> ((f64, f64, f64), f32) {
+/// Street coordinates, a heading, and how far the view ahead must be free, metres. `anchor` is where the traffic's own
+/// car drives.
+fn spot(rng: &mut ChaCha8Rng, place: &Place, anchor: f64) -> ((f64, f64, f64), f32) {
     let kind = weighted(
         rng,
         &[
@@ -121,14 +122,19 @@ fn spot(rng: &mut ChaCha8Rng, place: &Place) -> ((f64, f64, f64), f32) {
             (0.17, Kind::Beside),
         ],
     );
-    let s = rng.random_range(0.0..place.length);
     if !place.world.rooms.is_empty() {
-        return (in_room(rng, place, s), 0.8);
+        return (in_room(rng, place, anchor), 0.8);
     }
-    // On either lane, with the traffic of that lane.
-    let back = rng.random_bool(0.3);
-    let lane = if back { 1.65 } else { -1.65 } + normal(rng, 0.0, 0.4, 2.5);
-    let along = if back { PI } else { 0.0 };
+    // On any lane, with the traffic of that lane: at the anchor or among the cars before it.
+    let lanes = place.world.lanes();
+    let on = lanes[rng.random_range(0..lanes.len())];
+    let s = if matches!(kind, Kind::Driving) && on.forward && rng.random_bool(0.7) {
+        anchor
+    } else {
+        anchor + rng.random_range(-10.0..110.0)
+    };
+    let lane = on.lateral + normal(rng, 0.0, 0.35, 2.5);
+    let along = if on.forward { 0.0 } else { PI };
     // Drivers keep their distance, though not always.
     let ahead = match kind {
         Kind::Driving => rng.random_range(3.0..14.0),
@@ -166,9 +172,14 @@ fn in_room(rng: &mut ChaCha8Rng, place: &Place, s: f64) -> (f64, f64, f64) {
     (x, y, rng.random_range(0.0..TAU))
 }
 
-/// Draws a free place for a camera: not within a solid nor close to one, and not with most of its view within
-/// arm's length of one.
-pub fn stand(rng: &mut ChaCha8Rng, place: &Place, moving: &[Primitive], k: &Intrinsics) -> Stand {
+/// Draws a free place for a camera among the traffic around `anchor`, metres along the street: not within a solid nor
+/// close to one, and not with most of its view within arm's length of one.
+pub fn stand(
+    rng: &mut ChaCha8Rng,
+    place: &Place,
+    (moving, anchor): (&[Primitive], f64),
+    k: &Intrinsics,
+) -> Stand {
     let height = height(rng);
     let (mut pitch, roll) = tilt(rng, height);
     if !place.world.rooms.is_empty() {
@@ -176,17 +187,18 @@ pub fn stand(rng: &mut ChaCha8Rng, place: &Place, moving: &[Primitive], k: &Intr
         pitch += normal(rng, 0.12, 0.2, 1.8);
     }
     for _ in 0..TRIES {
-        let (spot, ahead) = spot(rng, place);
+        let (spot, ahead) = spot(rng, place, anchor);
         let stand = pose(place, spot, (height, pitch, roll));
         if is_free(place, moving, &stand.world_from_cam, k, ahead) {
             return stand;
         }
     }
     // A lane is free of everything that stands, and from here on of what moves.
-    let s = rng.random_range(0.0..place.length);
+    let lane = place.world.lanes().into_iter().find(|lane| lane.forward);
+    let lateral = lane.map_or(-1.65, |lane| lane.lateral);
     Stand {
         alone: true,
-        ..pose(place, (s, -1.65, 0.0), (height, pitch, roll))
+        ..pose(place, (anchor, lateral, 0.0), (height, pitch, roll))
     }
 }
 
@@ -224,6 +236,7 @@ fn is_free(
     let near: Vec<&Primitive> = world
         .primitives
         .iter()
+        .chain(&world.far)
         .chain(moving)
         .filter(|solid| {
             let (half_x, half_y, low, high) = solid.bounds(&world.hulls);

@@ -21,8 +21,6 @@ pub struct EndlessConfig {
     pub grey: f64,
     /// Share of the views by daylight in the open; the rest are of garages and of nights.
     pub daylight: f64,
-    /// Share of the worlds that are varied (see [`crate::Variety`]); the others are as [`crate::Simulation`]'s.
-    pub variety: f64,
     /// Whether the camera's image formation (exposure, noise, blur, JPEG and so on) is applied. Without it the
     /// pictures are as [`crate::Simulation`]'s, in varied light.
     pub formation: bool,
@@ -38,7 +36,6 @@ impl Default for EndlessConfig {
             worlds_at_once: 16,
             grey: 0.15,
             daylight: 0.8,
-            variety: 0.9,
             formation: true,
         }
     }
@@ -86,11 +83,7 @@ impl EndlessConfig {
             self.worlds_at_once.to_string(),
             "1 to 256",
         )?;
-        for (field, share) in [
-            ("grey", self.grey),
-            ("daylight", self.daylight),
-            ("variety", self.variety),
-        ] {
+        for (field, share) in [("grey", self.grey), ("daylight", self.daylight)] {
             check(
                 (0.0..=1.0).contains(&share),
                 field,

@@ -58,7 +58,7 @@ impl Hiss {
         let mut z = self.0;
         z = (z ^ (z >> 32)).wrapping_mul(0xD6E8_FEB8_6659_FD93);
         z ^= z >> 32;
-        let sum = (z & 0xFFFF) + (z >> 16 & 0xFFFF) + (z >> 32 & 0xFFFF) + (z >> 48);
+        let sum = (z & 0xFFFF) + ((z >> 16) & 0xFFFF) + ((z >> 32) & 0xFFFF) + (z >> 48);
         // Four uniform numbers of variance 65536²/12 each.
         (sum as f32 - 131_070.0) * (1.0 / 37_837.2)
     }

@@ -97,11 +97,13 @@ impl Endless {
         let world = &place.world;
 
         let mut rng = generator(config.seed, index, 0x00CA_4E4A);
-        let time_s = Place::time(&mut rng);
-        let mut moving = place.traffic.solids(world, time_s);
-        let mut cars = place.traffic.objects(world, time_s);
+        let anchor = rng.random_range(0.0..place.length);
+        let nearest = rng.random_range(3.0..40.0);
+        let traffic = place.traffic(&mut rng, anchor, nearest);
+        let mut moving = traffic.solids(world, 0.0);
+        let mut cars = traffic.objects(world, 0.0);
         let intrinsics = camera::intrinsics(&mut rng, config.width, config.height);
-        let stand = camera::stand(&mut rng, &place, &moving, &intrinsics);
+        let stand = camera::stand(&mut rng, &place, (&moving, anchor), &intrinsics);
         if stand.alone {
             moving.clear();
             cars.clear();
@@ -117,8 +119,8 @@ impl Endless {
             world_from_cam: &stand.world_from_cam,
             intrinsics: &intrinsics,
         };
-        let all = world.primitives.iter().chain(&world.far).chain(&moving);
-        let solids = all.copied().collect();
+        let standing = world.primitives.iter().chain(&world.far);
+        let solids = standing.chain(&moving).copied().collect();
         let mut exposure = render::expose(&shot, solids, Cores::One, Edges::EachSurface);
         wet::reflect(&shot, &mut exposure);
 

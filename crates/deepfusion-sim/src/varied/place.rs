@@ -17,8 +17,11 @@ use rand_chacha::ChaCha8Rng;
 const BEHIND: f64 = 110.0;
 const AHEAD: f64 = 190.0;
 
-/// Traffic is simulated for so long, seconds; cameras stand along the way that a car drives meanwhile.
+/// Cameras stand along the way that a car drives in this time, seconds.
 const DURATION_S: f64 = 9.0;
+
+/// Share of the worlds that are not varied.
+const PLAIN: f64 = 0.12;
 
 /// A built world.
 pub struct Place {
@@ -26,8 +29,8 @@ pub struct Place {
     pub world: World,
     /// Light on its ground.
     pub light: GroundLight,
-    /// What moves.
-    pub traffic: Traffic,
+    /// How dense its traffic is at most, in [0, 1]; none where nothing drives.
+    density: f64,
     /// Cameras are placed from 0 to here, metres along the street.
     pub length: f64,
 }
@@ -36,92 +39,65 @@ impl Place {
     /// Builds world `number` of a stream.
     pub fn build(config: &EndlessConfig, number: u64) -> Self {
         let mut rng = generator(config.seed, number, 0x90D);
-        let varied = rng.random_bool(config.variety);
-        let scene = scene(&mut rng, config.daylight, varied);
-        let variety = if varied {
-            Variety::draw(&mut rng)
-        } else {
-            Variety::none()
-        };
+        let scene = scene(&mut rng, config.daylight);
         let seed: u64 = rng.random();
         let longest = 14.0 * (DURATION_S + 3.0);
         let mut road = match scene {
-            Scene::Indoor => Road::straight(-0.5 * BEHIND, longest + AHEAD),
+            Scene::Indoor => Road::straight(-BEHIND, longest + AHEAD),
             Scene::Motorway | Scene::Country => Road::gentle(&mut rng, -BEHIND, longest + AHEAD),
             _ => Road::generate(&mut rng, -BEHIND, longest + AHEAD),
         };
         let drive = Drive::simulate(&mut rng, &road, DURATION_S, scene.pace());
         let length = drive.progress(DURATION_S).0;
-        road.truncate(length + if scene == Scene::Indoor { 40.0 } else { AHEAD });
+        road.truncate(length + AHEAD);
+        // Some worlds are the plain ones of `simulate`, where there is one of this kind.
+        let variety = if Scene::ALL.contains(&scene) && rng.random_bool(PLAIN) {
+            Variety::none()
+        } else {
+            Variety::draw(&mut rng)
+        };
         let mut world = World::furnish_varied(road, seed, scene, &variety);
         world.sun = sun(&mut rng);
         let light = GroundLight::bake(&world, Cores::One);
-        let cars = match scene {
-            Scene::Garage => rng.random_range(0..3),
-            Scene::Park => rng.random_range(0..5),
-            _ => rng.random_range(0..13),
-        };
-        let traffic = if varied && !matches!(scene, Scene::Garage | Scene::Indoor) {
-            let density = match scene {
-                Scene::Park => rng.random_range(0.0..0.3),
-                _ => rng.random_range(0.0..1.0),
-            };
-            let start = (-40.0, length / DURATION_S, 0.0);
-            Traffic::around(&mut rng, &world, start, density)
-        } else {
-            Traffic::new(&mut rng, &world, &drive, DURATION_S, cars)
-        };
         Self {
             world,
             light,
-            traffic,
+            density: rng.random(),
             length,
         }
     }
 
-    /// A time of its traffic, seconds.
-    pub fn time(rng: &mut ChaCha8Rng) -> f64 {
-        rng.random_range(0.0..DURATION_S)
+    /// The traffic around a place on the street, metres along it. `nearest`: how far ahead of it the lane is free.
+    pub fn traffic(&self, rng: &mut ChaCha8Rng, s: f64, nearest: f64) -> Traffic {
+        let speed = 9.0 * self.world.scene.pace();
+        let density = self.density * rng.random_range(0.0..1.0);
+        Traffic::around(rng, &self.world, (s, speed, nearest), density)
     }
 }
 
-/// By daylight mostly streets, then shopping streets and parks, and in varied worlds country roads and motorways;
-/// else rooms (in varied worlds), garages and nights.
-fn scene(rng: &mut ChaCha8Rng, daylight: f64, varied: bool) -> Scene {
-    if varied {
-        return if rng.random_bool(daylight) {
-            weighted(
-                rng,
-                &[
-                    (0.46, Scene::Urban),
-                    (0.15, Scene::Commercial),
-                    (0.13, Scene::Park),
-                    (0.16, Scene::Country),
-                    (0.1, Scene::Motorway),
-                ],
-            )
-        } else {
-            weighted(
-                rng,
-                &[
-                    (0.65, Scene::Indoor),
-                    (0.15, Scene::Garage),
-                    (0.2, Scene::Night),
-                ],
-            )
-        };
-    }
+/// By daylight mostly streets, then shopping streets, parks, country roads and motorways; else rooms, nights and
+/// garages.
+fn scene(rng: &mut ChaCha8Rng, daylight: f64) -> Scene {
     if rng.random_bool(daylight) {
         weighted(
             rng,
             &[
-                (0.5, Scene::Urban),
-                (0.25, Scene::Commercial),
-                (0.25, Scene::Park),
+                (0.42, Scene::Urban),
+                (0.18, Scene::Commercial),
+                (0.14, Scene::Park),
+                (0.15, Scene::Country),
+                (0.11, Scene::Motorway),
             ],
         )
     } else {
-        weighted(rng, &[(0.5, Scene::Garage), (0.5, Scene::Night)])
+        weighted(
+            rng,
+            &[
+                (0.55, Scene::Indoor),
+                (0.2, Scene::Garage),
+                (0.25, Scene::Night),
+            ],
+        )
     }
 }
 

@@ -37,7 +37,7 @@ pub use live::LiveArgs;
 pub use perceive::{PerceiveArgs, PerceiveSave};
 pub use predict::{BenchArgs, PredictArgs, Save};
 pub use prediction::{Outputs, PredictionArgs};
-pub use train::{DeviceChoice, LearnChoice, PresetChoice, TrainArgs, ViewMotionChoice};
+pub use train::{DeviceChoice, PresetChoice, TrainArgs, ViewMotionChoice};
 pub use values::{CameraIntrinsics, Shard, Size};
 pub use view::ViewArgs;
 pub use weights::{PackArgs, WeightsCommand};

@@ -302,7 +302,7 @@ impl Site<'_> {
         match self.rng.random_range(0..12) {
             0..=3 => {
                 let height = self.draw(0.7, 2.2);
-                return self.hedge(spot, length, height);
+                self.hedge(spot, length, height);
             }
             4..=5 => {
                 let mark = self.mark();

@@ -377,7 +377,7 @@ impl Site<'_> {
             }
             4..=5 => {
                 let cloth = self.any(&kit.cloth);
-                let turned = spot.spot(0.0, 0.0, 0.0, self.draw(0.0, 6.28));
+                let turned = spot.spot(0.0, 0.0, 0.0, self.draw(0.0, std::f64::consts::TAU));
                 self.chair(&turned, cloth);
                 ObjectClass::Misc
             }
@@ -385,7 +385,7 @@ impl Site<'_> {
                 if let Some(model) = self.person(ObjectClass::Pedestrian)
                     && f64::from(model.size[2]) < height
                 {
-                    let turned = spot.spot(0.0, 0.0, 0.0, self.draw(0.0, 6.28));
+                    let turned = spot.spot(0.0, 0.0, 0.0, self.draw(0.0, std::f64::consts::TAU));
                     self.put(&model, &turned);
                 }
                 return;

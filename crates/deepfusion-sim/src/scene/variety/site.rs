@@ -411,7 +411,7 @@ impl Site<'_> {
             fill: species.fill,
             salt,
         };
-        let heading = self.draw(0.0, 6.28);
+        let heading = self.draw(0.0, std::f64::consts::TAU);
         let material = species.leaves[light.min(2)];
         self.world
             .solid(Shape::Crown(crown), at, heading, material, salt);

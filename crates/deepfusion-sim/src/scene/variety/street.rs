@@ -656,7 +656,7 @@ impl Row<'_, '_> {
                     && let Some(model) = self.site.person(class)
                 {
                     spot.heading += match self.site.rng.random_range(0..5) {
-                        0 => self.site.draw(0.0, 6.28),
+                        0 => self.site.draw(0.0, std::f64::consts::TAU),
                         1 | 2 => PI,
                         _ => 0.0,
                     };

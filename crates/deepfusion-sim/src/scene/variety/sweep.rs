@@ -4,21 +4,38 @@ use super::site::Spot;
 use crate::primitive::{Primitive, Shape};
 use crate::scene::World;
 
-/// The lane that must be free: metres left of the centreline, from and to, and its height above the road.
-pub const LANE: [f64; 2] = [-2.7, -0.6];
-/// Nothing hangs lower over the lane, metres.
-pub const HEADROOM: f64 = 2.3;
+/// A way that must be free.
+#[derive(Debug, Clone, Copy)]
+pub struct Way {
+    /// Metres left of the centreline, from and to.
+    pub lane: [f64; 2],
+    /// Nothing hangs lower over it, metres.
+    pub headroom: f64,
+}
 
-/// Whether a solid reaches into the lane.
-pub fn intrudes(world: &World, solid: &Primitive) -> bool {
+/// The lane of a car.
+pub const ROAD: Way = Way {
+    lane: [-2.7, -0.6],
+    headroom: 2.3,
+};
+
+/// The way through rooms and their doors.
+pub const ROOMS: Way = Way {
+    lane: [-2.19, -1.11],
+    headroom: 1.95,
+};
+
+/// Whether a solid reaches into a way.
+fn intrudes(world: &World, way: &Way, solid: &Primitive) -> bool {
+    let lane = way.lane;
     let (half_x, half_y, low, _) = solid.bounds(&world.hulls);
-    if solid.position[2] + f64::from(low) > HEADROOM {
+    if solid.position[2] + f64::from(low) > way.headroom {
         return false;
     }
     let p = world.road.locate(solid.position[0], solid.position[1]);
     let middle = f64::from(p.lateral);
     let reach = f64::from(half_x.hypot(half_y));
-    if middle - reach > LANE[1] || middle + reach < LANE[0] {
+    if middle - reach > lane[1] || middle + reach < lane[0] {
         return false;
     }
     let spot = Spot {
@@ -34,7 +51,7 @@ pub fn intrudes(world: &World, solid: &Primitive) -> bool {
         Shape::Cylinder { .. } | Shape::Ellipsoid { .. } | Shape::Crown(_)
     );
     if round && (hx - hy).abs() < 0.1 * hx {
-        return middle - hx < LANE[1] && middle + hx > LANE[0];
+        return middle - hx < lane[1] && middle + hx > lane[0];
     }
     let (nx, ny) = ((hx / 0.5).ceil() as i32 + 1, (hy / 0.5).ceil() as i32 + 1);
     (-nx..=nx).any(|i| {
@@ -45,17 +62,17 @@ pub fn intrudes(world: &World, solid: &Primitive) -> bool {
             );
             let [x, y, _] = spot.at(u, v, 0.0);
             let lateral = f64::from(world.road.locate(x, y).lateral);
-            lateral > LANE[0] && lateral < LANE[1]
+            lateral > lane[0] && lateral < lane[1]
         })
     })
 }
 
-/// Removes everything that reaches into the lane.
-pub fn clear_the_lane(world: &mut World) {
+/// Removes everything that reaches into a way.
+pub fn clear(world: &mut World, way: &Way) {
     let kept: Vec<Primitive> = world
         .primitives
         .iter()
-        .filter(|solid| !intrudes(world, solid))
+        .filter(|solid| !intrudes(world, way, solid))
         .copied()
         .collect();
     world.primitives = kept;

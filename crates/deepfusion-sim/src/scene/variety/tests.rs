@@ -1,5 +1,5 @@
 use super::site::{Spot, boxed};
-use super::sweep::HEADROOM;
+use super::sweep::{ROAD, ROOMS};
 use super::*;
 use crate::primitive::{Primitive, Shape};
 use crate::render::gather;
@@ -50,7 +50,11 @@ fn the_camera_s_way_is_free() {
         for seed in 1..4 {
             let world = world(scene, seed);
             assert!(world.primitives.len() > 300, "{}", world.primitives.len());
-            let half = if scene == Scene::Indoor { 0.5 } else { 0.85 };
+            let (half, headroom) = if scene == Scene::Indoor {
+                (0.5, ROOMS.headroom)
+            } else {
+                (0.85, ROAD.headroom)
+            };
             for step in 0..360 {
                 let s = -40.0 + 0.6 * f64::from(step);
                 let near: Vec<&Primitive> = world
@@ -62,7 +66,7 @@ fn the_camera_s_way_is_free() {
                     .collect();
                 for aside in [-half, 0.0, half] {
                     let (x, y, _) = world.road.world(s, aside - 1.65);
-                    for z in [0.2, 0.8, 1.4, HEADROOM - 0.4] {
+                    for z in [0.2, 0.8, 1.4, headroom - 0.3] {
                         let point = Vector3::new(x, y, z);
                         let hit = near.iter().find(|solid| holds(&world, solid, &point));
                         assert!(
