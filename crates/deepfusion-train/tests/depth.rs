@@ -162,7 +162,7 @@ fn a_drive_is_learned_from_as_its_set_says() {
         let (train, validation) = samples(&config).unwrap();
         assert_eq!(train.samples.is_empty(), !motion, "{learn:?}");
         assert_eq!(train.depth.is_empty(), !depth, "{learn:?}");
-        assert_eq!(validation.is_empty(), false);
+        assert!(!validation.is_empty());
         if !depth {
             continue;
         }
