@@ -238,7 +238,7 @@ fn a_build_without_ros_2_says_how_to_build_one_with() {
     for place in ["drive", "drive/drive_0.mcap"] {
         let args = format!("data inspect {place}");
         fails(at, &args, &["ROS 2 bag", "--features ros2"]);
-        let args = format!("predict --model none {place} --out depth");
+        let args = format!("predict --model drive {place} --out depth");
         fails(at, &args, &["ROS 2 bag", "--features ros2"]);
     }
 }

@@ -1,0 +1,18 @@
+//! The recipes in the repository are configurations that this program takes.
+
+use deepfusion_train::TrainConfig;
+use std::path::Path;
+
+#[test]
+fn every_recipe_is_a_configuration() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../recipes");
+    let mut count = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            TrainConfig::read(&path).unwrap();
+            count += 1;
+        }
+    }
+    assert!(count > 0);
+}
