@@ -235,10 +235,13 @@ fn a_build_without_ros_2_says_how_to_build_one_with() {
     let at = folder.path();
     std::fs::create_dir(at.join("drive")).unwrap();
     std::fs::write(at.join("drive/drive_0.mcap"), b"").unwrap();
+    // A run by its looks: what is wrong with the input is told before its network is read.
+    std::fs::create_dir(at.join("run")).unwrap();
+    std::fs::write(at.join("run/config.toml"), b"").unwrap();
     for place in ["drive", "drive/drive_0.mcap"] {
         let args = format!("data inspect {place}");
         fails(at, &args, &["ROS 2 bag", "--features ros2"]);
-        let args = format!("predict --model drive {place} --out depth");
+        let args = format!("predict --model run {place} --out depth");
         fails(at, &args, &["ROS 2 bag", "--features ros2"]);
     }
 }
