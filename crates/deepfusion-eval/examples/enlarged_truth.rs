@@ -1,5 +1,5 @@
 //! How sharp the truth of simulated streets itself is, seen at a half, a quarter, … of its size and enlarged again, as a
-//! network of that size would at best be: the table in docs/concepts/evaluation.md.
+//! network of that size would at best be.
 //!
 //! ```text
 //! cargo run -p deepfusion-eval --example enlarged_truth
