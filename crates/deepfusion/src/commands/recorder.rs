@@ -81,9 +81,13 @@ impl Recorder {
                 } else {
                     String::new()
                 };
+                // Images that are learned from by their depth have not moved.
+                let moved = match mean_displacement_m > 0.0 {
+                    true => format!(", mean displacement {mean_displacement_m:.3} m"),
+                    false => String::new(),
+                };
                 say(&format!(
-                    "{samples} training samples, {validation_samples} held out, mean displacement \
-                     {mean_displacement_m:.3} m; {steps} steps{going_on}"
+                    "{samples} training samples, {validation_samples} held out{moved}; {steps} steps{going_on}"
                 ));
             }
             TrainEvent::Step {
