@@ -1,5 +1,6 @@
 //! What known depth is learned from: frames of recordings that have it, and views rendered for it.
 
+use crate::fit_depth::fit_depth;
 use crate::sampler::stream;
 use crate::{Error, Sampler, TrainConfig};
 use deepfusion_data::{Dataset, GtKind, RgbImage};
@@ -194,10 +195,18 @@ impl DepthSet {
             drive: recording.name().to_owned(),
         })?;
         let Frame { drive, number } = Frame::of(recording, frame);
+        let camera = recording.intrinsics(frame);
+        // Depth cameras often have fewer pixels than the colour camera they look along.
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        let depth = DepthMap {
+            data: fit_depth(&depth, width, height, false),
+            width,
+            height,
+        };
         Ok(DepthView {
             image: recording.load_image(frame)?,
             depth,
-            camera: recording.intrinsics(frame),
+            camera,
             sky: false,
             set: self.set_of[dataset],
             name: format!("{drive}/{number:010}"),
