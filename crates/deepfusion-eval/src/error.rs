@@ -55,6 +55,12 @@ pub enum Error {
         /// The first few names.
         names: String,
     },
+    /// Factors of intervals that are none of this program's.
+    #[error("factors of intervals: {reason}")]
+    Intervals {
+        /// What is wrong.
+        reason: String,
+    },
     /// A file that cannot be opened or read.
     #[error("cannot read {path}")]
     Io {
@@ -121,6 +127,9 @@ impl Error {
                 "check that the ground truth is in metres and 0 where there is none, and that --crop and --cap leave pixels"
                     .into(),
             ),
+            Self::Intervals { .. } => {
+                Some("write them anew with `eval --calibrate-uncertainty`".into())
+            }
             Self::Io { source, .. } => match source.kind() {
                 std::io::ErrorKind::NotFound => Some("check the spelling, and that the disk is mounted".into()),
                 std::io::ErrorKind::PermissionDenied => Some("check the permissions of the file".into()),

@@ -257,6 +257,7 @@ impl Evaluator {
             missing_rate: (self.protocol.holes == Holes::Skip)
                 .then(|| self.missing as f64 / self.masked.max(1) as f64),
             sharpness: Sharpness::mean(images.iter().filter_map(|i| i.sharpness.as_ref())),
+            intervals: None,
             points: self.point_statistics(),
             trivial: None,
             scenarios: Vec::new(),

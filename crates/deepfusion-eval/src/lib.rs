@@ -16,6 +16,7 @@ mod error;
 mod evaluator;
 mod grid;
 mod holes;
+mod intervals;
 mod metrics;
 pub mod odometry;
 mod points;
@@ -31,6 +32,9 @@ pub use array_set::{ArraySet, match_names};
 pub use error::{Error, Result};
 pub use evaluator::{Evaluator, ImageScore, Sample};
 pub use grid::{Grid, Prediction};
+pub use intervals::{
+    FactorRange, IntervalFactors, IntervalRange, IntervalRow, IntervalSample, Intervals, LEVELS,
+};
 pub use metrics::Metrics;
 pub use points::{DrawnPoint, PointErrors, PointRange, Points};
 pub use protocol::{Crop, GroundTruth, Holes, Protocol, Scaling};

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use crate::{Crop, GroundTruth, Metrics, Points, Protocol, Sharpness};
+use crate::{Crop, GroundTruth, Intervals, Metrics, Points, Protocol, Sharpness};
 
 /// What an evaluation says. Serialises to the JSON that scripts rely on: field names are fixed, parts that do not apply
 /// are absent, and a number that does not exist is `null`, never NaN.
@@ -47,6 +47,9 @@ pub struct Report {
     /// How sharp the predictions are, where truth is dense; median-scaled.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sharpness: Option<Sharpness>,
+    /// Whether the intervals of a network that says how sure it is hold what they promise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intervals: Option<Intervals>,
     /// Distances of randomly drawn points from the truth, where asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points: Option<Points>,

@@ -1,6 +1,6 @@
 use std::fmt;
 
-use crate::{Crop, GroundTruth, Metrics, PointErrors, Points, Report, Sharpness};
+use crate::{Crop, GroundTruth, Intervals, Metrics, PointErrors, Points, Report, Sharpness};
 
 const LABEL: usize = 22;
 
@@ -123,10 +123,31 @@ impl Report {
                 100.0 * rate
             )?;
         }
-        self.sharpness
+        if let Some(sharpness) = &self.sharpness {
+            sharp_lines(f, sharpness)?;
+        }
+        self.intervals
             .as_ref()
-            .map_or(Ok(()), |s| sharp_lines(f, s))
+            .map_or(Ok(()), |i| interval_lines(f, i))
     }
+}
+
+/// A line a level.
+fn interval_lines(f: &mut fmt::Formatter<'_>, intervals: &Intervals) -> fmt::Result {
+    let whose = match intervals.calibrated {
+        true => "calibrated",
+        false => "as the network says, not calibrated",
+    };
+    for row in &intervals.levels {
+        writeln!(
+            f,
+            "sure    the {:.0} % intervals hold {:.1} % of the pixels, {:.0} % of the depth wide ({whose})",
+            100.0 * row.level,
+            100.0 * row.coverage,
+            100.0 * row.width_rel,
+        )?;
+    }
+    Ok(())
 }
 
 /// What truth without a boundary leaves open is not printed.

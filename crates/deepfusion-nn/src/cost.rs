@@ -183,6 +183,11 @@ impl DepthNetConfig {
             .map(|w| (9 * w + 1) as u64)
             .sum();
         costs.push(heads);
+        if self.uncertainty {
+            let mut cost = ModuleCost::new("uncertainty");
+            cost.conv([from, 1], 3, before, After::Bias);
+            costs.push(cost);
+        }
     }
 }
 

@@ -141,6 +141,11 @@ impl DisparityDecoder {
     ///   before it at output stride 16
     /// - output: `[batch, 1, height / 2ˢ, width / 2ˢ]` in (0, 1) for scales s = 0…3, finest first
     pub fn forward(&self, features: [Tensor<4>; 5]) -> Vec<Tensor<4>> {
+        self.forward_with_feature(features).0
+    }
+
+    /// The same, and the feature that the finest head reads, `[batch, widths[4], height, width]`.
+    pub fn forward_with_feature(&self, features: [Tensor<4>; 5]) -> (Vec<Tensor<4>>, Tensor<4>) {
         let [f0, f1, f2, f3, f4] = features;
         let skips = [Some(f3), Some(f2), Some(f1), Some(f0), None];
         let mut x = f4;
@@ -155,6 +160,6 @@ impl DisparityDecoder {
             }
         }
         disparities.reverse();
-        disparities
+        (disparities, x)
     }
 }

@@ -1,6 +1,6 @@
 //! DepthNet: an encoder, context and attention on its skip paths, the disparity decoder (SPEC 1.1).
 
-use burn::module::Module;
+use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
 use deepfusion_geometry::DepthRange;
 use serde::{Deserialize, Serialize};
@@ -10,8 +10,12 @@ use crate::attention::{Attention, AttentionConfig, AttentionMasks, GlobalAggrega
 use crate::decoder::{DecoderConfig, DisparityDecoder};
 use crate::hce::{HceConfig, HierarchicalContext};
 use crate::init::WeightRng;
-use crate::layers::freeze_statistics;
+use crate::layers::{Conv2d, Conv2dConfig, freeze_statistics};
 use crate::resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth};
+use crate::weights::{self, Weights};
+
+/// The error of ln depth that the head for uncertainty starts at everywhere.
+const FIRST_SCALE: f32 = 0.2;
 
 /// The size of the images a network is given, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -81,6 +85,9 @@ pub struct DepthNetConfig {
     /// pixel out of view: nothing is left to learn from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial_depth_m: Option<f64>,
+    /// Whether a further head says how sure the network is of each pixel (SPEC 7.2).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub uncertainty: bool,
 }
 
 impl DepthNetConfig {
@@ -95,6 +102,7 @@ impl DepthNetConfig {
             decoder: DecoderConfig::default(),
             range: DepthRange::default(),
             initial_depth_m: Some(10.0),
+            uncertainty: false,
         }
     }
 
@@ -207,12 +215,20 @@ impl DepthNetConfig {
         let decoder = self
             .decoder
             .init(refined, stride, head_bias, &mut rng, device)?;
+        // Drawn last: the other weights are those of the same seed without it.
+        let uncertainty = self.uncertainty.then(|| {
+            let head = Conv2dConfig::new(self.decoder.widths[4], 1, 3).reflected();
+            let mut head = head.init(&mut rng, device);
+            head.bias = Some(Param::from_data([FIRST_SCALE.ln()], device));
+            head
+        });
         let net = DepthNet {
             encoder,
             hce,
             attention,
             aggregation,
             decoder,
+            uncertainty,
         };
         // The encoder has seen to its own; the context encoding has batch norms, too.
         Ok(match self.encoder.frozen_statistics {
@@ -235,6 +251,20 @@ pub struct DepthNet {
     pub aggregation: Option<GlobalAggregation>,
     /// The decoder.
     pub decoder: DisparityDecoder,
+    /// 3×3 from the decoder's finest feature to ln b, b the Laplace scale of the error of ln depth.
+    pub uncertainty: Option<Conv2d>,
+}
+
+/// The tensors of [`DepthNet::uncertainty`] begin so.
+const UNCERTAINTY: &str = "uncertainty.";
+
+/// What [`DepthNet::forward_with_uncertainty`] says of images.
+#[derive(Debug, Clone)]
+pub struct DepthOutput {
+    /// As [`DepthNet::forward`] gives them.
+    pub disparities: Vec<Tensor<4>>,
+    /// ln b of each pixel, `[batch, 1, height, width]`; `None` of a network without that head.
+    pub log_scale: Option<Tensor<4>>,
 }
 
 /// What a [`DepthNet`] computes on the way from features to disparities: the paper's Fig. 5.
@@ -260,6 +290,45 @@ impl DepthNet {
     /// When the images' size is no [`InputSize`]; check it where it enters the program.
     pub fn forward(&self, images: Tensor<4>) -> Vec<Tensor<4>> {
         self.decode(self.encoder.forward(images))
+    }
+
+    /// The same, and how sure the network is: it errs by b in ln depth, in the mean. What the head learns changes nothing
+    /// else: no gradient passes from it into the decoder.
+    ///
+    /// # Shapes
+    /// - `images`: as for [`Self::forward`]
+    pub fn forward_with_uncertainty(&self, images: Tensor<4>) -> DepthOutput {
+        let features = self.refine(self.encoder.forward(images), |_| ());
+        let (disparities, finest) = self.decoder.forward_with_feature(features);
+        let head = self.uncertainty.as_ref();
+        DepthOutput {
+            disparities,
+            log_scale: head.map(|head| head.forward(finest.detach())),
+        }
+    }
+
+    /// The network with these weights, which must be its own; but a network with the head for uncertainty may take the
+    /// weights of one without, and keeps its own head then, and one without leaves the other's head aside. Says whether the
+    /// head is new.
+    ///
+    /// # Errors
+    /// As [`weights::apply`].
+    pub fn with_weights(self, weights: &Weights) -> Result<(Self, bool), Error> {
+        let has = |weights: &Weights| weights.tensors.keys().any(|n| n.starts_with(UNCERTAINTY));
+        if self.uncertainty.is_some() == has(weights) {
+            return Ok((weights::apply(self, weights)?, false));
+        }
+        let mut weights = weights.clone();
+        match &self.uncertainty {
+            None => weights.tensors.retain(|n, _| !n.starts_with(UNCERTAINTY)),
+            Some(_) => {
+                let own = weights::collect(&self).tensors.into_iter();
+                let head = own.filter(|(name, _)| name.starts_with(UNCERTAINTY));
+                weights.tensors.extend(head);
+            }
+        }
+        let is_new = self.uncertainty.is_some();
+        Ok((weights::apply(self, &weights)?, is_new))
     }
 
     /// The same from the encoder's features, for whoever shares the encoder with another decoder.

@@ -5,6 +5,7 @@ use deepfusion_infer::{Engine, Precision};
 use deepfusion_nn::weights::{self, Weights};
 use deepfusion_nn::{
     AttentionConfig, AttentionForm, DepthNetConfig, Error, HceConfig, ResNetDepth, depth_graph,
+    depth_graph_with_uncertainty,
 };
 
 /// Weights as after some training: batch norms with statistics and factors of their own.
@@ -78,6 +79,50 @@ fn check(config: &DepthNetConfig, width: usize, height: usize) {
 #[test]
 fn a_basic_block_network() {
     check(&DepthNetConfig::new(ResNetDepth::ResNet18), 192, 96);
+}
+
+/// The head for uncertainty is a second output, and depth is what it is without the head.
+#[test]
+fn a_network_that_says_how_sure_it_is() {
+    let config = DepthNetConfig {
+        uncertainty: true,
+        ..DepthNetConfig::new(ResNetDepth::ResNet18)
+    };
+    check(&config, 96, 64);
+    let (mut weights, image) = (trained(&config), image(96, 64));
+    let head = weights.tensors.get_mut("uncertainty.weight").unwrap();
+    for value in &mut head.values {
+        *value *= 40.0;
+    }
+    let device = Device::flex();
+    let (net, is_new) = config
+        .init(&device)
+        .unwrap()
+        .with_weights(&weights)
+        .unwrap();
+    assert!(!is_new);
+    let input = TensorData::new(image.clone(), [1, 3, 64, 96]);
+    let seen = net.forward_with_uncertainty(Tensor::from_data(input, &device));
+    let expected: Vec<f32> = seen.log_scale.unwrap().into_data().iter().collect();
+    let graph = depth_graph_with_uncertainty(&config, weights.clone()).unwrap();
+    let mut engine = Engine::new(graph, 96, 64, Precision::F32).unwrap();
+    engine.run(&image);
+    let output = engine.output(1);
+    assert_eq!(output.len(), expected.len());
+    let off = output.iter().zip(&expected).map(|(a, b)| (a - b).abs());
+    assert!(off.fold(0.0, f32::max) < 1e-3);
+    let (low, high) = expected
+        .iter()
+        .fold((f32::MAX, f32::MIN), |(low, high), v| {
+            (low.min(*v), high.max(*v))
+        });
+    assert!(
+        high - low > 0.05,
+        "a flat answer would prove nothing: {low} {high}"
+    );
+    // Alone the graph has one output, as exported models have.
+    let alone = depth_graph(&config, weights).unwrap();
+    assert_eq!(alone.outputs().len(), 1);
 }
 
 #[test]

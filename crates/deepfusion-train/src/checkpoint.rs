@@ -254,13 +254,15 @@ impl RunFolder {
             model.pose_net.encoder = weights::apply(model.pose_net.encoder, &pose)?;
             return Ok((model, vec!["everything but the encoders"]));
         }
-        model.depth_net = weights::apply(model.depth_net, &depth)?;
+        let (depth_net, new_head) = model.depth_net.with_weights(&depth)?;
+        model.depth_net = depth_net;
         model.pose_net = weights::apply(model.pose_net, &pose)?;
         let new_decoder = take_flow_decoder(&mut model, &named("flow.")?)?;
-        Ok((
-            model,
-            Vec::from_iter(new_decoder.then_some("the flow decoder")),
-        ))
+        let new = [
+            new_decoder.then_some("the flow decoder"),
+            new_head.then_some("the head for uncertainty"),
+        ];
+        Ok((model, new.into_iter().flatten().collect()))
     }
 
     /// Where training stood at a checkpoint; its tensors are not read.

@@ -388,6 +388,11 @@ impl TrainConfig {
         self.flow_decoder.validate()?;
         self.loss.validate()?;
         self.validate_sets()?;
+        let sets = 0..self.data.sets.len().max(1);
+        if self.depth_net.uncertainty && !sets.into_iter().any(|set| self.learn(set).from_depth()) {
+            let expected = "false where nothing is learned from known depth: the head has nothing else to learn from";
+            return fail("depth_net.uncertainty", expected, "true".into());
+        }
         if self.batch == 0 {
             return fail("batch", "at least 1", "0".into());
         }

@@ -31,7 +31,6 @@ pub struct LayerMaps {
 #[derive(Debug)]
 pub struct Inspector {
     net: DepthNet,
-    size: InputSize,
     device: Device,
 }
 
@@ -43,7 +42,6 @@ impl Inspector {
     pub fn new(network: &StoredNetwork, device: &Device) -> Result<Self, Error> {
         Ok(Self {
             net: network.build(device)?,
-            size: network.config.size,
             device: device.clone(),
         })
     }
@@ -51,13 +49,13 @@ impl Inspector {
     /// The maps of the encoder's five features, fine to coarse.
     ///
     /// # Shapes
-    /// - `image`: 3×H×W at network size, RGB in [0, 1], channel by channel
+    /// - `image`: 3×H×W at `size`, RGB in [0, 1], channel by channel
     ///
     /// # Panics
     /// When the image has another size.
     #[must_use]
-    pub fn inspect(&self, image: &[f32]) -> Vec<LayerMaps> {
-        let shape = [1, 3, self.size.height, self.size.width];
+    pub fn inspect(&self, image: &[f32], size: InputSize) -> Vec<LayerMaps> {
+        let shape = [1, 3, size.height, size.width];
         let image = Tensor::from_data(TensorData::new(image.to_vec(), shape), &self.device);
         let seen = self.net.inspect(image);
         let has_context = !self.net.hce.is_empty() || !self.net.attention.is_empty();

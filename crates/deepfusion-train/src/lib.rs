@@ -64,10 +64,10 @@ pub use panel::{Lesson, SamplePanel};
 pub use pose::{Motion, rotation_from_axis_angle};
 pub use pose_predictor::PosePredictor;
 pub use predictor::{Prediction, Predictor};
-pub use prepare::{PreparedImage, Preparer};
+pub use prepare::{PreparedImage, Preparer, fitting};
 pub use preset::{Compute, Preset};
 
-pub use runner::{BurnRunner, DepthRunner, FusedRunner};
+pub use runner::{BurnRunner, DepthRunner, FusedRunner, NetworkOutput};
 pub use sampler::Sampler;
 pub use shared_frames::{SharedFrames, shared_frames};
 pub use source::{Sample, SampleSet};

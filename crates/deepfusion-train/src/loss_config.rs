@@ -51,7 +51,8 @@ pub struct LossConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DepthLossConfig {
-    /// Weight of the whole beside the terms that are learned from video.
+    /// Weight of the whole beside the terms that are learned from video. 0 with `depth_net.uncertainty`: the head for
+    /// uncertainty learns alone.
     pub weight: f64,
     /// λ_g of the differences between neighbours, which make edges sharp.
     pub gradient: f64,

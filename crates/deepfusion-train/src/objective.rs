@@ -10,7 +10,7 @@ use crate::{
 use burn::tensor::module::avg_pool2d;
 use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Bool, Tensor};
-use deepfusion_nn::{SCALES, ops};
+use deepfusion_nn::{DepthOutput, SCALES, ops};
 
 /// What of the loss depends on how far training is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,7 +129,12 @@ impl Model {
     /// The loss of images whose depth is known, and what the network says of them.
     #[must_use]
     pub fn learn_depth(&self, batch: &DepthBatch) -> DepthPass {
-        let disparities = self.depth_net.forward(batch.network.clone());
+        let DepthOutput {
+            disparities,
+            log_scale,
+        } = self
+            .depth_net
+            .forward_with_uncertainty(batch.network.clone());
         let full_size = |(scale, disparity): (usize, &Tensor<4>)| {
             let disparity = match scale {
                 0 => disparity.clone(),
@@ -141,7 +146,15 @@ impl Model {
         let settings = &self.config.loss.depth;
         let found = losses::depth(&inverse, &batch.truth, settings);
         let mut sum = Sum::default();
-        sum.terms.depth = sum.add(Some(found.loss), settings.weight);
+        // At weight 0 the head for uncertainty learns alone: what has no gradient is not even decayed.
+        let depth = match &log_scale {
+            Some(_) if settings.weight == 0.0 => found.loss.detach(),
+            _ => found.loss,
+        };
+        sum.terms.depth = sum.add(Some(depth), settings.weight);
+        let likelihood =
+            log_scale.map(|b| losses::uncertainty(inverse[0].clone(), b, &batch.truth));
+        sum.terms.uncertainty = sum.add(likelihood, 1.0);
         let total = sum.total.expect("it was added");
         sum.terms.total = number(&total);
         DepthPass {

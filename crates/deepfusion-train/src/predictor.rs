@@ -1,16 +1,56 @@
-use crate::{DepthRunner, Error, PreparedImage, Preparer, StoredNetwork, TrainConfig};
+use crate::{
+    DepthRunner, Error, NetworkOutput, PreparedImage, Preparer, StoredNetwork, TrainConfig,
+};
 use deepfusion_data::RgbImage;
 use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_nn::InputSize;
 use deepfusion_nn::weights::Weights;
-use std::sync::Arc;
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A trained depth network, ready for images.
 #[derive(Debug, Clone)]
 pub struct Predictor {
     config: TrainConfig,
     runner: Arc<dyn DepthRunner>,
+    /// For input sizes beside the one trained with; none of a network that has no use for them.
+    others: Option<Arc<OtherSizes>>,
     /// Steps it was trained for.
     pub step: usize,
+}
+
+/// Input sizes beside the one trained with, for which runners are kept: a camera has one.
+const SIZES_KEPT: usize = 3;
+
+/// Runners for other input sizes, made when they are asked for.
+struct OtherSizes {
+    make: Box<MakeRunner>,
+    made: Mutex<Vec<(InputSize, Arc<dyn DepthRunner>)>>,
+}
+
+type MakeRunner = dyn Fn(InputSize) -> Result<Arc<dyn DepthRunner>, Error> + Send + Sync;
+
+impl fmt::Debug for OtherSizes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("OtherSizes").finish_non_exhaustive()
+    }
+}
+
+impl OtherSizes {
+    fn runner(&self, size: InputSize) -> Result<Arc<dyn DepthRunner>, Error> {
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = match made.iter().position(|(of, _)| *of == size) {
+            Some(place) => made.remove(place),
+            None => (size, (self.make)(size)?),
+        };
+        let runner = Arc::clone(&found.1);
+        // The one used last stands last.
+        made.push(found);
+        if made.len() > SIZES_KEPT {
+            made.remove(0);
+        }
+        Ok(runner)
+    }
 }
 
 /// The metric depth of an image.
@@ -18,6 +58,8 @@ pub struct Predictor {
 pub struct Prediction {
     /// Metric disparity, 1/m, at network size, row by row; focal correction applied.
     pub disparity: Vec<f32>,
+    /// ln b at network size, b the Laplace scale of the error of ln depth; of a network that says so.
+    pub log_scale: Option<Vec<f32>>,
     /// Width of `disparity`.
     pub width: usize,
     /// Height of `disparity`.
@@ -56,6 +98,24 @@ impl Prediction {
     /// inverted; 0 outside the window that was looked at.
     #[must_use]
     pub fn depth(&self) -> DepthMap {
+        self.enlarged(&self.disparity, |disparity| 1.0 / disparity)
+    }
+
+    /// Standard deviation of depth in metres at the image's own size, √2·b·depth, 0 outside the window; `None` of a network
+    /// that does not say how sure it is. It is what the network expects, and not calibrated.
+    #[must_use]
+    pub fn sigma(&self) -> Option<DepthMap> {
+        let mut sigma = self.enlarged(self.log_scale.as_ref()?, |log_scale| {
+            std::f32::consts::SQRT_2 * log_scale.exp()
+        });
+        for (relative, depth) in sigma.data.iter_mut().zip(self.depth().data) {
+            *relative *= depth;
+        }
+        Some(sigma)
+    }
+
+    /// Values at the image's own size, bilinear; `of` each in the window, 0 outside.
+    fn enlarged(&self, values: &[f32], of: impl Fn(f32) -> f32) -> DepthMap {
         let [x0, y0, w, h] = self.window.map(|v| v as usize);
         let mut map = DepthMap::empty(self.image_size[0] as usize, self.image_size[1] as usize);
         let axis = |i: usize, to: usize, from: usize| {
@@ -70,10 +130,10 @@ impl Prediction {
             let (top, bottom) = (top * self.width, bottom * self.width);
             let row = &mut map.data[(y0 + y) * self.image_size[0] as usize + x0..][..w];
             for (depth, &(left, right, fx)) in row.iter_mut().zip(&columns) {
-                let d = &self.disparity;
+                let d = values;
                 let upper = d[top + left] + (d[top + right] - d[top + left]) * fx;
                 let lower = d[bottom + left] + (d[bottom + right] - d[bottom + left]) * fx;
-                *depth = 1.0 / (upper + (lower - upper) * fy);
+                *depth = of(upper + (lower - upper) * fy);
             }
         }
         map
@@ -83,25 +143,45 @@ impl Prediction {
 impl Predictor {
     /// Of a network wherever it is stored; `runner` makes what runs it of its configuration and weights.
     ///
+    /// A network with a canonical focal length runs at the input size that fits an image ([`crate::fitting`]): its weights
+    /// are kept, and `runner` is asked again for each other size.
+    ///
     /// # Errors
     /// The runner's own.
-    pub fn of<E>(
+    pub fn of<E: fmt::Display>(
         network: StoredNetwork,
-        runner: impl FnOnce(&TrainConfig, Weights) -> Result<Arc<dyn DepthRunner>, E>,
+        runner: impl Fn(&TrainConfig, Weights) -> Result<Arc<dyn DepthRunner>, E>
+        + Send
+        + Sync
+        + 'static,
     ) -> Result<Self, E> {
         let StoredNetwork {
             config,
             weights,
             step,
         } = network;
+        let kept = config.canonical_focal_px.map(|_| weights.clone());
+        let own = runner(&config, weights)?;
+        let others = kept.map(|weights| {
+            let of = config.clone();
+            let make = move |size: InputSize| {
+                let config = TrainConfig { size, ..of.clone() };
+                runner(&config, weights.clone()).map_err(|e| Error::engine("other size", &e))
+            };
+            Arc::new(OtherSizes {
+                make: Box::new(make),
+                made: Mutex::new(Vec::new()),
+            })
+        });
         Ok(Self {
-            runner: runner(&config, weights)?,
+            runner: own,
+            others,
             config,
             step,
         })
     }
 
-    /// What runs the network.
+    /// What runs the network at the size trained with.
     #[must_use]
     pub fn runner(&self) -> &dyn DepthRunner {
         &*self.runner
@@ -111,6 +191,12 @@ impl Predictor {
     #[must_use]
     pub fn into_runner(self) -> Arc<dyn DepthRunner> {
         self.runner
+    }
+
+    /// Whether it says how sure it is of each pixel ([`Prediction::sigma`]).
+    #[must_use]
+    pub fn knows_uncertainty(&self) -> bool {
+        self.config.depth_net.uncertainty && self.runner.tells_uncertainty()
     }
 
     /// The run's configuration.
@@ -129,8 +215,7 @@ impl Predictor {
     #[must_use]
     pub fn preparer(&self) -> Preparer {
         Preparer {
-            width: self.config.size.width,
-            height: self.config.size.height,
+            size: self.config.size,
             training_camera: self.config.camera,
             canonical_focal_px: self.config.canonical_focal_px,
         }
@@ -156,14 +241,23 @@ impl Predictor {
     /// # Errors
     /// As [`DepthRunner::disparity`].
     pub fn infer(&self, image: &PreparedImage) -> Result<Prediction, Error> {
-        let mut disparity = self.runner.disparity(&image.input)?;
+        let NetworkOutput {
+            mut disparity,
+            log_scale,
+        } = match &self.others {
+            Some(others) if image.size != self.config.size => {
+                others.runner(image.size)?.run(&image.input)?
+            }
+            _ => self.runner.run(&image.input)?,
+        };
         for d in &mut disparity {
             *d = (f64::from(*d) / image.focal_factor) as f32;
         }
         Ok(Prediction {
             disparity,
-            width: self.config.size.width,
-            height: self.config.size.height,
+            log_scale,
+            width: image.size.width,
+            height: image.size.height,
             window: image.window,
             image_size: image.image_size,
             focal_factor: image.focal_factor,

@@ -7,8 +7,8 @@ use std::time::Duration;
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_geometry::DepthRange;
 use deepfusion_infer::{Engine, Precision};
-use deepfusion_nn::weights::{self, Weights};
-use deepfusion_nn::{DepthNet, InputSize, depth_graph};
+use deepfusion_nn::weights::Weights;
+use deepfusion_nn::{DepthNet, InputSize, depth_graph_with_uncertainty};
 
 use crate::{Error, TrainConfig};
 
@@ -18,21 +18,42 @@ pub trait DepthRunner: Debug + Send + Sync {
     /// What reports call it.
     fn name(&self) -> &'static str;
 
-    /// Metric disparity, 1/m, of an image.
+    /// What the network says of an image.
     ///
     /// # Shapes
     /// - `image`: 3×H×W at network size, RGB in [0, 1], channel by channel
-    /// - output: H×W, row by row
     ///
     /// # Errors
     /// Where a library that runs the network fails.
-    fn disparity(&self, image: &[f32]) -> Result<Vec<f32>, Error>;
+    fn run(&self, image: &[f32]) -> Result<NetworkOutput, Error>;
+
+    /// Metric disparity alone, as [`Self::run`] gives it.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    fn disparity(&self, image: &[f32]) -> Result<Vec<f32>, Error> {
+        Ok(self.run(image)?.disparity)
+    }
+
+    /// Whether [`NetworkOutput::log_scale`] is there of a network that has the head for it.
+    fn tells_uncertainty(&self) -> bool {
+        true
+    }
 
     /// Runs once and tells what each step took, by name; `None` where the engine cannot say.
     fn profile(&self, image: &[f32]) -> Option<Vec<(String, Duration)>> {
         let _ = image;
         None
     }
+}
+
+/// What a network says of an image, pixel by pixel, row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NetworkOutput {
+    /// Metric disparity, 1/m, H×W.
+    pub disparity: Vec<f32>,
+    /// ln b, H×W, b the Laplace scale of the error of ln depth; `None` where the network, or what runs it, does not say.
+    pub log_scale: Option<Vec<f32>>,
 }
 
 /// The network as it is trained, on any of Burn's devices.
@@ -50,7 +71,7 @@ impl BurnRunner {
     /// # Errors
     /// [`Error::Network`] for weights of another network.
     pub fn new(config: &TrainConfig, weights: &Weights, device: &Device) -> Result<Self, Error> {
-        let net = weights::apply(config.depth_net.init(device)?, weights)?;
+        let (net, _) = config.depth_net.init(device)?.with_weights(weights)?;
         Ok(Self {
             net,
             range: config.depth_net.range,
@@ -65,11 +86,15 @@ impl DepthRunner for BurnRunner {
         "burn"
     }
 
-    fn disparity(&self, image: &[f32]) -> Result<Vec<f32>, Error> {
+    fn run(&self, image: &[f32]) -> Result<NetworkOutput, Error> {
         let shape = [1, 3, self.size.height, self.size.width];
         let image = Tensor::from_data(TensorData::new(image.to_vec(), shape), &self.device);
-        let sigmoid = self.net.forward(image).swap_remove(0).into_data();
-        Ok(metric(self.range, sigmoid.iter::<f32>()))
+        let mut seen = self.net.forward_with_uncertainty(image);
+        let sigmoid = seen.disparities.swap_remove(0).into_data();
+        Ok(NetworkOutput {
+            disparity: metric(self.range, sigmoid.iter::<f32>()),
+            log_scale: seen.log_scale.map(|b| b.into_data().iter().collect()),
+        })
     }
 }
 
@@ -82,6 +107,7 @@ pub struct FusedRunner {
     engine: Mutex<Engine>,
     precision: Precision,
     range: DepthRange,
+    uncertainty: bool,
 }
 
 impl FusedRunner {
@@ -94,12 +120,13 @@ impl FusedRunner {
         weights: Weights,
         precision: Precision,
     ) -> Result<Self, Error> {
-        let graph = depth_graph(&config.depth_net, weights)?;
+        let graph = depth_graph_with_uncertainty(&config.depth_net, weights)?;
         let engine = Engine::new(graph, config.size.width, config.size.height, precision);
         Ok(Self {
             engine: Mutex::new(engine.map_err(|e| Error::engine("fused", &e))?),
             precision,
             range: config.depth_net.range,
+            uncertainty: config.depth_net.uncertainty,
         })
     }
 }
@@ -112,10 +139,13 @@ impl DepthRunner for FusedRunner {
         }
     }
 
-    fn disparity(&self, image: &[f32]) -> Result<Vec<f32>, Error> {
+    fn run(&self, image: &[f32]) -> Result<NetworkOutput, Error> {
         let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
         engine.run(image);
-        Ok(metric(self.range, engine.output(0).into_iter()))
+        Ok(NetworkOutput {
+            disparity: metric(self.range, engine.output(0).into_iter()),
+            log_scale: self.uncertainty.then(|| engine.output(1)),
+        })
     }
 
     fn profile(&self, image: &[f32]) -> Option<Vec<(String, Duration)>> {

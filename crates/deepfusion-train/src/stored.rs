@@ -76,7 +76,7 @@ impl StoredNetwork {
     /// [`Error::Network`] for weights of another architecture.
     pub fn build(&self, device: &Device) -> Result<DepthNet, Error> {
         let net = self.config.depth_net.init(device)?;
-        Ok(weights::apply(net, &self.weights)?)
+        Ok(net.with_weights(&self.weights)?.0)
     }
 }
 

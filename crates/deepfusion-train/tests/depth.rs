@@ -4,6 +4,7 @@ mod support;
 
 use burn::tensor::Device;
 use deepfusion_data::{Dataset, OpenOptions};
+use deepfusion_nn::weights;
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{
     Control, DataSetConfig, DepthBatch, DepthLoader, Error, Learn, Lesson, LossTerms, Preset,
@@ -132,6 +133,47 @@ fn simulated_views_teach_depth_and_resume_exactly() {
     let mut resumed = Trainer::resume(stored, run_folder, sets, &Device::flex()).unwrap();
     begun.extend(run(&mut resumed, Some(12)).0);
     assert_eq!(begun, steps[..12]);
+}
+
+/// The head for uncertainty learns beside a depth that stays what it was, to the last bit.
+#[test]
+fn the_head_for_uncertainty_learns_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = streets(20);
+    config.depth_net.uncertainty = true;
+    config.depth_net.encoder.frozen_statistics = true;
+    config.loss.depth.weight = 0.0;
+    (config.learning_rate, config.weight_decay) = (1e-2, 0.1);
+    let mut trainer = trainer(&config, &folder.path().join("run"));
+    let (_, validation) = samples(&config).unwrap();
+    let held_out = |trainer: &Trainer| {
+        let device = Device::flex().autodiff();
+        let (model, config) = (trainer.model(), trainer.config());
+        let (terms, _) = validation_loss(model, config, &validation, &device).unwrap();
+        (terms, weights::collect(&model.depth_net).tensors)
+    };
+    let (before, old) = held_out(&trainer);
+    run(&mut trainer, None);
+    let (after, new) = held_out(&trainer);
+    assert_eq!(after.depth, before.depth);
+    assert!(
+        after.uncertainty < before.uncertainty - 0.05,
+        "{} to {}",
+        before.uncertainty,
+        after.uncertainty
+    );
+    for (name, tensor) in &old {
+        let same = *tensor == new[name];
+        assert_eq!(same, !name.starts_with("uncertainty."), "{name}");
+    }
+    // Where nothing has depth, the head could not learn.
+    let mut video = Preset::Tiny.config();
+    video.depth_net.uncertainty = true;
+    let error = video.validate().unwrap_err();
+    assert!(
+        error.to_string().contains("depth_net.uncertainty"),
+        "{error}"
+    );
 }
 
 fn batches(config: &TrainConfig, set: &SampleSet) -> Vec<DepthBatch> {

@@ -44,6 +44,9 @@ pub struct Card {
     /// What was measured of the checkpoint before it was packed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
+    /// How the intervals are to be stretched that the network says, as `eval --calibrate-uncertainty` found it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<toml::Table>,
     /// The run's configuration, without the places of its recordings.
     pub config: toml::Table,
 }
@@ -154,6 +157,7 @@ pub(crate) mod tests {
                 scale: 1.01,
                 a1: 0.95,
             }],
+            uncertainty: None,
             config: "preset = 'light'\nsize = { width = 640, height = 192 }"
                 .parse()
                 .unwrap(),

@@ -8,7 +8,9 @@ use deepfusion_nn::depth_graph;
 use deepfusion_nn::weights::Weights;
 use deepfusion_onnx::runtime::OrtEngine;
 use deepfusion_onnx::{DepthModel, write};
-use deepfusion_train::{BurnRunner, DepthRunner, Error, FusedRunner, Predictor, TrainConfig};
+use deepfusion_train::{
+    BurnRunner, DepthRunner, Error, FusedRunner, NetworkOutput, Predictor, TrainConfig,
+};
 
 use crate::allocator;
 use crate::cli::{DeviceChoice, EngineArgs, EngineChoice, PrecisionChoice};
@@ -19,7 +21,10 @@ use crate::model::ModelSource;
 /// Loads a network with the engine asked for.
 pub fn load(model: &ModelSource, args: &EngineArgs) -> Result<Predictor> {
     let network = model.load(args.set.as_deref())?;
-    Predictor::of(network, |config, weights| runner(args, config, weights))
+    let args = args.clone();
+    Predictor::of(network, move |config, weights| {
+        runner(&args, config, weights)
+    })
 }
 
 /// The engine asked for, with a network of this configuration and these weights.
@@ -94,14 +99,22 @@ impl DepthRunner for OrtRunner {
         "ort"
     }
 
-    fn disparity(&self, image: &[f32]) -> Result<Vec<f32>, Error> {
+    /// An exported model gives depth alone.
+    fn tells_uncertainty(&self) -> bool {
+        false
+    }
+
+    fn run(&self, image: &[f32]) -> Result<NetworkOutput, Error> {
         // The model takes bytes, and an image's values are bytes / 255.
         let byte = |i: usize| (image[i % 3 * self.pixels + i / 3] * 255.0).round() as u8;
         let rgb: Vec<u8> = (0..3 * self.pixels).map(byte).collect();
         let mut disparity = vec![0.0; self.pixels];
         let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
         match engine.run(&rgb, &mut disparity) {
-            Ok(()) => Ok(disparity),
+            Ok(()) => Ok(NetworkOutput {
+                disparity,
+                log_scale: None,
+            }),
             Err(error) => Err(Error::engine("ort", &error)),
         }
     }

@@ -279,6 +279,9 @@ pub enum CliError {
     /// A cloud without a camera.
     #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
     NoCamera,
+    /// `--save sigma` of a network, or an engine, that does not say how sure it is.
+    #[error("this network, or the engine that runs it, does not say how sure it is of its depth")]
+    NoUncertainty,
 }
 
 impl CliError {
@@ -379,6 +382,10 @@ impl CliError {
                 "give the folder that holds every drive that the split names, or leave --strict out to use what is there".into(),
             ),
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
+            Self::NoUncertainty => Some(
+                "leave sigma out of --save, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"
+                    .into(),
+            ),
         }
     }
 }

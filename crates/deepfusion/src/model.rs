@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use deepfusion_compare::{MetricScale, sha256_of_file};
+use deepfusion_eval::IntervalFactors;
 use deepfusion_train::{CheckpointKind, RunFolder, StoredNetwork};
 use deepfusion_weights::{DEFAULT, Shipped};
 use sha2::{Digest, Sha256};
 
+use crate::commands::uncertainty;
 use crate::error::CliError;
 use crate::output;
 use crate::progress::say;
@@ -147,7 +149,7 @@ impl ModelSource {
         }
     }
 
-    /// SHA-256 of configuration and weights: all that what it predicts depends on.
+    /// SHA-256 of configuration, weights and the factors of the intervals: all that what it predicts depends on.
     ///
     /// # Errors
     /// Where they cannot be read.
@@ -167,7 +169,32 @@ impl ModelSource {
                 hash.update(&network.card.sha256);
             }
         }
+        let factors = self.interval_factors()?;
+        if factors.is_calibrated() {
+            hash.update(toml::to_string(&factors)?);
+        }
         Ok(format!("{:x}", hash.finalize()))
+    }
+
+    /// The factors of the intervals of a network that says how sure it is: those found for it, else it is taken at its word.
+    ///
+    /// # Errors
+    /// For a file or a card that holds none.
+    pub fn interval_factors(&self) -> Result<IntervalFactors> {
+        let found = match self {
+            Self::Run { folder, .. } => uncertainty::read(folder.path())?,
+            Self::Packed { network, .. } => {
+                let table = network.card.uncertainty.clone();
+                let factors: Option<IntervalFactors> = table
+                    .map(toml::Table::try_into)
+                    .transpose()
+                    .with_context(|| network.card.name.clone())?;
+                factors
+            }
+        };
+        let factors = found.unwrap_or_else(IntervalFactors::uncalibrated);
+        factors.validate()?;
+        Ok(factors)
     }
 
     /// What evaluations that the run's folder keeps say of this checkpoint's metres, with the metres of a data set, for a network that

@@ -17,6 +17,45 @@ fn a_config_without_the_optional_fields_is_the_published_network() {
     assert_eq!(config, DepthNetConfig::new(ResNetDepth::ResNet18));
 }
 
+/// A network with the head for uncertainty starts from one without, and the other way round; depth is the same either way.
+#[test]
+fn the_head_for_uncertainty_comes_and_goes() {
+    let device = Device::flex();
+    let mut plain = DepthNetConfig::new(ResNetDepth::ResNet18);
+    plain.encoder.base_width = 8;
+    plain.decoder.widths = [8; 5];
+    let sure = DepthNetConfig {
+        uncertainty: true,
+        ..plain.clone()
+    };
+    let build = |config: &DepthNetConfig, seed| config.init_with_seed(seed, &device).unwrap();
+    let image = Tensor::<4>::ones([1, 3, 64, 96], &device).mul_scalar(0.5);
+    let depth = |net: &DepthNet| {
+        let seen = net.forward_with_uncertainty(image.clone());
+        let values: Vec<f32> = seen.disparities[0].clone().into_data().iter().collect();
+        (values, seen.log_scale.map(|b| b.dims()))
+    };
+    let old = build(&plain, 3);
+    let expected = depth(&old);
+    assert_eq!(expected.1, None);
+    let old = crate::weights::collect(&old);
+    let (grown, is_new) = build(&sure, 4).with_weights(&old).unwrap();
+    assert!(is_new);
+    assert_eq!(depth(&grown), (expected.0.clone(), Some([1, 1, 64, 96])));
+    let (cut, is_new) = build(&plain, 5)
+        .with_weights(&crate::weights::collect(&grown))
+        .unwrap();
+    assert!(!is_new);
+    assert_eq!(depth(&cut), expected);
+    // The same seed draws the same network with the head and without.
+    let drawn = build(&sure, 3).with_weights(&old).unwrap().0;
+    assert_eq!(depth(&drawn).0, depth(&build(&sure, 3)).0);
+    // What lacks anything else is still another network's.
+    let mut lacking = old;
+    lacking.tensors.remove("decoder.heads.0.bias");
+    assert!(build(&sure, 4).with_weights(&lacking).is_err());
+}
+
 /// Every part is one switch, and what is off leaves no tensor behind.
 #[test]
 fn each_part_is_switched_on_its_own() {

@@ -11,7 +11,7 @@ impl Builder {
         &mut self,
         config: &DepthNetConfig,
         [f0, f1, f2, f3, f4]: [ValueId; 5],
-    ) -> Result<ValueId, Error> {
+    ) -> Result<Vec<ValueId>, Error> {
         let layer = |name: String, input, channels, activation| Layer {
             name,
             offset: Offset::Bias,
@@ -52,11 +52,15 @@ impl Builder {
             ))?;
         }
         let channels = [config.decoder.widths[4], 1];
-        self.conv(&layer(
-            "decoder.heads.0".into(),
-            x,
-            channels,
-            &Activation::Sigmoid,
-        ))
+        let heads = [
+            ("decoder.heads.0", &Activation::Sigmoid),
+            ("uncertainty", &Activation::Identity),
+        ];
+        let of_config = 1 + usize::from(config.uncertainty);
+        heads
+            .into_iter()
+            .take(of_config)
+            .map(|(name, activation)| self.conv(&layer(name.into(), x, channels, activation)))
+            .collect()
     }
 }

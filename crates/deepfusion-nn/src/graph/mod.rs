@@ -20,7 +20,26 @@ use crate::weights::Weights;
 /// # Errors
 /// [`Error::Config`] for a network that cannot be built, [`Error::MissingTensor`] or
 /// [`Error::TensorShape`] or [`Error::UnexpectedTensor`] where the weights are another network's, [`Error::NotFinite`].
-pub fn depth_graph(config: &DepthNetConfig, weights: Weights) -> Result<Graph, Error> {
+pub fn depth_graph(config: &DepthNetConfig, mut weights: Weights) -> Result<Graph, Error> {
+    let alone = DepthNetConfig {
+        uncertainty: false,
+        ..config.clone()
+    };
+    if config.uncertainty {
+        let of_head = |name: &str| name.starts_with("uncertainty.");
+        weights.tensors.retain(|name, _| !of_head(name));
+    }
+    depth_graph_with_uncertainty(&alone, weights)
+}
+
+/// The same; a network with the head for uncertainty has ln b at full size as a second output.
+///
+/// # Errors
+/// As [`depth_graph`].
+pub fn depth_graph_with_uncertainty(
+    config: &DepthNetConfig,
+    weights: Weights,
+) -> Result<Graph, Error> {
     config.validate()?;
     let normalisation = config.encoder.normalisation;
     let mut builder = Builder {
@@ -29,8 +48,9 @@ pub fn depth_graph(config: &DepthNetConfig, weights: Weights) -> Result<Graph, E
     };
     let features = builder.encoder(&config.encoder)?;
     let features = builder.skips(config, features)?;
-    let finest = builder.decoder(config, features)?;
-    builder.graph.add_output(finest);
+    for output in builder.decoder(config, features)? {
+        builder.graph.add_output(output);
+    }
     builder.nothing_left()?;
     Ok(builder.graph)
 }

@@ -1,6 +1,6 @@
 use std::fmt::Write as _;
 
-use deepfusion_eval::{Crop, GroundTruth, Metrics, Report, Sharpness};
+use deepfusion_eval::{Crop, GroundTruth, IntervalRow, Intervals, Metrics, Report, Sharpness};
 
 use super::escape;
 
@@ -216,6 +216,25 @@ fn sharp_rows(sharpness: &Sharpness) -> Vec<Vec<String>> {
     .collect()
 }
 
+/// What intervals of each level hold.
+fn interval_rows(intervals: &Intervals) -> Vec<Vec<String>> {
+    let whose = match intervals.calibrated {
+        true => "",
+        false => ", not calibrated",
+    };
+    let row = |row: &IntervalRow| {
+        let percent = |v: f64| format!("{:.1} %", 100.0 * v);
+        vec![
+            format!(
+                "{:.0} % intervals: pixels within, and width over depth{whose}",
+                100.0 * row.level
+            ),
+            format!("{}, {}", percent(row.coverage), percent(row.width_rel)),
+        ]
+    };
+    intervals.levels.iter().map(row).collect()
+}
+
 fn scale_table(report: &Report) -> String {
     let scale = &report.scale;
     let interval = scale.bias_ci95.map_or_else(
@@ -250,6 +269,7 @@ fn scale_table(report: &Report) -> String {
         ]);
     }
     rows.extend(report.sharpness.iter().flat_map(sharp_rows));
+    rows.extend(report.intervals.iter().flat_map(interval_rows));
     if let Some(rate) = report.missing_rate {
         rows.push(vec![
             "ground truth without prediction".into(),

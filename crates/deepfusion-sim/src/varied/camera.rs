@@ -37,13 +37,17 @@ pub struct Stand {
     pub alone: bool,
 }
 
-/// Draws a lens. Horizontal field of view: 70 % normal around 78° (deviation 8°, 64° to 92°), the rest uniform from
-/// 35° to 60° or from 90° to 110°. fy is fx, within 1 % in two of three cameras and within 3 % in the others. The
-/// principal point is off the middle by normal draws of 1.5 % of the width and 5 % of the height; in one of five by
-/// up to 20 % of the height, as where a picture was cut from a taller one.
-pub fn intrinsics(rng: &mut ChaCha8Rng, width: u32, height: u32) -> Intrinsics {
+/// Draws a lens, and how its picture came to the size that is asked for.
+///
+/// Horizontal field of view: 70 % normal around 78° (deviation 8°, 64° to 92°), in rooms around 64°; the rest uniform
+/// from 35° to 60° or from 90° to 110°. Half of the pictures, nine in ten of those of rooms, are ones of another aspect
+/// ratio that were squeezed to this size ([`squeeze`]). Apart from that fy is fx, within 1 % in two of three cameras
+/// and within 3 % in the others. The principal point is off the middle by normal draws of 1.5 % of the width and 5 % of
+/// the height; in one of five of the pictures that were not squeezed by up to 20 % of the height, as where a picture
+/// was cut from a taller one.
+pub fn intrinsics(rng: &mut ChaCha8Rng, (width, height): (u32, u32), indoors: bool) -> Intrinsics {
     let field = match rng.random_range(0..20) {
-        0..=13 => normal(rng, 78.0, 8.0, 1.78),
+        0..=13 => normal(rng, if indoors { 64.0 } else { 78.0 }, 8.0, 1.78),
         14..=16 => rng.random_range(35.0..60.0),
         _ => rng.random_range(90.0..110.0),
     }
@@ -56,14 +60,16 @@ pub fn intrinsics(rng: &mut ChaCha8Rng, width: u32, height: u32) -> Intrinsics {
     } else {
         rng.random_range(-0.03..0.03)
     };
-    let row = if rng.random_bool(0.2) {
+    let squeezed = rng.random_bool(if indoors { 0.9 } else { 0.5 });
+    let squeeze = if squeezed { squeeze(rng, w / h) } else { 1.0 };
+    let row = if !squeezed && rng.random_bool(0.2) {
         rng.random_range(-0.2..0.2)
     } else {
         normal(rng, 0.0, 0.05, 3.0)
     };
     Intrinsics {
         fx,
-        fy: fx * (1.0 + unequal),
+        fy: fx * squeeze * (1.0 + unequal),
         cx: 0.5 * (w - 1.0) + w * normal(rng, 0.0, 0.015, 3.0),
         cy: 0.5 * (h - 1.0) + h * row,
         width,
@@ -71,11 +77,22 @@ pub fn intrinsics(rng: &mut ChaCha8Rng, width: u32, height: u32) -> Intrinsics {
     }
 }
 
-/// Height above the ground, metres: 60 % as on cars (normal, 1.55 ± 0.15), 25 % lower (robots), 15 % higher.
+/// fy / fx of a picture of a usual aspect ratio that was brought to another one: 16:9 as of dashcams and telephones,
+/// 4:3 as of depth cameras, or anything between 5:4 and 3:1. 1 where the wanted one is not wider.
+fn squeeze(rng: &mut ChaCha8Rng, wanted: f64) -> f64 {
+    let aspect = match rng.random_range(0..20) {
+        0..=8 => 16.0 / 9.0,
+        9..=14 => 4.0 / 3.0,
+        _ => rng.random_range(1.25..3.0),
+    };
+    (aspect / wanted).min(1.0)
+}
+
+/// Height above the ground, metres: 65 % as on cars (normal, 1.6 ± 0.17), 20 % lower (robots), 15 % higher.
 fn height(rng: &mut ChaCha8Rng) -> f64 {
     match rng.random_range(0..20) {
-        0..=11 => normal(rng, 1.55, 0.15, 2.3),
-        12..=16 => rng.random_range(HEIGHTS.0..1.2),
+        0..=12 => normal(rng, 1.6, 0.17, 2.3),
+        13..=16 => rng.random_range(HEIGHTS.0..1.2),
         _ => rng.random_range(1.8..HEIGHTS.1),
     }
 }
@@ -295,13 +312,15 @@ mod tests {
     #[test]
     fn lenses_are_within_their_bounds_and_dense_where_cars_have_theirs() {
         let mut rng = generator(1, 1, 1);
-        let (mut usual, mut like_kitti) = (0, 0);
+        let (mut usual, mut square, mut like_kitti) = (0, 0, 0);
         for _ in 0..5000 {
-            let k = intrinsics(&mut rng, 640, 192);
+            let k = intrinsics(&mut rng, (640, 192), false);
             assert_eq!(k.implausible(), None);
             let field = 2.0 * (320.0 / k.fx).atan();
             assert!(field > FIELDS.0 - 1e-9 && field < FIELDS.1 + 1e-9);
-            assert!((k.fy / k.fx - 1.0).abs() <= 0.03);
+            let ratio = k.fy / k.fx;
+            assert!((0.36..=1.03).contains(&ratio), "{ratio}");
+            square += usize::from((ratio - 1.0).abs() <= 0.03);
             assert!((k.cx - 319.5).abs() < 0.05 * 640.0 && (k.cy - 95.5).abs() <= 0.2 * 192.0);
             usual += usize::from(field > 60f64.to_radians() && field < 90f64.to_radians());
             // KITTI's camera 2 at this size: fx 371.8, fy 369.4, cx 313.9, cy 88.3.
@@ -313,7 +332,11 @@ mod tests {
             );
         }
         assert!((2900..3400).contains(&usual), "{usual}");
-        assert!(like_kitti > 380, "{like_kitti}");
+        assert!((2350..2650).contains(&square), "{square}");
+        assert!(like_kitti > 190, "{like_kitti}");
+        // Asked for a picture of 4:3, nothing is squeezed by more than a telephone's 5:4.
+        let tall = intrinsics(&mut rng, (320, 240), true);
+        assert!(tall.fy / tall.fx > 0.9, "{tall:?}");
     }
 
     #[test]
@@ -323,12 +346,12 @@ mod tests {
         for _ in 0..5000 {
             let height = height(&mut rng);
             assert!((HEIGHTS.0..=HEIGHTS.1).contains(&height));
-            usual += usize::from((1.2..=1.8).contains(&height));
+            usual += usize::from((1.2..=2.0).contains(&height));
             let (pitch, roll) = tilt(&mut rng, height);
             assert!(pitch.abs() <= 0.262 && roll.abs() <= 0.175);
             level += usize::from(pitch.abs() < 0.105 && roll.abs() < 0.053);
         }
-        assert!((2700..3400).contains(&usual), "{usual}");
+        assert!((3300..4000).contains(&usual), "{usual}");
         assert!(level > 3600, "{level}");
     }
 }

@@ -102,7 +102,9 @@ impl Endless {
         let traffic = place.traffic(&mut rng, anchor, nearest);
         let mut moving = traffic.solids(world, 0.0);
         let mut cars = traffic.objects(world, 0.0);
-        let intrinsics = camera::intrinsics(&mut rng, config.width, config.height);
+        let size = (config.width, config.height);
+        let indoors = !world.rooms.is_empty();
+        let intrinsics = camera::intrinsics(&mut rng, size, indoors);
         let stand = camera::stand(&mut rng, &place, (&moving, anchor), &intrinsics);
         if stand.alone {
             moving.clear();

@@ -9,6 +9,7 @@ mod moving;
 mod reprojection;
 mod smoothness;
 mod speed;
+mod uncertainty;
 
 pub use affine::{affine_invariant, depth_seen_from_target, seen_in_both};
 pub use agreement::{agreement, both_explain};
@@ -19,6 +20,7 @@ pub use moving::{RigidView, epipolar_distance, moving_pixels};
 pub use reprojection::{ReprojectionOutput, View, reprojection};
 pub use smoothness::smoothness;
 pub use speed::{motion, speed, speed_weight};
+pub use uncertainty::uncertainty;
 
 /// The loss of a batch, term by term, as numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -40,6 +42,8 @@ pub struct LossTerms {
     pub agreement: f64,
     /// L_depth of known depth, unweighted.
     pub depth: f64,
+    /// L_nll of a network that says how sure it is, on known depth.
+    pub uncertainty: f64,
     /// Share of pixels that the warp finds in view, at full resolution.
     pub valid_share: f64,
     /// Share of pixels that the warped source explains best (the rest are masked).
@@ -51,7 +55,7 @@ pub struct LossTerms {
 impl LossTerms {
     /// Names and values, in the order of `log.csv`.
     #[must_use]
-    pub fn named(&self) -> [(&'static str, f64); 11] {
+    pub fn named(&self) -> [(&'static str, f64); 12] {
         [
             ("total", self.total),
             ("reprojection", self.reprojection),
@@ -61,6 +65,7 @@ impl LossTerms {
             ("flow", self.flow),
             ("agreement", self.agreement),
             ("depth", self.depth),
+            ("uncertainty", self.uncertainty),
             ("valid_share", self.valid_share),
             ("explained_share", self.explained_share),
             ("moving_share", self.moving_share),
@@ -77,6 +82,7 @@ impl LossTerms {
         self.flow += weight * other.flow;
         self.agreement += weight * other.agreement;
         self.depth += weight * other.depth;
+        self.uncertainty += weight * other.uncertainty;
         self.valid_share += weight * other.valid_share;
         self.explained_share += weight * other.explained_share;
         self.moving_share += weight * other.moving_share;

@@ -92,6 +92,10 @@ pub struct EvalArgs {
     /// confidence, and --report shows whether it holds on frames not learned from: other drives, or of one drive another part.
     #[arg(long, requires = "model", conflicts_with = "gt")]
     pub calibrate_confidence: bool,
+    /// Find by how much the intervals must be stretched that a network with `depth_net.uncertainty` says, so that they hold what they
+    /// promise, and keep that beside the run. Of drives that training has not seen; measure the result on others.
+    #[arg(long, requires = "model", conflicts_with = "gt")]
+    pub calibrate_uncertainty: bool,
     /// What runs the network.
     #[command(flatten)]
     pub engine: EngineArgs,

@@ -77,6 +77,8 @@ pub enum Save {
     DepthPng,
     /// H×W f32 metres, for NumPy.
     Npy,
+    /// How sure the network is: H×W f32, the standard deviation of depth in metres, for NumPy; of networks that learned it.
+    Sigma,
     /// Depth in colours with a legend in metres.
     Color,
     /// The image and its depth in colours.

@@ -26,7 +26,8 @@ pub struct PredictionArgs {
     /// Do not correct depth for another focal length than the one trained on.
     #[arg(long)]
     pub no_focal_correction: bool,
-    /// Stretch images of another aspect ratio instead of cropping them about the principal row.
+    /// Stretch images of another aspect ratio instead of cropping them about the principal row. A network that learned with many
+    /// cameras, as the embedded ones, sees the whole image either way, at an input of its aspect ratio.
     #[arg(long)]
     pub stretch: bool,
     /// The camera's height over the road in metres, where it was measured: the scale monitor, which watches recordings

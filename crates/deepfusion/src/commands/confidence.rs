@@ -12,11 +12,10 @@ use serde::{Deserialize, Serialize};
 
 use super::division::divide;
 use super::evaluate::{Evaluated, Place, Truth};
+use super::known_pixels::known_pixels;
 
 /// The file in a run's folder.
 const FILE: &str = "confidence.toml";
-/// Pixels taken of each frame, at most.
-const PIXELS: usize = 4_000;
 /// Depths that are compared, metres.
 const RANGE_M: std::ops::Range<f64> = 1e-3..80.0;
 /// Dots of the reliability plot.
@@ -162,23 +161,9 @@ fn of_frame(
         row.reverse();
     }
     let evidence = Evidence::of(&seen.disparity, Some(&mirrored), seen.width);
-    let known: Vec<(usize, f64)> = depth
-        .values()
-        .iter()
-        .enumerate()
-        .filter(|(_, z)| RANGE_M.contains(*z))
-        .map(|(i, z)| (i, *z))
-        .collect();
-    let step = known.len().div_ceil(PIXELS).max(1);
-    let (width, height) = (depth.width(), depth.height());
-    Ok(known
+    Ok(known_pixels(&depth, &seen, &RANGE_M)
         .into_iter()
-        .step_by(step)
-        .map(|(i, z)| {
-            // The network's pixel at the truth's.
-            let u = (2 * (i % width) + 1) * seen.width / (2 * width);
-            let v = (2 * (i / width) + 1) * seen.height / (2 * height);
-            let at = v * seen.width + u;
+        .map(|(at, z)| {
             let predicted = 1.0 / f64::from(seen.disparity[at]);
             (evidence[at], (predicted - z).abs() / z)
         })

@@ -19,6 +19,7 @@ use super::evaluate::{
 };
 use super::held_out::{held_out, unseen};
 use super::run_report::{self, Choice};
+use super::uncertainty;
 use super::used_checkpoint::UsedCheckpoint;
 use crate::cli::{CameraIntrinsics, EvalArgs, PrecisionChoice, PredKind};
 use crate::engine;
@@ -69,6 +70,9 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
         return Err(CliError::NoRunFolder { option, model }.into());
     }
     let predictor = engine::load(&model, &args.engine)?;
+    if args.calibrate_uncertainty {
+        uncertainty::check(&model, &predictor)?;
+    }
     let options = OpenOptions {
         camera: args.camera,
         split: read_split(args.split.as_deref())?,
@@ -105,6 +109,16 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
     )?;
     evaluated.report.expected = expected;
     check_used(&options, &datasets, evaluated.report.n, args.strict)?;
+    if predictor.knows_uncertainty() && args.gt.is_none() {
+        uncertainty::measure(
+            (&model, &predictor),
+            &datasets,
+            &mut truth,
+            &mut evaluated,
+            (&protocol, !args.no_focal_correction),
+            args.calibrate_uncertainty,
+        )?;
+    }
     let saved = saved(args, &predictor, &model, &datasets, &evaluated)?;
     match model.folder().map(|folder| saved.write(folder)) {
         Some(Ok(path)) => say(&format!("kept as {}", path.display())),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use burn::tensor::Device;
 use deepfusion_nn::DepthNetConfig;
-use deepfusion_nn::weights::{apply, load_torchvision_resnet};
+use deepfusion_nn::weights::load_torchvision_resnet;
 use deepfusion_train::{CheckpointKind, Error, Model, RunFolder, TrainConfig};
 use deepfusion_weights::Shipped;
 
@@ -176,11 +176,16 @@ impl Start {
             Self::Nothing => Ok(model),
             Self::Packed { network, path } => {
                 let weights = unpacked_weights(network)?;
-                model.depth_net = apply(model.depth_net, &weights)?;
+                let (depth_net, new_head) = model.depth_net.with_weights(&weights)?;
+                model.depth_net = depth_net;
+                let new = match new_head {
+                    true => "PoseNet, the head for uncertainty",
+                    false => "PoseNet",
+                };
                 say(&match path {
-                    Some(path) => format!("starts from {}; new: PoseNet", path.display()),
+                    Some(path) => format!("starts from {}; new: {new}", path.display()),
                     None => format!(
-                        "starts from the embedded network `{}` of {}; new: PoseNet (--init none starts from nothing)",
+                        "starts from the embedded network `{}` of {}; new: {new} (--init none starts from nothing)",
                         network.card.name, network.card.date
                     ),
                 });
@@ -226,10 +231,12 @@ fn unpacked_weights(network: &Shipped) -> Result<deepfusion_nn::weights::Weights
     Ok(deepfusion_nn::weights::read_bytes(origin, &network.bytes)?)
 }
 
-/// Whether one network's weights are the other's, and mean the same depths: all but the depth that a new one starts at.
+/// Whether one network's weights are the other's, and mean the same depths: all but the depth that a new one starts at, and
+/// the head for uncertainty, which may be new or left aside.
 fn same_layers(a: &DepthNetConfig, b: &DepthNetConfig) -> bool {
     let bare = |config: &DepthNetConfig| DepthNetConfig {
         initial_depth_m: None,
+        uncertainty: false,
         ..config.clone()
     };
     bare(a) == bare(b)

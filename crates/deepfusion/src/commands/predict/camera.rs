@@ -134,9 +134,10 @@ impl LensFile {
     }
 }
 
-/// A camera of the same field of view from left to right, square pixels, the same height of the horizon.
+/// A camera of the same field of view from left to right, square pixels, the same height of the horizon. Of an upright
+/// image the field of view is that from top to bottom: the camera was turned, not its lens changed.
 fn with_the_view_of(k: &Intrinsics, width: u32, height: u32) -> Intrinsics {
-    let f = k.fx * f64::from(width) / f64::from(k.width);
+    let f = k.fx * f64::from(width.max(height)) / f64::from(k.width);
     let centre = |c: f64, from: u32, to: u32| (c + 0.5) * f64::from(to) / f64::from(from) - 0.5;
     Intrinsics {
         fx: f,

@@ -16,6 +16,7 @@ mod watcher;
 use anyhow::{Context, Result};
 use deepfusion_compare::MetricScale;
 use deepfusion_data::{LiveFrame, RgbImage, load_rgb};
+use deepfusion_eval::IntervalFactors;
 use deepfusion_geometry::Intrinsics;
 use deepfusion_train::{Inspector, LayerMaps, Prediction, Predictor, PreparedImage, Preparer};
 use rayon::prelude::*;
@@ -51,6 +52,8 @@ pub(super) struct Job<'a> {
     scale: MetricScale,
     /// Where features are to be saved.
     inspector: Option<Inspector>,
+    /// How the intervals are stretched that the network says.
+    intervals: IntervalFactors,
 }
 
 /// An image on its way through the network.
@@ -226,6 +229,9 @@ impl<'a> Job<'a> {
         model: &'a ModelSource,
         predictor: &Predictor,
     ) -> Result<Self> {
+        if outputs.save.contains(&Save::Sigma) && !predictor.knows_uncertainty() {
+            return Err(CliError::NoUncertainty.into());
+        }
         let camera = CameraSource::new(args, predictor.training_camera())?;
         let set = args.engine.set.as_deref();
         Ok(Self {
@@ -235,6 +241,7 @@ impl<'a> Job<'a> {
             camera,
             preparer: predictor.preparer(),
             step: predictor.step,
+            intervals: model.interval_factors()?,
             scale: model.scale(set, !args.no_focal_correction, predictor.step)?,
             inspector: match outputs.save.contains(&Save::Features) {
                 true => Some(Inspector::new(
@@ -295,7 +302,7 @@ impl<'a> Job<'a> {
         Ok(Seen {
             prediction: predictor.infer(prepared)?,
             layers: match &self.inspector {
-                Some(inspector) => inspector.inspect(&prepared.input),
+                Some(inspector) => inspector.inspect(&prepared.input, prepared.size),
                 None => Vec::new(),
             },
             scale: None,
@@ -317,9 +324,14 @@ impl<'a> Job<'a> {
         for save in &self.outputs.save {
             let file = outputs::file_name(&input.name, *save);
             let path = args.out.join(&file);
-            let (camera, maps) = (loaded.camera.as_ref(), (prediction, &depth));
-            let far = self.outputs.max_depth_m;
-            outputs::write(*save, far, image, camera, maps, &seen.layers, &path)?;
+            let maps = outputs::Maps {
+                prediction,
+                depth: &depth,
+                layers: &seen.layers,
+                intervals: &self.intervals,
+            };
+            let (camera, far) = (loaded.camera.as_ref(), self.outputs.max_depth_m);
+            outputs::write(*save, far, image, camera, &maps, &path)?;
             files.push(file);
         }
         if loaded.live.is_some() {

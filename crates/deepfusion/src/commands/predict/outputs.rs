@@ -6,6 +6,7 @@ use std::path::Path;
 use anyhow::Result;
 use deepfusion_cloud::PointCloud;
 use deepfusion_data::{RgbImage, save_png, write_depth_png, write_unsynced};
+use deepfusion_eval::IntervalFactors;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_render::{DepthScale, depth_picture, side_by_side, with_depth_legend};
 use deepfusion_train::{LayerMaps, Prediction};
@@ -19,6 +20,7 @@ pub fn file_name(name: &str, save: Save) -> String {
     let ending = match save {
         Save::DepthPng => "_depth.png",
         Save::Npy => "_depth.npy",
+        Save::Sigma => "_sigma.npy",
         Save::Color => "_color.png",
         Save::SideBySide => "_side.png",
         Save::Ply => ".ply",
@@ -29,20 +31,42 @@ pub fn file_name(name: &str, save: Save) -> String {
     format!("{name}{ending}")
 }
 
-/// Writes one output, whole or not at all, without waiting for the disk; `layers` are the network's, where [`Save::Features`] was asked for.
+/// What the network says of an image.
+pub struct Maps<'a> {
+    pub prediction: &'a Prediction,
+    /// At the image's own size.
+    pub depth: &'a DepthMap,
+    /// Where [`Save::Features`] was asked for.
+    pub layers: &'a [LayerMaps],
+    pub intervals: &'a IntervalFactors,
+}
+
+/// Writes one output, whole or not at all, without waiting for the disk.
 pub fn write(
     save: Save,
     max_depth_m: f64,
     image: &RgbImage,
     camera: Option<&Intrinsics>,
-    (prediction, depth): (&Prediction, &DepthMap),
-    layers: &[LayerMaps],
+    maps: &Maps,
     path: &Path,
 ) -> Result<()> {
+    let Maps {
+        prediction,
+        depth,
+        layers,
+        intervals,
+    } = maps;
     let scale = DepthScale::default();
     match save {
         Save::DepthPng => write_depth_png(depth, path)?,
         Save::Npy => write_npy(depth, path)?,
+        Save::Sigma => {
+            let mut sigma = prediction.sigma().ok_or(CliError::NoUncertainty)?;
+            for (sigma, depth) in sigma.data.iter_mut().zip(&depth.data) {
+                *sigma *= intervals.stretch(f64::from(*depth)) as f32;
+            }
+            write_npy(&sigma, path)?;
+        }
         Save::Color => {
             let picture = with_depth_legend(&depth_picture(depth, &scale), &scale);
             save_png(&picture, path)?;

@@ -10,6 +10,7 @@ use deepfusion_weights::{Card, FORMAT_VERSION, MAX_BYTES, NUMBERS, Shipped, Tens
 use super::figures;
 use super::list::Listed;
 use crate::cli::PackArgs;
+use crate::commands::uncertainty;
 use crate::error::CliError;
 use crate::output;
 use crate::progress::say;
@@ -66,6 +67,10 @@ pub fn run(args: &PackArgs) -> Result<()> {
         depth_difference: rounded(difference(&network, &bytes)?),
         note: args.note.clone(),
         figures: figures::of(folder.path(), &sha256_of_file(&file)?),
+        uncertainty: uncertainty::read(folder.path())?
+            .map(toml::Table::try_from)
+            .transpose()
+            .context("the factors of its intervals have no TOML form")?,
         config: toml::Table::try_from(config.without_places())
             .context("the run's configuration has no TOML form")?,
     };

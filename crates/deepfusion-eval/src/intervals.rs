@@ -1,0 +1,386 @@
+//! Intervals around a depth, from how sure a network says it is, and whether they hold what they promise.
+//!
+//! A network that errs by b in ln D̂ promises the interval D̂·exp(±q·b). Of a Laplace distribution q = −ln(1 − level);
+//! what a network says is seldom that exact, so q is found on drives that it has not learned from (split conformal
+//! prediction, for each range of depths on its own), and its coverage is measured on others.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Result};
+
+/// Shares of the pixels that intervals are to hold.
+pub const LEVELS: [f64; 3] = [0.5, 0.8, 0.95];
+
+/// Where the ranges of predicted depth end, metres; the last goes on.
+const ENDS_M: [f64; 3] = [10.0, 20.0, 40.0];
+
+/// A range with fewer pixels than this takes the factors of all ranges together.
+const FEWEST: usize = 200;
+
+/// A pixel of known depth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct IntervalSample {
+    /// Predicted depth D̂, metres.
+    pub depth_m: f64,
+    /// b, as the network says.
+    pub scale: f64,
+    /// |ln D̂ − ln D|.
+    pub error: f64,
+    /// Number of the drive.
+    pub drive: usize,
+}
+
+impl IntervalSample {
+    fn score(&self) -> f64 {
+        self.error / self.scale
+    }
+}
+
+/// The factors q of a network.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IntervalFactors {
+    /// What the factors are for: [`LEVELS`].
+    pub levels: [f64; 3],
+    /// By predicted depth, near to far.
+    pub ranges: Vec<FactorRange>,
+    /// Drives they were found on.
+    pub drives: usize,
+    /// Pixels of them.
+    pub pixels: usize,
+}
+
+/// The factors of a range of predicted depths.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FactorRange {
+    /// Its end, metres; absent of the last.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to_m: Option<f64>,
+    /// q for each level.
+    pub factors: [f64; 3],
+    /// Pixels.
+    pub pixels: usize,
+}
+
+/// Number of the range of a predicted depth.
+fn range_of(depth_m: f64) -> usize {
+    ENDS_M.partition_point(|end| depth_m >= *end)
+}
+
+fn ends() -> impl Iterator<Item = Option<f64>> {
+    ENDS_M.into_iter().map(Some).chain([None])
+}
+
+/// The smallest score that a share `level` of drives' pixels does not exceed, every drive counting as much. Of one drive of n
+/// pixels: the ⌈(n + 1)·level⌉-th smallest, or the greatest where there is none such.
+fn conformal(samples: &[&IntervalSample], level: f64) -> f64 {
+    let mut counts = std::collections::BTreeMap::<usize, usize>::new();
+    for sample in samples {
+        *counts.entry(sample.drive).or_default() += 1;
+    }
+    let (n, drives) = (samples.len() as f64, counts.len() as f64);
+    let mut scores: Vec<(f64, f64)> = samples
+        .iter()
+        .map(|sample| (sample.score(), n / (drives * counts[&sample.drive] as f64)))
+        .collect();
+    scores.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let wanted = (n + 1.0) * level;
+    let mut sum = 0.0;
+    for (score, weight) in &scores {
+        sum += weight;
+        // Weights of many drives do not add up to whole numbers exactly.
+        if sum >= wanted - 1e-9 * n {
+            return *score;
+        }
+    }
+    scores.last().map_or(0.0, |(score, _)| *score)
+}
+
+impl IntervalFactors {
+    /// Those of a Laplace distribution: the network is taken at its word.
+    #[must_use]
+    pub fn uncalibrated() -> Self {
+        let factors = LEVELS.map(|level| -(1.0 - level).ln());
+        Self {
+            levels: LEVELS,
+            ranges: ends()
+                .map(|to_m| FactorRange {
+                    to_m,
+                    factors,
+                    pixels: 0,
+                })
+                .collect(),
+            drives: 0,
+            pixels: 0,
+        }
+    }
+
+    /// Found on drives that the network has not learned from; `None` without a pixel.
+    #[must_use]
+    pub fn calibrate(samples: &[IntervalSample]) -> Option<Self> {
+        let all: Vec<&IntervalSample> = samples.iter().filter(|s| s.score().is_finite()).collect();
+        if all.is_empty() {
+            return None;
+        }
+        let together = LEVELS.map(|level| conformal(&all, level));
+        let ranges = ends().enumerate().map(|(range, to_m)| {
+            let of_range = all.iter().copied().filter(|s| range_of(s.depth_m) == range);
+            let own: Vec<&IntervalSample> = of_range.collect();
+            FactorRange {
+                to_m,
+                factors: match own.len() < FEWEST {
+                    true => together,
+                    false => LEVELS.map(|level| conformal(&own, level)),
+                },
+                pixels: own.len(),
+            }
+        });
+        let mut drives: Vec<usize> = all.iter().map(|s| s.drive).collect();
+        drives.sort_unstable();
+        drives.dedup();
+        Some(Self {
+            levels: LEVELS,
+            ranges: ranges.collect(),
+            drives: drives.len(),
+            pixels: all.len(),
+        })
+    }
+
+    /// Whether they were found on data.
+    #[must_use]
+    pub fn is_calibrated(&self) -> bool {
+        self.pixels > 0
+    }
+
+    /// Checks what was read from a file.
+    ///
+    /// # Errors
+    /// [`Error::Intervals`] for other levels or ranges than this program's, or factors that are no positive numbers.
+    pub fn validate(&self) -> Result<()> {
+        let fail = |reason: String| Err(Error::Intervals { reason });
+        if self.levels != LEVELS {
+            return fail(format!("levels {:?}, expected {LEVELS:?}", self.levels));
+        }
+        if !self.ranges.iter().map(|r| r.to_m).eq(ends()) {
+            return fail(format!("ranges other than those ending at {ENDS_M:?} m"));
+        }
+        let mut factors = self.ranges.iter().flat_map(|r| r.factors);
+        match factors.find(|q| !(q.is_finite() && *q >= 0.0)) {
+            Some(wrong) => fail(format!("a factor of {wrong}")),
+            None => Ok(()),
+        }
+    }
+
+    /// q of a predicted depth, for each level.
+    #[must_use]
+    pub fn at(&self, depth_m: f64) -> [f64; 3] {
+        let range = range_of(depth_m).min(self.ranges.len().saturating_sub(1));
+        self.ranges.get(range).map_or([0.0; 3], |r| r.factors)
+    }
+
+    /// How much wider or narrower than the network says the 80 % interval of a predicted depth is.
+    #[must_use]
+    pub fn stretch(&self, depth_m: f64) -> f64 {
+        self.at(depth_m)[1] / -(1.0 - LEVELS[1]).ln()
+    }
+
+    /// What the intervals hold of these pixels, every drive counting as much; `None` without a pixel.
+    #[must_use]
+    pub fn measure(&self, samples: &[IntervalSample]) -> Option<Intervals> {
+        let of = |samples: &[&IntervalSample]| -> Vec<IntervalRow> {
+            let levels = LEVELS.into_iter().enumerate();
+            levels
+                .map(|(i, level)| {
+                    let mut drives = std::collections::BTreeMap::<usize, [f64; 3]>::new();
+                    for sample in samples {
+                        let q = self.at(sample.depth_m)[i];
+                        let reach = q * sample.scale;
+                        let sums = drives.entry(sample.drive).or_default();
+                        sums[0] += 1.0;
+                        sums[1] += f64::from(u8::from(sample.error <= reach));
+                        sums[2] += reach.exp() - (-reach).exp();
+                    }
+                    let mean = |part: usize| {
+                        let shares = drives.values().map(|sums| sums[part] / sums[0]);
+                        shares.sum::<f64>() / drives.len().max(1) as f64
+                    };
+                    IntervalRow {
+                        level,
+                        coverage: mean(1),
+                        width_rel: mean(2),
+                    }
+                })
+                .collect()
+        };
+        let all: Vec<&IntervalSample> = samples.iter().filter(|s| s.score().is_finite()).collect();
+        if all.is_empty() {
+            return None;
+        }
+        let mut from_m = 0.0;
+        let mut ranges = Vec::new();
+        for (range, to_m) in ends().enumerate() {
+            let of_range = all.iter().copied().filter(|s| range_of(s.depth_m) == range);
+            let own: Vec<&IntervalSample> = of_range.collect();
+            if !own.is_empty() {
+                ranges.push(IntervalRange {
+                    from_m,
+                    to_m,
+                    n: own.len(),
+                    levels: of(&own),
+                });
+            }
+            from_m = to_m.unwrap_or(from_m);
+        }
+        Some(Intervals {
+            calibrated: self.is_calibrated(),
+            n: all.len(),
+            levels: of(&all),
+            ranges,
+        })
+    }
+}
+
+/// Whether intervals hold what they promise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Intervals {
+    /// Whether the network's word was corrected on held-out drives first.
+    pub calibrated: bool,
+    /// Pixels.
+    pub n: usize,
+    /// For each level.
+    pub levels: Vec<IntervalRow>,
+    /// The same by predicted depth.
+    pub ranges: Vec<IntervalRange>,
+}
+
+/// What the intervals of a level hold.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct IntervalRow {
+    /// The share that they promise.
+    pub level: f64,
+    /// The share of the pixels whose true depth is within; the mean over drives.
+    pub coverage: f64,
+    /// Width over predicted depth, the mean.
+    pub width_rel: f64,
+}
+
+/// The same of a range of predicted depths.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct IntervalRange {
+    /// From, metres.
+    pub from_m: f64,
+    /// To, metres; absent of the last.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to_m: Option<f64>,
+    /// Pixels.
+    pub n: usize,
+    /// For each level.
+    pub levels: Vec<IntervalRow>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Errors of a Laplace distribution of scale `true_scale`, by its quantiles, of a network that says `said`.
+    fn samples(
+        n: usize,
+        true_scale: f64,
+        said: f64,
+        depth_m: f64,
+        drive: usize,
+    ) -> Vec<IntervalSample> {
+        (0..n)
+            .map(|i| IntervalSample {
+                depth_m,
+                scale: said,
+                error: -true_scale * (1.0 - (i as f64 + 0.5) / n as f64).ln(),
+                drive,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn of_one_drive_it_is_the_definition() {
+        let scores = [0.3, 0.1, 0.9, 0.5, 0.7, 0.2, 0.4, 0.8, 0.6];
+        let drive: Vec<IntervalSample> = scores
+            .iter()
+            .map(|score| IntervalSample {
+                depth_m: 5.0,
+                scale: 0.5,
+                error: 0.5 * score,
+                drive: 3,
+            })
+            .collect();
+        let all: Vec<&IntervalSample> = drive.iter().collect();
+        // ⌈(9 + 1)·level⌉-th smallest: the 5th, the 8th, and of 10 there is none.
+        for (level, expected) in [(0.5, 0.5), (0.8, 0.8), (0.95, 0.9), (0.41, 0.5)] {
+            assert_eq!(conformal(&all, level), expected, "{level}");
+        }
+    }
+
+    #[test]
+    fn a_network_that_is_right_about_itself_needs_no_calibration() {
+        let drive = samples(20_000, 0.2, 0.2, 15.0, 0);
+        let said = IntervalFactors::uncalibrated();
+        let measured = said.measure(&drive).unwrap();
+        assert!(!measured.calibrated);
+        let found = IntervalFactors::calibrate(&drive).unwrap();
+        for (i, row) in measured.levels.iter().enumerate() {
+            assert!((row.coverage - row.level).abs() < 1e-3, "{row:?}");
+            assert!((found.at(15.0)[i] / said.at(15.0)[i] - 1.0).abs() < 2e-3);
+        }
+        assert!((found.stretch(15.0) - 1.0).abs() < 2e-3);
+        // Half of all errors are below b·ln 2: the interval is 2·sinh of that wide.
+        let width = 2.0 * (0.2 * 2f64.ln()).sinh();
+        assert!((measured.levels[0].width_rel - width).abs() < 1e-9);
+    }
+
+    /// Too sure near, too unsure far: each range is corrected on its own, and other drives of the kind are covered.
+    #[test]
+    fn each_range_is_corrected_and_each_drive_counts_as_much() {
+        let drive = |number| {
+            let mut all = samples(4_000, 0.2, 0.1, 5.0, number);
+            all.extend(samples(2_000, 0.1, 0.3, 30.0, number));
+            all
+        };
+        let mut learned = drive(0);
+        learned.extend(drive(1));
+        let factors = IntervalFactors::calibrate(&learned).unwrap();
+        factors.validate().unwrap();
+        assert_eq!((factors.drives, factors.pixels), (2, 12_000));
+        assert!((factors.stretch(5.0) - 2.0).abs() < 0.01);
+        assert!((factors.stretch(30.0) - 1.0 / 3.0).abs() < 0.01);
+        let measured = factors.measure(&drive(7)).unwrap();
+        assert!(measured.calibrated);
+        assert_eq!(measured.ranges.len(), 2);
+        for row in measured.ranges.iter().flat_map(|r| &r.levels) {
+            assert!((row.coverage - row.level).abs() < 2e-3, "{row:?}");
+        }
+        // A long drive that errs twice as much as a short one weighs no more than it.
+        let mut uneven = samples(9_000, 0.2, 0.1, 5.0, 0);
+        uneven.extend(samples(500, 0.1, 0.1, 5.0, 1));
+        let measured = IntervalFactors::uncalibrated().measure(&uneven).unwrap();
+        let expected = 0.5 * (1.0 - 0.5f64.powf(0.5) + 0.5);
+        assert!((measured.levels[0].coverage - expected).abs() < 5e-3);
+    }
+
+    #[test]
+    fn what_a_file_says_is_checked() {
+        let right = IntervalFactors::uncalibrated();
+        let mut wrong = right.clone();
+        wrong.ranges.pop();
+        assert!(wrong.validate().is_err());
+        let mut wrong = right.clone();
+        wrong.levels[1] = 0.9;
+        assert!(wrong.validate().is_err());
+        let mut wrong = right.clone();
+        wrong.ranges[2].factors[0] = f64::NAN;
+        let error = wrong.validate().unwrap_err();
+        assert!(error.to_string().contains("NaN"), "{error}");
+        assert!(right.validate().is_ok());
+        assert_eq!(IntervalFactors::calibrate(&[]), None);
+        assert_eq!(right.measure(&[]), None);
+    }
+}
