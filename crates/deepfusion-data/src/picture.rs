@@ -29,7 +29,8 @@ pub(crate) fn decode(path: &Path) -> Result<DynamicImage> {
     decode_bytes(&bytes, path)
 }
 
-fn decode_bytes(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
+/// The same of a file's bytes.
+pub(crate) fn decode_bytes(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
     if jpeg::is_jpeg(bytes) && !jpeg::has_end(bytes) {
         return Err(truncated(path));
     }

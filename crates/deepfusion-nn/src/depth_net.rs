@@ -307,6 +307,21 @@ impl DepthNet {
         }
     }
 
+    /// The same where the head for uncertainty alone learns: of everything else nothing is kept for a backward pass.
+    ///
+    /// # Shapes
+    /// - `images`: as for [`Self::forward`]
+    pub fn forward_for_uncertainty(&self, images: Tensor<4>) -> DepthOutput {
+        let fixed = self.clone().no_grad();
+        let features = fixed.refine(fixed.encoder.forward(images), |_| ());
+        let (disparities, finest) = fixed.decoder.forward_with_feature(features);
+        let head = self.uncertainty.as_ref();
+        DepthOutput {
+            disparities,
+            log_scale: head.map(|head| head.forward(finest)),
+        }
+    }
+
     /// The network with these weights, which must be its own; but a network with the head for uncertainty may take the
     /// weights of one without, and keeps its own head then, and one without leaves the other's head aside. Says whether the
     /// head is new.

@@ -129,12 +129,16 @@ impl Model {
     /// The loss of images whose depth is known, and what the network says of them.
     #[must_use]
     pub fn learn_depth(&self, batch: &DepthBatch) -> DepthPass {
+        // At weight 0 the head for uncertainty learns alone: what has no gradient is not even decayed.
+        let alone = self.config.loss.depth.weight == 0.0 && self.depth_net.uncertainty.is_some();
+        let images = batch.network.clone();
         let DepthOutput {
             disparities,
             log_scale,
-        } = self
-            .depth_net
-            .forward_with_uncertainty(batch.network.clone());
+        } = match alone {
+            true => self.depth_net.forward_for_uncertainty(images),
+            false => self.depth_net.forward_with_uncertainty(images),
+        };
         let full_size = |(scale, disparity): (usize, &Tensor<4>)| {
             let disparity = match scale {
                 0 => disparity.clone(),
@@ -146,12 +150,7 @@ impl Model {
         let settings = &self.config.loss.depth;
         let found = losses::depth(&inverse, &batch.truth, settings);
         let mut sum = Sum::default();
-        // At weight 0 the head for uncertainty learns alone: what has no gradient is not even decayed.
-        let depth = match &log_scale {
-            Some(_) if settings.weight == 0.0 => found.loss.detach(),
-            _ => found.loss,
-        };
-        sum.terms.depth = sum.add(Some(depth), settings.weight);
+        sum.terms.depth = sum.add(Some(found.loss), settings.weight);
         let likelihood =
             log_scale.map(|b| losses::uncertainty(inverse[0].clone(), b, &batch.truth));
         sum.terms.uncertainty = sum.add(likelihood, 1.0);

@@ -101,8 +101,8 @@ pub enum Command {
 /// `deepfusion demo`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Depth and 3D targets of a simulated street in seconds, by the embedded network; then learning there, some minutes on two cores.\nLeaves pictures, a point cloud, targets and report.html.\n\n\
-    Example:\n  deepfusion demo --out runs/first"
+    after_help = "Takes a few minutes on two cores. Leaves pictures, a point cloud and report.html.\n\n\
+    Examples:\n  deepfusion demo --out runs/first\n  deepfusion demo --embedded --out runs/second"
 )]
 pub struct DemoArgs {
     /// Folder for everything it makes [default: runs/demo-TIME].
@@ -111,9 +111,9 @@ pub struct DemoArgs {
     /// Print the final evaluation as JSON on stdout.
     #[arg(long)]
     pub json: bool,
-    /// Learn from scratch on six simulated streets, and not from the embedded network on one.
+    /// Show the embedded network: depth, cloud and 3D targets of a street at first sight, then learning there.
     #[arg(long)]
-    pub from_scratch: bool,
+    pub embedded: bool,
     /// Chooses the streets.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,

@@ -17,7 +17,8 @@ pub struct PredictionArgs {
     /// dataset.toml. Of recordings the camera is known, and lenses are undone. Or one live source.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<String>,
-    /// The camera, in pixels of the input images.
+    /// The camera, in pixels of the input images [default: the recording's, else EXIF's focal length, else the one trained with is
+    /// assumed].
     #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "calib")]
     pub intrinsics: Option<CameraIntrinsics>,
     /// A calibration file: KITTI's calib_cam_to_cam.txt, OpenCV's, ROS's or Kalibr's YAML, or four numbers; lenses are undone.

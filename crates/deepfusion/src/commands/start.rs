@@ -231,13 +231,15 @@ fn unpacked_weights(network: &Shipped) -> Result<deepfusion_nn::weights::Weights
     Ok(deepfusion_nn::weights::read_bytes(origin, &network.bytes)?)
 }
 
-/// Whether one network's weights are the other's, and mean the same depths: all but the depth that a new one starts at, and
-/// the head for uncertainty, which may be new or left aside.
+/// Whether one network's weights are the other's, and mean the same depths: all but the depth that a new one starts at, whether
+/// its batch norms learn, and the head for uncertainty, which may be new or left aside.
 fn same_layers(a: &DepthNetConfig, b: &DepthNetConfig) -> bool {
-    let bare = |config: &DepthNetConfig| DepthNetConfig {
-        initial_depth_m: None,
-        uncertainty: false,
-        ..config.clone()
+    let bare = |config: &DepthNetConfig| {
+        let mut config = config.clone();
+        config.initial_depth_m = None;
+        config.encoder.frozen_statistics = false;
+        config.uncertainty = false;
+        config
     };
     bare(a) == bare(b)
 }

@@ -159,13 +159,12 @@ impl Parts {
     }
 }
 
-/// 3D targets of the whole drive, followed over time, with pictures: the program's own command.
+/// 3D targets of the whole drive, followed over time, with pictures: the program's own command, which takes the embedded
+/// network where none is named.
 fn perceive(drive: &Path, out: &Path) -> Result<()> {
     let words = [
         "perceive".as_ref(),
         drive.as_os_str(),
-        "--model".as_ref(),
-        DEFAULT.as_ref(),
         "--out".as_ref(),
         out.as_os_str(),
     ];

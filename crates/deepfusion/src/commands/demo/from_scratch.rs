@@ -32,7 +32,7 @@ const STEPS: usize = 1500;
 /// Small images: many steps in few minutes, and image motion within a network's reach.
 const SIZE: (usize, usize) = (192, 64);
 
-/// The demo without an embedded network.
+/// The demo that needs no embedded network.
 pub fn run(demo: &Demo) -> Result<()> {
     say("1/4 simulating streets to learn on, and another to be measured on");
     let seed = demo.args.seed;

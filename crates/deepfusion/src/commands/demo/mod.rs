@@ -1,6 +1,6 @@
-//! The whole way with no data at all. A street is simulated; the embedded network sees it, in metres; learns on it from
-//! images and motion; and is measured before and after. Without an embedded network, or when asked to, everything is
-//! learned from scratch.
+//! The whole way with no data at all. Streets are simulated, a small network learns depth on them from scratch, and is
+//! measured on another. Or the embedded network sees a street at first sight, learns there from images and motion, and is
+//! measured before and after.
 
 mod adapt;
 mod from_scratch;
@@ -22,7 +22,7 @@ use super::evaluate::{Evaluated, Truth, evaluate_datasets, trivial_from_datasets
 use super::recorder::clock;
 use super::{device, train};
 use crate::cli::{DemoArgs, EngineArgs};
-use crate::model::{self, ModelSource};
+use crate::model::ModelSource;
 use crate::progress::{Progress, say};
 use crate::{engine, interrupt, output};
 
@@ -34,9 +34,9 @@ const DEMO: &str = "the demo";
 
 /// `deepfusion demo`.
 pub fn run(args: &DemoArgs) -> Result<()> {
-    let embedded = match args.from_scratch {
-        true => None,
-        false => model::embedded(Path::new(DEFAULT))?,
+    let embedded = match args.embedded {
+        true => Some(Box::new(deepfusion_weights::find(DEFAULT)?)),
+        false => None,
     };
     let demo = Demo {
         args,

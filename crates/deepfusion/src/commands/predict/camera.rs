@@ -66,14 +66,26 @@ impl CameraSource {
         }
     }
 
-    /// The image as a pinhole camera would have taken it, and that camera.
-    pub fn see(&self, image: RgbImage) -> Result<(RgbImage, Option<Intrinsics>)> {
+    /// The image as a pinhole camera would have taken it, that camera, and where it comes from, in a word. What `exif` says
+    /// comes before what would only be assumed.
+    pub fn see(&self, image: RgbImage, exif: Option<Intrinsics>) -> Result<Taken> {
         if let Self::Lens(file) = self {
             let lens = file.lens_for(image.dimensions())?;
-            return Ok((lens.correct(image)?, Some(lens.intrinsics())));
+            return Ok(Taken {
+                image: lens.correct(image)?,
+                camera: Some(lens.intrinsics()),
+                from: self.word(),
+            });
         }
-        let camera = self.of(image.width(), image.height())?;
-        Ok((image, camera))
+        let (camera, from) = match (self, exif) {
+            (Self::Trained(_) | Self::Unknown, Some(camera)) => (Some(camera), "exif"),
+            _ => (self.of(image.width(), image.height())?, self.word()),
+        };
+        Ok(Taken {
+            image,
+            camera,
+            from,
+        })
     }
 
     /// The camera of an image of this size.
@@ -98,6 +110,14 @@ impl CameraSource {
             Self::Unknown => Ok(None),
         }
     }
+}
+
+/// An image and its camera.
+pub struct Taken {
+    pub image: RgbImage,
+    pub camera: Option<Intrinsics>,
+    /// `given`, `recording`, `exif`, `assumed` or `unknown`.
+    pub from: &'static str,
 }
 
 /// A calibration tool's file: OpenCV's, ROS's, Kalibr's, or four numbers.

@@ -7,7 +7,7 @@ use deepfusion_data::{Address, LiveFrame, shown_for};
 
 use super::camera::CameraSource;
 use super::manifest::Lock;
-use super::{Job, tell_assumed, video};
+use super::{Job, video};
 use crate::cli::{PredictArgs, Shard};
 use crate::commands::live::{self, Feed, LiveMark};
 use crate::commands::scene::ScaleWatch;
@@ -31,9 +31,6 @@ pub fn run(args: &PredictArgs, model: &ModelSource, address: &Address) -> Result
     live::make_room(out, prediction.overwrite)?;
     let _lock = Lock::take(out, args.shard)?;
     interrupt::catch("stopping after the frames at work");
-    if job.camera.word() == "assumed" {
-        tell_assumed();
-    }
     let mut feed = Feed::open(address, &prediction.live)?;
     let look = |frame: LiveFrame| {
         let input = live::input(address, &frame);

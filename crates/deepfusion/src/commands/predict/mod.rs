@@ -13,15 +13,17 @@ pub(super) mod sidecar;
 mod video;
 mod watcher;
 
+use std::sync::Once;
+
 use anyhow::{Context, Result};
 use deepfusion_compare::MetricScale;
-use deepfusion_data::{LiveFrame, RgbImage, load_rgb};
+use deepfusion_data::{LiveFrame, RgbImage, load_photo};
 use deepfusion_eval::IntervalFactors;
 use deepfusion_geometry::Intrinsics;
 use deepfusion_train::{Inspector, LayerMaps, Prediction, Predictor, PreparedImage, Preparer};
 use rayon::prelude::*;
 
-use self::camera::CameraSource;
+use self::camera::{CameraSource, Taken};
 use self::inputs::Input;
 use self::ledger::Ledger;
 use self::manifest::{Lock, Manifest};
@@ -54,6 +56,8 @@ pub(super) struct Job<'a> {
     inspector: Option<Inspector>,
     /// How the intervals are stretched that the network says.
     intervals: IntervalFactors,
+    /// Warns once of cameras that nobody gave.
+    tell_assumed: Once,
 }
 
 /// An image on its way through the network.
@@ -61,6 +65,8 @@ pub(super) struct Loaded {
     mark: FileMark,
     pub image: RgbImage,
     pub camera: Option<Intrinsics>,
+    /// Where that comes from, in a word.
+    camera_from: &'static str,
     /// Of a live source's frame.
     pub live: Option<LiveMark>,
 }
@@ -105,9 +111,6 @@ pub fn run(args: &PredictArgs) -> Result<()> {
     let (ledger, todo) = begin(&job, args, &all, &mine)?;
     predict(&job, &predictor, &mine, &todo, &ledger);
     let summary = ledger.finish()?;
-    if job.camera.word() == "assumed" && mine.iter().any(|input| input.frame.is_none()) {
-        tell_assumed();
-    }
     let there = mine.len() - todo.len();
     say(&format!(
         "{} images written to {}{}",
@@ -132,7 +135,7 @@ pub fn run(args: &PredictArgs) -> Result<()> {
 /// Warns of a camera that nobody gave.
 fn tell_assumed() {
     tracing::warn!(
-        "no intrinsics given: the training camera's field of view is assumed, so the metres are \
+        "no intrinsics given, and none in the image's EXIF: the training camera's field of view is assumed, so the metres are \
          only as right as that is (camera_known: false; give --intrinsics or --calib)"
     );
 }
@@ -242,6 +245,7 @@ impl<'a> Job<'a> {
             preparer: predictor.preparer(),
             step: predictor.step,
             intervals: model.interval_factors()?,
+            tell_assumed: Once::new(),
             scale: model.scale(set, !args.no_focal_correction, predictor.step)?,
             inspector: match outputs.save.contains(&Save::Features) {
                 true => Some(Inspector::new(
@@ -258,32 +262,37 @@ impl<'a> Job<'a> {
     pub fn load(&self, input: &Input) -> Result<(Loaded, PreparedImage)> {
         // Before it is read: a change in between is then noticed by the next run.
         let mark = FileMark::of(&input.path)?;
-        let (image, camera) = match &input.frame {
-            Some((dataset, index)) => (
-                dataset.load_image(*index)?,
-                Some(dataset.intrinsics(*index)),
-            ),
+        let taken = match &input.frame {
+            Some((dataset, index)) => Taken {
+                image: dataset.load_image(*index)?,
+                camera: Some(dataset.intrinsics(*index)),
+                from: "recording",
+            },
             None => {
-                let seen = self.camera.see(load_rgb(&input.path)?);
+                let photo = load_photo(&input.path)?;
+                let seen = self.camera.see(photo.image, photo.intrinsics);
                 seen.with_context(|| input.path.display().to_string())?
             }
         };
-        Ok(self.prepare(mark, image, camera))
+        if taken.from == "assumed" {
+            self.tell_assumed.call_once(tell_assumed);
+        }
+        Ok(self.prepare(mark, taken))
     }
 
     /// Makes a live source's frame the network's input.
     pub fn load_live(&self, frame: LiveFrame) -> Result<(Loaded, PreparedImage)> {
         let mark = FileMark::of_frame(&frame);
-        let (image, camera) = self.camera.see(frame.image)?;
-        Ok(self.prepare(mark, image, camera))
+        let taken = self.camera.see(frame.image, None)?;
+        Ok(self.prepare(mark, taken))
     }
 
-    fn prepare(
-        &self,
-        mark: FileMark,
-        image: RgbImage,
-        camera: Option<Intrinsics>,
-    ) -> (Loaded, PreparedImage) {
+    fn prepare(&self, mark: FileMark, taken: Taken) -> (Loaded, PreparedImage) {
+        let Taken {
+            image,
+            camera,
+            from,
+        } = taken;
         let (correct, crop) = (!self.args.no_focal_correction, !self.args.stretch);
         let prepared = self
             .preparer
@@ -292,6 +301,7 @@ impl<'a> Job<'a> {
             mark,
             image,
             camera,
+            camera_from: from,
             live: None,
         };
         (loaded, prepared)
@@ -343,10 +353,7 @@ impl<'a> Job<'a> {
         }
         let known = depth.data.iter().copied().filter(|d| *d > 0.0);
         let ends = |[low, high]: [f32; 2], d: f32| [low.min(d), high.max(d)];
-        let camera_word = match input.frame {
-            Some(_) => "recording",
-            None => self.camera.word(),
-        };
+        let camera_word = loaded.camera_from;
         let mut sidecar = Sidecar {
             image: input.path.clone(),
             image_file: loaded.mark,
@@ -357,7 +364,7 @@ impl<'a> Job<'a> {
             checkpoint_step: self.step,
             intrinsics: loaded.camera.map(|k| [k.fx, k.fy, k.cx, k.cy]),
             intrinsics_from: camera_word.into(),
-            camera_known: matches!(camera_word, "given" | "recording"),
+            camera_known: matches!(camera_word, "given" | "recording" | "exif"),
             scale: self.scale,
             focal_factor: prediction.focal_factor,
             window: prediction.window,

@@ -39,9 +39,9 @@ pub struct Sidecar {
     pub checkpoint_step: usize,
     /// fx, fy, cx, cy in pixels of the input.
     pub intrinsics: Option<[f64; 4]>,
-    /// `given`, `recording` (its own calibration), `assumed` or `unknown`.
+    /// `given`, `recording` (its own calibration), `exif` (the lens's nominal focal length), `assumed` or `unknown`.
     pub intrinsics_from: String,
-    /// Whether the camera is known, so that depth is right for its focal length: given, or the recording's own.
+    /// Whether the camera is known, so that depth is right for its focal length: given, the recording's own, or EXIF's.
     #[serde(default)]
     pub camera_known: bool,
     /// What was measured of this checkpoint's metres on recordings that it has not learned from.
