@@ -6,7 +6,7 @@ use crate::{PointCloud, Result};
 
 impl PointCloud {
     /// Writes the cloud as a binary PCD: x, y, z as f32, and where the cloud has them `rgb` (packed as PCL does, 0x00RRGGBB in
-    /// the bits of an f32), `intensity`, `radial_velocity` and `confidence`.
+    /// the bits of an f32), `intensity`, `radial_velocity`, `confidence` and `sigma`.
     ///
     /// # Errors
     /// [`Error::Stream`](crate::Error::Stream) if writing fails, [`Error::Size`](crate::Error::Size) if a column does not
@@ -17,6 +17,7 @@ impl PointCloud {
             ("intensity", &self.intensity),
             ("radial_velocity", &self.radial_velocity),
             ("confidence", &self.confidence),
+            ("sigma", &self.sigma),
         ];
         let columns: Vec<(&str, &Vec<f32>)> = columns
             .into_iter()

@@ -1,5 +1,5 @@
-//! PLY, binary little-endian: `x y z` as float, then `red green blue` as uchar, `intensity`, `radial_velocity`
-//! and `confidence` as float, each where the cloud has it.
+//! PLY, binary little-endian: `x y z` as float, then `red green blue` as uchar, `intensity`, `radial_velocity`,
+//! `confidence` and `sigma` as float, each where the cloud has it.
 
 use crate::{Error, PointCloud, Result};
 use std::io::{BufRead, Read, Write};
@@ -33,6 +33,9 @@ impl PointCloud {
         if self.confidence.is_some() {
             header += "property float confidence\n";
         }
+        if self.sigma.is_some() {
+            header += "property float sigma\n";
+        }
         header += "end_header\n";
         let mut bytes = header.into_bytes();
         bytes.reserve(self.len() * 23);
@@ -43,7 +46,12 @@ impl PointCloud {
             if let Some(rgb) = &self.rgb {
                 bytes.extend_from_slice(&rgb[i]);
             }
-            let columns = [&self.intensity, &self.radial_velocity, &self.confidence];
+            let columns = [
+                &self.intensity,
+                &self.radial_velocity,
+                &self.confidence,
+                &self.sigma,
+            ];
             for column in columns.into_iter().flatten() {
                 bytes.extend_from_slice(&column[i].to_le_bytes());
             }
@@ -72,11 +80,13 @@ impl PointCloud {
         let intensity = header.find("intensity");
         let radial_velocity = header.find("radial_velocity");
         let confidence = header.find("confidence");
+        let sigma = header.find("sigma");
         let mut cloud = Self {
             rgb: colour.map(|_| Vec::new()),
             intensity: intensity.map(|_| Vec::new()),
             radial_velocity: radial_velocity.map(|_| Vec::new()),
             confidence: confidence.map(|_| Vec::new()),
+            sigma: sigma.map(|_| Vec::new()),
             ..Self::default()
         };
         let mut left = header.vertices;
@@ -103,6 +113,9 @@ impl PointCloud {
                     column.push(p.value(vertex) as f32);
                 }
                 if let (Some(column), Some(p)) = (&mut cloud.confidence, confidence) {
+                    column.push(p.value(vertex) as f32);
+                }
+                if let (Some(column), Some(p)) = (&mut cloud.sigma, sigma) {
                     column.push(p.value(vertex) as f32);
                 }
             }
@@ -294,6 +307,7 @@ mod tests {
             intensity: Some((0..n).map(x).collect()),
             radial_velocity: Some((0..n).map(|i| 3.0 - x(i)).collect()),
             confidence: Some(vec![0.5; n]),
+            sigma: Some((0..n).map(|i| 0.01 + x(i)).collect()),
         }
     }
 

@@ -14,6 +14,8 @@ pub struct PointCloud {
     pub radial_velocity: Option<Vec<f32>>,
     /// How far the position can be trusted, 0 to 1.
     pub confidence: Option<Vec<f32>>,
+    /// Standard deviation of the depth that the point was made from, metres along the camera's axis.
+    pub sigma: Option<Vec<f32>>,
 }
 
 impl PointCloud {
@@ -54,6 +56,15 @@ impl PointCloud {
         }))
     }
 
+    /// A column for the cloud that [`Self::from_depth`] makes of a depth: the values at the pixels that become points.
+    /// `values` belong to the pixels of `depth`, row by row.
+    #[must_use]
+    pub fn column(values: &[f32], depth: &DepthMap, max_depth_m: f32) -> Vec<f32> {
+        let pixels = depth.data.iter().zip(values);
+        let kept = pixels.filter(|(z, _)| is_point(**z, max_depth_m));
+        kept.map(|(_, value)| *value).collect()
+    }
+
     /// How many points.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -79,6 +90,7 @@ impl PointCloud {
                 self.radial_velocity.as_ref().map(Vec::len),
             ),
             ("confidence", self.confidence.as_ref().map(Vec::len)),
+            ("sigma", self.sigma.as_ref().map(Vec::len)),
         ];
         for (what, len) in columns {
             if let Some(len) = len.filter(|len| *len != self.len()) {
@@ -125,6 +137,12 @@ fn check_sizes(
     Ok(())
 }
 
+/// Whether a pixel of this depth becomes a point. The comparisons also turn NaN into "none".
+#[inline]
+fn is_point(z: f32, max_depth_m: f32) -> bool {
+    (z > 0.0) & (z <= max_depth_m) & (z < f32::INFINITY)
+}
+
 /// Points of the pixels whose depth, `depth_of` their value, is above 0 and at most `max_depth_m`.
 fn back_project(
     values: &[f32],
@@ -151,9 +169,7 @@ fn back_project(
         let ray_y = ((v as f64 - k.cy) / k.fy) as f32;
         for (depth, value) in depths.iter_mut().zip(row) {
             let z = depth_of(*value);
-            // The comparisons also turn NaN into "none".
-            let valid = (z > 0.0) & (z <= max_depth_m) & (z < f32::INFINITY);
-            *depth = if valid { z } else { 0.0 };
+            *depth = if is_point(z, max_depth_m) { z } else { 0.0 };
         }
         // Every pixel is written where the next point goes and kept by counting it: whether a pixel is
         // valid is noise to a branch predictor.
@@ -204,6 +220,8 @@ mod tests {
         // (u, v, z) = (1, 0, 4) and (2, 1, 8): x = (u - 1) / 2 z, y = (v - 0.5) / 4 z.
         assert_eq!(cloud.xyz, vec![[0.0, -0.5, 4.0], [4.0, 1.0, 8.0]]);
         assert_eq!(cloud.rgb, Some(vec![[3, 4, 5], [15, 16, 17]]));
+        let values = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        assert_eq!(PointCloud::column(&values, &depth, 80.0), [2.0, 6.0]);
     }
 
     #[test]

@@ -129,6 +129,7 @@ mod tests {
             size_m: [4.0, 1.8, 1.5],
             yaw_rad: std::f64::consts::FRAC_PI_2,
             distance_m: x.hypot(z),
+            sigma_m: None,
             velocity_mps: Some(velocity),
             moving: None,
             confidence: 1.0,

@@ -33,6 +33,8 @@ pub struct Detection {
     pub runs: Vec<Run>,
     /// 0 to 1.
     pub confidence: f32,
+    /// Standard deviation of its depth over itself, where the depth came with one.
+    pub relative_error: Option<f32>,
     /// What it is, where somebody knows.
     pub kind: Option<Kind>,
 }
@@ -46,6 +48,7 @@ impl Detection {
         let center_m = ground
             .place([right, forward, 0.5 * (low + high)])
             .map(f64::from);
+        let distance_m = center_m.iter().map(|x| x * x).sum::<f64>().sqrt();
         let (sin, cos) = self.place.angle.sin_cos();
         let along = |i: usize| f64::from(cos * ground.right[i] + sin * ground.forward[i]);
         Target {
@@ -53,7 +56,10 @@ impl Detection {
             center_m,
             size_m: [self.place.footprint[0], self.place.footprint[1], high - low].map(f64::from),
             yaw_rad: (-along(2)).atan2(along(0)),
-            distance_m: center_m.iter().map(|x| x * x).sum::<f64>().sqrt(),
+            distance_m,
+            sigma_m: self
+                .relative_error
+                .map(|share| f64::from(share) * distance_m),
             velocity_mps: None,
             moving: None,
             confidence: f64::from(self.confidence),
@@ -62,6 +68,22 @@ impl Detection {
             class: self.kind.as_ref().map(|kind| kind.class.clone()),
             detection: Some(index),
         }
+    }
+}
+
+impl Detection {
+    /// Takes what is said of its pixels: the median of `sigma` over `depth`, both row by row in images of this width.
+    /// They err together, so that many of them say no more than one.
+    pub(crate) fn weigh(&mut self, depth: &[f32], sigma: &[f32], width: usize) {
+        let pixels = self.runs.iter().flat_map(|run| run.pixels(width));
+        let shares = pixels.map(|i| sigma[i] / depth[i]);
+        let mut known: Vec<f32> = shares.filter(|s| s.is_finite() && *s > 0.0).collect();
+        if known.is_empty() {
+            return;
+        }
+        let middle = known.len() / 2;
+        let (_, median, _) = known.select_nth_unstable_by(middle, f32::total_cmp);
+        self.relative_error = Some(*median);
     }
 }
 
@@ -157,6 +179,7 @@ fn in_rows(
             bounds: candidate.cluster.bounds(),
             runs: candidate.cluster.runs,
             confidence: confidence(&vote.place, candidate.kind.as_ref()),
+            relative_error: None,
             kind: candidate.kind,
         })
         .collect()

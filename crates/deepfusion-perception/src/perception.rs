@@ -97,15 +97,34 @@ impl Perception {
         stamp: Option<Stamp>,
         instances: &[Instance],
     ) -> Result<Surroundings> {
+        self.look_with_sigma(depth, None, k, stamp, instances)
+    }
+
+    /// As [`Self::look_with`], where each pixel's depth comes with its standard deviation (metres, of the same size): what a
+    /// target's place is worth, and how far off it may be found again, follow from its own pixels, and
+    /// [`PerceptionConfig::relative_error`] is for those without.
+    ///
+    /// # Errors
+    /// As [`Self::look_with`].
+    pub fn look_with_sigma(
+        &mut self,
+        depth: &DepthMap,
+        sigma: Option<&DepthMap>,
+        k: &Intrinsics,
+        stamp: Option<Stamp>,
+        instances: &[Instance],
+    ) -> Result<Surroundings> {
         if let Some(problem) = k.implausible() {
             return Err(Error::Camera(problem));
         }
         let size = (k.width as usize, k.height as usize);
-        if (depth.width, depth.height) != size || depth.data.len() != size.0 * size.1 {
-            return Err(Error::Size {
-                found: (depth.width, depth.height),
-                expected: size,
-            });
+        for map in [Some(depth), sigma].into_iter().flatten() {
+            if (map.width, map.height) != size || map.data.len() != size.0 * size.1 {
+                return Err(Error::Size {
+                    found: (map.width, map.height),
+                    expected: size,
+                });
+            }
         }
         for instance in instances {
             instance.check(size)?;
@@ -151,7 +170,12 @@ impl Perception {
             ground: &ground,
             config: &self.config,
         };
-        let detections = self.parking.complete(detections, &moving, view, pose);
+        let mut detections = self.parking.complete(detections, &moving, view, pose);
+        if let Some(sigma) = sigma {
+            for detection in &mut detections {
+                detection.weigh(&depth.data, &sigma.data, size.0);
+            }
+        }
         let mut targets = match stamp {
             Some(stamp) => self.tracker.step(
                 &detections,

@@ -280,6 +280,7 @@ mod tests {
             size_m: [4.0, 1.8, 1.5],
             yaw_rad: 0.1,
             distance_m: norm(center_m),
+            sigma_m: None,
             velocity_mps: Some([0.0; 3]),
             moving: Some(false),
             confidence: 1.0,

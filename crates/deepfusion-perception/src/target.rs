@@ -14,6 +14,9 @@ pub struct Target {
     pub yaw_rad: f64,
     /// From the camera to the centre, metres.
     pub distance_m: f64,
+    /// Standard deviation of that, metres, where the depth came with one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_m: Option<f64>,
     /// Over ground, in the camera's axes, m/s; `None` before it could be measured.
     pub velocity_mps: Option<[f64; 3]>,
     /// Whether it moves over ground; `None` before that could be told.

@@ -1,7 +1,7 @@
 //! The promises of the endless mode: a view hangs on the settings and its index alone, and its depth is exact
 //! whatever the weather and the camera do to its colours.
 
-use deepfusion_sim::{Endless, EndlessConfig, View};
+use deepfusion_sim::{Endless, EndlessConfig, Scene, View, Weather};
 use nalgebra::Vector3;
 use std::collections::HashSet;
 
@@ -63,6 +63,44 @@ fn the_seed_and_the_index_change_the_view() {
     );
     assert_ne!(a.view(3).rgb.as_raw(), a.view(4).rgb.as_raw());
     assert_ne!(a.view(3).depth, b.view(3).depth);
+}
+
+/// Plain worlds are seen as `simulate` draws them; the others are the same as without plain ones among them.
+#[test]
+fn plain_worlds_are_put_among_the_others() {
+    let few = |plain| {
+        endless(EndlessConfig {
+            worlds_at_once: 8,
+            views_per_world: 1,
+            plain,
+            ..small()
+        })
+    };
+    let (without, half, only) = (few(0.0), few(0.5), few(1.0));
+    let mut kept = 0;
+    for index in 0..24 {
+        let (varied, view) = (without.view(index), half.view(index));
+        if view.rgb == varied.rgb {
+            assert_same(&view, &varied);
+            kept += 1;
+        } else {
+            assert_same(&view, &only.view(index));
+            assert!(Scene::ALL.contains(&view.scene) && !view.grey);
+            assert!(!matches!(view.weather, Weather::Fog | Weather::Overcast));
+        }
+    }
+    assert!((6..=18).contains(&kept), "{kept} of 24 are varied");
+}
+
+/// The world does not change with the camera's size.
+#[test]
+fn a_view_comes_in_any_size() {
+    let stream = endless(small());
+    assert_same(&stream.view(5), &stream.view_sized(5, (160, 48)));
+    let tall = stream.view_sized(5, (96, 80));
+    assert_eq!(tall.rgb.dimensions(), (96, 80));
+    assert_eq!((tall.depth.width, tall.intrinsics.height), (96, 80));
+    assert_eq!(tall.world, stream.view(5).world);
 }
 
 #[test]

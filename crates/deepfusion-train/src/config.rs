@@ -57,6 +57,10 @@ pub struct Augmentation {
     /// How much smaller than the image the part may be that is cut from it, of images whose depth is known; 1: all of it.
     #[serde(default = "no_zoom")]
     pub zoom: f32,
+    /// Other sizes of images whose depth is known, for a network that is to see pictures of other aspect ratios: half of
+    /// the batches have the run's own size, the others in turns one of these.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sizes: Vec<InputSize>,
 }
 
 /// How the step size changes over a run, after its rise.
@@ -361,6 +365,15 @@ impl TrainConfig {
         }
     }
 
+    /// The size of the images of batch number `number` of those whose depth is known.
+    pub(crate) fn size_of_depth_batch(&self, number: usize) -> InputSize {
+        let others = &self.augmentation.sizes;
+        match others.is_empty() || number.is_multiple_of(2) {
+            true => self.size,
+            false => others[number / 2 % others.len()],
+        }
+    }
+
     /// Whether anything in training reads how the vehicle turned, not only how far it went.
     #[must_use]
     pub fn reads_rotation(&self) -> bool {
@@ -437,6 +450,9 @@ impl TrainConfig {
         let zoom = self.augmentation.zoom;
         if !(1.0..=8.0).contains(&zoom) {
             return fail("augmentation.zoom", "1 to 8", zoom.to_string());
+        }
+        for size in &self.augmentation.sizes {
+            size.validate()?;
         }
         for (field, share) in [
             ("augmentation.jitter", self.augmentation.jitter),

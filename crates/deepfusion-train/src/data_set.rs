@@ -49,6 +49,8 @@ pub struct SimulatedConfig {
     pub validation_views: usize,
     /// Views of a world before it makes room for another.
     pub views_per_world: usize,
+    /// Share of the worlds that are as `simulate` draws them: not varied, in clear weather, by a camera without noise.
+    pub plain: f64,
 }
 
 impl Default for SimulatedConfig {
@@ -58,6 +60,7 @@ impl Default for SimulatedConfig {
             views: 4000,
             validation_views: 64,
             views_per_world: 24,
+            plain: 0.0,
         }
     }
 }
@@ -220,6 +223,10 @@ impl TrainConfig {
                 if simulated.views_per_world == 0 {
                     let field = "data.sets.simulated.views_per_world";
                     return fail(field, "at least 1", "0".into());
+                }
+                if !(0.0..=1.0).contains(&simulated.plain) {
+                    let found = simulated.plain.to_string();
+                    return fail("data.sets.simulated.plain", "0 to 1", found);
                 }
             }
             if set.paths.is_empty() && set.simulated.is_none() {

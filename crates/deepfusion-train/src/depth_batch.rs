@@ -7,6 +7,7 @@ use crate::window::Window;
 use crate::{BatchFactors, DepthSet, DepthView, Error, Jitter, SampleFactors, TrainConfig};
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_data::{resize_rgb, to_chw};
+use deepfusion_nn::InputSize;
 use rand::Rng;
 use rayon::prelude::*;
 
@@ -31,6 +32,7 @@ pub struct DepthBatch {
 
 /// A batch as plain values, made on the loader's thread.
 struct RawBatch {
+    size: InputSize,
     clean: Vec<f32>,
     network: Vec<f32>,
     log_depth: Vec<f32>,
@@ -43,7 +45,6 @@ struct RawBatch {
 /// Makes batches of images with depth, ahead of the trainer.
 pub struct DepthLoader {
     batches: Ahead<RawBatch>,
-    size: (usize, usize),
     /// The pose network's own metres per unit.
     unit_m: f64,
 }
@@ -81,17 +82,20 @@ impl DepthLoader {
     ) -> Self {
         let own = config.clone();
         let make = move |number: usize, picks: &Vec<Pick>| {
+            let mut own = own.clone();
+            if augment {
+                own.size = own.size_of_depth_batch(number);
+            }
             let first = number * picks.len();
             let items = picks
                 .par_iter()
                 .enumerate()
-                .map(|(slot, pick)| item(&own, &set.view(*pick)?, first + slot, augment))
+                .map(|(slot, pick)| item(&own, &set.view(*pick, own.size)?, first + slot, augment))
                 .collect::<Result<Vec<Item>, Error>>()?;
-            Ok(RawBatch::of(items))
+            Ok(RawBatch::of(items, own.size))
         };
         Self {
             batches: Ahead::start(plans, make),
-            size: (config.size.height, config.size.width),
             unit_m: config.pose_net.metres_per_unit.max(f64::MIN_POSITIVE),
         }
     }
@@ -107,7 +111,7 @@ impl DepthLoader {
             Err(error) => return Some(Err(error)),
         };
         let n = raw.names.len();
-        let (height, width) = self.size;
+        let InputSize { width, height } = raw.size;
         let tensor = |values, channels| {
             let shape = [n, channels, height, width];
             Tensor::<4>::from_data(TensorData::new(values, shape), device)
@@ -141,11 +145,12 @@ impl DepthBatch {
 }
 
 impl RawBatch {
-    fn of(items: Vec<Item>) -> Self {
+    fn of(items: Vec<Item>, size: InputSize) -> Self {
         let all = |plane: fn(&Item) -> &Vec<f32>| {
             items.iter().flat_map(move |i| plane(i).iter().copied())
         };
         Self {
+            size,
             clean: all(|i| &i.clean).collect(),
             network: all(|i| &i.network).collect(),
             log_depth: all(|i| &i.log_depth).collect(),

@@ -5,6 +5,7 @@ use crate::sampler::stream;
 use crate::{Error, Sampler, TrainConfig};
 use deepfusion_data::{Dataset, GtKind, RgbImage};
 use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_nn::InputSize;
 use deepfusion_sim::{Endless, EndlessConfig};
 use rand::Rng;
 use std::sync::Arc;
@@ -166,16 +167,17 @@ impl DepthSet {
         Pick::Frame(0)
     }
 
-    /// A view.
+    /// A view; a simulated one by a camera of the given size.
     ///
     /// # Errors
     /// [`Error::Data`] where an image or its depth cannot be read; [`Error::NoDepth`] where it is gone since.
-    pub(crate) fn view(&self, pick: Pick) -> Result<DepthView, Error> {
+    pub(crate) fn view(&self, pick: Pick, size: InputSize) -> Result<DepthView, Error> {
         match pick {
             Pick::Frame(index) => self.frame(self.frames[index]),
             Pick::View(index, number) => {
                 let source = &self.simulated[index];
-                let view = source.endless.view(number);
+                let size = (size.width as u32, size.height as u32);
+                let view = source.endless.view_sized(number, size);
                 Ok(DepthView {
                     image: view.rgb,
                     depth: view.depth,
@@ -283,6 +285,7 @@ fn simulated(config: &TrainConfig) -> Result<(Vec<SimulatedViews>, Vec<Simulated
                 width: config.size.width as u32,
                 height: config.size.height as u32,
                 views_per_world: simulated.views_per_world,
+                plain: simulated.plain,
                 ..EndlessConfig::default()
             })?;
             Ok(SimulatedViews {

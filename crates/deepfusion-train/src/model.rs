@@ -123,6 +123,22 @@ impl Model {
         )
     }
 
+    /// A scale's disparity at the full size, the run's or that of a batch that has one of its own.
+    pub(crate) fn enlarged(
+        &self,
+        scale: usize,
+        disparity: Tensor<4>,
+        height: usize,
+        width: usize,
+    ) -> Tensor<4> {
+        let size = self.config.size;
+        if (size.height, size.width) == (height, width) {
+            return self.enlarge[scale].apply(disparity);
+        }
+        let from = [height >> scale, width >> scale];
+        BilinearResize::new(from, [height, width], &disparity.device()).apply(disparity)
+    }
+
     /// The run's configuration, with what was taken from the data.
     #[must_use]
     pub fn config(&self) -> &TrainConfig {

@@ -139,10 +139,11 @@ impl Model {
             true => self.depth_net.forward_for_uncertainty(images),
             false => self.depth_net.forward_with_uncertainty(images),
         };
+        let [_, _, height, width] = batch.clean.dims();
         let full_size = |(scale, disparity): (usize, &Tensor<4>)| {
             let disparity = match scale {
                 0 => disparity.clone(),
-                _ => self.enlarge[scale].apply(disparity.clone()),
+                _ => self.enlarged(scale, disparity.clone(), height, width),
             };
             batch.factors.inverse_depth(disparity)
         };

@@ -1,3 +1,4 @@
+use crate::losses::LOG_SCALE_BOUNDS;
 use crate::{
     DepthRunner, Error, NetworkOutput, PreparedImage, Preparer, StoredNetwork, TrainConfig,
 };
@@ -105,10 +106,16 @@ impl Prediction {
     /// that does not say how sure it is. It is what the network expects, and not calibrated.
     #[must_use]
     pub fn sigma(&self) -> Option<DepthMap> {
+        self.sigma_of(&self.depth())
+    }
+
+    /// As [`Self::sigma`], where [`Self::depth`] is at hand.
+    #[must_use]
+    pub fn sigma_of(&self, depth: &DepthMap) -> Option<DepthMap> {
         let mut sigma = self.enlarged(self.log_scale.as_ref()?, |log_scale| {
             std::f32::consts::SQRT_2 * log_scale.exp()
         });
-        for (relative, depth) in sigma.data.iter_mut().zip(self.depth().data) {
+        for (relative, depth) in sigma.data.iter_mut().zip(&depth.data) {
             *relative *= depth;
         }
         Some(sigma)
@@ -243,7 +250,7 @@ impl Predictor {
     pub fn infer(&self, image: &PreparedImage) -> Result<Prediction, Error> {
         let NetworkOutput {
             mut disparity,
-            log_scale,
+            mut log_scale,
         } = match &self.others {
             Some(others) if image.size != self.config.size => {
                 others.runner(image.size)?.run(&image.input)?
@@ -252,6 +259,11 @@ impl Predictor {
         };
         for d in &mut disparity {
             *d = (f64::from(*d) / image.focal_factor) as f32;
+        }
+        // As the loss saw it: what lies beyond has never been learned.
+        let (low, high) = LOG_SCALE_BOUNDS;
+        for log_scale in log_scale.iter_mut().flatten() {
+            *log_scale = log_scale.clamp(low as f32, high as f32);
         }
         Ok(Prediction {
             disparity,

@@ -120,6 +120,7 @@ impl Preset {
                 brightness: 0.2,
                 hue: 0.1,
                 zoom: 1.0,
+                sizes: Vec::new(),
             },
             depth_net: DepthNetConfig::new(depth),
             pose_net: PoseNetConfig {

@@ -4,7 +4,7 @@ mod support;
 
 use burn::tensor::Device;
 use deepfusion_data::{Dataset, OpenOptions};
-use deepfusion_nn::weights;
+use deepfusion_nn::{InputSize, weights};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{
     Control, DataSetConfig, DepthBatch, DepthLoader, Error, Learn, Lesson, LossTerms, Preset,
@@ -33,6 +33,7 @@ fn streets(steps: usize) -> TrainConfig {
             views: 40,
             validation_views: 6,
             views_per_world: 8,
+            plain: 0.25,
         }),
         ..DataSetConfig::default()
     }];
@@ -133,6 +134,36 @@ fn simulated_views_teach_depth_and_resume_exactly() {
     let mut resumed = Trainer::resume(stored, run_folder, sets, &Device::flex()).unwrap();
     begun.extend(run(&mut resumed, Some(12)).0);
     assert_eq!(begun, steps[..12]);
+}
+
+/// Every other batch has another size, those in turns; a run that stopped before one of them goes on as if it had not.
+#[test]
+fn batches_of_other_sizes_take_turns() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = streets(6);
+    let others = [[64, 96], [128, 64]].map(|[width, height]| InputSize { width, height });
+    config.augmentation.sizes = others.to_vec();
+    let (train, _) = samples(&config).unwrap();
+    let loader = DepthLoader::training(&config, train.depth, 0);
+    for [height, width] in [[64, 96], [96, 64], [64, 96], [64, 128], [64, 96]] {
+        let batch = loader.next(&Device::flex()).unwrap().unwrap();
+        assert_eq!(batch.network.dims(), [2, 3, height, width]);
+        assert_eq!(batch.truth.known.dims(), [2, 1, height, width]);
+    }
+
+    let (steps, _) = run(&mut trainer(&config, &folder.path().join("whole")), None);
+    assert!(steps.iter().all(|loss| loss.total.is_finite()));
+    let parts = folder.path().join("parts");
+    let (mut begun, _) = run(&mut trainer(&config, &parts), Some(1));
+    let (run_folder, _) = RunFolder::open(&parts).unwrap();
+    let stored = run_folder.read_config().unwrap();
+    let sets = samples(&stored).unwrap();
+    let mut resumed = Trainer::resume(stored, run_folder, sets, &Device::flex()).unwrap();
+    begun.extend(run(&mut resumed, None).0);
+    assert_eq!(begun, steps);
+
+    config.augmentation.sizes[0].width = 100;
+    assert!(config.validate().is_err());
 }
 
 /// The head for uncertainty learns beside a depth that stays what it was, to the last bit.
@@ -278,14 +309,18 @@ fn a_longer_lens_sees_the_same_as_farther() {
 #[test]
 fn sets_that_cannot_be_learned_from_so_are_refused_by_field() {
     type Change = fn(&mut TrainConfig);
-    let cases: [(&str, Change); 6] = [
+    let cases: [(&str, Change); 8] = [
         ("data.sets.learn", |c| c.data.sets[0].learn = Learn::Both),
         ("data.sets.paths", |c| c.data.sets[0].paths.push("x".into())),
         ("data.sets.simulated.views", |c| {
             c.data.sets[0].simulated.as_mut().unwrap().views = 0;
         }),
+        ("data.sets.simulated.plain", |c| {
+            c.data.sets[0].simulated.as_mut().unwrap().plain = 2.0;
+        }),
         ("canonical_focal_px", |c| c.canonical_focal_px = Some(0.0)),
         ("augmentation.zoom", |c| c.augmentation.zoom = 0.5),
+        ("augmentation.zoom", |c| c.augmentation.zoom = f32::NAN),
         ("loss.depth.gradient", |c| c.loss.depth.gradient = f64::NAN),
     ];
     for (field, change) in cases {

@@ -7,6 +7,7 @@
 //! | `/api/runs/R/index?known=V` | the frames of folder R and the numbers of the time line |
 //! | `/api/runs/R/frame/NAME` | a frame: camera, targets, problems |
 //! | `/api/runs/R/depth/NAME` | [`DepthFile::into_bytes`] |
+//! | `/api/runs/R/sigma/NAME` | the same of its standard deviation |
 //! | `/api/runs/R/image/NAME` | the picture's own bytes |
 //! | `/api/runs/R/tracks?from=I&count=N` | centres of the targets of consecutive frames |
 //! | `/api/runs/R/training`, `/api/runs/R/panel/FILE` | a training run's curve and panels |
@@ -16,7 +17,7 @@ use std::path::Path;
 use deepfusion_render::{ColourMap, DepthScale};
 use serde_json::{Value, json};
 
-use crate::folder::{Kind, frame_json, picture_of, targets_of};
+use crate::folder::{Kind, PartFile, frame_json, picture_of, targets_of};
 use crate::http::{Request, Response};
 use crate::{DepthFile, Error, Folder, assets, training};
 
@@ -115,24 +116,28 @@ fn of_folder(folder: &Folder, rest: &[&str], request: &Request) -> Response {
             let tracks: Vec<_> = entries.iter().map(|e| targets_of(path, e)).collect();
             Response::json(&json!({ "from": from, "tracks": tracks }))
         }
-        [what @ ("frame" | "depth" | "image"), name] if !training => match folder.entry(name) {
-            None => Response::problem(404, &format!("there is no frame {name}"), None),
-            Some(entry) => match *what {
-                "frame" => Response::json(&frame_json(path, &entry)),
-                "depth" => match &entry.depth {
-                    Some(depth) => {
-                        sent(DepthFile::read(&path.join(&depth.file)).map(|depth| {
-                            Response::ok("application/octet-stream", depth.into_bytes())
-                        }))
-                    }
-                    None => Response::problem(404, "no depth was saved for this frame", None),
+        [what @ ("frame" | "depth" | "sigma" | "image"), name] if !training => {
+            match folder.entry(name) {
+                None => Response::problem(404, &format!("there is no frame {name}"), None),
+                Some(entry) => match *what {
+                    "frame" => Response::json(&frame_json(path, &entry)),
+                    "depth" => map(
+                        path,
+                        entry.depth.as_ref(),
+                        "no depth was saved for this frame",
+                    ),
+                    "sigma" => map(
+                        path,
+                        entry.sigma.as_ref(),
+                        "no sigma was saved for this frame",
+                    ),
+                    _ => match picture_of(path, &entry) {
+                        Ok(picture) => file(&picture.path, picture.content_type),
+                        Err(problem) => Response::problem(422, &problem, None),
+                    },
                 },
-                _ => match picture_of(path, &entry) {
-                    Ok(picture) => file(&picture.path, picture.content_type),
-                    Err(problem) => Response::problem(422, &problem, None),
-                },
-            },
-        },
+            }
+        }
         ["training"] if training => sent(training::run_json(path).map(|v| Response::json(&v))),
         ["panel", name] if training => match training::panel(path, name) {
             Some(panel) => file(&panel, "image/png"),
@@ -140,6 +145,15 @@ fn of_folder(folder: &Folder, rest: &[&str], request: &Request) -> Response {
         },
         _ => nothing(),
     }
+}
+
+/// The numbers of a depth or of its standard deviation.
+fn map(folder: &Path, file: Option<&PartFile>, missing: &str) -> Response {
+    let Some(PartFile { file, .. }) = file else {
+        return Response::problem(404, missing, None);
+    };
+    let read = DepthFile::read(&folder.join(file));
+    sent(read.map(|map| Response::ok("application/octet-stream", map.into_bytes())))
 }
 
 fn file(path: &Path, content_type: &'static str) -> Response {

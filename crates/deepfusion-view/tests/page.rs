@@ -283,3 +283,64 @@ fn two_runs_stand_side_by_side() {
     );
     assert_eq!(browser.complaints, Vec::<String>::new());
 }
+
+/// Sigma of frame `i`: a fiftieth of the depth on the left, nine tenths of it on the right.
+fn write_sigma(folder: &std::path::Path, i: usize, (width, height): (u32, u32)) {
+    let at = |y: u32, x: u32| {
+        let share = if x < width / 2 { 0.02 } else { 0.9 };
+        f32::from(steps(i, x, y)) / 256.0 * share
+    };
+    let map = ndarray::Array2::from_shape_fn((height as usize, width as usize), |(y, x)| {
+        at(y as u32, x as u32)
+    });
+    ndarray_npy::write_npy(folder.join(format!("{i:06}_sigma.npy")), &map).unwrap();
+}
+
+#[test]
+fn what_is_unsure_fades() {
+    let folder = results(3);
+    write_sigma(folder.path(), 0, SIZE);
+    write_sigma(folder.path(), 1, (SIZE.0 / 2, SIZE.1));
+    let server = Running::start(folder.path(), None);
+    let Some(mut browser) = opened(&server) else {
+        return;
+    };
+    // Painted pixels of the depth, left and right, and how many of the cloud's there are.
+    let seen = "(() => { const { depth, cloud } = deepfusion.app.kinds[0]; depth.draw(); \
+         const pixel = (x, y) => [...depth.sheet.getContext('2d').getImageData(x, y, 1, 1).data]; \
+         cloud.draw(true); const { gl, canvas } = cloud, pixels = new Uint8Array(4 * canvas.width * canvas.height); \
+         gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels); \
+         let points = 0; for (let i = 0; i < pixels.length; i += 4) if (pixels[i] > 200 && pixels[i + 1] < 30 && pixels[i + 2] > 190) points++; \
+         return [pixel(20, 30), pixel(80, 30), points]; })()";
+    let before = browser.value(seen);
+    browser.key("u");
+    browser.wait_for("deepfusion.app.options.fade && [...document.querySelectorAll('#tools button')].some(b => b.textContent === 'Fade' && b.ariaPressed === 'true')");
+    let after = browser.value(seen);
+    assert_eq!(after[0], before[0], "what is sure stays");
+    assert_ne!(after[1], before[1]);
+    assert_eq!(
+        after[1],
+        json!([40, 40, 44, 255]),
+        "what is not goes over into what has no depth"
+    );
+    let [all, sure] = [&before[2], &after[2]].map(|points| points.as_u64().unwrap());
+    assert!(
+        10 * sure < 8 * all && 10 * sure > all,
+        "{sure} pixels of {all} of the cloud"
+    );
+    let (metres, _) = told_at(&mut browser, "depth", 20, 30);
+    let told = browser.value("document.querySelector('#tip [data-sigma]').innerText");
+    assert_eq!(told, json!(format!("± {:.2} m", 0.02 * metres)));
+
+    // Of another size it is told, and nothing fades; without any likewise.
+    browser.key("ArrowRight");
+    browser.wait_for(
+        "deepfusion.app.kinds[0].picture.problem.innerText.includes('sigma is 48x48, depth 96x48')",
+    );
+    assert_eq!(browser.value("deepfusion.app.shown(0).sigma"), Value::Null);
+    browser.key("ArrowRight");
+    browser.wait_for("deepfusion.app.drawnFrame === '000002'");
+    let unfaded = browser.value(seen);
+    assert_ne!(unfaded[1], json!([40, 40, 44, 255]));
+    assert_eq!(browser.complaints, Vec::<String>::new());
+}

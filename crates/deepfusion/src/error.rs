@@ -383,7 +383,7 @@ impl CliError {
             ),
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
             Self::NoUncertainty => Some(
-                "leave sigma out of --save, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"
+                "leave out sigma of --save and --max-sigma, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"
                     .into(),
             ),
         }

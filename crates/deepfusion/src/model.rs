@@ -189,12 +189,14 @@ impl ModelSource {
                     .map(toml::Table::try_into)
                     .transpose()
                     .with_context(|| network.card.name.clone())?;
+                if let Some(factors) = &factors {
+                    let named = || network.card.name.clone();
+                    factors.validate().with_context(named)?;
+                }
                 factors
             }
         };
-        let factors = found.unwrap_or_else(IntervalFactors::uncalibrated);
-        factors.validate()?;
-        Ok(factors)
+        Ok(found.unwrap_or_else(IntervalFactors::uncalibrated))
     }
 
     /// What evaluations that the run's folder keeps say of this checkpoint's metres, with the metres of a data set, for a network that

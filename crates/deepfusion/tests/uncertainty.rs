@@ -43,6 +43,42 @@ fn train(at: &Path) {
     assert!(first.parse::<f64>().unwrap() != 0.0, "{log}");
 }
 
+/// Each point has its pixel's sigma; points that are too unsure are left out where that is asked for, and `perceive` tells it of
+/// its targets and keeps it for the viewer.
+fn clouds_carry_it(at: &Path) {
+    let cloud = |options: &str, out: &str| {
+        ok(
+            at,
+            &format!("predict --model sure other --save ply,npy,sigma {options} --out {out}"),
+        );
+        let path = at.join(out).join("0000000000.ply");
+        let bytes = fs::read(&path).unwrap();
+        deepfusion_cloud::PointCloud::read_ply(bytes.as_slice()).unwrap()
+    };
+    let all = cloud("", "all");
+    let pixels = 160 * 96;
+    let map = |ending: &str| values(&at.join(format!("all/0000000000_{ending}.npy")), pixels);
+    let (depth, sigma) = (map("depth"), map("sigma"));
+    let of_points = depth.iter().zip(&sigma);
+    let of_points = of_points.filter(|(z, _)| **z > 0.0 && **z <= 80.0);
+    let expected: Vec<f32> = of_points.clone().map(|(_, s)| *s).collect();
+    assert_eq!(all.sigma.unwrap(), expected);
+    // The middle of what there is, so that both sides have points.
+    let mut shares: Vec<f32> = of_points.map(|(z, s)| s / z).collect();
+    shares.sort_by(f32::total_cmp);
+    let most = shares[shares.len() / 2] * 1.0001;
+    let sure = cloud(&format!("--max-sigma {most}"), "sure-points");
+    assert!(sure.len() < all.xyz.len() && sure.len() * 3 > all.xyz.len());
+    let (points, sigma) = (&sure.xyz, sure.sigma.as_ref().unwrap());
+    let worst = points.iter().zip(sigma).map(|(p, s)| s / p[2]);
+    assert!(worst.fold(0.0, f32::max) <= most * 1.001);
+
+    ok(at, "perceive --model sure other --save sigma --out seen");
+    let kept = fs::read_dir(at.join("seen")).unwrap();
+    let names = kept.map(|f| f.unwrap().file_name().into_string().unwrap());
+    assert!(names.into_iter().any(|name| name.ends_with("_sigma.npy")));
+}
+
 /// The values of an array file of f32, row by row.
 fn values(path: &Path, count: usize) -> Vec<f32> {
     let bytes = fs::read(path).unwrap();
@@ -79,6 +115,10 @@ fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
         (
             "eval --model plain --data other --calibrate-uncertainty",
             ["does not say how sure", "uncertainty"],
+        ),
+        (
+            "predict --model plain other --save ply --max-sigma 0.2 --out no",
+            ["does not say how sure", "--max-sigma"],
         ),
     ] {
         fails(at, command, &names);
@@ -126,6 +166,8 @@ fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
     assert!(known.clone().count() > 1000);
     assert!(known.clone().all(|(_, s)| *s > 0.0 && s.is_finite()));
 
+    clouds_carry_it(at);
+
     let card = json(
         at,
         "weights pack --model sure --checkpoint last --name hut --out packed --json",
@@ -147,8 +189,14 @@ fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
     // Depth is all that an exported file has.
     ok(at, "export --model sure --out sure.onnx");
 
-    fs::write(at.join("sure/uncertainty.toml"), "levels = [0.5]").unwrap();
-    let run = support::run(at, eval);
-    assert_eq!(run.code, 1, "{}", run.stderr);
-    assert!(run.stderr.contains("uncertainty.toml"), "{}", run.stderr);
+    let kept = at.join("sure/uncertainty.toml");
+    let good = fs::read_to_string(&kept).unwrap();
+    let impossible = good.replacen("factors = [", "factors = [-1.0, 1.0, 1.0] # ", 1);
+    assert_ne!(impossible, good);
+    for wrong in ["levels = [0.5]", &impossible] {
+        fs::write(&kept, wrong).unwrap();
+        let run = support::run(at, eval);
+        assert_eq!(run.code, 1, "{wrong}: {}", run.stderr);
+        assert!(run.stderr.contains("uncertainty.toml"), "{}", run.stderr);
+    }
 }

@@ -50,6 +50,7 @@ pub fn car(along: f32, points: &[&Seen], row: &Row, view: &View) -> Option<(Dete
         bounds: cluster.bounds(),
         runs: cluster.runs,
         confidence: 0.5 * (place.seen[0] + place.seen[1]),
+        relative_error: None,
         kind: None,
     };
     Some((detection, front))

@@ -228,6 +228,7 @@ mod tests {
             bounds: [0; 4],
             runs: Vec::new(),
             confidence: 0.5,
+            relative_error: None,
             kind: None,
         }
     }

@@ -68,6 +68,7 @@ impl Scene {
             bounds: [0; 4],
             runs,
             confidence: 0.5,
+            relative_error: None,
             kind: None,
         }
     }

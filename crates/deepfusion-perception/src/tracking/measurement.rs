@@ -48,7 +48,7 @@ impl<'a> Measurement<'a> {
     }
 
     /// How far the centre may be off, as a covariance in the world's horizontal axes: along the ray by the depth's own
-    /// error, and by what had to be completed.
+    /// error, as it was told of these pixels or else as it usually is, and by what had to be completed.
     pub fn noise(&self, config: &PerceptionConfig) -> Matrix2<f64> {
         let place = &self.detection.place;
         let ray = self
@@ -67,7 +67,9 @@ impl<'a> Measurement<'a> {
             .sum();
         let across = 0.1 + 0.004 * distance + 0.1 * unseen;
         // An object's pixels err together: their mean is no better than one of them.
-        let along = across.hypot(f64::from(config.relative_error) * distance);
+        let relative = self.detection.relative_error;
+        let relative = f64::from(relative.unwrap_or(config.relative_error));
+        let along = across.hypot(relative * distance);
         Matrix2::identity() * across.powi(2)
             + ray * ray.transpose() * (along.powi(2) - across.powi(2))
     }

@@ -71,6 +71,8 @@ pub struct Track {
     confidence: f64,
     /// What it was seen as most, and by how much.
     kind: Option<Kind>,
+    /// Standard deviation of its depth over itself when it was last seen, where that was told.
+    relative_error: Option<f32>,
     /// How it was seen in the last frame, if it was.
     pub seen: Option<Seen>,
 }
@@ -99,6 +101,7 @@ impl Track {
             moving: None,
             confidence: f64::from(measurement.detection.confidence),
             kind: measurement.detection.kind.clone(),
+            relative_error: measurement.detection.relative_error,
             seen: Some(Seen::of(measurement)),
         }
     }
@@ -174,6 +177,7 @@ impl Track {
         self.hits += 1;
         self.unseen_s = 0.0;
         self.confidence += 0.3 * (f64::from(measurement.detection.confidence) - self.confidence);
+        self.relative_error = measurement.detection.relative_error;
         self.seen = Some(Seen::of(measurement));
         self.vote(measurement.detection.kind.as_ref());
         self.tell_motion();
@@ -252,6 +256,9 @@ impl Track {
             size_m: [length, width, height],
             yaw_rad: (yaw_rad + PI).rem_euclid(2.0 * PI) - PI,
             distance_m: centre.norm(),
+            sigma_m: self
+                .relative_error
+                .map(|share| f64::from(share) * centre.norm()),
             velocity_mps: velocity.map(Into::into),
             moving: self.moving,
             confidence: (self.confidence * proven * fading).clamp(0.0, 1.0),

@@ -24,6 +24,9 @@ pub struct EndlessConfig {
     /// Whether the camera's image formation (exposure, noise, blur, JPEG and so on) is applied. Without it the
     /// pictures are as [`crate::Simulation`]'s, in varied light.
     pub formation: bool,
+    /// Share of the worlds, and of the views, that are as [`crate::Simulation`] draws them: nothing varied but the
+    /// camera, in plain weather, without image formation.
+    pub plain: f64,
 }
 
 impl Default for EndlessConfig {
@@ -37,6 +40,7 @@ impl Default for EndlessConfig {
             grey: 0.15,
             daylight: 0.8,
             formation: true,
+            plain: 0.0,
         }
     }
 }
@@ -83,7 +87,11 @@ impl EndlessConfig {
             self.worlds_at_once.to_string(),
             "1 to 256",
         )?;
-        for (field, share) in [("grey", self.grey), ("daylight", self.daylight)] {
+        for (field, share) in [
+            ("grey", self.grey),
+            ("daylight", self.daylight),
+            ("plain", self.plain),
+        ] {
             check(
                 (0.0..=1.0).contains(&share),
                 field,
@@ -138,6 +146,13 @@ mod tests {
                     ..base()
                 },
                 "daylight",
+            ),
+            (
+                EndlessConfig {
+                    plain: -0.1,
+                    ..base()
+                },
+                "plain",
             ),
         ];
         for (config, name) in bad {

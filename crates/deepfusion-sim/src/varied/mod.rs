@@ -15,7 +15,7 @@ mod wet;
 
 use crate::Result;
 use crate::config::Scene;
-use crate::render::{self, Cores, Edges, Shot};
+use crate::render::{self, Air, Cores, Edges, Shot};
 use cache::Cache;
 pub use config::EndlessConfig;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
@@ -89,6 +89,13 @@ impl Endless {
     /// alone; where its world is not built yet, that is done first.
     #[must_use]
     pub fn view(&self, index: u64) -> View {
+        self.view_sized(index, (self.config.width, self.config.height))
+    }
+
+    /// The same place, seen by a camera of another size (width, height; in pixels). Its lens and where it stands are
+    /// drawn for that size.
+    #[must_use]
+    pub fn view_sized(&self, index: u64, size: (u32, u32)) -> View {
         let config = &self.config;
         let world_number = self.schedule.turn(index).world;
         let place = self
@@ -102,7 +109,6 @@ impl Endless {
         let traffic = place.traffic(&mut rng, anchor, nearest);
         let mut moving = traffic.solids(world, 0.0);
         let mut cars = traffic.objects(world, 0.0);
-        let size = (config.width, config.height);
         let indoors = !world.rooms.is_empty();
         let intrinsics = camera::intrinsics(&mut rng, size, indoors);
         let stand = camera::stand(&mut rng, &place, (&moving, anchor), &intrinsics);
@@ -112,7 +118,11 @@ impl Endless {
         }
 
         let mut rng = generator(config.seed, index, 0x5EA);
-        let (weather, air) = weather::draw(&mut rng, world);
+        let (weather, air) = if place.plain {
+            (weather::plain(world), Air::of(world))
+        } else {
+            weather::draw(&mut rng, world)
+        };
         let shot = Shot {
             world,
             light: &place.light,
@@ -132,11 +142,12 @@ impl Endless {
             _ => Brightness::Day,
         };
         let formation = Formation::draw(&mut rng, brightness, config.grey);
-        let (width, height) = (config.width as usize, config.height as usize);
-        let rgb = if config.formation {
+        let formed = config.formation && !place.plain;
+        let rgb = if formed {
+            let (width, height) = (size.0 as usize, size.1 as usize);
             formation.image(&exposure.light, width, height, rng.random())
         } else {
-            render::encode(&exposure.light, config.width, config.height)
+            render::encode(&exposure.light, size.0, size.1)
         };
         View {
             rgb,
@@ -148,7 +159,7 @@ impl Endless {
             scene: world.scene,
             weather,
             height_m: stand.height,
-            grey: config.formation && formation.is_grey(),
+            grey: formed && formation.is_grey(),
         }
     }
 }

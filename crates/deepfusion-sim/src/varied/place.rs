@@ -20,8 +20,8 @@ const AHEAD: f64 = 190.0;
 /// Cameras stand along the way that a car drives in this time, seconds.
 const DURATION_S: f64 = 9.0;
 
-/// Share of the worlds that are not varied.
-const PLAIN: f64 = 0.12;
+/// Share of the worlds that are not varied, but seen in any weather and through any camera.
+const UNVARIED: f64 = 0.12;
 
 /// A built world.
 pub struct Place {
@@ -31,6 +31,8 @@ pub struct Place {
     pub light: GroundLight,
     /// How dense its traffic is at most, in [0, 1]; none where nothing drives.
     density: f64,
+    /// Whether its views are as [`crate::Simulation`] draws them.
+    pub plain: bool,
     /// Cameras are placed from 0 to here, metres along the street.
     pub length: f64,
 }
@@ -38,8 +40,13 @@ pub struct Place {
 impl Place {
     /// Builds world `number` of a stream.
     pub fn build(config: &EndlessConfig, number: u64) -> Self {
+        // Drawn apart, so that the other worlds are the same whatever the share of the plain ones is.
+        let mut rng = generator(config.seed, number, 0x91A1);
+        let plain = rng.random_bool(config.plain);
+        let plain_scene = Scene::ALL[rng.random_range(0..Scene::ALL.len())];
         let mut rng = generator(config.seed, number, 0x90D);
-        let scene = scene(&mut rng, config.daylight);
+        let varied_scene = scene(&mut rng, config.daylight);
+        let scene = if plain { plain_scene } else { varied_scene };
         let seed: u64 = rng.random();
         let longest = 14.0 * (DURATION_S + 3.0);
         let mut road = match scene {
@@ -51,18 +58,21 @@ impl Place {
         let length = drive.progress(DURATION_S).0;
         road.truncate(length + AHEAD);
         // Some worlds are the plain ones of `simulate`, where there is one of this kind.
-        let variety = if Scene::ALL.contains(&scene) && rng.random_bool(PLAIN) {
+        let variety = if plain || (Scene::ALL.contains(&scene) && rng.random_bool(UNVARIED)) {
             Variety::none()
         } else {
             Variety::draw(&mut rng)
         };
         let mut world = World::furnish_varied(road, seed, scene, &variety);
-        world.sun = sun(&mut rng);
+        if !plain {
+            world.sun = sun(&mut rng);
+        }
         let light = GroundLight::bake(&world, Cores::One);
         Self {
             world,
             light,
             density: rng.random(),
+            plain,
             length,
         }
     }

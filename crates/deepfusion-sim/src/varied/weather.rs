@@ -29,6 +29,15 @@ pub enum Weather {
     Night,
 }
 
+/// The weather of a world as it is without any drawn for it.
+pub fn plain(world: &World) -> Weather {
+    match world.scene {
+        Scene::Garage | Scene::Indoor => Weather::Indoor,
+        Scene::Night => Weather::Night,
+        _ => Weather::Clear,
+    }
+}
+
 /// Draws the weather: by day 42 % clear, 20 % cloudy, 33 % overcast, 5 % fog. Haze (visibility of 0.8 to 20 km) in half of
 /// the pictures; the ground is wet in a third of those without sun and in one of ten others.
 pub fn draw(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {

@@ -4,8 +4,8 @@ use super::DepthTruth;
 use super::depth::log_depth_error;
 use burn::tensor::Tensor;
 
-/// ln b is held within these: errors of ln depth between 0.25 % and a factor of 7.
-const BOUNDS: (f64, f64) = (-6.0, 2.0);
+/// ln b is held within these, in learning and in what is told: errors of ln depth between 0.25 % and a factor of 7.
+pub const LOG_SCALE_BOUNDS: (f64, f64) = (-6.0, 2.0);
 
 /// L_nll = mean(|e|/b + ln b) over the pixels of known depth, e = ln D̂ − ln D. It is least where b is the error that is to be
 /// expected. The depth itself learns nothing from it: e counts as a constant.
@@ -20,7 +20,7 @@ pub fn uncertainty(
 ) -> Tensor<1> {
     let known = truth.known.clone();
     let error = log_depth_error(inverse_depth.detach(), truth).abs();
-    let log_scale = log_scale.clamp(BOUNDS.0, BOUNDS.1);
+    let log_scale = log_scale.clamp(LOG_SCALE_BOUNDS.0, LOG_SCALE_BOUNDS.1);
     let each = error * log_scale.clone().neg().exp() + log_scale;
     (each * known.clone()).sum() / known.sum().clamp_min(1.0)
 }

@@ -23,6 +23,7 @@ export const session = async () => (await get('/api/session')).json();
 export const index = async (run, known) => (await get(`${of(run, 'index')}?known=${known}`)).json();
 export const frame = async (run, name) => (await get(of(run, 'frame', name))).json();
 export const depth = async (run, name) => (await get(of(run, 'depth', name))).arrayBuffer();
+export const sigma = async (run, name) => (await get(of(run, 'sigma', name))).arrayBuffer();
 export const image = async (run, name) => (await get(of(run, 'image', name))).blob();
 export const tracks = async (run, from, count) => (await get(`${of(run, 'tracks')}?from=${from}&count=${count}`)).json();
 export const training = async run => (await get(of(run, 'training'))).json();

@@ -1,6 +1,7 @@
 // The cloud in 3D, with boxes and tracks.
 
 import { css, ofTarget, themeColour } from './colour.js';
+import { FADE } from './depth.js';
 import { backProject, boxCorners, resizedCamera, toScreen } from './geometry.js';
 import { fit, gestures } from './gestures.js';
 import { drawLabel } from './picture_pane.js';
@@ -73,16 +74,17 @@ export class CloudView {
     this.points = program(gl, POINTS);
     this.strokes = program(gl, LINES);
     this.textures = {};
-    for (const [unit, name] of ['depth', 'picture', 'table'].entries()) {
+    for (const [unit, name] of ['depth', 'picture', 'table', 'sigma'].entries()) {
       this.textures[name] = gl.createTexture();
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, this.textures[name]);
-      const filter = name === 'depth' ? gl.NEAREST : gl.LINEAR;
+      const filter = name === 'depth' || name === 'sigma' ? gl.NEAREST : gl.LINEAR;
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, filter);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, filter);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
     }
+    gl.activeTexture(gl.TEXTURE2);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, this.app.colours.depthTable());
     this.empty = gl.createVertexArray();
     this.segments = gl.createVertexArray();
@@ -101,13 +103,15 @@ export class CloudView {
     const { gl } = this;
     if (this.uploaded === frame) return;
     this.uploaded = frame;
-    const { depth, bitmap } = frame;
+    const { depth, sigma, bitmap } = frame;
     gl.activeTexture(gl.TEXTURE0);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, depth.width, depth.height, 0, gl.RED, gl.FLOAT, depth.metres());
     gl.activeTexture(gl.TEXTURE1);
     if (bitmap) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
     this.hasPicture = Boolean(bitmap);
+    gl.activeTexture(gl.TEXTURE3);
+    if (sigma) gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, sigma.width, sigma.height, 0, gl.RED, gl.FLOAT, sigma.metres());
   }
 
   draw(scene) {
@@ -145,6 +149,10 @@ export class CloudView {
     gl.uniform1i(at.depth, 0);
     gl.uniform1i(at.picture, 1);
     gl.uniform1i(at.table, 2);
+    gl.uniform1i(at.sigma, 3);
+    gl.uniform1i(at.fades, options.fade && frame.sigma ? 1 : 0);
+    gl.uniform2f(at.fade, ...FADE);
+    gl.uniform3f(at.background, ...themeColour('--sky').map(c => c / 255));
     gl.uniformMatrix4fv(at.viewProjection, false, this.viewProjection);
     gl.uniform4f(at.camera, k.fx, k.fy, k.cx, k.cy);
     gl.uniform2i(at.size, depth.width, depth.height);

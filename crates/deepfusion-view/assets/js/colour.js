@@ -1,6 +1,7 @@
 // Colours: depth by the logarithm of metres as in the pictures that `predict` writes, differences, tracks.
 
-const NOTHING = [40, 40, 44];
+/** The colour of what has no depth. */
+export const NOTHING = [40, 40, 44];
 const packed = ([r, g, b]) => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
 
 /** Lays the session's colour tables out for looking up. */

@@ -1,5 +1,14 @@
 // A frame's depth: the file's own numbers.
 
+/** Standard deviation over depth from which on a place fades, and at which nothing of it is left. */
+export const FADE = [0.1, 0.5];
+
+/** How much of a place is shown: 1 where it is sure, 0 where it is not. */
+export function sureness(depth, sigma) {
+  if (!(depth > 0 && sigma >= 0)) return 0;
+  return Math.min(1, Math.max(0, (FADE[1] - sigma / depth) / (FADE[1] - FADE[0])));
+}
+
 /** Depth as it was sent: "DFD1", width, height, code (0: u16 steps of 1/256 m; 1: f32 metres), values row by row. */
 export class Depth {
   constructor(buffer) {
@@ -40,6 +49,16 @@ export class Depth {
       const step = values[i] * 256;
       // NaN and what is not above 0 are none; what is there at all is at least one step.
       pixels[i] = table[step > 0 ? Math.min(65535, Math.max(1, Math.round(step))) : 0];
+    }
+  }
+
+  /** Lets painted pixels go over into `background` (r, g, b) where they are unsure. */
+  fade(sigma, pixels, background) {
+    const channels = new Uint8ClampedArray(pixels.buffer), rescale = this.perMetre / sigma.perMetre;
+    for (let i = 0; i < this.values.length; i++) {
+      const kept = sureness(this.values[i], sigma.values[i] * rescale);
+      if (kept === 1) continue;
+      for (let c = 0; c < 3; c++) channels[4 * i + c] = background[c] + (channels[4 * i + c] - background[c]) * kept;
     }
   }
 

@@ -18,6 +18,7 @@ export const KEYS = [
     [['4'], ['4'], 'from the camera', app => app.go('eye')],
     [['M'], ['m'], 'colour by picture, depth, height', app => app.nextMode()],
     [['E'], ['e'], 'hide points at depth edges', app => app.flip('edges')],
+    [['U'], ['u'], 'fade what is unsure', app => app.flip('fade')],
     [['S'], ['s'], 'surface, points', app => app.flip('surface')],
     [['[', ']'], ['[', ']'], 'how far the cloud reaches', (app, e) => app.reach(e.key === '[' ? -1 : 1)],
     [['-', '+'], ['-', '+', '='], 'size of the points', (app, e) => app.pointSize(e.key === '-' ? 1 / 1.25 : 1.25)],

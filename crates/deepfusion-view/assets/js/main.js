@@ -29,7 +29,7 @@ class App {
     this.view = { zoom: 1, x: 0.5, y: 0.5 };
     this.options = {
       picture: true, depth: true, cloud: true, list: true, boxes: true, tracks: true, labels: true, ground: true, edges: true, byTrack: false,
-      surface: false, difference: false, mode: 'picture', farthest: 60, pointScale: 1.1,
+      surface: false, fade: false, difference: false, mode: 'picture', farthest: 60, pointScale: 1.1,
     };
     this.pointer = null;
     this.chosen = null;
@@ -280,6 +280,7 @@ class App {
     };
     const gap = () => Object.assign(document.createElement('span'), { className: 'gap' });
     const hasTargets = this.runs.some(r => r.series.targets?.some(v => v !== null));
+    const hasSigma = this.runs.some(r => r.hasSigma?.some(Boolean));
     bar.replaceChildren(...[
       button('Picture', options.picture, () => this.pane('picture'), 'Picture (P)'),
       button('Depth', options.depth, () => this.pane('depth'), 'Depth (D)'),
@@ -288,6 +289,7 @@ class App {
       gap(),
       hasTargets && button('Boxes', options.boxes, () => this.flip('boxes'), 'Boxes (B)', true),
       hasTargets && button('Tracks', options.tracks, () => this.flip('tracks'), 'Tracks (T)', true),
+      hasSigma && button('Fade', options.fade, () => this.flip('fade'), 'Fade what is unsure (U)'),
       two && button('Difference', options.difference, () => this.flip('difference'), 'Depth against the first run (X)'),
       gap(),
       button('theme', null, () => this.nextTheme(), 'Dark or light (Y)'),
@@ -376,12 +378,17 @@ class App {
     }
   }
 
+  /** Which of the optional things there are: the buttons change with it. */
+  shownOf() {
+    return this.runs.map(r => [r.series.targets?.some(v => v !== null), r.hasSigma?.some(Boolean)].map(Boolean)).join();
+  }
+
   // The folders, as they grow.
 
   async watch() {
     try {
       const name = this.runs[0].names[this.frame], key = this.runs[0].key(this.frame), before = this.runs[0].length;
-      const hadTargets = this.runs.some(r => r.series.targets?.some(v => v !== null));
+      const had = this.shownOf();
       const changed = (await Promise.all(this.runs.map(run => run.refresh()))).some(Boolean);
       const wasLost = this.lost;
       this.lost = false;
@@ -391,7 +398,7 @@ class App {
         // The same frame, wherever it stands now; the newest where that was looked at while it was the last.
         const follow = grown && this.live && this.following;
         this.frame = follow ? run.length - 1 : run.places.get(name) ?? Math.min(this.frame, Math.max(0, run.length - 1));
-        if (this.runs.some(r => r.series.targets?.some(v => v !== null)) !== hadTargets) this.build();
+        if (this.shownOf() !== had) this.build();
         if (follow || run.key(this.frame) !== key || this.runs.length > 1) this.seek(this.frame);
       } else if (wasLost) this.seek(this.frame);
       const live = this.grownAt !== undefined && performance.now() - this.grownAt < 15_000;

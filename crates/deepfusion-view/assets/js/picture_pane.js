@@ -1,6 +1,6 @@
 // A picture or a depth map, with boxes, a cross where the pointer is in any pane, and a zoom that all pictures share.
 
-import { css, ofTarget, themeColour, ticks } from './colour.js';
+import { NOTHING, css, ofTarget, themeColour, ticks } from './colour.js';
 import { BOX_EDGES, FRONT_EDGES, boxCorners, project, projectEdge } from './geometry.js';
 import { fit, gestures } from './gestures.js';
 
@@ -138,8 +138,9 @@ export class PicturePane {
     if (!depth) return null;
     const other = this.app.options.difference && this.run > 0 ? this.app.shown(0)?.depth : null;
     const against = other && other.width === depth.width && other.height === depth.height ? other : null;
-    const what = [depth, against];
-    if (this.painted?.[0] !== what[0] || this.painted?.[1] !== what[1]) {
+    const sigma = this.app.options.fade ? frame.sigma : null;
+    const what = [depth, against, sigma];
+    if (what.some((part, i) => this.painted?.[i] !== part)) {
       if (this.sheet.width !== depth.width || this.sheet.height !== depth.height || !this.pixelsOfSheet) {
         Object.assign(this.sheet, { width: depth.width, height: depth.height });
         this.pixelsOfSheet = new ImageData(depth.width, depth.height);
@@ -147,6 +148,7 @@ export class PicturePane {
       const pixels = new Uint32Array(this.pixelsOfSheet.data.buffer);
       if (against) depth.paintAgainst(against, pixels, this.app.colours.bySigned);
       else depth.paint(pixels, this.app.colours.bySteps);
+      if (sigma) depth.fade(sigma, pixels, NOTHING);
       this.sheet.getContext('2d').putImageData(this.pixelsOfSheet, 0, 0);
       this.painted = what;
     }

@@ -48,6 +48,7 @@ export class Run {
     Object.assign(this, { version: index.version, names: index.names, revisions: index.revisions, series: index.series });
     this.pending = index.pending;
     this.hasDepth = index.has_depth;
+    this.hasSigma = index.has_sigma;
     this.places = new Map(this.names.map((name, i) => [name, i]));
     return true;
   }
@@ -68,7 +69,7 @@ export class Run {
     if (there) return Promise.resolve(there);
     let coming = this.coming.get(key);
     if (!coming) {
-      coming = this.fetch(this.names[i], this.hasDepth[i]).then(frame => {
+      coming = this.fetch(this.names[i], this.hasDepth[i], this.hasSigma[i]).then(frame => {
         frame.key = key;
         // A server that does not answer is asked again, not remembered.
         if (!frame.lost) this.frames.set(key, frame, frame.bytes);
@@ -79,16 +80,17 @@ export class Run {
     return coming;
   }
 
-  async fetch(name, hasDepth) {
-    const frame = { name, problems: [], targets: [], depth: null, bitmap: null, camera: null, bytes: 4096, lost: false };
+  async fetch(name, hasDepth, hasSigma) {
+    const frame = { name, problems: [], targets: [], depth: null, sigma: null, bitmap: null, camera: null, bytes: 4096, lost: false };
     const failed = error => {
       if (error instanceof api.Problem) return error;
       frame.lost = true;
       return new api.Problem('the server does not answer', 'is `deepfusion view` still running?');
     };
     const attempt = promise => promise.catch(error => failed(error));
-    const [meta, depth, blob] = await Promise.all([
-      attempt(api.frame(this.number, name)), hasDepth ? attempt(api.depth(this.number, name)) : null, attempt(api.image(this.number, name)),
+    const [meta, depth, sigma, blob] = await Promise.all([
+      attempt(api.frame(this.number, name)), hasDepth ? attempt(api.depth(this.number, name)) : null,
+      hasDepth && hasSigma ? attempt(api.sigma(this.number, name)) : null, attempt(api.image(this.number, name)),
     ]);
     if (meta instanceof api.Problem) frame.problems.push(meta.message);
     else {
@@ -107,6 +109,15 @@ export class Run {
         frame.depth = new Depth(depth);
         frame.bytes += frame.depth.bytes;
       } catch (error) { frame.depthProblem = error.message; }
+    }
+    if (sigma instanceof api.Problem) frame.problems.push(sigma.message);
+    else if (sigma && frame.depth) {
+      try {
+        const map = new Depth(sigma);
+        if (map.width !== frame.depth.width || map.height !== frame.depth.height) throw new Error(`${name}: sigma is ${map.width}x${map.height}, depth ${frame.depth.width}x${frame.depth.height}`);
+        frame.sigma = map;
+        frame.bytes += map.bytes;
+      } catch (error) { frame.problems.push(error.message); }
     }
     if (blob instanceof api.Problem) frame.imageProblem = blob.message;
     else {

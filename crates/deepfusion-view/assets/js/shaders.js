@@ -4,7 +4,7 @@
 export const POINTS = {
   vertex: `#version 300 es
 precision highp float; precision highp sampler2D;
-uniform sampler2D depth; uniform sampler2D picture; uniform sampler2D table;
+uniform sampler2D depth; uniform sampler2D picture; uniform sampler2D table; uniform sampler2D sigma;
 uniform mat4 viewProjection;
 uniform vec4 camera;           // fx, fy, cx, cy in depth pixels
 uniform ivec2 size;            // of the depth
@@ -14,7 +14,11 @@ uniform float farthest, steepest, tear, pixelScale, pointScale;
 uniform vec4 ground;           // plane: normal, offset
 out vec3 colour;
 uniform bool surface;          // patches between pixels instead of points
+uniform bool fades;            // what is unsure goes over into the background
+uniform vec2 fade;             // sigma / depth where that begins and ends
+uniform vec3 background;
 float at(ivec2 p) { return texelFetch(depth, clamp(p, ivec2(0), size - 1), 0).r; }
+float sureness(ivec2 p, float d) { return clamp((fade.y - texelFetch(sigma, p, 0).r / d) / (fade.y - fade.x), 0.0, 1.0); }
 bool shown(float d) { return d > 0.0 && d <= farthest; }
 // How the disparity of a place differs from a neighbour's; nothing where that has none.
 float fall(float d, ivec2 p) { float n = at(p); return n > 0.0 ? abs(1.0 / n - 1.0 / d) : 0.0; }
@@ -23,10 +27,11 @@ void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   gl_PointSize = 1.0;
   colour = vec3(0.0);
-  ivec2 p;
+  ivec2 p, whole;
   if (surface) {
     int cell = gl_VertexID / 6, corner = gl_VertexID % 6;
     ivec2 first = ivec2(cell % columns, cell / columns) * stride;
+    whole = first;
     if (any(greaterThanEqual(first + stride, size))) return;
     float a = at(first), b = at(first + ivec2(stride, 0)), c = at(first + ivec2(0, stride)), e = at(first + stride);
     if (!(shown(a) && shown(b) && shown(c) && shown(e))) return;
@@ -35,7 +40,7 @@ void main() {
     if ((high - low) * camera.x > 1.5 * float(stride) * tear) return;
     p = first + stride * ivec2(corner == 1 || corner >= 4 ? 1 : 0, corner == 2 || corner == 3 || corner == 5 ? 1 : 0);
   } else {
-    p = ivec2(gl_VertexID % columns, gl_VertexID / columns) * stride;
+    p = whole = ivec2(gl_VertexID % columns, gl_VertexID / columns) * stride;
   }
   float d = at(p);
   if (!shown(d)) return;
@@ -60,6 +65,11 @@ void main() {
     colour = texture(table, vec2(clamp(1.0 - (height + 0.5) / 4.5, 0.002, 0.998), 0.5)).rgb;
   } else {
     colour = texture(picture, (vec2(p) + 0.5) / vec2(size)).rgb;
+  }
+  if (fades) {
+    colour = mix(background, colour, sureness(p, d));
+    // What is left of the least sure would cover what is behind; a patch goes as a whole.
+    if (sureness(whole, at(whole)) < 0.15) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   }
 }`,
   fragment: `#version 300 es

@@ -9,6 +9,8 @@ export function tip(app) {
   if (!first) return;
   const metres = app.metresUnderPointer(pointer.run), point = app.pointerPoint(pointer.run);
   const lines = [`<b data-metres="${metres}">${metres > 0 ? `${metres.toFixed(2)} m` : 'no depth'}</b>`];
+  const sigma = metres > 0 ? app.shown(pointer.run)?.sigma?.at(first.x, first.y) : 0;
+  if (sigma > 0) lines.push(`<span data-sigma="${sigma}">± ${sigma.toFixed(2)} m</span><br>`);
   app.runs.forEach((_, r) => {
     if (r === pointer.run) return;
     const other = app.metresUnderPointer(r);

@@ -13,6 +13,8 @@ pub(crate) enum Part {
     Sidecar,
     /// `NAME_depth.png` or `.npy`.
     Depth,
+    /// `NAME_sigma.npy`.
+    Sigma,
     /// `NAME_image.jpg` or `.png`.
     Image,
     /// `NAME_targets.json`.
@@ -20,9 +22,10 @@ pub(crate) enum Part {
 }
 
 /// The parts' names: endings, and what they mean. The plain `.json` is last: it ends others, too.
-const ENDINGS: [(&str, Part); 7] = [
+const ENDINGS: [(&str, Part); 8] = [
     ("_depth.png", Part::Depth),
     ("_depth.npy", Part::Depth),
+    ("_sigma.npy", Part::Sigma),
     ("_image.jpg", Part::Image),
     ("_image.jpeg", Part::Image),
     ("_image.png", Part::Image),
@@ -72,6 +75,7 @@ pub(crate) struct Entry {
     pub name: String,
     pub sidecar: Option<PartFile>,
     pub depth: Option<PartFile>,
+    pub sigma: Option<PartFile>,
     pub image: Option<PartFile>,
     pub targets: Option<PartFile>,
     /// `None` until its small files were read.
@@ -91,6 +95,7 @@ impl Entry {
         let place = match part {
             Part::Sidecar => &mut self.sidecar,
             Part::Depth => &mut self.depth,
+            Part::Sigma => &mut self.sigma,
             Part::Image => &mut self.image,
             Part::Targets => &mut self.targets,
         };
@@ -102,7 +107,14 @@ impl Entry {
     /// A number that is another one when one of the files has changed.
     pub fn revision(&self) -> u64 {
         let mut hash = DefaultHasher::new();
-        (&self.sidecar, &self.depth, &self.image, &self.targets).hash(&mut hash);
+        let files = [
+            &self.sidecar,
+            &self.depth,
+            &self.sigma,
+            &self.image,
+            &self.targets,
+        ];
+        files.hash(&mut hash);
         // As many bits as a JavaScript number holds.
         hash.finish() >> 12
     }
@@ -122,6 +134,7 @@ mod tests {
             ),
             ("a_b_depth.npy", Some(("a_b", Part::Depth))),
             ("a_depth.png", Some(("a", Part::Depth))),
+            ("a_sigma.npy", Some(("a", Part::Sigma))),
             ("a_image.jpeg", Some(("a", Part::Image))),
             ("predict-1-of-1.manifest.json", None),
             (".a.json.12-0.partial", None),

@@ -156,6 +156,7 @@ impl Listing {
             "names": self.entries.iter().map(|e| e.name.as_str()).collect::<Vec<_>>(),
             "revisions": self.entries.iter().map(Entry::revision).collect::<Vec<_>>(),
             "has_depth": self.entries.iter().map(|e| u8::from(e.depth.is_some())).collect::<Vec<_>>(),
+            "has_sigma": self.entries.iter().map(|e| u8::from(e.sigma.is_some())).collect::<Vec<_>>(),
             "series": {
                 "problem": column(|s| json!(s.problem)),
                 "time_s": column(|s| json!(s.time_s)),

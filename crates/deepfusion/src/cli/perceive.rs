@@ -49,6 +49,8 @@ pub struct PerceiveArgs {
 pub enum PerceiveSave {
     /// Depth as 16-bit PNG, metres × 256: what `view` shows.
     DepthPng,
+    /// How sure the network is, as `predict --save sigma` writes it: `view` can then fade what is unsure.
+    Sigma,
     /// The image with boxes.
     Overlay,
     /// The road from above: free space, boxes, velocities.
@@ -64,10 +66,15 @@ pub enum PerceiveSave {
 impl PerceiveArgs {
     /// What is kept of the prediction that this stands on.
     pub fn outputs(&self, max_depth_m: f64) -> Outputs {
-        let depth = self.save.contains(&PerceiveSave::DepthPng);
+        let both = [
+            (PerceiveSave::DepthPng, Save::DepthPng),
+            (PerceiveSave::Sigma, Save::Sigma),
+        ];
+        let asked = both.iter().filter(|(asked, _)| self.save.contains(asked));
         Outputs {
-            save: depth.then_some(Save::DepthPng).into_iter().collect(),
+            save: asked.map(|(_, save)| *save).collect(),
             max_depth_m,
+            max_sigma: None,
         }
     }
 }

@@ -30,6 +30,10 @@ pub struct PredictArgs {
     /// Leave out points of the cloud beyond this depth, in metres.
     #[arg(long, value_name = "M", default_value_t = 80.0, value_parser = positive)]
     pub max_depth: f64,
+    /// Leave out points of the cloud whose standard deviation is above this share of their depth (0.2: a fifth); of networks that
+    /// say how sure they are.
+    #[arg(long, value_name = "SHARE", value_parser = positive)]
+    pub max_sigma: Option<f64>,
     /// Do one part of the work: the I-th of N (counted from 1) of the images in the order of their paths. Started
     /// with the same inputs and options, N such runs, at once and on any machines, do every image once.
     #[arg(
@@ -61,6 +65,7 @@ impl PredictArgs {
         Outputs {
             save,
             max_depth_m: self.max_depth,
+            max_sigma: self.max_sigma,
         }
     }
 

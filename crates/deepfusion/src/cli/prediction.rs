@@ -78,4 +78,6 @@ pub struct Outputs {
     pub save: Vec<Save>,
     /// Points of a cloud beyond this depth are left out, metres.
     pub max_depth_m: f64,
+    /// Points whose standard deviation is above this share of their depth are left out, too.
+    pub max_sigma: Option<f64>,
 }

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use deepfusion_data::{Dataset, write_atomically};
 use deepfusion_eval::{IntervalFactors, IntervalSample, Protocol};
-use deepfusion_train::Predictor;
+use deepfusion_geometry::DepthMap;
+use deepfusion_train::{Prediction, Predictor};
 
 use super::evaluate::{Evaluated, Place, Truth};
 use super::known_pixels::known_pixels;
@@ -22,7 +23,11 @@ pub fn read(run: &Path) -> Result<Option<IntervalFactors>> {
     let path = run.join(FILE);
     let named = || path.display().to_string();
     match std::fs::read_to_string(&path) {
-        Ok(text) => Ok(Some(toml::from_str(&text).with_context(named)?)),
+        Ok(text) => {
+            let factors: IntervalFactors = toml::from_str(&text).with_context(named)?;
+            factors.validate().with_context(named)?;
+            Ok(Some(factors))
+        }
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(e) => Err(deepfusion_data::Error::file(&path, e).into()),
     }
@@ -40,6 +45,31 @@ fn write(factors: &IntervalFactors, run: &Path) -> Result<PathBuf> {
             .map_err(|e| deepfusion_data::Error::file(&path, e))
     })?;
     Ok(path)
+}
+
+/// Standard deviation of a prediction's depth (`depth`, at the image's size), metres, stretched as the intervals of 80 % are;
+/// `None` of a network that does not say how sure it is.
+pub fn sigma(
+    prediction: &Prediction,
+    depth: &DepthMap,
+    factors: &IntervalFactors,
+) -> Option<DepthMap> {
+    let mut sigma = prediction.sigma_of(depth)?;
+    for (sigma, depth) in sigma.data.iter_mut().zip(&depth.data) {
+        *sigma *= factors.stretch(f64::from(*depth)) as f32;
+    }
+    Some(sigma)
+}
+
+/// A depth without the pixels whose standard deviation is above a share of it.
+pub fn without_unsure(depth: &DepthMap, sigma: &DepthMap, most: f64) -> DepthMap {
+    let mut sure = depth.clone();
+    for (depth, sigma) in sure.data.iter_mut().zip(&sigma.data) {
+        if *sigma > *depth * most as f32 {
+            *depth = 0.0;
+        }
+    }
+    sure
 }
 
 /// That a network can be calibrated at all, before anything is measured.

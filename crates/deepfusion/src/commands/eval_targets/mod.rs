@@ -10,9 +10,10 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use deepfusion_data::{Dataset, OpenOptions, RgbImage, kitti::GtKind, read_depth_png, save_png};
+use deepfusion_eval::IntervalFactors;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::{
-    Label, Perception, PerceptionConfig, Scorer, ScoringRules, Target, TargetScore,
+    Label, Perception, PerceptionConfig, Scorer, ScoringRules, Stamp, Target, TargetScore,
 };
 use deepfusion_render::box_overlay;
 use deepfusion_train::Predictor;
@@ -23,6 +24,7 @@ use self::object_frames::ObjectFrame;
 use super::perceive::read_config;
 use super::remarks;
 use super::scene::{MotionTracker, working_depth};
+use super::uncertainty;
 use crate::cli::{EvalTargetsArgs, TargetDepth};
 use crate::error::CliError;
 use crate::model::ModelSource;
@@ -50,7 +52,7 @@ enum Source {
     /// The scans.
     Lidar,
     /// A network, of every frame: targets need more than one to be confirmed.
-    Network(Box<Predictor>),
+    Network(Box<Predictor>, IntervalFactors),
 }
 
 impl Source {
@@ -58,7 +60,8 @@ impl Source {
         Ok(match (args.depth, &args.model) {
             (None, Some(model)) => {
                 let model = ModelSource::named(model)?;
-                Self::Network(Box::new(engine::load(&model, &args.engine)?))
+                let predictor = engine::load(&model, &args.engine)?;
+                Self::Network(Box::new(predictor), model.interval_factors()?)
             }
             (Some(TargetDepth::Lidar), _) => Self::Lidar,
             // One of the two is asked for by the command line.
@@ -71,14 +74,14 @@ impl Source {
         match self {
             Self::Truth => "truth",
             Self::Lidar => "lidar",
-            Self::Network(_) => "predicted",
+            Self::Network(..) => "predicted",
         }
     }
 
     fn settings(&self) -> PerceptionConfig {
         match self {
             Self::Truth | Self::Lidar => PerceptionConfig::default(),
-            Self::Network(_) => PerceptionConfig::predicted(),
+            Self::Network(..) => PerceptionConfig::predicted(),
         }
     }
 
@@ -88,42 +91,73 @@ impl Source {
         dataset: &Dataset,
         index: usize,
         witness: Option<&Witness>,
-    ) -> Result<Option<(DepthMap, Intrinsics)>> {
+    ) -> Result<Option<Measured>> {
         let camera = dataset.intrinsics(index);
         Ok(match self {
             Self::Truth => witness
                 .filter(|witness| witness.dense)
-                .map(|witness| working_depth(&witness.depth, &camera)),
+                .map(|witness| Measured::exact(working_depth(&witness.depth, &camera))),
             Self::Lidar => dataset
                 .ground_truth(index, GtKind::Z)?
-                .map(|scan| lidar::gathered(&scan, &camera)),
-            Self::Network(predictor) => {
+                .map(|scan| Measured::exact(lidar::gathered(&scan, &camera))),
+            Self::Network(predictor, intervals) => {
                 let image = dataset.load_image(index)?;
-                Some(predicted(predictor, &image, &camera)?)
+                Some(predicted((predictor, intervals), &image, &camera)?)
             }
         })
     }
 
     /// What is seen of a labelled frame; it has no exact depth.
-    fn of_object_frame(&self, frame: &ObjectFrame) -> Result<Option<(DepthMap, Intrinsics)>> {
+    fn of_object_frame(&self, frame: &ObjectFrame) -> Result<Option<Measured>> {
         Ok(match self {
             Self::Truth => None,
-            Self::Lidar => Some(lidar::gathered(&frame.scan, &frame.camera)),
-            Self::Network(predictor) => {
+            Self::Lidar => Some(Measured::exact(lidar::gathered(&frame.scan, &frame.camera))),
+            Self::Network(predictor, intervals) => {
                 let image = deepfusion_data::load_rgb(&frame.image)?;
-                Some(predicted(predictor, &image, &frame.camera)?)
+                Some(predicted((predictor, intervals), &image, &frame.camera)?)
             }
         })
     }
 }
 
 fn predicted(
-    predictor: &Predictor,
+    (predictor, intervals): (&Predictor, &IntervalFactors),
     image: &RgbImage,
     camera: &Intrinsics,
-) -> Result<(DepthMap, Intrinsics)> {
+) -> Result<Measured> {
     let prediction = predictor.predict(image, Some(camera), true, true)?;
-    Ok(working_depth(&prediction.depth(), camera))
+    let whole = prediction.depth();
+    let sigma = uncertainty::sigma(&prediction, &whole, intervals);
+    let (depth, camera_of_depth) = working_depth(&whole, camera);
+    Ok(Measured {
+        depth,
+        sigma: sigma.map(|sigma| working_depth(&sigma, camera).0),
+        camera: camera_of_depth,
+    })
+}
+
+/// Depth of a frame, and what it is worth where its source says so.
+struct Measured {
+    depth: DepthMap,
+    sigma: Option<DepthMap>,
+    camera: Intrinsics,
+}
+
+impl Measured {
+    fn exact((depth, camera): (DepthMap, Intrinsics)) -> Self {
+        Self {
+            depth,
+            sigma: None,
+            camera,
+        }
+    }
+
+    /// What stands there.
+    fn targets(&self, perception: &mut Perception, stamp: Option<Stamp>) -> Result<Vec<Target>> {
+        let sigma = self.sigma.as_ref();
+        let seen = perception.look_with_sigma(&self.depth, sigma, &self.camera, stamp, &[])?;
+        Ok(seen.targets)
+    }
 }
 
 /// `deepfusion eval-targets`.
@@ -183,28 +217,25 @@ impl Work {
             self.progress.set(done, frames.len());
             let witness = witness(dataset, *index)?;
             let seen = self.source.of_frame(dataset, *index, witness.as_ref())?;
-            let Some((depth, k)) = seen else {
+            let Some(measured) = seen else {
                 continue;
             };
             let motion = motions.of(dataset, *index);
             if !motion.goes_on {
                 self.perception.forget();
             }
-            let surroundings = self.perception.look(&depth, &k, motion.stamp)?;
+            let targets = measured.targets(&mut self.perception, motion.stamp)?;
             // Without a witness nothing says which boxes are seen: such a frame is followed, but not scored.
             if let Some(witness) = &witness {
                 let labels = labels.of(dataset, *index, witness);
                 let time_s = motion.stamp.map_or(0.0, |stamp| stamp.time_s);
-                self.scorer.add(time_s, &surroundings.targets, &labels);
+                self.scorer.add(time_s, &targets, &labels);
             }
             let number = dataset.frames()[*index].number;
             let name = format!("{}-{number:010}.png", dataset.name());
-            self.save(
-                &name,
-                &surroundings.targets,
-                &dataset.intrinsics(*index),
-                || dataset.load_image(*index),
-            )?;
+            self.save(&name, &targets, &dataset.intrinsics(*index), || {
+                dataset.load_image(*index)
+            })?;
         }
         self.some_frames_since(before, dataset.folder())
     }
@@ -214,14 +245,14 @@ impl Work {
         for frame in object_frames::read(folder)? {
             self.scorer.begin_drive();
             self.perception.forget();
-            let Some((depth, k)) = self.source.of_object_frame(&frame)? else {
+            let Some(measured) = self.source.of_object_frame(&frame)? else {
                 continue;
             };
-            let surroundings = self.perception.look(&depth, &k, None)?;
-            self.scorer.add(0.0, &surroundings.targets, &frame.labels);
+            let targets = measured.targets(&mut self.perception, None)?;
+            self.scorer.add(0.0, &targets, &frame.labels);
             let name = frame.image.with_extension("png");
             let name = name.file_name().unwrap_or_default().to_string_lossy();
-            self.save(&name, &surroundings.targets, &frame.camera, || {
+            self.save(&name, &targets, &frame.camera, || {
                 deepfusion_data::load_rgb(&frame.image)
             })?;
         }

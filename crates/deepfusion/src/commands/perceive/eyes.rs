@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use anyhow::Result;
+use deepfusion_eval::IntervalFactors;
 use deepfusion_perception::{
     ConfidenceModel, Perception, PerceptionConfig, VehicleShape, time_to_collision,
 };
@@ -16,6 +17,7 @@ use crate::commands::confidence::Confidence;
 use crate::commands::predict::inputs::Input;
 use crate::commands::predict::{Loaded, Seen};
 use crate::commands::scene::{Motion, ScaleWatch, working_depth};
+use crate::commands::uncertainty;
 use crate::error::CliError;
 use crate::model::ModelSource;
 
@@ -45,6 +47,8 @@ pub struct Eyes<'a> {
     spotter: Spotter,
     /// What a pixel's depth is worth, where the run was calibrated.
     confidence: Option<ConfidenceModel>,
+    /// How the intervals are stretched that the network says.
+    intervals: IntervalFactors,
 }
 
 impl<'a> Eyes<'a> {
@@ -67,6 +71,7 @@ impl<'a> Eyes<'a> {
             watch: ScaleWatch::of(prediction),
             spotter: Spotter::of(&args.masks, prediction.engine.ort_lib.as_deref())?,
             confidence: confidence.map(|c| c.single),
+            intervals: model.interval_factors()?,
         })
     }
 
@@ -86,10 +91,14 @@ impl<'a> Eyes<'a> {
         if !motion.goes_on {
             self.perception.forget();
         }
-        let (depth, k) = working_depth(&prediction.depth(), &camera);
+        let whole = prediction.depth();
+        let sigma = uncertainty::sigma(&prediction, &whole, &self.intervals);
+        let (depth, k) = working_depth(&whole, &camera);
+        let sigma = sigma.map(|sigma| working_depth(&sigma, &camera).0);
         let things = self.spotter.find(&loaded.image, &depth)?;
         let perception = &mut self.perception;
-        let surroundings = perception.look_with(&depth, &k, motion.stamp, &things)?;
+        let surroundings =
+            perception.look_with_sigma(&depth, sigma.as_ref(), &k, motion.stamp, &things)?;
         let collision = motion.speed_mps.and_then(|speed| {
             let vehicle = VehicleShape::default();
             time_to_collision(&surroundings.targets, speed, motion.yaw_rate, &vehicle)
@@ -106,7 +115,7 @@ impl<'a> Eyes<'a> {
             &self.args.save,
             image,
             &camera,
-            (&depth, &k),
+            (&depth, sigma.as_ref(), &k),
             &surroundings,
             &self.perception,
             self.confidence.as_ref().map(|model| (model, &prediction)),

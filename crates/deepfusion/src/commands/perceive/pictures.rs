@@ -32,14 +32,15 @@ pub fn draw(
     save: &[PerceiveSave],
     image: &RgbImage,
     camera: &Intrinsics,
-    (depth, k): (&DepthMap, &Intrinsics),
+    (depth, sigma, k): (&DepthMap, Option<&DepthMap>, &Intrinsics),
     surroundings: &Surroundings,
     perception: &Perception,
     confidence: Option<(&ConfidenceModel, &Prediction)>,
 ) -> Vec<(PerceiveSave, Picture)> {
     let targets = &surroundings.targets;
     let picture = |save: PerceiveSave| match save {
-        PerceiveSave::DepthPng => None,
+        // Written with the prediction.
+        PerceiveSave::DepthPng | PerceiveSave::Sigma => None,
         PerceiveSave::Overlay => Some(Picture::Image(box_overlay(image, camera, targets))),
         PerceiveSave::BirdsEye => surroundings.ground.as_ref().map(|ground| {
             let mut space = FreeSpace::new(GRID.0, GRID.1);
@@ -60,7 +61,7 @@ pub fn draw(
             &surroundings.detections,
         ))),
         PerceiveSave::Ply | PerceiveSave::Pcd => {
-            cloud(image, depth, k, perception, confidence).map(Picture::Cloud)
+            cloud(image, (depth, sigma, k), perception, confidence).map(Picture::Cloud)
         }
     };
     save.iter()
@@ -71,8 +72,7 @@ pub fn draw(
 /// The cloud at the working size, each point with the image's colour there.
 fn cloud(
     image: &RgbImage,
-    depth: &DepthMap,
-    k: &Intrinsics,
+    (depth, sigma, k): (&DepthMap, Option<&DepthMap>, &Intrinsics),
     perception: &Perception,
     confidence: Option<(&ConfidenceModel, &Prediction)>,
 ) -> Option<PointCloud> {
@@ -83,11 +83,9 @@ fn cloud(
     let mut cloud = PointCloud::from_depth(&clean, k, Some(rgb.as_raw()), far).ok()?;
     cloud.confidence = confidence.map(|(model, prediction)| {
         let trust = confidences(model, prediction, depth.width, depth.height);
-        let kept = clean.data.iter().zip(trust);
-        kept.filter(|(z, _)| **z > 0.0 && **z <= far)
-            .map(|(_, trust)| trust)
-            .collect()
+        PointCloud::column(&trust, &clean, far)
     });
+    cloud.sigma = sigma.map(|sigma| PointCloud::column(&sigma.data, &clean, far));
     // One a point: the same pixels were kept.
     cloud.check().is_ok().then_some(cloud)
 }
@@ -126,6 +124,7 @@ fn confidences(
 pub fn path(out: &Path, name: &str, save: PerceiveSave) -> PathBuf {
     out.join(match save {
         PerceiveSave::DepthPng => format!("{name}_depth.png"),
+        PerceiveSave::Sigma => format!("{name}_sigma.npy"),
         PerceiveSave::Overlay => format!("{name}_overlay.png"),
         PerceiveSave::BirdsEye => format!("{name}_birds_eye.png"),
         PerceiveSave::Segments => format!("{name}_segments.png"),

@@ -232,7 +232,8 @@ impl<'a> Job<'a> {
         model: &'a ModelSource,
         predictor: &Predictor,
     ) -> Result<Self> {
-        if outputs.save.contains(&Save::Sigma) && !predictor.knows_uncertainty() {
+        let wants_sigma = outputs.save.contains(&Save::Sigma) || outputs.max_sigma.is_some();
+        if wants_sigma && !predictor.knows_uncertainty() {
             return Err(CliError::NoUncertainty.into());
         }
         let camera = CameraSource::new(args, predictor.training_camera())?;
@@ -340,8 +341,8 @@ impl<'a> Job<'a> {
                 layers: &seen.layers,
                 intervals: &self.intervals,
             };
-            let (camera, far) = (loaded.camera.as_ref(), self.outputs.max_depth_m);
-            outputs::write(*save, far, image, camera, &maps, &path)?;
+            let limits = (self.outputs.max_depth_m, self.outputs.max_sigma);
+            outputs::write(*save, limits, image, loaded.camera.as_ref(), &maps, &path)?;
             files.push(file);
         }
         if loaded.live.is_some() {

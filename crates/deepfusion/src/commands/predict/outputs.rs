@@ -13,6 +13,7 @@ use deepfusion_train::{LayerMaps, Prediction};
 
 use super::features;
 use crate::cli::Save;
+use crate::commands::uncertainty;
 use crate::error::CliError;
 
 /// The name of an output.
@@ -44,7 +45,7 @@ pub struct Maps<'a> {
 /// Writes one output, whole or not at all, without waiting for the disk.
 pub fn write(
     save: Save,
-    max_depth_m: f64,
+    (max_depth_m, max_sigma): (f64, Option<f64>),
     image: &RgbImage,
     camera: Option<&Intrinsics>,
     maps: &Maps,
@@ -61,11 +62,8 @@ pub fn write(
         Save::DepthPng => write_depth_png(depth, path)?,
         Save::Npy => write_npy(depth, path)?,
         Save::Sigma => {
-            let mut sigma = prediction.sigma().ok_or(CliError::NoUncertainty)?;
-            for (sigma, depth) in sigma.data.iter_mut().zip(&depth.data) {
-                *sigma *= intervals.stretch(f64::from(*depth)) as f32;
-            }
-            write_npy(&sigma, path)?;
+            let sigma = uncertainty::sigma(prediction, depth, intervals);
+            write_npy(&sigma.ok_or(CliError::NoUncertainty)?, path)?;
         }
         Save::Color => {
             let picture = with_depth_legend(&depth_picture(depth, &scale), &scale);
@@ -81,7 +79,18 @@ pub fn write(
         Save::Ply | Save::Pcd => {
             let k = camera.ok_or(CliError::NoCamera)?;
             let rgb = Some(image.as_raw().as_slice());
-            let cloud = PointCloud::from_depth(depth, k, rgb, max_depth_m as f32)?;
+            let far = max_depth_m as f32;
+            let sigma = uncertainty::sigma(prediction, depth, intervals);
+            let sure;
+            let depth = match (&sigma, max_sigma) {
+                (Some(sigma), Some(most)) => {
+                    sure = uncertainty::without_unsure(depth, sigma, most);
+                    &sure
+                }
+                _ => *depth,
+            };
+            let mut cloud = PointCloud::from_depth(depth, k, rgb, far)?;
+            cloud.sigma = sigma.map(|sigma| PointCloud::column(&sigma.data, depth, far));
             write_unsynced::<CloudError>(path, |out| match save {
                 Save::Pcd => Ok(cloud.write_pcd(out)?),
                 _ => Ok(cloud.write_ply(out)?),

@@ -116,6 +116,9 @@ pub struct MadeWith {
     pub save: Vec<String>,
     /// `--max-depth`.
     pub max_depth_m: f64,
+    /// `--max-sigma`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_sigma: Option<f64>,
     /// `--intrinsics`, or those of `--calib`.
     pub intrinsics: Option<[f64; 4]>,
     /// SHA-256 of `--calib`, where that is a calibration tool's file.
@@ -152,6 +155,7 @@ impl MadeWith {
             ),
             save: outputs.save.iter().map(|s| word(*s)).collect(),
             max_depth_m: outputs.max_depth_m,
+            max_sigma: outputs.max_sigma,
             intrinsics: match camera {
                 CameraSource::Given(k) => Some([k.fx, k.fy, k.cx, k.cy]),
                 CameraSource::File(k) => Some([k.fx, k.fy, k.cx, k.cy]),
@@ -190,6 +194,7 @@ impl MadeWith {
                 !equal(self.max_depth_m, other.max_depth_m),
                 "another --max-depth",
             ),
+            (self.max_sigma != other.max_sigma, "another --max-sigma"),
             (
                 !self.same_camera(other) || self.calibration_sha256 != other.calibration_sha256,
                 "another camera (--intrinsics, --calib)",

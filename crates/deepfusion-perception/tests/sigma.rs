@@ -1,0 +1,99 @@
+//! What depth is said to be worth, in targets and in how far off they may be found again.
+
+#[path = "common/blocks.rs"]
+mod blocks;
+
+use blocks::{camera, scene};
+use deepfusion_geometry::{DepthMap, Se3};
+use deepfusion_perception::{Error, Perception, PerceptionConfig, Stamp, Surroundings, Target};
+
+fn stamp(time_s: f64) -> Option<Stamp> {
+    Some(Stamp {
+        time_s,
+        world_from_cam: Se3::identity(),
+    })
+}
+
+/// `share` of each depth.
+fn sigma(depth: &DepthMap, share: f32) -> DepthMap {
+    let mut sigma = depth.clone();
+    sigma.data.iter_mut().for_each(|z| *z *= share);
+    sigma
+}
+
+fn only(seen: &Surroundings) -> &Target {
+    assert_eq!(seen.targets.len(), 1, "{:?}", seen.targets);
+    &seen.targets[0]
+}
+
+/// A car whose front is at a distance.
+fn car(front_m: f64) -> DepthMap {
+    scene(&[([-2.6, front_m], [-0.8, front_m + 4.2], 1.5)]).0
+}
+
+/// A target's standard deviation is that of its pixels, of one image and followed; without any it says none.
+#[test]
+fn a_target_says_what_its_distance_is_worth() {
+    let (depth, k) = (car(14.0), camera());
+    let mut deviation = sigma(&depth, 0.07);
+    // What is not of the car has no say, nor has a pixel of which nothing is known.
+    for (s, z) in deviation.data.iter_mut().zip(&depth.data) {
+        if !(13.5..19.0).contains(z) {
+            *s = 50.0;
+        }
+    }
+    let middle = 100 * depth.width + 260;
+    deviation.data[middle] = f32::NAN;
+    for time in [None, stamp(0.0)] {
+        let mut perception = Perception::new(PerceptionConfig::default());
+        let seen = perception.look_with_sigma(&depth, Some(&deviation), &k, time, &[]);
+        let seen = seen.unwrap();
+        let target = only(&seen);
+        let share = target.sigma_m.unwrap() / target.distance_m;
+        assert!((share - 0.07).abs() < 1e-4, "{share}");
+        let unsaid = perception.look(&depth, &k, stamp(0.1)).unwrap();
+        assert!(unsaid.targets.iter().all(|t| t.sigma_m.is_none()));
+    }
+}
+
+/// A car that jumps by two metres is another one to exact depth, and the same one to depth that is good to a tenth.
+#[test]
+fn what_is_unsure_may_be_found_farther_off() {
+    let k = camera();
+    let (before, after) = (car(18.0), car(20.0));
+    let ids = |share: f32| {
+        let mut perception = Perception::new(PerceptionConfig::default());
+        [(&before, 0.0), (&before, 0.1), (&after, 0.2)].map(|(depth, time)| {
+            let deviation = sigma(depth, share);
+            let seen = perception.look_with_sigma(depth, Some(&deviation), &k, stamp(time), &[]);
+            let seen = seen.unwrap();
+            let nearest_to = |t: &&Target| (t.pixels > 0).then_some(t.id);
+            seen.targets.iter().find_map(|t| nearest_to(&t)).unwrap()
+        })
+    };
+    let [first, second, jumped] = ids(0.1);
+    assert_eq!((first, second), (first, first));
+    assert_eq!(jumped, first);
+    let [first, second, jumped] = ids(0.001);
+    assert_eq!(second, first);
+    assert_ne!(jumped, first);
+}
+
+#[test]
+fn a_sigma_of_another_size_is_refused() {
+    let (depth, k) = (car(14.0), camera());
+    let small = DepthMap::empty(64, 24);
+    let error = Perception::new(PerceptionConfig::default())
+        .look_with_sigma(&depth, Some(&small), &k, None, &[])
+        .unwrap_err();
+    assert!(
+        matches!(
+            error,
+            Error::Size {
+                found: (64, 24),
+                ..
+            }
+        ),
+        "{error}"
+    );
+}
