@@ -86,7 +86,7 @@ mod tests {
             [1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 4.0, 4.0]
         );
         assert_eq!(DepthMap::empty(0, 0).nearest(2, 2).count(), 0);
-        assert_eq!(map.nearest(0, 0).data, []);
+        assert!(map.nearest(0, 0).data.is_empty());
     }
 
     #[test]

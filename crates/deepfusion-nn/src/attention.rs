@@ -11,6 +11,7 @@ use crate::layers::{Conv2d, Conv2dConfig, global_mean};
 
 /// How the masks act on the feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum AttentionForm {
     /// F' = F ⊙ M_s ⊙ M_c, the paper's Eq. 15. Masks that know nothing yet are ½ each: the feature starts
@@ -23,6 +24,7 @@ pub enum AttentionForm {
 
 /// What an [`Attention`] is built from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct AttentionConfig {
     /// How the masks act.

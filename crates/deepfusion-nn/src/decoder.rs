@@ -14,6 +14,7 @@ pub const SCALES: usize = 4;
 
 /// What a [`DisparityDecoder`] is built from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DecoderConfig {
     /// Channels of the five stages, coarse to fine.

@@ -19,6 +19,7 @@ const FIRST_SCALE: f32 = 0.2;
 
 /// The size of the images a network is given, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct InputSize {
     /// Width in pixels.
@@ -58,6 +59,7 @@ impl InputSize {
 
 /// What a [`DepthNet`] is built from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DepthNetConfig {
     /// The backbone.
@@ -85,7 +87,7 @@ pub struct DepthNetConfig {
     /// pixel out of view: nothing is left to learn from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial_depth_m: Option<f64>,
-    /// Whether a further head says how sure the network is of each pixel (SPEC 7.2).
+    /// Whether a further head says how sure the network is of each pixel.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub uncertainty: bool,
 }

@@ -20,6 +20,7 @@ const FEATURE_EPSILON: f64 = 1e-6;
 
 /// What a [`FlowDecoder`] is built from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct FlowDecoderConfig {
     /// The largest residual displacement that a level looks for along each axis, in its own pixels.

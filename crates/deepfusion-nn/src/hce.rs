@@ -13,6 +13,7 @@ use crate::layers::{Conv2d, Conv2dConfig, ConvNorm, global_mean};
 /// The paper's text gives the multi-scale factors 1, 3, 6 and 12, its Eq. 12 a 1×1 and 6, 12 and 18. The
 /// default is a 1×1, 3, 6 and 12.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct HceConfig {
     /// The dilation of each 3×3 branch: its multi-scale factor.

@@ -17,6 +17,7 @@ pub const RADIANS_PER_UNIT: f64 = 0.01;
 
 /// What a [`PoseNet`] is built from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PoseNetConfig {
     /// The backbone, on two frames.

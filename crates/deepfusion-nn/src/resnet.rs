@@ -11,6 +11,7 @@ use crate::residual_block::{BlockConfig, ResidualBlock};
 
 /// Which of the published ResNets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum ResNetDepth {
     /// 2, 2, 2, 2 basic blocks.
@@ -57,6 +58,7 @@ impl ResNetDepth {
 
 /// How images in [0, 1] are brought to what an encoder's first convolution expects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum InputNormalisation {
     /// (x − mean) / std per channel, with ImageNet's statistics.
@@ -104,6 +106,7 @@ impl InputNormalisation {
 
 /// What a [`ResNet`] is built from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ResNetConfig {
     /// The layout.

@@ -4,11 +4,12 @@ use deepfusion_nn::{
     AttentionConfig, AttentionForm, DepthNetConfig, FlowDecoderConfig, HceConfig, InputSize,
     PoseNetConfig,
 };
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// How the views of a target are compared (SPEC 2).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// How the views of a target are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Reprojection {
     /// Two frames, each warped onto the other: the paper's double-frame coupled reprojection.
@@ -18,7 +19,7 @@ pub enum Reprojection {
 }
 
 /// Where the motion of the reversed pair comes from in bidirectional reprojection.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ReversedPose {
     /// The network is asked again with the frames swapped.
@@ -29,7 +30,7 @@ pub enum ReversedPose {
 
 /// Whose motion the views are synthesised with. The first error that depth has to wait for is PoseNet's:
 /// what the vehicle knows already need not be learned first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ViewMotion {
     /// PoseNet's, whose length the speed loss pulls towards the vehicle's: the paper's way.
@@ -37,13 +38,13 @@ pub enum ViewMotion {
     PoseNet,
     /// PoseNet's rotation and direction, with the length that the vehicle's speed gives.
     Distance,
-    /// The vehicle's own, from speed and yaw rate (SPEC 3.4), and the body's lean where it is known. PoseNet learns
+    /// The vehicle's own, from speed and yaw rate, and the body's lean where it is known. PoseNet learns
     /// that motion beside it.
     Vehicle,
 }
 
 /// What is done to the images before the networks see them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Augmentation {
     /// Mirror every other sample left to right, its camera and motion with it.
@@ -64,7 +65,7 @@ pub struct Augmentation {
 }
 
 /// How the step size changes over a run, after its rise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum LearningRateSchedule {
     /// A tenth from `learning_rate_drop` on.
@@ -75,7 +76,7 @@ pub enum LearningRateSchedule {
 }
 
 /// Where a run's images come from; a resumed run finds them again by this.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DataConfig {
     /// Drive folders, date folders or KITTI roots.
@@ -103,7 +104,7 @@ pub struct DataConfig {
 
 /// Everything that decides a training run. One struct serves the command line, the `--config` file
 /// and the checkpoint; it is stored beside the run as `config.toml`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrainConfig {
     /// The preset this started from.
@@ -155,6 +156,7 @@ pub struct TrainConfig {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub init: Option<PathBuf>,
     /// SHA-256 of the embedded network's weights, so that a repeated run notices that it would begin from others.
+    #[schemars(skip)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub init_sha256: Option<String>,
     /// Pairs slower than this are dropped, in m/s.
@@ -173,6 +175,7 @@ pub struct TrainConfig {
     #[serde(default)]
     pub view_motion: ViewMotion,
     /// The camera trained with, at network size; filled in from the data. Several cameras: the first.
+    #[schemars(skip)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Intrinsics>,
     /// f_c, the focal length in pixels of the network's input to which all cameras are brought (Metric3D): the network

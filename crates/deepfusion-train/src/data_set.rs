@@ -2,11 +2,12 @@
 
 use crate::{Error, TrainConfig};
 use deepfusion_geometry::{DepthRange, Intrinsics};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// What is learned from a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Learn {
     /// Depth from its own motion: views of one frame synthesised from another.
@@ -38,7 +39,7 @@ impl Learn {
 }
 
 /// Views of simulated worlds that are rendered while they are learned from, each another one, without a file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulatedConfig {
     /// Chooses the worlds.
@@ -70,10 +71,10 @@ impl Default for SimulatedConfig {
 /// The networks' raw outputs stay near one for each of them: the sigmoid spans the set's own range of depths,
 /// and a unit of PoseNet's translation is the set's own mean displacement. What the networks say about an image
 /// therefore means metres only together with a set: [`TrainConfig::for_set`].
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DataSetConfig {
-    /// What `--set` calls it.
+    /// What `--data-set` calls it.
     pub name: String,
     /// Drive folders, date folders or KITTI roots.
     pub paths: Vec<PathBuf>,
@@ -104,6 +105,7 @@ pub struct DataSetConfig {
     /// then filled in.
     pub metres_per_unit: f64,
     /// The camera of its first sample, at the size of its images; filled in from the data.
+    #[schemars(skip)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trained_with: Option<Intrinsics>,
 }
@@ -150,7 +152,7 @@ impl TrainConfig {
                 ),
             };
             return Err(Error::Config {
-                field: "--set",
+                field: "--data-set",
                 expected,
                 found: name.unwrap_or("none").to_owned(),
             });

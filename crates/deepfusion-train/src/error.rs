@@ -14,6 +14,14 @@ pub enum Error {
         /// What was found.
         found: String,
     },
+    /// A key that cannot be set so.
+    #[error("{assignment}: {reason}")]
+    Setting {
+        /// What was asked for: KEY=VALUE.
+        assignment: String,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// A configuration file that cannot be read as one.
     #[error("{path}: not a training configuration: {reason}")]
     ConfigFile {
@@ -145,8 +153,8 @@ impl Error {
     #[must_use]
     pub fn hint(&self) -> Option<String> {
         match self {
-            Self::Config { field: "--set", .. } => {
-                Some("give the name of the data set whose metres are meant: --set NAME".into())
+            Self::Config { field: "--data-set", .. } => {
+                Some("give the name of the data set whose metres are meant: --data-set NAME".into())
             }
             Self::Config { field: "data" | "data.paths", .. } => Some(
                 "give recordings with --data, or as data.paths or [[data.sets]] in the config file, one of the three".into(),
@@ -157,8 +165,11 @@ impl Error {
             Self::Config { field, .. } => Some(format!(
                 "set `{field}` so in the config file, or by its option; --help lists them"
             )),
+            Self::Setting { .. } => Some(
+                "`deepfusion config show` prints every key and what it means".into(),
+            ),
             Self::ConfigFile { .. } => Some(
-                "a run's own config.toml is a complete example; start from one and change it".into(),
+                "name a preset and the keys in which it differs; `deepfusion config show` prints them all".into(),
             ),
             Self::Io { source, action, .. } => match source.kind() {
                 std::io::ErrorKind::StorageFull => {

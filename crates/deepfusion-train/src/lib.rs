@@ -9,6 +9,8 @@ mod augment;
 mod batch;
 mod checkpoint;
 mod config;
+mod config_file;
+mod config_keys;
 mod data_set;
 mod depth_batch;
 mod depth_set;
@@ -48,6 +50,7 @@ pub use config::{
     Augmentation, DataConfig, LearningRateSchedule, Reprojection, ReversedPose, TrainConfig,
     ViewMotion,
 };
+pub use config_keys::{ConfigKey, config_keys, config_reference};
 pub use data_set::{DataSetConfig, Learn, SimulatedConfig};
 pub use deepfusion_nn::BilinearResize;
 pub use depth_batch::{DepthBatch, DepthLoader};

@@ -1,11 +1,12 @@
 use crate::Error;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The size at which the views of a coarser scale are compared with their targets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CompareAt {
-    /// Full size, to which its disparity is enlarged: fewer holes and copied textures (SPEC 2).
+    /// Full size, to which its disparity is enlarged: fewer holes and copied textures.
     #[default]
     Full,
     /// The scale's own: a pixel there sees 2ˢ times as far, so that near things, which move far, are found
@@ -13,8 +14,8 @@ pub enum CompareAt {
     Own,
 }
 
-/// Weights and switches of the loss terms (SPEC 2). A weight of 0 switches a term off.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// Weights and switches of the loss terms. A weight of 0 switches a term off.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LossConfig {
     /// α of the photometric error: the share of SSIM beside the absolute difference.
@@ -47,8 +48,8 @@ pub struct LossConfig {
     pub depth: DepthLossConfig,
 }
 
-/// The loss on known depth (SPEC 7.1). It has an effect only where a data set says `learn = "depth"` or `"both"`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// The loss on known depth. It has an effect only where a data set says `learn = "depth"` or `"both"`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DepthLossConfig {
     /// Weight of the whole beside the terms that are learned from video. 0 with `depth_net.uncertainty`: the head for
@@ -68,7 +69,7 @@ impl Default for DepthLossConfig {
 }
 
 /// The terms of the optical flow (Eq. 16–20), all of them inside L_flow but for the agreement.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FlowLossConfig {
     /// λ_f of the whole; 0 trains no flow decoder.
@@ -98,7 +99,7 @@ impl Default for FlowLossConfig {
 /// the flow explains better than the rigid warp by `margin`, while the two flows differ by more than
 /// `min_flow_px` and `min_flow_share`, and the flow leaves the epipolar line by `min_epipolar_px` or goes along
 /// it `min_parallax_ratio` times as far as the depth says, or as little. Neither limit set: neither is asked.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MovingConfig {
     /// Whether they are looked for; needs the flow.

@@ -7,10 +7,11 @@ use deepfusion_nn::{
     DecoderConfig, DepthNetConfig, FlowDecoderConfig, InputSize, PoseNetConfig, ResNetConfig,
     ResNetDepth,
 };
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Named configurations to start from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
     /// ResNet-18 at half width, 320×96: learns something useful on two cores in minutes.

@@ -1,6 +1,6 @@
 //! The recipes in the repository are configurations that this program takes.
 
-use deepfusion_train::TrainConfig;
+use deepfusion_train::{Compute, TrainConfig};
 use std::path::Path;
 
 #[test]
@@ -10,7 +10,10 @@ fn every_recipe_is_a_configuration() {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "toml") {
-            TrainConfig::read(&path).unwrap();
+            let [processor, gpu] = [Compute::Processor, Compute::Gpu]
+                .map(|on| TrainConfig::read_over_preset(&path, on).unwrap());
+            // A recipe gives the same wherever it is followed.
+            assert_eq!(processor, gpu, "{}", path.display());
             count += 1;
         }
     }

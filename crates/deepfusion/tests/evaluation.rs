@@ -164,7 +164,7 @@ fn several_data_sets_are_learned_together() {
         "eval-odometry --model both --data yard",
     ] {
         fails(at, command, &["one of road, yard"]);
-        fails(at, &format!("{command} --set yrad"), &["found yrad"]);
+        fails(at, &format!("{command} --data-set yrad"), &["found yrad"]);
     }
     fails(
         at,
@@ -174,7 +174,7 @@ fn several_data_sets_are_learned_together() {
     let scale = |set: &str| {
         let report = json(
             at,
-            &format!("eval --model both --data road --set {set} --json"),
+            &format!("eval --model both --data road --data-set {set} --json"),
         );
         report["unscaled"]["abs_rel"].as_f64().unwrap()
     };

@@ -20,7 +20,7 @@ pub struct EngineArgs {
     #[arg(long, value_enum, default_value_t)]
     pub device: DeviceChoice,
     /// Which of the data sets that the run learned from its metres are of, where it learned several.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long = "data-set", alias = "set", value_name = "NAME")]
     pub set: Option<String>,
 }
 

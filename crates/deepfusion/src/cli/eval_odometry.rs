@@ -21,7 +21,12 @@ pub struct EvalOdometryArgs {
     #[arg(long, value_name = "RUN", requires = "data")]
     pub model: Option<PathBuf>,
     /// Which of the data sets that the run learned from its metres are of, where it learned several.
-    #[arg(long, value_name = "NAME", conflicts_with = "pred")]
+    #[arg(
+        long = "data-set",
+        alias = "set",
+        value_name = "NAME",
+        conflicts_with = "pred"
+    )]
     pub set: Option<String>,
     /// Recordings to evaluate on: drive folders, date folders or KITTI roots.
     #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pred")]

@@ -18,7 +18,7 @@ pub struct ExportArgs {
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
     /// Which of the data sets that the run learned from its metres are of, where it learned several.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long = "data-set", alias = "set", value_name = "NAME")]
     pub set: Option<String>,
     /// File to write.
     #[arg(long, value_name = "FILE.onnx")]

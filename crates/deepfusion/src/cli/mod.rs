@@ -2,6 +2,7 @@
 
 mod ablate;
 mod compare;
+mod config;
 mod data;
 mod doctor;
 mod engine;
@@ -25,6 +26,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use ablate::AblateArgs;
 pub use compare::{CompareArgs, TableFormat};
+pub use config::{ConfigCommand, ShowArgs};
 pub use data::{ConvertArgs, DataCommand, ExportGtArgs, GtDepth, InspectArgs};
 pub use doctor::DoctorArgs;
 pub use engine::{EngineArgs, EngineChoice, PrecisionChoice};
@@ -73,6 +75,9 @@ pub enum Command {
     Doctor(DoctorArgs),
     /// Train on drives, without depth labels.
     Train(Box<TrainArgs>),
+    /// What can be configured.
+    #[command(subcommand)]
+    Config(ConfigCommand),
     /// Train and measure with parts of the system switched off: the on/off table of the paper.
     Ablate(Box<AblateArgs>),
     /// Measure depth: the field's seven metrics, unscaled and median-scaled.

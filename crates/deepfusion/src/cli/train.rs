@@ -12,7 +12,7 @@ use super::values::milliseconds;
 #[command(
     after_help = "Learns from images and the car's speed alone (and its yaw rate, with --view-motion vehicle), or from recorded depth \
     (--learn depth). Writes config.toml, log.csv, TensorBoard events, the \
-    checkpoints last and best, and sample panels. A config file sets everything; options override it.\n\n\
+    checkpoints last and best, and sample panels. Options override a config file.\n\n\
     Ctrl-C, and SIGTERM as schedulers send it, save after the step at work and end with code 130. --resume goes on as the run is \
     configured: --epochs or --steps may make it longer, --data, --val-data and --split say where its recordings are now, and any other \
     option that contradicts it is an error.\n\n\
@@ -27,7 +27,7 @@ pub struct TrainArgs {
     /// Settings to start from [default: tiny].
     #[arg(long, value_enum)]
     pub preset: Option<PresetChoice>,
-    /// Settings from a file, as written into every run as config.toml.
+    /// Settings from a file: a preset and the keys in which it differs, or all of them, as written into every run as config.toml.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "preset")]
     pub config: Option<PathBuf>,
     /// Folder of the run [default: runs/train-TIME].
@@ -85,6 +85,9 @@ pub struct TrainArgs {
     /// Parts of the network and terms of the loss to leave out.
     #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = TrainConfig::TERMS)]
     pub without: Vec<String>,
+    /// Any key of the configuration, as loss.smoothness=0.01 (`deepfusion config show` prints them all); may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
 }
 
 /// Settings to start from.

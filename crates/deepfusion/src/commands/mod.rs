@@ -4,6 +4,7 @@ mod ablate;
 mod bench;
 mod compare;
 mod confidence;
+mod config;
 mod convert;
 mod demo;
 pub mod device;
@@ -39,7 +40,7 @@ mod weights;
 
 use anyhow::Result;
 
-use crate::cli::{Command, DataCommand, WeightsCommand};
+use crate::cli::{Command, ConfigCommand, DataCommand, WeightsCommand};
 
 /// Runs what was asked for.
 pub fn run(command: Option<Command>) -> Result<()> {
@@ -54,6 +55,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Data(DataCommand::Convert(args)) => convert::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Train(args) => train::run(&args),
+        Command::Config(ConfigCommand::Show(args)) => config::show(&args),
         Command::Ablate(args) => ablate::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Compare(args) => compare::run(&args),

@@ -37,6 +37,7 @@ pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> 
         view_motion,
         with,
         without,
+        set,
     } = args;
     let mut config = run.clone();
     config.data.make_absolute();
@@ -89,6 +90,14 @@ pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> 
         other.without(term)?;
         if other != *run {
             return contradicts("--without", term.clone(), "is learned with it".into());
+        }
+    }
+    for assignment in set {
+        let mut other = run.clone();
+        other.set(assignment)?;
+        if other != *run {
+            let found = "has another value in its config.toml";
+            return contradicts("--set", assignment.clone(), found.into());
         }
     }
     if let Some(asked) = init {
@@ -165,7 +174,7 @@ fn move_recordings(
 
 /// What a configuration file may change, and that it says nothing else than the run's.
 fn take_file(config: &mut TrainConfig, path: &Path, args: &TrainArgs) -> Result<()> {
-    let file = TrainConfig::read(path)?;
+    let file = TrainConfig::read_over_preset(path, args.device.compute())?;
     (config.steps, config.epochs) = (file.steps, file.epochs);
     config.min_steps = file.min_steps;
     config.checkpoint_minutes = file.checkpoint_minutes;

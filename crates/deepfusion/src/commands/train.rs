@@ -134,7 +134,7 @@ pub fn train(trainer: &mut Trainer, outlook: Option<Outlook>) -> Result<TrainSum
 
 fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     let mut config = match &args.config {
-        Some(path) => TrainConfig::read(path)?,
+        Some(path) => TrainConfig::read_over_preset(path, args.device.compute())?,
         None => preset(args.preset.unwrap_or(PresetChoice::Tiny)).config_on(args.device.compute()),
     };
     if let Some(size) = args.size {
@@ -156,6 +156,9 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     // Said last: a motion that contradicts a term left out is an error, and not silently another one.
     if let Some(choice) = args.view_motion {
         config.view_motion = choice.into();
+    }
+    for assignment in &args.set {
+        config.set(assignment)?;
     }
     choose_recordings(&mut config.data, args)?;
     Ok(config)

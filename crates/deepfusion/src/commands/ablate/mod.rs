@@ -108,7 +108,7 @@ pub fn run(args: &AblateArgs) -> Result<()> {
 
 fn new_plan(args: &AblateArgs) -> Result<Plan> {
     let mut config = match &args.config {
-        Some(path) => TrainConfig::read(path)?,
+        Some(path) => TrainConfig::read_over_preset(path, args.device.compute())?,
         None => {
             let preset = train::preset(args.preset.unwrap_or(PresetChoice::Light));
             let mut config = preset.config_on(args.device.compute());

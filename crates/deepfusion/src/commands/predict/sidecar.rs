@@ -131,7 +131,7 @@ pub struct MadeWith {
     /// `--correct-scale`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub correct_scale: bool,
-    /// `--set`.
+    /// `--data-set`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub set: Option<String>,
 }
@@ -189,7 +189,7 @@ impl MadeWith {
                 "another engine (--engine, --precision)",
             ),
             (self.save != other.save, "another --save"),
-            (self.set != other.set, "another --set"),
+            (self.set != other.set, "another --data-set"),
             (
                 !equal(self.max_depth_m, other.max_depth_m),
                 "another --max-depth",

@@ -1,0 +1,313 @@
+//! What every key of a configuration means, as its field's own comment says it.
+
+use crate::{Error, TrainConfig};
+use serde_json::{Map, Value};
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+/// A key of a configuration file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ConfigKey {
+    /// With dots between tables: `loss.depth.weight`. `data.sets[].name` is a key of each of a list of tables.
+    pub key: String,
+    /// The field's comment, on one line.
+    pub meaning: String,
+    /// The words that it may be, and what each means; empty where it is something else.
+    pub words: Vec<(String, String)>,
+    /// What it is where it is no word: a number, a text, …
+    pub kind: &'static str,
+}
+
+/// All keys, table by table.
+#[must_use]
+pub fn config_keys() -> Vec<ConfigKey> {
+    let schema = schemars::schema_for!(TrainConfig).to_value();
+    let mut keys = Vec::new();
+    collect(&schema, &schema, "", &mut keys);
+    keys
+}
+
+impl ConfigKey {
+    /// The table that it stands in: `loss.depth`.
+    #[must_use]
+    pub fn table(&self) -> &str {
+        self.key.rsplit_once('.').map_or("", |(table, _)| table)
+    }
+
+    /// Its own name: `weight`.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.key
+            .rsplit_once('.')
+            .map_or(&*self.key, |(_, name)| name)
+    }
+
+    /// The first sentence of its meaning, and the words that it may be.
+    fn line(&self) -> String {
+        let end = self.meaning.find(". ").unwrap_or(self.meaning.len());
+        let sentence = self.meaning[..end].trim_end_matches('.');
+        let words: Vec<&str> = self.words.iter().map(|(word, _)| &**word).collect();
+        match words.is_empty() {
+            true => sentence.to_owned(),
+            false => format!("{sentence} [{}]", words.join(" | ")),
+        }
+    }
+}
+
+/// The schema that a reference stands for; of an optional one that of its value.
+fn resolved<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
+    if let Some(reference) = schema.get("$ref").and_then(Value::as_str) {
+        let found = root.pointer(reference.trim_start_matches('#'));
+        return found.map_or(schema, |found| resolved(root, found));
+    }
+    let any = schema.get("anyOf").and_then(Value::as_array);
+    let is_value = |s: &&Value| s.get("type").and_then(Value::as_str) != Some("null");
+    match any.and_then(|any| any.iter().find(is_value)) {
+        Some(value) => resolved(root, value),
+        None => schema,
+    }
+}
+
+fn collect(root: &Value, schema: &Value, prefix: &str, keys: &mut Vec<ConfigKey>) {
+    let Some(properties) = schema.get("properties").and_then(Value::as_object) else {
+        return;
+    };
+    let is_table = |own: &Value| own.get("properties").is_some();
+    let mut tables: Vec<(String, &Value)> = Vec::new();
+    for (name, property) in properties {
+        let own = resolved(root, property);
+        let key = format!("{prefix}{name}");
+        let items = own.get("items").map(|items| resolved(root, items));
+        match items {
+            _ if is_table(own) => tables.push((format!("{key}."), own)),
+            Some(items) if is_table(items) && of_its_own(items) => {
+                tables.push((format!("{key}[]."), items));
+            }
+            _ => keys.push(ConfigKey {
+                key,
+                meaning: one_line(property.get("description").or(own.get("description"))),
+                words: words(own),
+                kind: kind(own, items),
+            }),
+        }
+    }
+    for (prefix, table) in tables {
+        collect(root, table, &prefix, keys);
+    }
+}
+
+/// Whether the tables of a list have keys to tell of: a list of sizes is a value.
+fn of_its_own(items: &Value) -> bool {
+    let count = items.get("properties").and_then(Value::as_object);
+    count.map_or(0, Map::len) > 2
+}
+
+fn words(schema: &Value) -> Vec<(String, String)> {
+    let choices = schema.get("oneOf").and_then(Value::as_array);
+    let word = |choice: &Value| {
+        let word = choice.get("const")?.as_str()?.to_owned();
+        Some((word, one_line(choice.get("description"))))
+    };
+    choices.map_or(Vec::new(), |all| all.iter().filter_map(word).collect())
+}
+
+fn kind(schema: &Value, items: Option<&Value>) -> &'static str {
+    let types = match schema.get("type") {
+        Some(Value::String(one)) => vec![one.as_str()],
+        Some(Value::Array(several)) => several.iter().filter_map(Value::as_str).collect(),
+        _ => Vec::new(),
+    };
+    let has = |name: &str| types.contains(&name);
+    match items {
+        Some(items) => match kind(items, None) {
+            "whole number" => "list of whole numbers",
+            "text" => "list of texts",
+            _ => "list of { width, height }",
+        },
+        None if has("boolean") => "true or false",
+        None if has("integer") => "whole number",
+        None if has("number") => "number",
+        None if has("string") => "text",
+        None => "word",
+    }
+}
+
+fn one_line(description: Option<&Value>) -> String {
+    let text = description.and_then(Value::as_str).unwrap_or_default();
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+impl TrainConfig {
+    /// The configuration as TOML with a line above each key that says what it means; keys that it does not set are there as
+    /// comments.
+    ///
+    /// # Errors
+    /// As [`TrainConfig::to_toml`].
+    pub fn to_commented_toml(&self) -> Result<String, Error> {
+        let all = config_keys();
+        let mut told = BTreeSet::new();
+        let mut text = String::new();
+        let mut table = String::new();
+        for line in self.to_toml()?.lines() {
+            let header = line.strip_prefix('[').and_then(|l| l.strip_suffix(']'));
+            if let Some(header) = header {
+                unset(&mut text, &all, &mut told, &table);
+                table = header.to_owned();
+            } else if let Some((name, _)) = line.split_once(" = ")
+                && let Some(key) = all.iter().find(|k| k.table() == table && k.name() == name)
+            {
+                // `writeln!` into a string does not fail.
+                let _ = writeln!(text, "# {}", key.line());
+                told.insert(key.key.clone());
+            }
+            text += line;
+            text.push('\n');
+        }
+        unset(&mut text, &all, &mut told, &table);
+        // Tables that are not there at all.
+        let mut left: Vec<&str> = Vec::new();
+        for key in all.iter().filter(|k| !told.contains(&k.key)) {
+            if !left.contains(&key.table()) {
+                left.push(key.table());
+            }
+        }
+        for table in left {
+            let _ = match table.strip_suffix("[]") {
+                Some(list) => writeln!(text, "\n# [[{list}]]"),
+                None => writeln!(text, "\n# [{table}]"),
+            };
+            unset(&mut text, &all, &mut BTreeSet::new(), table);
+        }
+        Ok(text)
+    }
+}
+
+/// The keys of a table that are not told yet, as comments, before the empty line that ends it.
+fn unset(text: &mut String, all: &[ConfigKey], told: &mut BTreeSet<String>, table: &str) {
+    let ends_empty = text.ends_with("\n\n");
+    if ends_empty {
+        text.pop();
+    }
+    for key in all.iter().filter(|k| k.table() == table) {
+        if told.insert(key.key.clone()) {
+            let _ = writeln!(text, "# {}: {}", key.name(), key.line());
+        }
+    }
+    if ends_empty {
+        text.push('\n');
+    }
+}
+
+/// All keys as a page of Markdown, a table each; `defaults` are what a configuration has.
+#[must_use]
+pub fn config_reference(defaults: &TrainConfig) -> String {
+    let values = toml::Table::try_from(defaults).unwrap_or_default();
+    let value_of = |key: &str| {
+        let mut parts = key.split('.');
+        let first = values.get(parts.next()?)?;
+        parts.try_fold(first, |value, part| value.get(part))
+    };
+    let mut page = String::new();
+    let mut table = None;
+    for key in config_keys() {
+        if table.as_deref() != Some(key.table()) {
+            table = Some(key.table().to_owned());
+            let title = match key.table() {
+                "" => "The run".to_owned(),
+                name => match name.strip_suffix("[]") {
+                    Some(list) => format!("`[[{list}]]`"),
+                    None => format!("`[{name}]`"),
+                },
+            };
+            let _ = writeln!(
+                page,
+                "\n## {title}\n\n| Key | Is | Default |\n|---|---|---|"
+            );
+        }
+        let escape = |text: &str| text.replace('|', "\\|");
+        let meaning = match key.words.is_empty() {
+            true => format!("{} ({})", escape(&key.meaning), key.kind),
+            false => {
+                let word =
+                    |(word, means): &(String, String)| format!("`{word}`: {}", escape(means));
+                let words: Vec<String> = key.words.iter().map(word).collect();
+                format!("{}<br>{}", escape(&key.meaning), words.join("<br>"))
+            }
+        };
+        let default = value_of(&key.key).map_or_else(String::new, |v| format!("`{v}`"));
+        let _ = writeln!(page, "| `{}` | {meaning} | {default} |", key.name());
+    }
+    page
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Preset;
+    use std::path::Path;
+
+    /// Every key that any preset writes is known, and nothing is without a meaning.
+    #[test]
+    fn every_key_has_a_meaning() {
+        let keys = config_keys();
+        for key in &keys {
+            assert!(key.meaning.len() > 5, "{key:?}");
+            assert!(!key.meaning.contains("SPEC"), "{key:?}");
+        }
+        fn leaves(table: &toml::Table, prefix: &str, found: &mut Vec<String>) {
+            for (name, value) in table {
+                match value {
+                    toml::Value::Table(inner) => leaves(inner, &format!("{prefix}{name}."), found),
+                    _ => found.push(format!("{prefix}{name}")),
+                }
+            }
+        }
+        for (preset, _) in Preset::ALL {
+            let mut written = Vec::new();
+            let table = toml::Table::try_from(preset.config()).unwrap();
+            leaves(&table, "", &mut written);
+            for key in written {
+                assert!(keys.iter().any(|k| k.key == key), "{key} of {preset}");
+            }
+        }
+        let weight = keys.iter().find(|k| k.key == "data.sets[].simulated.plain");
+        assert_eq!(weight.unwrap().kind, "number");
+    }
+
+    /// What is shown is a file that can be trained with, and says all that there is.
+    #[test]
+    fn a_commented_file_is_the_configuration() {
+        for (preset, _) in Preset::ALL {
+            let config = preset.config();
+            let text = config.to_commented_toml().unwrap();
+            assert_eq!(toml::from_str::<TrainConfig>(&text).unwrap(), config);
+            for key in config_keys() {
+                let name = key.name();
+                let set = text.contains(&format!("\n{name} = "));
+                assert!(
+                    set || text.contains(&format!("\n# {name}: ")),
+                    "{}",
+                    key.key
+                );
+            }
+        }
+    }
+
+    /// The page under docs/ is what this program says. `UPDATE_REFERENCE=1` writes it anew.
+    #[test]
+    fn the_reference_page_is_up_to_date() {
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/configuration.md");
+        let head = include_str!("config_reference_head.md");
+        let page = format!("{head}{}", config_reference(&Preset::Light.config()));
+        if std::env::var_os("UPDATE_REFERENCE").is_some() {
+            std::fs::write(&path, &page).unwrap();
+        }
+        let found = std::fs::read_to_string(&path).unwrap();
+        assert!(
+            found == page,
+            "{} is not what the comments say: run this test with UPDATE_REFERENCE=1",
+            path.display()
+        );
+    }
+}
