@@ -23,9 +23,9 @@ pub struct HceConfig {
     /// Whether the dilated branches read a 1×1 reduction to the branch width instead of the feature itself:
     /// at a ResNet-50's widths four HCEs without it cost more than the backbone.
     pub reduce_first: bool,
-    /// A branch, and the output, has this share of the feature's channels …
+    /// By what a branch, and the output, has fewer channels than the feature.
     pub width_divisor: usize,
-    /// … but at least so many.
+    /// The least channels that a branch, and the output, has.
     pub min_width: usize,
 }
 

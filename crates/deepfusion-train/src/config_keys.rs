@@ -16,6 +16,8 @@ pub struct ConfigKey {
     pub words: Vec<(String, String)>,
     /// What it is where it is no word: a number, a text, …
     pub kind: &'static str,
+    /// What it is where a file leaves it out, as TOML; `None` where it has to be there, or is then absent.
+    pub default: Option<String>,
 }
 
 /// All keys, table by table.
@@ -88,6 +90,7 @@ fn collect(root: &Value, schema: &Value, prefix: &str, keys: &mut Vec<ConfigKey>
                 meaning: one_line(property.get("description").or(own.get("description"))),
                 words: words(own),
                 kind: kind(own, items),
+                default: default(own, property),
             }),
         }
     }
@@ -129,6 +132,31 @@ fn kind(schema: &Value, items: Option<&Value>) -> &'static str {
         None if has("number") => "number",
         None if has("string") => "text",
         None => "word",
+    }
+}
+
+/// What a key that is left out is. A switch that the files of old runs lack is off.
+fn default(own: &Value, property: &Value) -> Option<String> {
+    let off = || (kind(own, None) == "true or false").then(|| "false".to_owned());
+    let own = property.get("default").and_then(as_toml);
+    own.or_else(off)
+}
+
+/// A value of the schema as a configuration file has it.
+fn as_toml(value: &Value) -> Option<String> {
+    match value {
+        Value::Null => None,
+        Value::Number(number) if number.is_f64() => number.as_f64().map(shortest),
+        other => Some(other.to_string()),
+    }
+}
+
+/// The shortest decimal of a number that may have come from 32 bits.
+fn shortest(number: f64) -> String {
+    let single = number as f32;
+    match f64::from(single) == number {
+        true => format!("{single:?}"),
+        false => format!("{number:?}"),
     }
 }
 
@@ -174,7 +202,7 @@ impl TrainConfig {
         for table in left {
             let _ = match table.strip_suffix("[]") {
                 Some(list) => writeln!(text, "\n# [[{list}]]"),
-                None => writeln!(text, "\n# [{table}]"),
+                None => writeln!(text, "\n# [{}]", table.replace("[]", "")),
             };
             unset(&mut text, &all, &mut BTreeSet::new(), table);
         }
@@ -216,7 +244,7 @@ pub fn config_reference(defaults: &TrainConfig) -> String {
                 "" => "The run".to_owned(),
                 name => match name.strip_suffix("[]") {
                     Some(list) => format!("`[[{list}]]`"),
-                    None => format!("`[{name}]`"),
+                    None => format!("`[{}]`", name.replace("[]", "")),
                 },
             };
             let _ = writeln!(
@@ -234,7 +262,12 @@ pub fn config_reference(defaults: &TrainConfig) -> String {
                 format!("{}<br>{}", escape(&key.meaning), words.join("<br>"))
             }
         };
-        let default = value_of(&key.key).map_or_else(String::new, |v| format!("`{v}`"));
+        let own = value_of(&key.key).map(|value| match value {
+            toml::Value::Float(number) => shortest(*number),
+            other => other.to_string(),
+        });
+        let default = own.or(key.default.clone());
+        let default = default.map_or_else(String::new, |value| format!("`{value}`"));
         let _ = writeln!(page, "| `{}` | {meaning} | {default} |", key.name());
     }
     page

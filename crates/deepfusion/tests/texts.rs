@@ -23,6 +23,8 @@ fn help_texts() {
         "train",
         "ablate",
         "compare",
+        "config",
+        "config show",
         "eval",
         "eval-odometry",
         "predict",

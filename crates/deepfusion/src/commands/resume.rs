@@ -351,7 +351,7 @@ mod tests {
         // What it has already is no contradiction, and what can apply is used.
         assert_eq!(with(&[]).unwrap(), run);
         type Change = fn(&mut TrainConfig);
-        let used: [(&[&str], Change); 17] = [
+        let used: [(&[&str], Change); 18] = [
             (&["--device", "cpu"], |_| {}),
             (&["--init", "none"], |_| {}),
             (&["--preset", "tiny"], |_| {}),
@@ -363,6 +363,7 @@ mod tests {
             (&["--view-motion", "distance"], |_| {}),
             (&["--with", "smoothness"], |_| {}),
             (&["--without", "flow"], |_| {}),
+            (&["--set", "batch=4"], |_| {}),
             (&["--config", &same], |c| c.steps = Some(300)),
             (&["--config", &same, "--steps", "400"], |c| {
                 c.steps = Some(400)
@@ -383,11 +384,12 @@ mod tests {
             change(&mut expected);
             assert_eq!(with(options).unwrap(), expected, "{options:?}");
         }
-        let refused: [(&[&str], &str, &str); 15] = [
+        let refused: [(&[&str], &str, &str); 16] = [
             (&["--preset", "light"], "light", "tiny"),
             (&["--size", "640x192"], "640x192", "320x96"),
             (&["--batch", "3"], "3", "4"),
             (&["--seed", "7"], "7", "0"),
+            (&["--set", "batch=5"], "batch=5", "another value"),
             (&["--learn", "both"], "both", "self"),
             (&["--camera", "both"], "both", "2"),
             (&["--view-motion", "vehicle"], "vehicle", "distance"),
