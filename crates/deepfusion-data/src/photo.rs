@@ -57,15 +57,7 @@ fn number(exif: &Exif, tag: Tag) -> Option<u32> {
 /// The pinhole camera of a lens that is `focal_mm` long for film.
 fn of_film(focal_mm: f64, (width, height): (u32, u32)) -> Intrinsics {
     let diagonal = f64::from(width).hypot(f64::from(height));
-    let focal = focal_mm / FILM_DIAGONAL_MM * diagonal;
-    Intrinsics {
-        fx: focal,
-        fy: focal,
-        cx: (f64::from(width) - 1.0) / 2.0,
-        cy: (f64::from(height) - 1.0) / 2.0,
-        width,
-        height,
-    }
+    Intrinsics::centred(focal_mm / FILM_DIAGONAL_MM * diagonal, (width, height))
 }
 
 #[cfg(test)]

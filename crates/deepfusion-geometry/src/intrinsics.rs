@@ -36,6 +36,14 @@ impl Intrinsics {
         }
     }
 
+    /// Square pixels, and the principal point in the middle of the image.
+    #[must_use]
+    pub fn centred(focal_px: f64, (width, height): (u32, u32)) -> Self {
+        let middle = |side: u32| (f64::from(side) - 1.0) / 2.0;
+        let numbers = [focal_px, focal_px, middle(width), middle(height)];
+        Self::from_numbers(numbers, (width, height))
+    }
+
     /// The same camera after its image was resized to `width` × `height` with half-pixel centres
     /// (OpenCV, PIL): f' = s·f, c' = s(c + ½) − ½ on each axis.
     #[must_use]

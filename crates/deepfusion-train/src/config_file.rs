@@ -54,6 +54,12 @@ impl TrainConfig {
             return Err(wrong("expected KEY=VALUE".into()));
         };
         let (key, value) = (key.trim(), value.trim());
+        if key == "preset" {
+            // Its name alone would change, and none of its settings.
+            return Err(wrong(
+                "a preset is chosen with --preset or in the file".into(),
+            ));
+        }
         let mut parts: Vec<&str> = key.split('.').collect();
         let last = parts.pop().unwrap_or_default();
         let mut table = table_of(self)?;
@@ -205,6 +211,7 @@ mod tests {
             ("batch=none", "batch"),
             ("batsch=none", "batsch"),
             ("batch.size=3", "no table"),
+            ("preset=tiny", "--preset"),
         ] {
             let error = config.set(assignment).unwrap_err();
             assert!(matches!(error, Error::Setting { .. }));

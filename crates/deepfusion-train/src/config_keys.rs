@@ -1,7 +1,7 @@
 //! What every key of a configuration means, as its field's own comment says it.
 
 use crate::{Error, TrainConfig};
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
@@ -79,30 +79,25 @@ fn collect(root: &Value, schema: &Value, prefix: &str, keys: &mut Vec<ConfigKey>
     for (name, property) in properties {
         let own = resolved(root, property);
         let key = format!("{prefix}{name}");
-        let items = own.get("items").map(|items| resolved(root, items));
-        match items {
-            _ if is_table(own) => tables.push((format!("{key}."), own)),
-            Some(items) if is_table(items) && of_its_own(items) => {
-                tables.push((format!("{key}[]."), items));
-            }
-            _ => keys.push(ConfigKey {
-                key,
-                meaning: one_line(property.get("description").or(own.get("description"))),
-                words: words(own),
-                kind: kind(own, items),
-                default: default(own, property),
-            }),
+        if is_table(own) {
+            tables.push((format!("{key}."), own));
+            continue;
         }
+        let items = own.get("items").map(|items| resolved(root, items));
+        if let Some(items) = items.filter(|items| is_table(items)) {
+            tables.push((format!("{key}[]."), items));
+        }
+        keys.push(ConfigKey {
+            key,
+            meaning: one_line(property.get("description").or(own.get("description"))),
+            words: words(own),
+            kind: kind(own, items),
+            default: default(own, property),
+        });
     }
     for (prefix, table) in tables {
         collect(root, table, &prefix, keys);
     }
-}
-
-/// Whether the tables of a list have keys to tell of: a list of sizes is a value.
-fn of_its_own(items: &Value) -> bool {
-    let count = items.get("properties").and_then(Value::as_object);
-    count.map_or(0, Map::len) > 2
 }
 
 fn words(schema: &Value) -> Vec<(String, String)> {
@@ -125,7 +120,7 @@ fn kind(schema: &Value, items: Option<&Value>) -> &'static str {
         Some(items) => match kind(items, None) {
             "whole number" => "list of whole numbers",
             "text" => "list of texts",
-            _ => "list of { width, height }",
+            _ => "list of tables",
         },
         None if has("boolean") => "true or false",
         None if has("integer") => "whole number",
@@ -226,58 +221,10 @@ fn unset(text: &mut String, all: &[ConfigKey], told: &mut BTreeSet<String>, tabl
     }
 }
 
-/// All keys as a page of Markdown, a table each; `defaults` are what a configuration has.
-#[must_use]
-pub fn config_reference(defaults: &TrainConfig) -> String {
-    let values = toml::Table::try_from(defaults).unwrap_or_default();
-    let value_of = |key: &str| {
-        let mut parts = key.split('.');
-        let first = values.get(parts.next()?)?;
-        parts.try_fold(first, |value, part| value.get(part))
-    };
-    let mut page = String::new();
-    let mut table = None;
-    for key in config_keys() {
-        if table.as_deref() != Some(key.table()) {
-            table = Some(key.table().to_owned());
-            let title = match key.table() {
-                "" => "The run".to_owned(),
-                name => match name.strip_suffix("[]") {
-                    Some(list) => format!("`[[{list}]]`"),
-                    None => format!("`[{}]`", name.replace("[]", "")),
-                },
-            };
-            let _ = writeln!(
-                page,
-                "\n## {title}\n\n| Key | Is | Default |\n|---|---|---|"
-            );
-        }
-        let escape = |text: &str| text.replace('|', "\\|");
-        let meaning = match key.words.is_empty() {
-            true => format!("{} ({})", escape(&key.meaning), key.kind),
-            false => {
-                let word =
-                    |(word, means): &(String, String)| format!("`{word}`: {}", escape(means));
-                let words: Vec<String> = key.words.iter().map(word).collect();
-                format!("{}<br>{}", escape(&key.meaning), words.join("<br>"))
-            }
-        };
-        let own = value_of(&key.key).map(|value| match value {
-            toml::Value::Float(number) => shortest(*number),
-            other => other.to_string(),
-        });
-        let default = own.or(key.default.clone());
-        let default = default.map_or_else(String::new, |value| format!("`{value}`"));
-        let _ = writeln!(page, "| `{}` | {meaning} | {default} |", key.name());
-    }
-    page
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Preset;
-    use std::path::Path;
 
     /// Every key that any preset writes is known, and nothing is without a meaning.
     #[test]
@@ -324,23 +271,5 @@ mod tests {
                 );
             }
         }
-    }
-
-    /// The page under docs/ is what this program says. `UPDATE_REFERENCE=1` writes it anew.
-    #[test]
-    fn the_reference_page_is_up_to_date() {
-        let path =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/configuration.md");
-        let head = include_str!("config_reference_head.md");
-        let page = format!("{head}{}", config_reference(&Preset::Light.config()));
-        if std::env::var_os("UPDATE_REFERENCE").is_some() {
-            std::fs::write(&path, &page).unwrap();
-        }
-        let found = std::fs::read_to_string(&path).unwrap();
-        assert!(
-            found == page,
-            "{} is not what the comments say: run this test with UPDATE_REFERENCE=1",
-            path.display()
-        );
     }
 }

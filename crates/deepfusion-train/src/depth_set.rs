@@ -244,16 +244,8 @@ impl DepthSet {
 
 /// A lens as most phones have it, 69° wide: what is assumed of a camera that is not known.
 fn typical_camera(config: &EndlessConfig) -> Intrinsics {
-    let (width, height) = (config.width, config.height);
-    let focal = TYPICAL_FOCAL * f64::from(width);
-    Intrinsics {
-        fx: focal,
-        fy: focal,
-        cx: (f64::from(width) - 1.0) / 2.0,
-        cy: (f64::from(height) - 1.0) / 2.0,
-        width,
-        height,
-    }
+    let focal = TYPICAL_FOCAL * f64::from(config.width);
+    Intrinsics::centred(focal, (config.width, config.height))
 }
 
 /// Name and number of a frame.

@@ -50,7 +50,7 @@ pub use config::{
     Augmentation, DataConfig, LearningRateSchedule, Reprojection, ReversedPose, TrainConfig,
     ViewMotion,
 };
-pub use config_keys::{ConfigKey, config_keys, config_reference};
+pub use config_keys::{ConfigKey, config_keys};
 pub use data_set::{DataSetConfig, Learn, SimulatedConfig};
 pub use deepfusion_nn::BilinearResize;
 pub use depth_batch::{DepthBatch, DepthLoader};

@@ -1,7 +1,7 @@
 // A frame's depth: the file's own numbers.
 
 /** Standard deviation over depth from which on a place fades, and at which nothing of it is left. */
-export const FADE = [0.1, 0.5];
+export const FADE = [0.2, 0.6];
 
 /** How much of a place is shown: 1 where it is sure, 0 where it is not. */
 export function sureness(depth, sigma) {

@@ -30,7 +30,7 @@ pub struct PredictArgs {
     /// Leave out points of the cloud beyond this depth, in metres.
     #[arg(long, value_name = "M", default_value_t = 80.0, value_parser = positive)]
     pub max_depth: f64,
-    /// Leave out points of the cloud whose standard deviation is above this share of their depth (0.2: a fifth); of networks that
+    /// Leave out points of the cloud whose standard deviation is above this share of their depth (0.4: two fifths); of networks that
     /// say how sure they are.
     #[arg(long, value_name = "SHARE", value_parser = positive)]
     pub max_sigma: Option<f64>,

@@ -32,6 +32,7 @@ use self::watcher::Watcher;
 use super::live::LiveMark;
 use super::perceive::pictures;
 use super::scene::{Scale, ScaleWatch};
+use super::uncertainty;
 use super::{device, live as sources};
 use crate::cli::{Outputs, PredictArgs, PredictionArgs, Save, Shard};
 use crate::engine;
@@ -331,6 +332,11 @@ impl<'a> Job<'a> {
     fn write_outputs(&self, input: &Input, loaded: &Loaded, seen: &Seen) -> Result<Sidecar> {
         let (args, image, prediction) = (self.args, &loaded.image, &seen.prediction);
         let depth = prediction.depth();
+        let has_sigma = |save: &Save| *save == Save::Sigma || save.is_cloud();
+        let sigma = match self.outputs.save.iter().any(has_sigma) {
+            true => uncertainty::sigma(prediction, &depth, &self.intervals),
+            false => None,
+        };
         let mut files = Vec::new();
         for save in &self.outputs.save {
             let file = outputs::file_name(&input.name, *save);
@@ -339,7 +345,7 @@ impl<'a> Job<'a> {
                 prediction,
                 depth: &depth,
                 layers: &seen.layers,
-                intervals: &self.intervals,
+                sigma: sigma.as_ref(),
             };
             let limits = (self.outputs.max_depth_m, self.outputs.max_sigma);
             outputs::write(*save, limits, image, loaded.camera.as_ref(), &maps, &path)?;

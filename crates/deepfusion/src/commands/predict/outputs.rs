@@ -6,7 +6,6 @@ use std::path::Path;
 use anyhow::Result;
 use deepfusion_cloud::PointCloud;
 use deepfusion_data::{RgbImage, save_png, write_depth_png, write_unsynced};
-use deepfusion_eval::IntervalFactors;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_render::{DepthScale, depth_picture, side_by_side, with_depth_legend};
 use deepfusion_train::{LayerMaps, Prediction};
@@ -39,7 +38,8 @@ pub struct Maps<'a> {
     pub depth: &'a DepthMap,
     /// Where [`Save::Features`] was asked for.
     pub layers: &'a [LayerMaps],
-    pub intervals: &'a IntervalFactors,
+    /// The standard deviation of `depth`, where the network says it and an output has it.
+    pub sigma: Option<&'a DepthMap>,
 }
 
 /// Writes one output, whole or not at all, without waiting for the disk.
@@ -55,15 +55,14 @@ pub fn write(
         prediction,
         depth,
         layers,
-        intervals,
+        sigma,
     } = maps;
     let scale = DepthScale::default();
     match save {
         Save::DepthPng => write_depth_png(depth, path)?,
         Save::Npy => write_npy(depth, path)?,
         Save::Sigma => {
-            let sigma = uncertainty::sigma(prediction, depth, intervals);
-            write_npy(&sigma.ok_or(CliError::NoUncertainty)?, path)?;
+            write_npy(sigma.ok_or(CliError::NoUncertainty)?, path)?;
         }
         Save::Color => {
             let picture = with_depth_legend(&depth_picture(depth, &scale), &scale);
@@ -80,9 +79,8 @@ pub fn write(
             let k = camera.ok_or(CliError::NoCamera)?;
             let rgb = Some(image.as_raw().as_slice());
             let far = max_depth_m as f32;
-            let sigma = uncertainty::sigma(prediction, depth, intervals);
             let sure;
-            let depth = match (&sigma, max_sigma) {
+            let depth = match (sigma, max_sigma) {
                 (Some(sigma), Some(most)) => {
                     sure = uncertainty::without_unsure(depth, sigma, most);
                     &sure
