@@ -1,12 +1,12 @@
 """The peer of `cargo bench -p deepfusion-train -- light`: a training step of the preset `light` in PyTorch, eager.
 
 pip install torch torchvision
-python benches/peers/torch_light_step.py [--threads 2] [--size 320x96] [--batch 4]
+python benches/peers/torch_light_step.py [--threads 2] [--size 320x96] [--batch 4] [--autocast]
 
 Prints the median of ten steps on random images, in both memory layouts. A step is: depth of both frames (ResNet-18, four
 scales), motion of the pair (ResNet-18 on six channels) and its inverse, the views of both frames at the measured distance
 for four disparities enlarged to full size, SSIM + L1 with auto-mask, smoothness at each scale's size, speed loss,
-backward, gradient clipping, fused Adam.
+backward, gradient clipping, fused Adam. With --autocast the two networks run in bf16 as torch.autocast chooses.
 """
 import argparse
 
@@ -101,9 +101,12 @@ class Views:
         return F.grid_sample(sources, grid, padding_mode="border", align_corners=True), valid
 
 
-def step(depth_net, pose_net, optimiser, views, first, second, k, inverse_k, distance):
-    disparities = depth_net(torch.cat([first, second]))[::-1]  # the finest first
-    axis_angle, t = pose_net(torch.cat([first, second], 1))
+def step(depth_net, pose_net, optimiser, views, first, second, k, inverse_k, distance, autocast):
+    with torch.autocast("cpu", torch.bfloat16, enabled=autocast):
+        disparities = depth_net(torch.cat([first, second]))[::-1]  # the finest first
+        axis_angle, t = pose_net(torch.cat([first, second], 1))
+    disparities = [disparity.float() for disparity in disparities]
+    axis_angle, t = axis_angle.float(), t.float()
     r = rotation(axis_angle)
     back = r.transpose(1, 2)
     r, t = torch.cat([r, back]), torch.cat([t, -(back @ t[:, :, None])[:, :, 0]])
@@ -139,6 +142,7 @@ def main():
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--size", default="320x96")
     parser.add_argument("--batch", type=int, default=4)
+    parser.add_argument("--autocast", action="store_true")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
     width, height = map(int, args.size.split("x"))
@@ -154,9 +158,11 @@ def main():
         pose_net.decoder[-1].bias.data[5] = -1
         optimiser = torch.optim.Adam([*depth_net.parameters(), *pose_net.parameters()], LEARNING_RATE, fused=True)
         first, second = (torch.rand(args.batch, 3, height, width).to(memory_format=layout) for _ in range(2))
-        work = depth_net, pose_net, optimiser, Views(height, width), first, second, k, k.inverse(), distance
+        views = Views(height, width)
+        work = depth_net, pose_net, optimiser, views, first, second, k, k.inverse(), distance, args.autocast
         ms = median_ms(lambda: step(*work))
-        print(f"training step, preset light, {args.size}, batch {args.batch}, {name}: {ms:.1f} ms")
+        word = ", autocast bf16" if args.autocast else ""
+        print(f"training step, preset light, {args.size}, batch {args.batch}, {name}{word}: {ms:.1f} ms")
 
 
 if __name__ == "__main__":

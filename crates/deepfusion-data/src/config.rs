@@ -19,6 +19,8 @@ pub(crate) struct FolderConfig {
     pub(crate) cache: Option<PathBuf>,
     /// The table of speeds.
     pub(crate) speed: Option<PathBuf>,
+    /// Longest time between two speeds that is bridged, in seconds.
+    pub(crate) max_gap_s: Option<f64>,
     /// The table of the IMU.
     pub(crate) imu: Option<PathBuf>,
     /// The calibration file.
@@ -152,7 +154,11 @@ impl FolderConfig {
         let path = folder.join(Self::NAME);
         let mut config: Self = read_or_default(&path)?;
         config.path = path;
-        let numbers = [("fps", config.fps), ("depth_unit_m", config.depth_unit_m)];
+        let numbers = [
+            ("fps", config.fps),
+            ("depth_unit_m", config.depth_unit_m),
+            ("max_gap_s", config.max_gap_s),
+        ];
         for (key, value) in numbers {
             if let Some(bad) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
                 return Err(config.error(format!("{key} is {bad}, it must be above 0")));

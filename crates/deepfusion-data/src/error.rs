@@ -115,6 +115,18 @@ pub enum Error {
         /// What is wrong with the value.
         problem: String,
     },
+    /// A log of a vehicle's or receiver's cannot be used.
+    #[error("{}:{line}: {field}: {problem}", path.display())]
+    Log {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: u64,
+        /// The element or sentence.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// A table lacks a column, or nothing says its unit.
     #[error("{}: {problem}", path.display())]
     Columns {
@@ -441,6 +453,7 @@ impl Error {
             | Self::NoFrames { remedy, .. } => remedy,
             Self::Config { .. } => "docs/reference/ lists every key of dataset.toml and bag.toml",
             Self::Table { .. } => "correct the row or delete it",
+            Self::Log { .. } => "correct the line or delete it, or export the track anew",
             Self::Clocks { .. } => {
                 "both must count from the same moment; start_s in dataset.toml is the first frame's time on the speeds' clock"
             }

@@ -23,6 +23,7 @@ mod export;
 mod folder;
 mod frame;
 mod frame_times;
+mod gps_log;
 mod inspect;
 mod inspect_text;
 mod jpeg;

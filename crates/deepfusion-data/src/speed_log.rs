@@ -2,6 +2,7 @@
 
 use crate::clock::{TimeUnit, seconds};
 use crate::config::FolderConfig;
+use crate::gps_log::{self, GpsLog};
 use crate::table::{Column, Table, describe};
 use crate::vehicle_log::{VehicleLog, imu_readings};
 use crate::{Error, MotionModel, Result, Stream, VehicleTrack};
@@ -10,6 +11,10 @@ use std::path::{Path, PathBuf};
 
 /// Samples farther apart are not bridged, as in [`VehicleTrack`].
 const MAX_GAP_S: f64 = 0.5;
+/// A step between samples from which on a log is a slow one; what is filled in is no farther apart.
+const SLOW_S: f64 = 0.25;
+/// Longest gap of a slow log that is bridged unasked: a car does not stop and start again within it.
+const MOST_BRIDGED_S: f64 = 3.5;
 const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timestamps"];
 const SPEEDS: [&str; 4] = ["speed", "velocity", "vehicle_speed", "v"];
 const YAW_RATES: [&str; 6] = [
@@ -44,35 +49,48 @@ pub(crate) struct SpeedLog {
 }
 
 impl SpeedLog {
-    /// Reads the tables that `dataset.toml` names, or `speed.csv` and `imu.csv`; `None` without speeds.
+    /// Reads the tables that `dataset.toml` names, or `speed.csv` and `imu.csv`, or a receiver's track in place of the first;
+    /// `None` without speeds.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] where a named table is absent, [`crate::Error::Columns`] where a column is
+    /// [`crate::Error::Config`] where a named table is absent, [`crate::Error::Log`] for a track that cannot be read, [`crate::Error::Columns`] where a column is
     /// missing or its unit is not said, [`crate::Error::Table`] for a bad value or a time that goes back.
     pub(crate) fn read(folder: &Path, config: &FolderConfig) -> Result<Option<Self>> {
         let speed = config.find(folder, "speed", config.speed.as_ref(), &["speed.csv"])?;
         let imu = config.find(folder, "imu", config.imu.as_ref(), &["imu.csv"])?;
+        let speed = match speed {
+            None => gps_log::in_folder(folder, config)?,
+            named => named,
+        };
         let Some(path) = speed else {
             return Ok(None);
         };
-        let table = Table::read(&path)?;
         let mut remarks = Vec::new();
-        let ns = times(&table, config, &mut remarks, &name(&path))?;
-        let column = table.require(&SPEEDS, "time_s,speed_mps")?;
-        let factor = speed_factor(&table, column, config)? * config.speed_scale();
-        let values = scaled(table.numbers(column)?, factor);
-        let mut streams = vec![stream(&path, "speed", &ns)];
-        let speeds_mps = Samples { ns, values };
+        let (measured, table) = match gps_log::is_gps(&path) {
+            true => (of_track(&path, config, &mut remarks)?, None),
+            false => {
+                let table = Table::read(&path)?;
+                let ns = times(&table, config, &mut remarks, &name(&path))?;
+                let column = table.require(&SPEEDS, "time_s,speed_mps")?;
+                let factor = speed_factor(&table, column, config)? * config.speed_scale();
+                let values = scaled(table.numbers(column)?, factor);
+                (Samples { ns, values }, Some(table))
+            }
+        };
+        let mut streams = vec![stream(&path, "speed", &measured.ns)];
         let (mut yaw_rates_radps, mut vehicle) = (None, None);
         let mut yaw_table = None;
-        if let Some(column) = table.column(&YAW_RATES) {
-            yaw_table = Some((table.numbers(column)?, yaw_factor(&table, column, config)?));
+        if let Some(table) = &table
+            && let Some(column) = table.column(&YAW_RATES)
+        {
+            yaw_table = Some((table.numbers(column)?, yaw_factor(table, column, config)?));
         }
         if let Some((values, factor)) = yaw_table {
-            yaw_rates_radps = Some(Samples {
-                ns: speeds_mps.ns.clone(),
+            let yaw_rates = Samples {
+                ns: measured.ns.clone(),
                 values: scaled(values, factor),
-            });
+            };
+            yaw_rates_radps = Some(yaw_rates.bridged(config.max_gap_s, None));
         } else if let Some(imu) = imu {
             let table = Table::read(&imu)?;
             let ns = times(&table, config, &mut remarks, &name(&imu))?;
@@ -97,14 +115,7 @@ impl SpeedLog {
                 name(&path)
             ));
         }
-        let rate = streams[0].rate_hz;
-        if let Some(rate) = rate.filter(|r| *r < 1.0 / MAX_GAP_S) {
-            remarks.push(format!(
-                "{}: {rate:.1} samples a second; across more than {MAX_GAP_S} s the speed counts as unknown, \
-                 so no pair can be used",
-                name(&path)
-            ));
-        }
+        let speeds_mps = measured.bridged(config.max_gap_s, Some((&mut remarks, &name(&path))));
         Ok(Some(Self {
             path,
             speeds_mps,
@@ -154,6 +165,64 @@ impl SpeedLog {
 }
 
 impl Samples {
+    /// The same with gaps that are longer than [`MAX_GAP_S`] and not too long filled in a straight line: to `most` seconds, else to
+    /// three times the usual step where that is long, a few seconds at most. What was done is added to the remarks.
+    fn bridged(mut self, most: Option<f64>, remarks: Option<(&mut Vec<String>, &str)>) -> Self {
+        let steps = self.ns.windows(2).map(|w| seconds(w[1], w[0]));
+        let mut steps: Vec<f64> = steps.collect();
+        steps.sort_by(f64::total_cmp);
+        let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+        let most = most.unwrap_or(match usual > SLOW_S {
+            true => (3.0 * usual).min(MOST_BRIDGED_S),
+            false => MAX_GAP_S,
+        });
+        let (mut ns, mut values) = (Vec::new(), Vec::new());
+        let (mut filled, mut longest, mut left) = (0, 0.0_f64, 0);
+        for i in 0..self.ns.len() {
+            if let Some(before) = i.checked_sub(1) {
+                let gap = seconds(self.ns[i], self.ns[before]);
+                if gap > MAX_GAP_S && gap <= most {
+                    (filled, longest) = (filled + 1, longest.max(gap));
+                    let parts = (gap / SLOW_S).ceil() as i64;
+                    for part in 1..parts {
+                        let share = part as f64 / parts as f64;
+                        let step = self.ns[i] - self.ns[before];
+                        ns.push(self.ns[before] + (step as f64 * share).round() as i64);
+                        let (a, b) = (self.values[before], self.values[i]);
+                        values.push(a + (b - a) * share);
+                    }
+                } else if gap > MAX_GAP_S {
+                    left += 1;
+                }
+            }
+            ns.push(self.ns[i]);
+            values.push(self.values[i]);
+        }
+        if let Some((remarks, name)) = remarks {
+            let gaps = |n: usize| {
+                if n == 1 {
+                    "1 gap".into()
+                } else {
+                    format!("{n} gaps")
+                }
+            };
+            if filled > 0 {
+                remarks.push(format!(
+                    "{name}: {} of up to {longest:.1} s between speeds are bridged in a straight line (max_gap_s in dataset.toml)",
+                    gaps(filled)
+                ));
+            }
+            if left > 0 {
+                remarks.push(format!(
+                    "{name}: {} of more than {most:.1} s, across which the speed counts as unknown (max_gap_s in dataset.toml)",
+                    gaps(left)
+                ));
+            }
+        }
+        (self.ns, self.values) = (ns, values);
+        self
+    }
+
     /// The value at a time, straight between its neighbours; `None` beyond the ends and across gaps.
     fn at(&self, ns: i64) -> Option<f64> {
         let after = self.ns.partition_point(|t| *t < ns);
@@ -167,6 +236,33 @@ impl Samples {
         (gap_s <= MAX_GAP_S)
             .then(|| self.values[before] + (self.values[after] - self.values[before]) * part)
     }
+}
+
+/// The speeds of a receiver's track.
+fn of_track(path: &Path, config: &FolderConfig, remarks: &mut Vec<String>) -> Result<Samples> {
+    let log = GpsLog::read(path)?;
+    let (name, scale) = (name(path), config.speed_scale());
+    if log.speeds.len() < log.fixes {
+        let lost = log.fixes - log.speeds.len();
+        remarks.push(format!(
+            "{name}: {lost} of {} fixes stand alone or go back in time and are left out",
+            log.fixes
+        ));
+    }
+    let mut sigmas: Vec<f64> = log.speeds.iter().map(|s| s.sigma_mps).collect();
+    sigmas.sort_by(f64::total_cmp);
+    let from = match log.measured {
+        true => "as the receiver measured them",
+        false => "from its positions, smoothed",
+    };
+    remarks.push(format!(
+        "{name}: speeds {from}, sure to {:.2} m/s in the middle",
+        sigmas[sigmas.len() / 2]
+    ));
+    Ok(Samples {
+        ns: log.ns,
+        values: scaled(log.speeds.iter().map(|s| s.speed_mps).collect(), scale),
+    })
 }
 
 /// The table's times in nanoseconds, which must rise; equal ones are told once.

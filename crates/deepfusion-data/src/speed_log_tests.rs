@@ -123,14 +123,83 @@ fn repeated_times_and_slow_clocks_are_told() {
         log.remarks
     );
     assert_eq!(log.track(0).times_s(), [0.0, 0.1]);
-    let log = read(&[("speed.csv", "time_s,speed_mps\n0,1\n1,2\n2,1\n")]).unwrap();
     assert!(
-        log.remarks
-            .iter()
-            .any(|r| r.contains("1.0 samples a second")),
+        !log.remarks.iter().any(|r| r.contains("gap")),
         "{:?}",
         log.remarks
     );
+}
+
+/// A speed a second, as receivers and phones write it, is bridged; a hole in it is not, and one in a fast log neither, unless
+/// `dataset.toml` says so.
+#[test]
+fn slow_logs_are_bridged() {
+    let known = |text: &str, config: &str, at: &[f64]| {
+        let log = read(&[("speed.csv", text), ("dataset.toml", config)]).unwrap();
+        let track = log.track(0);
+        let known: Vec<Option<f64>> = at.iter().map(|t| track.speed_at(*t)).collect();
+        (known, log.remarks.join("; "))
+    };
+    let slow = "time_s,speed_mps\n0,1\n1,2\n2,1\n3,1\n7,1\n8,1\n";
+    let (speeds, remarks) = known(slow, "", &[0.5, 1.25, 5.0]);
+    assert_eq!(speeds, [Some(1.5), Some(1.75), None]);
+    assert!(
+        remarks.contains("4 gaps of up to 1.0 s between speeds are bridged"),
+        "{remarks}"
+    );
+    assert!(remarks.contains("1 gap of more than 3.0 s"), "{remarks}");
+    assert_eq!(known(slow, "max_gap_s = 4", &[5.0]).0, [Some(1.0)]);
+    assert_eq!(known(slow, "max_gap_s = 0.4", &[0.5]).0, [None]);
+
+    let mut fast: String = (0..20)
+        .map(|i| format!("{},1\n", f64::from(i) / 10.0))
+        .collect();
+    fast = format!("time_s,speed_mps\n{fast}3.5,1\n3.6,1\n");
+    assert_eq!(known(&fast, "", &[1.0, 2.7]).0, [Some(1.0), None]);
+    assert_eq!(known(&fast, "max_gap_s = 2", &[2.7]).0, [Some(1.0)]);
+    let error = refusal(&[("speed.csv", slow), ("dataset.toml", "max_gap_s = 0")]);
+    assert!(error.to_string().contains("max_gap_s is 0"), "{error}");
+}
+
+#[test]
+fn a_track_stands_for_speeds() {
+    let point = |i: i32| {
+        format!(
+            "<trkpt lat=\"{:.7}\" lon=\"8.4\"><time>2026-05-01T12:00:{i:02}Z</time></trkpt>",
+            49.0 + f64::from(i) * 1e-4
+        )
+    };
+    let points: String = (0..20).map(point).collect();
+    let gpx = format!("<gpx><trk><trkseg>{points}</trkseg></trk></gpx>");
+    let log = read(&[
+        ("walk.gpx", &gpx),
+        ("dataset.toml", "vehicle.speed_scale = 0.5"),
+    ])
+    .unwrap();
+    let speed = log.speeds_mps.at(1_777_636_805_400_000_000).unwrap();
+    assert!((speed - 0.5 * 11.12).abs() < 0.02, "{speed}");
+    assert!(
+        log.remarks
+            .iter()
+            .any(|r| r.contains("from its positions, smoothed")),
+        "{:?}",
+        log.remarks
+    );
+    let error = refusal(&[("a.gpx", &gpx), ("b.gpx", &gpx)]);
+    assert!(error.to_string().contains("2 tracks are there"), "{error}");
+    let named = read(&[
+        ("a.gpx", &gpx),
+        ("b.gpx", &gpx),
+        ("dataset.toml", "speed = 'b.gpx'"),
+    ])
+    .unwrap();
+    assert!(named.path.ends_with("b.gpx"));
+    let both = read(&[
+        ("a.gpx", &gpx),
+        ("speed.csv", "time_s,speed_mps\n0,1\n0.1,1\n"),
+    ])
+    .unwrap();
+    assert!(both.path.ends_with("speed.csv"));
 }
 
 #[test]

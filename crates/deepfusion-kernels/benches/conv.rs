@@ -2,7 +2,9 @@
 //! in multiply-adds; a multiply-add is two floating-point operations.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use deepfusion_kernels::{ConvShape, conv2d, conv2d_backward_input, conv2d_backward_weight};
+use deepfusion_kernels::{
+    ConvShape, Precision, conv2d, conv2d_backward_input, conv2d_backward_weight, has_bf16,
+};
 
 /// Layers of the ResNet-18 depth network at 320×96, both frames of a batch of 4.
 fn shapes() -> Vec<(&'static str, ConvShape)> {
@@ -18,6 +20,7 @@ fn shapes() -> Vec<(&'static str, ConvShape)> {
         padding: k / 2,
         dilation: 1,
         reflect,
+        precision: Precision::F32,
     };
     vec![
         ("conv1 7x7/2", layer((3, 64), (96, 320), 7, 2, false)),
@@ -49,15 +52,24 @@ fn conv(criterion: &mut Criterion) {
         let grad = values(shape.out_len());
         let mut out = vec![0.0; shape.out_len()];
         let (mut grad_x, mut grad_weight) = (x.clone(), weight.clone());
-        group.bench_function(BenchmarkId::from_parameter("forward"), |b| {
-            b.iter(|| conv2d(&shape, &x, &weight, None, &mut out));
-        });
-        group.bench_function(BenchmarkId::from_parameter("input gradient"), |b| {
-            b.iter(|| conv2d_backward_input(&shape, &weight, &grad, &mut grad_x));
-        });
-        group.bench_function(BenchmarkId::from_parameter("weight gradient"), |b| {
-            b.iter(|| conv2d_backward_weight(&shape, &x, &grad, &mut grad_weight));
-        });
+        for (precision, suffix) in [(Precision::F32, ""), (Precision::Bf16, " bf16")] {
+            let pairs = |channels: usize| channels.is_multiple_of(16);
+            let fits = pairs(shape.in_channels) && pairs(shape.out_channels) && has_bf16();
+            if precision == Precision::Bf16 && !fits {
+                continue;
+            }
+            let shape = ConvShape { precision, ..shape };
+            let id = |pass: &str| BenchmarkId::from_parameter(format!("{pass}{suffix}"));
+            group.bench_function(id("forward"), |b| {
+                b.iter(|| conv2d(&shape, &x, &weight, None, &mut out));
+            });
+            group.bench_function(id("input gradient"), |b| {
+                b.iter(|| conv2d_backward_input(&shape, &weight, &grad, &mut grad_x));
+            });
+            group.bench_function(id("weight gradient"), |b| {
+                b.iter(|| conv2d_backward_weight(&shape, &x, &grad, &mut grad_weight));
+            });
+        }
     }
 }
 

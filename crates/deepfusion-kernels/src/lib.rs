@@ -11,6 +11,8 @@ mod box_filter;
 mod conv;
 mod correlation;
 mod lanes;
+#[cfg(target_arch = "x86_64")]
+pub mod matrix_unit;
 mod photometric;
 mod project;
 mod scratch;
@@ -27,7 +29,9 @@ mod noise;
 pub use activation::{channel_sums, elu, elu_backward};
 pub use adam::{AdamStep, adam, sum_of_squares};
 pub use batch_norm::{BatchNormSaved, batch_norm, batch_norm_backward, batch_norm_inference};
-pub use conv::{ConvShape, conv2d, conv2d_backward_input, conv2d_backward_weight};
+pub use conv::{
+    ConvShape, Precision, conv2d, conv2d_backward_input, conv2d_backward_weight, has_bf16,
+};
 pub use correlation::{
     CorrelationShape, local_correlation, local_correlation_backward_first,
     local_correlation_backward_second,

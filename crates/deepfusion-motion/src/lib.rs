@@ -46,6 +46,7 @@ mod identify;
 mod image_motion;
 mod imu;
 mod motion_model;
+mod positions;
 mod road_height;
 mod scale_correction;
 mod scale_monitor;
@@ -66,6 +67,7 @@ pub use imu::{
     ImuConfig, ImuMount, ImuSample, ImuTrack, Standstill, StandstillConfig, standstills,
 };
 pub use motion_model::MotionModel;
+pub use positions::{Fix, FixSpeed, speeds_of_fixes};
 pub use road_height::{
     GreyImage, GroundPair, RoadTexture, SWEEP_M, SWEEP_RATIO, implied_camera_height,
 };

@@ -39,6 +39,7 @@ impl Conv2dConfig {
                 padding: kernel / 2,
                 dilation: 1,
                 reflect: false,
+                precision: ops::Precision::F32,
             },
             bias: true,
             init: WeightInit::UniformFanIn,

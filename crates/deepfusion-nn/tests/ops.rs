@@ -60,6 +60,7 @@ fn convolution() {
                 padding,
                 dilation,
                 reflect,
+                ..ConvOptions::default()
             };
             let (x, w) = (
                 random(size, &device),
@@ -91,6 +92,58 @@ fn convolution() {
             assert_close(&format!("{name} bias"), a.3, b.3);
         }
     }
+}
+
+/// Within `autocast` a convolution and its gradients see their numbers rounded to bf16, and nothing else changes; after it,
+/// and on a processor without bf16, they do not.
+#[test]
+fn convolutions_within_autocast() {
+    let device = Device::flex().autodiff();
+    let options = ConvOptions {
+        padding: 1,
+        reflect: true,
+        ..ConvOptions::default()
+    };
+    let rounded = |t: &Tensor<4>| {
+        let data = t.clone().into_data();
+        let values = data.iter::<f32>().map(|v| {
+            let bits = v.to_bits();
+            f32::from_bits((bits + 0x7fff + ((bits >> 16) & 1)) & 0xffff_0000)
+        });
+        let values: Vec<f32> = values.collect();
+        Tensor::<1>::from_data(values.as_slice(), &device).reshape(t.dims())
+    };
+    let (x, w) = (
+        random([2, 32, 6, 9], &device),
+        random([48, 32, 3, 3], &device),
+    );
+    let weights = random([2, 48, 6, 9], &device);
+    let run = |x: &Tensor<4>, w: &Tensor<4>, weights: &Tensor<4>, precision| {
+        let (x, w) = (leaf(x), leaf(w));
+        let y = ops::autocast(precision, || {
+            ops::conv2d(x.clone(), w.clone(), None, options)
+        });
+        // The gradients are asked for outside.
+        let gradients = y.clone().mul(weights.clone()).sum().backward();
+        let (gx, gw) = (x.grad(&gradients).unwrap(), w.grad(&gradients).unwrap());
+        (y.inner(), gx, gw)
+    };
+    let (bf16, f32) = (ops::Precision::Bf16, ops::Precision::F32);
+    let a = run(&x, &w, &weights, bf16);
+    let b = if ops::supports(&device, bf16) {
+        run(&rounded(&x), &rounded(&w), &rounded(&weights), f32)
+    } else {
+        run(&x, &w, &weights, f32)
+    };
+    assert_close("output", a.0, b.0);
+    assert_close("x", a.1, b.1);
+    assert_close("weight", a.2, b.2);
+
+    let outside = |x: &Tensor<4>| ops::conv2d(x.clone(), w.clone(), None, options).into_data();
+    let before = outside(&x);
+    let inner = ops::autocast(bf16, || ops::autocast(f32, || outside(&x)));
+    assert_eq!(inner, before, "the inner one counts");
+    assert_eq!(outside(&x), before, "nothing is left of it");
 }
 
 #[test]

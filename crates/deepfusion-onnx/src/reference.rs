@@ -156,6 +156,7 @@ impl Plan<'_> {
             padding: conv.reach(),
             dilation: conv.dilation,
             reflect: conv.border == Border::Reflect,
+            precision: deepfusion_kernels::Precision::F32,
         };
         let mut y = vec![0.0; shape.out_len()];
         conv2d(

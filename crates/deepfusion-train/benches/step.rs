@@ -4,6 +4,7 @@
 use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{BatchSize, Criterion, criterion_group};
 use deepfusion_infer::{Engine, Precision};
+use deepfusion_nn::ops::{self, Precision::Bf16};
 use deepfusion_nn::{DepthNet, DepthNetConfig, ResNetDepth, depth_graph, weights};
 use deepfusion_train::{
     Adam, Model, Motion, NamedGradients, Preset, Schedule, SnippetBatch, TrainConfig,
@@ -111,8 +112,12 @@ fn snippets(batch: usize, height: usize, width: usize, device: &Device) -> Snipp
 /// A whole training step of the preset `light` at 320×96, batch 4: depth of both frames, motion, views, the
 /// preset's losses, backward, clipped Adam; the batch is there already.
 fn light_step(criterion: &mut Criterion) {
-    let config = Preset::Light.config();
-    training_step(criterion, "training step, preset light", config);
+    let mut config = Preset::Light.config();
+    training_step(criterion, "training step, preset light", config.clone());
+    config.precision = Bf16;
+    if ops::supports(&Device::flex(), Bf16) {
+        training_step(criterion, "training step, preset light, bf16", config);
+    }
 }
 
 /// The same with every loss: optical flow both ways, what moves, agreement, affine invariance.
@@ -136,8 +141,9 @@ fn training_step(criterion: &mut Criterion, name: &str, mut config: TrainConfig)
     };
     criterion.bench_function(&format!("{name}, 320x96, batch 4"), |b| {
         b.iter(|| {
-            let pass = model.forward(&batch);
-            let loss = model.loss(&pass, &batch, schedule);
+            let loss = ops::autocast(config.precision, || {
+                model.loss(&model.forward(&batch), &batch, schedule)
+            });
             let mut raw = loss.total.backward();
             let mut gradients = NamedGradients::default();
             gradients.add("depth", &model.depth_net, &mut raw, 1.0);

@@ -1,5 +1,6 @@
 use crate::{DataSetConfig, Error, Learn, LossConfig, Preset};
 use deepfusion_geometry::Intrinsics;
+use deepfusion_nn::ops::Precision;
 use deepfusion_nn::{
     AttentionConfig, AttentionForm, DepthNetConfig, FlowDecoderConfig, HceConfig, InputSize,
     PoseNetConfig,
@@ -152,6 +153,10 @@ pub struct TrainConfig {
     pub clip_norm: f64,
     /// Decides everything random.
     pub seed: u64,
+    /// How the networks' convolutions multiply while they learn. What a trained network then predicts is computed in f32, or
+    /// as its runner says.
+    #[serde(default)]
+    pub precision: Precision,
     /// The weights to begin from, as `--init` takes them: a path, or with `init_sha256` the name of a network that the program carries.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub init: Option<PathBuf>,

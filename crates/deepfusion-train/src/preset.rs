@@ -3,6 +3,7 @@ use crate::config::{
     ViewMotion,
 };
 use crate::loss_config::{CompareAt, DepthLossConfig, FlowLossConfig, LossConfig, MovingConfig};
+use deepfusion_nn::ops::Precision;
 use deepfusion_nn::{
     DecoderConfig, DepthNetConfig, FlowDecoderConfig, InputSize, PoseNetConfig, ResNetConfig,
     ResNetDepth,
@@ -91,6 +92,7 @@ impl Preset {
             weight_decay: 0.0,
             clip_norm: 10.0,
             seed: 0,
+            precision: Precision::F32,
             init: None,
             init_sha256: None,
             min_speed_mps: 0.5,

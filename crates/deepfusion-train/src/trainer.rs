@@ -7,6 +7,7 @@ use crate::{
     RunFolder, SamplePanel, SampleSet, Sampler, Schedule, StepOutcome, TrainConfig, TrainEvent,
 };
 use burn::tensor::{Device, Tensor};
+use deepfusion_nn::ops::{Precision, autocast, supports};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -73,6 +74,7 @@ impl Trainer {
         init: impl FnOnce(Model) -> Result<Model, Error>,
     ) -> Result<Self, Error> {
         config.validate()?;
+        check_precision(&config, device)?;
         config.make_absolute();
         check_samples(&config, &train, &validation)?;
         if config.pose_net.metres_per_unit == 0.0 {
@@ -118,6 +120,7 @@ impl Trainer {
         (train, validation): (SampleSet, SampleSet),
         device: &Device,
     ) -> Result<Self, Error> {
+        check_precision(&config, device)?;
         check_samples(&config, &train, &validation)?;
         let device = device.clone().autodiff();
         let (model, adam, state) = folder.load(CheckpointKind::Last, &config, &device)?;
@@ -221,8 +224,11 @@ impl Trainer {
                 if let Some(loader) = &loaders.video {
                     let batch = next(|| loader.next(&self.device))?;
                     images += batch.len() * (1 + batch.offsets.len());
-                    let pass = self.model.forward(&batch);
-                    let loss = self.model.loss(&pass, &batch, schedule);
+                    let (pass, loss) = autocast(self.config.precision, || {
+                        let pass = self.model.forward(&batch);
+                        let loss = self.model.loss(&pass, &batch, schedule);
+                        (pass, loss)
+                    });
                     self.check_finite(&loss.terms, &batch.names)?;
                     losses.add(&loss.terms, scale);
                     low_view.add(loss.terms.valid_share);
@@ -237,7 +243,7 @@ impl Trainer {
                 if let Some(loader) = &loaders.depth {
                     let batch = next(|| loader.next(&self.device))?;
                     images += batch.len();
-                    let pass = self.model.learn_depth(&batch);
+                    let pass = autocast(self.config.precision, || self.model.learn_depth(&batch));
                     self.check_finite(&pass.terms, &batch.names)?;
                     losses.add(&pass.terms, scale);
                     if loaders.video.is_none() {
@@ -505,6 +511,24 @@ fn first_unit(config: &TrainConfig, set: &SampleSet) -> f64 {
         true => 1.0,
         false => config.first_unit(set.mean_displacement_m()),
     }
+}
+
+/// # Errors
+/// [`Error::Config`] where the device cannot do what the configuration asks for.
+fn check_precision(config: &TrainConfig, device: &Device) -> Result<(), Error> {
+    if supports(device, config.precision) {
+        return Ok(());
+    }
+    Err(Error::Config {
+        field: "precision",
+        expected: "\"f32\" (bf16 needs a processor with AVX512-BF16 or AMX, and --device cpu)"
+            .into(),
+        found: match config.precision {
+            Precision::F32 => "f32",
+            Precision::Bf16 => "bf16",
+        }
+        .into(),
+    })
 }
 
 /// # Errors

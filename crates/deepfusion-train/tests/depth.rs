@@ -4,6 +4,7 @@ mod support;
 
 use burn::tensor::Device;
 use deepfusion_data::{Dataset, OpenOptions};
+use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_nn::{InputSize, weights};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{
@@ -329,4 +330,32 @@ fn sets_that_cannot_be_learned_from_so_are_refused_by_field() {
         let error = config.validate().unwrap_err().to_string();
         assert!(error.contains(&format!("`{field}`")), "{error}");
     }
+}
+
+/// Pairs of bf16 learn as f32 does: the same views, nearly the same losses. Where the processor cannot, the run is refused.
+#[test]
+fn convolutions_in_bf16_learn_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = streets(12);
+    config.depth_net.encoder = config.depth_net.encoder.with_base_width(16);
+    config.depth_net.decoder.widths = [16; 5];
+    let (exact, _) = run(&mut trainer(&config, &folder.path().join("f32")), None);
+    config.precision = Precision::Bf16;
+    let at = folder.path().join("bf16");
+    if !supports(&Device::flex(), Precision::Bf16) {
+        let sets = samples(&config).unwrap();
+        let run = RunFolder::create(&at).unwrap();
+        let error = Trainer::create(config, run, sets, &Device::flex(), Ok).unwrap_err();
+        assert!(error.to_string().contains("`precision`"), "{error}");
+        return;
+    }
+    let (pairs, _) = run(&mut trainer(&config, &at), None);
+    assert_eq!(pairs.len(), exact.len());
+    for (step, (a, b)) in pairs.iter().zip(&exact).enumerate() {
+        let (a, b) = (a.depth, b.depth);
+        assert!((a - b).abs() < 0.02 * b, "step {step}: {a} instead of {b}");
+    }
+    assert_ne!(pairs[0].depth, exact[0].depth, "bf16 was used");
+    let stored = std::fs::read_to_string(at.join("config.toml")).unwrap();
+    assert!(stored.contains("precision = \"bf16\""));
 }

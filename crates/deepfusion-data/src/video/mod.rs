@@ -8,6 +8,7 @@ pub(crate) mod program;
 pub use encode::{Shown, can_write_video, shown_for, write_video};
 
 use crate::calibration::find_camera;
+use crate::clock::{TimeUnit, seconds};
 use crate::config::FolderConfig;
 use crate::folder::{CAMERA_REMEDY, NO_MOUNT};
 use crate::frame_times::{TimedImage, from_start, numbers_by_time};
@@ -21,7 +22,7 @@ use std::sync::Mutex;
 
 /// Endings of the files that are taken for videos.
 const ENDINGS: [&str; 7] = ["mp4", "mkv", "mov", "avi", "hevc", "m4v", "webm"];
-const SPEED_REMEDY: &str = "training needs speed.csv (time_s,speed_mps) beside the video; evaluation and prediction do not";
+const SPEED_REMEDY: &str = "training needs speed.csv (time_s,speed_mps) or a GPS track (.gpx, .nmea) beside the video; evaluation and prediction do not";
 
 /// Whether a file is named like a video.
 pub(crate) fn is_video(path: &Path) -> bool {
@@ -90,13 +91,25 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
             vec![None; video.len()]
         }
     };
-    let times = from_start(times, config.start_s);
+    let speeds = SpeedLog::read(&folder, &config)?;
+    let start_s = config.start_s.or_else(|| {
+        let (created, log) = (video.probed.created_ns?, speeds.as_ref()?);
+        let ns = &log.speeds_mps.ns;
+        let start = begun(created, &times, (*ns.first()?, *ns.last()?))?;
+        remarks.push(format!(
+            "the video is taken to begin at {}, as its recorder says (start_s = {:.3} in dataset.toml; another moves it)",
+            jiff::Timestamp::from_nanosecond(start.into()).map_or_else(|_| "?".into(), |t| t.to_string()),
+            seconds(start, 0)
+        ));
+        Some(seconds(start, 0))
+    });
+    let times = from_start(times, start_s);
     let known: Option<Vec<i64>> = times.iter().copied().collect();
     let numbers = match known {
         Some(known) => numbers_by_time(&known),
         None => (0..video.len() as u64).collect(),
     };
-    if config.start_s.is_none() {
+    if start_s.is_none() {
         remarks.push(
             "the video's time stamps are taken to be on the tables' clock (start_s in dataset.toml moves them)"
                 .into(),
@@ -118,7 +131,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         calibration,
         camera_ahead_s: config.camera_ahead_s(options),
         image_size: video.size(),
-        speeds: SpeedLog::read(&folder, &config)?,
+        speeds,
         cam_from_vehicle: config.cam_from_vehicle(),
         depth: None,
         world_from_cam: BTreeMap::new(),
@@ -129,6 +142,27 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         folder,
     }
     .into_dataset()
+}
+
+/// When a video of dates' speeds began, whose own times count from 0: recorders say when it was made, and mean its first frame or
+/// its last; that is taken of which more lies within the log. `None` where the video's times are dates themselves, or the log's are
+/// none.
+fn begun(created_ns: i64, times: &[Option<i64>], log: (i64, i64)) -> Option<i64> {
+    let (first, last) = ((*times.first()?)?, (*times.last()?)?);
+    let is_date = |ns: i64| TimeUnit::of_date(ns as f64).is_some();
+    if is_date(first) || !is_date(log.0) {
+        return None;
+    }
+    let length = last.saturating_sub(first);
+    let within = |start: i64| {
+        let end = start.saturating_add(length).min(log.1);
+        end.saturating_sub(start.max(log.0)).max(0)
+    };
+    let from_end = created_ns.saturating_sub(length);
+    Some(match within(from_end) > within(created_ns) {
+        true => from_end,
+        false => created_ns,
+    })
 }
 
 /// A video's frames: counted when it is opened, decoded when the first of them is read.
@@ -189,5 +223,43 @@ impl VideoFrames {
             }
         }
         load_rgb(&decode::frame_path(&self.cache, index))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A minute of video, made at the moment that both kinds of recorders write.
+    #[test]
+    fn a_video_begins_where_its_log_has_speeds() {
+        const S: i64 = 1_000_000_000;
+        let day = 1_700_000_000 * S;
+        let times = [Some(0), Some(30 * S), Some(60 * S)];
+        let log = (day, day + 60 * S);
+        assert_eq!(
+            begun(day, &times, log),
+            Some(day),
+            "it was made when it began"
+        );
+        assert_eq!(
+            begun(day + 60 * S, &times, log),
+            Some(day),
+            "or when it ended"
+        );
+        let longer = (day - 600 * S, day + 600 * S);
+        assert_eq!(
+            begun(day, &times, longer),
+            Some(day),
+            "either fits: the first frame"
+        );
+        assert_eq!(
+            begun(day, &times, (0, 60 * S)),
+            None,
+            "the log counts from 0, too"
+        );
+        let dates = times.map(|t| t.map(|t| t + day));
+        assert_eq!(begun(day, &dates, log), None, "the video's times are dates");
+        assert_eq!(begun(day, &[None], log), None);
     }
 }

@@ -15,6 +15,9 @@ pub(super) struct Probed {
     pub(super) frames: usize,
     /// Their times in order, in nanoseconds; `None` where the file has none.
     pub(super) times_ns: Option<Vec<i64>>,
+    /// When the recorder says that the video was made, in nanoseconds since 1970: its first frame of some recorders, its last of
+    /// others.
+    pub(super) created_ns: Option<i64>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -23,6 +26,19 @@ struct Answer {
     packets: Vec<Packet>,
     #[serde(default)]
     streams: Vec<StreamAnswer>,
+    #[serde(default)]
+    format: FormatAnswer,
+}
+
+#[derive(Debug, Default, Deserialize)]
+struct FormatAnswer {
+    #[serde(default)]
+    tags: Tags,
+}
+
+#[derive(Debug, Default, Deserialize)]
+struct Tags {
+    creation_time: Option<String>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -48,7 +64,7 @@ struct SideData {
 /// Looks at the first video stream. Its packets are listed rather than its frames: that needs no decoding,
 /// and each packet is a frame.
 pub(super) fn probe(file: &Path) -> Result<Probed> {
-    let entries = "packet=pts_time,flags:stream=width,height:stream_side_data=rotation";
+    let entries = "packet=pts_time,flags:stream=width,height:stream_side_data=rotation:format_tags=creation_time";
     let arguments = [
         "-v",
         "error",
@@ -108,7 +124,15 @@ fn parse(json: &[u8]) -> std::result::Result<Probed, String> {
         },
         frames: shown.len(),
         times_ns: distinct,
+        created_ns: created(answer.format.tags.creation_time.as_deref()),
     })
+}
+
+/// A date with its zone; recorders without a clock write 1904 or 1970, which is none.
+fn created(word: Option<&str>) -> Option<i64> {
+    let stamp: jiff::Timestamp = word?.parse().ok()?;
+    let ns = i64::try_from(stamp.as_nanosecond()).ok()?;
+    TimeUnit::of_date(ns as f64).map(|_| ns)
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@
 //! stable intrinsics, so they are written as assembly.
 
 use std::arch::asm;
-use std::sync::OnceLock;
+
+use deepfusion_kernels::matrix_unit::{TileSizes, configured};
 
 use super::{Finish, Place};
 use crate::Conv;
@@ -33,46 +34,6 @@ const SUMS: usize = 4 * TILE_SUMS;
 const INPUTS_AT_ONCE: usize = 512;
 /// Strips of a task: their inputs and outputs stay in the second cache.
 const STRIPS_AT_ONCE: usize = 32;
-
-/// Whether the processor has the unit and the system lets this process use it.
-pub(super) fn available() -> bool {
-    static AVAILABLE: OnceLock<bool> = OnceLock::new();
-    *AVAILABLE.get_or_init(|| has_tiles() && may_use_tiles())
-}
-
-fn has_tiles() -> bool {
-    use std::arch::x86_64::{__cpuid, __cpuid_count};
-    const BF16: u32 = 1 << 22;
-    const TILES: u32 = 1 << 24;
-    __cpuid(0).eax >= 7 && __cpuid_count(7, 0).edx & (BF16 | TILES) == BF16 | TILES
-}
-
-/// Linux grants the tile registers' state to a process that asks for it; its threads share the grant.
-#[cfg(target_os = "linux")]
-fn may_use_tiles() -> bool {
-    const ARCH_PRCTL: i64 = 158;
-    const ARCH_REQ_XCOMP_PERM: i64 = 0x1023;
-    const XFEATURE_XTILEDATA: i64 = 18;
-    let result: i64;
-    // SAFETY: a system call that reads no memory of ours.
-    unsafe {
-        asm!(
-            "syscall",
-            inlateout("rax") ARCH_PRCTL => result,
-            in("rdi") ARCH_REQ_XCOMP_PERM,
-            in("rsi") XFEATURE_XTILEDATA,
-            out("rcx") _,
-            out("r11") _,
-        );
-    }
-    result == 0
-}
-
-/// Not tried on other systems.
-#[cfg(not(target_os = "linux"))]
-fn may_use_tiles() -> bool {
-    false
-}
 
 /// A convolution ready to run.
 #[derive(Debug)]
@@ -154,11 +115,11 @@ impl ConvForm<Bf16> for Amx {
                 // SAFETY: the processor has the unit and nobody else uses the output (the caller's promise), whose
                 // strips belong to one task each; the tiles are configured first.
                 unsafe {
-                    configure();
-                    for group in groups {
-                        self.group(arena, group, strips, sums);
-                    }
-                    release();
+                    configured(TileSizes::WHOLE, || {
+                        for group in groups {
+                            self.group(arena, group, strips, sums);
+                        }
+                    });
                 }
             });
         });
@@ -273,50 +234,6 @@ fn strips(g: &Geometry) -> Vec<Strip> {
         places: std::array::from_fn(|i| place(x + i, y)),
     })
     .collect()
-}
-
-/// Makes this thread's tile registers eight tiles of 16 rows of 64 bytes, until [`release`].
-///
-/// That is the one thing that lasts from an `asm!` block to the next. It may: the compiler knows of no configuration
-/// and gives out no tile registers, nothing else in this program uses the unit, and the system keeps it for each
-/// thread. Configuring for every product would clear all registers every time.
-///
-/// # Safety
-/// The processor must have the unit.
-unsafe fn configure() {
-    #[repr(align(64))]
-    struct Palette([u8; 64]);
-    let mut palette = Palette([0; 64]);
-    palette.0[0] = 1;
-    for tile in 0..8 {
-        palette.0[16 + 2 * tile] = 64;
-        palette.0[48 + tile] = 16;
-    }
-    // SAFETY: 64 bytes that describe a valid palette; all registers are cleared, and declared so.
-    unsafe {
-        asm!(
-            "ldtilecfg [{}]", in(reg) &raw const palette.0,
-            out("tmm0") _, out("tmm1") _, out("tmm2") _, out("tmm3") _,
-            out("tmm4") _, out("tmm5") _, out("tmm6") _, out("tmm7") _,
-            options(nostack, readonly, preserves_flags),
-        );
-    }
-}
-
-/// Gives the registers back, so that the system need not keep them any more.
-///
-/// # Safety
-/// As [`configure`].
-unsafe fn release() {
-    // SAFETY: all registers are cleared, and declared so; no memory is touched.
-    unsafe {
-        asm!(
-            "tilerelease",
-            out("tmm0") _, out("tmm1") _, out("tmm2") _, out("tmm3") _,
-            out("tmm4") _, out("tmm5") _, out("tmm6") _, out("tmm7") _,
-            options(nostack, nomem, preserves_flags),
-        );
-    }
 }
 
 /// Two strips' inputs times one group's weights.

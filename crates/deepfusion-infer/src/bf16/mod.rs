@@ -28,7 +28,7 @@ pub(crate) fn has_dot() -> bool {
 
 /// Whether the processor has the matrix unit and the system lets this process use it.
 pub(crate) fn has_amx() -> bool {
-    has_dot() && amx::available()
+    has_dot() && deepfusion_kernels::matrix_unit::available()
 }
 
 /// Where an output pixel is written, and its residual read.

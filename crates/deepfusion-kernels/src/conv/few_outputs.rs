@@ -6,8 +6,7 @@
 
 use super::{
     ConvShape,
-    forward::gather,
-    lattice::{Lattice, Tile},
+    lattice::{Lattice, Tile, gather_channels},
     product::{LANES, padded},
 };
 use crate::scratch::with_scratch;
@@ -24,7 +23,7 @@ pub(super) fn add(shape: &ConvShape, tile: Tile, x: &[f32], grad_out: &[f32], su
     let source_len = shape.in_channels * lattice.plane_len;
     with_scratch(source_len + columns, |buffer| {
         let (source, grad) = buffer.split_at_mut(source_len);
-        gather(&lattice, x, shape.in_channels, 0..shape.in_channels, source);
+        gather_channels(&lattice, x, shape.in_channels, 0..shape.in_channels, source);
         // Zero wherever a column is no pixel.
         grad.fill(0.0);
         for (output, sum) in sum.chunks_exact_mut(offsets.len()).enumerate() {

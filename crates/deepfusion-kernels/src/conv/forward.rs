@@ -1,7 +1,7 @@
 use super::{
     ConvShape,
+    arithmetic::{Arithmetic, Product, Weights},
     lattice::{Lattice, Tile, tiles},
-    product::{TapProduct, padded},
 };
 use crate::{
     scratch::with_scratch,
@@ -15,10 +15,11 @@ use std::ops::Range;
 /// Tasks below which the output channels of a tile are shared out too, so that no core waits.
 const TASKS: usize = 4;
 
-/// Every tile with every group of `channels`; several groups only where the tiles are few.
-pub(super) fn tasks(tiles: &[Tile], channels: usize) -> Vec<(Tile, Range<usize>)> {
+/// Every tile with every group of `channels`, a multiple of `step`; several groups only where the tiles are few,
+/// of which the last may be smaller.
+pub(super) fn tasks(tiles: &[Tile], channels: usize, step: usize) -> Vec<(Tile, Range<usize>)> {
     let groups = TASKS.div_ceil(tiles.len().max(1));
-    let most = channels.div_ceil(groups).next_multiple_of(8);
+    let most = channels.div_ceil(groups).next_multiple_of(step);
     let mut tasks = Vec::new();
     for tile in tiles {
         for first in (0..channels).step_by(most) {
@@ -57,13 +58,36 @@ pub fn conv2d(
         + shape.out_channels * (shape.out_width() + 2);
     let tiles = tiles(shape.batch, 0, shape.out_height(), row_floats);
     let out = SharedMut::new(room(out));
-    tasks(&tiles, shape.out_channels)
-        .into_par_iter()
-        .for_each(|(tile, channels)| forward_tile(shape, tile, channels, x, weight, bias, &out));
+    let arithmetic = Arithmetic::of(shape);
+    let run = |weight: &[f32]| {
+        tasks(&tiles, shape.out_channels, arithmetic.rows())
+            .into_par_iter()
+            .for_each(|(tile, channels)| {
+                forward_tile(shape, arithmetic, tile, channels, x, weight, bias, &out);
+            });
+    };
+    if arithmetic == Arithmetic::Single {
+        // They lie as they should.
+        return run(weight);
+    }
+    let taps: Vec<usize> = (0..shape.kernel_area()).collect();
+    let weights = Weights {
+        values: weight,
+        strides: (shape.taps(), shape.kernel_area()),
+        channels: shape.in_channels,
+        taps: &taps,
+    };
+    let row = arithmetic.row_len(shape.in_channels, taps.len());
+    with_scratch(shape.out_channels * row, |prepared| {
+        arithmetic.prepare(weights, prepared);
+        run(prepared);
+    });
 }
 
+#[allow(clippy::too_many_arguments)]
 fn forward_tile(
     shape: &ConvShape,
+    arithmetic: Arithmetic,
     tile: Tile,
     channels: Range<usize>,
     x: &[f32],
@@ -72,22 +96,24 @@ fn forward_tile(
     out: &SharedMut<MaybeUninit<f32>>,
 ) {
     let lattice = Lattice::new(shape.window(), tile);
-    let (columns, taps) = (padded(lattice.columns()), shape.taps());
-    let offsets = shape.tap_offsets(&lattice, 0..shape.in_channels);
-    let source_len = shape.in_channels * lattice.plane_len;
+    let columns = arithmetic.columns(&lattice);
+    let taps: Vec<usize> = shape.kernel_taps().map(|t| lattice.offset(t)).collect();
+    let offsets = arithmetic.offsets(shape.in_channels, lattice.plane_len, &taps);
+    let row = arithmetic.row_len(shape.in_channels, taps.len());
+    let source_len = arithmetic.source_len(shape.in_channels, lattice.plane_len);
     with_scratch(source_len + channels.len() * columns, |buffer| {
         let (source, result) = buffer.split_at_mut(source_len);
-        gather(&lattice, x, shape.in_channels, 0..shape.in_channels, source);
-        TapProduct {
-            weights: &weight[channels.start * taps..channels.end * taps],
-            weight_stride: taps,
+        arithmetic.gather(&lattice, x, shape.in_channels, source);
+        arithmetic.product(Product {
+            weights: &weight[channels.start * row..channels.end * row],
+            rows: channels.len(),
+            channels: shape.in_channels,
             offsets: &offsets,
+            plane_len: lattice.plane_len,
             source,
             columns,
             out: result,
-            rows: channels.len(),
-        }
-        .run();
+        });
         let (area, width) = (shape.out_area(), shape.out_width());
         for (channel, result) in channels.clone().zip(result.chunks_exact(columns)) {
             let bias = bias.map_or(0.0, |b| b[channel]);
@@ -102,18 +128,4 @@ fn forward_tile(
             }
         }
     });
-}
-
-/// Gathers `wanted` of the `channels` channels of `x` into consecutive planes.
-pub(super) fn gather(
-    lattice: &Lattice,
-    x: &[f32],
-    channels: usize,
-    wanted: Range<usize>,
-    planes: &mut [f32],
-) {
-    let area = lattice.image_area();
-    for (channel, plane) in wanted.zip(planes.chunks_exact_mut(lattice.plane_len)) {
-        lattice.gather(|n| &x[(n * channels + channel) * area..][..area], plane);
-    }
 }

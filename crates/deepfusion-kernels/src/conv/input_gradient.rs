@@ -1,8 +1,8 @@
 use super::{
     ConvShape,
-    forward::{gather, tasks},
+    arithmetic::{Arithmetic, Product, Weights},
+    forward::tasks,
     lattice::{Lattice, Tile, Window, inside, tiles},
-    product::{TapProduct, padded},
 };
 use crate::{
     scratch::with_scratch,
@@ -20,7 +20,7 @@ struct Phase<'a> {
     right: usize,
     /// Taps (index in the kernel, distance from the first tap).
     taps: Vec<(usize, (usize, usize))>,
-    /// Transposed weights, C × (O·taps).
+    /// Transposed weights, C rows of O·taps as the arithmetic wants them.
     weights: &'a [f32],
 }
 
@@ -53,16 +53,19 @@ pub fn conv2d_backward_input(
     if grad_out.is_empty() {
         return;
     }
+    let arithmetic = Arithmetic::of(shape);
     // Each weight belongs to one phase.
-    with_scratch(shape.weight_len(), |transposed| {
-        let phases = phases(shape, weight, transposed);
-        backward_input(shape, &phases, grad_out, grad_x);
+    let words = shape.in_channels * arithmetic.row_len(shape.out_channels, shape.kernel_area());
+    with_scratch(words, |transposed| {
+        let phases = phases(shape, arithmetic, weight, transposed);
+        backward_input(shape, arithmetic, &phases, grad_out, grad_x);
     });
 }
 
 /// With reflection, what it adds to must have been cleared.
 fn backward_input(
     shape: &ConvShape,
+    arithmetic: Arithmetic,
     phases: &[Phase],
     grad_out: &[f32],
     grad_x: &mut [MaybeUninit<f32>],
@@ -89,14 +92,16 @@ fn backward_input(
             .for_each(|of_image| {
                 for tile in of_image {
                     let channels = 0..shape.in_channels;
-                    gradient_tile(shape, window, *tile, channels, phases, grad_out, &to);
+                    let tile = (window, *tile);
+                    gradient_tile(shape, arithmetic, tile, channels, phases, grad_out, &to);
                 }
             });
     } else {
-        tasks(&tiles, shape.in_channels)
+        tasks(&tiles, shape.in_channels, arithmetic.rows())
             .into_par_iter()
             .for_each(|(tile, channels)| {
-                gradient_tile(shape, window, tile, channels, phases, grad_out, &to);
+                let tile = (window, tile);
+                gradient_tile(shape, arithmetic, tile, channels, phases, grad_out, &to);
             });
     }
 }
@@ -128,7 +133,12 @@ fn gradient_window(shape: &ConvShape, margin: usize) -> Window {
 }
 
 /// All phases that have taps; their weights are written to `transposed`, one after the other.
-fn phases<'a>(shape: &ConvShape, weight: &[f32], transposed: &'a mut [f32]) -> Vec<Phase<'a>> {
+fn phases<'a>(
+    shape: &ConvShape,
+    arithmetic: Arithmetic,
+    weight: &[f32],
+    transposed: &'a mut [f32],
+) -> Vec<Phase<'a>> {
     let s = shape.stride;
     let mut rest = transposed;
     let mut phases = Vec::new();
@@ -141,10 +151,17 @@ fn phases<'a>(shape: &ConvShape, weight: &[f32], transposed: &'a mut [f32]) -> V
         if taps.is_empty() {
             continue;
         }
-        let len = shape.in_channels * shape.out_channels * taps.len();
-        let (weights, after) = rest.split_at_mut(len);
+        let row = arithmetic.row_len(shape.out_channels, taps.len());
+        let (weights, after) = rest.split_at_mut(shape.in_channels * row);
         rest = after;
-        transpose_weights(shape, weight, &taps, weights);
+        let in_kernel: Vec<usize> = taps.iter().map(|(tap, _)| *tap).collect();
+        let transposed = Weights {
+            values: weight,
+            strides: (shape.kernel_area(), shape.taps()),
+            channels: shape.out_channels,
+            taps: &in_kernel,
+        };
+        arithmetic.prepare(transposed, weights);
         phases.push(Phase {
             down,
             right,
@@ -155,74 +172,38 @@ fn phases<'a>(shape: &ConvShape, weight: &[f32], transposed: &'a mut [f32]) -> V
     phases
 }
 
-/// From O × (C·kernel) to C × (O·taps).
-fn transpose_weights(
-    shape: &ConvShape,
-    weight: &[f32],
-    taps: &[(usize, (usize, usize))],
-    to: &mut [f32],
-) {
-    /// Channels of a task: their taps lie side by side.
-    const GROUP: usize = 8;
-    let (area, channels, count) = (shape.kernel_area(), shape.in_channels, taps.len());
-    let row = shape.out_channels * count;
-    to.par_chunks_mut(GROUP * row)
-        .enumerate()
-        .for_each(|(group, to)| {
-            for output in 0..shape.out_channels {
-                let from = &weight[(output * channels + group * GROUP) * area..];
-                for (to, from) in to.chunks_exact_mut(row).zip(from.chunks_exact(area)) {
-                    let to = &mut to[output * count..][..count];
-                    if let (Some(to), Some(from)) = (to.as_mut_array::<9>(), from.as_array::<9>()) {
-                        // The usual 3×3: a copy of known length needs no call.
-                        *to = *from;
-                    } else {
-                        for (to, (tap, _)) in to.iter_mut().zip(taps) {
-                            *to = from[*tap];
-                        }
-                    }
-                }
-            }
-        });
-}
-
 fn gradient_tile(
     shape: &ConvShape,
-    window: Window,
-    tile: Tile,
+    arithmetic: Arithmetic,
+    (window, tile): (Window, Tile),
     channels: Range<usize>,
     phases: &[Phase],
     grad_out: &[f32],
     to: &SharedMut<MaybeUninit<f32>>,
 ) {
     let lattice = Lattice::new(window, tile);
-    let columns = padded(lattice.columns());
-    let source_len = shape.out_channels * lattice.plane_len;
+    let (columns, outputs) = (arithmetic.columns(&lattice), shape.out_channels);
+    let source_len = arithmetic.source_len(outputs, lattice.plane_len);
     with_scratch(source_len + channels.len() * columns, |buffer| {
         let (source, result) = buffer.split_at_mut(source_len);
-        let outputs = 0..shape.out_channels;
-        gather(&lattice, grad_out, shape.out_channels, outputs, source);
+        arithmetic.gather(&lattice, grad_out, outputs, source);
         for phase in phases {
-            let offsets: Vec<usize> = (0..shape.out_channels)
-                .flat_map(|o| {
-                    phase.taps.iter().map(move |(_, (y, x))| {
-                        let (y, x) = (y / shape.stride, x / shape.stride);
-                        let shift = (window.reach.0 - y, window.reach.1 - x);
-                        o * lattice.plane_len + lattice.offset(shift)
-                    })
-                })
-                .collect();
-            let row = offsets.len();
-            TapProduct {
+            let of_tap = |(_, (y, x)): &(usize, (usize, usize))| {
+                let (y, x) = (y / shape.stride, x / shape.stride);
+                lattice.offset((window.reach.0 - y, window.reach.1 - x))
+            };
+            let taps: Vec<usize> = phase.taps.iter().map(of_tap).collect();
+            let row = arithmetic.row_len(outputs, taps.len());
+            arithmetic.product(Product {
                 weights: &phase.weights[channels.start * row..channels.end * row],
-                weight_stride: row,
-                offsets: &offsets,
+                rows: channels.len(),
+                channels: outputs,
+                offsets: &arithmetic.offsets(outputs, lattice.plane_len, &taps),
+                plane_len: lattice.plane_len,
                 source,
                 columns,
                 out: &mut *result,
-                rows: channels.len(),
-            }
-            .run();
+            });
             for (channel, result) in channels.clone().zip(result.chunks_exact(columns)) {
                 scatter(shape, &lattice, tile, phase, channel, result, to);
             }

@@ -1,6 +1,7 @@
 //! Padded pieces of images in which every tap of a kernel is a shift.
 
-use super::product::LANES;
+use super::bf16::{self, planar, zipped};
+use std::ops::Range;
 
 /// Floats a tile's padded input and its output may take: they should stay in the second cache.
 const TILE_FLOATS: usize = 1 << 17;
@@ -100,8 +101,8 @@ impl Lattice {
         } else {
             tile.rows + down
         };
-        // The last pixels' taps reach past the last row; the last vector a little further.
-        let slack = (down + 1) * pitch + right + LANES;
+        // The last pixels' taps reach past the last row; the last block of columns a little further.
+        let slack = (down + 1) * pitch + right + bf16::COLUMNS;
         let phase_len = tile.images * image_rows * pitch + slack;
         Self {
             window,
@@ -149,18 +150,54 @@ impl Lattice {
     /// Copies a channel of the tile's images, `image(n)` that of the n-th image of the batch, into its
     /// padded plane.
     pub(super) fn gather<'a>(&self, image: impl Fn(usize) -> &'a [f32], plane: &mut [f32]) {
+        self.rows(plane, 0.0, |n, row, shift, to| {
+            self.gather_row(image(n), row, shift, to);
+        });
+    }
+
+    /// The same of two channels at once, rounded to bf16: each word of the plane holds both.
+    pub(super) fn gather_pairs<'a>(
+        &self,
+        first: impl Fn(usize) -> &'a [f32],
+        second: impl Fn(usize) -> &'a [f32],
+        plane: &mut [u32],
+    ) {
+        let (mut a, mut b) = (vec![0.0; self.pitch], vec![0.0; self.pitch]);
+        self.rows(plane, 0, |n, row, shift, to| {
+            self.gather_row(first(n), row, shift, &mut a);
+            self.gather_row(second(n), row, shift, &mut b);
+            zipped(&a, &b, to);
+        });
+    }
+
+    /// The same of one channel, rounded to bf16.
+    pub(super) fn gather_halves<'a>(&self, image: impl Fn(usize) -> &'a [f32], plane: &mut [u16]) {
+        let mut values = vec![0.0; self.pitch];
+        self.rows(plane, 0, |n, row, shift, to| {
+            self.gather_row(image(n), row, shift, &mut values);
+            planar(&values, to);
+        });
+    }
+
+    /// Calls `write` with every row of a plane: its image in the batch, its number in the tile, its phase's shift, and the
+    /// row itself; what lies behind the last is cleared.
+    fn rows<T: Copy>(
+        &self,
+        plane: &mut [T],
+        zero: T,
+        mut write: impl FnMut(usize, usize, (usize, usize), &mut [T]),
+    ) {
         let s = self.window.stride;
         for (index, phase) in plane.chunks_exact_mut(self.phase_len).enumerate() {
             let shift = (index / s, index % s);
             for n in 0..self.tile.images {
-                let from = image(self.tile.first_image + n);
                 let start = self.column(n, 0);
                 let rows = &mut phase[start..][..self.image_rows * self.pitch];
                 for (row, to) in rows.chunks_exact_mut(self.pitch).enumerate() {
-                    self.gather_row(from, row, shift, to);
+                    write(self.tile.first_image + n, row, shift, to);
                 }
             }
-            phase[self.column(self.tile.images, 0)..].fill(0.0);
+            phase[self.column(self.tile.images, 0)..].fill(zero);
         }
     }
 
@@ -205,6 +242,20 @@ impl Lattice {
                 *value = *from;
             }
         }
+    }
+}
+
+/// Gathers `wanted` of the `channels` channels of `x` into consecutive planes.
+pub(super) fn gather_channels(
+    lattice: &Lattice,
+    x: &[f32],
+    channels: usize,
+    wanted: Range<usize>,
+    planes: &mut [f32],
+) {
+    let area = lattice.image_area();
+    for (channel, plane) in wanted.zip(planes.chunks_exact_mut(lattice.plane_len)) {
+        lattice.gather(|n| &x[(n * channels + channel) * area..][..area], plane);
     }
 }
 

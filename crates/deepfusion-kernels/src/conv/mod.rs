@@ -7,9 +7,13 @@
 //!   the s×s residues of the input's rows and columns,
 //! - weight gradient: ∂W\[o, k\] = Σ_q ∂Y\[o, q\]·X\[q + offset k\].
 //!
+//! In [`Precision::Bf16`] the planes hold pairs, and other loops multiply them ([`bf16`]).
+//!
 //! Tiles are sized for the second cache; where an image has few pixels (deep layers), a tile holds several
 //! images, so that the weights are read once for all of them.
 
+mod arithmetic;
+mod bf16;
 mod few_outputs;
 mod forward;
 mod input_gradient;
@@ -19,6 +23,7 @@ mod shape;
 mod transpose;
 mod weight_gradient;
 
+pub use bf16::{Precision, has_bf16};
 pub use forward::conv2d;
 pub use input_gradient::conv2d_backward_input;
 pub use shape::ConvShape;

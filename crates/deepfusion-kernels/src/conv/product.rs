@@ -1,4 +1,4 @@
-//! The one inner loop of all convolutions: a small block of outputs kept in registers.
+//! The inner loop of convolutions in f32: a small block of outputs kept in registers.
 //!
 //! A convolution's forward pass and both its gradients are sums over products of one number (a row's)
 //! with a vector of neighbouring numbers (the columns'). They differ only in where the two are read:

@@ -1,3 +1,4 @@
+use super::bf16::Precision;
 use super::lattice::{Lattice, Window};
 use crate::sizes::product;
 use std::ops::Range;
@@ -27,6 +28,8 @@ pub struct ConvShape {
     pub dilation: usize,
     /// Padding mirrors the image (without repeating its edge) instead of being zero.
     pub reflect: bool,
+    /// How its numbers are multiplied.
+    pub precision: Precision,
 }
 
 impl ConvShape {

@@ -59,10 +59,18 @@ fn assert_close(ours: &[f32], exact: &[f64], what: &str) {
     }
 }
 
-/// Image, weights, bias and the output's gradient.
+/// Image, weights, bias and the output's gradient; in bf16 numbers that are such, so that only sums are rounded.
 fn inputs(s: &ConvShape) -> [Vec<f32>; 4] {
     let lengths = [s.in_len(), s.weight_len(), s.out_channels, s.out_len()];
-    std::array::from_fn(|i| noise(lengths[i], i as u64 + 1))
+    std::array::from_fn(|i| {
+        let mut values = noise(lengths[i], i as u64 + 1);
+        if s.precision == Precision::Bf16 {
+            for value in &mut values {
+                *value = f32::from_bits(value.to_bits() & 0xffff_0000);
+            }
+        }
+        values
+    })
 }
 
 /// The output, and the gradients of image, weights and bias.
@@ -107,6 +115,24 @@ fn check(s: &ConvShape) {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
+    /// On a processor without bf16 this is the same in f32.
+    #[test]
+    fn pairs_equal_the_definition(
+        batch in 1usize..6, in_channels in 1usize..5, out_channels in 1usize..4,
+        in_height in 4usize..12, in_width in 4usize..17,
+        kernel in prop::sample::select(vec![1usize, 3, 5]),
+        stride in 1usize..4, padding in 0usize..4, dilation in 1usize..3, reflect in any::<bool>(),
+    ) {
+        let shape = ConvShape {
+            batch, in_channels: 16 * in_channels, in_height, in_width, out_channels: 16 * out_channels,
+            kernel_height: kernel, kernel_width: kernel, stride, padding, dilation, reflect,
+            precision: Precision::Bf16,
+        };
+        let fits = shape.out_height() > 0 && shape.out_width() > 0;
+        prop_assume!(fits && (!reflect || padding < in_height.min(in_width)));
+        check(&shape);
+    }
+
     #[test]
     fn equals_the_definition(
         batch in 1usize..6, in_channels in 1usize..20, out_channels in 1usize..12,
@@ -117,6 +143,7 @@ proptest! {
         let shape = ConvShape {
             batch, in_channels, in_height, in_width, out_channels,
             kernel_height: kernel, kernel_width: kernel, stride, padding, dilation, reflect,
+            precision: Precision::F32,
         };
         prop_assume!(shape.out_height() > 0 && shape.out_width() > 0);
         check(&shape);
@@ -139,6 +166,7 @@ fn equals_the_definition_across_tiles() {
             padding: 1,
             dilation: 1,
             reflect: true,
+            precision: Precision::F32,
         };
         check(&shape);
         check(&ConvShape {
@@ -158,6 +186,27 @@ fn equals_the_definition_across_tiles() {
             padding: 3,
             reflect: false,
             ..shape
+        });
+    }
+}
+
+/// The same in bf16: rows of an image in several tiles, at both strides, and odd numbers of steps and blocks.
+#[test]
+fn pairs_equal_the_definition_across_tiles() {
+    for (stride, reflect) in [(1, true), (1, false), (2, false), (2, true)] {
+        check(&ConvShape {
+            batch: 2,
+            in_channels: 48,
+            in_height: 64,
+            in_width: 97,
+            out_channels: 80,
+            kernel_height: 3,
+            kernel_width: 3,
+            stride,
+            padding: 1,
+            dilation: 1,
+            reflect,
+            precision: Precision::Bf16,
         });
     }
 }
@@ -189,6 +238,7 @@ fn threads_do_not_change_a_bit() {
         padding: 1,
         dilation: 1,
         reflect: false,
+        precision: Precision::F32,
     };
     // Above the limit where the weight gradient is shared out by channels.
     let many_weights = ConvShape {
@@ -209,6 +259,17 @@ fn threads_do_not_change_a_bit() {
         ConvShape {
             out_channels: 2,
             ..shape
+        },
+        ConvShape {
+            in_channels: 48,
+            out_channels: 80,
+            precision: Precision::Bf16,
+            ..shape
+        },
+        ConvShape {
+            in_channels: 128,
+            precision: Precision::Bf16,
+            ..many_weights
         },
     ];
     for shape in cases {

@@ -5,12 +5,12 @@ const BLOCK: usize = 16;
 ///
 /// # Panics
 /// When a slice is too short for its strides.
-pub(super) fn transpose(
-    from: &[f32],
+pub(super) fn transpose<T: Copy + Default>(
+    from: &[T],
     from_stride: usize,
     rows: usize,
     columns: usize,
-    to: &mut [f32],
+    to: &mut [T],
     to_stride: usize,
 ) {
     assert!(rows <= to_stride && to.len() >= columns * to_stride);
@@ -18,7 +18,7 @@ pub(super) fn transpose(
         let height = BLOCK.min(rows.saturating_sub(first_row));
         for first in (0..columns).step_by(BLOCK) {
             let width = BLOCK.min(columns - first);
-            let mut block = [[0.0f32; BLOCK]; BLOCK];
+            let mut block = [[T::default(); BLOCK]; BLOCK];
             for r in 0..height {
                 let from = &from[(first_row + r) * from_stride + first..][..width];
                 if width == BLOCK {

@@ -1,11 +1,14 @@
 use super::{
-    ConvShape, few_outputs,
-    forward::gather,
-    lattice::{Lattice, Tile, tiles},
+    ConvShape,
+    arithmetic::Arithmetic,
+    bf16::{self, PixelPairs, Unit},
+    few_outputs,
+    lattice::{Lattice, Tile, gather_channels, tiles},
     product::{LANES, PixelProduct, padded},
     transpose::transpose,
 };
 use crate::{scratch::with_scratch, send_ptr::SharedMut};
+use pulp::bytemuck::{cast_slice, cast_slice_mut};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -58,28 +61,35 @@ pub fn conv2d_backward_weight(
         grad_weight.copy_from_slice(&sum_over(&tiles, shape.weight_len(), || (), add));
         return;
     }
+    let arithmetic = Arithmetic::of(shape);
     let to = SharedMut::new(grad_weight);
     let all = 0..shape.in_channels;
-    if shape.weight_len() > FEW_WEIGHTS && shape.in_channels >= TASKS {
+    // Groups of pairs' products are whole tiles of channels.
+    let step = match arithmetic {
+        Arithmetic::Single => 1,
+        Arithmetic::Pairs(_) => bf16::ROWS,
+    };
+    if shape.weight_len() > FEW_WEIGHTS && shape.in_channels >= TASKS * step {
         // Every group of channels needs the transposed gradient of all tiles: it is made once.
-        let len = shape.batch * shape.out_area() * padded(shape.out_channels);
-        with_scratch(len, |grads| {
+        let len = |tile: &Tile| grad_len(shape, arithmetic, tile);
+        with_scratch(tiles.iter().map(len).sum(), |grads| {
             let mut rest = grads;
             let mut parts = Vec::new();
             for tile in &tiles {
-                let (part, after) = rest.split_at_mut(grad_len(shape, tile));
+                let (part, after) = rest.split_at_mut(len(tile));
                 parts.push((tile, part));
                 rest = after;
             }
-            parts
-                .par_iter_mut()
-                .for_each(|(tile, part)| transposed_grad(shape, tile, grad_out, part));
+            parts.par_iter_mut().for_each(|(tile, part)| {
+                transposed_grad(shape, arithmetic, tile, grad_out, part);
+            });
             let parts: Vec<(Tile, &[f32])> = parts.into_iter().map(|(t, p)| (*t, &*p)).collect();
-            split(shape.in_channels, TASKS)
+            split(shape.in_channels / step, TASKS)
                 .into_par_iter()
+                .map(|group| group.start * step..group.end * step)
                 .for_each(|channels| {
                     let mut sum = vec![0.0; sum_len(shape, &channels)];
-                    let mut adder = Adder::default();
+                    let mut adder = Adder::new(arithmetic);
                     for (tile, grad) in &parts {
                         adder.add(shape, *tile, channels.clone(), x, grad, &mut sum);
                     }
@@ -91,10 +101,10 @@ pub fn conv2d_backward_weight(
     let total = sum_over(
         &tiles,
         sum_len(shape, &all),
-        Adder::default,
+        || Adder::new(arithmetic),
         |adder, tile, sum| {
-            with_scratch(grad_len(shape, &tile), |grad| {
-                transposed_grad(shape, &tile, grad_out, grad);
+            with_scratch(grad_len(shape, arithmetic, &tile), |grad| {
+                transposed_grad(shape, arithmetic, &tile, grad_out, grad);
                 adder.add(shape, tile, all.clone(), x, grad, sum);
             });
         },
@@ -128,13 +138,33 @@ fn sum_over<S>(
     total
 }
 
-/// Length of a tile's transposed gradient: pixels × padded outputs.
-fn grad_len(shape: &ConvShape, tile: &Tile) -> usize {
-    tile.images * tile.rows * shape.out_width() * padded(shape.out_channels)
+/// Pixels of a tile, as pairs' products sum them: its columns, those between its rows among them.
+fn columns(shape: &ConvShape, tile: &Tile) -> usize {
+    let lattice = Lattice::new(shape.window(), *tile);
+    lattice.columns().next_multiple_of(bf16::COLUMNS)
 }
 
-/// The output gradient of a tile as pixels × outputs.
-fn transposed_grad(shape: &ConvShape, tile: &Tile, grad_out: &[f32], to: &mut [f32]) {
+/// Words of a tile's transposed gradient: pixels × padded outputs, or pairs of columns × outputs.
+fn grad_len(shape: &ConvShape, arithmetic: Arithmetic, tile: &Tile) -> usize {
+    match arithmetic {
+        Arithmetic::Single => {
+            tile.images * tile.rows * shape.out_width() * padded(shape.out_channels)
+        }
+        Arithmetic::Pairs(_) => columns(shape, tile) / 2 * shape.out_channels,
+    }
+}
+
+/// The output gradient of a tile with its outputs side by side.
+fn transposed_grad(
+    shape: &ConvShape,
+    arithmetic: Arithmetic,
+    tile: &Tile,
+    grad_out: &[f32],
+    to: &mut [f32],
+) {
+    if matches!(arithmetic, Arithmetic::Pairs(_)) {
+        return transposed_pairs(shape, tile, grad_out, cast_slice_mut(to));
+    }
     let outputs = padded(shape.out_channels);
     let (area, width) = (shape.out_area(), shape.out_width());
     let count = tile.rows * width;
@@ -145,25 +175,55 @@ fn transposed_grad(shape: &ConvShape, tile: &Tile, grad_out: &[f32], to: &mut [f
     }
 }
 
+/// Words of two neighbouring columns × outputs; zero where a column is no pixel.
+fn transposed_pairs(shape: &ConvShape, tile: &Tile, grad_out: &[f32], to: &mut [u32]) {
+    let lattice = Lattice::new(shape.window(), *tile);
+    let (outputs, pairs) = (shape.out_channels, columns(shape, tile) / 2);
+    let (area, width) = (shape.out_area(), shape.out_width());
+    with_scratch(outputs * pairs, |rows| {
+        rows.fill(0.0);
+        let halves = cast_slice_mut::<f32, u16>(rows).chunks_exact_mut(2 * pairs);
+        for (output, halves) in halves.enumerate() {
+            for image in 0..tile.images {
+                let plane = ((tile.first_image + image) * outputs + output) * area;
+                for row in 0..tile.rows {
+                    let from = &grad_out[plane + (tile.first_row + row) * width..][..width];
+                    bf16::planar(from, &mut halves[lattice.column(image, row)..][..width]);
+                }
+            }
+        }
+        transpose(cast_slice(rows), pairs, outputs, pairs, to, outputs);
+    });
+}
+
 /// Length of the transposed sum of some channels' taps: taps × padded outputs.
 fn sum_len(shape: &ConvShape, channels: &Range<usize>) -> usize {
     channels.len() * shape.kernel_area() * padded(shape.out_channels)
 }
 
 /// Sums weight gradients over tiles; remembers the offsets, which tiles of one size share.
-#[derive(Default)]
 struct Adder {
+    arithmetic: Arithmetic,
     layout: Option<Layout>,
 }
 
 struct Layout {
     images: usize,
     rows: usize,
+    /// Of all channels, or of the first one for pairs.
     taps: Vec<usize>,
+    /// Not of pairs, which sum all columns.
     pixels: Vec<usize>,
 }
 
 impl Adder {
+    fn new(arithmetic: Arithmetic) -> Self {
+        Self {
+            arithmetic,
+            layout: None,
+        }
+    }
+
     /// Adds the weight gradient of `channels` over a tile to its transpose, taps × outputs.
     fn add(
         &mut self,
@@ -176,29 +236,73 @@ impl Adder {
     ) {
         let lattice = Lattice::new(shape.window(), tile);
         let same = |l: &Layout| (l.images, l.rows) == (tile.images, tile.rows);
-        let layout = match self.layout.take().filter(same) {
-            Some(layout) => layout,
-            None => Layout {
-                images: tile.images,
-                rows: tile.rows,
-                taps: shape.tap_offsets(&lattice, 0..channels.len()),
-                pixels: lattice.pixels(),
-            },
-        };
-        with_scratch(channels.len() * lattice.plane_len, |source| {
-            gather(&lattice, x, shape.in_channels, channels, source);
-            PixelProduct {
-                offsets: &layout.taps,
-                source,
-                pixels: &layout.pixels,
-                grad,
-                columns: padded(shape.out_channels),
-                out: sum,
-            }
-            .run();
-        });
+        let layout = self.layout.take().filter(same);
+        let layout = layout.unwrap_or_else(|| self.layout(shape, tile, &lattice, channels.len()));
+        match self.arithmetic {
+            Arithmetic::Single => with_scratch(channels.len() * lattice.plane_len, |source| {
+                gather_channels(&lattice, x, shape.in_channels, channels, source);
+                PixelProduct {
+                    offsets: &layout.taps,
+                    source,
+                    pixels: &layout.pixels,
+                    grad,
+                    columns: padded(shape.out_channels),
+                    out: sum,
+                }
+                .run();
+            }),
+            Arithmetic::Pairs(unit) => add_pairs(
+                shape,
+                unit,
+                (&lattice, &layout.taps),
+                channels,
+                x,
+                cast_slice(grad),
+                sum,
+            ),
+        }
         self.layout = Some(layout);
     }
+
+    fn layout(&self, shape: &ConvShape, tile: Tile, lattice: &Lattice, channels: usize) -> Layout {
+        let single = self.arithmetic == Arithmetic::Single;
+        Layout {
+            images: tile.images,
+            rows: tile.rows,
+            taps: shape.tap_offsets(lattice, 0..if single { channels } else { 1 }),
+            pixels: if single { lattice.pixels() } else { Vec::new() },
+        }
+    }
+}
+
+fn add_pairs(
+    shape: &ConvShape,
+    unit: Unit,
+    (lattice, taps): (&Lattice, &[usize]),
+    channels: Range<usize>,
+    x: &[f32],
+    grad: &[u32],
+    sum: &mut [f32],
+) {
+    let (area, len) = (lattice.image_area(), lattice.plane_len);
+    with_scratch((channels.len() * len).div_ceil(2), |words| {
+        let source = &mut cast_slice_mut::<f32, u16>(words)[..channels.len() * len];
+        for (channel, plane) in channels.clone().zip(source.chunks_exact_mut(len)) {
+            let image = |n: usize| &x[(n * shape.in_channels + channel) * area..][..area];
+            lattice.gather_halves(image, plane);
+        }
+        PixelPairs {
+            offsets: taps,
+            plane_len: len,
+            channels: channels.len(),
+            source,
+            pixels: lattice.columns().next_multiple_of(bf16::COLUMNS),
+            grad,
+            outputs: shape.out_channels,
+            out: sum,
+        }
+        .run(unit);
+    });
 }
 
 /// Writes the transposed sum of `channels` to their weights.

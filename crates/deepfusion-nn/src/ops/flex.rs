@@ -75,6 +75,7 @@ fn conv_shape(x: [usize; 4], weight: [usize; 4], options: ConvOptions) -> ConvSh
         padding: options.padding,
         dilation: options.dilation,
         reflect: options.reflect,
+        precision: options.precision,
     }
 }
 

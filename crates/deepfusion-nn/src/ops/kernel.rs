@@ -1,6 +1,7 @@
 //! The operations as Burn's dispatch sees them.
 
 use burn::backend::{Backend, backend_extension, tensor::FloatTensor};
+use deepfusion_kernels::Precision;
 
 /// Stride, padding and dilation of a convolution, the same on both axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,6 +14,8 @@ pub struct ConvOptions {
     pub dilation: usize,
     /// Padding mirrors the image (without repeating its edge) instead of being zero.
     pub reflect: bool,
+    /// How it multiplies where the kernels run; within [`super::autocast`] as that says.
+    pub precision: Precision,
 }
 
 impl Default for ConvOptions {
@@ -23,6 +26,7 @@ impl Default for ConvOptions {
             padding: 0,
             dilation: 1,
             reflect: false,
+            precision: Precision::F32,
         }
     }
 }

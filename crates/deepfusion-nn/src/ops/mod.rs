@@ -5,6 +5,7 @@
 //! same. `kernel` declares them to Burn's dispatch, `flex` runs them, `autodiff` derives them, and
 //! `composed` holds the other backends' form.
 
+mod autocast;
 mod autodiff;
 mod composed;
 mod flex;
@@ -14,6 +15,7 @@ use burn::backend::{Dispatch, DispatchDevice};
 use burn::tensor::{Bool, Tensor, TensorData};
 use kernel::KernelOps;
 
+pub use autocast::{autocast, supports};
 pub use composed::{
     batch_norm as composed_batch_norm, conv2d as composed_conv2d, elu as composed_elu,
     local_correlation as composed_local_correlation,
@@ -21,6 +23,7 @@ pub use composed::{
     smoothness as composed_smoothness, upsample_concat as composed_upsample_concat,
     warp as composed_warp,
 };
+pub use deepfusion_kernels::Precision;
 pub use kernel::ConvOptions;
 
 /// Whether the tensor lives where the kernels run.
@@ -62,7 +65,7 @@ pub fn conv2d(
         weight.into_dispatch(),
         bias.into_dispatch(),
         has_bias,
-        options,
+        autocast::within(options),
     ))
 }
 

@@ -58,6 +58,7 @@ fn run(case: &Case, inputs: &[Input]) -> Tensor<4> {
                 padding: options.padding,
                 dilation: options.dilation,
                 reflect: options.reflect,
+                ..ConvOptions::default()
             };
             let bias = bias.first().map(Input::tensor);
             ops::conv2d(x.tensor(), weight.tensor(), bias, options)

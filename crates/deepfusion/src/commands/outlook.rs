@@ -2,7 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+use burn::tensor::Device;
 use deepfusion_nn::InputSize;
+use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_train::{Compute, Learn, Preset, Reprojection, TrainConfig};
 
 use super::recorder::clock;
@@ -16,6 +18,8 @@ const PATIENCE: Duration = Duration::from_secs(20);
 pub struct Outlook {
     config: TrainConfig,
     compute: Compute,
+    /// Whether bf16 could be chosen and is not.
+    bf16: bool,
     /// When the first step was done, and which it was.
     first: Option<(Instant, usize)>,
     done: bool,
@@ -24,7 +28,9 @@ pub struct Outlook {
 impl Outlook {
     /// Of a run with this configuration.
     pub fn new(config: TrainConfig, compute: Compute) -> Self {
+        let on_processor = compute == Compute::Processor && config.precision == Precision::F32;
         Self {
+            bf16: on_processor && supports(&Device::flex(), Precision::Bf16),
             config,
             compute,
             first: None,
@@ -67,6 +73,9 @@ impl Outlook {
                 "; as many with {} (by their multiply-adds)",
                 choices.join(", ")
             ));
+        }
+        if self.bf16 {
+            line.push_str("; on this processor --set precision=bf16 is nearly twice as fast");
         }
         line.push_str("; --steps N ends sooner or later");
         line
@@ -140,6 +149,14 @@ mod tests {
         assert!(line.contains("--size 640x192 about 1 h 20 min"), "{line}");
         assert!(line.contains("--preset tiny about "), "{line}");
         assert!(work(&Preset::Tiny.config()) * 2 < work(&light));
+
+        let mut outlook = Outlook::new(light, Compute::Processor);
+        assert_eq!(outlook.bf16, supports(&Device::flex(), Precision::Bf16));
+        for bf16 in [false, true] {
+            outlook.bf16 = bf16;
+            let said = outlook.line(1.0, 1200).contains("--set precision=bf16");
+            assert_eq!(said, bf16);
+        }
 
         let tiny = Outlook::new(Preset::Tiny.config(), Compute::Processor).line(0.2, 1200);
         assert!(!tiny.contains("--preset"), "{tiny}");

@@ -1,0 +1,122 @@
+//! AMX, the matrix unit of Xeon processors since Sapphire Rapids: eight tile registers of at most 16 rows of 64 bytes, and an
+//! instruction that multiplies two of them, as pairs of bf16, and adds to a third. They have no stable intrinsics, so
+//! those who use them write assembly.
+
+use std::arch::asm;
+use std::sync::OnceLock;
+
+/// Whether the processor has the unit and the system lets this process use it.
+#[must_use]
+pub fn available() -> bool {
+    static AVAILABLE: OnceLock<bool> = OnceLock::new();
+    *AVAILABLE.get_or_init(|| has_tiles() && may_use_tiles())
+}
+
+fn has_tiles() -> bool {
+    use std::arch::x86_64::{__cpuid, __cpuid_count};
+    const BF16: u32 = 1 << 22;
+    const TILES: u32 = 1 << 24;
+    __cpuid(0).eax >= 7 && __cpuid_count(7, 0).edx & (BF16 | TILES) == BF16 | TILES
+}
+
+/// Linux grants the tile registers' state to a process that asks for it; its threads share the grant.
+#[cfg(target_os = "linux")]
+fn may_use_tiles() -> bool {
+    const ARCH_PRCTL: i64 = 158;
+    const ARCH_REQ_XCOMP_PERM: i64 = 0x1023;
+    const XFEATURE_XTILEDATA: i64 = 18;
+    let result: i64;
+    // SAFETY: a system call that reads no memory of ours.
+    unsafe {
+        asm!(
+            "syscall",
+            inlateout("rax") ARCH_PRCTL => result,
+            in("rdi") ARCH_REQ_XCOMP_PERM,
+            in("rsi") XFEATURE_XTILEDATA,
+            out("rcx") _,
+            out("r11") _,
+        );
+    }
+    result == 0
+}
+
+/// Not tried on other systems.
+#[cfg(not(target_os = "linux"))]
+fn may_use_tiles() -> bool {
+    false
+}
+
+/// The sizes of the tile registers: 0 to 3 have 16 rows of 64 bytes, for sums of 16×16; of the products' factors, 4 and 5
+/// are those of the sums' rows, 6 and 7 those of their columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TileSizes {
+    /// Pairs of bf16 that a product sums, 1 to 16: what a row of the registers 4 and 5 holds, and the rows of the registers
+    /// 6 and 7, of 64 bytes each.
+    pub pairs: usize,
+}
+
+impl TileSizes {
+    /// Eight tiles of 16 rows of 64 bytes.
+    pub const WHOLE: Self = Self { pairs: 16 };
+
+    /// As the unit reads them: a palette, and the bytes of a row and the number of rows of each register.
+    fn palette(self) -> Palette {
+        assert!((1..=16).contains(&self.pairs), "pairs of a product");
+        let pairs = self.pairs as u8;
+        let mut palette = Palette([0; 64]);
+        palette.0[0] = 1;
+        for tile in 0..8 {
+            palette.0[16 + 2 * tile] = if matches!(tile, 4 | 5) { 4 * pairs } else { 64 };
+            palette.0[48 + tile] = if matches!(tile, 6 | 7) { pairs } else { 16 };
+        }
+        palette
+    }
+}
+
+#[repr(align(64))]
+struct Palette([u8; 64]);
+
+/// Does `work` with this thread's tile registers configured, and gives them back, so that the system need not keep them
+/// any more.
+///
+/// That is the one thing that lasts from an `asm!` block to the next. It may: the compiler knows of no configuration and
+/// gives out no tile registers, nothing but such work uses the unit, and the system keeps it for each thread. Configuring
+/// for every product would clear all registers every time.
+///
+/// # Safety
+/// The unit must be [`available`]. The work must not configure the registers itself, nor wait for other work of this thread that
+/// does, such as a task of rayon's.
+///
+/// # Panics
+/// Unless there are 1 to 16 pairs.
+pub unsafe fn configured<R>(sizes: TileSizes, work: impl FnOnce() -> R) -> R {
+    /// However the work ends.
+    struct Release;
+
+    impl Drop for Release {
+        fn drop(&mut self) {
+            // SAFETY: the unit is there, as it was configured; all registers are cleared, and declared so; no memory is touched.
+            unsafe {
+                asm!(
+                    "tilerelease",
+                    out("tmm0") _, out("tmm1") _, out("tmm2") _, out("tmm3") _,
+                    out("tmm4") _, out("tmm5") _, out("tmm6") _, out("tmm7") _,
+                    options(nostack, nomem, preserves_flags),
+                );
+            }
+        }
+    }
+
+    let palette = sizes.palette();
+    // SAFETY: 64 bytes that describe a valid palette; all registers are cleared, and declared so.
+    unsafe {
+        asm!(
+            "ldtilecfg [{}]", in(reg) &raw const palette.0,
+            out("tmm0") _, out("tmm1") _, out("tmm2") _, out("tmm3") _,
+            out("tmm4") _, out("tmm5") _, out("tmm6") _, out("tmm7") _,
+            options(nostack, readonly, preserves_flags),
+        );
+    }
+    let _release = Release;
+    work()
+}

@@ -1,0 +1,317 @@
+//! Speed along a track of positions, such as a satellite receiver's.
+//!
+//! Differences of neighbouring positions are noise: a metre of jitter at one a second is a metre a second. So the whole track is
+//! smoothed at once: on each axis position and velocity follow a random acceleration, what was measured pulls them towards
+//! it, and what lies far off pulls less the farther it lies (Student's t by reweighting). The answer at every fix is the
+//! velocity given all of them, before and after (Rauch, Tung, Striebel).
+
+use nalgebra::{Matrix2, Vector2};
+
+/// Standard deviation of a measured position on an axis, in metres. Receivers claim more, but most of their error stays the
+/// same from second to second, and does not touch the speed.
+const POSITION_SIGMA_M: f64 = 1.0;
+/// Standard deviation of a measured speed, in m/s.
+const SPEED_SIGMA_MPS: f64 = 0.15;
+/// Spectral density of the random acceleration, m²/s³: a car's speed wanders by so many (m/s)² in a second.
+const ACCELERATION_DENSITY: f64 = 1.5;
+/// Degrees of freedom of Student's t: small is robust.
+const FREEDOM: f64 = 4.0;
+/// Rounds of reweighting.
+const ROUNDS: usize = 5;
+/// Fixes farther apart are of different tracks, in seconds.
+const MAX_GAP_S: f64 = 10.0;
+/// The ellipsoid of WGS 84: its equator's radius in metres, and its eccentricity squared.
+const EQUATOR_M: f64 = 6_378_137.0;
+const ECCENTRICITY_2: f64 = 6.694_379_990_14e-3;
+
+/// Where a receiver was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fix {
+    /// In seconds.
+    pub time_s: f64,
+    /// North of the equator, in degrees.
+    pub latitude_deg: f64,
+    /// East of Greenwich, in degrees.
+    pub longitude_deg: f64,
+    /// The speed over ground where the receiver tells it (from Doppler shifts, better than any difference of positions),
+    /// in m/s.
+    pub speed_mps: Option<f64>,
+}
+
+/// The speed at a fix.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FixSpeed {
+    /// In seconds.
+    pub time_s: f64,
+    /// Over ground, in m/s.
+    pub speed_mps: f64,
+    /// Its standard deviation.
+    pub sigma_mps: f64,
+}
+
+/// The speed at every fix. Fixes that are not finite, or not later than the one before, are left out; a fix more than ten seconds
+/// from both neighbours has none.
+#[must_use]
+pub fn speeds_of_fixes(fixes: &[Fix]) -> Vec<FixSpeed> {
+    let mut kept: Vec<Fix> = Vec::with_capacity(fixes.len());
+    for fix in fixes {
+        let numbers = [fix.time_s, fix.latitude_deg, fix.longitude_deg];
+        let later = kept.last().is_none_or(|last| fix.time_s > last.time_s);
+        if later && numbers.iter().all(|n| n.is_finite()) {
+            kept.push(*fix);
+        }
+    }
+    let parts = kept.chunk_by(|a, b| b.time_s - a.time_s <= MAX_GAP_S);
+    parts
+        .filter(|part| part.len() > 1)
+        .flat_map(speeds)
+        .collect()
+}
+
+/// The speeds of a track without gaps.
+fn speeds(fixes: &[Fix]) -> Vec<FixSpeed> {
+    if fixes.iter().all(|fix| fix.speed_mps.is_some()) {
+        let of = |fix: &Fix| FixSpeed {
+            time_s: fix.time_s,
+            speed_mps: fix.speed_mps.unwrap_or_default().max(0.0),
+            sigma_mps: SPEED_SIGMA_MPS,
+        };
+        return fixes.iter().map(of).collect();
+    }
+    let places = metres(fixes);
+    let mut weights = vec![1.0; fixes.len()];
+    let mut tracks = [Vec::new(), Vec::new()];
+    for _ in 0..ROUNDS {
+        for (axis, track) in tracks.iter_mut().enumerate() {
+            let measured: Vec<f64> = places.iter().map(|place| place[axis]).collect();
+            *track = smoothed(fixes, &measured, &weights);
+        }
+        for (i, weight) in weights.iter_mut().enumerate() {
+            let off = |axis: usize| (tracks[axis][i].state[0] - places[i][axis]) / POSITION_SIGMA_M;
+            let square = off(0).powi(2) + off(1).powi(2);
+            *weight = (FREEDOM + 2.0) / (FREEDOM + square);
+        }
+    }
+    let [east, north] = &tracks;
+    let all = fixes.iter().zip(east.iter().zip(north));
+    all.map(|(fix, (east, north))| {
+        let (x, y) = (east.state[1], north.state[1]);
+        let (var_x, var_y) = (east.covariance[(1, 1)], north.covariance[(1, 1)]);
+        let speed = x.hypot(y);
+        // Along the way it goes; of one that stands, either.
+        let variance = match speed > 1e-6 {
+            true => (x * x * var_x + y * y * var_y) / (speed * speed),
+            false => var_x.max(var_y),
+        };
+        FixSpeed {
+            time_s: fix.time_s,
+            speed_mps: speed,
+            sigma_mps: variance.sqrt(),
+        }
+    })
+    .collect()
+}
+
+/// East and north of the first fix, in metres, on the plane that touches the ellipsoid in the middle of the track: the scale is
+/// right to a millionth within some kilometres.
+fn metres(fixes: &[Fix]) -> Vec<[f64; 2]> {
+    let mean = fixes.iter().map(|f| f.latitude_deg).sum::<f64>() / fixes.len() as f64;
+    let (sin, cos) = mean.to_radians().sin_cos();
+    let w = 1.0 - ECCENTRICITY_2 * sin * sin;
+    let per_longitude = EQUATOR_M / w.sqrt() * cos;
+    let per_latitude = EQUATOR_M * (1.0 - ECCENTRICITY_2) / w.powf(1.5);
+    let first = fixes[0];
+    let place = |fix: &Fix| {
+        // Over the date line it is not far.
+        let east = (fix.longitude_deg - first.longitude_deg + 540.0).rem_euclid(360.0) - 180.0;
+        let north = fix.latitude_deg - first.latitude_deg;
+        [
+            east.to_radians() * per_longitude,
+            north.to_radians() * per_latitude,
+        ]
+    };
+    fixes.iter().map(place).collect()
+}
+
+/// Position and velocity on an axis.
+#[derive(Clone, Copy)]
+struct Estimate {
+    state: Vector2<f64>,
+    covariance: Matrix2<f64>,
+}
+
+/// The smoother on one axis; a weight of a half doubles a measurement's variance.
+fn smoothed(fixes: &[Fix], measured: &[f64], weights: &[f64]) -> Vec<Estimate> {
+    // Nothing is known of the velocity at first.
+    let mut next = Estimate {
+        state: Vector2::new(measured[0], 0.0),
+        covariance: Matrix2::new(1e4, 0.0, 0.0, 1e4),
+    };
+    let (mut predicted, mut filtered) = (Vec::new(), Vec::new());
+    for i in 0..fixes.len() {
+        if i > 0 {
+            next = advanced(&next, fixes[i].time_s - fixes[i - 1].time_s);
+        }
+        predicted.push(next);
+        let noise = POSITION_SIGMA_M.powi(2) / weights[i].max(1e-9);
+        let gain = next.covariance.column(0) / (next.covariance[(0, 0)] + noise);
+        let off = measured[i] - next.state[0];
+        next = Estimate {
+            state: next.state + gain * off,
+            covariance: next.covariance - gain * next.covariance.row(0),
+        };
+        filtered.push(next);
+    }
+    let mut result = filtered.clone();
+    for i in (0..fixes.len().saturating_sub(1)).rev() {
+        let step = transition(fixes[i + 1].time_s - fixes[i].time_s);
+        let Some(inverse) = predicted[i + 1].covariance.try_inverse() else {
+            continue;
+        };
+        let gain = filtered[i].covariance * step.transpose() * inverse;
+        let (later, expected) = (result[i + 1], predicted[i + 1]);
+        result[i] = Estimate {
+            state: filtered[i].state + gain * (later.state - expected.state),
+            covariance: filtered[i].covariance
+                + gain * (later.covariance - expected.covariance) * gain.transpose(),
+        };
+    }
+    result
+}
+
+fn transition(dt: f64) -> Matrix2<f64> {
+    Matrix2::new(1.0, dt, 0.0, 1.0)
+}
+
+/// What is expected `dt` seconds later.
+fn advanced(from: &Estimate, dt: f64) -> Estimate {
+    let step = transition(dt);
+    let noise = Matrix2::new(dt.powi(3) / 3.0, dt.powi(2) / 2.0, dt.powi(2) / 2.0, dt);
+    Estimate {
+        state: step * from.state,
+        covariance: step * from.covariance * step.transpose() + noise * ACCELERATION_DENSITY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A number between -1 and 1 that looks random.
+    fn noise(i: usize) -> f64 {
+        let x = (i as f64 * 12.9898).sin() * 43_758.545_3;
+        2.0 * (x - x.floor()) - 1.0
+    }
+
+    /// A drive at 49° north that speeds up from 5 to 15 m/s, brakes and turns; `jitter` metres to either side.
+    fn drive(jitter: f64) -> (Vec<Fix>, Vec<f64>) {
+        let (mut x, mut y, mut heading) = (0.0_f64, 0.0_f64, 0.6_f64);
+        let (mut fixes, mut speeds) = (Vec::new(), Vec::new());
+        let (sin, cos) = 49_f64.to_radians().sin_cos();
+        let w = 1.0 - ECCENTRICITY_2 * sin * sin;
+        for tenth in 0..1200 {
+            let t = f64::from(tenth) / 10.0;
+            let speed = 10.0 + 5.0 * (t / 15.0).sin();
+            if tenth % 10 == 0 {
+                let (east, north) = (
+                    x + jitter * noise(tenth as usize),
+                    y + jitter * noise(7919 + tenth as usize),
+                );
+                fixes.push(Fix {
+                    time_s: t,
+                    latitude_deg: 49.0
+                        + (north * w.powf(1.5) / (EQUATOR_M * (1.0 - ECCENTRICITY_2))).to_degrees(),
+                    longitude_deg: 8.4 + (east * w.sqrt() / (EQUATOR_M * cos)).to_degrees(),
+                    speed_mps: None,
+                });
+                speeds.push(speed);
+            }
+            (x, y) = (
+                x + 0.1 * speed * heading.cos(),
+                y + 0.1 * speed * heading.sin(),
+            );
+            heading += 0.1 * 0.15 * (t / 9.0).sin();
+        }
+        (fixes, speeds)
+    }
+
+    /// Root mean square of what is wrong, and the ratio of the distances.
+    fn errors(found: &[FixSpeed], truth: &[f64]) -> (f64, f64) {
+        let squares = found
+            .iter()
+            .zip(truth)
+            .map(|(f, t)| (f.speed_mps - t).powi(2));
+        let ratio = found.iter().map(|f| f.speed_mps).sum::<f64>() / truth.iter().sum::<f64>();
+        ((squares.sum::<f64>() / truth.len() as f64).sqrt(), ratio)
+    }
+
+    #[test]
+    fn a_track_gives_its_speeds() {
+        for (jitter, rms, bias) in [(0.0, 0.2, 2e-3), (1.0, 0.5, 6e-3)] {
+            let (fixes, truth) = drive(jitter);
+            let found = speeds_of_fixes(&fixes);
+            assert_eq!(found.len(), truth.len());
+            let (error, ratio) = errors(&found, &truth);
+            assert!(error < rms, "{jitter}: {error}");
+            assert!((ratio - 1.0).abs() < bias, "{jitter}: {ratio}");
+            // Two thirds lie within what it says of itself, or more.
+            let within = found
+                .iter()
+                .zip(&truth)
+                .filter(|(f, t)| (f.speed_mps - **t).abs() < f.sigma_mps);
+            assert!(within.count() * 3 > 2 * truth.len(), "{jitter}");
+        }
+    }
+
+    #[test]
+    fn leaps_do_not_become_speed() {
+        let (mut fixes, truth) = drive(0.3);
+        for i in [17, 40, 41, 90] {
+            fixes[i].latitude_deg += 4e-4;
+        }
+        let (error, ratio) = errors(&speeds_of_fixes(&fixes), &truth);
+        assert!(error < 0.7 && (ratio - 1.0).abs() < 0.01, "{error} {ratio}");
+        // What neighbours say is tens of m/s.
+        let naive = 4e-4_f64.to_radians() * EQUATOR_M;
+        assert!(naive > 40.0);
+    }
+
+    #[test]
+    fn a_receivers_own_speed_counts_and_gaps_part_the_track() {
+        let fix = |time_s: f64, speed: f64| Fix {
+            time_s,
+            latitude_deg: 49.0,
+            longitude_deg: 179.999_99,
+            speed_mps: Some(speed),
+        };
+        let fixes = [
+            fix(0.0, 3.0),
+            fix(1.0, 4.0),
+            fix(1.0, 9.0),
+            fix(30.0, 5.0),
+            fix(f64::NAN, 5.0),
+        ];
+        let found = speeds_of_fixes(&fixes);
+        let speeds: Vec<f64> = found.iter().map(|f| f.speed_mps).collect();
+        assert_eq!(
+            speeds,
+            [3.0, 4.0],
+            "twice a time, a lone fix, and one without a time"
+        );
+        assert!(speeds_of_fixes(&[]).is_empty());
+        let over = |longitude_deg: f64, time_s: f64| Fix {
+            longitude_deg,
+            speed_mps: None,
+            ..fix(time_s, 0.0)
+        };
+        let found = speeds_of_fixes(&[
+            over(179.9999, 0.0),
+            over(-179.9999, 1.0),
+            over(-179.9997, 2.0),
+        ]);
+        assert!(
+            found.iter().all(|f| (10.0..20.0).contains(&f.speed_mps)),
+            "{found:?}"
+        );
+    }
+}
