@@ -1,14 +1,16 @@
 #!/usr/bin/env bash
-# Everything that makes `street`, the embedded network, from nothing: three stages of training on simulated views, the calibration
+# Everything that makes `street`, the embedded network, from nothing: six stages of training on simulated views, the calibration
 # of its intervals on simulated drives, and the two files that the crate deepfusion-weights embeds.
 #
 #   recipes/street.sh [FOLDER]        default: runs/street; DEEPFUSION names another binary
 #
-# About three hours on two cores. Stopped, the same command goes on where it was.
+# About four hours on two cores. Stopped, the same command goes on where it was. The later stages learn in bf16; on a processor
+# that has none (`train` then says so), PRECISION=f32 takes about twice as long.
 set -euo pipefail
 recipes=$(cd "$(dirname "$0")" && pwd)
 out=${1:-runs/street}
 deepfusion=${DEEPFUSION:-deepfusion}
+precision=${PRECISION:-bf16}
 mkdir -p "$out"
 
 # train NAME [--init FILE]: one stage, begun, gone on with, or left as it is.
@@ -27,7 +29,10 @@ train() {
 
 train street
 train street-more --init "$out/street/last.safetensors"
-train street-uncertainty --init "$out/street-more/last.safetensors"
+train street-again --init "$out/street-more/last.safetensors" --set "precision=$precision"
+train street-large --init "$out/street-again/last.safetensors" --set "precision=$precision"
+train street-large-more --init "$out/street-large/last.safetensors" --set "precision=$precision"
+train street-uncertainty --init "$out/street-large-more/last.safetensors"
 
 # Drives that no stage has seen; a drive that is half-written is made again.
 scenes=(urban commercial park garage night urban)
@@ -45,4 +50,4 @@ done
 
 "$deepfusion" weights pack --model "$out/street-uncertainty" --checkpoint last --name street --simulated-only --out "$out/packed" \
     --recipe "recipes/street.sh" \
-    --note "depth on simulated views: 5,200 steps at 320x96, 4,800 at three sizes; then 60 of the head for uncertainty alone"
+    --note "depth on simulated views: 11,700 steps at 320x96 and two sizes like it, 4,450 at 640x192 and three others; then 60 of the head for uncertainty alone"

@@ -64,7 +64,7 @@ pub struct Cli {
 /// Everything the program can do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// With no data at all: simulate a drive, train on it, measure depth on a street never seen.
+    /// With no data at all: depth, cloud and targets of a new street, then learning there.
     Demo(DemoArgs),
     /// Write a simulated drive with exact ground truth.
     Simulate(SimulateArgs),
@@ -107,7 +107,7 @@ pub enum Command {
 #[derive(Debug, Args)]
 #[command(
     after_help = "Takes a few minutes on two cores. Leaves pictures, a point cloud and report.html.\n\n\
-    Examples:\n  deepfusion demo --out runs/first\n  deepfusion demo --embedded --out runs/second"
+    Examples:\n  deepfusion demo --out runs/first\n  deepfusion demo --from-scratch --out runs/second"
 )]
 pub struct DemoArgs {
     /// Folder for everything it makes [default: runs/demo-TIME].
@@ -116,9 +116,9 @@ pub struct DemoArgs {
     /// Print the final evaluation as JSON on stdout.
     #[arg(long)]
     pub json: bool,
-    /// Show the embedded network: depth, cloud and 3D targets of a street at first sight, then learning there.
+    /// Start from nothing: train a small network on six simulated streets for some minutes, and measure it on a seventh.
     #[arg(long)]
-    pub embedded: bool,
+    pub from_scratch: bool,
     /// Chooses the streets.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,

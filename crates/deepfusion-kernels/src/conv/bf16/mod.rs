@@ -36,8 +36,8 @@ pub enum Precision {
     #[default]
     F32,
     /// Images, gradients and weights rounded to bf16 where they are multiplied, sums and results in f32.
-    /// Convolutions with a multiple of 16 input and output channels, on processors that have it
-    /// ([`has_bf16`](crate::has_bf16)); the others stay in f32.
+    /// Of convolutions with a multiple of 16 input and output channels, on processors with AMX or AVX512-BF16; the others stay
+    /// in f32.
     Bf16,
 }
 

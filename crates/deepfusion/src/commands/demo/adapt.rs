@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Result;
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use deepfusion_data::{Dataset, OpenOptions, Split, write_atomically};
+use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_render::{HtmlReport, PictureFormat};
 use deepfusion_sim::SimConfig;
 use deepfusion_train::{TrainConfig, ViewMotion};
@@ -29,10 +30,11 @@ const MOVING_CARS: usize = 6;
 /// Frames that it learns from; those after the gap are measured on.
 const LEARNED: usize = 120;
 const GAP: usize = 5;
-/// Steps of learning: about two minutes on two cores.
-const STEPS: usize = 120;
+/// Steps of learning, and samples of a step: about two minutes on two cores.
+const STEPS: usize = 60;
+const BATCH: usize = 2;
 /// A network that knows its trade takes smaller steps than one that begins.
-const LEARNING_RATE: f64 = 2e-5;
+const LEARNING_RATE: f64 = 1e-5;
 
 /// Arguments of `perceive` alone.
 #[derive(Parser)]
@@ -68,7 +70,7 @@ pub fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     let first = Shown::of(demo, &predictor, &parts.all, frame)?;
     let first_ms = 1e3 * before.elapsed().as_secs_f64();
     let targets = demo.out.join("targets");
-    perceive(&drive, &targets)?;
+    perceive(demo, &drive, &targets)?;
     let at_first_sight = measure(&predictor, &parts.learned, &parts.measured)?;
     say(&format!(
         "abs_rel {:.3} unscaled, from one image and nothing learned here",
@@ -81,15 +83,23 @@ pub fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
         path: None,
     };
     let own = predictor.config();
+    let precision = match supports(&demo.device, Precision::Bf16) {
+        true => Precision::Bf16,
+        false => Precision::F32,
+    };
     let mut config = TrainConfig {
         view_motion: ViewMotion::Vehicle,
+        precision,
         size: own.size,
+        batch: BATCH,
         steps: Some(STEPS),
         learning_rate: LEARNING_RATE,
         seed: demo.args.seed,
         validate_every: STEPS / 2,
         ..own.preset.config_on(demo.args.device.compute())
     };
+    // Two pictures of one street say little of how pictures are distributed.
+    config.depth_net.encoder.frozen_statistics = true;
     config.data.paths = vec![drive.clone()];
     config.data.split = Some(parts.learn.clone());
     start.record_in(&mut config)?;
@@ -161,12 +171,16 @@ impl Parts {
 
 /// 3D targets of the whole drive, followed over time, with pictures: the program's own command, which takes the embedded
 /// network where none is named.
-fn perceive(drive: &Path, out: &Path) -> Result<()> {
+fn perceive(demo: &Demo, drive: &Path, out: &Path) -> Result<()> {
+    let device = demo.args.device.to_possible_value();
+    let device = device.map_or_else(String::new, |value| value.get_name().to_owned());
     let words = [
         "perceive".as_ref(),
         drive.as_os_str(),
         "--out".as_ref(),
         out.as_os_str(),
+        "--device".as_ref(),
+        device.as_ref(),
     ];
     perceive::run(&Typed::try_parse_from(words)?.args)
 }

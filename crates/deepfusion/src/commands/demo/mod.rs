@@ -1,6 +1,6 @@
-//! The whole way with no data at all. Streets are simulated, a small network learns depth on them from scratch, and is
-//! measured on another. Or the embedded network sees a street at first sight, learns there from images and motion, and is
-//! measured before and after.
+//! The whole way with no data at all. The embedded network sees a simulated street at first sight, learns there from images and
+//! motion, and is measured before and after. Or streets are simulated, a small network learns depth on them from scratch,
+//! and is measured on another.
 
 mod adapt;
 mod from_scratch;
@@ -34,9 +34,9 @@ const DEMO: &str = "the demo";
 
 /// `deepfusion demo`.
 pub fn run(args: &DemoArgs) -> Result<()> {
-    let embedded = match args.embedded {
-        true => Some(Box::new(deepfusion_weights::find(DEFAULT)?)),
-        false => None,
+    let embedded = match args.from_scratch {
+        true => None,
+        false => Some(Box::new(deepfusion_weights::find(DEFAULT)?)),
     };
     let demo = Demo {
         args,
