@@ -7,6 +7,9 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
+/// Longest gap between speeds that can be asked to be bridged, in seconds: nobody knows how a car drove for longer.
+const MOST_GAP_S: f64 = 60.0;
+
 /// A recording's `dataset.toml`. Every key is optional; docs/reference/dataset-toml.md lists them.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -163,6 +166,11 @@ impl FolderConfig {
             if let Some(bad) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
                 return Err(config.error(format!("{key} is {bad}, it must be above 0")));
             }
+        }
+        if let Some(bad) = config.max_gap_s.filter(|v| *v > MOST_GAP_S) {
+            return Err(config.error(format!(
+                "max_gap_s is {bad}, at most {MOST_GAP_S} s can be bridged"
+            )));
         }
         let place = config.vehicle_from_imu.unwrap_or_default();
         let mut numbers = place.translation.iter().chain(&place.rotation);

@@ -129,16 +129,19 @@ type Timed = Vec<(i64, Fix)>;
 /// The points of all tracks of a GPX file (1.0 and 1.1) that have a time; a speed in m/s, of the point or of an extension.
 fn gpx(bytes: &[u8]) -> std::result::Result<Timed, Bad> {
     let mut reader = Reader::from_reader(bytes);
-    let line_at = |position: u64| {
-        let before = &bytes[..(position as usize).min(bytes.len())];
-        1 + memchr::memchr_iter(b'\n', before).count() as u64
-    };
+    // Lines are counted on from the event before: a track has millions of events.
+    let (mut line, mut counted) = (1, 0);
     let (mut fixes, mut point, mut text, mut known) = (Vec::new(), None, String::new(), false);
     loop {
         let event = reader.read_event();
-        let line = line_at(reader.buffer_position());
-        let event =
-            event.map_err(|e| bad(line_at(reader.error_position()), "XML", e.to_string()))?;
+        let position = match &event {
+            Ok(_) => reader.buffer_position(),
+            Err(_) => reader.error_position(),
+        };
+        let position = (position as usize).clamp(counted, bytes.len());
+        line += memchr::memchr_iter(b'\n', &bytes[counted..position]).count() as u64;
+        counted = position;
+        let event = event.map_err(|e| bad(line, "XML", e.to_string()))?;
         match event {
             Event::Start(tag) => {
                 known |= tag.local_name().as_ref() == b"gpx";
@@ -234,11 +237,14 @@ fn sentences(bytes: &[u8]) -> std::result::Result<Timed, Bad> {
         let Ok(text) = std::str::from_utf8(&line[start..]) else {
             continue;
         };
-        if text.len() < 7 || &text[3..6] != "RMC" {
-            known |= text.len() > 6;
+        // Sentences are ASCII; anything else between them is noise.
+        if !text.is_ascii() || text.len() < 7 {
             continue;
         }
         known = true;
+        if &text[3..6] != "RMC" {
+            continue;
+        }
         let sentence =
             nmea::parse_nmea_sentence(text).map_err(|e| bad(number, "RMC", e.to_string()))?;
         if sentence.checksum != sentence.calc_checksum() {

@@ -102,7 +102,7 @@ fn sentences_give_the_receivers_speed() {
     let text = [
         gga,
         rmc(0, 'A', 10.0),
-        "noise\n".into(),
+        "noise $\u{e9}\u{20ac}\u{20ac}\n".into(),
         rmc(1, 'V', 99.0),
         rmc(2, 'A', 20.0),
         rmc(3, 'A', 20.0),

@@ -159,6 +159,8 @@ fn slow_logs_are_bridged() {
     assert_eq!(known(&fast, "max_gap_s = 2", &[2.7]).0, [Some(1.0)]);
     let error = refusal(&[("speed.csv", slow), ("dataset.toml", "max_gap_s = 0")]);
     assert!(error.to_string().contains("max_gap_s is 0"), "{error}");
+    let error = refusal(&[("speed.csv", slow), ("dataset.toml", "max_gap_s = 1e9")]);
+    assert!(error.to_string().contains("at most 60 s"), "{error}");
 }
 
 #[test]
