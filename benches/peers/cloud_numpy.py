@@ -1,4 +1,4 @@
-"""The peer of `cargo bench -p deepfusion-cloud`: the same disparities to the same coloured cloud in NumPy.
+"""The peer of `cargo bench -p deepfusion-geometry`: the same disparities to the same coloured cloud in NumPy.
 
 pip install numpy
 python benches/peers/cloud_numpy.py

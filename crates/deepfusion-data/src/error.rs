@@ -370,7 +370,7 @@ pub enum Error {
     },
     /// A velodyne scan cannot be read.
     #[error(transparent)]
-    Cloud(#[from] deepfusion_cloud::Error),
+    Cloud(#[from] deepfusion_geometry::cloud::Error),
     /// An array file cannot be written.
     #[error("{}: {problem}", path.display())]
     Array {

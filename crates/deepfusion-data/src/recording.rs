@@ -25,6 +25,8 @@ pub enum DatasetKind {
     RgbD,
     /// A ROS bag.
     Bag,
+    /// A layout of somebody else's: a [`Recording`] from outside this crate.
+    Other,
 }
 
 impl DatasetKind {
@@ -38,6 +40,7 @@ impl DatasetKind {
             Self::Comma2k19 => "comma2k19 segment",
             Self::RgbD => "RGB-D folder",
             Self::Bag => "ROS bag",
+            Self::Other => "recording",
         }
     }
 }

@@ -3,12 +3,12 @@
 mod common;
 
 use common::TinyDrive;
-use deepfusion_cloud::PointCloud;
 use deepfusion_data::kitti::{Calibration, depth_map};
 use deepfusion_data::{
     Camera, CameraChoice, Dataset, Error, GtKind, OpenOptions, export_gt, overlay, read_depth_png,
 };
 use deepfusion_geometry::DepthMap;
+use deepfusion_geometry::cloud::PointCloud;
 use ndarray::Array2;
 use ndarray_npy::NpzReader;
 use std::fs::{self, File};

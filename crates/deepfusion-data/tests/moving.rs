@@ -3,9 +3,9 @@
 mod common;
 
 use common::{TinyDrive, real_data, wall};
-use deepfusion_cloud::PointCloud;
 use deepfusion_data::kitti::{Calibration, depth_map};
 use deepfusion_data::{Camera, Dataset, Error, GtKind, MovingSource, OpenOptions};
+use deepfusion_geometry::cloud::PointCloud;
 use std::fs;
 use std::path::Path;
 

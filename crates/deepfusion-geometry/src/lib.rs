@@ -1,4 +1,4 @@
-//! Cameras, rigid motions, trajectories and depth maps, in plain `f32` / `f64`.
+//! Cameras, rigid motions, trajectories, depth maps and point clouds, in plain `f32` / `f64`.
 //!
 //! # Conventions
 //! - Camera frame: x right, y down, z forward. Vehicle frame: x forward, y left, z up.
@@ -6,6 +6,7 @@
 //! - Transforms are named `a_from_b`: they take a point of frame b to frame a.
 //! - Pixels have integer centres: the centre of the top-left pixel is (0, 0).
 
+pub mod cloud;
 mod depth_map;
 mod depth_range;
 mod distortion;

@@ -1,6 +1,7 @@
 //! The engine: a graph laid out and packed for one image size, run again and again without allocating
 //! buffers.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::aligned::Aligned;
@@ -21,7 +22,7 @@ pub enum Precision {
     Bf16,
 }
 
-/// A network that runs.
+/// A network that runs: a plan with packed weights, which [`Engine::another`] shares, and buffers of its own.
 #[derive(Debug)]
 pub struct Engine {
     runner: Runner,
@@ -64,6 +65,23 @@ impl Engine {
     #[must_use]
     pub fn has_bf16() -> bool {
         Bf16Conv::available()
+    }
+
+    /// Another engine on the same packed weights, with buffers of its own: one for each thread.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] where there is no room for them.
+    pub fn another(&self) -> Result<Self, Error> {
+        let (width, height) = self.size;
+        let full = || Error::Memory { width, height };
+        let runner = match &self.runner {
+            Runner::F32(runner) => Runner::F32(runner.another().ok_or_else(full)?),
+            Runner::Bf16(runner) => Runner::Bf16(runner.another().ok_or_else(full)?),
+        };
+        Ok(Self {
+            runner,
+            size: self.size,
+        })
     }
 
     /// Width and height of the images, in pixels.
@@ -117,9 +135,19 @@ impl Engine {
     /// When the graph has no such output.
     #[must_use]
     pub fn output(&self, index: usize) -> Vec<f32> {
+        let mut values = Vec::new();
+        self.read_output(index, &mut values);
+        values
+    }
+
+    /// The same in place of what `values` holds.
+    ///
+    /// # Panics
+    /// As [`Self::output`].
+    pub fn read_output(&self, index: usize, values: &mut Vec<f32>) {
         match &self.runner {
-            Runner::F32(runner) => runner.output(index),
-            Runner::Bf16(runner) => runner.output(index),
+            Runner::F32(runner) => runner.read_output(index, values),
+            Runner::Bf16(runner) => runner.read_output(index, values),
         }
     }
 }
@@ -127,7 +155,7 @@ impl Engine {
 /// An engine whose values are stored as `E`.
 #[derive(Debug)]
 pub(crate) struct Typed<E, C> {
-    plan: Plan<C>,
+    plan: Arc<Plan<C>>,
     arena: Aligned<E>,
     normalisation: Normalisation,
 }
@@ -140,9 +168,18 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
         };
         let (plan, arena) = Plan::new(graph, width, height)?;
         Ok(Self {
-            plan,
+            plan: Arc::new(plan),
             arena,
             normalisation,
+        })
+    }
+
+    /// On the same plan; `None` where memory has no room for another arena.
+    pub(crate) fn another(&self) -> Option<Self> {
+        Some(Self {
+            plan: Arc::clone(&self.plan),
+            arena: Aligned::try_zeros(self.arena.len())?,
+            normalisation: self.normalisation,
         })
     }
 
@@ -190,9 +227,10 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
         }
     }
 
-    pub(crate) fn output(&self, index: usize) -> Vec<f32> {
+    pub(crate) fn read_output(&self, index: usize, out: &mut Vec<f32>) {
         let (view, places) = &self.plan.outputs[index];
-        let mut out = Vec::with_capacity(places.len() * view.pixels());
+        out.clear();
+        out.reserve(places.len() * view.pixels());
         let value = |at: usize| {
             if view.result {
                 let slots = &self.arena[at..at + size_of::<f32>() / size_of::<E>()];
@@ -207,12 +245,17 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
                 out.extend((0..view.width).map(|x| value(view.at(x, y) + c)));
             }
         }
-        out
     }
 }
 
 #[cfg(test)]
 impl<E: Element, C: ConvForm<E>> Typed<E, C> {
+    pub(crate) fn output(&self, index: usize) -> Vec<f32> {
+        let mut values = Vec::new();
+        self.read_output(index, &mut values);
+        values
+    }
+
     /// Leaves the arena full of what is no number, as the worst of images might.
     pub(crate) fn poison(&mut self) {
         self.arena.fill(E::of(f32::NAN));

@@ -1,7 +1,8 @@
 //! An image fitted into a model's input, its sides kept in proportion.
 
-use fast_image_resize::images::{Image, ImageRef};
-use fast_image_resize::{FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer};
+use fast_image_resize::images::{TypedImage, TypedImageRef};
+use fast_image_resize::pixels::U8x3;
+use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions, Resizer};
 use image::RgbImage;
 
 /// The grey of what the image does not fill.
@@ -106,18 +107,20 @@ impl Letterbox {
     /// The image at its size within the input; bilinear without a filter, as these models were trained.
     fn resized(&self, image: &RgbImage) -> Vec<u8> {
         let [width, height] = self.inner.map(|s| s as u32);
-        let mut small = Image::new(width, height, PixelType::U8x3);
+        let mut small = vec![0; 3 * width as usize * height as usize];
         let options =
             ResizeOptions::new().resize_alg(ResizeAlg::Interpolation(FilterType::Bilinear));
-        let done = ImageRef::new(
-            image.width(),
-            image.height(),
-            image.as_raw(),
-            PixelType::U8x3,
-        )
-        .is_ok_and(|from| Resizer::new().resize(&from, &mut small, &options).is_ok());
+        let from = TypedImageRef::<U8x3>::from_buffer(image.width(), image.height(), image);
+        let to = TypedImage::<U8x3>::from_buffer(width, height, &mut small);
+        // Not `resize`: that one compiles every pixel type there is, for a minute.
+        let done = match (from, to) {
+            (Ok(from), Ok(mut to)) => Resizer::new()
+                .resize_typed(&from, &mut to, &options)
+                .is_ok(),
+            _ => false,
+        };
         debug_assert!(done, "an image of bytes can be resized");
-        small.into_vec()
+        small
     }
 }
 

@@ -3,94 +3,10 @@
 use burn::module::Module;
 use burn::tensor::activation::{relu, sigmoid};
 use burn::tensor::{Device, Tensor};
-use serde::{Deserialize, Serialize};
 
-use crate::Error;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig, global_mean};
-
-/// How the masks act on the feature.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(rename_all = "lowercase")]
-pub enum AttentionForm {
-    /// F' = F ⊙ M_s ⊙ M_c, the paper's Eq. 15. Masks that know nothing yet are ½ each: the feature starts
-    /// at a quarter.
-    #[default]
-    Product,
-    /// F' = F ⊙ (1 + M_s ⊙ M_c): the feature always passes.
-    Residual,
-}
-
-/// What an [`Attention`] is built from.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields, default)]
-pub struct AttentionConfig {
-    /// How the masks act.
-    pub form: AttentionForm,
-    /// The channel mask's hidden layer has this share of the feature's channels (rounded up).
-    pub reduction: usize,
-    /// Side of the spatial mask's kernel in pixels, odd.
-    pub kernel: usize,
-}
-
-impl Default for AttentionConfig {
-    /// The plain product, a reduction by 16, 7×7.
-    fn default() -> Self {
-        Self {
-            form: AttentionForm::default(),
-            reduction: 16,
-            kernel: 7,
-        }
-    }
-}
-
-impl AttentionConfig {
-    /// Channels of the channel mask's hidden layer.
-    #[must_use]
-    pub fn hidden(&self, channels: usize) -> usize {
-        channels.div_ceil(self.reduction.max(1))
-    }
-
-    /// # Errors
-    /// [`Error::Config`] for a reduction or a kernel that means no network.
-    pub fn validate(&self) -> Result<(), Error> {
-        if !(1..=1024).contains(&self.reduction) {
-            let found = self.reduction;
-            return Err(Error::config("attention.reduction", "1 to 1024", found));
-        }
-        if self.kernel.is_multiple_of(2) || self.kernel > 15 {
-            let found = self.kernel;
-            return Err(Error::config("attention.kernel", "odd, at most 15", found));
-        }
-        Ok(())
-    }
-
-    /// A new one for a feature of `channels`.
-    ///
-    /// # Errors
-    /// As [`Self::validate`].
-    pub fn init(
-        &self,
-        channels: usize,
-        rng: &mut WeightRng,
-        device: &Device,
-    ) -> Result<Attention, Error> {
-        self.validate()?;
-        let mut conv = |from: usize, to: usize, kernel: usize| {
-            let conv = Conv2dConfig::new(from, to, kernel).without_bias();
-            conv.init(rng, device)
-        };
-        let hidden = self.hidden(channels);
-        Ok(Attention {
-            squeeze: conv(channels, hidden, 1),
-            excite: conv(hidden, channels, 1),
-            spatial: conv(2, 1, self.kernel),
-            form: self.form,
-        })
-    }
-}
+use crate::{AttentionConfig, AttentionForm, Error};
 
 /// Where an [`Attention`] looks, between 0 and 1.
 #[derive(Debug, Clone)]
@@ -115,6 +31,30 @@ pub struct Attention {
 }
 
 impl Attention {
+    /// A new one for a feature of `channels`.
+    ///
+    /// # Errors
+    /// As [`AttentionConfig::validate`].
+    pub fn new(
+        config: &AttentionConfig,
+        channels: usize,
+        rng: &mut WeightRng,
+        device: &Device,
+    ) -> Result<Self, Error> {
+        config.validate()?;
+        let mut conv = |from: usize, to: usize, kernel: usize| {
+            let conv = Conv2dConfig::new(from, to, kernel).without_bias();
+            conv.init(rng, device)
+        };
+        let hidden = config.hidden(channels);
+        Ok(Self {
+            squeeze: conv(channels, hidden, 1),
+            excite: conv(hidden, channels, 1),
+            spatial: conv(2, 1, config.kernel),
+            form: config.form,
+        })
+    }
+
     /// M_c = σ(W₂·relu(W₁·mean(F))) over the image, M_s = σ(w ⋆ [mean_c F; max_c F]).
     ///
     /// # Shapes

@@ -2,100 +2,14 @@
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, activation::sigmoid};
-use serde::{Deserialize, Serialize};
 
-use crate::Error;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig};
 use crate::ops::{elu, upsample_concat};
+use crate::{DecoderConfig, Error};
 
 /// How many scales a disparity is predicted at: 1, 1/2, 1/4, 1/8 of the input's size.
 pub const SCALES: usize = 4;
-
-/// What a [`DisparityDecoder`] is built from.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields)]
-pub struct DecoderConfig {
-    /// Channels of the five stages, coarse to fine.
-    pub widths: [usize; 5],
-}
-
-impl Default for DecoderConfig {
-    /// 256, 128, 64, 32, 16.
-    fn default() -> Self {
-        Self {
-            widths: [256, 128, 64, 32, 16],
-        }
-    }
-}
-
-impl DecoderConfig {
-    /// # Errors
-    /// [`Error::Config`] for a stage without channels.
-    pub fn validate(&self) -> Result<(), Error> {
-        if self.widths.iter().any(|width| !(1..=4096).contains(width)) {
-            return Err(Error::config(
-                "decoder.widths",
-                "five widths of 1 to 4096",
-                self.widths,
-            ));
-        }
-        Ok(())
-    }
-
-    /// A new decoder for features of `encoder_channels` (fine to coarse). Where the two coarsest features
-    /// have one size (`output_stride` 16), the first stage does not enlarge. A `head_bias` makes each head
-    /// start with that bias instead of a random one.
-    ///
-    /// # Errors
-    /// As [`Self::validate`].
-    pub fn init(
-        &self,
-        encoder_channels: [usize; 5],
-        output_stride: usize,
-        head_bias: Option<f32>,
-        rng: &mut WeightRng,
-        device: &Device,
-    ) -> Result<DisparityDecoder, Error> {
-        self.validate()?;
-        let mut channels_in = encoder_channels[4];
-        let stages = (0..5)
-            .map(|index| {
-                let width = self.widths[index];
-                // Stage 0 meets the feature at stride 16, …, stage 3 the one at stride 2, stage 4 none.
-                let skip = if index < 4 {
-                    encoder_channels[3 - index]
-                } else {
-                    0
-                };
-                let stage = DecoderStage {
-                    reduce: Conv2dConfig::new(channels_in, width, 3)
-                        .reflected()
-                        .init(rng, device),
-                    fuse: Conv2dConfig::new(width + skip, width, 3)
-                        .reflected()
-                        .init(rng, device),
-                    enlarge: index > 0 || output_stride == 32,
-                };
-                channels_in = width;
-                stage
-            })
-            .collect();
-        let heads = (0..SCALES)
-            .map(|scale| {
-                let mut head = Conv2dConfig::new(self.widths[4 - scale], 1, 3)
-                    .reflected()
-                    .init(rng, device);
-                if let Some(bias) = head_bias {
-                    head.bias = Some(Param::from_data([bias], device));
-                }
-                head
-            })
-            .collect();
-        Ok(DisparityDecoder { stages, heads })
-    }
-}
 
 /// One stage: 3×3 + ELU, nearest ×2 (but for the first at output stride 16), the skip feature appended,
 /// 3×3 + ELU; all reflection-padded.
@@ -135,6 +49,58 @@ pub struct DisparityDecoder {
 }
 
 impl DisparityDecoder {
+    /// A new decoder for features of `encoder_channels` (fine to coarse). Where the two coarsest features
+    /// have one size (`output_stride` 16), the first stage does not enlarge. A `head_bias` makes each head
+    /// start with that bias instead of a random one.
+    ///
+    /// # Errors
+    /// As [`DecoderConfig::validate`].
+    pub fn new(
+        config: &DecoderConfig,
+        encoder_channels: [usize; 5],
+        output_stride: usize,
+        head_bias: Option<f32>,
+        rng: &mut WeightRng,
+        device: &Device,
+    ) -> Result<Self, Error> {
+        config.validate()?;
+        let mut channels_in = encoder_channels[4];
+        let stages = (0..5)
+            .map(|index| {
+                let width = config.widths[index];
+                // Stage 0 meets the feature at stride 16, …, stage 3 the one at stride 2, stage 4 none.
+                let skip = if index < 4 {
+                    encoder_channels[3 - index]
+                } else {
+                    0
+                };
+                let stage = DecoderStage {
+                    reduce: Conv2dConfig::new(channels_in, width, 3)
+                        .reflected()
+                        .init(rng, device),
+                    fuse: Conv2dConfig::new(width + skip, width, 3)
+                        .reflected()
+                        .init(rng, device),
+                    enlarge: index > 0 || output_stride == 32,
+                };
+                channels_in = width;
+                stage
+            })
+            .collect();
+        let heads = (0..SCALES)
+            .map(|scale| {
+                let mut head = Conv2dConfig::new(config.widths[4 - scale], 1, 3)
+                    .reflected()
+                    .init(rng, device);
+                if let Some(bias) = head_bias {
+                    head.bias = Some(Param::from_data([bias], device));
+                }
+                head
+            })
+            .collect();
+        Ok(Self { stages, heads })
+    }
+
     /// σ = sigmoid(head(stage)), a disparity between the ends of the network's depth range.
     ///
     /// # Shapes

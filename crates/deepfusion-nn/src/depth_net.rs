@@ -2,243 +2,18 @@
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
-use deepfusion_geometry::DepthRange;
-use serde::{Deserialize, Serialize};
 
-use crate::Error;
-use crate::attention::{Attention, AttentionConfig, AttentionMasks, GlobalAggregation};
-use crate::decoder::{DecoderConfig, DisparityDecoder};
-use crate::hce::{HceConfig, HierarchicalContext};
+use crate::attention::{Attention, AttentionMasks, GlobalAggregation};
+use crate::decoder::DisparityDecoder;
+use crate::hce::HierarchicalContext;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig, freeze_statistics};
-use crate::resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth};
+use crate::resnet::ResNet;
 use crate::weights::{self, Weights};
+use crate::{DepthNetConfig, Error};
 
 /// The error of ln depth that the head for uncertainty starts at everywhere.
 const FIRST_SCALE: f32 = 0.2;
-
-/// The size of the images a network is given, in pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields)]
-pub struct InputSize {
-    /// Width in pixels.
-    pub width: usize,
-    /// Height in pixels.
-    pub height: usize,
-}
-
-impl InputSize {
-    /// A size that the encoder can halve five times.
-    ///
-    /// # Errors
-    /// As [`Self::validate`].
-    pub fn new(width: usize, height: usize) -> Result<Self, Error> {
-        let size = Self { width, height };
-        size.validate()?;
-        Ok(size)
-    }
-
-    /// The coarsest feature has 1/32 of the size; the decoder's reflection padding needs two of its
-    /// pixels in each direction.
-    ///
-    /// # Errors
-    /// [`Error::InputSize`] unless both sides are multiples of 32 and at least 64.
-    pub fn validate(&self) -> Result<(), Error> {
-        let fits = |n: usize| n >= 64 && n.is_multiple_of(32);
-        if fits(self.width) && fits(self.height) {
-            Ok(())
-        } else {
-            Err(Error::InputSize {
-                width: self.width,
-                height: self.height,
-            })
-        }
-    }
-}
-
-/// What a [`DepthNet`] is built from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields)]
-pub struct DepthNetConfig {
-    /// The backbone.
-    pub encoder: ResNetConfig,
-    /// Hierarchical context encoding of the features of `layer1`…`layer4` on their way to the decoder;
-    /// absent: the decoder reads the features as they are.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub hce: Option<HceConfig>,
-    /// Attention on what the context encoding gives (or on the features themselves); absent: none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub attention: Option<AttentionConfig>,
-    /// Whether the mean of the coarsest feature over the image is projected and added to it.
-    #[serde(default)]
-    pub aggregation: bool,
-    /// The decoder.
-    #[serde(default)]
-    pub decoder: DecoderConfig,
-    /// The depths that the ends of the sigmoid mean.
-    #[serde(default)]
-    pub range: DepthRange,
-    /// The depth in metres that a new network starts at everywhere, by the heads' bias; absent: the
-    /// heads start with a random bias.
-    ///
-    /// With a bias near zero the first depths are about 0.2 m, and a metric pose then projects every
-    /// pixel out of view: nothing is left to learn from.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub initial_depth_m: Option<f64>,
-    /// Whether a further head says how sure the network is of each pixel.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub uncertainty: bool,
-}
-
-impl DepthNetConfig {
-    /// The published ResNet with the decoder's full widths, 0.1 to 90 m, starting at 10 m.
-    #[must_use]
-    pub fn new(depth: ResNetDepth) -> Self {
-        Self {
-            encoder: ResNetConfig::new(depth),
-            hce: None,
-            attention: None,
-            aggregation: false,
-            decoder: DecoderConfig::default(),
-            range: DepthRange::default(),
-            initial_depth_m: Some(10.0),
-            uncertainty: false,
-        }
-    }
-
-    /// The paper's network (its Fig. 3): ResNet-50 at output stride 16, context encoding, attention and
-    /// aggregation, 0.1 to 90 m, starting at 10 m.
-    #[must_use]
-    pub fn paper() -> Self {
-        Self {
-            encoder: ResNetConfig::new(ResNetDepth::ResNet50).with_output_stride(16),
-            hce: Some(HceConfig::default()),
-            attention: Some(AttentionConfig::default()),
-            aggregation: true,
-            ..Self::new(ResNetDepth::ResNet50)
-        }
-    }
-
-    /// Monodepth2's network: its normalisation, its range of 0.1 to 100, random head biases.
-    #[must_use]
-    pub fn monodepth2(depth: ResNetDepth) -> Self {
-        Self {
-            encoder: ResNetConfig::new(depth).with_normalisation(InputNormalisation::Monodepth),
-            range: DepthRange {
-                min_m: 0.1,
-                max_m: 100.0,
-            },
-            initial_depth_m: None,
-            ..Self::new(depth)
-        }
-    }
-
-    /// # Errors
-    /// [`Error::Config`] for a network that cannot be built, or a depth range that is none.
-    pub fn validate(&self) -> Result<(), Error> {
-        self.encoder.validate()?;
-        self.hce.as_ref().map_or(Ok(()), HceConfig::validate)?;
-        self.attention
-            .as_ref()
-            .map_or(Ok(()), AttentionConfig::validate)?;
-        self.decoder.validate()?;
-        if self.encoder.frames != 1 {
-            return Err(Error::config(
-                "encoder.frames",
-                "1 (a depth network sees one image)",
-                self.encoder.frames,
-            ));
-        }
-        let DepthRange { min_m, max_m } = self.range;
-        if !(min_m > 0.0 && max_m > min_m && max_m.is_finite()) {
-            return Err(Error::config(
-                "range",
-                "0 < min_m < max_m, finite",
-                self.range,
-            ));
-        }
-        match self.initial_depth_m {
-            Some(depth) if !(depth > min_m && depth < max_m) => Err(Error::config(
-                "initial_depth_m",
-                format!("between {min_m} and {max_m} m, the ends of the range"),
-                depth,
-            )),
-            _ => Ok(()),
-        }
-    }
-
-    /// Channels of the features that the decoder reads, fine to coarse.
-    #[must_use]
-    pub fn decoder_channels(&self) -> [usize; 5] {
-        let mut channels = self.encoder.channels();
-        if let Some(hce) = &self.hce {
-            for channels in &mut channels[1..] {
-                *channels = hce.width(*channels);
-            }
-        }
-        channels
-    }
-
-    /// A new network with the weights of seed 0.
-    ///
-    /// # Errors
-    /// As [`Self::validate`].
-    pub fn init(&self, device: &Device) -> Result<DepthNet, Error> {
-        self.init_with_seed(0, device)
-    }
-
-    /// A new network whose weights depend on `seed` alone.
-    ///
-    /// # Errors
-    /// As [`Self::validate`].
-    pub fn init_with_seed(&self, seed: u64, device: &Device) -> Result<DepthNet, Error> {
-        self.validate()?;
-        let mut rng = WeightRng::new(seed);
-        let encoder = self.encoder.init(&mut rng, device)?;
-        let head_bias = self.initial_depth_m.map(|m| self.range.logit_of(m) as f32);
-        let raw = self.encoder.channels();
-        let refined = self.decoder_channels();
-        let mut hce = Vec::new();
-        let mut attention = Vec::new();
-        for level in 1..5 {
-            if let Some(config) = &self.hce {
-                hce.push(config.init(raw[level], &mut rng, device)?);
-            }
-            if let Some(config) = &self.attention {
-                attention.push(config.init(refined[level], &mut rng, device)?);
-            }
-        }
-        let aggregation = self
-            .aggregation
-            .then(|| GlobalAggregation::new(refined[4], &mut rng, device));
-        let stride = self.encoder.output_stride;
-        let decoder = self
-            .decoder
-            .init(refined, stride, head_bias, &mut rng, device)?;
-        // Drawn last: the other weights are those of the same seed without it.
-        let uncertainty = self.uncertainty.then(|| {
-            let head = Conv2dConfig::new(self.decoder.widths[4], 1, 3).reflected();
-            let mut head = head.init(&mut rng, device);
-            head.bias = Some(Param::from_data([FIRST_SCALE.ln()], device));
-            head
-        });
-        let net = DepthNet {
-            encoder,
-            hce,
-            attention,
-            aggregation,
-            decoder,
-            uncertainty,
-        };
-        // The encoder has seen to its own; the context encoding has batch norms, too.
-        Ok(match self.encoder.frozen_statistics {
-            true => freeze_statistics(net, true),
-            false => net,
-        })
-    }
-}
 
 /// Disparity of a single image, at four scales.
 #[derive(Module, Debug)]
@@ -281,15 +56,81 @@ pub struct Inspection {
 }
 
 impl DepthNet {
-    /// Sigmoid disparities; [`DepthRange`] turns them into metres:
+    /// A new network with the weights of seed 0.
+    ///
+    /// # Errors
+    /// As [`DepthNetConfig::validate`].
+    pub fn new(config: &DepthNetConfig, device: &Device) -> Result<Self, Error> {
+        Self::with_seed(config, 0, device)
+    }
+
+    /// A new network whose weights depend on `seed` alone.
+    ///
+    /// # Errors
+    /// As [`DepthNetConfig::validate`].
+    pub fn with_seed(config: &DepthNetConfig, seed: u64, device: &Device) -> Result<Self, Error> {
+        config.validate()?;
+        let mut rng = WeightRng::new(seed);
+        let encoder = ResNet::new(&config.encoder, &mut rng, device)?;
+        let head_bias = config
+            .initial_depth_m
+            .map(|m| config.range.logit_of(m) as f32);
+        let raw = config.encoder.channels();
+        let refined = config.decoder_channels();
+        let mut hce = Vec::new();
+        let mut attention = Vec::new();
+        for level in 1..5 {
+            if let Some(config) = &config.hce {
+                let context = HierarchicalContext::new(config, raw[level], &mut rng, device)?;
+                hce.push(context);
+            }
+            if let Some(config) = &config.attention {
+                attention.push(Attention::new(config, refined[level], &mut rng, device)?);
+            }
+        }
+        let aggregation = config
+            .aggregation
+            .then(|| GlobalAggregation::new(refined[4], &mut rng, device));
+        let stride = config.encoder.output_stride;
+        let decoder = DisparityDecoder::new(
+            &config.decoder,
+            refined,
+            stride,
+            head_bias,
+            &mut rng,
+            device,
+        )?;
+        // Drawn last: the other weights are those of the same seed without it.
+        let uncertainty = config.uncertainty.then(|| {
+            let head = Conv2dConfig::new(config.decoder.widths[4], 1, 3).reflected();
+            let mut head = head.init(&mut rng, device);
+            head.bias = Some(Param::from_data([FIRST_SCALE.ln()], device));
+            head
+        });
+        let net = Self {
+            encoder,
+            hce,
+            attention,
+            aggregation,
+            decoder,
+            uncertainty,
+        };
+        // The encoder has seen to its own; the context encoding has batch norms, too.
+        Ok(match config.encoder.frozen_statistics {
+            true => freeze_statistics(net, true),
+            false => net,
+        })
+    }
+
+    /// Sigmoid disparities; [`DepthRange`](deepfusion_geometry::DepthRange) turns them into metres:
     /// d = 1/D_max + (1/D_min − 1/D_max)·σ, depth = 1/d.
     ///
     /// # Shapes
-    /// - `images`: `[batch, 3, height, width]`, RGB in [0, 1], of an [`InputSize`]
+    /// - `images`: `[batch, 3, height, width]`, RGB in [0, 1], of an [`InputSize`](crate::InputSize)
     /// - output: `[batch, 1, height / 2ˢ, width / 2ˢ]` in (0, 1) for scales s = 0…3, finest first
     ///
     /// # Panics
-    /// When the images' size is no [`InputSize`]; check it where it enters the program.
+    /// When the images' size is no [`InputSize`](crate::InputSize); check it where it enters the program.
     pub fn forward(&self, images: Tensor<4>) -> Vec<Tensor<4>> {
         self.decode(self.encoder.forward(images))
     }

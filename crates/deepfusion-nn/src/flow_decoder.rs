@@ -2,12 +2,11 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use serde::{Deserialize, Serialize};
 
 use crate::init::{WeightInit, WeightRng};
 use crate::layers::{Conv2d, Conv2dConfig};
 use crate::ops::{elu, flow_coords, local_correlation, warp};
-use crate::{BilinearResize, Error};
+use crate::{BilinearResize, Error, FlowDecoderConfig};
 
 /// How many sizes the flow is predicted at, coarse to fine: 1/16, 1/8 and 1/4 of the image.
 pub const FLOW_LEVELS: usize = 3;
@@ -17,93 +16,6 @@ const LAST_ENLARGEMENT: usize = 4;
 
 /// Added to a feature's mean square before it is divided by its root.
 const FEATURE_EPSILON: f64 = 1e-6;
-
-/// What a [`FlowDecoder`] is built from.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields, default)]
-pub struct FlowDecoderConfig {
-    /// The largest residual displacement that a level looks for along each axis, in its own pixels.
-    pub radius: usize,
-    /// Channels that the encoder's features are projected to before they are correlated.
-    pub feature_width: usize,
-    /// Channels of each level's 3×3 convolutions, in order.
-    pub widths: Vec<usize>,
-}
-
-impl Default for FlowDecoderConfig {
-    /// Radius 4 (81 displacements), 32 channels, widths 64, 48, 32.
-    fn default() -> Self {
-        Self {
-            radius: 4,
-            feature_width: 32,
-            widths: vec![64, 48, 32],
-        }
-    }
-}
-
-impl FlowDecoderConfig {
-    /// # Errors
-    /// [`Error::Config`] for a decoder that cannot be built.
-    pub fn validate(&self) -> Result<(), Error> {
-        if !(1..=16).contains(&self.radius) {
-            return Err(Error::config("flow_decoder.radius", "1 to 16", self.radius));
-        }
-        if !(1..=1024).contains(&self.feature_width) {
-            let (field, found) = ("flow_decoder.feature_width", self.feature_width);
-            return Err(Error::config(field, "1 to 1024", found));
-        }
-        let fits = |width: &usize| (1..=4096).contains(width);
-        if self.widths.is_empty() || !self.widths.iter().all(fits) {
-            return Err(Error::config(
-                "flow_decoder.widths",
-                "one width or more, of 1 to 4096",
-                &self.widths,
-            ));
-        }
-        Ok(())
-    }
-
-    /// A new decoder for features of `encoder_channels` (fine to coarse). Its first flow is zero everywhere: the last
-    /// convolution of every level starts at zero.
-    ///
-    /// # Errors
-    /// As [`Self::validate`].
-    pub fn init(
-        &self,
-        encoder_channels: [usize; 5],
-        rng: &mut WeightRng,
-        device: &Device,
-    ) -> Result<FlowDecoder, Error> {
-        self.validate()?;
-        let side = 2 * self.radius + 1;
-        let levels = (0..FLOW_LEVELS)
-            .map(|index| {
-                let from = encoder_channels[feature(index)];
-                let project = Conv2dConfig::new(from, self.feature_width, 1).init(rng, device);
-                // The correlation, the first frame's feature, and the flow so far.
-                let mut channels_in = side * side + self.feature_width + 2;
-                let hidden = self.widths.iter().map(|&width| {
-                    let conv = Conv2dConfig::new(channels_in, width, 3).init(rng, device);
-                    channels_in = width;
-                    conv
-                });
-                let hidden = hidden.collect();
-                let mut output = Conv2dConfig::new(channels_in, 2, 3);
-                output.init = WeightInit::Zeros;
-                FlowLevel {
-                    project,
-                    hidden,
-                    output: output.init(rng, device),
-                }
-            })
-            .collect();
-        Ok(FlowDecoder {
-            levels,
-            radius: self.radius,
-        })
-    }
-}
 
 /// Which of the encoder's five features a level reads: those at strides 16, 8 and 4, which are the same whether the
 /// encoder ends at stride 32 or 16.
@@ -188,6 +100,46 @@ pub struct FlowDecoder {
 }
 
 impl FlowDecoder {
+    /// A new decoder for features of `encoder_channels` (fine to coarse). Its first flow is zero everywhere: the last
+    /// convolution of every level starts at zero.
+    ///
+    /// # Errors
+    /// As [`FlowDecoderConfig::validate`].
+    pub fn new(
+        config: &FlowDecoderConfig,
+        encoder_channels: [usize; 5],
+        rng: &mut WeightRng,
+        device: &Device,
+    ) -> Result<Self, Error> {
+        config.validate()?;
+        let side = 2 * config.radius + 1;
+        let levels = (0..FLOW_LEVELS)
+            .map(|index| {
+                let from = encoder_channels[feature(index)];
+                let project = Conv2dConfig::new(from, config.feature_width, 1).init(rng, device);
+                // The correlation, the first frame's feature, and the flow so far.
+                let mut channels_in = side * side + config.feature_width + 2;
+                let hidden = config.widths.iter().map(|&width| {
+                    let conv = Conv2dConfig::new(channels_in, width, 3).init(rng, device);
+                    channels_in = width;
+                    conv
+                });
+                let hidden = hidden.collect();
+                let mut output = Conv2dConfig::new(channels_in, 2, 3);
+                output.init = WeightInit::Zeros;
+                FlowLevel {
+                    project,
+                    hidden,
+                    output: output.init(rng, device),
+                }
+            })
+            .collect();
+        Ok(Self {
+            levels,
+            radius: config.radius,
+        })
+    }
+
     /// The flow from the first frame to the second.
     ///
     /// # Shapes

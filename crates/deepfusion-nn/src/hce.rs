@@ -2,113 +2,10 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation::relu};
-use serde::{Deserialize, Serialize};
 
-use crate::Error;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig, ConvNorm, global_mean};
-
-/// What a [`HierarchicalContext`] is built from.
-///
-/// The paper's text gives the multi-scale factors 1, 3, 6 and 12, its Eq. 12 a 1×1 and 6, 12 and 18. The
-/// default is a 1×1, 3, 6 and 12.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields, default)]
-pub struct HceConfig {
-    /// The dilation of each 3×3 branch: its multi-scale factor.
-    pub rates: Vec<usize>,
-    /// Whether the mean over the image is a branch too.
-    pub global_pool: bool,
-    /// Whether the dilated branches read a 1×1 reduction to the branch width instead of the feature itself:
-    /// at a ResNet-50's widths four HCEs without it cost more than the backbone.
-    pub reduce_first: bool,
-    /// By what a branch, and the output, has fewer channels than the feature.
-    pub width_divisor: usize,
-    /// The least channels that a branch, and the output, has.
-    pub min_width: usize,
-}
-
-impl Default for HceConfig {
-    /// 3, 6, 12 and the global mean, on a quarter of the channels but at least 32.
-    fn default() -> Self {
-        Self {
-            rates: vec![3, 6, 12],
-            global_pool: true,
-            reduce_first: true,
-            width_divisor: 4,
-            min_width: 32,
-        }
-    }
-}
-
-impl HceConfig {
-    /// Channels of a branch, and of the output, for a feature of `channels`.
-    #[must_use]
-    pub fn width(&self, channels: usize) -> usize {
-        (channels / self.width_divisor.max(1)).max(self.min_width)
-    }
-
-    /// # Errors
-    /// [`Error::Config`] for rates or widths that mean no network.
-    pub fn validate(&self) -> Result<(), Error> {
-        let in_range = |rate: &usize| (1..=64).contains(rate);
-        if self.rates.len() > 8 || !self.rates.iter().all(in_range) {
-            let found = &self.rates;
-            return Err(Error::config(
-                "hce.rates",
-                "up to eight rates of 1 to 64",
-                found,
-            ));
-        }
-        if !(1..=64).contains(&self.width_divisor) {
-            let found = self.width_divisor;
-            return Err(Error::config("hce.width_divisor", "1 to 64", found));
-        }
-        if !(1..=1024).contains(&self.min_width) {
-            return Err(Error::config("hce.min_width", "1 to 1024", self.min_width));
-        }
-        Ok(())
-    }
-
-    /// A new one for a feature of `channels`.
-    ///
-    /// # Errors
-    /// As [`Self::validate`].
-    pub fn init(
-        &self,
-        channels: usize,
-        rng: &mut WeightRng,
-        device: &Device,
-    ) -> Result<HierarchicalContext, Error> {
-        self.validate()?;
-        let width = self.width(channels);
-        let mut conv = |from: usize, to: usize, kernel: usize, rate: usize| {
-            ConvNorm::new([from, to], kernel, rate, rng, device)
-        };
-        let point = conv(channels, width, 1, 1);
-        let reduce =
-            (self.reduce_first && !self.rates.is_empty()).then(|| conv(channels, width, 1, 1));
-        let dilated_from = if reduce.is_some() { width } else { channels };
-        let dilated: Vec<_> = self
-            .rates
-            .iter()
-            .map(|rate| conv(dilated_from, width, 3, *rate))
-            .collect();
-        let branches = 1 + dilated.len() + usize::from(self.global_pool);
-        let project = conv(branches * width, width, 1, 1);
-        let global = self
-            .global_pool
-            .then(|| Conv2dConfig::new(channels, width, 1).init(rng, device));
-        Ok(HierarchicalContext {
-            point,
-            reduce,
-            dilated,
-            global,
-            project,
-        })
-    }
-}
+use crate::{Error, HceConfig};
 
 /// Branches over one feature, side by side: a 1×1, dilated 3×3 and the mean over the image.
 #[derive(Module, Debug)]
@@ -127,6 +24,44 @@ pub struct HierarchicalContext {
 }
 
 impl HierarchicalContext {
+    /// A new one for a feature of `channels`.
+    ///
+    /// # Errors
+    /// As [`HceConfig::validate`].
+    pub fn new(
+        config: &HceConfig,
+        channels: usize,
+        rng: &mut WeightRng,
+        device: &Device,
+    ) -> Result<Self, Error> {
+        config.validate()?;
+        let width = config.width(channels);
+        let mut conv = |from: usize, to: usize, kernel: usize, rate: usize| {
+            ConvNorm::new([from, to], kernel, rate, rng, device)
+        };
+        let point = conv(channels, width, 1, 1);
+        let reduce =
+            (config.reduce_first && !config.rates.is_empty()).then(|| conv(channels, width, 1, 1));
+        let dilated_from = if reduce.is_some() { width } else { channels };
+        let dilated: Vec<_> = config
+            .rates
+            .iter()
+            .map(|rate| conv(dilated_from, width, 3, *rate))
+            .collect();
+        let branches = 1 + dilated.len() + usize::from(config.global_pool);
+        let project = conv(branches * width, width, 1, 1);
+        let global = config
+            .global_pool
+            .then(|| Conv2dConfig::new(channels, width, 1).init(rng, device));
+        Ok(Self {
+            point,
+            reduce,
+            dilated,
+            global,
+            project,
+        })
+    }
+
     /// H = P([B₁(x); B_d(R(x)) for each rate d; relu(W·mean(x) + b)]): B, R and P are a convolution, batch
     /// normalisation and ReLU each; the last branch stands at every pixel alike.
     ///

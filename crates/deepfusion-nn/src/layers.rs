@@ -220,7 +220,7 @@ pub struct BatchNorm2d {
 
 impl BatchNorm2d {
     /// Added to the variance.
-    pub const EPSILON: f64 = 1e-5;
+    pub const EPSILON: f64 = deepfusion_model::BATCH_NORM_EPSILON;
     /// Weight of the new batch in the running statistics.
     pub const MOMENTUM: f64 = 0.1;
 

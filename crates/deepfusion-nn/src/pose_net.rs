@@ -2,124 +2,15 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation::relu};
-use serde::{Deserialize, Serialize};
 
-use crate::Error;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig};
-use crate::resnet::{InputNormalisation, ResNet, ResNetConfig, ResNetDepth};
-
-/// Channels between the pose decoder's convolutions.
-pub(crate) const WIDTH: usize = 256;
+use crate::resnet::ResNet;
+use crate::{Error, PoseNetConfig};
+use deepfusion_model::POSE_WIDTH;
 
 /// Radians per unit of the raw output: a new network then starts near no rotation at all.
 pub const RADIANS_PER_UNIT: f64 = 0.01;
-
-/// What a [`PoseNet`] is built from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields)]
-pub struct PoseNetConfig {
-    /// The backbone, on two frames.
-    pub encoder: ResNetConfig,
-    /// How many poses the last convolution has channels for (six each); the first is used.
-    #[serde(default = "one_pose")]
-    pub poses: usize,
-    /// Metres of translation per unit of the raw output. The data's mean displacement per pair
-    /// keeps the raw output near one.
-    #[serde(default = "one_metre")]
-    pub metres_per_unit: f64,
-}
-
-fn one_pose() -> usize {
-    1
-}
-
-fn one_metre() -> f64 {
-    1.0
-}
-
-impl PoseNetConfig {
-    /// The published ResNet on two frames, one pose, one metre per unit.
-    #[must_use]
-    pub fn new(depth: ResNetDepth) -> Self {
-        Self {
-            encoder: ResNetConfig::new(depth).with_frames(2),
-            poses: one_pose(),
-            metres_per_unit: one_metre(),
-        }
-    }
-
-    /// Monodepth2's network: its normalisation, twelve outputs of which the first six are used,
-    /// translation × 0.01 (in units of its own: its scale is not metric).
-    #[must_use]
-    pub fn monodepth2(depth: ResNetDepth) -> Self {
-        Self {
-            encoder: ResNetConfig::new(depth)
-                .with_frames(2)
-                .with_normalisation(InputNormalisation::Monodepth),
-            poses: 2,
-            metres_per_unit: 0.01,
-        }
-    }
-
-    /// # Errors
-    /// [`Error::Config`] for a network that cannot be built, or a factor that is not positive.
-    pub fn validate(&self) -> Result<(), Error> {
-        self.encoder.validate()?;
-        if self.encoder.frames < 2 {
-            return Err(Error::config(
-                "pose.encoder.frames",
-                "2 (a pose network sees a pair)",
-                self.encoder.frames,
-            ));
-        }
-        if !(1..=16).contains(&self.poses) {
-            return Err(Error::config("pose.poses", "1 to 16", self.poses));
-        }
-        if !(self.metres_per_unit > 0.0 && self.metres_per_unit.is_finite()) {
-            return Err(Error::config(
-                "pose.metres_per_unit",
-                "a positive number of metres",
-                self.metres_per_unit,
-            ));
-        }
-        Ok(())
-    }
-
-    /// A new network with the weights of seed 0.
-    ///
-    /// # Errors
-    /// As [`Self::validate`].
-    pub fn init(&self, device: &Device) -> Result<PoseNet, Error> {
-        self.init_with_seed(0, device)
-    }
-
-    /// A new network whose weights depend on `seed` alone.
-    ///
-    /// # Errors
-    /// As [`Self::validate`].
-    pub fn init_with_seed(&self, seed: u64, device: &Device) -> Result<PoseNet, Error> {
-        self.validate()?;
-        // Not the numbers the depth network of the same seed starts from.
-        let mut rng = WeightRng::with_stream(seed, 1);
-        let encoder = self.encoder.init(&mut rng, device)?;
-        let mut conv = |channels_in: usize, channels_out: usize, kernel: usize| {
-            Conv2dConfig::new(channels_in, channels_out, kernel).init(&mut rng, device)
-        };
-        let decoder = PoseDecoder {
-            squeeze: conv(self.encoder.channels()[4], WIDTH, 1),
-            conv1: conv(WIDTH, WIDTH, 3),
-            conv2: conv(WIDTH, WIDTH, 3),
-            output: conv(WIDTH, 6 * self.poses, 1),
-        };
-        Ok(PoseNet {
-            encoder,
-            decoder,
-            metres_per_unit: self.metres_per_unit,
-        })
-    }
-}
 
 /// A rigid motion per sample, as the network predicts it.
 #[derive(Debug, Clone)]
@@ -174,6 +65,39 @@ pub struct PoseNet {
 }
 
 impl PoseNet {
+    /// A new network with the weights of seed 0.
+    ///
+    /// # Errors
+    /// As [`PoseNetConfig::validate`].
+    pub fn new(config: &PoseNetConfig, device: &Device) -> Result<Self, Error> {
+        Self::with_seed(config, 0, device)
+    }
+
+    /// A new network whose weights depend on `seed` alone.
+    ///
+    /// # Errors
+    /// As [`PoseNetConfig::validate`].
+    pub fn with_seed(config: &PoseNetConfig, seed: u64, device: &Device) -> Result<Self, Error> {
+        config.validate()?;
+        // Not the numbers the depth network of the same seed starts from.
+        let mut rng = WeightRng::with_stream(seed, 1);
+        let encoder = ResNet::new(&config.encoder, &mut rng, device)?;
+        let mut conv = |channels_in: usize, channels_out: usize, kernel: usize| {
+            Conv2dConfig::new(channels_in, channels_out, kernel).init(&mut rng, device)
+        };
+        let decoder = PoseDecoder {
+            squeeze: conv(config.encoder.channels()[4], POSE_WIDTH, 1),
+            conv1: conv(POSE_WIDTH, POSE_WIDTH, 3),
+            conv2: conv(POSE_WIDTH, POSE_WIDTH, 3),
+            output: conv(POSE_WIDTH, 6 * config.poses, 1),
+        };
+        Ok(Self {
+            encoder,
+            decoder,
+            metres_per_unit: config.metres_per_unit,
+        })
+    }
+
     /// axis-angle = 0.01·o₀…₂, translation = `metres_per_unit`·o₃…₅, o the first pose's raw output.
     ///
     /// # Shapes

@@ -3,9 +3,9 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation::relu};
 
+use crate::ResNetDepth;
 use crate::init::WeightRng;
 use crate::layers::{BatchNorm2d, Conv2d, Conv2dConfig};
-use crate::resnet::ResNetDepth;
 
 /// Where a block stands: what it is built from beside its kind.
 #[derive(Debug, Clone, Copy)]

@@ -2,15 +2,15 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_infer::{Engine, Precision};
+use deepfusion_model::{depth_graph, depth_graph_with_uncertainty};
 use deepfusion_nn::weights::{self, Weights};
 use deepfusion_nn::{
-    AttentionConfig, AttentionForm, DepthNetConfig, Error, HceConfig, ResNetDepth, depth_graph,
-    depth_graph_with_uncertainty,
+    AttentionConfig, AttentionForm, DepthNet, DepthNetConfig, Error, HceConfig, ResNetDepth,
 };
 
 /// Weights as after some training: batch norms with statistics and factors of their own.
 fn trained(config: &DepthNetConfig) -> Weights {
-    let net = config.init_with_seed(5, &Device::flex()).unwrap();
+    let net = DepthNet::with_seed(config, 5, &Device::flex()).unwrap();
     let mut weights = weights::collect(&net);
     for (name, tensor) in &mut weights.tensors {
         let spread = |i: usize| ((i * 37 + name.len() * 11) % 17) as f32 / 17.0;
@@ -40,7 +40,7 @@ fn image(width: usize, height: usize) -> Vec<f32> {
 fn check(config: &DepthNetConfig, width: usize, height: usize) {
     let (weights, image) = (trained(config), image(width, height));
     let device = Device::flex();
-    let net = weights::apply(config.init(&device).unwrap(), &weights).unwrap();
+    let net = weights::apply(DepthNet::new(config, &device).unwrap(), &weights).unwrap();
     let input = TensorData::new(image.clone(), [1, 3, height, width]);
     let expected = net
         .forward(Tensor::from_data(input, &device))
@@ -95,8 +95,7 @@ fn a_network_that_says_how_sure_it_is() {
         *value *= 40.0;
     }
     let device = Device::flex();
-    let (net, is_new) = config
-        .init(&device)
+    let (net, is_new) = DepthNet::new(&config, &device)
         .unwrap()
         .with_weights(&weights)
         .unwrap();

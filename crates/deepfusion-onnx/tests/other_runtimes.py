@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Whether an exported file means elsewhere what it means here.
 
-    cargo run --release -p deepfusion -- export --model RUN --out model.onnx
+    cargo run --release -- export --model RUN --out model.onnx
     python crates/deepfusion-onnx/tests/other_runtimes.py model.onnx
 
 Checks the file with onnx.checker (types and shapes inferred in full), then runs it in onnx's own reference evaluator

@@ -1,4 +1,4 @@
-use deepfusion_cloud::PointCloud;
+use deepfusion_geometry::cloud::PointCloud;
 use image::{Rgb, RgbImage};
 use nalgebra::Vector3;
 

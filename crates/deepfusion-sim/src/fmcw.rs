@@ -5,8 +5,8 @@ use crate::primitive::{Primitive, V3};
 use crate::scanner::{Scanner, gaussian};
 use crate::scene::World;
 use crate::texture::noise::{hash, unit};
-use deepfusion_cloud::PointCloud;
 use deepfusion_geometry::Se3;
+use deepfusion_geometry::cloud::PointCloud;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 

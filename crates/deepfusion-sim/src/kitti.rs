@@ -3,7 +3,7 @@
 use crate::oxts::DATA_FORMAT;
 use crate::rig::CAM2_FROM_CAM0_X;
 use crate::{Error, Result, SimFrame, Simulation, tracklets};
-use deepfusion_cloud::PointCloud;
+use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Se3};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -236,7 +236,9 @@ fn write_mask(path: &Path, frame: &SimFrame) -> Result<()> {
 fn write_scan(path: &Path, cloud: &PointCloud) -> Result<()> {
     write_with(path, |writer| {
         cloud.write_kitti_bin(writer).map_err(|error| match error {
-            deepfusion_cloud::Error::Stream(source) => io(path, "write this scan")(source),
+            deepfusion_geometry::cloud::Error::Stream(source) => {
+                io(path, "write this scan")(source)
+            }
             error => io(path, "write this scan")(std::io::Error::other(error)),
         })
     })

@@ -12,7 +12,7 @@ use crate::scene::{SceneObject, Variety, World};
 use crate::texture::noise::hash;
 use crate::traffic::Traffic;
 use crate::{Result, render, velodyne};
-use deepfusion_cloud::PointCloud;
+use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use image::RgbImage;
 use rand::{Rng, SeedableRng};

@@ -4,7 +4,7 @@
 use burn::module::Module;
 use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{Criterion, criterion_group};
-use deepfusion_nn::{FlowDecoderConfig, ResNetConfig, ResNetDepth, WeightRng};
+use deepfusion_nn::{FlowDecoder, FlowDecoderConfig, ResNetConfig, ResNetDepth, WeightRng};
 
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
@@ -15,8 +15,8 @@ const BATCH: usize = 4;
 fn flow_decoder(criterion: &mut Criterion) {
     let device = Device::flex().autodiff();
     let channels = ResNetConfig::new(ResNetDepth::ResNet18).channels();
-    let decoder = FlowDecoderConfig::default()
-        .init(channels, &mut WeightRng::new(0), &device)
+    let config = FlowDecoderConfig::default();
+    let decoder = FlowDecoder::new(&config, channels, &mut WeightRng::new(0), &device)
         .expect("the default is valid");
     for (height, width) in [(96, 320), (192, 640)] {
         let [first, second] = [0, 1].map(|_| -> [Tensor<4>; 5] {

@@ -4,8 +4,9 @@
 use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{BatchSize, Criterion, criterion_group};
 use deepfusion_infer::{Engine, Precision};
+use deepfusion_model::depth_graph;
 use deepfusion_nn::ops::{self, Precision::Bf16};
-use deepfusion_nn::{DepthNet, DepthNetConfig, ResNetDepth, depth_graph, weights};
+use deepfusion_nn::{DepthNet, DepthNetConfig, ResNetDepth, weights};
 use deepfusion_train::{
     Adam, Model, Motion, NamedGradients, Preset, Schedule, SnippetBatch, TrainConfig,
 };
@@ -24,7 +25,7 @@ fn images(batch: usize, height: usize, width: usize, device: &Device) -> Tensor<
 }
 
 fn depth_net(depth: ResNetDepth, device: &Device) -> DepthNet {
-    let net = DepthNetConfig::new(depth).init(device);
+    let net = DepthNet::new(&DepthNetConfig::new(depth), device);
     net.expect("the preset is valid")
 }
 

@@ -186,7 +186,7 @@ impl Adam {
     /// The optimiser that [`Self::state`] came from, after `steps` steps with this model.
     ///
     /// # Errors
-    /// [`Error::Network`] naming the first moment that is not as long as its parameter, has none, or lacks the other
+    /// [`Error::Model`] naming the first moment that is not as long as its parameter, has none, or lacks the other
     /// one beside it.
     pub fn restore(state: Weights, steps: u32, model: &Model) -> Result<Self, Error> {
         let lengths = parameter_lengths(model);
@@ -199,7 +199,7 @@ impl Adam {
             let parameter = name.strip_prefix("m.").or(name.strip_prefix("v."));
             let known = parameter.and_then(|p| Some((p, *lengths.get(p)?)));
             let Some((parameter, length)) = known else {
-                return Err(Error::Network(deepfusion_nn::Error::UnexpectedTensor {
+                return Err(Error::from(deepfusion_nn::Error::UnexpectedTensor {
                     origin,
                     name: format!("adam.{name}"),
                     found,
@@ -207,7 +207,7 @@ impl Adam {
                 }));
             };
             if found != [length] {
-                return Err(Error::Network(deepfusion_nn::Error::TensorShape {
+                return Err(Error::from(deepfusion_nn::Error::TensorShape {
                     origin,
                     name: format!("adam.{name}"),
                     expected: vec![length],
@@ -227,7 +227,7 @@ impl Adam {
                 (_, true) => "v",
                 _ => continue,
             };
-            return Err(Error::Network(deepfusion_nn::Error::MissingTensor {
+            return Err(Error::from(deepfusion_nn::Error::MissingTensor {
                 origin,
                 name: format!("adam.{missing}.{name}"),
                 expected: vec![lengths[name]],

@@ -1,61 +1,8 @@
 use crate::SharedFrames;
-use std::path::PathBuf;
 
 /// What can go wrong while learning.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A setting that means nothing.
-    #[error("setting `{field}`: expected {expected}, found {found}")]
-    Config {
-        /// The setting's name, as in the file.
-        field: &'static str,
-        /// What would do.
-        expected: String,
-        /// What was found.
-        found: String,
-    },
-    /// A key that cannot be set so.
-    #[error("{assignment}: {reason}")]
-    Setting {
-        /// What was asked for: KEY=VALUE.
-        assignment: String,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// A configuration file that cannot be read as one.
-    #[error("{path}: not a training configuration: {reason}")]
-    ConfigFile {
-        /// The file.
-        path: PathBuf,
-        /// What the parser says, with the line.
-        reason: String,
-    },
-    /// A file that cannot be read or written.
-    #[error("{path}: cannot {action}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// "read" or "write".
-        action: &'static str,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// A checkpoint that does not fit the program or the configuration.
-    #[error("{path}: {reason}")]
-    Checkpoint {
-        /// The file.
-        path: PathBuf,
-        /// Why it cannot be used.
-        reason: String,
-        /// What to do about it.
-        remedy: String,
-    },
-    /// A folder that already holds a run.
-    #[error("{path}: there is a run here already")]
-    RunExists {
-        /// The folder.
-        path: PathBuf,
-    },
     /// Nothing to learn from.
     #[error("no training sample in {data}: {reason}")]
     NoSamples {
@@ -121,69 +68,22 @@ pub enum Error {
     /// Samples should be held out, and none are.
     #[error("no sample is held out to validate on")]
     NoValidation,
-    /// Something that runs networks and cannot run this one.
-    #[error("engine `{engine}`: {reason}")]
-    Engine {
-        /// Its name.
-        engine: &'static str,
-        /// What it says.
-        reason: String,
-    },
     /// The recording.
     #[error(transparent)]
     Data(#[from] deepfusion_data::Error),
     /// The simulator, of which views are learned from.
     #[error(transparent)]
     Simulator(#[from] deepfusion_sim::Error),
-    /// The networks or their weights.
+    /// The configuration, the run's folder, or the networks' weights.
     #[error(transparent)]
-    Network(#[from] deepfusion_nn::Error),
+    Model(#[from] deepfusion_model::Error),
 }
 
 impl Error {
-    /// What an engine said.
-    pub fn engine(engine: &'static str, reason: &dyn std::fmt::Display) -> Self {
-        Self::Engine {
-            engine,
-            reason: reason.to_string(),
-        }
-    }
-
     /// What to do about it, in a line.
     #[must_use]
     pub fn hint(&self) -> Option<String> {
         match self {
-            Self::Config { field: "--data-set", .. } => {
-                Some("give the name of the data set whose metres are meant: --data-set NAME".into())
-            }
-            Self::Config { field: "data" | "data.paths", .. } => Some(
-                "give recordings with --data, or as data.paths or [[data.sets]] in the config file, one of the three".into(),
-            ),
-            Self::Config { field: "view_motion", .. } => Some(
-                "without the speed loss nothing measured may enter: take --view-motion posenet, or keep the speed loss".into(),
-            ),
-            Self::Config { field, .. } => Some(format!(
-                "set `{field}` so in the config file, or by its option; --help lists them"
-            )),
-            Self::Setting { .. } => Some(
-                "`deepfusion config show` prints every key and what it means".into(),
-            ),
-            Self::ConfigFile { .. } => Some(
-                "name a preset and the keys in which it differs; `deepfusion config show` prints them all".into(),
-            ),
-            Self::Io { source, action, .. } => match source.kind() {
-                std::io::ErrorKind::StorageFull => {
-                    Some("the disk is full; what was there before is untouched".into())
-                }
-                std::io::ErrorKind::PermissionDenied => {
-                    Some(format!("no permission to {action} there"))
-                }
-                _ => None,
-            },
-            Self::Checkpoint { remedy, .. } => Some(remedy.clone()),
-            Self::RunExists { .. } => Some(
-                "continue it with --resume, or choose another folder with --out".into(),
-            ),
             Self::NoSamples { .. } => Some(
                 "training needs consecutive frames of a moving camera, with time stamps and speeds; \
                  `deepfusion data inspect` shows what is there"
@@ -209,7 +109,6 @@ impl Error {
                  learning rate, and continue with --resume"
                     .into(),
             ),
-            Self::Engine { .. } => Some("`--engine burn` runs every network on every device".into()),
             Self::Threads { .. } => Some(
                 "the system allows this user too few threads or too little memory; see `ulimit -u`"
                     .into(),
@@ -226,16 +125,20 @@ impl Error {
             ),
             Self::Data(error) => error.hint(),
             Self::Simulator(error) => error.hint(),
-            Self::Network(error) => error.hint(),
+            Self::Model(error) => error.hint(),
         }
     }
+}
 
+impl Error {
     pub(crate) fn io(path: &std::path::Path, action: &'static str, source: std::io::Error) -> Self {
-        Self::Io {
-            path: path.to_owned(),
-            action,
-            source,
-        }
+        deepfusion_model::Error::io(path, action, source).into()
+    }
+}
+
+impl From<deepfusion_nn::Error> for Error {
+    fn from(error: deepfusion_nn::Error) -> Self {
+        Self::Model(error.into())
     }
 }
 

@@ -1,40 +1,7 @@
-use crate::{Motion, TrainConfig};
 use burn::tensor::{Device, Tensor};
-use deepfusion_geometry::{DepthRange, Intrinsics};
+use deepfusion_model::SampleFactors;
 
-/// What the networks' raw outputs mean of one sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SampleFactors {
-    /// The depths that the sigmoid spans, before `focal`.
-    pub range: DepthRange,
-    /// Metres of translation per unit of the pose network's output.
-    pub metres_per_unit: f64,
-    /// What depth is multiplied by for the sample's camera, f_y/f_c; 1 without a canonical focal length.
-    pub focal: f64,
-}
-
-impl TrainConfig {
-    /// Whether the networks' outputs mean something else from sample to sample.
-    #[must_use]
-    pub fn has_factors(&self) -> bool {
-        !self.data.sets.is_empty() || self.canonical_focal_px.is_some()
-    }
-
-    /// What the outputs mean of a sample of a set, by its place in `data.sets`, seen by `camera` (at any size).
-    #[must_use]
-    pub fn sample_factors(&self, set: usize, camera: &Intrinsics) -> SampleFactors {
-        let (range, metres_per_unit) = self.factors(set);
-        let (width, height) = (self.size.width as u32, self.size.height as u32);
-        let fy = camera.resized(width, height).fy;
-        SampleFactors {
-            range,
-            metres_per_unit,
-            focal: self
-                .canonical_focal_px
-                .map_or(1.0, |canonical| fy / canonical),
-        }
-    }
-}
+use crate::Motion;
 
 /// What turns the networks' raw outputs into metres, for each sample of a batch whose samples differ in it.
 #[derive(Debug, Clone)]
@@ -99,6 +66,7 @@ fn repeated(values: &Tensor<1>, n: usize) -> Tensor<1> {
 mod tests {
     use super::*;
     use burn::tensor::TensorData;
+    use deepfusion_geometry::DepthRange;
 
     const ROAD: DepthRange = DepthRange {
         min_m: 0.1,

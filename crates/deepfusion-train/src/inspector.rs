@@ -2,30 +2,10 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_nn::{DepthNet, InputSize};
+use deepfusion_runtime::{FeatureMap, LayerMaps};
 
+use crate::runner::depth_net;
 use crate::{Error, StoredNetwork};
-
-/// A map over the image, as coarse as the layer it comes from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FeatureMap {
-    /// Pixels of a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// H×W, row by row.
-    pub values: Vec<f32>,
-}
-
-/// Where a network looks in an image, from one layer of its encoder.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LayerMaps {
-    /// Mean magnitude of the encoder's feature over its channels.
-    pub feature: FeatureMap,
-    /// The same of what the decoder reads, where context or attention make it another one.
-    pub refined: Option<FeatureMap>,
-    /// The spatial mask and the least and greatest value of the channel mask, where there is attention.
-    pub attention: Option<(FeatureMap, [f32; 2])>,
-}
 
 /// Shows what a depth network computes within. It runs in Burn, beside whatever engine predicts.
 #[derive(Debug)]
@@ -38,10 +18,10 @@ impl Inspector {
     /// For a network, on a device.
     ///
     /// # Errors
-    /// As [`StoredNetwork::build`].
+    /// [`Error::Model`] for weights of another architecture.
     pub fn new(network: &StoredNetwork, device: &Device) -> Result<Self, Error> {
         Ok(Self {
-            net: network.build(device)?,
+            net: depth_net(&network.config, &network.weights, device)?,
             device: device.clone(),
         })
     }

@@ -1,5 +1,4 @@
-use crate::config::{Reprojection, ReversedPose};
-use crate::{BilinearResize, Error, Motion, SnippetBatch, TrainConfig};
+use crate::{BilinearResize, Error, Motion, Reprojection, ReversedPose, SnippetBatch, TrainConfig};
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use deepfusion_geometry::DepthRange;
@@ -73,12 +72,11 @@ impl Model {
     /// New networks with the weights of the configuration's seed.
     ///
     /// # Errors
-    /// [`Error::Network`] for a configuration that cannot be built.
+    /// [`Error::Model`] for a configuration that cannot be built.
     pub fn new(config: &TrainConfig, device: &Device) -> Result<Self, Error> {
-        let depth_net = config.depth_net.init_with_seed(config.seed, device)?;
-        let mut pose_net = config
-            .pose_net
-            .init_with_seed(config.seed.wrapping_add(1), device)?;
+        let depth_net = DepthNet::with_seed(&config.depth_net, config.seed, device)?;
+        let mut pose_net =
+            PoseNet::with_seed(&config.pose_net, config.seed.wrapping_add(1), device)?;
         if config.start_moving && config.reversed_pose == ReversedPose::Inverted {
             pose_net = start_moving(pose_net);
         }
@@ -86,7 +84,8 @@ impl Model {
         if config.loss.flow.weight > 0.0 {
             let mut rng = WeightRng::new(config.seed.wrapping_add(2));
             let channels = config.depth_net.encoder.channels();
-            model.flow_decoder = Some(config.flow_decoder.init(channels, &mut rng, device)?);
+            let decoder = FlowDecoder::new(&config.flow_decoder, channels, &mut rng, device)?;
+            model.flow_decoder = Some(decoder);
         }
         Ok(model)
     }

@@ -1,12 +1,12 @@
 //! What is minimised: L = Σ_s ¼(L_rp + λ_s·L_smooth) + λ_v·L_speed + λ_a·L_aff + λ_f·L_flow + agreement.
 
-use crate::config::{Reprojection, ViewMotion};
 use crate::level::{Level, levels, pyramid};
 use crate::losses::{self, FlowView, LossTerms, ReprojectionOutput, RigidView, View, share};
 use crate::model::swap_halves;
 use crate::{
     CompareAt, DepthBatch, ForwardPass, Model, Motion, SnippetBatch, Synthesised, synthesise,
 };
+use crate::{Reprojection, ViewMotion};
 use burn::tensor::module::avg_pool2d;
 use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Bool, Tensor};

@@ -1,4 +1,4 @@
-use crate::{CheckpointKind, Error, RunFolder, TrainConfig};
+use crate::{CheckpointKind, Checkpoints, Error, RunFolder, TrainConfig};
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_data::{RgbImage, to_network_input};
 use deepfusion_geometry::Se3;
@@ -26,7 +26,7 @@ impl PosePredictor {
     /// `set` names one of the data sets the run learned from, where it learned several.
     ///
     /// # Errors
-    /// As [`RunFolder::open`], [`RunFolder::load`] and [`TrainConfig::for_set`].
+    /// As [`RunFolder::open`], [`Checkpoints::load`] and [`TrainConfig::for_set`].
     pub fn load(path: &Path, set: Option<&str>, device: &Device) -> Result<Self, Error> {
         let (folder, kind) = RunFolder::open(path)?;
         let config = folder.read_config()?.for_set(set)?;

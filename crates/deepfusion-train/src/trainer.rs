@@ -2,11 +2,13 @@ use crate::losses::speed_weight;
 use crate::model::displacement_ratio;
 use crate::selection::selection;
 use crate::{
-    Adam, BatchLoader, BatchLoss, Checkpoint, CheckpointKind, Control, DepthBatch, DepthLoader,
-    DepthPass, Error, ForwardPass, LearningRateSchedule, LossTerms, Model, NamedGradients,
-    RunFolder, SamplePanel, SampleSet, Sampler, Schedule, StepOutcome, TrainConfig, TrainEvent,
+    Adam, BatchLoader, BatchLoss, Checkpoint, CheckpointKind, Checkpoints, Control, DepthBatch,
+    DepthLoader, DepthPass, Error, ForwardPass, LearningRateSchedule, LossTerms, Model,
+    NamedGradients, RunFolder, SamplePanel, SampleSet, Sampler, Schedule, StepOutcome, TrainConfig,
+    TrainEvent,
 };
 use burn::tensor::{Device, Tensor};
+use deepfusion_model::Error as ModelError;
 use deepfusion_nn::ops::{Precision, autocast, supports};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -65,7 +67,7 @@ impl Trainer {
     /// taken from the data and stored with it. `init` changes the networks before the first step.
     ///
     /// # Errors
-    /// [`Error::Config`], [`Error::NoSamples`], [`Error::NoValidation`], [`Error::Network`], [`Error::Io`].
+    /// [`Error::Model`], [`Error::NoSamples`], [`Error::NoValidation`].
     pub fn create(
         mut config: TrainConfig,
         folder: RunFolder,
@@ -124,7 +126,7 @@ impl Trainer {
         check_samples(&config, &train, &validation)?;
         let device = device.clone().autodiff();
         let (model, adam, state) = folder.load(CheckpointKind::Last, &config, &device)?;
-        let adam = adam.ok_or_else(|| Error::Checkpoint {
+        let adam = adam.ok_or_else(|| ModelError::Checkpoint {
             path: folder.checkpoint_path(CheckpointKind::Last),
             reason: "it has no optimiser state to go on with".into(),
             remedy: "start a new run from these weights with --init".into(),
@@ -186,7 +188,7 @@ impl Trainer {
     ///
     /// # Errors
     /// [`Error::NotFinite`] naming term and frames: the last good checkpoint stays. [`Error::Data`]
-    /// for an image that cannot be read, [`Error::Loader`] where the loader has died, [`Error::Network`] for a
+    /// for an image that cannot be read, [`Error::Loader`] where the loader has died, [`Error::Model`] for a
     /// checkpoint that cannot be written.
     pub fn run(
         &mut self,
@@ -514,12 +516,12 @@ fn first_unit(config: &TrainConfig, set: &SampleSet) -> f64 {
 }
 
 /// # Errors
-/// [`Error::Config`] where the device cannot do what the configuration asks for.
+/// [`Error::Model`] where the device cannot do what the configuration asks for.
 fn check_precision(config: &TrainConfig, device: &Device) -> Result<(), Error> {
     if supports(device, config.precision) {
         return Ok(());
     }
-    Err(Error::Config {
+    Err(ModelError::Config {
         field: "precision",
         expected: "\"f32\" (bf16 needs a processor with AVX512-BF16 or AMX, and --device cpu)"
             .into(),
@@ -528,7 +530,8 @@ fn check_precision(config: &TrainConfig, device: &Device) -> Result<(), Error> {
             Precision::Bf16 => "bf16",
         }
         .into(),
-    })
+    }
+    .into())
 }
 
 /// # Errors

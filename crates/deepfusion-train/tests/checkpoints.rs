@@ -3,10 +3,12 @@
 mod support;
 
 use burn::tensor::Device;
+use deepfusion_model::Error as ModelError;
 use deepfusion_nn::weights::{self, Weights};
 use deepfusion_nn::{DepthNetConfig, PoseNetConfig, ResNetDepth};
 use deepfusion_train::{
-    Checkpoint, CheckpointKind, Control, Error, Model, Preset, RunFolder, TrainConfig, Trainer,
+    Checkpoint, CheckpointKind, Checkpoints, Control, Error, Model, Preset, RunFolder, TrainConfig,
+    Trainer,
 };
 use std::path::Path;
 use support::{drive, small};
@@ -151,7 +153,10 @@ fn imported_encoders_start_a_network_with_other_parts() {
     let error = run
         .load_networks(kind, &narrow(Preset::Light.config()), &device)
         .unwrap_err();
-    assert!(matches!(error, Error::Network(_)), "{error}");
+    assert!(
+        matches!(error, Error::Model(ModelError::Network(_))),
+        "{error}"
+    );
 
     // A run that was trained as a whole is taken as a whole.
     state.encoders_only = false;

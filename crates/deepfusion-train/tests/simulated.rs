@@ -5,10 +5,12 @@ mod support;
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_data::to_chw;
 use deepfusion_geometry::Se3;
+use deepfusion_model::Error as ModelError;
+use deepfusion_nn::PoseNet;
 use deepfusion_train::{
-    BatchLoader, CheckpointKind, CompareAt, Control, Error, LossTerms, Model, Motion, Reprojection,
-    RunFolder, SampleSet, Schedule, TrainConfig, TrainEvent, Trainer, ViewMotion, synthesise,
-    validation_loss,
+    BatchLoader, CheckpointKind, Checkpoints, CompareAt, Control, Error, LossTerms, Model, Motion,
+    Reprojection, RunFolder, SampleSet, Schedule, TrainConfig, TrainEvent, Trainer, ViewMotion,
+    synthesise, validation_loss,
 };
 use support::{drive, small, street};
 
@@ -269,11 +271,11 @@ fn a_checkpoint_of_another_network_is_refused_by_its_tensor() {
     wider.depth_net.encoder = wider.depth_net.encoder.with_base_width(16);
     let error = run.load(CheckpointKind::Last, &wider, &device).unwrap_err();
     assert!(error.to_string().contains("encoder"), "{error}");
-    assert!(matches!(error, Error::Network(_)));
+    assert!(matches!(error, Error::Model(ModelError::Network(_))));
     // A run is not overwritten.
     assert!(matches!(
         RunFolder::create(run.path()),
-        Err(Error::RunExists { .. })
+        Err(ModelError::RunExists { .. })
     ));
 }
 
@@ -313,7 +315,7 @@ fn the_views_follow_the_motion_that_is_asked_for() {
         config.loss.compare_at = compare_at;
         config.pose_net.metres_per_unit = metres_per_unit;
         let mut model = Model::new(&config, &device).unwrap();
-        model.pose_net = config.pose_net.init_with_seed(seed, &device).unwrap();
+        model.pose_net = PoseNet::with_seed(&config.pose_net, seed, &device).unwrap();
         let (losses, _) = validation_loss(&model, &config, &samples, &device).unwrap();
         losses.reprojection
     };

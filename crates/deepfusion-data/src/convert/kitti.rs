@@ -1,7 +1,7 @@
 use super::calendar::{date, stamp};
 use super::{Converted, Moving, at_ns, cam_from_scanner, moving_at, points, seconds_to_move};
 use crate::{Dataset, Error, Result, save_png, write_unsynced};
-use deepfusion_cloud::PointCloud;
+use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{Intrinsics, Se3};
 use rayon::prelude::*;
 use std::fmt::Write as _;

@@ -11,8 +11,8 @@ use crate::{
     Camera, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame, FrameImage, MovingLabels,
     OpenOptions, Result, Stream, load_rgb, read_depth_png,
 };
-use deepfusion_cloud::PointCloud;
 use deepfusion_geometry::DepthMap;
+use deepfusion_geometry::cloud::PointCloud;
 use image::RgbImage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! Sparse ground-truth depth from a velodyne scan (SPEC 5).
 
-use deepfusion_cloud::PointCloud;
 use deepfusion_geometry::DepthMap;
+use deepfusion_geometry::cloud::PointCloud;
 use nalgebra::{Matrix3, Matrix3x4, Vector3, Vector4};
 
 /// What a ground-truth depth means and at which pixel it lies.

@@ -1,7 +1,7 @@
 //! Drives for the tests: tiny ones written here, and real ones where they are on the machine.
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
-use deepfusion_cloud::PointCloud;
+use deepfusion_geometry::cloud::PointCloud;
 use image::{Rgb, RgbImage};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -157,3 +157,26 @@ fn a_finite_image_that_overflows_is_not_seen_in_the_next() {
         }
     }
 }
+
+/// Engines on one plan know nothing of each other, even while both run.
+#[test]
+fn another_engine_gives_the_same_bits() {
+    for precision in [Precision::F32, Precision::Bf16] {
+        for (graph, width, height) in graphs() {
+            let Ok(mut first) = Engine::new(graph, width, height, precision) else {
+                assert!(precision == Precision::Bf16 && !Engine::has_bf16());
+                continue;
+            };
+            let (image, other) = (noise_image(8, width, height), noise_image(9, width, height));
+            first.run(&image);
+            let expected = bits(&first.output(0));
+            let mut second = first.another().unwrap();
+            std::thread::scope(|scope| {
+                scope.spawn(|| first.run(&other));
+                second.run(&image);
+            });
+            assert!(bits(&second.output(0)) == expected);
+            assert!(bits(&first.output(0)) != expected);
+        }
+    }
+}

@@ -1,4 +1,5 @@
 use super::*;
+use crate::{AttentionConfig, HceConfig, InputSize, ResNetDepth};
 
 #[test]
 fn sizes_that_do_not_halve_five_times_are_refused_with_the_nearest_that_does() {
@@ -28,7 +29,7 @@ fn the_head_for_uncertainty_comes_and_goes() {
         uncertainty: true,
         ..plain.clone()
     };
-    let build = |config: &DepthNetConfig, seed| config.init_with_seed(seed, &device).unwrap();
+    let build = |config: &DepthNetConfig, seed| DepthNet::with_seed(config, seed, &device).unwrap();
     let image = Tensor::<4>::ones([1, 3, 64, 96], &device).mul_scalar(0.5);
     let depth = |net: &DepthNet| {
         let seen = net.forward_with_uncertainty(image.clone());
@@ -62,7 +63,7 @@ fn each_part_is_switched_on_its_own() {
     let device = Device::flex();
     let image = Tensor::<4>::ones([1, 3, 64, 96], &device).mul_scalar(0.5);
     let names = |config: &DepthNetConfig| {
-        let net = config.init(&device).unwrap();
+        let net = DepthNet::new(config, &device).unwrap();
         let disparities = net.forward(image.clone());
         for (s, disparity) in disparities.iter().enumerate() {
             assert_eq!(disparity.dims(), [1, 1, 64 >> s, 96 >> s]);

@@ -12,7 +12,7 @@ fn features(height: usize, width: usize, device: &Device) -> [Tensor<4>; 5] {
 }
 
 fn decoder(config: &FlowDecoderConfig, channels: [usize; 5], device: &Device) -> FlowDecoder {
-    let decoder = config.init(channels, &mut WeightRng::new(1), device);
+    let decoder = FlowDecoder::new(config, channels, &mut WeightRng::new(1), device);
     decoder.unwrap()
 }
 

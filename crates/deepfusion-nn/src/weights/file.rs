@@ -1,14 +1,10 @@
-//! Weights in files: safetensors both ways, PyTorch's `.pth` for reading.
+//! Weights in files: safetensors, and PyTorch's `.pth`.
 
-use std::collections::HashMap;
-use std::fs;
-use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use burn::store::pytorch_reader::{DType as TorchDType, PytorchReader};
 use burn::tensor::{bf16, f16};
-use deepfusion_fs::Partial;
-use safetensors::tensor::{Dtype, Metadata, SafeTensorError, TensorView};
+use deepfusion_model::weights::{FileKind, read_safetensors};
 
 use super::{WeightTensor, Weights};
 use crate::Error;
@@ -20,121 +16,12 @@ use crate::Error;
 /// # Errors
 /// [`Error::Io`] for a file that cannot be read, [`Error::Format`] for one that holds no weights.
 pub fn read(path: &Path) -> Result<Weights, Error> {
-    let weights = read_under(path, "")?;
+    let weights = match FileKind::of(path)? {
+        FileKind::Safetensors => read_safetensors(path)?,
+        FileKind::PyTorch => read_pytorch(path)?,
+    };
     if weights.tensors.is_empty() {
         return Err(format_error(path, "it holds no float tensors"));
-    }
-    Ok(weights)
-}
-
-/// The same for the tensors alone whose names start with `prefix`, without it; there may be none. The others of a
-/// safetensors file are not even read: a checkpoint holds the optimiser's state beside the networks.
-///
-/// # Errors
-/// As [`read`].
-pub fn read_under(path: &Path, prefix: &str) -> Result<Weights, Error> {
-    if is_pytorch(path)? {
-        Ok(read_pytorch(path)?.under(prefix))
-    } else {
-        read_safetensors(path, prefix)
-    }
-}
-
-/// PyTorch writes a zip archive ("PK"), before version 1.6 a bare pickle (0x80, protocol). A
-/// safetensors file starts with the length of its JSON header, whose first byte stands at offset 8.
-fn is_pytorch(path: &Path) -> Result<bool, Error> {
-    let mut start = [0_u8; 9];
-    let mut file = fs::File::open(path).map_err(|source| io_error(path, "open", source))?;
-    let mut filled = 0;
-    while filled < start.len() {
-        match file.read(&mut start[filled..]) {
-            Ok(0) => break,
-            Ok(n) => filled += n,
-            Err(source) => return Err(io_error(path, "read", source)),
-        }
-    }
-    if filled == start.len() && start[8] == b'{' {
-        return Ok(false);
-    }
-    if start.starts_with(b"PK") || start[0] == 0x80 {
-        return Ok(true);
-    }
-    let seen = if filled == 0 {
-        "the file is empty".to_owned()
-    } else {
-        format!("it starts with the bytes {:02x?}", &start[..filled])
-    };
-    Err(format_error(path, seen))
-}
-
-/// The float tensors of a safetensors file that is in memory; `origin` is what error messages call it.
-///
-/// # Errors
-/// [`Error::Format`] for bytes that are no such file.
-pub fn read_bytes(origin: &str, bytes: &[u8]) -> Result<Weights, Error> {
-    let length = bytes.len() as u64;
-    safetensors_of(std::io::Cursor::new(bytes), length, Path::new(origin), "")
-}
-
-fn read_safetensors(path: &Path, prefix: &str) -> Result<Weights, Error> {
-    let file = fs::File::open(path).map_err(|source| io_error(path, "open", source))?;
-    let length = file
-        .metadata()
-        .map_err(|source| io_error(path, "read", source))?
-        .len();
-    safetensors_of(file, length, path, prefix)
-}
-
-/// Of `length` bytes; `path` is what error messages call them.
-fn safetensors_of(
-    mut file: impl Read + Seek,
-    length: u64,
-    path: &Path,
-    prefix: &str,
-) -> Result<Weights, Error> {
-    let failed = |source| io_error(path, "read", source);
-    let cut_off = || format_error(path, "the file ends within its header or its tensors");
-    if length < 8 {
-        return Err(cut_off());
-    }
-    let mut start = [0_u8; 8];
-    file.read_exact(&mut start).map_err(failed)?;
-    let data = u64::from_le_bytes(start).saturating_add(8);
-    if data > length {
-        return Err(cut_off());
-    }
-    let mut header = vec![0; (data - 8) as usize];
-    file.read_exact(&mut header).map_err(failed)?;
-    let header: Metadata =
-        serde_json::from_slice(&header).map_err(|e| format_error(path, e.to_string()))?;
-    if header.data_len() as u64 != length - data {
-        return Err(cut_off());
-    }
-    let mut weights = Weights::new(path.display().to_string());
-    if let Some(metadata) = header.metadata() {
-        weights.metadata = metadata.clone().into_iter().collect();
-    }
-    let mut bytes = Vec::new();
-    for name in header.offset_keys() {
-        let (Some(short), Some(info)) = (name.strip_prefix(prefix), header.info(&name)) else {
-            continue;
-        };
-        let (begin, end) = info.data_offsets;
-        file.seek(SeekFrom::Start(data + begin as u64))
-            .map_err(failed)?;
-        bytes.resize(end - begin, 0);
-        file.read_exact(&mut bytes).map_err(failed)?;
-        let values = match info.dtype {
-            Dtype::F32 => floats(&bytes, f32::from_le_bytes),
-            Dtype::F64 => floats(&bytes, |b| f64::from_le_bytes(b) as f32),
-            Dtype::F16 => floats(&bytes, |b| f16::from_le_bytes(b).to_f32()),
-            Dtype::BF16 => floats(&bytes, |b| bf16::from_le_bytes(b).to_f32()),
-            _ => continue,
-        };
-        let shape = info.shape.clone();
-        weights
-            .tensors
-            .insert(short.to_owned(), WeightTensor { shape, values });
     }
     Ok(weights)
 }
@@ -161,47 +48,6 @@ fn read_pytorch(path: &Path) -> Result<Weights, Error> {
 fn floats<const N: usize>(bytes: &[u8], convert: impl Fn([u8; N]) -> f32) -> Vec<f32> {
     let (chunks, _) = bytes.as_chunks::<N>();
     chunks.iter().map(|chunk| convert(*chunk)).collect()
-}
-
-/// Writes the tensors as f32 to a safetensors file. The file appears under its name only when it is
-/// complete and on the disk.
-///
-/// # Errors
-/// [`Error::Io`] naming the file; what was written of it is removed.
-pub fn write_safetensors(path: &Path, weights: &Weights) -> Result<(), Error> {
-    let bytes: Vec<(&String, &WeightTensor, Vec<u8>)> = weights
-        .tensors
-        .iter()
-        .map(|(name, tensor)| {
-            let bytes = tensor.values.iter().flat_map(|v| v.to_le_bytes()).collect();
-            (name, tensor, bytes)
-        })
-        .collect();
-    let mut views = Vec::with_capacity(bytes.len());
-    for (name, tensor, bytes) in &bytes {
-        let view = TensorView::new(Dtype::F32, tensor.shape.clone(), bytes)
-            .map_err(|e| format_error(path, format!("tensor `{name}`: {e}")))?;
-        views.push((name.as_str(), view));
-    }
-    let metadata: HashMap<String, String> = weights.metadata.clone().into_iter().collect();
-    let part = Partial::beside(path);
-    safetensors::serialize_to_file(views, Some(metadata), part.path())
-        .map_err(|error| match error {
-            SafeTensorError::IoError(source) => io_error(path, "write", source),
-            other => format_error(path, other.to_string()),
-        })
-        .and_then(|()| {
-            part.publish()
-                .map_err(|source| io_error(path, "write", source))
-        })
-}
-
-fn io_error(path: &Path, action: &'static str, source: std::io::Error) -> Error {
-    Error::Io {
-        path: path.to_owned(),
-        action,
-        source,
-    }
 }
 
 fn format_error(path: &Path, reason: impl Into<String>) -> Error {

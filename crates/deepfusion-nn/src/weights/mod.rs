@@ -1,101 +1,18 @@
-//! Weights by name: out of a network, into a network, to and from files.
+//! Weights out of a network, into a network, and from other programs' files.
 //!
 //! A tensor's name is its path in the module, `encoder.layer1.0.conv1.weight`; the encoders' paths are
-//! torchvision's names. Our own files are safetensors with f32 values; what PyTorch saved (`.pth`) can
-//! be read. Importing renames the tensors of a foreign file to ours and then asks for an exact fit:
-//! nothing missing, nothing left over, every shape equal.
+//! torchvision's names. What PyTorch saved (`.pth`) can be read. Importing renames the tensors of a foreign file to ours and
+//! then asks for an exact fit: nothing missing, nothing left over, every shape equal.
 
 mod file;
 mod module;
 mod monodepth2;
 mod torchvision;
 
-use std::collections::BTreeMap;
-
-pub use file::{read, read_bytes, read_under, write_safetensors};
+pub use deepfusion_model::weights::{
+    WeightTensor, Weights, read_bytes, read_safetensors_under, write_safetensors,
+};
+pub use file::read;
 pub use module::{apply, collect};
 pub use monodepth2::{Monodepth2, Monodepth2Files, load_monodepth2};
 pub use torchvision::{detect_resnet, load_torchvision_resnet};
-
-/// One tensor's values, row-major.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WeightTensor {
-    /// Extents, outermost first.
-    pub shape: Vec<usize>,
-    /// As many values as the extents' product.
-    pub values: Vec<f32>,
-}
-
-/// Tensors by name, and where they come from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Weights {
-    /// What error messages call them: the file's path, or a description.
-    pub origin: String,
-    /// The tensors.
-    pub tensors: BTreeMap<String, WeightTensor>,
-    /// Free text stored beside the tensors (safetensors' metadata).
-    pub metadata: BTreeMap<String, String>,
-}
-
-impl Weights {
-    /// No tensors yet.
-    #[must_use]
-    pub fn new(origin: impl Into<String>) -> Self {
-        Self {
-            origin: origin.into(),
-            tensors: BTreeMap::new(),
-            metadata: BTreeMap::new(),
-        }
-    }
-
-    /// The tensors whose names start with `prefix`, without it.
-    #[must_use]
-    pub fn under(&self, prefix: &str) -> Self {
-        Self {
-            origin: self.origin.clone(),
-            tensors: self
-                .tensors
-                .iter()
-                .filter_map(|(name, tensor)| {
-                    Some((name.strip_prefix(prefix)?.to_owned(), tensor.clone()))
-                })
-                .collect(),
-            metadata: self.metadata.clone(),
-        }
-    }
-
-    /// All tensors, `prefix` before their names.
-    #[must_use]
-    pub fn with_prefix(self, prefix: &str) -> Self {
-        self.renamed(|name| Some(format!("{prefix}{name}")))
-    }
-
-    /// The tensors under the names that `rename` gives them; those it gives none are dropped.
-    #[must_use]
-    pub fn renamed(self, rename: impl Fn(&str) -> Option<String>) -> Self {
-        Self {
-            tensors: self
-                .tensors
-                .into_iter()
-                .filter_map(|(name, tensor)| Some((rename(&name)?, tensor)))
-                .collect(),
-            ..self
-        }
-    }
-
-    /// These and the other's tensors, the other's where both have one.
-    #[must_use]
-    pub fn merged(mut self, other: Self) -> Self {
-        self.tensors.extend(other.tensors);
-        self
-    }
-
-    /// How many values all tensors hold.
-    #[must_use]
-    pub fn value_count(&self) -> usize {
-        self.tensors
-            .values()
-            .map(|tensor| tensor.values.len())
-            .sum()
-    }
-}

@@ -8,9 +8,7 @@ use burn::tensor::Device;
 
 use super::torchvision::apply_torchvision;
 use super::{Weights, apply, detect_resnet, read};
-use crate::Error;
-use crate::depth_net::{DepthNet, DepthNetConfig, InputSize};
-use crate::pose_net::{PoseNet, PoseNetConfig};
+use crate::{DepthNet, DepthNetConfig, Error, InputSize, PoseNet, PoseNetConfig};
 
 /// Where the four files are.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,7 +65,7 @@ pub fn load_monodepth2(files: &Monodepth2Files, device: &Device) -> Result<Monod
     let depth_config = DepthNetConfig::monodepth2(detect_resnet(&encoder)?);
     let decoder = read(&files.depth)?;
     let decoder = rename(decoder, depth_decoder_name)?;
-    let mut depth_net = depth_config.init(device)?;
+    let mut depth_net = DepthNet::new(&depth_config, device)?;
     depth_net.encoder = apply_torchvision(depth_net.encoder, encoder)?;
     depth_net.decoder = apply(depth_net.decoder, &decoder)?;
 
@@ -100,7 +98,7 @@ fn load_pose(
     if let Some(output) = decoder.tensors.get("output.weight") {
         config.poses = output.shape.first().map_or(0, |channels| channels / 6);
     }
-    let mut net = config.init(device)?;
+    let mut net = PoseNet::new(&config, device)?;
     net.encoder = apply_torchvision(net.encoder, encoder)?;
     net.decoder = apply(net.decoder, &decoder)?;
     Ok((config, net))

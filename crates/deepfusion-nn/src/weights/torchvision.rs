@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use super::{Weights, apply, read};
-use crate::Error;
-use crate::resnet::{ResNet, ResNetDepth};
+use crate::{Error, ResNet, ResNetDepth};
 
 /// Reads ImageNet weights, as torchvision publishes them (`resnet18-f37072fd.pth` and its like, or
 /// the same tensors as `.safetensors`), into an encoder. The classifier (`fc`) is left out; for an

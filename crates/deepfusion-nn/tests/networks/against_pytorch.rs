@@ -10,7 +10,7 @@ use burn::tensor::Device;
 use deepfusion_nn::weights::{
     self, Monodepth2Files, Weights, load_monodepth2, load_torchvision_resnet,
 };
-use deepfusion_nn::{InputSize, ResNetConfig, ResNetDepth, WeightRng};
+use deepfusion_nn::{InputSize, ResNet, ResNetConfig, ResNetDepth, WeightRng};
 
 const TOLERANCE: f32 = 1e-5;
 
@@ -114,9 +114,8 @@ fn torchvision_resnet18_from_a_legacy_pth() {
     let folder = tempfile::tempdir().unwrap();
     let path = unpack("resnet18.pth", folder.path());
     let device = Device::flex();
-    let encoder = ResNetConfig::new(ResNetDepth::ResNet18)
-        .init(&mut WeightRng::new(1), &device)
-        .unwrap();
+    let config = ResNetConfig::new(ResNetDepth::ResNet18);
+    let encoder = ResNet::new(&config, &mut WeightRng::new(1), &device).unwrap();
     let encoder = load_torchvision_resnet(encoder, &path).unwrap();
     check_features("resnet18", encoder.forward(images("images", 3, &device)));
 }
@@ -127,10 +126,8 @@ fn torchvision_resnet50_on_two_frames() {
     let path = folder.path().join("resnet50.safetensors");
     write_listed(&path, &manifest()["resnet50"]);
     let device = Device::flex();
-    let encoder = ResNetConfig::new(ResNetDepth::ResNet50)
-        .with_frames(2)
-        .init(&mut WeightRng::new(1), &device)
-        .unwrap();
+    let config = ResNetConfig::new(ResNetDepth::ResNet50).with_frames(2);
+    let encoder = ResNet::new(&config, &mut WeightRng::new(1), &device).unwrap();
     let encoder = load_torchvision_resnet(encoder, &path).unwrap();
     check_features("resnet50", encoder.forward(images("pair", 6, &device)));
 }

@@ -9,8 +9,9 @@ use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use deepfusion_nn::layers::freeze_statistics;
 use deepfusion_nn::weights::{self, WeightTensor, Weights};
 use deepfusion_nn::{
-    AttentionConfig, AttentionForm, DecoderConfig, DepthNetConfig, GlobalAggregation, HceConfig,
-    ResNetConfig, ResNetDepth, WeightRng,
+    Attention, AttentionConfig, AttentionForm, DecoderConfig, DepthNet, DepthNetConfig,
+    GlobalAggregation, HceConfig, HierarchicalContext, ResNet, ResNetConfig, ResNetDepth,
+    WeightRng,
 };
 
 use crate::common::{formula, largest_difference, reference, uniform, values};
@@ -124,7 +125,7 @@ fn hierarchical_context() {
     let device = Device::flex().autodiff();
     let init = |config: &HceConfig, channels| {
         let mut rng = WeightRng::new(1);
-        config.init(channels, &mut rng, &device).unwrap()
+        HierarchicalContext::new(config, channels, &mut rng, &device).unwrap()
     };
     let shape = [2, 24, 9, 17];
     let hce = init(&HceConfig::default(), 24);
@@ -157,7 +158,7 @@ fn attention_in_both_forms() {
             form,
             ..AttentionConfig::default()
         };
-        let attention = config.init(40, &mut WeightRng::new(1), &device).unwrap();
+        let attention = Attention::new(&config, 40, &mut WeightRng::new(1), &device).unwrap();
         check(case, attention, [2, 40, 9, 11], |a, x| vec![a.forward(x)]);
     }
 }
@@ -181,7 +182,7 @@ fn dilated_encoders() {
         let config = ResNetConfig::new(depth)
             .with_base_width(8)
             .with_output_stride(16);
-        let encoder = config.init(&mut WeightRng::new(1), &device).unwrap();
+        let encoder = ResNet::new(&config, &mut WeightRng::new(1), &device).unwrap();
         let encoder = freeze_statistics(encoder, true);
         check(case, encoder, [2, 3, 96, 128], |encoder, x| {
             let [_, _, _, f3, f4] = encoder.forward(x);
@@ -212,10 +213,10 @@ fn the_whole_network() {
     let device = Device::flex().autodiff();
     let shape = [2, 3, 64, 96];
     let eighteen = small_paper(ResNetDepth::ResNet18, 16, AttentionForm::Product);
-    let net = eighteen.init(&device).unwrap();
+    let net = DepthNet::new(&eighteen, &device).unwrap();
     check("paper_18", net, shape, |net, x| net.forward(x));
     let fifty = small_paper(ResNetDepth::ResNet50, 8, AttentionForm::Residual);
-    let net = freeze_statistics(fifty.init(&device).unwrap(), true);
+    let net = freeze_statistics(DepthNet::new(&fifty, &device).unwrap(), true);
     // Through `decode`, as another decoder beside this one does.
     check("paper_50", net, shape, |net, x| {
         net.decode(net.encoder.forward(x))
@@ -226,7 +227,7 @@ fn the_whole_network() {
 fn inspection_shows_what_forward_uses() {
     let device = Device::flex();
     let config = small_paper(ResNetDepth::ResNet18, 8, AttentionForm::Product);
-    let net = filled(config.init(&device).unwrap());
+    let net = filled(DepthNet::new(&config, &device).unwrap());
     let x = crate::common::images("images", 3, &device);
     let seen = net.inspect(x.clone());
     assert_eq!(seen.masks.len(), 4);

@@ -22,7 +22,7 @@ fn decoder(device: &Device) -> FlowDecoder {
         feature_width: 16,
         widths: vec![24, 20],
     };
-    let decoder = config.init(CHANNELS, &mut WeightRng::new(0), device);
+    let decoder = FlowDecoder::new(&config, CHANNELS, &mut WeightRng::new(0), device);
     let decoder = decoder.unwrap();
     let mut by_formula = Weights::new("the formula");
     for (name, tensor) in weights::collect(&decoder).tensors {

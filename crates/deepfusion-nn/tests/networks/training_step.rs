@@ -148,7 +148,7 @@ fn tiny(device: &Device) -> DepthNet {
     let mut config = DepthNetConfig::new(ResNetDepth::ResNet18);
     config.encoder.base_width = 4;
     config.decoder.widths = [8, 8, 4, 4, 4];
-    config.init(device).unwrap()
+    DepthNet::new(&config, device).unwrap()
 }
 
 fn statistics(net: &DepthNet) -> Vec<Vec<f32>> {
@@ -221,7 +221,7 @@ fn a_configuration_freezes_the_batch_norms_of_the_whole_network() {
     config.decoder.widths = [8, 8, 4, 4, 4];
     config.hce = Some(HceConfig::default());
     let moved = |config: &DepthNetConfig| {
-        let net = config.init(&device).unwrap();
+        let net = DepthNet::new(config, &device).unwrap();
         let before = collect(&net).tensors;
         net.forward(images("images", 3, &device));
         let mut moved = collect(&net).tensors;
@@ -240,7 +240,7 @@ fn a_configuration_freezes_the_batch_norms_of_the_whole_network() {
 fn a_new_network_starts_at_ten_metres() {
     let device = Device::flex();
     let config = DepthNetConfig::new(ResNetDepth::ResNet18);
-    let net = config.init_with_seed(7, &device).unwrap();
+    let net = DepthNet::with_seed(&config, 7, &device).unwrap();
     for disparity in net.forward(images("images", 3, &device)) {
         let mut depths: Vec<f64> = values(disparity)
             .iter()
@@ -256,7 +256,7 @@ fn a_new_network_starts_at_ten_metres() {
 fn a_seed_fixes_every_weight() {
     let device = Device::flex();
     let config = DepthNetConfig::new(ResNetDepth::ResNet18);
-    let weights = |seed| collect(&config.init_with_seed(seed, &device).unwrap());
+    let weights = |seed| collect(&DepthNet::with_seed(&config, seed, &device).unwrap());
     assert!(weights(5) == weights(5));
     assert!(weights(5) != weights(6));
 }

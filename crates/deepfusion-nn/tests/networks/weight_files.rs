@@ -9,7 +9,8 @@ use deepfusion_nn::weights::{
     self, Monodepth2Files, WeightTensor, Weights, load_monodepth2, load_torchvision_resnet,
 };
 use deepfusion_nn::{
-    DepthNet, DepthNetConfig, Error, PoseNetConfig, ResNetConfig, ResNetDepth, WeightRng,
+    DepthNet, DepthNetConfig, Error, PoseNet, PoseNetConfig, ResNet, ResNetConfig, ResNetDepth,
+    WeightRng,
 };
 
 fn tiny_config() -> DepthNetConfig {
@@ -21,7 +22,7 @@ fn tiny_config() -> DepthNetConfig {
 
 fn tiny(seed: u64) -> DepthNet {
     let device = Device::flex().autodiff();
-    tiny_config().init_with_seed(seed, &device).unwrap()
+    DepthNet::with_seed(&tiny_config(), seed, &device).unwrap()
 }
 
 #[test]
@@ -74,9 +75,8 @@ fn names_are_torchvisions() {
         (ResNetDepth::ResNet18, "resnet18"),
         (ResNetDepth::ResNet50, "resnet50"),
     ] {
-        let encoder = ResNetConfig::new(depth)
-            .init(&mut WeightRng::new(0), &device)
-            .unwrap();
+        let config = ResNetConfig::new(depth);
+        let encoder = ResNet::new(&config, &mut WeightRng::new(0), &device).unwrap();
         let mut ours: Vec<_> = weights::collect(&encoder)
             .tensors
             .into_iter()
@@ -208,17 +208,15 @@ fn weights_of_another_architecture_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let device = Device::flex();
     let resnet18 = unpack("resnet18.pth", folder.path());
-    let encoder = ResNetConfig::new(ResNetDepth::ResNet34)
-        .init(&mut WeightRng::new(0), &device)
-        .unwrap();
+    let config = ResNetConfig::new(ResNetDepth::ResNet34);
+    let encoder = ResNet::new(&config, &mut WeightRng::new(0), &device).unwrap();
     let error = load_torchvision_resnet(encoder, &resnet18).unwrap_err();
     assert!(matches!(error, Error::MissingTensor { .. }), "{error}");
     assert!(error.hint().unwrap().contains("another architecture"));
 
     let pose = unpack("pose.pth", folder.path());
-    let encoder = ResNetConfig::new(ResNetDepth::ResNet18)
-        .init(&mut WeightRng::new(0), &device)
-        .unwrap();
+    let config = ResNetConfig::new(ResNetDepth::ResNet18);
+    let encoder = ResNet::new(&config, &mut WeightRng::new(0), &device).unwrap();
     let error = load_torchvision_resnet(encoder, &pose).unwrap_err();
     assert!(
         matches!(error, Error::UnknownArchitecture { .. }),
@@ -257,9 +255,9 @@ fn the_pose_factor_is_metres_per_unit() {
     let mut config = PoseNetConfig::new(ResNetDepth::ResNet18);
     config.encoder.base_width = 4;
     let x = images("pair", 6, &device);
-    let one = config.init(&device).unwrap().forward(x.clone());
+    let one = PoseNet::new(&config, &device).unwrap().forward(x.clone());
     config.metres_per_unit = 0.5;
-    let half = config.init(&device).unwrap().forward(x);
+    let half = PoseNet::new(&config, &device).unwrap().forward(x);
     assert_eq!(values(one.axis_angle), values(half.axis_angle));
     assert_eq!(
         values(one.translation.mul_scalar(0.5)),

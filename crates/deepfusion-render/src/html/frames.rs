@@ -1,6 +1,6 @@
 //! Single frames in a report: image, prediction, truth, error, and the clouds.
 
-use deepfusion_cloud::PointCloud;
+use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use image::imageops::{self, FilterType};
 use image::{Rgb, RgbImage};

@@ -53,7 +53,7 @@ impl CsvLog {
     /// Opens the log; records after `step`, left by a run that was interrupted later, are dropped.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Model`].
     pub fn open(path: &Path, step: usize) -> Result<Self, Error> {
         let io = |action| move |e| Error::io(path, action, e);
         let mut kept = vec![header()];
@@ -83,7 +83,7 @@ impl CsvLog {
     /// Appends a record.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Model`].
     pub fn write(&mut self, record: &CsvRecord<'_>) -> Result<(), Error> {
         let terms: Vec<_> = record
             .losses

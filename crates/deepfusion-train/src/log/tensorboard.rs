@@ -19,7 +19,7 @@ impl TensorBoardLog {
     /// names, so a resumed run simply adds one.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Model`].
     pub fn create(folder: &Path) -> Result<Self, Error> {
         let now = seconds();
         let path = folder.join(format!(
@@ -42,7 +42,7 @@ impl TensorBoardLog {
     /// Appends scalars of a step.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Model`].
     pub fn scalars(&mut self, step: usize, values: &[(&str, f64)]) -> Result<(), Error> {
         let mut summary = Vec::new();
         for (tag, value) in values {

@@ -1,5 +1,5 @@
 use super::mean::mean_where;
-use crate::loss_config::FlowLossConfig;
+use crate::FlowLossConfig;
 use burn::tensor::{Bool, Device, Tensor};
 use deepfusion_nn::ops;
 

@@ -20,7 +20,7 @@ pub use moving::{RigidView, epipolar_distance, moving_pixels};
 pub use reprojection::{ReprojectionOutput, View, reprojection};
 pub use smoothness::smoothness;
 pub use speed::{motion, speed, speed_weight};
-pub use uncertainty::{LOG_SCALE_BOUNDS, uncertainty};
+pub use uncertainty::uncertainty;
 
 /// The loss of a batch, term by term, as numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

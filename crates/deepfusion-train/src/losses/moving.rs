@@ -1,5 +1,5 @@
 use super::flow::{FlowView, pixel_grid};
-use crate::loss_config::MovingConfig;
+use crate::MovingConfig;
 use crate::pose::cross_matrix;
 use crate::{Motion, Synthesised};
 use burn::tensor::{Bool, Tensor};

@@ -3,9 +3,7 @@
 use super::DepthTruth;
 use super::depth::log_depth_error;
 use burn::tensor::Tensor;
-
-/// ln b is held within these, in learning and in what is told: errors of ln depth between 0.25 % and a factor of 7.
-pub const LOG_SCALE_BOUNDS: (f64, f64) = (-6.0, 2.0);
+use deepfusion_model::LOG_SCALE_BOUNDS;
 
 /// L_nll = mean(|e|/b + ln b) over the pixels of known depth, e = ln D̂ − ln D. It is least where b is the error that is to be
 /// expected. The depth itself learns nothing from it: e counts as a constant.

@@ -1,0 +1,247 @@
+//! The command line's shape: what can be said, not what it does.
+
+mod ablate;
+mod compare;
+mod completions;
+mod config;
+mod data;
+mod doctor;
+mod engine;
+mod eval;
+mod eval_odometry;
+mod eval_targets;
+mod export;
+mod instances;
+mod live;
+mod perceive;
+mod predict;
+mod prediction;
+mod train;
+mod values;
+mod view;
+mod weights;
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+pub use ablate::AblateArgs;
+pub use compare::{CompareArgs, TableFormat};
+pub use completions::{CompletionsArgs, CompletionsKind};
+pub use config::{ConfigCommand, ShowArgs};
+pub use data::{ConvertArgs, DataCommand, ExportGtArgs, GtDepth, InspectArgs};
+pub use doctor::DoctorArgs;
+pub use engine::{EngineArgs, EngineChoice, PrecisionChoice};
+pub use eval::{EvalArgs, PredKind};
+pub use eval_odometry::EvalOdometryArgs;
+pub use eval_targets::{EvalTargetsArgs, TargetDepth};
+pub use export::ExportArgs;
+pub use instances::InstanceArgs;
+pub use live::LiveArgs;
+pub use perceive::{PerceiveArgs, PerceiveSave};
+pub use predict::{BenchArgs, PredictArgs, Save};
+pub use prediction::{Outputs, PredictionArgs};
+pub use train::{DeviceChoice, PresetChoice, TrainArgs, ViewMotionChoice};
+pub use values::{CameraIntrinsics, Shard, Size};
+pub use view::ViewArgs;
+pub use weights::{PackArgs, WeightsCommand};
+
+/// Metric depth from one camera and a speed signal.
+#[derive(Debug, Parser)]
+#[command(
+    name = "deepfusion",
+    version,
+    max_term_width = 100,
+    subcommand_required = false
+)]
+pub struct Cli {
+    /// What to do; without it, an overview with examples.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// No progress on stderr, only warnings and errors.
+    #[arg(long, short, global = true, display_order = 900)]
+    pub quiet: bool,
+}
+
+/// Everything the program can do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// With no data at all: depth, cloud and targets of a new street, then learning there.
+    #[cfg(feature = "train")]
+    Demo(DemoArgs),
+    /// Write a simulated drive with exact ground truth.
+    Simulate(SimulateArgs),
+    /// Look into recordings.
+    #[command(subcommand)]
+    Data(DataCommand),
+    /// Every reason why training on a recording would fail or give a wrong scale; alone, what this machine has.
+    Doctor(DoctorArgs),
+    /// Train on drives, without depth labels.
+    #[cfg(feature = "train")]
+    Train(Box<TrainArgs>),
+    /// What can be configured.
+    #[command(subcommand)]
+    Config(ConfigCommand),
+    /// Train and measure with parts of the system switched off: the on/off table of the paper.
+    #[cfg(feature = "train")]
+    Ablate(Box<AblateArgs>),
+    /// Measure depth: the field's seven metrics, unscaled and median-scaled.
+    Eval(Box<EvalArgs>),
+    /// Evaluations side by side, and beside the field's published tables.
+    Compare(Box<CompareArgs>),
+    /// Measure the camera's path: drift, five-frame error, scale.
+    #[cfg(feature = "train")]
+    EvalOdometry(EvalOdometryArgs),
+    /// Measure 3D targets against labelled boxes: recall, precision, errors, identities.
+    EvalTargets(Box<EvalTargetsArgs>),
+    /// Metric depth of images.
+    Predict(Box<PredictArgs>),
+    /// 3D targets: boxes, distance, size, track, velocity.
+    Perceive(Box<PerceiveArgs>),
+    /// Look at results in the browser: picture, depth in metres, cloud, boxes and tracks, over time.
+    View(ViewArgs),
+    /// A trained network as an ONNX file, checked before it is kept.
+    #[cfg(feature = "train")]
+    Export(ExportArgs),
+    /// Embedded networks, and weights of other programs.
+    #[command(subcommand)]
+    Weights(WeightsCommand),
+    /// Measure speed: milliseconds per stage, frames a second, memory.
+    Bench(BenchArgs),
+    /// What a shell needs to complete the command line, or pages of the manual.
+    Completions(CompletionsArgs),
+}
+
+/// `deepfusion demo`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Takes a few minutes on two cores. Leaves pictures, a point cloud and report.html.\n\n\
+    Examples:\n  deepfusion demo --out runs/first\n  deepfusion demo --from-scratch --out runs/second"
+)]
+pub struct DemoArgs {
+    /// Folder for everything it makes [default: runs/demo-TIME].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print the final evaluation as JSON on stdout.
+    #[arg(long)]
+    pub json: bool,
+    /// Start from nothing: train a small network on six simulated streets for some minutes, and measure it on a seventh.
+    #[arg(long)]
+    pub from_scratch: bool,
+    /// Chooses the streets.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value_t)]
+    pub device: DeviceChoice,
+}
+
+/// `deepfusion simulate`.
+#[derive(Debug, Args)]
+#[command(after_help = "Equal settings give equal drives, byte for byte.\n\n\
+    Examples:\n  deepfusion simulate --out street --frames 200 --seed 7\n  \
+    deepfusion simulate --out traffic --frames 100 --moving-cars 6 --size 1242x375\n  \
+    deepfusion simulate --out garage --format bag --scene garage --frames 250")]
+pub struct SimulateArgs {
+    /// Folder to write, new or empty.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Layout of the drive.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: SimulateFormat,
+    /// Number of frames.
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    pub frames: usize,
+    /// Chooses the street, its look, the light and the way it is driven.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// Kind of place.
+    #[arg(long, value_enum, default_value_t)]
+    pub scene: SceneChoice,
+    /// Number of cars that move.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub moving_cars: usize,
+    /// Size of the pictures [default: 640x192; UMAD's 640x480 in a bag].
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Frames a second [default: 10; UMAD's 25 in a bag].
+    #[arg(long, value_name = "HZ")]
+    pub fps: Option<f64>,
+    /// Sensors of the car [default: those of the layout's data set].
+    #[arg(long, value_enum)]
+    pub sensors: Option<SensorsChoice>,
+    /// Set the clock of camera and LiDAR so many milliseconds ahead of the vehicle's (bag).
+    #[arg(
+        long,
+        value_name = "MS",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub clock_offset: f64,
+    /// Compression of the bag.
+    #[arg(long, value_enum, default_value_t)]
+    pub compression: CompressionChoice,
+    /// A velodyne scan for every N-th frame (KITTI); 0 writes none.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub scan_every: usize,
+    /// Print what was written as JSON on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Layouts the simulator writes.
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+pub enum SimulateFormat {
+    /// KITTI raw: images, oxts, velodyne scans, calibration, and exact depth beside them.
+    #[default]
+    Kitti,
+    /// A ROS 1 bag as UMAD's: camera, FMCW LiDAR, inertial unit, CAN speed and steering, and the truth.
+    Bag,
+}
+
+/// What the simulated car carries.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum SensorsChoice {
+    /// KITTI's, camera and velodyne on the roof.
+    Kitti,
+    /// UMAD's, camera, FMCW LiDAR and inertial unit in one head.
+    Umad,
+}
+
+/// How a bag's chunks are compressed.
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+pub enum CompressionChoice {
+    /// Not at all.
+    None,
+    /// Fast.
+    #[default]
+    Lz4,
+    /// Small and slow.
+    Bz2,
+}
+
+impl From<CompressionChoice> for deepfusion_rosbag::Compression {
+    fn from(choice: CompressionChoice) -> Self {
+        match choice {
+            CompressionChoice::None => Self::None,
+            CompressionChoice::Lz4 => Self::Lz4,
+            CompressionChoice::Bz2 => Self::Bz2,
+        }
+    }
+}
+
+/// Places the simulator knows.
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+pub enum SceneChoice {
+    /// A street with houses, parked cars, trees.
+    #[default]
+    Urban,
+    /// A narrow road between lawns and trees.
+    Park,
+    /// Under ground: dark, near walls, pillars, a low ceiling.
+    Garage,
+    /// Large houses, wide pavements, many parked cars.
+    Commercial,
+    /// The urban street by night, under its lamps.
+    Night,
+}

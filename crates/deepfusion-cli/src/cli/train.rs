@@ -1,0 +1,191 @@
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use deepfusion_data::CameraChoice;
+use deepfusion_model::{Compute, Learn, Preset, TrainConfig, ViewMotion};
+
+use super::Size;
+use super::values::milliseconds;
+
+/// `deepfusion train`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Learns from images and the car's speed alone (and its yaw rate, with --view-motion vehicle), or from recorded depth \
+    (--learn depth). Writes config.toml, log.csv, TensorBoard events, the \
+    checkpoints last and best, and sample panels. Options override a config file.\n\n\
+    Ctrl-C, and SIGTERM as schedulers send it, save after the step at work and end with code 130. --resume goes on as the run is \
+    configured: --epochs or --steps may make it longer, --data, --val-data and --split say where its recordings are now, and any other \
+    option that contradicts it is an error.\n\n\
+    Examples:\n  deepfusion train --data kitti/2011_09_26/2011_09_26_drive_0005_sync --preset tiny\n  \
+    deepfusion train --data kitti --preset light --epochs 20 --out runs/light\n  \
+    deepfusion train --out runs/light --resume"
+)]
+pub struct TrainArgs {
+    /// Recordings to train on: KITTI drives or roots, image folders, videos [default: the config file's].
+    #[arg(long, value_name = "PATH", num_args = 1.., required_unless_present_any = ["resume", "config"])]
+    pub data: Vec<PathBuf>,
+    /// Settings to start from [default: tiny].
+    #[arg(long, value_enum)]
+    pub preset: Option<PresetChoice>,
+    /// Settings from a file: a preset and the keys in which it differs, or all of them, as written into every run as config.toml.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "preset")]
+    pub config: Option<PathBuf>,
+    /// Folder of the run [default: runs/train-TIME].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Continue the run in --out exactly where it stopped.
+    #[arg(long, requires = "out")]
+    pub resume: bool,
+    /// Where to compute.
+    #[arg(long, value_enum, default_value_t)]
+    pub device: DeviceChoice,
+    /// Passes over the data [default: the preset's 20, and at least 1200 steps].
+    #[arg(long, value_name = "N", conflicts_with = "steps")]
+    pub epochs: Option<usize>,
+    /// Optimiser steps, instead of epochs.
+    #[arg(long, value_name = "N")]
+    pub steps: Option<usize>,
+    /// Size of the network's input [default: the preset's; on a processor 320x96].
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Samples a step [default: the preset's; on a processor 4].
+    #[arg(long, value_name = "N")]
+    pub batch: Option<usize>,
+    /// Fixes everything that is random.
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// What is learned from: the drive's own motion, the depth recorded with it (RGB-D, scans), or both [default: self].
+    #[arg(long, value_enum, value_name = "LESSON")]
+    pub learn: Option<LearnChoice>,
+    /// Which cameras [default: 2].
+    #[arg(long, value_name = "2|3|both")]
+    pub camera: Option<CameraChoice>,
+    /// Train on the frames of this split file only (lines "folder index side").
+    #[arg(long, value_name = "FILE")]
+    pub split: Option<PathBuf>,
+    /// Recordings to validate on [default: the last tenth of each drive].
+    #[arg(long, value_name = "PATH", num_args = 1..)]
+    pub val_data: Vec<PathBuf>,
+    /// Validate on the frames of this split file only, of --val-data, or of --data where there is none.
+    #[arg(long, value_name = "FILE")]
+    pub val_split: Option<PathBuf>,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
+    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
+    pub camera_ahead_s: Option<f64>,
+    /// Weights to start from: a run, a checkpoint, a ResNet's file, the name of an embedded network (`weights list`), or none
+    /// [default: the embedded network of the preset's layers, if any; with --config what the file says].
+    #[arg(long, value_name = "WEIGHTS")]
+    pub init: Option<PathBuf>,
+    /// Whose motion the views are synthesised with [default: the preset's].
+    #[arg(long, value_enum, value_name = "MOTION")]
+    pub view_motion: Option<ViewMotionChoice>,
+    /// Parts of the network and terms of the loss to switch on.
+    #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = TrainConfig::TERMS)]
+    pub with: Vec<String>,
+    /// Parts of the network and terms of the loss to leave out.
+    #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = TrainConfig::TERMS)]
+    pub without: Vec<String>,
+    /// Any key of the configuration, as loss.smoothness=0.01 (`deepfusion config show` prints them all); may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
+/// Settings to start from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PresetChoice {
+    /// ResNet-18 at half width, 320×96: useful on two cores in minutes.
+    Tiny,
+    /// ResNet-18, 640×192; trained on a processor 320×96.
+    Light,
+    /// ResNet-50, 640×192, batch 12; trained on a processor 320×96, batch 4.
+    Resnet50,
+    /// The paper's network: ResNet-50 with context and attention; sizes as resnet50.
+    Paper,
+    /// Monodepth2's network and losses, with the speed term.
+    Monodepth2,
+}
+
+impl From<PresetChoice> for Preset {
+    fn from(choice: PresetChoice) -> Self {
+        match choice {
+            PresetChoice::Tiny => Self::Tiny,
+            PresetChoice::Light => Self::Light,
+            PresetChoice::Resnet50 => Self::Resnet50,
+            PresetChoice::Paper => Self::Paper,
+            PresetChoice::Monodepth2 => Self::Monodepth2,
+        }
+    }
+}
+
+/// What a recording is learned from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LearnChoice {
+    /// Its own motion: views of one frame from another; needs a speed.
+    #[value(name = "self")]
+    OwnMotion,
+    /// Its depth: RGB-D images or a LiDAR's scans; needs no speed.
+    Depth,
+    /// Both.
+    Both,
+}
+
+/// Whose motion the views are synthesised with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ViewMotionChoice {
+    /// PoseNet's; the speed loss pulls its length to the vehicle's.
+    Posenet,
+    /// PoseNet's direction and rotation, the vehicle's distance.
+    Distance,
+    /// The vehicle's, from speed and yaw rate.
+    Vehicle,
+}
+
+impl From<LearnChoice> for Learn {
+    fn from(choice: LearnChoice) -> Self {
+        match choice {
+            LearnChoice::OwnMotion => Self::OwnMotion,
+            LearnChoice::Depth => Self::Depth,
+            LearnChoice::Both => Self::Both,
+        }
+    }
+}
+
+impl From<ViewMotionChoice> for ViewMotion {
+    fn from(choice: ViewMotionChoice) -> Self {
+        match choice {
+            ViewMotionChoice::Posenet => Self::PoseNet,
+            ViewMotionChoice::Distance => Self::Distance,
+            ViewMotionChoice::Vehicle => Self::Vehicle,
+        }
+    }
+}
+
+/// Where to compute. Help lists what this build has; the others are known, so that they are answered with how to build them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum DeviceChoice {
+    /// This machine's processor.
+    #[default]
+    Cpu,
+    /// A GPU through Vulkan.
+    #[cfg_attr(not(feature = "vulkan"), value(hide = true))]
+    Vulkan,
+    /// A GPU through WebGPU.
+    #[cfg_attr(not(feature = "wgpu"), value(hide = true))]
+    Wgpu,
+    /// An NVIDIA GPU.
+    #[cfg_attr(not(feature = "cuda"), value(hide = true))]
+    Cuda,
+    /// An Apple GPU.
+    #[cfg_attr(not(feature = "metal"), value(hide = true))]
+    Metal,
+}
+
+impl DeviceChoice {
+    /// What a preset's sizes follow.
+    pub fn compute(self) -> Compute {
+        match self {
+            Self::Cpu => Compute::Processor,
+            Self::Vulkan | Self::Wgpu | Self::Cuda | Self::Metal => Compute::Gpu,
+        }
+    }
+}

@@ -1,0 +1,91 @@
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use deepfusion_model::CheckpointKind;
+
+/// `deepfusion weights …`.
+#[derive(Debug, Subcommand)]
+pub enum WeightsCommand {
+    /// Make a run of weights of torchvision's ResNet or of Monodepth2 (.pth, .safetensors).
+    #[command(
+        after_help = "Examples:\n  deepfusion weights import encoder.pth depth.pth pose_encoder.pth pose.pth --out runs/monodepth2\n  \
+        deepfusion weights import resnet18-5c106cde.pth --out runs/imagenet18"
+    )]
+    #[cfg(feature = "train")]
+    Import {
+        /// The files: one of a ResNet, or Monodepth2's encoder, depth, pose_encoder and pose.
+        #[arg(required = true, value_name = "FILE")]
+        files: Vec<PathBuf>,
+        /// Folder of the run to make.
+        #[arg(long, value_name = "RUN")]
+        out: PathBuf,
+    },
+    /// Make the two files of an embedded network of a run: its depth network in bf16, and a card.
+    Pack(PackArgs),
+    /// Which networks are embedded and what they were made from; which weights can be imported.
+    List {
+        /// Print as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// `deepfusion weights pack`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Writes DIR/NAME.safetensors, the depth network alone (kernels rounded to bf16, vectors in f32), and DIR/NAME.toml: the run's \
+    configuration, the names of its recordings, the evaluations that the run keeps of this checkpoint, licence and SHA-256. The same run \
+    gives the same bytes. `--model` and `--init` take the .safetensors file; in crates/deepfusion-weights/weights both are built into the \
+    program.\n\n\
+    Example:\n  deepfusion weights pack --model runs/street --name street --simulated-only --out packed"
+)]
+pub struct PackArgs {
+    /// A run folder or a checkpoint in it.
+    #[arg(long, value_name = "RUN")]
+    pub model: PathBuf,
+    /// Which checkpoint [default: best, where there is one].
+    #[arg(long, value_enum)]
+    pub checkpoint: Option<CheckpointChoice>,
+    /// What `--model` is to call it: letters a to z, digits and dashes.
+    #[arg(long, value_name = "NAME")]
+    pub name: String,
+    /// Folder for the two files.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// What else there is to say of it, for its card.
+    #[arg(long, value_name = "TEXT")]
+    pub note: Option<String>,
+    /// How to make it again, for its card: a file of recipes/, or a command.
+    #[arg(long, value_name = "TEXT")]
+    pub recipe: Option<String>,
+    /// Under which terms it may be used, for its card.
+    #[arg(long, value_name = "TERMS", default_value = env!("CARGO_PKG_LICENSE"))]
+    pub licence: String,
+    /// Say in its card that it learned from no real image: real recordings then count as not seen in training.
+    #[arg(long)]
+    pub simulated_only: bool,
+    /// Replace files that are there.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Print the card as JSON on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A checkpoint of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum CheckpointChoice {
+    /// At the lowest held-out loss.
+    Best,
+    /// Where training ended.
+    Last,
+}
+
+impl From<CheckpointChoice> for CheckpointKind {
+    fn from(choice: CheckpointChoice) -> Self {
+        match choice {
+            CheckpointChoice::Best => Self::Best,
+            CheckpointChoice::Last => Self::Last,
+        }
+    }
+}

@@ -1,0 +1,172 @@
+use deepfusion_model::{Error, Reprojection, TrainConfig};
+use serde::{Deserialize, Serialize};
+
+/// One row of the table: what is switched on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Row {
+    /// Hierarchical context encoding.
+    pub hce: bool,
+    /// The speed loss.
+    pub speed: bool,
+    /// The flow loss.
+    pub flow: bool,
+    /// Three frames and the minimum of their errors, instead of two frames in both directions.
+    pub minimum: bool,
+}
+
+impl Row {
+    /// The rows of the paper's Table 3: everything on first, then what lacks something.
+    pub fn table_3() -> Vec<Self> {
+        let combination = |off: u8| Self {
+            hce: off & 1 == 0,
+            speed: off & 2 == 0,
+            flow: off & 4 == 0,
+            minimum: false,
+        };
+        (0..8).map(combination).collect()
+    }
+
+    /// Every row that can be asked for: those of Table 3, and everything on with three frames.
+    pub fn all() -> Vec<Self> {
+        let three_frames = Self {
+            hce: true,
+            speed: true,
+            flow: true,
+            minimum: true,
+        };
+        Self::table_3().into_iter().chain([three_frames]).collect()
+    }
+
+    /// Its name in file names and on the command line: what is on, joined by `+`; `none`, or `minimum` for the row with
+    /// three frames.
+    pub fn name(self) -> String {
+        if self.minimum {
+            return "minimum".into();
+        }
+        let parts = [
+            ("hce", self.hce),
+            ("speed", self.speed),
+            ("flow", self.flow),
+        ];
+        let on: Vec<_> = parts
+            .iter()
+            .filter(|(_, on)| *on)
+            .map(|(n, _)| *n)
+            .collect();
+        if on.is_empty() {
+            "none".into()
+        } else {
+            on.join("+")
+        }
+    }
+
+    /// The settings of the row, from those that all rows share. It differs from them by its parts alone: the pose used
+    /// for warping is the same in every row, so that what a row without the speed loss lacks is that loss. Only the
+    /// masks of what moves go with the flow, which they are made of.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where the shared settings and the row's cannot be together.
+    pub fn config(self, shared: &TrainConfig) -> Result<TrainConfig, Error> {
+        let mut config = shared.clone();
+        for (on, term) in [
+            (self.hce, "hce"),
+            (self.flow, "flow"),
+            (self.speed, "speed"),
+        ] {
+            if on {
+                config.with(term)?;
+            } else {
+                config.without(term)?;
+            }
+        }
+        config.view_motion = shared.view_motion;
+        if self.minimum {
+            (config.reprojection, config.frames) = (Reprojection::Minimum, vec![-1, 1]);
+            // It compares the depths of both frames, and three frames have the target's alone.
+            config.loss.affine = 0.0;
+        }
+        config.validate()?;
+        Ok(config)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_model::{Preset, ViewMotion};
+    use std::collections::HashSet;
+
+    fn shared(preset: Preset) -> TrainConfig {
+        TrainConfig {
+            view_motion: ViewMotion::PoseNet,
+            ..preset.config()
+        }
+    }
+
+    #[test]
+    fn every_row_is_another_configuration_of_the_same_rest() {
+        let shared = shared(Preset::Light);
+        assert_eq!(Row::table_3().len(), 8);
+        let rows = Row::all();
+        let names: HashSet<String> = rows.iter().map(|row| row.name()).collect();
+        assert_eq!(names.len(), 9, "{names:?}");
+        assert_eq!(
+            (rows[0].name(), rows[7].name()),
+            ("hce+speed+flow".into(), "none".into())
+        );
+        for row in rows {
+            let config = row.config(&shared).unwrap();
+            assert_eq!(config.depth_net.hce.is_some(), row.hce);
+            assert_eq!(config.loss.speed > 0.0, row.speed);
+            assert_eq!(config.loss.flow.weight > 0.0, row.flow);
+            assert_eq!(config.size, shared.size);
+            let frames = if row.minimum { 3 } else { 2 };
+            assert_eq!(1 + config.frames.len(), frames);
+        }
+    }
+
+    /// A row switches its own part and nothing else: not attention with HCE, not masks with the flow, not the pose
+    /// used for warping with the speed loss.
+    #[test]
+    fn a_row_lacks_its_own_part_alone() {
+        for preset in [Preset::Light, Preset::Paper] {
+            let mut shared = shared(preset);
+            shared.loss.moving.enabled = false;
+            let full = Row::table_3()[0].config(&shared).unwrap();
+            for row in Row::table_3() {
+                let mut config = row.config(&shared).unwrap();
+                if !row.hce {
+                    config.depth_net.hce.clone_from(&full.depth_net.hce);
+                }
+                if !row.speed {
+                    config.loss.speed = full.loss.speed;
+                }
+                if !row.flow {
+                    config.loss.flow.weight = full.loss.flow.weight;
+                }
+                assert_eq!(config, full, "{preset}, {}", row.name());
+            }
+        }
+    }
+
+    /// Masks of what moves that all rows share are made of the flow: without it they are off.
+    #[test]
+    fn masks_go_with_the_flow_that_they_are_made_of() {
+        let shared = shared(Preset::Paper);
+        assert!(shared.loss.moving.enabled);
+        for row in Row::table_3() {
+            let config = row.config(&shared).unwrap();
+            assert_eq!(config.loss.moving.enabled, row.flow, "{}", row.name());
+        }
+    }
+
+    /// With measured motion in the warp a row without the speed loss would still learn from it: it is refused.
+    #[test]
+    fn a_row_without_the_speed_loss_takes_no_measured_pose() {
+        let mut shared = shared(Preset::Light);
+        shared.view_motion = ViewMotion::Distance;
+        for row in Row::table_3() {
+            assert_eq!(row.config(&shared).is_ok(), row.speed, "{}", row.name());
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! `deepfusion completions`: what shells and `man` want to know of the command line.
+
+use std::path::Path;
+
+use anyhow::Result;
+use clap::CommandFactory;
+use clap_complete::{Shell, generate};
+use clap_mangen::Man;
+use deepfusion_data::write_atomically;
+
+use crate::cli::{Cli, CompletionsArgs, CompletionsKind};
+use crate::output;
+
+/// `deepfusion completions`.
+pub fn run(args: &CompletionsArgs) -> Result<()> {
+    let shell = match args.kind {
+        CompletionsKind::Bash => Shell::Bash,
+        CompletionsKind::Elvish => Shell::Elvish,
+        CompletionsKind::Fish => Shell::Fish,
+        CompletionsKind::Powershell => Shell::PowerShell,
+        CompletionsKind::Zsh => Shell::Zsh,
+        CompletionsKind::Man => {
+            // Required by the command line.
+            return args.out.as_deref().map_or(Ok(()), manual);
+        }
+    };
+    let mut script = Vec::new();
+    generate(shell, &mut Cli::command(), "deepfusion", &mut script);
+    output::print(&String::from_utf8_lossy(&script))
+}
+
+/// A page for the program and one for each command, `deepfusion-data-inspect.1`.
+fn manual(out: &Path) -> Result<()> {
+    std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
+    let mut program = Cli::command();
+    program.build();
+    let mut left = vec![(String::from("deepfusion"), program)];
+    while let Some((name, command)) = left.pop() {
+        for inner in command.get_subcommands().filter(|c| c.get_name() != "help") {
+            left.push((format!("{name}-{}", inner.get_name()), inner.clone()));
+        }
+        let path = out.join(format!("{name}.1"));
+        let page = Man::new(command).title(name);
+        write_atomically::<deepfusion_data::Error>(&path, |file| {
+            page.render(file)
+                .map_err(|e| deepfusion_data::Error::file(&path, e))
+        })?;
+    }
+    Ok(())
+}

@@ -1,0 +1,18 @@
+//! `deepfusion config`: what can be configured.
+
+use anyhow::Result;
+
+use deepfusion_model::Preset;
+
+use crate::cli::ShowArgs;
+use crate::output;
+
+/// `deepfusion config show`.
+pub fn show(args: &ShowArgs) -> Result<()> {
+    let mut config = Preset::from(args.preset).config_on(args.device.compute());
+    for assignment in &args.set {
+        config.set(assignment)?;
+    }
+    config.validate()?;
+    output::print(&config.to_commented_toml()?)
+}

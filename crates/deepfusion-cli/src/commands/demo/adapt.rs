@@ -1,0 +1,247 @@
+//! With the embedded network: what it sees at first sight on a street it has never seen, and what learning there adds.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Result;
+use clap::{Parser, ValueEnum};
+use deepfusion_data::{Dataset, OpenOptions, Split, write_atomically};
+use deepfusion_model::{TrainConfig, ViewMotion};
+use deepfusion_nn::ops::{Precision, supports};
+use deepfusion_render::{HtmlReport, PictureFormat};
+use deepfusion_runtime::ModelSource;
+use deepfusion_sim::SimConfig;
+use deepfusion_weights::{DEFAULT, Shipped};
+
+use super::page::{self, Shown};
+use super::{Demo, TEST_SEED, measure};
+use crate::cli::PerceiveArgs;
+use crate::commands::evaluate::Evaluated;
+use crate::commands::recorder::clock;
+use crate::commands::start::Start;
+use crate::commands::{perceive, run_report};
+use crate::progress::say;
+
+/// Frames of the drive along the new street, ten a second, and how many of them have a scan.
+const FRAMES: usize = 200;
+const SCAN_EVERY: usize = 5;
+/// Cars that drive there.
+const MOVING_CARS: usize = 6;
+/// Frames that it learns from; those after the gap are measured on.
+const LEARNED: usize = 120;
+const GAP: usize = 5;
+/// Steps of learning, and samples of a step: about two minutes on two cores.
+const STEPS: usize = 60;
+const BATCH: usize = 2;
+/// A network that knows its trade takes smaller steps than one that begins.
+const LEARNING_RATE: f64 = 1e-5;
+
+/// Arguments of `perceive` alone.
+#[derive(Parser)]
+struct Typed {
+    #[command(flatten)]
+    args: PerceiveArgs,
+}
+
+/// The demo of an embedded network.
+pub fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
+    say("1/4 simulating a drive along a street that no network has seen");
+    let street = SimConfig {
+        seed: demo.args.seed.wrapping_add(TEST_SEED),
+        frames: FRAMES,
+        scan_every: SCAN_EVERY,
+        moving_cars: MOVING_CARS,
+        ..SimConfig::default()
+    };
+    let drive = demo.simulate("street", &street)?;
+    let parts = Parts::of(demo, &drive)?;
+
+    say(&format!(
+        "2/4 depth in metres, a point cloud and 3D targets, from the embedded network `{}` of {}",
+        network.card.name, network.card.date
+    ));
+    let shipped = ModelSource::Packed {
+        given: DEFAULT.into(),
+        network: network.clone(),
+    };
+    let mut estimator = demo.estimator(&shipped)?;
+    let frame = LEARNED + GAP + (FRAMES - LEARNED - GAP) / 3;
+    let before = Instant::now();
+    let first = Shown::of(demo, &mut estimator, &parts.all, frame)?;
+    let first_ms = 1e3 * before.elapsed().as_secs_f64();
+    let targets = demo.out.join("targets");
+    perceive(demo, &drive, &targets)?;
+    let at_first_sight = measure(&mut estimator, &parts.learned, &parts.measured)?;
+    say(&format!(
+        "abs_rel {:.3} unscaled, from one image and nothing learned here",
+        at_first_sight.report.unscaled.abs_rel
+    ));
+
+    say("3/4 learning on the street's first part from images, speed and yaw rate");
+    let start = Start::Packed {
+        network,
+        path: None,
+    };
+    let own = estimator.config();
+    let precision = match supports(&demo.device, Precision::Bf16) {
+        true => Precision::Bf16,
+        false => Precision::F32,
+    };
+    let mut config = TrainConfig {
+        view_motion: ViewMotion::Vehicle,
+        precision,
+        size: own.size,
+        batch: BATCH,
+        steps: Some(STEPS),
+        learning_rate: LEARNING_RATE,
+        seed: demo.args.seed,
+        validate_every: STEPS / 2,
+        ..own.preset.config_on(demo.args.device.compute())
+    };
+    // Two pictures of one street say little of how pictures are distributed.
+    config.depth_net.encoder.frozen_statistics = true;
+    config.data.paths = vec![drive.clone()];
+    config.data.split = Some(parts.learn.clone());
+    start.record_in(&mut config)?;
+    let adapted = demo.learn(config, |model| start.initialise(model, &demo.device))?;
+
+    say("4/4 measuring again on the part that was not learned from; pictures and the report");
+    let mut estimator = demo.estimator(&adapted)?;
+    let learned = measure(&mut estimator, &parts.learned, &parts.measured)?;
+    let second = Shown::of(demo, &mut estimator, &parts.all, frame)?;
+    let html = demo.out.join("report.html");
+    let overlay = overlay_of(&targets, &first)?;
+    report(
+        demo,
+        first_ms,
+        (&first, &at_first_sight),
+        (&second, &learned),
+        overlay.as_deref(),
+        &html,
+    )?;
+    say(&format!("targets deepfusion view {}", targets.display()));
+    demo.end(&learned, &html)
+}
+
+/// The drive's first part, to learn from, and its last, to be measured on.
+struct Parts {
+    all: Dataset,
+    learned: Vec<Dataset>,
+    measured: Vec<Dataset>,
+    /// Split file of the first.
+    learn: PathBuf,
+}
+
+impl Parts {
+    fn of(demo: &Demo, drive: &Path) -> Result<Self> {
+        let open = |split: Option<&Path>| -> Result<Vec<Dataset>> {
+            let split = split.map(Split::read).transpose()?;
+            Ok(Dataset::open(
+                drive,
+                &OpenOptions {
+                    split,
+                    ..OpenOptions::default()
+                },
+            )?)
+        };
+        let all = open(None)?.swap_remove(0);
+        let frames = all.frames();
+        let list = |name: &str, part: &[deepfusion_data::Frame]| -> Result<PathBuf> {
+            let path = demo.out.join(name);
+            let line = |frame: &deepfusion_data::Frame| {
+                format!("{} {:010} l\n", all.split_name(), frame.number)
+            };
+            let text: String = part.iter().map(line).collect();
+            write_atomically::<deepfusion_data::Error>(&path, |file| {
+                std::io::Write::write_all(file, text.as_bytes())
+                    .map_err(|e| deepfusion_data::Error::file(&path, e))
+            })?;
+            Ok(path)
+        };
+        let learn = list("learned.txt", &frames[..LEARNED])?;
+        let measure = list("measured.txt", &frames[LEARNED + GAP..])?;
+        Ok(Self {
+            learned: open(Some(&learn))?,
+            measured: open(Some(&measure))?,
+            all,
+            learn,
+        })
+    }
+}
+
+/// 3D targets of the whole drive, followed over time, with pictures: the program's own command, which takes the embedded
+/// network where none is named.
+fn perceive(demo: &Demo, drive: &Path, out: &Path) -> Result<()> {
+    let device = demo.args.device.to_possible_value();
+    let device = device.map_or_else(String::new, |value| value.get_name().to_owned());
+    let words = [
+        "perceive".as_ref(),
+        drive.as_os_str(),
+        "--out".as_ref(),
+        out.as_os_str(),
+        "--device".as_ref(),
+        device.as_ref(),
+    ];
+    perceive::run(&Typed::try_parse_from(words)?.args)
+}
+
+/// The picture that `perceive` drew of a frame.
+fn overlay_of(targets: &Path, shown: &Shown) -> Result<Option<PathBuf>> {
+    let end = format!("{:010}_overlay.png", shown.number());
+    let failed = |e| deepfusion_data::Error::file(targets, e);
+    for entry in std::fs::read_dir(targets).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if path.to_string_lossy().ends_with(&end) {
+            return Ok(Some(path));
+        }
+    }
+    Ok(None)
+}
+
+/// The page: what it sees at first sight and after learning.
+fn report(
+    demo: &Demo,
+    first_ms: f64,
+    (first, at_first_sight): (&Shown, &Evaluated),
+    (second, learned): (&Shown, &Evaluated),
+    overlay: Option<&Path>,
+    html: &Path,
+) -> Result<()> {
+    let number = |v: f64| format!("{v:.3}");
+    let (before, after) = (&at_first_sight.report, &learned.report);
+    let trivial = after.trivial.as_ref().map(|t| t.unscaled.abs_rel);
+    let mut page = HtmlReport::new(
+        "DeepFusion: metric depth from one camera and a speed signal",
+        "A simulated street that the embedded network has never seen: at first sight, and after learning on its first part from \
+         images, speed and yaw rate, without any depth label",
+    )
+    .facts(&[
+        ("Abs Rel at first sight", &number(before.unscaled.abs_rel)),
+        ("after learning", &number(after.unscaled.abs_rel)),
+        ("trivial row", &trivial.map_or("-".into(), number)),
+        ("scale (1 is metric)", &number(after.scale.median)),
+        ("first image to depth", &format!("{first_ms:.0} ms")),
+        ("time", &clock(demo.start.elapsed().as_secs_f64())),
+    ])
+    .section("At first sight");
+    page = first.add_to(page, "its depth in metres", "")?;
+    page = first.add_truth_to(page)?;
+    page = first.add_cloud_to(page, &demo.out.join("cloud.ply"))?;
+    if let Some(path) = overlay {
+        let picture = deepfusion_data::load_rgb(path)?;
+        let caption = "3D targets: boxes with distance, followed over time";
+        page = page.picture(caption, &picture, PictureFormat::Png)?;
+    }
+    page = page.section("After learning here");
+    page = second.add_to(page, "its depth in metres after learning", "_learned")?;
+    page = second.add_error_to(page, "error_learned", "Relative error after learning")?;
+    page = page
+        .section("Accuracy on the part of the street that was not learned from")
+        .paragraph(page::PROTOCOL);
+    page = run_report::accuracy(page, learned);
+    run_report::training(page, &demo.model())?
+        .section("Again")
+        .command(&run_report::command())
+        .write(html)?;
+    Ok(())
+}

@@ -1,0 +1,138 @@
+//! The whole way with no data at all. The embedded network sees a simulated street at first sight, learns there from images and
+//! motion, and is measured before and after. Or streets are simulated, a small network learns depth on them from scratch,
+//! and is measured on another.
+
+mod adapt;
+mod from_scratch;
+mod page;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Result;
+use burn::tensor::Device;
+use deepfusion_data::{Dataset, GtKind};
+use deepfusion_eval::{Crop, GroundTruth, Protocol};
+use deepfusion_model::{RunFolder, TrainConfig};
+use deepfusion_runtime::DepthEstimator;
+use deepfusion_runtime::ModelSource;
+use deepfusion_sim::{SimConfig, Simulation, write_kitti};
+use deepfusion_train::{Model, Trainer};
+use deepfusion_weights::DEFAULT;
+
+use super::eval::predict;
+use super::evaluate::{Evaluated, Truth, evaluate_datasets, trivial_from_datasets};
+use super::recorder::clock;
+use super::{device, train};
+use crate::cli::{DemoArgs, EngineArgs};
+use crate::progress::{Progress, say};
+use crate::{engine, interrupt, output};
+
+/// Far from any seed a user is likely to choose for training.
+const TEST_SEED: u64 = 1_000_003;
+
+/// What is told of one that was stopped.
+const DEMO: &str = "the demo";
+
+/// `deepfusion demo`.
+pub fn run(args: &DemoArgs) -> Result<()> {
+    let embedded = match args.from_scratch {
+        true => None,
+        false => Some(Box::new(deepfusion_weights::find(DEFAULT)?)),
+    };
+    let demo = Demo {
+        args,
+        start: Instant::now(),
+        device: device::open(args.device)?,
+        out: output::run_folder(args.out.as_deref(), "demo")?,
+    };
+    match embedded {
+        Some(network) => adapt::run(&demo, network),
+        None => from_scratch::run(&demo),
+    }
+}
+
+/// What both ways have in common.
+struct Demo<'a> {
+    args: &'a DemoArgs,
+    start: Instant,
+    device: Device,
+    /// Folder for everything.
+    out: PathBuf,
+}
+
+impl Demo<'_> {
+    /// Simulates a drive into a folder of its own; gives the drive's.
+    fn simulate(&self, name: &str, config: &SimConfig) -> Result<PathBuf> {
+        let simulation = Simulation::new(config)?;
+        let mut progress = Progress::new("simulating");
+        let out = self.out.join(name);
+        Ok(write_kitti(&simulation, &out, &mut |done, total| {
+            progress.set(done, total);
+        })?)
+    }
+
+    /// Trains into the folder `model`.
+    fn learn(
+        &self,
+        config: TrainConfig,
+        initialise: impl FnOnce(Model) -> Result<Model, deepfusion_train::Error>,
+    ) -> Result<ModelSource> {
+        let sets = train::open_samples(&config)?;
+        let folder = RunFolder::create(&self.model())?;
+        let mut trainer = Trainer::create(config, folder, sets, &self.device, initialise)?;
+        train::train(&mut trainer, None)?;
+        interrupt::check(DEMO)?;
+        Ok(ModelSource::named(&self.model().join("last.safetensors"))?)
+    }
+
+    fn model(&self) -> PathBuf {
+        self.out.join("model")
+    }
+
+    fn estimator(&self, model: &ModelSource) -> Result<DepthEstimator> {
+        engine::load(model, &EngineArgs::on(self.args.device))
+    }
+
+    /// Prints what it came to and where it lies.
+    fn end(&self, evaluated: &Evaluated, page: &Path) -> Result<()> {
+        let report = &evaluated.report;
+        say(&format!(
+            "{report}\ndone in {}\nreport  {}\nmodel   {}\ncloud   {}",
+            clock(self.start.elapsed().as_secs_f64()),
+            page.display(),
+            self.model().display(),
+            self.out.join("cloud.ply").display(),
+        ));
+        match self.args.json {
+            true => output::print_json(report),
+            false => output::print(&format!("{}\n", page.display())),
+        }
+    }
+}
+
+/// Measures on the scans of `test`, beside the mean depth of the scans of `train`.
+fn measure(
+    estimator: &mut DepthEstimator,
+    train: &[Dataset],
+    test: &[Dataset],
+) -> Result<Evaluated> {
+    let protocol = Protocol {
+        crop: Crop::Garg,
+        gt: GroundTruth::Z,
+        ..Protocol::default()
+    };
+    let mut progress = Progress::new("evaluating");
+    evaluate_datasets(
+        test,
+        &mut Truth::Scans(GtKind::Z),
+        &protocol,
+        Some(trivial_from_datasets(train, GtKind::Z)?),
+        &mut |dataset, frame| {
+            interrupt::check(DEMO)?;
+            let image = dataset.load_image(frame)?;
+            predict(estimator, &image, &dataset.intrinsics(frame), true)
+        },
+        &mut |done, total| progress.set(done, total),
+    )
+}

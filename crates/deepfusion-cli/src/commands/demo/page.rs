@@ -1,0 +1,130 @@
+//! Pictures of a frame for the demo's report, each also a file of its own.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use deepfusion_data::{Dataset, RgbImage, save_png, write_atomically, write_depth_png};
+use deepfusion_geometry::cloud::PointCloud;
+use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_render::{
+    CloudView, DepthScale, HtmlReport, PictureFormat, depth_picture, error_picture, render_cloud,
+    side_by_side, with_depth_legend,
+};
+use deepfusion_runtime::DepthEstimator;
+
+use super::{DEMO, Demo};
+use crate::interrupt;
+
+/// How both ways measure.
+pub const PROTOCOL: &str = "Scans of the simulated LiDAR, Garg's crop, 80 m. Unscaled: the prediction as it is, in metres. \
+    Median-scaled: each image multiplied by median(truth) / median(prediction), as methods without a metric scale need. The \
+    trivial row predicts each pixel's mean depth over the training streets.";
+
+/// Points of the cloud reach so far, metres.
+const CLOUD_REACH_M: f32 = 60.0;
+
+/// A frame and the depth that a network sees in it.
+pub struct Shown {
+    number: u64,
+    image: RgbImage,
+    camera: Intrinsics,
+    depth: DepthMap,
+    truth: DepthMap,
+    scale: DepthScale,
+    /// Folder of the pictures.
+    folder: PathBuf,
+}
+
+impl Shown {
+    /// Predicts a frame of a simulated drive.
+    pub fn of(
+        demo: &Demo,
+        estimator: &mut DepthEstimator,
+        drive: &Dataset,
+        frame: usize,
+    ) -> Result<Self> {
+        interrupt::check(DEMO)?;
+        let folder = demo.out.join("pictures");
+        std::fs::create_dir_all(&folder).map_err(|e| deepfusion_data::Error::file(&folder, e))?;
+        let image = drive.load_image(frame)?;
+        let camera = drive.intrinsics(frame);
+        let depth = estimator
+            .predict(&image, Some(&camera), true, true)?
+            .depth();
+        Ok(Self {
+            number: drive.frames()[frame].number,
+            image,
+            camera,
+            depth,
+            truth: exact_depth(drive, frame)?,
+            scale: DepthScale::default(),
+            folder,
+        })
+    }
+
+    /// The frame's number.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    fn path(&self, what: &str) -> PathBuf {
+        self.folder.join(format!("{:010}_{what}.png", self.number))
+    }
+
+    /// The image beside its depth; `mark` is added to the files' names.
+    pub fn add_to(&self, page: HtmlReport, what: &str, mark: &str) -> Result<HtmlReport> {
+        let side = side_by_side(&self.image, &self.depth, &self.scale)?;
+        save_png(&side, &self.path(&format!("side{mark}")))?;
+        write_depth_png(&self.depth, &self.path(&format!("depth{mark}")))?;
+        let caption = format!("Frame {}: the image, and {what}", self.number);
+        Ok(page.picture(&caption, &side, PictureFormat::Jpeg)?)
+    }
+
+    /// The exact depth, and where the prediction is wrong.
+    pub fn add_truth_to(&self, page: HtmlReport) -> Result<HtmlReport> {
+        let exact = with_depth_legend(&depth_picture(&self.truth, &self.scale), &self.scale);
+        save_png(&exact, &self.path("truth"))?;
+        let page = page.picture("The same frame: exact depth", &exact, PictureFormat::Png)?;
+        self.add_error_to(page, "error", "Relative error of the prediction")
+    }
+
+    /// Where the prediction is wrong.
+    pub fn add_error_to(&self, page: HtmlReport, mark: &str, caption: &str) -> Result<HtmlReport> {
+        let errors = error_picture(&self.image, &self.depth, &self.truth)?;
+        save_png(&errors, &self.path(mark))?;
+        Ok(page.picture(caption, &errors, PictureFormat::Png)?)
+    }
+
+    /// The point cloud from two sides, and as a PLY file.
+    pub fn add_cloud_to(&self, mut page: HtmlReport, path: &Path) -> Result<HtmlReport> {
+        let colours = Some(self.image.as_raw().as_slice());
+        let cloud = PointCloud::from_depth(&self.depth, &self.camera, colours, CLOUD_REACH_M)?;
+        let mut bytes = Vec::new();
+        cloud.write_ply(&mut bytes)?;
+        write_atomically::<deepfusion_data::Error>(path, |file| {
+            std::io::Write::write_all(file, &bytes)
+                .map_err(|e| deepfusion_data::Error::file(path, e))
+        })?;
+        for (view, caption) in [
+            (
+                CloudView::oblique(),
+                "The point cloud, from above and behind the camera",
+            ),
+            (
+                CloudView::birds_eye(),
+                "The point cloud from straight above, 10 m grid",
+            ),
+        ] {
+            let picture = render_cloud(&cloud, &view, 960, 540);
+            page = page.picture(caption, &picture, PictureFormat::Png)?;
+        }
+        Ok(page)
+    }
+}
+
+/// Where the simulator keeps the exact depth of a frame.
+fn exact_depth(drive: &Dataset, frame: usize) -> Result<DepthMap> {
+    let name = format!("{:010}.png", drive.frames()[frame].number);
+    let folder = drive.folder().join("proj_depth/groundtruth/image_02");
+    Ok(deepfusion_data::read_depth_png(&folder.join(name))?)
+}

@@ -1,0 +1,439 @@
+use std::path::Path;
+
+use anyhow::Result;
+use deepfusion_compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
+use deepfusion_data::{CameraChoice, Dataset, GtKind, OpenOptions, RgbImage};
+use deepfusion_eval::{
+    ArraySet, Crop, Grid, Prediction, Protocol, Report, Sample, TrivialBaseline, match_names,
+};
+use deepfusion_geometry::Intrinsics;
+use deepfusion_render::{HtmlReport, ShownFrame};
+use deepfusion_runtime::DepthEstimator;
+use deepfusion_runtime::ModelSource;
+use serde::Serialize;
+
+use super::confidence;
+use super::evaluate::{
+    Comparison, Evaluated, Place, Truth, array_places, check_used, default_crop, depth_map,
+    evaluate_datasets, expected_frames, open_recordings, read_split, trivial_from_arrays,
+    trivial_from_datasets,
+};
+use super::held_out::{held_out, unseen};
+use super::run_report::{self, Choice};
+use super::uncertainty;
+use super::used_checkpoint::UsedCheckpoint;
+use crate::cli::{CameraIntrinsics, EvalArgs, PrecisionChoice, PredKind};
+use crate::engine;
+use crate::error::CliError;
+use crate::model::{self, ModelFacts};
+use crate::output;
+use crate::progress::{Progress, say};
+
+/// `deepfusion eval`.
+pub fn run(args: &EvalArgs) -> Result<()> {
+    if let Some(file) = &args.report {
+        output::require_folder_of(file)?;
+    }
+    let (report, checkpoint) = match (&args.pred, args.pred_kind, &args.gt) {
+        (Some(predictions), Some(kind), Some(truth)) => {
+            (from_arrays(args, predictions, kind, truth)?, None)
+        }
+        _ => {
+            let (report, checkpoint) = from_model(args)?;
+            (report, Some(checkpoint))
+        }
+    };
+    if args.json {
+        return output::print_json(&Printed {
+            checkpoint: checkpoint.as_ref(),
+            report: &report,
+        });
+    }
+    let used = checkpoint.map_or(String::new(), |c| format!("{c}\n\n"));
+    output::print(&format!("{used}{report}"))
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Printed<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    checkpoint: Option<&'a UsedCheckpoint>,
+    #[serde(flatten)]
+    report: &'a Report,
+}
+
+/// Predicts every frame that has ground truth. An image of another aspect ratio is stretched, so that
+/// all of its ground truth counts.
+fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
+    let model = model::chosen(args.model.as_deref())?;
+    if args.calibrate_confidence && model.folder().is_none() {
+        let (option, model) = ("--calibrate-confidence", model.name());
+        return Err(CliError::NoRunFolder { option, model }.into());
+    }
+    let mut estimator = engine::load(&model, &args.engine)?;
+    if args.calibrate_uncertainty {
+        uncertainty::check(&model, &estimator)?;
+    }
+    let options = OpenOptions {
+        camera: args.camera,
+        split: read_split(args.split.as_deref())?,
+        intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
+        camera_ahead_s: args.camera_ahead_s,
+    };
+    let datasets = open_recordings(&args.data, &options)?;
+    let expected = expected_frames(&options, &datasets, args.strict)?;
+    let crop = default_crop(&datasets);
+    let kind = args.gt_depth.kind();
+    let mut truth = match &args.gt {
+        Some(path) => Truth::Arrays(Box::new(ArraySet::open(path)?)),
+        None => Truth::Scans(kind),
+    };
+    let baseline = match &args.trivial {
+        Some(path) => Some(trivial_from_arrays(path)?),
+        None => training_scans(&estimator, kind),
+    };
+    let protocol = args.protocol(crop);
+    let mut progress = Progress::new("evaluating");
+    let see = |estimator: &mut DepthEstimator, dataset: &Dataset, frame: usize| {
+        let image = dataset.load_image(frame)?;
+        let camera = dataset.intrinsics(frame);
+        let prediction = predict(estimator, &image, &camera, !args.no_focal_correction)?;
+        Ok((image, prediction))
+    };
+    let mut evaluated = evaluate_datasets(
+        &datasets,
+        &mut truth,
+        &protocol,
+        baseline,
+        &mut |dataset, frame| see(&mut estimator, dataset, frame).map(|(_, prediction)| prediction),
+        &mut |done, total| progress.set(done, total),
+    )?;
+    evaluated.report.expected = expected;
+    check_used(&options, &datasets, evaluated.report.n, args.strict)?;
+    if estimator.knows_uncertainty() && args.gt.is_none() {
+        uncertainty::measure(
+            (&model, &mut estimator),
+            &datasets,
+            &mut truth,
+            &mut evaluated,
+            (&protocol, !args.no_focal_correction),
+            args.calibrate_uncertainty,
+        )?;
+    }
+    let saved = saved(args, &estimator, &model, &datasets, &evaluated)?;
+    match model.folder().map(|folder| saved.write(folder)) {
+        Some(Ok(path)) => say(&format!("kept as {}", path.display())),
+        // A run on a disk that cannot be written is measured all the same.
+        Some(Err(error)) => tracing::warn!("the result is not kept beside the run: {error}"),
+        None => say(&format!(
+            "not kept: `{}` has no run's folder; --json prints what `compare` reads",
+            model.name()
+        )),
+    }
+    let reliability = match (args.calibrate_confidence, model.folder()) {
+        (true, Some(folder)) => confidence::calibrate(
+            &mut estimator,
+            &datasets,
+            &mut truth,
+            &evaluated,
+            !args.no_focal_correction,
+            folder,
+        )?,
+        _ => None,
+    };
+    if let Some(path) = &args.report {
+        let names = deepfusion_data::ground_truth_names(&datasets);
+        let arrays = match &truth {
+            Truth::Scans(_) => Default::default(),
+            Truth::Arrays(arrays) => array_places(arrays, &names),
+        };
+        let shown = shown(&evaluated, |Place(number, frame)| {
+            let dataset = &datasets[number];
+            let place = dataset.selected().iter().position(|f| *f == frame);
+            let name = place.and_then(|p| names[number].get(p));
+            let array = name.and_then(|n| arrays.get(n)).copied();
+            let (image, prediction) = see(&mut estimator, dataset, frame)?;
+            let depth = truth.of(dataset, frame, array)?;
+            Ok(depth.map(|depth| Seen {
+                image: Some(image),
+                prediction,
+                truth: depth,
+                camera: Some(dataset.intrinsics(frame)),
+            }))
+        })?;
+        let how = how_a_model_was_measured(args, &protocol, &saved);
+        let mut page = page(args, &model.name(), &evaluated, &shown, &how)?;
+        if let Some(bins) = reliability {
+            page = run_report::reliability(page, &bins);
+        }
+        if let Some(folder) = model.folder() {
+            page = run_report::training(page, folder)?;
+        }
+        page.write(path)?;
+        say(&format!("report  {}", path.display()));
+    }
+    let checkpoint = UsedCheckpoint::of(&estimator, &model);
+    Ok((evaluated.report, checkpoint))
+}
+
+/// The disparity of an image, as the protocol wants it.
+pub fn predict(
+    estimator: &mut DepthEstimator,
+    image: &RgbImage,
+    camera: &Intrinsics,
+    focal_correction: bool,
+) -> Result<Prediction> {
+    let prediction = estimator.predict(image, Some(camera), focal_correction, false)?;
+    let grid = Grid::from_f32(prediction.width, prediction.height, &prediction.disparity)?;
+    Ok(Prediction::Disparity(grid))
+}
+
+/// The trivial row from the recordings the model was trained on, where they are still there.
+fn training_scans(estimator: &DepthEstimator, kind: GtKind) -> Option<TrivialBaseline> {
+    let config = estimator.config();
+    let recordings = super::recordings::training_recordings(config).ok()?;
+    let datasets: Vec<_> = recordings.into_iter().map(|(_, dataset)| dataset).collect();
+    trivial_from_datasets(&datasets, kind).ok()
+}
+
+fn from_arrays(
+    args: &EvalArgs,
+    predictions: &Path,
+    kind: PredKind,
+    truth: &Path,
+) -> Result<Report> {
+    let mut predicted = ArraySet::open(predictions)?;
+    let mut known = ArraySet::open(truth)?;
+    let baseline = args
+        .trivial
+        .as_deref()
+        .map(trivial_from_arrays)
+        .transpose()?;
+    let protocol = args.protocol(Crop::None);
+    let mut comparison = Comparison::new(&protocol, baseline)?;
+    let matched = match_names(&predicted, &known)?;
+    let mut progress = Progress::new("evaluating");
+    let of_kind = |grid| match kind {
+        PredKind::Depth => Prediction::Depth(grid),
+        PredKind::Disparity => Prediction::Disparity(grid),
+    };
+    let mut places = Vec::new();
+    for (i, (name, prediction, depth)) in matched.iter().enumerate() {
+        let counted = comparison.add(&Sample {
+            name,
+            prediction: &of_kind(predicted.read(*prediction)?),
+            ground_truth: &known.read(*depth)?,
+            moving: None,
+            intrinsics: None,
+            dense: None,
+        })?;
+        if counted {
+            places.push(Place(*prediction, *depth));
+        }
+        progress.set(i + 1, matched.len());
+    }
+    let evaluated = comparison.evaluated(places)?;
+    if let Some(path) = &args.report {
+        let shown = shown(&evaluated, |Place(prediction, depth)| {
+            Ok(Some(Seen {
+                image: None,
+                prediction: of_kind(predicted.read(prediction)?),
+                truth: known.read(depth)?,
+                camera: None,
+            }))
+        })?;
+        let how = [
+            ("predictions", predictions.display().to_string()),
+            ("ground truth", truth.display().to_string()),
+        ];
+        let mut how: Vec<_> = how.map(|(a, b)| (a.to_owned(), b)).into();
+        how.extend(protocol_rows(&protocol));
+        let name = output::name_of(predictions);
+        page(args, &name, &evaluated, &shown, &how)?.write(path)?;
+        say(&format!("report  {}", path.display()));
+    }
+    Ok(evaluated.report)
+}
+
+/// What there is to show of an image.
+struct Seen {
+    image: Option<RgbImage>,
+    prediction: Prediction,
+    truth: Grid,
+    camera: Option<Intrinsics>,
+}
+
+/// The frames worth showing, looked at again.
+fn shown(
+    evaluated: &Evaluated,
+    mut see: impl FnMut(Place) -> Result<Option<Seen>>,
+) -> Result<Vec<(Choice, ShownFrame)>> {
+    let mut frames = Vec::new();
+    for choice in run_report::choose(evaluated) {
+        if let Some(seen) = see(evaluated.places[choice.image])? {
+            let truth = depth_map(&seen.truth);
+            let frame = ShownFrame {
+                title: choice.title.clone(),
+                image: seen.image,
+                prediction: seen.prediction.depth_at(truth.width, truth.height),
+                truth,
+                camera: seen.camera,
+            };
+            frames.push((choice, frame));
+        }
+    }
+    Ok(frames)
+}
+
+/// The page but for the training of the model.
+fn page(
+    args: &EvalArgs,
+    name: &str,
+    evaluated: &Evaluated,
+    shown: &[(Choice, ShownFrame)],
+    how: &[(String, String)],
+) -> Result<HtmlReport> {
+    let report = &evaluated.report;
+    let number = |v: f64| format!("{v:.3}");
+    let trivial = report.trivial.as_ref().map(|t| t.unscaled.abs_rel);
+    let names: Vec<_> = args.data.iter().map(|p| output::name_of(p)).collect();
+    let on = match names.is_empty() {
+        true => String::new(),
+        false => format!(" on {}", names.join(", ")),
+    };
+    let images = match report.expected {
+        Some(expected) => format!("{} of the split's {expected}", report.n),
+        None => report.n.to_string(),
+    };
+    let page = HtmlReport::new(name, format!("Depth measured{on}"))
+        .facts(&[
+            ("Abs Rel, unscaled", &number(report.unscaled.abs_rel)),
+            ("Abs Rel, trivial row", &trivial.map_or("–".into(), number)),
+            ("scale (1 is metric)", &number(report.scale.median)),
+            (
+                "within 25 %",
+                &format!("{:.1} %", 100.0 * report.unscaled.a1),
+            ),
+            ("images", &images),
+        ])
+        .section("Accuracy");
+    let page = run_report::accuracy(page, evaluated);
+    let page = run_report::frames(page, shown)?;
+    Ok(page
+        .section("How it was measured")
+        .properties(how)
+        .command(&run_report::command()))
+}
+
+/// The evaluation as it is kept beside a run.
+fn saved(
+    args: &EvalArgs,
+    estimator: &DepthEstimator,
+    model: &ModelSource,
+    datasets: &[Dataset],
+    evaluated: &Evaluated,
+) -> Result<SavedEvaluation> {
+    let absolute = |p: &std::path::PathBuf| std::path::absolute(p).unwrap_or_else(|_| p.clone());
+    let precision = match args.engine.precision {
+        PrecisionChoice::F32 => "f32",
+        PrecisionChoice::Bf16 => "bf16",
+    };
+    Ok(SavedEvaluation {
+        format_version: SAVED_VERSION,
+        measured: Measured {
+            data: args.data.iter().map(absolute).collect(),
+            split: args.split.as_ref().map(absolute),
+            gt: args.gt.as_ref().map(absolute),
+            camera: match args.camera {
+                CameraChoice::Left => "2",
+                CameraChoice::Right => "3",
+                CameraChoice::Both => "both",
+            }
+            .into(),
+            engine: format!("{} {precision}", estimator.engine()),
+            set: args.engine.set.clone(),
+            focal_correction: !args.no_focal_correction,
+            held_out: match model {
+                ModelSource::Run { .. } => {
+                    held_out(estimator.config(), datasets, &evaluated.places)
+                }
+                ModelSource::Packed { network, .. } => {
+                    unseen(&network.card, datasets).then_some(true)
+                }
+            },
+            program: format!("deepfusion {}", env!("CARGO_PKG_VERSION")),
+            command: run_report::command(),
+            time: output::now(),
+        },
+        model: ModelFile {
+            sha256: model.sha256()?,
+            checkpoint: match model {
+                ModelSource::Run { folder, kind, .. } => {
+                    output::name_of(&folder.checkpoint_path(*kind))
+                }
+                ModelSource::Packed { network, .. } => network.card.name.clone(),
+            },
+        },
+        report: evaluated.report.clone(),
+        images: evaluated.images.iter().map(FrameScore::from).collect(),
+    })
+}
+
+fn how_a_model_was_measured(
+    args: &EvalArgs,
+    protocol: &Protocol,
+    saved: &SavedEvaluation,
+) -> Vec<(String, String)> {
+    let m = &saved.measured;
+    let data = args.data.iter().map(|p| p.display().to_string());
+    let truth = match &args.gt {
+        Some(path) => path.display().to_string(),
+        None => "the recordings' scans".into(),
+    };
+    let mut rows = vec![
+        ("recordings", data.collect::<Vec<_>>().join(", ")),
+        ("ground truth", truth),
+        ("camera", m.camera.clone()),
+        ("checkpoint", saved.model.checkpoint.clone()),
+        ("its SHA-256", saved.model.sha256.clone()),
+        ("engine", m.engine.clone()),
+        (
+            "seen in training",
+            match m.held_out {
+                Some(true) => "no",
+                Some(false) => "yes",
+                None => "not known",
+            }
+            .into(),
+        ),
+        (
+            "correction for the focal length",
+            if m.focal_correction { "on" } else { "off" }.into(),
+        ),
+        ("program", m.program.clone()),
+        ("time (UTC)", m.time.clone()),
+    ];
+    if let Some(split) = &args.split {
+        rows.insert(1, ("split", split.display().to_string()));
+    }
+    let mut rows: Vec<_> = rows.into_iter().map(|(a, b)| (a.to_owned(), b)).collect();
+    rows.extend(protocol_rows(protocol));
+    if let Some(digest) = &saved.report.truth_sha256 {
+        rows.push(("SHA-256 of the ground truth".to_owned(), digest.clone()));
+    }
+    rows
+}
+
+fn protocol_rows(protocol: &Protocol) -> [(String, String); 2] {
+    let crop = match protocol.crop {
+        Crop::None => "the whole image",
+        Crop::Garg => "Garg's crop",
+    };
+    [
+        ("compared".to_owned(), crop.to_owned()),
+        (
+            "range".to_owned(),
+            format!("{} to {} m", protocol.min_m, protocol.cap_m),
+        ),
+    ]
+}

@@ -1,0 +1,93 @@
+//! What each command does, one file a command.
+
+#[cfg(feature = "train")]
+mod ablate;
+mod bench;
+mod compare;
+mod completions;
+mod confidence;
+mod config;
+mod convert;
+#[cfg(feature = "train")]
+mod demo;
+pub mod device;
+mod division;
+mod doctor;
+mod eval;
+#[cfg(feature = "train")]
+mod eval_odometry;
+mod eval_targets;
+mod evaluate;
+#[cfg(feature = "train")]
+mod export;
+mod export_gt;
+mod held_out;
+mod inspect;
+mod known_pixels;
+mod live;
+#[cfg(feature = "train")]
+mod outlook;
+mod overview;
+mod perceive;
+mod predict;
+#[cfg(feature = "train")]
+mod recorder;
+mod recordings;
+mod remarks;
+#[cfg(feature = "train")]
+mod resume;
+mod run_report;
+mod scene;
+mod simulate;
+#[cfg(feature = "train")]
+mod start;
+#[cfg(feature = "train")]
+mod train;
+pub mod uncertainty;
+mod used_checkpoint;
+mod view;
+mod view_rerun;
+mod weights;
+
+use anyhow::Result;
+
+use crate::cli::{Command, ConfigCommand, DataCommand, WeightsCommand};
+
+/// Runs what was asked for.
+pub fn run(command: Option<Command>) -> Result<()> {
+    let Some(command) = command else {
+        return overview::run();
+    };
+    match command {
+        #[cfg(feature = "train")]
+        Command::Demo(args) => demo::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Data(DataCommand::Inspect(args)) => inspect::run(&args),
+        Command::Data(DataCommand::ExportGt(args)) => export_gt::run(&args),
+        Command::Data(DataCommand::Convert(args)) => convert::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
+        #[cfg(feature = "train")]
+        Command::Train(args) => train::run(&args),
+        Command::Config(ConfigCommand::Show(args)) => config::show(&args),
+        #[cfg(feature = "train")]
+        Command::Ablate(args) => ablate::run(&args),
+        Command::Eval(args) => eval::run(&args),
+        Command::Compare(args) => compare::run(&args),
+        #[cfg(feature = "train")]
+        Command::EvalOdometry(args) => eval_odometry::run(&args),
+        Command::EvalTargets(args) => eval_targets::run(&args),
+        Command::Predict(args) => predict::run(&args),
+        Command::Perceive(args) => perceive::run(&args),
+        Command::View(args) => view::run(&args),
+        #[cfg(feature = "train")]
+        Command::Export(args) => export::run(&args),
+        #[cfg(feature = "train")]
+        Command::Weights(WeightsCommand::Import { files, out }) => {
+            weights::import::run(&files, &out)
+        }
+        Command::Weights(WeightsCommand::Pack(args)) => weights::pack::run(&args),
+        Command::Weights(WeightsCommand::List { json }) => weights::list::run(json),
+        Command::Bench(args) => bench::run(&args),
+        Command::Completions(args) => completions::run(&args),
+    }
+}

@@ -1,0 +1,136 @@
+//! One frame: depth, things, targets, and what is drawn of them.
+
+use std::time::Instant;
+
+use anyhow::Result;
+use deepfusion_eval::IntervalFactors;
+use deepfusion_perception::{
+    ConfidenceModel, Perception, PerceptionConfig, VehicleShape, time_to_collision,
+};
+use deepfusion_runtime::ModelSource;
+use deepfusion_runtime::{DepthEstimator, PreparedImage};
+
+use super::instances::Spotter;
+use super::pictures::{self, Picture};
+use super::record::FrameRecord;
+use crate::cli::{PerceiveArgs, PerceiveSave};
+use crate::commands::confidence::Confidence;
+use crate::commands::predict::inputs::Input;
+use crate::commands::predict::{Loaded, Seen};
+use crate::commands::scene::{Motion, ScaleWatch, working_depth};
+use crate::commands::uncertainty;
+use crate::error::CliError;
+use crate::model::ModelFacts;
+
+/// A frame that is loaded, and when that began.
+pub struct Begun {
+    pub input: Input,
+    pub loaded: Loaded,
+    pub prepared: PreparedImage,
+    pub start: Instant,
+}
+
+/// A frame with all that was found in it.
+pub struct Found {
+    pub input: Input,
+    pub loaded: Loaded,
+    pub seen: Seen,
+    pub record: FrameRecord,
+    pub pictures: Vec<(PerceiveSave, Picture)>,
+}
+
+/// Looks at frame after frame, and remembers what it saw.
+pub struct Eyes<'a> {
+    args: &'a PerceiveArgs,
+    estimator: &'a mut DepthEstimator,
+    perception: Perception,
+    watch: ScaleWatch,
+    spotter: Spotter,
+    /// What a pixel's depth is worth, where the run was calibrated.
+    confidence: Option<ConfidenceModel>,
+    /// How the intervals are stretched that the network says.
+    intervals: IntervalFactors,
+}
+
+impl<'a> Eyes<'a> {
+    /// Open, nothing seen yet.
+    pub fn open(
+        args: &'a PerceiveArgs,
+        model: &ModelSource,
+        estimator: &'a mut DepthEstimator,
+        config: PerceptionConfig,
+    ) -> Result<Self> {
+        let prediction = &args.prediction;
+        let confidence = match model.folder() {
+            Some(run) => Confidence::read(run)?,
+            None => None,
+        };
+        Ok(Self {
+            args,
+            estimator,
+            perception: Perception::new(config),
+            watch: ScaleWatch::of(prediction),
+            spotter: Spotter::of(&args.masks, prediction.engine.ort_lib.as_deref())?,
+            confidence: confidence.map(|c| c.single),
+            intervals: model.interval_factors()?,
+        })
+    }
+
+    /// The next frame, and how the camera came there.
+    pub fn look(&mut self, begun: Begun, motion: Motion) -> Result<Found> {
+        let Begun {
+            input,
+            loaded,
+            prepared,
+            start,
+        } = begun;
+        let mut prediction = self.estimator.infer(&prepared)?;
+        if let Some(factor) = self.watch.correction() {
+            prediction.scale_depth(factor);
+        }
+        let camera = loaded.camera.ok_or(CliError::NoCamera)?;
+        if !motion.goes_on {
+            self.perception.forget();
+        }
+        let whole = prediction.depth();
+        let sigma = uncertainty::sigma(&prediction, &whole, &self.intervals);
+        let (depth, k) = working_depth(&whole, &camera);
+        let sigma = sigma.map(|sigma| working_depth(&sigma, &camera).0);
+        let things = self.spotter.find(&loaded.image, &depth)?;
+        let perception = &mut self.perception;
+        let surroundings =
+            perception.look_with_sigma(&depth, sigma.as_ref(), &k, motion.stamp, &things)?;
+        let collision = motion.speed_mps.and_then(|speed| {
+            let vehicle = VehicleShape::default();
+            time_to_collision(&surroundings.targets, speed, motion.yaw_rate, &vehicle)
+        });
+        let latency_ms = start.elapsed().as_secs_f64() * 1e3;
+        // The targets need not wait for it.
+        let (image, ground) = (&loaded.image, surroundings.ground.as_ref());
+        let scale = self.watch.add(&input.name, image, &camera, &motion, ground);
+        let record = FrameRecord {
+            scale_monitor: scale,
+            ..FrameRecord::new(&input.name, &surroundings, &motion, collision, latency_ms)
+        };
+        let pictures = pictures::draw(
+            &self.args.save,
+            image,
+            &camera,
+            (&depth, sigma.as_ref(), &k),
+            &surroundings,
+            &self.perception,
+            self.confidence.as_ref().map(|model| (model, &prediction)),
+        );
+        Ok(Found {
+            input,
+            loaded,
+            seen: Seen {
+                prediction,
+                layers: Vec::new(),
+                scale,
+            },
+            record,
+            pictures,
+        })
+    }
+}

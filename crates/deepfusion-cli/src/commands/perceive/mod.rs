@@ -1,0 +1,236 @@
+//! `deepfusion perceive`: images to 3D targets, followed over time.
+
+mod eyes;
+mod instances;
+mod live;
+pub(super) mod pictures;
+mod record;
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use deepfusion_perception::PerceptionConfig;
+
+use self::eyes::{Begun, Eyes, Found};
+use self::record::Lines;
+use super::live as sources;
+use super::predict::Job;
+use super::predict::inputs::{self, Input};
+use super::scene::{MotionTracker, ScaleWatch};
+use crate::cli::{PerceiveArgs, PredictionArgs};
+use crate::error::{CliError, hint_of, told};
+use crate::model;
+use crate::pipeline::{self, Threads};
+use crate::progress::say;
+use crate::{engine, interrupt, output};
+
+/// `deepfusion perceive`.
+pub fn run(args: &PerceiveArgs) -> Result<()> {
+    let prediction = &args.prediction;
+    let out = &prediction.out;
+    let model = model::chosen(prediction.model.as_deref())?;
+    let source = sources::source(&prediction.inputs, &prediction.live)?;
+    let all = match (&source, args.speed) {
+        (Some(_), _) => Vec::new(),
+        (None, Some(_)) => return Err(CliError::OnlyLive { option: "--speed" }.into()),
+        (None, None) => inputs::find(&prediction.inputs, &prediction.open_options())?,
+    };
+    ScaleWatch::check(prediction, source.as_ref(), &all)?;
+    let mut config = read_config(args.config.as_deref(), PerceptionConfig::predicted())?;
+    if let Some(far) = args.max_depth {
+        config.max_depth_m = far as f32;
+    }
+    let mut estimator = engine::load(&model, &prediction.engine)?;
+    let job = Job::new(
+        prediction,
+        args.outputs(f64::from(config.max_depth_m)),
+        &model,
+        &estimator,
+    )?;
+    let eyes = Eyes::open(args, &model, &mut estimator, config)?;
+    std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
+    if source.is_some() {
+        sources::make_room(out, prediction.overwrite)?;
+    }
+    refuse_what_is_there(prediction, &all)?;
+    interrupt::catch("stopping after the frames at work");
+    let work = Work {
+        args,
+        job: &job,
+        all: &all,
+        lines: Mutex::new(Lines::begin(&out.join("targets.jsonl"))?),
+        outcome: Mutex::new(Outcome::default()),
+    };
+    match source {
+        Some(address) => work.go_live(&address, eyes),
+        None => work.go(eyes),
+    }
+}
+
+/// Settings from a file over `base`.
+pub fn read_config(path: Option<&Path>, base: PerceptionConfig) -> Result<PerceptionConfig> {
+    let Some(path) = path else { return Ok(base) };
+    // What the file says over what it does not.
+    let text = std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
+    let named = || path.display().to_string();
+    let mut table = toml::Table::try_from(&base).with_context(named)?;
+    table.extend(text.parse::<toml::Table>().with_context(named)?);
+    let config: PerceptionConfig = table.try_into().with_context(named)?;
+    config.validate().with_context(named)?;
+    Ok(config)
+}
+
+/// Nothing is overwritten unless asked.
+fn refuse_what_is_there(args: &PredictionArgs, all: &[Input]) -> Result<()> {
+    let first = all.iter().map(|input| record_path(&args.out, &input.name));
+    let mut paths = first.chain([args.out.join("targets.jsonl")]);
+    match paths.find(|path| !args.overwrite && path.exists()) {
+        Some(path) => Err(CliError::Exists {
+            path,
+            remedy: "allow it with --overwrite, or choose another folder",
+        }
+        .into()),
+        None => Ok(()),
+    }
+}
+
+fn record_path(out: &Path, name: &str) -> PathBuf {
+    out.join(format!("{name}_targets.json"))
+}
+
+/// What became of the frames.
+#[derive(Default)]
+struct Outcome {
+    done: usize,
+    targets: usize,
+    latency_ms: Vec<f64>,
+    unreadable: Vec<anyhow::Error>,
+    fatal: Option<anyhow::Error>,
+}
+
+struct Work<'a> {
+    args: &'a PerceiveArgs,
+    job: &'a Job<'a>,
+    all: &'a [Input],
+    lines: Mutex<Lines>,
+    outcome: Mutex<Outcome>,
+}
+
+impl Work<'_> {
+    fn go(self, mut eyes: Eyes) -> Result<()> {
+        let mut motions = MotionTracker::default();
+        let load = |index: usize| {
+            let start = Instant::now();
+            let input = self.all[index].clone();
+            match self.job.load(&input) {
+                Ok((loaded, prepared)) => Some(Begun {
+                    input,
+                    loaded,
+                    prepared,
+                    start,
+                }),
+                Err(error) => {
+                    self.outcome().unreadable.push(error);
+                    None
+                }
+            }
+        };
+        let look = |begun: Begun| {
+            let motion = motions.next(&begun.input);
+            eyes.look(begun, motion)
+        };
+        let write = |_: usize, found: Result<Found>| {
+            if let Err(error) = found.and_then(|found| self.write(&found)) {
+                self.outcome().fatal.get_or_insert(error);
+            }
+        };
+        let stop = || interrupt::asked() || self.outcome().fatal.is_some();
+        // One thread reads and one writes: frames stay in their order.
+        let threads = Threads {
+            before: 1,
+            after: 1,
+        };
+        pipeline::run(self.all.len(), threads, &stop, &load, look, &write);
+        self.finish()
+    }
+
+    fn outcome(&self) -> std::sync::MutexGuard<'_, Outcome> {
+        // A thread that panicked ends the program with its own message.
+        self.outcome.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    fn write(&self, found: &Found) -> Result<()> {
+        let (out, input) = (&self.args.prediction.out, &found.input);
+        for (save, picture) in &found.pictures {
+            picture.save(&pictures::path(out, &input.name, *save))?;
+        }
+        if input
+            .frame
+            .as_ref()
+            .is_some_and(|(dataset, index)| dataset.frames()[*index].image.file().is_none())
+        {
+            pictures::save_jpeg(
+                &found.loaded.image,
+                &out.join(format!("{}_image.jpg", input.name)),
+            )?;
+        }
+        self.job.write(input, &found.loaded, &found.seen)?;
+        found.record.write(&record_path(out, &input.name))?;
+        let line = found.record.line()?;
+        self.lines
+            .lock()
+            .unwrap_or_else(|e| e.into_inner())
+            .add(&line)?;
+        let live = found.loaded.live.is_some();
+        if self.args.json && !live {
+            output::print(&line)?;
+        }
+        let mut outcome = self.outcome();
+        outcome.done += 1;
+        outcome.targets += found.record.targets.len();
+        if !live {
+            outcome.latency_ms.push(found.record.latency_ms);
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Result<()> {
+        // What is there stays: a stopped run's lines are of its frames.
+        self.lines
+            .into_inner()
+            .unwrap_or_else(|e| e.into_inner())
+            .finish()?;
+        let mut outcome = self.outcome.into_inner().unwrap_or_else(|e| e.into_inner());
+        if let Some(error) = outcome.fatal {
+            return Err(error);
+        }
+        outcome.latency_ms.sort_by(f64::total_cmp);
+        let median = outcome.latency_ms.get(outcome.done / 2).copied();
+        say(&format!(
+            "{} frames, {} targets written to {}{}",
+            outcome.done,
+            outcome.targets,
+            self.args.prediction.out.display(),
+            median.map_or(String::new(), |ms| format!(
+                ", {ms:.0} ms from file to targets (median)"
+            ))
+        ));
+        let total = self.all.len();
+        if !outcome.unreadable.is_empty() {
+            return Err(CliError::SomeFailed {
+                hint: outcome.unreadable.iter().find_map(hint_of),
+                failures: outcome.unreadable.iter().map(told).collect(),
+                total,
+                interrupted: interrupt::asked(),
+            }
+            .into());
+        }
+        if outcome.done < total {
+            let done = outcome.done;
+            return Err(CliError::Interrupted { done, total }.into());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,44 @@
+//! What shows a network's layers: the training framework, in a build that has it.
+
+#[cfg(feature = "train")]
+mod imp {
+    use anyhow::Result;
+    use deepfusion_model::StoredNetwork;
+
+    use crate::cli::DeviceChoice;
+    use crate::commands::device;
+
+    pub use deepfusion_train::Inspector;
+
+    pub fn open(network: &StoredNetwork, device: DeviceChoice) -> Result<Inspector> {
+        Ok(Inspector::new(network, &device::open(device)?)?)
+    }
+}
+
+#[cfg(not(feature = "train"))]
+mod imp {
+    use anyhow::Result;
+    use deepfusion_model::{InputSize, StoredNetwork};
+    use deepfusion_runtime::LayerMaps;
+
+    use crate::cli::DeviceChoice;
+    use crate::error::CliError;
+
+    /// There is none.
+    pub enum Inspector {}
+
+    impl Inspector {
+        pub fn inspect(&self, _: &[f32], _: InputSize) -> Vec<LayerMaps> {
+            match *self {}
+        }
+    }
+
+    pub fn open(_: &StoredNetwork, _: DeviceChoice) -> Result<Inspector> {
+        Err(CliError::BuiltWithoutTraining {
+            what: "--save features",
+        }
+        .into())
+    }
+}
+
+pub use imp::{Inspector, open};

@@ -1,0 +1,74 @@
+//! Depth of a camera or a stream.
+
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::Result;
+use deepfusion_data::{Address, LiveFrame, shown_for};
+use deepfusion_runtime::ModelSource;
+
+use super::camera::CameraSource;
+use super::manifest::Lock;
+use super::{Job, video};
+use crate::cli::{PredictArgs, Shard};
+use crate::commands::live::{self, Feed, LiveMark};
+use crate::commands::scene::ScaleWatch;
+use crate::error::CliError;
+use crate::progress::say;
+use crate::{engine, interrupt, output};
+
+/// `deepfusion predict` of a live source: no manifest, for there is nothing to go on with.
+pub fn run(args: &PredictArgs, model: &ModelSource, address: &Address) -> Result<()> {
+    let (prediction, out) = (&args.prediction, &args.prediction.out);
+    if args.shard != Shard::WHOLE {
+        return Err(CliError::LiveShard.into());
+    }
+    ScaleWatch::check(prediction, Some(address), &[])?;
+    let mut estimator = engine::load(model, &prediction.engine)?;
+    let job = Job::new(prediction, args.outputs(), model, &estimator)?;
+    if args.save.iter().any(|save| save.is_cloud()) && matches!(job.camera, CameraSource::Unknown) {
+        return Err(CliError::NoCamera.into());
+    }
+    live::make_room(out, prediction.overwrite)?;
+    let _lock = Lock::take(out, args.shard)?;
+    interrupt::catch("stopping after the frames at work");
+    let mut feed = Feed::open(address, &prediction.live)?;
+    let look = |frame: LiveFrame| {
+        let input = live::input(address, &frame);
+        let (arrived, mark) = (frame.arrived, LiveMark::of(&frame));
+        let (mut loaded, prepared) = job.load_live(frame)?;
+        let seen = job.see(&mut estimator, &prepared)?;
+        let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
+        loaded.live = Some(LiveMark { latency_ms, ..mark });
+        Ok(((input, loaded, seen), latency_ms))
+    };
+    // Name and time of each frame that was written.
+    let done = Mutex::new(Vec::new());
+    let ending = live::run(&mut feed, look, |(input, loaded, seen)| {
+        let sidecar = job.write(&input, &loaded, &seen)?;
+        let mark = loaded.live.as_ref().map(|mark| mark.arrived_unix_s);
+        let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
+        done.push((input.name, mark));
+        drop(done);
+        match args.json {
+            true => output::print(&(serde_json::to_string(&sidecar)? + "\n")),
+            false => Ok(()),
+        }
+    });
+    let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if let Some(figures) = feed.told() {
+        let ended = ending.as_ref().map_or("the source was lost", |e| e.told());
+        say(&format!(
+            "{} images written to {} ({ended}): {figures}",
+            done.len(),
+            out.display()
+        ));
+    }
+    let mut filmed = Ok(());
+    if args.video() {
+        let times: Vec<Option<f64>> = done.iter().map(|(_, time)| *time).collect();
+        let shown = done.iter().map(|(name, _)| name.as_str());
+        filmed = video::write_one(out, shown.zip(shown_for(&times)), live::VIDEO);
+    }
+    // Why the source ended comes first: a full disk ends the video, too.
+    ending.and(filmed)
+}

@@ -1,0 +1,129 @@
+//! The files of one prediction.
+
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::Result;
+use deepfusion_data::{RgbImage, save_png, write_depth_png, write_unsynced};
+use deepfusion_geometry::cloud::PointCloud;
+use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_render::{DepthScale, depth_picture, side_by_side, with_depth_legend};
+use deepfusion_runtime::{LayerMaps, Prediction};
+
+use super::features;
+use crate::cli::Save;
+use crate::commands::uncertainty;
+use crate::error::CliError;
+
+/// The name of an output.
+pub fn file_name(name: &str, save: Save) -> String {
+    let ending = match save {
+        Save::DepthPng => "_depth.png",
+        Save::Npy => "_depth.npy",
+        Save::Sigma => "_sigma.npy",
+        Save::Color => "_color.png",
+        Save::SideBySide => "_side.png",
+        Save::Ply => ".ply",
+        Save::Pcd => ".pcd",
+        Save::Features => "_features.png",
+        Save::Video => "_video.mp4",
+    };
+    format!("{name}{ending}")
+}
+
+/// What the network says of an image.
+pub struct Maps<'a> {
+    pub prediction: &'a Prediction,
+    /// At the image's own size.
+    pub depth: &'a DepthMap,
+    /// Where [`Save::Features`] was asked for.
+    pub layers: &'a [LayerMaps],
+    /// The standard deviation of `depth`, where the network says it and an output has it.
+    pub sigma: Option<&'a DepthMap>,
+}
+
+/// Writes one output, whole or not at all, without waiting for the disk.
+pub fn write(
+    save: Save,
+    (max_depth_m, max_sigma): (f64, Option<f64>),
+    image: &RgbImage,
+    camera: Option<&Intrinsics>,
+    maps: &Maps,
+    path: &Path,
+) -> Result<()> {
+    let Maps {
+        prediction,
+        depth,
+        layers,
+        sigma,
+    } = maps;
+    let scale = DepthScale::default();
+    match save {
+        Save::DepthPng => write_depth_png(depth, path)?,
+        Save::Npy => write_npy(depth, path)?,
+        Save::Sigma => {
+            write_npy(sigma.ok_or(CliError::NoUncertainty)?, path)?;
+        }
+        Save::Color => {
+            let picture = with_depth_legend(&depth_picture(depth, &scale), &scale);
+            save_png(&picture, path)?;
+        }
+        // Of all images, by `video`.
+        Save::Video => {}
+        Save::SideBySide => save_png(&side_by_side(image, depth, &scale)?, path)?,
+        Save::Features => {
+            let picture = features::picture(image, depth, prediction.window, layers)?;
+            save_png(&picture, path)?;
+        }
+        Save::Ply | Save::Pcd => {
+            let k = camera.ok_or(CliError::NoCamera)?;
+            let rgb = Some(image.as_raw().as_slice());
+            let far = max_depth_m as f32;
+            let sure;
+            let depth = match (sigma, max_sigma) {
+                (Some(sigma), Some(most)) => {
+                    sure = uncertainty::without_unsure(depth, sigma, most);
+                    &sure
+                }
+                _ => *depth,
+            };
+            let mut cloud = PointCloud::from_depth(depth, k, rgb, far)?;
+            cloud.sigma = sigma.map(|sigma| PointCloud::column(&sigma.data, depth, far));
+            write_unsynced::<CloudError>(path, |out| match save {
+                Save::Pcd => Ok(cloud.write_pcd(out)?),
+                _ => Ok(cloud.write_ply(out)?),
+            })
+            .map_err(CloudError::into_inner)?;
+        }
+    }
+    Ok(())
+}
+
+fn write_npy(depth: &DepthMap, path: &Path) -> Result<()> {
+    let view = ndarray::ArrayView2::from_shape((depth.height, depth.width), &depth.data)?;
+    let mut bytes = Vec::new();
+    ndarray_npy::WriteNpyExt::write_npy(&view, &mut bytes)?;
+    write_unsynced::<deepfusion_data::Error>(path, |out| {
+        out.write_all(&bytes)
+            .map_err(|e| deepfusion_data::Error::file(path, e))
+    })?;
+    Ok(())
+}
+
+/// Either crate's error, out of a file being written.
+#[derive(Debug, thiserror::Error)]
+enum CloudError {
+    #[error(transparent)]
+    File(#[from] deepfusion_data::Error),
+    #[error(transparent)]
+    Cloud(#[from] deepfusion_geometry::cloud::Error),
+}
+
+impl CloudError {
+    fn into_inner(self) -> anyhow::Error {
+        match self {
+            Self::File(error) => error.into(),
+            Self::Cloud(error) => error.into(),
+        }
+    }
+}

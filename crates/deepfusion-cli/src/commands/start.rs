@@ -1,0 +1,357 @@
+//! What a new run starts from: `--init`, its configuration's `init`, or the network that the program carries.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use burn::tensor::Device;
+use deepfusion_model::weights::{Weights, read_bytes};
+use deepfusion_model::{
+    CheckpointKind, DepthNetConfig, Error as ModelError, InputNormalisation, RunFolder, TrainConfig,
+};
+use deepfusion_nn::weights::load_torchvision_resnet;
+use deepfusion_runtime::{Error as RuntimeError, embedded, embedded_names};
+use deepfusion_train::{Checkpoints, Error, Model};
+use deepfusion_weights::Shipped;
+
+use crate::cli::TrainArgs;
+use crate::error::CliError;
+use crate::progress::say;
+
+/// The weights of a new run before its first step.
+#[derive(Debug)]
+pub enum Start {
+    /// Those of the seed.
+    Nothing,
+    /// A run's, or an ImageNet encoder's.
+    Path(PathBuf),
+    /// A packed network's; `path` where it is no embedded one.
+    Packed {
+        /// The network.
+        network: Box<Shipped>,
+        /// Its file.
+        path: Option<PathBuf>,
+    },
+}
+
+/// Whether `--init` asks for nothing at all.
+pub fn is_none(init: &Path) -> bool {
+    init == Path::new("none")
+}
+
+impl Start {
+    /// What the options say, else the configuration file, else the embedded network that is built as the preset's. A file that names
+    /// nothing means nothing: a run repeated by its config.toml starts as it did, whatever is embedded.
+    ///
+    /// # Errors
+    /// [`RuntimeError::NoSuchModel`] for what is neither there nor embedded; [`CliError::OtherStart`] where a configuration began from other
+    /// weights of the name; [`Shipped::read`]'s.
+    pub fn of(args: &TrainArgs, config: &TrainConfig) -> Result<Self> {
+        if let Some(init) = &args.init {
+            return Self::named(init);
+        }
+        let Some(init) = &config.init else {
+            return match args.config {
+                Some(_) => Ok(Self::Nothing),
+                None => Self::by_default(config),
+            };
+        };
+        let Some(expected) = &config.init_sha256 else {
+            return Self::named(init);
+        };
+        let Some(network) = embedded(init)? else {
+            return Err(RuntimeError::NoSuchModel {
+                model: init.clone(),
+                known: embedded_names(),
+            }
+            .into());
+        };
+        if network.card.sha256 != *expected {
+            return Err(CliError::OtherStart {
+                name: network.card.name,
+                found: network.card.sha256,
+                expected: expected.clone(),
+            }
+            .into());
+        }
+        let path = None;
+        Ok(Self::Packed { network, path })
+    }
+
+    fn named(init: &Path) -> Result<Self> {
+        if is_none(init) {
+            return Ok(Self::Nothing);
+        }
+        if Shipped::is_at(init) {
+            let network = Box::new(Shipped::read(init)?);
+            let path = Some(init.to_owned());
+            return Ok(Self::Packed { network, path });
+        }
+        if init.exists() {
+            return Ok(Self::Path(init.to_owned()));
+        }
+        match embedded(init)? {
+            Some(network) => Ok(Self::Packed {
+                network,
+                path: None,
+            }),
+            None => Err(RuntimeError::NoSuchModel {
+                model: init.to_owned(),
+                known: embedded_names(),
+            }
+            .into()),
+        }
+    }
+
+    /// The embedded network with the same layers, in the same range of depths; says so where there is none. Without any embedded
+    /// network there is nothing to say.
+    fn by_default(config: &TrainConfig) -> Result<Self> {
+        let networks = deepfusion_weights::all()?;
+        for network in &networks {
+            let of_its_run = unpacked_config(network)?.depth_net;
+            if same_layers(&of_its_run, &config.depth_net) {
+                return Ok(Self::Packed {
+                    network: Box::new(network.clone()),
+                    path: None,
+                });
+            }
+        }
+        if !networks.is_empty() {
+            say("starts from nothing: no embedded network is built as this configuration's");
+        }
+        Ok(Self::Nothing)
+    }
+
+    /// Writes down in a run's configuration what it starts from, so that it can be repeated, and takes the unit that a run's PoseNet
+    /// speaks of.
+    ///
+    /// # Errors
+    /// As [`RunFolder::read_config`] and [`RunFolder::read_state`] of the run it starts from.
+    pub fn record_in(&self, config: &mut TrainConfig) -> Result<(), ModelError> {
+        (config.init, config.init_sha256) = match self {
+            Self::Nothing => (None, None),
+            Self::Path(path) => (Some(path.clone()), None),
+            Self::Packed {
+                path: Some(path), ..
+            } => (Some(path.clone()), None),
+            Self::Packed {
+                network,
+                path: None,
+            } => {
+                let card = &network.card;
+                (Some(card.name.clone().into()), Some(card.sha256.clone()))
+            }
+        };
+        self.take_focal_length(config)?;
+        if let Self::Path(path) = self
+            && let Some((folder, kind)) = run_of(path)?
+            && config.pose_net.metres_per_unit == 0.0
+            && !folder.read_state(kind)?.encoders_only
+        {
+            // Its PoseNet speaks of this unit.
+            config.pose_net.metres_per_unit = folder.read_config()?.pose_net.metres_per_unit;
+        }
+        Ok(())
+    }
+
+    /// What its depth is of: a network whose metres are those of one focal length keeps that, unless another is asked for.
+    fn take_focal_length(&self, config: &mut TrainConfig) -> Result<(), ModelError> {
+        if config.canonical_focal_px.is_some() {
+            return Ok(());
+        }
+        config.canonical_focal_px = match self {
+            Self::Nothing => None,
+            Self::Packed { network, .. } => unpacked_config(network)?.canonical_focal_px,
+            Self::Path(path) => match run_of(path)? {
+                Some((folder, _)) => folder.read_config()?.canonical_focal_px,
+                None => None,
+            },
+        };
+        Ok(())
+    }
+
+    /// The model with the weights to start from, and a line of what they are.
+    ///
+    /// # Errors
+    /// As [`Checkpoints::load_networks`]; [`Error::Model`] for weights of another architecture.
+    pub fn initialise(&self, mut model: Model, device: &Device) -> Result<Model, Error> {
+        let device = device.clone().autodiff();
+        match self {
+            Self::Nothing => Ok(model),
+            Self::Packed { network, path } => {
+                warn_of_other_meaning(&unpacked_config(network)?, model.config());
+                let weights = unpacked_weights(network)?;
+                let (depth_net, new_head) = model.depth_net.with_weights(&weights)?;
+                model.depth_net = depth_net;
+                let new = match new_head {
+                    true => "PoseNet, the head for uncertainty",
+                    false => "PoseNet",
+                };
+                say(&match path {
+                    Some(path) => format!("starts from {}; new: {new}", path.display()),
+                    None => format!(
+                        "starts from the embedded network `{}` of {}; new: {new} (--init none starts from nothing)",
+                        network.card.name, network.card.date
+                    ),
+                });
+                Ok(model)
+            }
+            Self::Path(path) => {
+                if let Some((folder, kind)) = run_of(path)? {
+                    warn_of_other_meaning(&folder.read_config()?, model.config());
+                    let (model, anew) = folder.load_networks(kind, model.config(), &device)?;
+                    let from = folder.checkpoint_path(kind);
+                    say(&match anew.as_slice() {
+                        [] => format!("starts from {}", from.display()),
+                        parts => {
+                            format!("starts from {}; new: {}", from.display(), parts.join(", "))
+                        }
+                    });
+                    return Ok(model);
+                }
+                model.depth_net.encoder = load_torchvision_resnet(model.depth_net.encoder, path)?;
+                model.pose_net.encoder = load_torchvision_resnet(model.pose_net.encoder, path)?;
+                Ok(model)
+            }
+        }
+    }
+}
+
+/// The configuration of a packed network's run; its metres are no matter here, of whichever data set.
+fn unpacked_config(network: &Shipped) -> Result<TrainConfig, ModelError> {
+    let origin = || network.card.name.clone().into();
+    network
+        .card
+        .config
+        .clone()
+        .try_into()
+        .map_err(|e: toml::de::Error| ModelError::ConfigFile {
+            path: origin(),
+            reason: e.to_string(),
+        })
+}
+
+/// Its tensors.
+fn unpacked_weights(network: &Shipped) -> Result<Weights, ModelError> {
+    let origin = &network.card.name;
+    Ok(read_bytes(origin, &network.bytes)?)
+}
+
+/// Weights may fit a network that reads images or says depths in another way than the one they were learned in.
+fn warn_of_other_meaning(theirs: &TrainConfig, own: &TrainConfig) {
+    let (from, to) = (&theirs.depth_net, &own.depth_net);
+    let (was, is) = (from.encoder.normalisation, to.encoder.normalisation);
+    if was != is {
+        let name = |n: InputNormalisation| format!("{n:?}").to_lowercase();
+        tracing::warn!(
+            "the weights to start from were learned on images normalised as {}, this configuration has {}: \
+             --set depth_net.encoder.normalisation={} keeps what they know",
+            name(was),
+            name(is),
+            name(was)
+        );
+    }
+    if theirs.data.sets.is_empty() && own.data.sets.is_empty() && from.range != to.range {
+        tracing::warn!(
+            "the weights to start from say depths of {} to {} m, this configuration of {} to {} m: \
+             --set depth_net.range.max_m={} keeps their metres",
+            from.range.min_m,
+            from.range.max_m,
+            to.range.min_m,
+            to.range.max_m,
+            from.range.max_m
+        );
+    }
+}
+
+/// Whether one network's weights are the other's, and mean the same depths: all but the depth that a new one starts at, whether
+/// its batch norms learn, and the head for uncertainty, which may be new or left aside.
+fn same_layers(a: &DepthNetConfig, b: &DepthNetConfig) -> bool {
+    let bare = |config: &DepthNetConfig| {
+        let mut config = config.clone();
+        config.initial_depth_m = None;
+        config.encoder.frozen_statistics = false;
+        config.uncertainty = false;
+        config
+    };
+    bare(a) == bare(b)
+}
+
+/// The run that a path is, or is a checkpoint of, and which; `None` of other weights.
+fn run_of(path: &Path) -> Result<Option<(RunFolder, CheckpointKind)>, ModelError> {
+    if !is_run(path) {
+        return Ok(None);
+    }
+    let (folder, kind) = RunFolder::open(path)?;
+    let kind = kind.unwrap_or_else(|| folder.preferred());
+    Ok(Some((folder, kind)))
+}
+
+/// Whether a path is a run's folder, or in one.
+pub fn is_run(path: &Path) -> bool {
+    let in_a_run = |p: &Path| p.join("config.toml").exists();
+    path.is_dir() || path.parent().is_some_and(in_a_run)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_model::Preset;
+
+    /// Which presets could start from which: `light` is the shipped network's shape, Monodepth2's has the same tensors and other depths.
+    #[test]
+    fn layers_and_range_decide() {
+        let net = |preset: Preset| preset.config().depth_net;
+        for (a, _) in Preset::ALL {
+            for (b, _) in Preset::ALL {
+                assert_eq!(same_layers(&net(a), &net(b)), a == b, "{a}, {b}");
+            }
+        }
+        let mut other = net(Preset::Light);
+        other.initial_depth_m = None;
+        assert!(same_layers(&other, &net(Preset::Light)));
+        other.range.max_m = 60.0;
+        assert!(!same_layers(&other, &net(Preset::Light)));
+        let mut config = Preset::Light.config();
+        config.with("attention").unwrap();
+        assert!(!same_layers(&config.depth_net, &net(Preset::Light)));
+    }
+
+    #[test]
+    fn what_is_neither_there_nor_embedded_is_told_with_both() {
+        let error = Start::named(Path::new("no-such-network")).unwrap_err();
+        assert!(error.to_string().contains("no-such-network"), "{error}");
+        let hint = crate::error::hint_of(&error).unwrap();
+        assert!(hint.contains("folder"), "{hint}");
+        for name in embedded_names() {
+            assert!(hint.contains(name), "{hint}");
+        }
+        assert!(matches!(
+            Start::named(Path::new("none")).unwrap(),
+            Start::Nothing
+        ));
+    }
+
+    /// A repeated run notices that what it began from is not embedded, or another.
+    #[test]
+    fn other_weights_than_a_run_began_from_are_refused() {
+        use clap::Parser;
+        #[derive(Parser)]
+        struct Alone {
+            #[command(flatten)]
+            args: TrainArgs,
+        }
+        let args = Alone::parse_from(["train", "--config", "run.toml"]).args;
+        let mut config = Preset::Light.config();
+        assert!(matches!(Start::of(&args, &config).unwrap(), Start::Nothing));
+        for name in embedded_names().into_iter().chain(["no-such-network"]) {
+            (config.init, config.init_sha256) = (Some(name.into()), Some("ab".repeat(32)));
+            let error = Start::of(&args, &config).unwrap_err();
+            assert!(error.to_string().contains(name), "{error}");
+        }
+        let nothing = Alone::parse_from(["train", "--config", "run.toml", "--init", "none"]).args;
+        let start = Start::of(&nothing, &config).unwrap();
+        assert!(matches!(start, Start::Nothing));
+        start.record_in(&mut config).unwrap();
+        assert_eq!((config.init, config.init_sha256), (None, None));
+    }
+}

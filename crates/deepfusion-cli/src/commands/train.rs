@@ -1,0 +1,264 @@
+use std::collections::HashSet;
+
+use anyhow::Result;
+use deepfusion_data::{CameraChoice, Dataset, speed_unit_warning};
+use deepfusion_model::{
+    DataConfig, Error as ModelError, InputSize, Learn, Preset, RunFolder, TrainConfig,
+};
+use deepfusion_train::{SampleSet, TrainSummary, Trainer, shared_frames};
+
+use super::outlook::Outlook;
+use super::recorder::{Recorder, clock};
+use super::recordings::{Part, camera_word, open_part, validates};
+use super::start::Start;
+use super::{device, remarks, resume};
+use crate::allocator;
+use crate::cli::{PresetChoice, TrainArgs};
+use crate::error::CliError;
+use crate::progress::say;
+use crate::{interrupt, output};
+
+/// `deepfusion train`.
+pub fn run(args: &TrainArgs) -> Result<()> {
+    let device = device::open(args.device)?;
+    let resumed = match (&args.out, args.resume) {
+        (Some(out), true) => Some(RunFolder::open(out)?.0),
+        _ => None,
+    };
+    let mut config = match &resumed {
+        Some(folder) => resume::with_options(&folder.read_config()?, args)?,
+        None => start_config(args)?,
+    };
+    config.validate()?;
+    let sets = open_samples(&config).map_err(|error| match &resumed {
+        Some(folder) => resume::where_recordings_are(error, &config, folder.path()),
+        None => error,
+    })?;
+    let mut trainer = match resumed {
+        Some(folder) => {
+            folder.write_config(&config)?;
+            Trainer::resume(config, folder, sets, &device)?
+        }
+        None => {
+            let start = Start::of(args, &config)?;
+            start.record_in(&mut config)?;
+            let folder = output::run_folder(args.out.as_deref(), "train")?;
+            let folder = RunFolder::create(&folder)?;
+            Trainer::create(config, folder, sets, &device, |model| {
+                start.initialise(model, &device)
+            })?
+        }
+    };
+    say(&plan(&trainer));
+    let outlook = Outlook::new(trainer.config().clone(), args.device.compute());
+    let summary = train(&mut trainer, Some(outlook))?;
+    if summary.step < summary.steps {
+        let folder = trainer.folder().display();
+        return Err(CliError::Stopped {
+            step: summary.step,
+            steps: summary.steps,
+            go_on: format!("deepfusion train --out {folder} --resume"),
+        }
+        .into());
+    }
+    output::print(&format!("{}\n", trainer.folder().display()))
+}
+
+/// What will be done: the network, its images, and how many steps and why.
+fn plan(trainer: &Trainer) -> String {
+    let config = trainer.config();
+    let InputSize { width, height } = config.size;
+    let epochs = config.epochs * trainer.epoch_steps();
+    let steps = match config.steps {
+        None if epochs < config.min_steps => format!(
+            "{} steps (the least: {} epochs of so few images would be {epochs})",
+            trainer.steps(),
+            config.epochs
+        ),
+        None => format!("{} epochs", config.epochs),
+        Some(steps) => format!("{steps} steps"),
+    };
+    let sets = 0..config.data.sets.len().max(1);
+    let learned = |from: fn(Learn) -> bool| sets.clone().any(|set| from(config.learn(set)));
+    let batches = [
+        (learned(Learn::from_motion), config.batch, "of video"),
+        (
+            learned(Learn::from_depth),
+            config.depth_batch(),
+            "of known depth",
+        ),
+    ];
+    let samples = batches
+        .iter()
+        .filter(|(learned, ..)| *learned)
+        .map(|(_, batch, kind)| format!("{} {kind}", batch * config.accumulate));
+    let samples: Vec<String> = samples.collect();
+    format!(
+        "{}: images of {width}x{height}, {} a step, {steps}",
+        config.preset,
+        samples.join(" and ")
+    )
+}
+
+/// Runs a trainer with its logs, to its last step or until it is asked to stop; with an `outlook`, how long it will
+/// take is said.
+pub fn train(trainer: &mut Trainer, outlook: Option<Outlook>) -> Result<TrainSummary> {
+    allocator::keep_memory();
+    interrupt::catch("stopping after this step; the run is saved");
+    let mut recorder = Recorder::open(trainer.folder(), trainer.step(), outlook)?;
+    let summary = trainer.run(&mut |event| recorder.handle(event))?;
+    recorder.finish()?;
+    say(&format!(
+        "{} {} of {} steps in {}{}",
+        if summary.step < summary.steps {
+            "stopped after"
+        } else {
+            "done:"
+        },
+        summary.step,
+        summary.steps,
+        clock(summary.seconds),
+        if summary.skipped > 0 {
+            format!(
+                ", {} skipped for a gradient that was not finite",
+                summary.skipped
+            )
+        } else {
+            String::new()
+        }
+    ));
+    Ok(summary)
+}
+
+fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
+    let mut config = match &args.config {
+        Some(path) => TrainConfig::read_over_preset(path, args.device.compute())?,
+        None => {
+            let preset = Preset::from(args.preset.unwrap_or(PresetChoice::Tiny));
+            preset.config_on(args.device.compute())
+        }
+    };
+    if let Some(size) = args.size {
+        config.size.width = size.width as usize;
+        config.size.height = size.height as usize;
+    }
+    config.steps = args.steps.or(config.steps);
+    if let Some(epochs) = args.epochs {
+        (config.epochs, config.steps, config.min_steps) = (epochs, None, 0);
+    }
+    config.batch = args.batch.unwrap_or(config.batch);
+    config.seed = args.seed.unwrap_or(config.seed);
+    for term in &args.with {
+        config.with(term)?;
+    }
+    for term in &args.without {
+        config.without(term)?;
+    }
+    // Said last: a motion that contradicts a term left out is an error, and not silently another one.
+    if let Some(choice) = args.view_motion {
+        config.view_motion = choice.into();
+    }
+    for assignment in &args.set {
+        config.set(assignment)?;
+    }
+    choose_recordings(&mut config.data, args)?;
+    Ok(config)
+}
+
+/// The file's own recordings, each part of which an option replaces where it is given.
+fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), ModelError> {
+    let given = [
+        ("--data", !args.data.is_empty()),
+        ("--val-data", !args.val_data.is_empty()),
+        ("--split", args.split.is_some()),
+        ("--val-split", args.val_split.is_some()),
+        // The sets' own where each has one; else it is the camera of those that have none.
+        (
+            "--camera",
+            args.camera.is_some() && data.sets.iter().any(|set| !set.camera.is_empty()),
+        ),
+        ("--learn", args.learn.is_some()),
+        (
+            "--clock-offset",
+            args.camera_ahead_s.is_some()
+                && data.sets.iter().any(|set| set.camera_ahead_s.is_some()),
+        ),
+    ];
+    for (field, given) in given {
+        if given && !data.sets.is_empty() {
+            return Err(ModelError::Config {
+                field,
+                expected: "none beside [[data.sets]] in the config file: each set has its own"
+                    .into(),
+                found: "both".into(),
+            });
+        }
+    }
+    if !args.data.is_empty() {
+        data.paths.clone_from(&args.data);
+    }
+    if !args.val_data.is_empty() {
+        data.validation.clone_from(&args.val_data);
+    }
+    if args.split.is_some() {
+        data.split.clone_from(&args.split);
+    }
+    if args.val_split.is_some() {
+        data.validation_split.clone_from(&args.val_split);
+    }
+    data.camera_ahead_s = args.camera_ahead_s.or(data.camera_ahead_s);
+    data.learn = args.learn.map_or(data.learn, Into::into);
+    if let Some(camera) = args.camera {
+        data.camera = camera_word(camera).into();
+    } else if data.camera.is_empty() && data.sets.is_empty() {
+        data.camera = camera_word(CameraChoice::default()).into();
+    }
+    if data.paths.is_empty() && data.sets.is_empty() {
+        return Err(ModelError::Config {
+            field: "data",
+            expected: "--data, or data.paths or [[data.sets]] in the config file".into(),
+            found: "none".into(),
+        });
+    }
+    Ok(())
+}
+
+/// The training and validation samples of a configuration; warns of drives that are skipped and of
+/// speeds that cannot be m/s.
+pub fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
+    let train = open_part(config, Part::Training, true)?;
+    let mut checked = HashSet::new();
+    for (_, dataset) in &train {
+        // Both cameras of a drive have one speed.
+        if checked.insert((dataset.folder().to_owned(), dataset.name().to_owned())) {
+            warn_of_speed(dataset);
+        }
+    }
+    let validation = match validates(config) {
+        true => Some(open_part(config, Part::Validation, true)?),
+        false => None,
+    };
+    let apart = validation.is_some();
+    let (train, validation, skipped) = SampleSet::split_sets(config, train, validation)?;
+    for reason in skipped {
+        remarks::warn_once(format!("skipped: {reason}"));
+    }
+    if apart {
+        for shared in shared_frames(&train, &validation) {
+            remarks::warn_once(format!(
+                "{}: {} of its validation frames are neighbours of training frames, and were seen as such",
+                shared.drive, shared.sources
+            ));
+        }
+    }
+    Ok((train, validation))
+}
+
+fn warn_of_speed(dataset: &Dataset) {
+    match speed_unit_warning(dataset) {
+        Ok(Some(warning)) => remarks::warn_once(format!("{}: {warning}", dataset.name())),
+        Ok(None) => {}
+        // The check is a service: what is really wrong with the images, training will say.
+        Err(error) => tracing::debug!("speed check of {}: {error}", dataset.name()),
+    }
+}

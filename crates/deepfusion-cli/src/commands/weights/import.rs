@@ -1,0 +1,83 @@
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use burn::tensor::Device;
+use deepfusion_nn::weights::{Monodepth2Files, detect_resnet, load_monodepth2, read};
+use deepfusion_nn::{
+    DepthNet, DepthNetConfig, PoseNet, PoseNetConfig, weights::load_torchvision_resnet,
+};
+use deepfusion_train::{
+    Checkpoint, CheckpointKind, Checkpoints, Model, Preset, RunFolder, TrainConfig,
+};
+
+use crate::output;
+use crate::progress::say;
+
+/// `deepfusion weights import`.
+pub fn run(files: &[PathBuf], out: &Path) -> Result<()> {
+    let device = Device::flex();
+    let encoders_only = matches!(files, [file] if !file.is_dir());
+    let (config, model) = match files {
+        [file] if encoders_only => from_resnet(file, &device)?,
+        [folder] => from_monodepth2(&Monodepth2Files::in_folder(folder), &device)?,
+        files => from_monodepth2(&named(files), &device)?,
+    };
+    let folder = RunFolder::create(&output::run_folder(Some(out), "weights")?)?;
+    folder.write_config(&config)?;
+    let state = Checkpoint {
+        step: 0,
+        best_validation: None,
+        skipped: 0,
+        encoders_only,
+    };
+    let path = folder.save(CheckpointKind::Last, &model, None, &state)?;
+    say("imported; the scale of imported weights is not metric until they are trained with speeds");
+    output::print(&format!("{}\n", path.display()))
+}
+
+/// Monodepth2's files among those given, by their names.
+fn named(files: &[PathBuf]) -> Monodepth2Files {
+    let find = |name: &str| {
+        let is = |p: &&PathBuf| p.file_stem().is_some_and(|stem| stem == name);
+        files.iter().find(is).cloned()
+    };
+    Monodepth2Files {
+        encoder: find("encoder").unwrap_or_else(|| PathBuf::from("encoder.pth")),
+        depth: find("depth").unwrap_or_else(|| PathBuf::from("depth.pth")),
+        pose: find("pose_encoder").zip(find("pose")),
+    }
+}
+
+fn from_monodepth2(files: &Monodepth2Files, device: &Device) -> Result<(TrainConfig, Model)> {
+    let imported = load_monodepth2(files, device)?;
+    let mut config = Preset::Monodepth2.config();
+    config.depth_net = imported.depth_config;
+    if let Some(size) = imported.input_size {
+        config.size = size;
+    }
+    let pose_net = match imported.pose {
+        Some((pose_config, pose_net)) => {
+            config.pose_net = pose_config;
+            pose_net
+        }
+        None => {
+            config.pose_net = PoseNetConfig::monodepth2(config.depth_net.encoder.depth);
+            PoseNet::new(&config.pose_net, device)?
+        }
+    };
+    let model = Model::with_networks(&config, imported.depth_net, pose_net, device);
+    Ok((config, model))
+}
+
+fn from_resnet(file: &Path, device: &Device) -> Result<(TrainConfig, Model)> {
+    let depth = detect_resnet(&read(file)?)?;
+    let mut config = Preset::Light.config();
+    config.depth_net = DepthNetConfig::new(depth);
+    config.pose_net = PoseNetConfig::new(depth);
+    let mut depth_net = DepthNet::new(&config.depth_net, device)?;
+    let mut pose_net = PoseNet::new(&config.pose_net, device)?;
+    depth_net.encoder = load_torchvision_resnet(depth_net.encoder, file)?;
+    pose_net.encoder = load_torchvision_resnet(pose_net.encoder, file)?;
+    let model = Model::with_networks(&config, depth_net, pose_net, device);
+    Ok((config, model))
+}

@@ -1,0 +1,173 @@
+use anyhow::Result;
+use deepfusion_weights::{Card, DEFAULT, Figure};
+use serde::Serialize;
+
+use crate::output;
+
+/// What can be imported: name, files, what it gives, terms.
+const KNOWN: [[&str; 4]; 3] = [
+    [
+        "torchvision ResNet-18, 34, 50, 101",
+        "resnet*.pth or .safetensors",
+        "encoders of both networks, trained on ImageNet",
+        "BSD-3-Clause (torchvision); ImageNet's own terms for the data",
+    ],
+    [
+        "Monodepth2",
+        "encoder.pth, depth.pth, pose_encoder.pth, pose.pth",
+        "the whole networks; depth up to an unknown factor",
+        "non-commercial (Niantic)",
+    ],
+    [
+        "a run of this program",
+        "its folder, last.safetensors or best.safetensors",
+        "with --init: training starts from its networks",
+        "yours",
+    ],
+];
+
+/// What `--json` prints of a packed network: its card without the configuration, and what of that one asks for first.
+#[derive(Debug, Serialize)]
+pub struct Listed<'a> {
+    name: &'a str,
+    /// Whether it is meant where no `--model` is given.
+    default: bool,
+    preset: &'a str,
+    size: Option<[i64; 2]>,
+    parameters: u64,
+    bytes: u64,
+    numbers: &'a str,
+    depth_difference: f64,
+    checkpoint: &'a str,
+    steps: usize,
+    date: &'a str,
+    data: &'a [String],
+    simulated_only: bool,
+    recipe: Option<&'a str>,
+    licence: &'a str,
+    note: Option<&'a str>,
+    figures: &'a [Figure],
+    sha256: &'a str,
+    format_version: u32,
+}
+
+impl<'a> From<&'a Card> for Listed<'a> {
+    fn from(card: &'a Card) -> Self {
+        Self {
+            name: &card.name,
+            default: card.name == DEFAULT,
+            preset: card.preset(),
+            size: card.size(),
+            parameters: card.parameters,
+            bytes: card.bytes,
+            numbers: &card.numbers,
+            depth_difference: card.depth_difference,
+            checkpoint: &card.checkpoint,
+            steps: card.steps,
+            date: &card.date,
+            data: &card.data,
+            simulated_only: card.simulated_only,
+            recipe: card.recipe.as_deref(),
+            licence: &card.licence,
+            note: card.note.as_deref(),
+            figures: &card.figures,
+            sha256: &card.sha256,
+            format_version: card.format_version,
+        }
+    }
+}
+
+/// `deepfusion weights list`.
+pub fn run(json: bool) -> Result<()> {
+    let networks = deepfusion_weights::all()?;
+    if json {
+        let embedded: Vec<Listed> = networks.iter().map(|n| Listed::from(&n.card)).collect();
+        let importable: Vec<_> = KNOWN
+            .iter()
+            .map(|[name, files, gives, terms]| {
+                serde_json::json!({"name": name, "files": files, "gives": gives, "terms": terms})
+            })
+            .collect();
+        return output::print_json(
+            &serde_json::json!({"embedded": embedded, "importable": importable}),
+        );
+    }
+    let mut text = "Embedded, for --model NAME and --init NAME:\n".to_owned();
+    if networks.is_empty() {
+        text += "  none in this build; `weights pack` makes one of a run\n";
+    }
+    for network in &networks {
+        text += &told(&network.card);
+    }
+    text += "\nTo be imported, with `weights import`:\n";
+    for [name, files, gives, terms] in KNOWN {
+        text += &format!("  {name}\n    files  {files}\n    gives  {gives}\n    terms  {terms}\n");
+    }
+    output::print(&text)
+}
+
+/// A network in lines.
+fn told(card: &Card) -> String {
+    /// Recordings that are told by name.
+    const NAMED: usize = 6;
+    let size = card
+        .size()
+        .map_or(String::new(), |[w, h]| format!(" at {w}x{h}"));
+    let default = match card.name == DEFAULT {
+        true => " (taken where no --model is given)",
+        false => "",
+    };
+    let mut data = card.data.iter().take(NAMED).cloned().collect::<Vec<_>>();
+    if card.data.len() > NAMED {
+        data.push(format!("and {} more", card.data.len() - NAMED));
+    }
+    let real = match card.simulated_only {
+        true => ", no real image among them",
+        false => "",
+    };
+    let mut text = format!(
+        "  {}{default}\n    network   {}{size}, {:.2} M parameters, {:.1} MB ({})\n    learned   {} steps, the {} checkpoint, {}\n    \
+         from      {}{real}\n",
+        card.name,
+        card.preset(),
+        card.parameters as f64 / 1e6,
+        card.bytes as f64 / 1e6,
+        card.numbers,
+        card.steps,
+        card.checkpoint,
+        card.date,
+        data.join(", "),
+    );
+    let rest = [
+        ("recipe", card.recipe.as_deref()),
+        ("note", card.note.as_deref()),
+        ("licence", Some(card.licence.as_str())),
+        ("sha256", Some(card.sha256.as_str())),
+    ];
+    for figure in &card.figures {
+        text += &format!("    measured  {}\n", told_figure(figure));
+    }
+    for (key, value) in rest {
+        if let Some(value) = value {
+            text += &format!("    {key:<9} {value}\n");
+        }
+    }
+    text
+}
+
+fn told_figure(figure: &Figure) -> String {
+    let seen = match figure.held_out {
+        Some(true) => "not seen in training",
+        Some(false) => "seen in training",
+        None => "not known whether seen in training",
+    };
+    format!(
+        "{}: abs_rel {:.3}, scaled {:.3}, scale {:.3}, within 25 % {:.1} % ({} images, {seen})",
+        figure.data,
+        figure.abs_rel,
+        figure.abs_rel_scaled,
+        figure.scale,
+        100.0 * figure.a1,
+        figure.images,
+    )
+}

@@ -1,0 +1,78 @@
+//! What runs a trained network: the choice made on the command line.
+
+use anyhow::Result;
+use deepfusion_infer::Precision;
+use deepfusion_model::TrainConfig;
+use deepfusion_model::weights::Weights;
+use deepfusion_runtime::{DepthEstimator, DepthRunner, FusedRunner, ModelSource, OrtRunner};
+
+use crate::allocator;
+use crate::cli::{DeviceChoice, EngineArgs, EngineChoice, PrecisionChoice};
+use crate::error::CliError;
+
+/// Loads a network with the engine asked for.
+pub fn load(model: &ModelSource, args: &EngineArgs) -> Result<DepthEstimator> {
+    let network = model.load(args.set.as_deref())?;
+    let args = args.clone();
+    DepthEstimator::of(network, move |config, weights| {
+        runner(&args, config, weights)
+    })
+}
+
+/// The engine asked for, with a network of this configuration and these weights.
+pub fn runner(
+    args: &EngineArgs,
+    config: &TrainConfig,
+    weights: Weights,
+) -> Result<Box<dyn DepthRunner>> {
+    let on_cpu = args.device == DeviceChoice::Cpu;
+    let engine = match args.engine {
+        EngineChoice::Auto if on_cpu => EngineChoice::Fused,
+        EngineChoice::Auto => EngineChoice::Burn,
+        chosen => chosen,
+    };
+    if engine != EngineChoice::Burn && !on_cpu {
+        return Err(CliError::OnlyOnCpu.into());
+    }
+    if engine != EngineChoice::Fused && args.precision != PrecisionChoice::F32 {
+        return Err(CliError::OnlyFused.into());
+    }
+    if engine != EngineChoice::Ort && args.ort_lib.is_some() {
+        return Err(CliError::OnlyOrt.into());
+    }
+    Ok(match engine {
+        EngineChoice::Burn | EngineChoice::Auto => in_burn(args, config, &weights)?,
+        EngineChoice::Fused => {
+            let precision = match args.precision {
+                PrecisionChoice::F32 => Precision::F32,
+                PrecisionChoice::Bf16 => Precision::Bf16,
+            };
+            let packed = || FusedRunner::new(config, weights, precision);
+            Box::new(allocator::without_hoarding(packed)?)
+        }
+        EngineChoice::Ort => Box::new(OrtRunner::new(args.ort_lib.as_deref(), config, weights)?),
+    })
+}
+
+/// The network as it is trained.
+#[cfg(feature = "train")]
+fn in_burn(
+    args: &EngineArgs,
+    config: &TrainConfig,
+    weights: &Weights,
+) -> Result<Box<dyn DepthRunner>> {
+    use crate::commands::device;
+    use deepfusion_train::BurnRunner;
+
+    allocator::keep_memory();
+    let device = device::open(args.device)?;
+    Ok(Box::new(BurnRunner::new(config, weights, &device)?))
+}
+
+#[cfg(not(feature = "train"))]
+fn in_burn(_: &EngineArgs, _: &TrainConfig, _: &Weights) -> Result<Box<dyn DepthRunner>> {
+    Err(CliError::BuiltWithoutTraining {
+        what: "--engine burn, or another device than the processor,",
+    }
+    .into())
+}

@@ -1,0 +1,512 @@
+//! Training, evaluation and prediction through the program alone, on good input and bad.
+
+mod support;
+
+use std::fs;
+
+use burn::tensor::Device;
+use deepfusion_nn::weights;
+use deepfusion_nn::{ResNet, ResNetConfig, ResNetDepth, WeightRng};
+use serde_json::Value;
+use support::{fails, ok, run};
+
+const SMALL: &str = "--size 96x64 --batch 2 --init none";
+
+#[test]
+fn a_drive_is_learned_resumed_evaluated_and_predicted() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 12 --seed 3 --scan-every 4");
+    ok(at, &format!("train --data sim {SMALL} --steps 2 --out run"));
+    for file in [
+        "config.toml",
+        "log.csv",
+        "last.safetensors",
+        "best.safetensors",
+    ] {
+        assert!(at.join("run").join(file).is_file(), "{file}");
+    }
+    assert_eq!(fs::read_dir(at.join("run/panels")).unwrap().count(), 1);
+
+    // A longer run goes on; one that is there is not overwritten.
+    ok(at, "train --out run --resume --steps 3");
+    let log = fs::read_to_string(at.join("run/log.csv")).unwrap();
+    let steps: Vec<_> = log
+        .lines()
+        .filter(|l| l.contains(",train,"))
+        .map(|l| &l[..1])
+        .collect();
+    assert_eq!(steps, ["1", "2", "3"]);
+    fails(
+        at,
+        &format!("train --data sim {SMALL} --steps 1 --out run"),
+        &["run"],
+    );
+
+    // A new run may start from another's networks; its PoseNet goes on to speak of that one's unit. What that one does
+    // not have is told.
+    let tuned = ok(
+        at,
+        "train --data sim --size 96x64 --batch 2 --steps 1 --with flow --init run --out tuned",
+    );
+    let told = "starts from run/best.safetensors; new: the flow decoder";
+    assert!(tuned.stderr.contains(told), "{}", tuned.stderr);
+    let unit = |run: &str| {
+        let config = fs::read_to_string(at.join(run).join("config.toml")).unwrap();
+        let line = config.lines().find(|l| l.starts_with("metres_per_unit"));
+        line.unwrap().to_owned()
+    };
+    assert_eq!(unit("tuned"), unit("run"));
+
+    let report: Value =
+        serde_json::from_str(&ok(at, "eval --model run --data sim --json").stdout).unwrap();
+    assert_eq!(report["n"], 3);
+    assert_eq!(report["protocol"]["crop"], "garg");
+    let abs_rel = report["unscaled"]["abs_rel"].as_f64().unwrap();
+    assert!(abs_rel > 0.01 && abs_rel < 3.0, "{abs_rel}");
+    assert!(report["scale"]["median"].as_f64().unwrap() > 0.2);
+    assert!(report["trivial"]["unscaled"]["abs_rel"].is_number());
+    // Which of the run's checkpoints that was: what was validated last, the third step or before.
+    assert_eq!(report["checkpoint"]["name"], "best");
+    assert_eq!(report["checkpoint"]["path"], "run/best.safetensors");
+    let step = report["checkpoint"]["step"].as_u64().unwrap();
+    assert!(log.contains(&format!("\n{step},validation,")), "{log}");
+    let text = ok(at, "eval --model run --data sim").stdout;
+    let first = format!("checkpoint  run/best.safetensors, step {step} (the lowest held-out loss");
+    assert!(text.starts_with(&first), "{text}");
+    let text = ok(at, "eval --model run/last.safetensors --data sim").stdout;
+    assert!(
+        text.starts_with("checkpoint  run/last.safetensors, step 3\n"),
+        "{text}"
+    );
+
+    let image = "sim/2026_01_01/2026_01_01_drive_0003_sync/image_02/data/0000000001.png";
+    let all = "depth-png,npy,color,side-by-side,ply";
+    ok(
+        at,
+        &format!("predict --model run {image} --calib sim/2026_01_01 --save {all} --out depth"),
+    );
+    let sidecar = fs::read_to_string(at.join("depth/0000000001.json")).unwrap();
+    let sidecar: Value = serde_json::from_str(&sidecar).unwrap();
+    assert_eq!(sidecar["files"].as_array().unwrap().len(), 5);
+    assert_eq!(sidecar["camera_known"], true);
+    // Measured on what was learned from, alone: that says nothing of the metres.
+    let unknown = serde_json::json!({"bias": null, "ci95": null, "verdict": "open"});
+    assert_eq!(sidecar["scale"], unknown);
+    ok(
+        at,
+        "simulate --out other --frames 12 --seed 9 --scan-every 1",
+    );
+    let other: Value =
+        serde_json::from_str(&ok(at, "eval --model run --data other --json").stdout).unwrap();
+    ok(
+        at,
+        &format!("predict --model run {image} --calib sim/2026_01_01 --save npy --out measured"),
+    );
+    let measured = fs::read_to_string(at.join("measured/0000000001.json")).unwrap();
+    let measured: Value = serde_json::from_str(&measured).unwrap();
+    let near = |a: &Value, b: &Value| (a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-9;
+    let (told, found) = (&measured["scale"], &other["scale"]);
+    assert!(near(&told["bias"], &found["bias"]), "{told} {found}");
+    for end in 0..2 {
+        assert!(
+            near(&told["ci95"][end], &found["bias_ci95"][end]),
+            "{told} {found}"
+        );
+    }
+    // Two steps are no reason to trust it, wherever its metres happen to lie.
+    assert_ne!(measured["scale"]["verdict"], "trusted");
+    let seen: Vec<_> = fs::read_dir(at.join("run/eval"))
+        .unwrap()
+        .map(|entry| fs::read(entry.unwrap().path()).unwrap())
+        .map(|text| serde_json::from_slice::<Value>(&text).unwrap())
+        .map(|saved| saved["measured"]["held_out"].clone())
+        .collect();
+    // Of best on both drives, and of last.
+    assert_eq!(seen.len(), 3);
+    assert!(
+        seen.contains(&Value::Bool(true)) && seen.contains(&Value::Bool(false)),
+        "{seen:?}"
+    );
+    assert!((sidecar["focal_factor"].as_f64().unwrap() - 1.0).abs() < 1e-9);
+    // Twice the focal length: the same picture is twice as far.
+    let k = "--intrinsics 743.6,738.9,313.9,88.3";
+    ok(
+        at,
+        &format!("predict --model run {image} {k} --save npy --out zoomed"),
+    );
+    let zoomed = fs::read_to_string(at.join("zoomed/0000000001.json")).unwrap();
+    let zoomed: Value = serde_json::from_str(&zoomed).unwrap();
+    assert!((zoomed["focal_factor"].as_f64().unwrap() - 2.0).abs() < 1e-3);
+    // Without a camera the assumption is said.
+    let assumed = ok(
+        at,
+        &format!("predict --model run {image} --out assumed --json"),
+    );
+    assert!(assumed.stderr.contains("assumed"), "{}", assumed.stderr);
+    assert!(
+        assumed.stdout.contains("\"camera_known\": false"),
+        "{}",
+        assumed.stdout
+    );
+
+    // Nothing is overwritten, and wrong cameras are told.
+    fails(
+        at,
+        &format!("predict --model run {image} --out assumed --save npy"),
+        &["0000000001"],
+    );
+    let wrong = "--intrinsics 743.6,738.9,5000,88.3";
+    fails(
+        at,
+        &format!("predict --model run {image} {wrong} --out wrong"),
+        &["cx"],
+    );
+    fails(
+        at,
+        "predict --model run nothing.png --out none",
+        &["nothing.png"],
+    );
+    fails(at, "predict --model nowhere a.png --out none", &["nowhere"]);
+    fs::write(
+        at.join("cut.png"),
+        &fs::read(at.join(image)).unwrap()[..900],
+    )
+    .unwrap();
+    fails(at, "predict --model run cut.png --out none", &["cut.png"]);
+
+    // A checkpoint of another architecture, and one cut off.
+    let config = fs::read_to_string(at.join("run/config.toml")).unwrap();
+    let wider = config.replacen("base_width = 32", "base_width = 24", 1);
+    assert_ne!(config, wider);
+    fs::write(at.join("run/config.toml"), wider).unwrap();
+    fails(at, "eval --model run --data sim", &["encoder"]);
+    fs::write(at.join("run/config.toml"), &config).unwrap();
+    let weights = fs::read(at.join("run/last.safetensors")).unwrap();
+    fs::write(
+        at.join("run/last.safetensors"),
+        &weights[..weights.len() / 2],
+    )
+    .unwrap();
+    fails(
+        at,
+        "train --out run --resume --steps 4",
+        &["last.safetensors"],
+    );
+}
+
+/// As a scheduler and a closed terminal stop it: saved, never done, and gone on with.
+#[test]
+#[cfg(unix)]
+fn a_stopped_run_is_saved_and_does_not_end_with_0() {
+    use std::process::{Command, Stdio};
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    let steps = || {
+        let log = fs::read_to_string(at.join("run/log.csv")).unwrap_or_default();
+        log.lines().filter(|l| l.contains(",train,")).count()
+    };
+    let stopped = |args: &str, signal: &str, reader_stays: bool| {
+        let before = steps();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_deepfusion"))
+            .current_dir(at)
+            .args(args.split_whitespace())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        if !reader_stays {
+            // The terminal is gone: nothing can be said any more.
+            drop(child.stderr.take());
+        }
+        while steps() <= before && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        let pid = child.id().to_string();
+        let sent = Command::new("kill").args([signal, &pid]).status().unwrap();
+        assert!(sent.success());
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(130), "{signal}: {said}");
+        assert_eq!(output.stdout, b"", "{signal}");
+        said
+    };
+    let train = format!("train --data sim {SMALL} --steps 100000 --out run");
+    let said = stopped(&train, "-TERM", true);
+    assert!(
+        said.contains("hint: go on with: deepfusion train --out run --resume"),
+        "{said}"
+    );
+    assert!(at.join("run/last.safetensors").is_file());
+    stopped("train --out run --resume", "-HUP", false);
+    let done = steps();
+    ok(
+        at,
+        &format!("train --out run --resume --steps {}", done + 1),
+    );
+    assert_eq!(steps(), done + 1);
+}
+
+/// `nohup` is asked to go on when the terminal closes.
+#[test]
+#[cfg(unix)]
+fn a_hangup_that_was_ignored_stays_ignored() {
+    use std::process::{Command, Stdio};
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    let train = format!("train --data sim {SMALL} --steps 12 --out run");
+    let mut child = Command::new("sh")
+        .current_dir(at)
+        .args(["-c", "trap '' HUP; exec \"$0\" \"$@\""])
+        .arg(env!("CARGO_BIN_EXE_deepfusion"))
+        .args(train.split_whitespace())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let begun = || fs::read_to_string(at.join("run/log.csv")).is_ok_and(|l| l.contains(",train,"));
+    while !begun() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let pid = child.id().to_string();
+    assert!(
+        Command::new("kill")
+            .args(["-HUP", &pid])
+            .status()
+            .unwrap()
+            .success()
+    );
+    assert!(child.wait().unwrap().success());
+}
+
+#[test]
+fn a_run_is_gone_on_with_from_any_folder_and_where_its_data_is_now() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let elsewhere = at.join("elsewhere");
+    fs::create_dir(&elsewhere).unwrap();
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    ok(at, "simulate --out val --frames 6 --seed 4 --scan-every 0");
+    ok(
+        at,
+        &format!("train --data sim --val-data val {SMALL} --steps 1 --out run"),
+    );
+    ok(&elsewhere, "train --out ../run --resume --steps 2");
+
+    fs::rename(at.join("sim"), at.join("moved")).unwrap();
+    let sim = at.join("sim").display().to_string();
+    fails(
+        &elsewhere,
+        "train --out ../run --resume --steps 3",
+        &[&sim, "--data"],
+    );
+    ok(
+        &elsewhere,
+        "train --out ../run --resume --steps 3 --data ../moved",
+    );
+    fs::rename(at.join("val"), at.join("val2")).unwrap();
+    fails(
+        at,
+        "train --out run --resume --steps 4",
+        &["/val:", "--val-data"],
+    );
+    ok(at, "train --out run --resume --steps 4 --val-data val2");
+    ok(&elsewhere, "train --out ../run --resume --steps 5");
+    // What is not the run's is no way to go on with it.
+    fails(
+        at,
+        "train --out run --resume --steps 6 --batch 4",
+        &["`--batch`: 4 contradicts the run, which has 2"],
+    );
+}
+
+/// A file's recordings, and each option in the place of its own part of them.
+#[test]
+fn options_replace_their_own_part_of_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    ok(at, "simulate --out val --frames 6 --seed 4 --scan-every 0");
+    ok(at, "simulate --out more --frames 6 --seed 5 --scan-every 0");
+    ok(
+        at,
+        &format!("train --data sim {SMALL} --steps 1 --out first"),
+    );
+    let data = |run: &str| {
+        let text = fs::read_to_string(at.join(run).join("config.toml")).unwrap();
+        text.parse::<toml::Table>().unwrap()["data"].clone()
+    };
+    let told = |name: &str| toml::Value::from(at.join(name).display().to_string());
+    // Without --data: the file's recordings, validated on what is asked for.
+    ok(
+        at,
+        "train --config first/config.toml --val-data val --out second",
+    );
+    assert_eq!(data("second")["paths"][0], told("sim"));
+    assert_eq!(data("second")["validation"][0], told("val"));
+    // With it: other recordings, and the file's validation.
+    ok(
+        at,
+        "train --config second/config.toml --data more --out third",
+    );
+    assert_eq!(data("third")["paths"][0], told("more"));
+    assert_eq!(data("third")["validation"][0], told("val"));
+    // A split and a camera that the file's recordings do not have are told, not left out.
+    fs::write(at.join("split.txt"), "nowhere/nothing 1 l\n").unwrap();
+    fails(
+        at,
+        "train --config first/config.toml --split split.txt --out fourth",
+        &["split.txt"],
+    );
+    fails(
+        at,
+        "train --config first/config.toml --camera 3 --out fifth",
+        &["camera 3"],
+    );
+    // Recordings beside those of a file's data sets.
+    let config = fs::read_to_string(at.join("first/config.toml")).unwrap();
+    let mut table: toml::Table = config.parse().unwrap();
+    table["data"] = toml::Value::Table(
+        "sets = [{ name = 'road', paths = ['sim'] }]"
+            .parse()
+            .unwrap(),
+    );
+    fs::write(at.join("sets.toml"), table.to_string()).unwrap();
+    for option in ["--data more", "--val-data val", "--split split.txt"] {
+        let name = option.split(' ').next().unwrap();
+        let args = format!("train --config sets.toml {option} --out sixth");
+        let run = run(at, &args);
+        assert_eq!(run.code, 1, "{}", run.stderr);
+        assert!(
+            run.stderr.contains(name) && run.stderr.contains("[[data.sets]]"),
+            "{}",
+            run.stderr
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_trained_on_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fails(at, "train --data nowhere", &["nowhere"]);
+    fs::create_dir(at.join("empty")).unwrap();
+    fails(at, "train --data empty", &["empty"]);
+    // What the command line itself contradicts is not silently put right.
+    let contradiction = run(
+        at,
+        "train --data empty --without speed --view-motion vehicle",
+    );
+    assert_eq!(contradiction.code, 1, "{}", contradiction.stderr);
+    for part in ["`view_motion`", "posenet where loss.speed is 0", "vehicle"] {
+        let told = contradiction.stderr.contains(part);
+        assert!(told, "{part}: {}", contradiction.stderr);
+    }
+
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    let drive = at.join("sim/2026_01_01/2026_01_01_drive_0003_sync");
+    let packet = drive.join("oxts/data/0000000002.txt");
+    let good = fs::read_to_string(&packet).unwrap();
+    let mut fields: Vec<_> = good.split_whitespace().collect();
+    fields[8] = "nan";
+    fs::write(&packet, fields.join(" ")).unwrap();
+    fails(at, "train --data sim", &["0000000002.txt", "vf"]);
+    fs::write(&packet, &good).unwrap();
+
+    let stamps = drive.join("image_02/timestamps.txt");
+    fs::rename(&stamps, at.join("stamps")).unwrap();
+    fails(at, "train --data sim", &["timestamps.txt"]);
+    fs::rename(at.join("stamps"), &stamps).unwrap();
+
+    // A learning rate that destroys the weights: the loss is named with its frames, and the run can be
+    // looked at.
+    ok(
+        at,
+        &format!("train --data sim {SMALL} --steps 1 --out seed"),
+    );
+    let config = fs::read_to_string(at.join("seed/config.toml")).unwrap();
+    let broken: String = config
+        .lines()
+        .map(|l| {
+            let is_rate = l.starts_with("learning_rate = ");
+            let steps = l.starts_with("steps = ");
+            match (is_rate, steps) {
+                (true, _) => "learning_rate = 1e30\n".to_owned(),
+                (_, true) => "steps = 30\n".to_owned(),
+                _ => format!("{l}\n"),
+            }
+        })
+        .collect();
+    fs::write(at.join("broken.toml"), broken).unwrap();
+    fails(
+        at,
+        "train --data sim --config broken.toml --out broken",
+        &["loss term", "2026_01_01_drive_0003_sync/"],
+    );
+
+    // A car that stands has no parallax to learn from.
+    for entry in fs::read_dir(drive.join("oxts/data")).unwrap() {
+        let path = entry.unwrap().path();
+        let text = fs::read_to_string(&path).unwrap();
+        let mut fields: Vec<_> = text.split_whitespace().collect();
+        for field in 8..11 {
+            fields[field] = "0.0";
+        }
+        fs::write(&path, fields.join(" ")).unwrap();
+    }
+    fails(at, "train --data sim", &["m/s"]);
+}
+
+/// Imported encoders start a network whose other parts the import does not have. PoseNet's unit is the new data's: the
+/// import has never seen a metre.
+#[test]
+fn imported_encoders_start_a_preset_with_other_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut rng = WeightRng::new(5);
+    let config = ResNetConfig::new(ResNetDepth::ResNet18);
+    let resnet = ResNet::new(&config, &mut rng, &Device::flex());
+    let resnet = weights::collect(&resnet.unwrap());
+    weights::write_safetensors(&at.join("resnet18.safetensors"), &resnet).unwrap();
+    ok(at, "weights import resnet18.safetensors --out imported");
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    let start = "train --data sim --preset light --size 96x64 --batch 1 --steps 1";
+    let parts = "--with hce,attention,aggregation";
+    let run = ok(at, &format!("{start} {parts} --init imported --out run"));
+    let told = "starts from imported/last.safetensors; new: everything but the encoders";
+    assert!(run.stderr.contains(told), "{}", run.stderr);
+    let config = fs::read_to_string(at.join("run/config.toml")).unwrap();
+    assert!(!config.contains("metres_per_unit = 1.0"), "{config}");
+}
+
+#[test]
+fn weights_and_bench_tell_what_they_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    assert!(ok(at, "weights list").stdout.contains("Monodepth2"));
+    fails(at, "weights import missing.pth --out run", &["missing.pth"]);
+    let bench = ok(at, "bench --preset tiny --size 96x64 --repeats 1 --json");
+    let bench: Value = serde_json::from_str(&bench.stdout).unwrap();
+    for stage in ["decode", "resize", "network", "depth", "cloud", "colour"] {
+        assert!(bench["stages_ms"][stage].as_f64().unwrap() > 0.0, "{stage}");
+    }
+    assert!(bench["fps"].as_f64().unwrap() > 0.0);
+    assert!(
+        bench["latency_ms"].as_f64().unwrap() > bench["stages_ms"]["network"].as_f64().unwrap()
+    );
+    assert!(bench["peak_device_mb"].is_null());
+    assert!(bench["parameters"].as_u64().unwrap() > 100_000);
+    let modules = bench["modules"].as_array().unwrap();
+    let (pose, depth) = modules.split_last().unwrap();
+    assert_eq!(pose["name"], "pose_net");
+    for total in ["parameters", "multiply_adds"] {
+        let parts = depth.iter().map(|m| m[total].as_u64().unwrap());
+        assert_eq!(bench[total].as_u64().unwrap(), parts.sum::<u64>());
+    }
+    #[cfg(target_os = "linux")]
+    assert!(bench["peak_rss_mb"].as_f64().unwrap() > 1.0);
+}

@@ -1,0 +1,202 @@
+//! A network that says how sure it is: learned, calibrated, packed, written.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use support::{fails, json, ok};
+
+/// A run that knows depth alone, and one that goes on from it with the head for uncertainty.
+fn train(at: &Path) {
+    for (drive, seed) in [("sim", 3), ("other", 4)] {
+        ok(
+            at,
+            &format!(
+                "simulate --out {drive} --frames 12 --seed {seed} --scan-every 3 --size 160x96"
+            ),
+        );
+    }
+    ok(
+        at,
+        "train --data sim --learn depth --size 96x64 --batch 2 --steps 2 --init none --out plain",
+    );
+    let config = fs::read_to_string(at.join("plain/config.toml")).unwrap();
+    let mut config: toml::Table = config.parse().unwrap();
+    let net = config["depth_net"].as_table_mut().unwrap();
+    net.insert("uncertainty".into(), true.into());
+    fs::write(at.join("sure.toml"), config.to_string()).unwrap();
+    let begun = ok(
+        at,
+        "train --config sure.toml --init plain/last.safetensors --steps 3 --out sure",
+    );
+    assert!(
+        begun.stderr.contains("new: the head for uncertainty"),
+        "{}",
+        begun.stderr
+    );
+    let log = fs::read_to_string(at.join("sure/log.csv")).unwrap();
+    let column = log.lines().next().unwrap().split(',');
+    let column = column.clone().position(|c| c == "uncertainty").unwrap();
+    let first = log.lines().nth(1).unwrap().split(',').nth(column).unwrap();
+    assert!(first.parse::<f64>().unwrap() != 0.0, "{log}");
+}
+
+/// Each point has its pixel's sigma; points that are too unsure are left out where that is asked for, and `perceive` tells it of
+/// its targets and keeps it for the viewer.
+fn clouds_carry_it(at: &Path) {
+    let cloud = |options: &str, out: &str| {
+        ok(
+            at,
+            &format!("predict --model sure other --save ply,npy,sigma {options} --out {out}"),
+        );
+        let path = at.join(out).join("0000000000.ply");
+        let bytes = fs::read(&path).unwrap();
+        deepfusion_geometry::cloud::PointCloud::read_ply(bytes.as_slice()).unwrap()
+    };
+    let all = cloud("", "all");
+    let pixels = 160 * 96;
+    let map = |ending: &str| values(&at.join(format!("all/0000000000_{ending}.npy")), pixels);
+    let (depth, sigma) = (map("depth"), map("sigma"));
+    let of_points = depth.iter().zip(&sigma);
+    let of_points = of_points.filter(|(z, _)| **z > 0.0 && **z <= 80.0);
+    let expected: Vec<f32> = of_points.clone().map(|(_, s)| *s).collect();
+    assert_eq!(all.sigma.unwrap(), expected);
+    // The middle of what there is, so that both sides have points.
+    let mut shares: Vec<f32> = of_points.map(|(z, s)| s / z).collect();
+    shares.sort_by(f32::total_cmp);
+    let most = shares[shares.len() / 2] * 1.0001;
+    let sure = cloud(&format!("--max-sigma {most}"), "sure-points");
+    assert!(sure.len() < all.xyz.len() && sure.len() * 3 > all.xyz.len());
+    let (points, sigma) = (&sure.xyz, sure.sigma.as_ref().unwrap());
+    let worst = points.iter().zip(sigma).map(|(p, s)| s / p[2]);
+    assert!(worst.fold(0.0, f32::max) <= most * 1.001);
+
+    ok(at, "perceive --model sure other --save sigma --out seen");
+    let kept = fs::read_dir(at.join("seen")).unwrap();
+    let names = kept.map(|f| f.unwrap().file_name().into_string().unwrap());
+    assert!(names.into_iter().any(|name| name.ends_with("_sigma.npy")));
+}
+
+/// The values of an array file of f32, row by row.
+fn values(path: &Path, count: usize) -> Vec<f32> {
+    let bytes = fs::read(path).unwrap();
+    let of = bytes[bytes.len() - 4 * count..].chunks_exact(4);
+    of.map(|b| f32::from_le_bytes(b.try_into().unwrap()))
+        .collect()
+}
+
+#[test]
+fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    train(at);
+    let levels = |report: &Value| -> Vec<[f64; 3]> {
+        let rows = report["intervals"]["levels"].as_array().unwrap();
+        let number = |row: &Value, field: &str| row[field].as_f64().unwrap();
+        rows.iter()
+            .map(|row| ["level", "coverage", "width_rel"].map(|field| number(row, field)))
+            .collect()
+    };
+    let plain = json(at, "eval --model plain --data other --crop none --json");
+    assert!(plain.get("intervals").is_none());
+    let eval = "eval --model sure --data other --crop none";
+    let word = json(at, &format!("{eval} --json"));
+    assert_eq!(word["intervals"]["calibrated"], false);
+    let said: Vec<f64> = levels(&word).iter().map(|row| row[0]).collect();
+    assert_eq!(said, [0.5, 0.8, 0.95]);
+
+    for (command, names) in [
+        (
+            "predict --model plain other --save sigma --out no",
+            ["does not say how sure", "sigma"],
+        ),
+        (
+            "eval --model plain --data other --calibrate-uncertainty",
+            ["does not say how sure", "uncertainty"],
+        ),
+        (
+            "predict --model plain other --save ply --max-sigma 0.2 --out no",
+            ["does not say how sure", "--max-sigma"],
+        ),
+    ] {
+        fails(at, command, &names);
+    }
+    assert!(!at.join("no").exists());
+
+    let before = &json(
+        at,
+        "predict --model sure other --save sigma,npy --out word --json",
+    )[0];
+    ok(at, &format!("{eval} --calibrate-uncertainty"));
+    assert!(at.join("sure/uncertainty.toml").exists());
+    let held = json(at, &format!("{eval} --json"));
+    assert_eq!(held["intervals"]["calibrated"], true);
+    // Measured where they were found, they hold what they promise, to the pixels that share a score.
+    for [level, coverage, width] in levels(&held) {
+        assert!((coverage - level).abs() < 0.02, "{level}: {coverage}");
+        assert!(width > 0.0);
+    }
+    let table = ok(at, eval).stdout;
+    assert!(
+        table.contains("the 80 % intervals hold") && table.contains("(calibrated)"),
+        "{table}"
+    );
+
+    // Sigma is stretched as the 80 % interval was, and what was written before is made anew.
+    let after = &json(
+        at,
+        "predict --model sure other --save sigma,npy --out word --overwrite --json",
+    )[0];
+    assert_ne!(
+        before["made_with"]["weights"],
+        after["made_with"]["weights"]
+    );
+    let file = |sidecar: &Value, ending: &str| {
+        let files = sidecar["files"].as_array().unwrap().iter();
+        let mut names = files.map(|f| f.as_str().unwrap().to_owned());
+        at.join("word")
+            .join(names.find(|f| f.ends_with(ending)).unwrap())
+    };
+    let pixels = 160 * 96;
+    let depth = values(&file(after, "_depth.npy"), pixels);
+    let sigma = values(&file(after, "_sigma.npy"), pixels);
+    let known = depth.iter().zip(&sigma).filter(|(d, _)| **d > 0.0);
+    assert!(known.clone().count() > 1000);
+    assert!(known.clone().all(|(_, s)| *s > 0.0 && s.is_finite()));
+
+    clouds_carry_it(at);
+
+    let card = json(
+        at,
+        "weights pack --model sure --checkpoint last --name hut --out packed --json",
+    );
+    assert_eq!(card["name"], "hut");
+    let text = fs::read_to_string(at.join("packed/hut.toml")).unwrap();
+    let table: toml::Table = text.parse().unwrap();
+    assert_eq!(table["uncertainty"]["levels"].as_array().unwrap().len(), 3);
+    let packed = json(
+        at,
+        "eval --model packed/hut.safetensors --data other --crop none --json",
+    );
+    assert_eq!(packed["intervals"]["calibrated"], true);
+    // A preset's network starts from it, and leaves the head aside.
+    ok(
+        at,
+        "train --data sim --size 96x64 --batch 2 --steps 1 --init packed/hut.safetensors --out on",
+    );
+    // Depth is all that an exported file has.
+    ok(at, "export --model sure --out sure.onnx");
+
+    let kept = at.join("sure/uncertainty.toml");
+    let good = fs::read_to_string(&kept).unwrap();
+    let impossible = good.replacen("factors = [", "factors = [-1.0, 1.0, 1.0] # ", 1);
+    assert_ne!(impossible, good);
+    for wrong in ["levels = [0.5]", &impossible] {
+        fs::write(&kept, wrong).unwrap();
+        let run = support::run(at, eval);
+        assert_eq!(run.code, 1, "{wrong}: {}", run.stderr);
+        assert!(run.stderr.contains("uncertainty.toml"), "{}", run.stderr);
+    }
+}

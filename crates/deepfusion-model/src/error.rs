@@ -1,0 +1,114 @@
+use std::path::PathBuf;
+
+use crate::NetworkError;
+
+/// What can go wrong with a configuration, or with a run on disk.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A setting that means nothing.
+    #[error("setting `{field}`: expected {expected}, found {found}")]
+    Config {
+        /// The setting's name, as in the file.
+        field: &'static str,
+        /// What would do.
+        expected: String,
+        /// What was found.
+        found: String,
+    },
+    /// A key that cannot be set so.
+    #[error("{assignment}: {reason}")]
+    Setting {
+        /// What was asked for: KEY=VALUE.
+        assignment: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A configuration file that cannot be read as one.
+    #[error("{path}: not a training configuration: {reason}")]
+    ConfigFile {
+        /// The file.
+        path: PathBuf,
+        /// What the parser says, with the line.
+        reason: String,
+    },
+    /// A file that cannot be read or written.
+    #[error("{path}: cannot {action}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// "read" or "write".
+        action: &'static str,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A checkpoint that does not fit the program or the configuration.
+    #[error("{path}: {reason}")]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// Why it cannot be used.
+        reason: String,
+        /// What to do about it.
+        remedy: String,
+    },
+    /// A folder that already holds a run.
+    #[error("{path}: there is a run here already")]
+    RunExists {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The networks or their weights.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+}
+
+impl Error {
+    /// A file that cannot be read or written; `action` is "read" or "write".
+    #[must_use]
+    pub fn io(path: &std::path::Path, action: &'static str, source: std::io::Error) -> Self {
+        Self::Io {
+            path: path.to_owned(),
+            action,
+            source,
+        }
+    }
+
+    /// What to do about it, in a line.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Config { field: "--data-set", .. } => {
+                Some("give the name of the data set whose metres are meant: --data-set NAME".into())
+            }
+            Self::Config { field: "data" | "data.paths", .. } => Some(
+                "give recordings with --data, or as data.paths or [[data.sets]] in the config file, one of the three".into(),
+            ),
+            Self::Config { field: "view_motion", .. } => Some(
+                "without the speed loss nothing measured may enter: take --view-motion posenet, or keep the speed loss".into(),
+            ),
+            Self::Config { field, .. } => Some(format!(
+                "set `{field}` so in the config file, or by its option; --help lists them"
+            )),
+            Self::Setting { .. } => Some(
+                "`deepfusion config show` prints every key and what it means".into(),
+            ),
+            Self::ConfigFile { .. } => Some(
+                "name a preset and the keys in which it differs; `deepfusion config show` prints them all".into(),
+            ),
+            Self::Io { source, action, .. } => match source.kind() {
+                std::io::ErrorKind::StorageFull => {
+                    Some("the disk is full; what was there before is untouched".into())
+                }
+                std::io::ErrorKind::PermissionDenied => {
+                    Some(format!("no permission to {action} there"))
+                }
+                _ => None,
+            },
+            Self::Checkpoint { remedy, .. } => Some(remedy.clone()),
+            Self::RunExists { .. } => Some(
+                "continue it with --resume, or choose another folder with --out".into(),
+            ),
+            Self::Network(error) => error.hint(),
+        }
+    }
+}

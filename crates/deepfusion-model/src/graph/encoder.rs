@@ -1,0 +1,89 @@
+//! The encoder's part of the graph.
+
+use deepfusion_infer::{Activation, Border, Op, ValueId};
+
+use super::{Builder, Layer, Offset};
+use crate::{NetworkError, ResNetConfig};
+
+impl Builder {
+    pub(super) fn encoder(&mut self, encoder: &ResNetConfig) -> Result<[ValueId; 5], NetworkError> {
+        let width = encoder.base_width;
+        let expansion = encoder.depth.expansion();
+        let f0 = self.conv(&Layer {
+            name: "encoder.conv1".into(),
+            offset: Offset::Norm("encoder.bn1".into()),
+            input: ValueId::IMAGE,
+            channels: [3, width],
+            kernel: 7,
+            stride: 2,
+            dilation: 1,
+            border: Border::Zero,
+            residual: None,
+            activation: &Activation::Relu,
+        })?;
+        let mut features = [f0; 5];
+        let mut x = self.push("encoder.maxpool".into(), Op::MaxPool { input: f0 })?;
+        let mut channels = width;
+        for (index, blocks) in encoder.depth.blocks().into_iter().enumerate() {
+            let inner = width << index;
+            for block in 0..blocks {
+                let steps = encoder.steps(index, block);
+                let path = format!("encoder.layer{}.{block}", index + 1);
+                let outer = inner * expansion;
+                x = self.block(&path, x, [channels, inner, outer], steps)?;
+                channels = outer;
+            }
+            features[index + 1] = x;
+        }
+        Ok(features)
+    }
+
+    /// relu(residual(x) + shortcut(x)): a basic block where the inner and the outer channels agree.
+    fn block(
+        &mut self,
+        path: &str,
+        x: ValueId,
+        [channels, inner, outer]: [usize; 3],
+        [stride, dilation]: [usize; 2],
+    ) -> Result<ValueId, NetworkError> {
+        let layer = |conv: &str, norm: &str, input, channels, kernel, stride| Layer {
+            name: format!("{path}.{conv}"),
+            offset: Offset::Norm(format!("{path}.{norm}")),
+            input,
+            channels,
+            kernel,
+            stride,
+            dilation: if kernel > 1 { dilation } else { 1 },
+            border: Border::Zero,
+            residual: None,
+            activation: &Activation::Relu,
+        };
+        let shortcut = if stride != 1 || channels != outer {
+            self.conv(&Layer {
+                activation: &Activation::Identity,
+                ..layer(
+                    "downsample.0",
+                    "downsample.1",
+                    x,
+                    [channels, outer],
+                    1,
+                    stride,
+                )
+            })?
+        } else {
+            x
+        };
+        let last = if inner == outer {
+            let y = self.conv(&layer("conv1", "bn1", x, [channels, inner], 3, stride))?;
+            layer("conv2", "bn2", y, [inner, outer], 3, 1)
+        } else {
+            let y = self.conv(&layer("conv1", "bn1", x, [channels, inner], 1, 1))?;
+            let y = self.conv(&layer("conv2", "bn2", y, [inner, inner], 3, stride))?;
+            layer("conv3", "bn3", y, [inner, outer], 1, 1)
+        };
+        self.conv(&Layer {
+            residual: Some(shortcut),
+            ..last
+        })
+    }
+}

@@ -1,0 +1,22 @@
+//! What a network is and what it weighs, without a framework to train it.
+//!
+//! - [`DepthNetConfig`], [`PoseNetConfig`] and their parts say what a network is built from; [`ModuleCost`] what it costs.
+//! - [`TrainConfig`] is everything that decides a training run, and what a run's `config.toml` holds.
+//! - [`weights`] are tensors by name, in memory and in safetensors files.
+//! - [`RunFolder`] is a run on disk; [`StoredNetwork`] the trained depth network of one, or of a packed file.
+//! - [`depth_graph`] turns configuration and weights into the graph that `deepfusion-infer` runs and `deepfusion-onnx` writes.
+
+mod error;
+mod graph;
+mod network;
+mod run_folder;
+mod stored;
+mod training;
+pub mod weights;
+
+pub use error::Error;
+pub use graph::{depth_graph, depth_graph_with_uncertainty};
+pub use network::*;
+pub use run_folder::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder};
+pub use stored::StoredNetwork;
+pub use training::*;

@@ -1,0 +1,210 @@
+//! What each part of the networks costs: parameters, multiply-adds, values.
+
+use super::{DepthNetConfig, InputSize, POSE_WIDTH, PoseNetConfig, ResNetConfig};
+
+/// What a part of a network costs for one image, batch normalisation folded into the convolutions.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct ModuleCost {
+    /// Where its tensors' names begin: `encoder.layer1`, `hce.0`, …
+    pub name: String,
+    /// Numbers that are learned: weights, biases, γ and β; not the running statistics.
+    pub parameters: u64,
+    /// Multiplications with addition in its convolutions, zeros of a border included.
+    pub multiply_adds: u64,
+    /// Values that its operations give.
+    pub values: u64,
+}
+
+/// What follows a convolution's sum.
+#[derive(Clone, Copy)]
+enum After {
+    Norm,
+    Bias,
+    Nothing,
+}
+
+impl ModuleCost {
+    fn new(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            parameters: 0,
+            multiply_adds: 0,
+            values: 0,
+        }
+    }
+
+    fn conv(&mut self, [from, to]: [usize; 2], kernel: usize, pixels: usize, after: After) {
+        let weights = from * to * kernel * kernel;
+        let more = match after {
+            After::Norm => 2 * to,
+            After::Bias => to,
+            After::Nothing => 0,
+        };
+        self.parameters += (weights + more) as u64;
+        self.multiply_adds += (weights * pixels) as u64;
+        self.give(to, pixels);
+    }
+
+    fn give(&mut self, channels: usize, pixels: usize) {
+        self.values += (channels * pixels) as u64;
+    }
+}
+
+impl ResNetConfig {
+    /// The stem (`conv1`, `bn1`, the pooling) and `layer1`…`layer4`, their names behind `prefix`.
+    fn costs(&self, prefix: &str, size: InputSize) -> Vec<ModuleCost> {
+        let channels = self.channels();
+        let pixels = feature_pixels(self, size);
+        let mut stem = ModuleCost::new(format!("{prefix}.stem"));
+        stem.conv([3 * self.frames, channels[0]], 7, pixels[0], After::Norm);
+        stem.give(channels[0], pixels[1]);
+        let mut costs = vec![stem];
+        let mut from = channels[0];
+        let mut before = pixels[1];
+        for (layer, blocks) in self.depth.blocks().into_iter().enumerate() {
+            let mut cost = ModuleCost::new(format!("{prefix}.layer{}", layer + 1));
+            let (width, to) = (self.base_width << layer, channels[layer + 1]);
+            let after = pixels[layer + 1];
+            for block in 0..blocks {
+                let [stride, _] = self.steps(layer, block);
+                if stride != 1 || from != to {
+                    cost.conv([from, to], 1, after, After::Norm);
+                }
+                if self.depth.is_bottleneck() {
+                    cost.conv([from, width], 1, before, After::Norm);
+                    cost.conv([width, width], 3, after, After::Norm);
+                    cost.conv([width, to], 1, after, After::Norm);
+                } else {
+                    cost.conv([from, width], 3, after, After::Norm);
+                    cost.conv([width, width], 3, after, After::Norm);
+                }
+                (from, before) = (to, after);
+            }
+            costs.push(cost);
+        }
+        costs
+    }
+}
+
+/// Pixels of the five features.
+fn feature_pixels(encoder: &ResNetConfig, size: InputSize) -> [usize; 5] {
+    std::array::from_fn(|level| {
+        let halvings = if level == 4 && encoder.is_dilated() {
+            4
+        } else {
+            level + 1
+        };
+        (size.width >> halvings) * (size.height >> halvings)
+    })
+}
+
+impl DepthNetConfig {
+    /// The network's parts in the order in which they run. Of the heads all four have parameters, and the finest
+    /// alone has multiply-adds: the others only train.
+    #[must_use]
+    pub fn costs(&self, size: InputSize) -> Vec<ModuleCost> {
+        let mut costs = self.encoder.costs("encoder", size);
+        let (raw, refined) = (self.encoder.channels(), self.decoder_channels());
+        let pixels = feature_pixels(&self.encoder, size);
+        for (index, level) in (1..5).enumerate() {
+            let (channels, width, pixels) = (raw[level], refined[level], pixels[level]);
+            if let Some(hce) = &self.hce {
+                let mut cost = ModuleCost::new(format!("hce.{index}"));
+                let reduce = hce.reduce_first && !hce.rates.is_empty();
+                for _ in 0..1 + usize::from(reduce) {
+                    cost.conv([channels, width], 1, pixels, After::Norm);
+                }
+                let from = if reduce { width } else { channels };
+                for _ in &hce.rates {
+                    cost.conv([from, width], 3, pixels, After::Norm);
+                }
+                let local = (1 + hce.rates.len()) * width;
+                cost.conv([local, width], 1, pixels, After::Norm);
+                if hce.global_pool {
+                    cost.give(channels, 1);
+                    cost.conv([channels, width], 1, 1, After::Bias);
+                    // The projection's share of the branch that is the same everywhere.
+                    cost.conv([width, width], 1, 1, After::Nothing);
+                }
+                costs.push(cost);
+            }
+            if let Some(attention) = &self.attention {
+                let mut cost = ModuleCost::new(format!("attention.{index}"));
+                let hidden = attention.hidden(width);
+                cost.give(width, 1);
+                cost.conv([width, hidden], 1, 1, After::Nothing);
+                cost.conv([hidden, width], 1, 1, After::Nothing);
+                cost.give(2, pixels);
+                cost.conv([2, 1], attention.kernel, pixels, After::Nothing);
+                cost.give(width, pixels);
+                costs.push(cost);
+            }
+        }
+        if self.aggregation {
+            let mut cost = ModuleCost::new("aggregation");
+            cost.give(refined[4], 1);
+            cost.conv([refined[4]; 2], 1, 1, After::Bias);
+            cost.give(refined[4], pixels[4]);
+            costs.push(cost);
+        }
+        self.decoder_costs(refined, pixels, size, &mut costs);
+        costs
+    }
+
+    fn decoder_costs(
+        &self,
+        channels: [usize; 5],
+        pixels: [usize; 5],
+        size: InputSize,
+        costs: &mut Vec<ModuleCost>,
+    ) {
+        let mut from = channels[4];
+        let mut before = pixels[4];
+        for (index, width) in self.decoder.widths.into_iter().enumerate() {
+            let mut cost = ModuleCost::new(format!("decoder.stages.{index}"));
+            let (skip, after) = match 3_usize.checked_sub(index) {
+                Some(level) => (channels[level], pixels[level]),
+                None => (0, size.width * size.height),
+            };
+            cost.conv([from, width], 3, before, After::Bias);
+            if after != before {
+                cost.give(width, after);
+            }
+            cost.conv([width + skip, width], 3, after, After::Bias);
+            (from, before) = (width, after);
+            costs.push(cost);
+        }
+        let mut heads = ModuleCost::new("decoder.heads");
+        heads.conv([from, 1], 3, before, After::Bias);
+        heads.parameters = self.decoder.widths[1..]
+            .iter()
+            .map(|w| (9 * w + 1) as u64)
+            .sum();
+        costs.push(heads);
+        if self.uncertainty {
+            let mut cost = ModuleCost::new("uncertainty");
+            cost.conv([from, 1], 3, before, After::Bias);
+            costs.push(cost);
+        }
+    }
+}
+
+impl PoseNetConfig {
+    /// The whole network, on one pair of frames.
+    #[must_use]
+    pub fn cost(&self, size: InputSize) -> ModuleCost {
+        let mut all = ModuleCost::new("pose_net");
+        for part in self.encoder.costs("encoder", size) {
+            all.parameters += part.parameters;
+            all.multiply_adds += part.multiply_adds;
+            all.values += part.values;
+        }
+        let pixels = feature_pixels(&self.encoder, size)[4];
+        let width = POSE_WIDTH;
+        all.conv([self.encoder.channels()[4], width], 1, pixels, After::Bias);
+        all.conv([width; 2], 3, pixels, After::Bias);
+        all.conv([width; 2], 3, pixels, After::Bias);
+        all.conv([width, 6 * self.poses], 1, pixels, After::Bias);
+        all
+    }
+}

@@ -1,0 +1,176 @@
+//! The settings of the depth network: an encoder, context and attention on its skip paths, the disparity decoder.
+
+use deepfusion_geometry::DepthRange;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    AttentionConfig, DecoderConfig, HceConfig, InputNormalisation, NetworkError, ResNetConfig,
+    ResNetDepth,
+};
+
+/// ln b is held within these, in learning and in a prediction: errors of ln depth between 0.25 % and a factor of 7.
+pub const LOG_SCALE_BOUNDS: (f64, f64) = (-6.0, 2.0);
+
+/// The size of the images a network is given, in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InputSize {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+}
+
+impl InputSize {
+    /// A size that the encoder can halve five times.
+    ///
+    /// # Errors
+    /// As [`Self::validate`].
+    pub fn new(width: usize, height: usize) -> Result<Self, NetworkError> {
+        let size = Self { width, height };
+        size.validate()?;
+        Ok(size)
+    }
+
+    /// The coarsest feature has 1/32 of the size; the decoder's reflection padding needs two of its
+    /// pixels in each direction.
+    ///
+    /// # Errors
+    /// [`NetworkError::InputSize`] unless both sides are multiples of 32 and at least 64.
+    pub fn validate(&self) -> Result<(), NetworkError> {
+        let fits = |n: usize| n >= 64 && n.is_multiple_of(32);
+        if fits(self.width) && fits(self.height) {
+            Ok(())
+        } else {
+            Err(NetworkError::InputSize {
+                width: self.width,
+                height: self.height,
+            })
+        }
+    }
+}
+
+/// What a `DepthNet` is built from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DepthNetConfig {
+    /// The backbone.
+    pub encoder: ResNetConfig,
+    /// Hierarchical context encoding of the features of `layer1`…`layer4` on their way to the decoder;
+    /// absent: the decoder reads the features as they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hce: Option<HceConfig>,
+    /// Attention on what the context encoding gives (or on the features themselves); absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attention: Option<AttentionConfig>,
+    /// Whether the mean of the coarsest feature over the image is projected and added to it.
+    #[serde(default)]
+    pub aggregation: bool,
+    /// The decoder.
+    #[serde(default)]
+    pub decoder: DecoderConfig,
+    /// The depths that the ends of the sigmoid mean.
+    #[serde(default)]
+    pub range: DepthRange,
+    /// The depth in metres that a new network starts at everywhere, by the heads' bias; absent: the
+    /// heads start with a random bias.
+    ///
+    /// With a bias near zero the first depths are about 0.2 m, and a metric pose then projects every
+    /// pixel out of view: nothing is left to learn from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub initial_depth_m: Option<f64>,
+    /// Whether a further head says how sure the network is of each pixel.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub uncertainty: bool,
+}
+
+impl DepthNetConfig {
+    /// The published ResNet with the decoder's full widths, 0.1 to 90 m, starting at 10 m.
+    #[must_use]
+    pub fn new(depth: ResNetDepth) -> Self {
+        Self {
+            encoder: ResNetConfig::new(depth),
+            hce: None,
+            attention: None,
+            aggregation: false,
+            decoder: DecoderConfig::default(),
+            range: DepthRange::default(),
+            initial_depth_m: Some(10.0),
+            uncertainty: false,
+        }
+    }
+
+    /// The paper's network (its Fig. 3): ResNet-50 at output stride 16, context encoding, attention and
+    /// aggregation, 0.1 to 90 m, starting at 10 m.
+    #[must_use]
+    pub fn paper() -> Self {
+        Self {
+            encoder: ResNetConfig::new(ResNetDepth::ResNet50).with_output_stride(16),
+            hce: Some(HceConfig::default()),
+            attention: Some(AttentionConfig::default()),
+            aggregation: true,
+            ..Self::new(ResNetDepth::ResNet50)
+        }
+    }
+
+    /// Monodepth2's network: its normalisation, its range of 0.1 to 100, random head biases.
+    #[must_use]
+    pub fn monodepth2(depth: ResNetDepth) -> Self {
+        Self {
+            encoder: ResNetConfig::new(depth).with_normalisation(InputNormalisation::Monodepth),
+            range: DepthRange {
+                min_m: 0.1,
+                max_m: 100.0,
+            },
+            initial_depth_m: None,
+            ..Self::new(depth)
+        }
+    }
+
+    /// # Errors
+    /// [`NetworkError::Config`] for a network that cannot be built, or a depth range that is none.
+    pub fn validate(&self) -> Result<(), NetworkError> {
+        self.encoder.validate()?;
+        self.hce.as_ref().map_or(Ok(()), HceConfig::validate)?;
+        self.attention
+            .as_ref()
+            .map_or(Ok(()), AttentionConfig::validate)?;
+        self.decoder.validate()?;
+        if self.encoder.frames != 1 {
+            return Err(NetworkError::config(
+                "encoder.frames",
+                "1 (a depth network sees one image)",
+                self.encoder.frames,
+            ));
+        }
+        let DepthRange { min_m, max_m } = self.range;
+        if !(min_m > 0.0 && max_m > min_m && max_m.is_finite()) {
+            return Err(NetworkError::config(
+                "range",
+                "0 < min_m < max_m, finite",
+                self.range,
+            ));
+        }
+        match self.initial_depth_m {
+            Some(depth) if !(depth > min_m && depth < max_m) => Err(NetworkError::config(
+                "initial_depth_m",
+                format!("between {min_m} and {max_m} m, the ends of the range"),
+                depth,
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Channels of the features that the decoder reads, fine to coarse.
+    #[must_use]
+    pub fn decoder_channels(&self) -> [usize; 5] {
+        let mut channels = self.encoder.channels();
+        if let Some(hce) = &self.hce {
+            for channels in &mut channels[1..] {
+                *channels = hce.width(*channels);
+            }
+        }
+        channels
+    }
+}

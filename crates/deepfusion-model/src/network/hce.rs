@@ -1,0 +1,73 @@
+//! The settings of hierarchical context encoding (Eq. 11–12): one feature seen at several scales at once.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::NetworkError;
+
+/// What a `HierarchicalContext` is built from.
+///
+/// The paper's text gives the multi-scale factors 1, 3, 6 and 12, its Eq. 12 a 1×1 and 6, 12 and 18. The
+/// default is a 1×1, 3, 6 and 12.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct HceConfig {
+    /// The dilation of each 3×3 branch: its multi-scale factor.
+    pub rates: Vec<usize>,
+    /// Whether the mean over the image is a branch too.
+    pub global_pool: bool,
+    /// Whether the dilated branches read a 1×1 reduction to the branch width instead of the feature itself:
+    /// at a ResNet-50's widths four HCEs without it cost more than the backbone.
+    pub reduce_first: bool,
+    /// By what a branch, and the output, has fewer channels than the feature.
+    pub width_divisor: usize,
+    /// The least channels that a branch, and the output, has.
+    pub min_width: usize,
+}
+
+impl Default for HceConfig {
+    /// 3, 6, 12 and the global mean, on a quarter of the channels but at least 32.
+    fn default() -> Self {
+        Self {
+            rates: vec![3, 6, 12],
+            global_pool: true,
+            reduce_first: true,
+            width_divisor: 4,
+            min_width: 32,
+        }
+    }
+}
+
+impl HceConfig {
+    /// Channels of a branch, and of the output, for a feature of `channels`.
+    #[must_use]
+    pub fn width(&self, channels: usize) -> usize {
+        (channels / self.width_divisor.max(1)).max(self.min_width)
+    }
+
+    /// # Errors
+    /// [`NetworkError::Config`] for rates or widths that mean no network.
+    pub fn validate(&self) -> Result<(), NetworkError> {
+        let in_range = |rate: &usize| (1..=64).contains(rate);
+        if self.rates.len() > 8 || !self.rates.iter().all(in_range) {
+            let found = &self.rates;
+            return Err(NetworkError::config(
+                "hce.rates",
+                "up to eight rates of 1 to 64",
+                found,
+            ));
+        }
+        if !(1..=64).contains(&self.width_divisor) {
+            let found = self.width_divisor;
+            return Err(NetworkError::config("hce.width_divisor", "1 to 64", found));
+        }
+        if !(1..=1024).contains(&self.min_width) {
+            return Err(NetworkError::config(
+                "hce.min_width",
+                "1 to 1024",
+                self.min_width,
+            ));
+        }
+        Ok(())
+    }
+}

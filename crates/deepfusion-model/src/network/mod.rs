@@ -1,0 +1,21 @@
+//! What the networks are built from: one config struct each, stored beside the weights.
+
+mod attention;
+mod cost;
+mod decoder;
+mod depth_net;
+mod error;
+mod flow_decoder;
+mod hce;
+mod pose_net;
+mod resnet;
+
+pub use attention::{AttentionConfig, AttentionForm};
+pub use cost::ModuleCost;
+pub use decoder::DecoderConfig;
+pub use depth_net::{DepthNetConfig, InputSize, LOG_SCALE_BOUNDS};
+pub use error::NetworkError;
+pub use flow_decoder::FlowDecoderConfig;
+pub use hce::HceConfig;
+pub use pose_net::{POSE_WIDTH, PoseNetConfig};
+pub use resnet::{BATCH_NORM_EPSILON, InputNormalisation, ResNetConfig, ResNetDepth};

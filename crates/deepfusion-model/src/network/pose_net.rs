@@ -1,0 +1,81 @@
+//! The settings of the pose network: the motion between two frames.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{InputNormalisation, NetworkError, ResNetConfig, ResNetDepth};
+
+/// Channels between the layers of the pose decoder.
+pub const POSE_WIDTH: usize = 256;
+
+/// What a `PoseNet` is built from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PoseNetConfig {
+    /// The backbone, on two frames.
+    pub encoder: ResNetConfig,
+    /// How many poses the last convolution has channels for (six each); the first is used.
+    #[serde(default = "one_pose")]
+    pub poses: usize,
+    /// Metres of translation per unit of the raw output. The data's mean displacement per pair
+    /// keeps the raw output near one.
+    #[serde(default = "one_metre")]
+    pub metres_per_unit: f64,
+}
+
+fn one_pose() -> usize {
+    1
+}
+
+fn one_metre() -> f64 {
+    1.0
+}
+
+impl PoseNetConfig {
+    /// The published ResNet on two frames, one pose, one metre per unit.
+    #[must_use]
+    pub fn new(depth: ResNetDepth) -> Self {
+        Self {
+            encoder: ResNetConfig::new(depth).with_frames(2),
+            poses: one_pose(),
+            metres_per_unit: one_metre(),
+        }
+    }
+
+    /// Monodepth2's network: its normalisation, twelve outputs of which the first six are used,
+    /// translation × 0.01 (in units of its own: its scale is not metric).
+    #[must_use]
+    pub fn monodepth2(depth: ResNetDepth) -> Self {
+        Self {
+            encoder: ResNetConfig::new(depth)
+                .with_frames(2)
+                .with_normalisation(InputNormalisation::Monodepth),
+            poses: 2,
+            metres_per_unit: 0.01,
+        }
+    }
+
+    /// # Errors
+    /// [`NetworkError::Config`] for a network that cannot be built, or a factor that is not positive.
+    pub fn validate(&self) -> Result<(), NetworkError> {
+        self.encoder.validate()?;
+        if self.encoder.frames < 2 {
+            return Err(NetworkError::config(
+                "pose.encoder.frames",
+                "2 (a pose network sees a pair)",
+                self.encoder.frames,
+            ));
+        }
+        if !(1..=16).contains(&self.poses) {
+            return Err(NetworkError::config("pose.poses", "1 to 16", self.poses));
+        }
+        if !(self.metres_per_unit > 0.0 && self.metres_per_unit.is_finite()) {
+            return Err(NetworkError::config(
+                "pose.metres_per_unit",
+                "a positive number of metres",
+                self.metres_per_unit,
+            ));
+        }
+        Ok(())
+    }
+}

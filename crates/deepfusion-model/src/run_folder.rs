@@ -1,0 +1,241 @@
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::weights::{Weights, read_safetensors_under};
+use crate::{Error, TrainConfig};
+
+/// The version of the checkpoint's layout; files of another version are refused.
+pub const CHECKPOINT_VERSION: u32 = 1;
+
+/// Metadata: the lowest value that `best` was chosen by. Files of before are without it: what was chosen by then held
+/// terms that depth cannot change, and is not to be compared with.
+const BEST: &str = "best_selection";
+/// Metadata: what of the networks was ever trained, where that is not all.
+const TRAINED: &str = "trained";
+const ENCODERS: &str = "encoders";
+
+/// Which checkpoint of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CheckpointKind {
+    /// Everything needed to go on.
+    Last,
+    /// The networks at the lowest held-out loss that depth can change.
+    Best,
+}
+
+impl CheckpointKind {
+    /// Its name: the file's without the ending.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Last => "last",
+            Self::Best => "best",
+        }
+    }
+
+    fn file(self) -> &'static str {
+        match self {
+            Self::Last => "last.safetensors",
+            Self::Best => "best.safetensors",
+        }
+    }
+}
+
+/// Where training stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Checkpoint {
+    /// Steps done, skipped ones included.
+    pub step: usize,
+    /// The lowest value so far that `best` is chosen by.
+    pub best_validation: Option<f64>,
+    /// Steps skipped for a gradient that was not finite.
+    pub skipped: usize,
+    /// Whether only the encoders were ever trained: imported ImageNet weights.
+    pub encoders_only: bool,
+}
+
+/// A run's folder: `config.toml`, `last.safetensors`, `best.safetensors`, logs and panels.
+#[derive(Debug, Clone)]
+pub struct RunFolder {
+    path: PathBuf,
+}
+
+impl RunFolder {
+    /// An empty folder for a new run.
+    ///
+    /// # Errors
+    /// [`Error::RunExists`] where a run already is; [`Error::Io`].
+    pub fn create(path: &Path) -> Result<Self, Error> {
+        if path.join("config.toml").exists() {
+            return Err(Error::RunExists {
+                path: path.to_owned(),
+            });
+        }
+        std::fs::create_dir_all(path).map_err(|e| Error::io(path, "write", e))?;
+        Ok(Self {
+            path: path.to_owned(),
+        })
+    }
+
+    /// A folder that holds a run, or a checkpoint file in one; the latter also says which checkpoint.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] when there is no run.
+    pub fn open(path: &Path) -> Result<(Self, Option<CheckpointKind>), Error> {
+        let (folder, kind) = match path.file_name().and_then(|n| n.to_str()) {
+            Some("last.safetensors") => (path.parent(), Some(CheckpointKind::Last)),
+            Some("best.safetensors") => (path.parent(), Some(CheckpointKind::Best)),
+            _ => (Some(path), None),
+        };
+        let folder = folder.unwrap_or(Path::new("."));
+        if !folder.join("config.toml").is_file() {
+            let reason = if folder.exists() {
+                "this is no run: it has no config.toml"
+            } else {
+                "no such run"
+            };
+            return Err(Error::Checkpoint {
+                path: path.to_owned(),
+                reason: reason.into(),
+                remedy: "give the folder that `train`, `demo` or `weights import` wrote".into(),
+            });
+        }
+        let folder = Self {
+            path: folder.to_owned(),
+        };
+        Ok((folder, kind))
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The configuration file.
+    #[must_use]
+    pub fn config_path(&self) -> PathBuf {
+        self.path.join("config.toml")
+    }
+
+    /// A checkpoint's file.
+    #[must_use]
+    pub fn checkpoint_path(&self, kind: CheckpointKind) -> PathBuf {
+        self.path.join(kind.file())
+    }
+
+    /// The checkpoint that the folder as a whole means: the best where there is one, else the last.
+    #[must_use]
+    pub fn preferred(&self) -> CheckpointKind {
+        if self.checkpoint_path(CheckpointKind::Best).exists() {
+            CheckpointKind::Best
+        } else {
+            CheckpointKind::Last
+        }
+    }
+
+    /// Writes the configuration.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write_config(&self, config: &TrainConfig) -> Result<(), Error> {
+        let text = config.to_toml()?;
+        let path = self.config_path();
+        let failed = |e| Error::io(&path, "write", e);
+        deepfusion_fs::write_atomically(&path, failed, |file| {
+            std::io::Write::write_all(file, text.as_bytes()).map_err(failed)
+        })
+    }
+
+    /// Reads the configuration.
+    ///
+    /// # Errors
+    /// As [`TrainConfig::read`].
+    pub fn read_config(&self) -> Result<TrainConfig, Error> {
+        TrainConfig::read(&self.config_path())
+    }
+
+    /// Where training stood at a checkpoint; its tensors are not read.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] for a file of another version, [`Error::Network`] for one that cannot be read.
+    pub fn read_state(&self, kind: CheckpointKind) -> Result<Checkpoint, Error> {
+        let path = self.checkpoint_path(kind);
+        Checkpoint::of(&path, &read_safetensors_under(&path, "no tensor's name")?)
+    }
+
+    /// The depth network's weights alone, and where training stood: nothing else of the file is read.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] for a file of another version, [`Error::Network`] for one without a network.
+    pub fn load_depth_weights(&self, kind: CheckpointKind) -> Result<(Weights, Checkpoint), Error> {
+        let path = self.checkpoint_path(kind);
+        let weights = read_safetensors_under(&path, "depth.")?;
+        let state = Checkpoint::of(&path, &weights)?;
+        Ok((weights, state))
+    }
+}
+
+impl Checkpoint {
+    /// What its file's metadata say of it.
+    #[must_use]
+    pub fn metadata(&self) -> BTreeMap<String, String> {
+        let mut all = BTreeMap::new();
+        let mut note = |key: &str, value: String| all.insert(key.to_owned(), value);
+        note("format_version", CHECKPOINT_VERSION.to_string());
+        note("program_version", env!("CARGO_PKG_VERSION").into());
+        note("step", self.step.to_string());
+        note("skipped", self.skipped.to_string());
+        if let Some(best) = self.best_validation {
+            // All digits: the comparison must go on exactly.
+            note(BEST, format!("{:016x}", best.to_bits()));
+        }
+        if self.encoders_only {
+            note(TRAINED, ENCODERS.into());
+        }
+        all
+    }
+
+    /// What the metadata of a file say.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] for a file of another version, or of another program.
+    pub fn of(path: &Path, file: &Weights) -> Result<Self, Error> {
+        let version = Self::number(path, file, "format_version")?;
+        if version != CHECKPOINT_VERSION as usize {
+            return Err(Error::Checkpoint {
+                path: path.to_owned(),
+                reason: format!(
+                    "checkpoint format {version}, this program reads {CHECKPOINT_VERSION}"
+                ),
+                remedy: "use the version of the program that wrote it".into(),
+            });
+        }
+        Ok(Self {
+            step: Self::number(path, file, "step")?,
+            skipped: Self::number(path, file, "skipped")?,
+            best_validation: file
+                .metadata
+                .get(BEST)
+                .and_then(|t| u64::from_str_radix(t, 16).ok())
+                .map(f64::from_bits),
+            encoders_only: file.metadata.get(TRAINED).is_some_and(|t| t == ENCODERS),
+        })
+    }
+
+    /// A number among a file's metadata.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] where it is missing.
+    pub fn number(path: &Path, file: &Weights, key: &str) -> Result<usize, Error> {
+        let text = file.metadata.get(key);
+        text.and_then(|t| t.parse().ok())
+            .ok_or_else(|| Error::Checkpoint {
+                path: path.to_owned(),
+                reason: format!(
+                    "no checkpoint of this program: `{key}` is missing from its metadata"
+                ),
+                remedy: "`weights import` reads weights of other programs".into(),
+            })
+    }
+}

@@ -1,0 +1,224 @@
+//! Configurations as people write them: a whole file, some keys over a preset, or one key on the command line.
+
+use crate::{Compute, Error, Preset, TrainConfig};
+use std::path::Path;
+use toml::{Table, Value};
+
+/// What stands for "without a value" in [`TrainConfig::set`].
+const NONE: &str = "none";
+
+impl TrainConfig {
+    /// Reads a TOML file that names every key, or a `preset` and the keys in which it differs from that. Tables are
+    /// taken together key by key, lists are replaced whole.
+    ///
+    /// A whole file stands for itself: what it leaves out is left out, whatever its preset has.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::ConfigFile`] naming the line or the key, or what [`Self::validate`] says.
+    pub fn read_over_preset(path: &Path, compute: Compute) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+        let wrong = |e: toml::de::Error| Error::ConfigFile {
+            path: path.to_owned(),
+            reason: e.to_string().trim_end().to_owned(),
+        };
+        let config = match toml::from_str::<Self>(&text) {
+            Ok(whole) => whole,
+            Err(whole) => {
+                let keys: Table = toml::from_str(&text).map_err(wrong)?;
+                match keys.get("preset") {
+                    None => return Err(wrong(whole)),
+                    Some(preset) => {
+                        let preset: Preset = preset.clone().try_into().map_err(wrong)?;
+                        let mut table = table_of(&preset.config_on(compute))?;
+                        merge(&mut table, keys);
+                        table.try_into().map_err(wrong)?
+                    }
+                }
+            }
+        };
+        config.validate()?;
+        Ok(config)
+    }
+
+    /// Sets one key, as `loss.smoothness=0.01` says it: dots between tables, a TOML value or a bare word, and `none` to take
+    /// an optional one away. What comes out is not validated.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a key that there is none of, and for a value that it cannot have.
+    pub fn set(&mut self, assignment: &str) -> Result<(), Error> {
+        let wrong = |reason: String| Error::Setting {
+            assignment: assignment.to_owned(),
+            reason,
+        };
+        let Some((key, value)) = assignment.split_once('=') else {
+            return Err(wrong("expected KEY=VALUE".into()));
+        };
+        let (key, value) = (key.trim(), value.trim());
+        if key == "preset" {
+            // Its name alone would change, and none of its settings.
+            return Err(wrong(
+                "a preset is chosen with --preset or in the file".into(),
+            ));
+        }
+        let mut parts: Vec<&str> = key.split('.').collect();
+        let last = parts.pop().unwrap_or_default();
+        let mut table = table_of(self)?;
+        let mut inner = &mut table;
+        for part in parts {
+            let next = inner
+                .entry(part)
+                .or_insert_with(|| Value::Table(Table::new()));
+            let Value::Table(next) = next else {
+                return Err(wrong(format!("`{part}` is a value and no table")));
+            };
+            inner = next;
+        }
+        if value == NONE {
+            if inner.remove(last).is_none() {
+                return match crate::config_keys().iter().any(|k| k.key == key) {
+                    true => Ok(()),
+                    false => Err(wrong(format!("there is no key `{key}`"))),
+                };
+            }
+        } else {
+            inner.insert(last.to_owned(), parsed(value));
+        }
+        let changed = Value::Table(table).try_into::<Self>();
+        *self = changed.map_err(|e| wrong(e.to_string().trim().replace('\n', " ")))?;
+        Ok(())
+    }
+}
+
+/// A TOML value, or the text itself where it is none: `light` needs no quotes.
+fn parsed(text: &str) -> Value {
+    let read: Result<Table, _> = toml::from_str(&format!("value = {text}"));
+    let value = read.ok().and_then(|mut table| table.remove("value"));
+    value.unwrap_or_else(|| Value::String(text.to_owned()))
+}
+
+fn table_of(config: &TrainConfig) -> Result<Table, Error> {
+    Table::try_from(config).map_err(|e| Error::Config {
+        field: "config",
+        expected: "values that TOML can hold".into(),
+        found: e.to_string(),
+    })
+}
+
+fn merge(base: &mut Table, over: Table) {
+    for (key, value) in over {
+        match (base.get_mut(&key), value) {
+            (Some(Value::Table(base)), Value::Table(over)) => merge(base, over),
+            (_, value) => {
+                base.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<TrainConfig, Error> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.toml");
+        std::fs::write(&path, text).unwrap();
+        TrainConfig::read_over_preset(&path, Compute::Processor)
+    }
+
+    #[test]
+    fn a_few_keys_change_a_preset() {
+        let config = read(
+            "preset = \"light\"\nbatch = 7\n[loss]\nsmoothness = 0.5\n[loss.depth]\nweight = 2\n",
+        )
+        .unwrap();
+        let mut expected = Preset::Light.config_on(Compute::Processor);
+        expected.batch = 7;
+        expected.loss.smoothness = 0.5;
+        expected.loss.depth.weight = 2.0;
+        assert_eq!(config, expected);
+    }
+
+    /// The paper's preset has a context encoding; a whole file without it means a network without it.
+    #[test]
+    fn a_whole_file_stands_for_itself() {
+        let mut config = Preset::Paper.config();
+        config.depth_net.hce = None;
+        assert_eq!(read(&config.to_toml().unwrap()).unwrap(), config);
+        let few = read("preset = \"paper\"\nseed = 3\n").unwrap();
+        assert!(few.depth_net.hce.is_some());
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        for (text, expected) in [
+            ("preset = \"light\"\nbatsch = 7\n", "batsch"),
+            (
+                "preset = \"light\"\n[loss]\nsmoothness = \"much\"\n",
+                "smoothness",
+            ),
+            ("preset = \"lihgt\"\n", "lihgt"),
+            ("batch = 7\n", "preset"),
+            ("preset = \"light\"\nbatch = \n", "2"),
+        ] {
+            let error = read(text).unwrap_err().to_string();
+            assert!(
+                error.contains("run.toml") && error.contains(expected),
+                "{error}"
+            );
+        }
+        // Values are checked as in a whole file.
+        let error = read("preset = \"light\"\nclip_norm = -1.0\n").unwrap_err();
+        assert!(error.to_string().contains("`clip_norm`"), "{error}");
+    }
+
+    #[test]
+    fn keys_are_set_one_by_one() {
+        let mut config = Preset::Light.config();
+        for assignment in [
+            "batch=3",
+            "loss.depth.weight = 2",
+            "view_motion=vehicle",
+            "canonical_focal_px=185",
+            "frames=[-1, 1]",
+            "size.width=320",
+            "depth_net.initial_depth_m=none",
+            "init=none",
+            "depth_net.hce.min_width=16",
+        ] {
+            config.set(assignment).unwrap();
+        }
+        let mut expected = Preset::Light.config();
+        expected.batch = 3;
+        expected.loss.depth.weight = 2.0;
+        expected.view_motion = crate::ViewMotion::Vehicle;
+        expected.canonical_focal_px = Some(185.0);
+        expected.frames = vec![-1, 1];
+        expected.size.width = 320;
+        expected.depth_net.initial_depth_m = None;
+        let hce = crate::HceConfig {
+            min_width: 16,
+            ..Default::default()
+        };
+        expected.depth_net.hce = Some(hce);
+        assert_eq!(config, expected);
+
+        for (assignment, reason) in [
+            ("batch", "KEY=VALUE"),
+            ("batsch=3", "batsch"),
+            ("loss.depht.weight=2", "depht"),
+            ("batch=many", "many"),
+            ("batch=none", "batch"),
+            ("batsch=none", "batsch"),
+            ("batch.size=3", "no table"),
+            ("preset=tiny", "--preset"),
+        ] {
+            let error = config.set(assignment).unwrap_err();
+            assert!(matches!(error, Error::Setting { .. }));
+            let text = error.to_string();
+            assert!(text.contains(reason) && text.contains(assignment), "{text}");
+            assert!(error.hint().is_some());
+        }
+        assert_eq!(config, expected, "what failed changed nothing");
+    }
+}

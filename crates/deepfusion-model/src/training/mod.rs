@@ -1,0 +1,19 @@
+//! Everything that decides a training run, as one struct: the command line, `--config` and a run's `config.toml` say the same.
+
+mod config_file;
+mod config_keys;
+mod data_set;
+mod loss_config;
+mod preset;
+mod sample_factors;
+mod train_config;
+
+pub use config_keys::{ConfigKey, config_keys};
+pub use data_set::{DataSetConfig, Learn, SimulatedConfig};
+pub use loss_config::{CompareAt, DepthLossConfig, FlowLossConfig, LossConfig, MovingConfig};
+pub use preset::{Compute, Preset};
+pub use sample_factors::SampleFactors;
+pub use train_config::{
+    Augmentation, DataConfig, LearningRateSchedule, Reprojection, ReversedPose, TrainConfig,
+    ViewMotion,
+};

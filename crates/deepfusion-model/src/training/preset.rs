@@ -1,0 +1,234 @@
+use super::{
+    Augmentation, DataConfig, LearningRateSchedule, Reprojection, ReversedPose, TrainConfig,
+    ViewMotion,
+};
+use super::{CompareAt, DepthLossConfig, FlowLossConfig, LossConfig, MovingConfig};
+use crate::{
+    DecoderConfig, DepthNetConfig, FlowDecoderConfig, InputSize, PoseNetConfig, ResNetConfig,
+    ResNetDepth,
+};
+use deepfusion_kernels::Precision;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Named configurations to start from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// ResNet-18 at half width, 320×96: learns something useful on two cores in minutes.
+    Tiny,
+    /// ResNet-18, 640×192.
+    Light,
+    /// ResNet-50, 640×192, batch 12: the paper's sizes.
+    Resnet50,
+    /// The paper's network (ResNet-50, context encoding, attention), 640×192, batch 12.
+    Paper,
+    /// Monodepth2's network and losses (three frames, minimum reprojection) with the speed term.
+    Monodepth2,
+}
+
+/// What a run computes on, as far as a preset's sizes follow it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Compute {
+    /// A few cores.
+    Processor,
+    /// A graphics card.
+    Gpu,
+}
+
+/// Fewer steps than this teach a network from scratch hardly anything, however short the drive: on 154 frames, 1,200
+/// steps of `light` came to an abs_rel of 0.24 to 0.26 on another street, where 20 epochs would be 240 steps of twelve
+/// (docs/BENCHMARKS.md).
+const MIN_STEPS: usize = 1200;
+
+impl Preset {
+    /// All presets with the names the command line takes.
+    pub const ALL: [(Self, &'static str); 5] = [
+        (Self::Tiny, "tiny"),
+        (Self::Light, "light"),
+        (Self::Resnet50, "resnet50"),
+        (Self::Paper, "paper"),
+        (Self::Monodepth2, "monodepth2"),
+    ];
+
+    /// The configuration to train with on such a device. On a processor every preset takes images of 320×96, four a step,
+    /// which it learns from in minutes: twelve of 640×192 are twelve times as many pixels.
+    #[must_use]
+    pub fn config_on(self, compute: Compute) -> TrainConfig {
+        let mut config = self.config();
+        if compute == Compute::Processor {
+            config.size = InputSize {
+                width: 320,
+                height: 96,
+            };
+            config.batch = 4;
+        }
+        config
+    }
+
+    /// The configuration at the preset's full size.
+    #[must_use]
+    pub fn config(self) -> TrainConfig {
+        let base = |depth: ResNetDepth| TrainConfig {
+            preset: self,
+            size: InputSize {
+                width: 640,
+                height: 192,
+            },
+            frames: vec![1],
+            frame_distance_m: 0.0,
+            reprojection: Reprojection::Bidirectional,
+            reversed_pose: ReversedPose::Predicted,
+            batch: 12,
+            depth_batch: 0,
+            accumulate: 1,
+            epochs: 20,
+            steps: None,
+            min_steps: MIN_STEPS,
+            learning_rate: 1e-4,
+            learning_rate_warmup_steps: 0,
+            learning_rate_schedule: LearningRateSchedule::Drop,
+            learning_rate_drop: 0.75,
+            weight_decay: 0.0,
+            clip_norm: 10.0,
+            seed: 0,
+            precision: Precision::F32,
+            init: None,
+            init_sha256: None,
+            min_speed_mps: 0.5,
+            validation_share: 0.1,
+            validate_every: 0,
+            checkpoint_minutes: 10.0,
+            start_moving: false,
+            view_motion: ViewMotion::PoseNet,
+            camera: None,
+            canonical_focal_px: None,
+            data: DataConfig::default(),
+            loss: LossConfig {
+                ssim_weight: 0.85,
+                compare_at: CompareAt::Full,
+                smoothness: 1e-3,
+                speed: 0.2,
+                rotation: 0.0,
+                speed_warmup_steps: 500,
+                automask: true,
+                affine: 0.0,
+                flow: FlowLossConfig::default(),
+                moving: MovingConfig::default(),
+                depth: DepthLossConfig::default(),
+            },
+            augmentation: Augmentation {
+                flip: true,
+                jitter: 0.5,
+                brightness: 0.2,
+                hue: 0.1,
+                zoom: 1.0,
+                sizes: Vec::new(),
+            },
+            depth_net: DepthNetConfig::new(depth),
+            pose_net: PoseNetConfig {
+                // Measured from the data when training starts (SPEC 1.2).
+                metres_per_unit: 0.0,
+                ..PoseNetConfig::new(depth)
+            },
+            flow_decoder: FlowDecoderConfig::default(),
+        };
+        match self {
+            Self::Tiny => {
+                let narrow = |config: ResNetConfig| config.with_base_width(32);
+                let mut config = base(ResNetDepth::ResNet18);
+                config.size = InputSize {
+                    width: 320,
+                    height: 96,
+                };
+                config.batch = 4;
+                config.learning_rate = 1e-3;
+                config.learning_rate_warmup_steps = 100;
+                config.reversed_pose = ReversedPose::Inverted;
+                config.start_moving = true;
+                config.view_motion = ViewMotion::Distance;
+                config.depth_net.encoder = narrow(config.depth_net.encoder);
+                config.depth_net.decoder = DecoderConfig {
+                    widths: [128, 64, 32, 16, 16],
+                };
+                config.pose_net.encoder = narrow(config.pose_net.encoder).with_base_width(16);
+                config
+            }
+            Self::Light => {
+                let mut config = base(ResNetDepth::ResNet18);
+                config.reversed_pose = ReversedPose::Inverted;
+                config.start_moving = true;
+                config.view_motion = ViewMotion::Distance;
+                config
+            }
+            Self::Resnet50 => base(ResNetDepth::ResNet50),
+            Self::Paper => {
+                let mut config = base(ResNetDepth::ResNet50);
+                config.depth_net = DepthNetConfig::paper();
+                config.loss = config.loss.with_every_term();
+                config
+            }
+            Self::Monodepth2 => {
+                let mut config = base(ResNetDepth::ResNet18);
+                config.frames = vec![-1, 1];
+                config.reprojection = Reprojection::Minimum;
+                config.depth_net = DepthNetConfig {
+                    // A metric pose needs a first depth that keeps pixels in view.
+                    initial_depth_m: Some(10.0),
+                    ..DepthNetConfig::monodepth2(ResNetDepth::ResNet18)
+                };
+                config.pose_net = PoseNetConfig {
+                    metres_per_unit: 0.0,
+                    ..PoseNetConfig::monodepth2(ResNetDepth::ResNet18)
+                };
+                config
+            }
+        }
+    }
+}
+
+impl std::fmt::Display for Preset {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let name = Self::ALL.iter().find(|(preset, _)| preset == self);
+        f.write_str(name.map_or("", |(_, name)| name))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A processor's images are small; on a graphics card, and where nothing is trained, the sizes are the published ones.
+    #[test]
+    fn sizes_follow_the_device() {
+        for (preset, _) in Preset::ALL {
+            let on = |compute| {
+                let config = preset.config_on(compute);
+                config.validate().unwrap();
+                (config.size.width, config.size.height, config.batch)
+            };
+            assert_eq!(on(Compute::Processor), (320, 96, 4), "{preset}");
+            let full = match preset {
+                Preset::Tiny => (320, 96, 4),
+                _ => (640, 192, 12),
+            };
+            assert_eq!(on(Compute::Gpu), full, "{preset}");
+            assert_eq!(preset.config_on(Compute::Gpu), preset.config());
+        }
+    }
+
+    #[test]
+    fn every_preset_is_valid_and_survives_its_file() {
+        for (preset, name) in Preset::ALL {
+            let config = preset.config();
+            config.validate().unwrap();
+            assert_eq!(preset.to_string(), name);
+            let text = config.to_toml().unwrap();
+            assert_eq!(
+                toml::from_str::<TrainConfig>(&text).unwrap(),
+                config,
+                "{text}"
+            );
+        }
+    }
+}

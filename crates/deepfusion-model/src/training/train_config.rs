@@ -1,0 +1,642 @@
+use crate::{
+    AttentionConfig, AttentionForm, DepthNetConfig, FlowDecoderConfig, HceConfig, InputSize,
+    PoseNetConfig,
+};
+use crate::{DataSetConfig, Error, Learn, LossConfig, Preset};
+use deepfusion_geometry::Intrinsics;
+use deepfusion_kernels::Precision;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// How the views of a target are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Reprojection {
+    /// Two frames, each warped onto the other: the paper's double-frame coupled reprojection.
+    Bidirectional,
+    /// The smallest error of all sources at each pixel: Monodepth2's.
+    Minimum,
+}
+
+/// Where the motion of the reversed pair comes from in bidirectional reprojection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ReversedPose {
+    /// The network is asked again with the frames swapped.
+    Predicted,
+    /// The forward motion is inverted: half the work of the pose network.
+    Inverted,
+}
+
+/// Whose motion the views are synthesised with. The first error that depth has to wait for is PoseNet's:
+/// what the vehicle knows already need not be learned first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ViewMotion {
+    /// PoseNet's, whose length the speed loss pulls towards the vehicle's: the paper's way.
+    #[default]
+    PoseNet,
+    /// PoseNet's rotation and direction, with the length that the vehicle's speed gives.
+    Distance,
+    /// The vehicle's own, from speed and yaw rate, and the body's lean where it is known. PoseNet learns
+    /// that motion beside it.
+    Vehicle,
+}
+
+/// What is done to the images before the networks see them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Augmentation {
+    /// Mirror every other sample left to right, its camera and motion with it.
+    pub flip: bool,
+    /// Probability of a colour jitter; the losses always see the clean images.
+    pub jitter: f64,
+    /// Largest change of brightness, contrast and saturation, as a factor around 1.
+    pub brightness: f32,
+    /// Largest change of hue, in turns.
+    pub hue: f32,
+    /// How much smaller than the image the part may be that is cut from it, of images whose depth is known; 1: all of it.
+    #[serde(default = "no_zoom")]
+    pub zoom: f32,
+    /// Other sizes of images whose depth is known, for a network that is to see pictures of other aspect ratios: half of
+    /// the batches have the run's own size, the others in turns one of these.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sizes: Vec<InputSize>,
+}
+
+/// How the step size changes over a run, after its rise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum LearningRateSchedule {
+    /// A tenth from `learning_rate_drop` on.
+    #[default]
+    Drop,
+    /// Half a cosine from `learning_rate` to a hundredth of it.
+    Cosine,
+}
+
+/// Where a run's images come from; a resumed run finds them again by this.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DataConfig {
+    /// Drive folders, date folders or KITTI roots.
+    pub paths: Vec<PathBuf>,
+    /// Recordings to validate on; none: the held-out end of each drive.
+    pub validation: Vec<PathBuf>,
+    /// A split file that selects the frames to train on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub split: Option<PathBuf>,
+    /// A split file that selects the frames to validate on: of `validation`, or of `paths` where that is empty.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation_split: Option<PathBuf>,
+    /// How far the cameras' clock is ahead of the vehicles', in seconds, instead of what the recordings' own files say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera_ahead_s: Option<f64>,
+    /// Which cameras: `2`, `3` or `both`; empty means 2.
+    pub camera: String,
+    /// What is learned from.
+    #[serde(skip_serializing_if = "Learn::is_own_motion")]
+    pub learn: Learn,
+    /// Several data sets with cameras, ranges and displacements of their own, instead of `paths`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sets: Vec<DataSetConfig>,
+}
+
+/// Everything that decides a training run. One struct serves the command line, the `--config` file
+/// and the checkpoint; it is stored beside the run as `config.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrainConfig {
+    /// The preset this started from.
+    pub preset: Preset,
+    /// Width and height of the images the networks see.
+    pub size: InputSize,
+    /// Offsets of the sources: `[1]` or `[-1, 1]`.
+    pub frames: Vec<i32>,
+    /// An offset counts in steps of at least so many metres that the camera moved, where its frames are closer; 0:
+    /// in frames. At walking pace a frame differs from the next by less than a pixel, which says nothing about depth.
+    #[serde(default)]
+    pub frame_distance_m: f64,
+    /// How views are compared.
+    pub reprojection: Reprojection,
+    /// Where the reversed pair's motion comes from.
+    pub reversed_pose: ReversedPose,
+    /// Samples a step.
+    pub batch: usize,
+    /// Samples of known depth a step, beside those of video where there are both; 0: as many as `batch`.
+    #[serde(default)]
+    pub depth_batch: usize,
+    /// Batches whose gradients are averaged before a step of the optimiser.
+    pub accumulate: usize,
+    /// Passes over the data; `steps` overrides it.
+    pub epochs: usize,
+    /// Steps of the optimiser, where given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steps: Option<usize>,
+    /// The least steps of the optimiser where `steps` is not given: the epochs of a short drive are too few to learn from.
+    #[serde(default)]
+    pub min_steps: usize,
+    /// Adam's step size.
+    pub learning_rate: f64,
+    /// Steps over which the step size rises from 0: large first steps can flatten the depth for good.
+    pub learning_rate_warmup_steps: usize,
+    /// How it falls.
+    #[serde(default)]
+    pub learning_rate_schedule: LearningRateSchedule,
+    /// Share of the run after which the step size is divided by ten, where it falls by `drop`.
+    pub learning_rate_drop: f64,
+    /// Share of each weight, not of biases and norms, that a step of size 1 takes away beside Adam's own (AdamW).
+    #[serde(default)]
+    pub weight_decay: f64,
+    /// Largest norm of the gradient; longer ones are shortened to it. 0: no limit.
+    pub clip_norm: f64,
+    /// Decides everything random.
+    pub seed: u64,
+    /// How the networks' convolutions multiply while they learn. What a trained network then predicts is computed in f32, or
+    /// as its runner says.
+    #[serde(default)]
+    pub precision: Precision,
+    /// The weights to begin from, as `--init` takes them: a path, or with `init_sha256` the name of a network that the program carries.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub init: Option<PathBuf>,
+    /// SHA-256 of the embedded network's weights, so that a repeated run notices that it would begin from others.
+    #[schemars(skip)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub init_sha256: Option<String>,
+    /// Pairs slower than this are dropped, in m/s.
+    pub min_speed_mps: f64,
+    /// Share of each drive's end that is held out for validation.
+    pub validation_share: f64,
+    /// Steps between validations, checkpoints and panels; 0: once an epoch.
+    pub validate_every: usize,
+    /// Minutes after which a checkpoint is written also between those; 0: never. What a run learns does not depend on it.
+    #[serde(default = "checkpoint_minutes")]
+    pub checkpoint_minutes: f64,
+    /// A PoseNet that starts out driving ahead by the data's mean displacement, instead of standing.
+    /// Needs the frames in time order, so it has no effect where the reversed pose is predicted.
+    pub start_moving: bool,
+    /// Whose motion the views are synthesised with.
+    #[serde(default)]
+    pub view_motion: ViewMotion,
+    /// The camera trained with, at network size; filled in from the data. Several cameras: the first.
+    #[schemars(skip)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Intrinsics>,
+    /// f_c, the focal length in pixels of the network's input to which all cameras are brought (Metric3D): the network
+    /// says depth × f_c/f_y, so that what looks the same in pixels is the same to it whatever the lens. Absent: it says
+    /// the depth of the camera it is trained with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub canonical_focal_px: Option<f64>,
+    /// The recordings.
+    #[serde(default)]
+    pub data: DataConfig,
+    /// The loss.
+    pub loss: LossConfig,
+    /// The augmentation.
+    pub augmentation: Augmentation,
+    /// The depth network.
+    pub depth_net: DepthNetConfig,
+    /// The pose network. `metres_per_unit` 0 means the data's mean displacement per pair, and 1 without
+    /// the speed loss.
+    pub pose_net: PoseNetConfig,
+    /// The flow decoder, which training alone has, and only where `loss.flow.weight` is above 0.
+    #[serde(default)]
+    pub flow_decoder: FlowDecoderConfig,
+}
+
+fn no_zoom() -> f32 {
+    1.0
+}
+
+/// What a kill or a power cut costs at most.
+fn checkpoint_minutes() -> f64 {
+    10.0
+}
+
+impl DataConfig {
+    /// Makes every path absolute, so that the run is gone on with and measured from any folder.
+    pub fn make_absolute(&mut self) {
+        // Every field by name: one that is added says whether it is a path.
+        let Self {
+            paths,
+            validation,
+            split,
+            validation_split,
+            camera_ahead_s: _,
+            camera: _,
+            learn: _,
+            sets,
+        } = self;
+        let mut all: Vec<&mut PathBuf> = paths.iter_mut().chain(validation).collect();
+        all.extend(split);
+        all.extend(validation_split);
+        for set in sets {
+            all.extend(set.paths.iter_mut().chain(&mut set.validation));
+            all.extend(&mut set.split);
+            all.extend(&mut set.validation_split);
+        }
+        for path in all {
+            *path = absolute(std::mem::take(path));
+        }
+    }
+}
+
+/// A path from the root. An empty one stays, and any one whose working directory is gone: opening it then says so.
+fn absolute(path: PathBuf) -> PathBuf {
+    std::path::absolute(&path).unwrap_or(path)
+}
+
+impl TrainConfig {
+    /// Makes every path absolute. The name of an embedded network is none.
+    pub fn make_absolute(&mut self) {
+        self.data.make_absolute();
+        if self.init_sha256.is_none() {
+            self.init = self.init.take().map(absolute);
+        }
+    }
+
+    /// The names that [`Self::with`] and [`Self::without`] take: parts of the depth network, then the terms
+    /// of the loss.
+    pub const TERMS: [&'static str; 9] = [
+        "hce",
+        "attention",
+        "aggregation",
+        "smoothness",
+        "speed",
+        "automask",
+        "affine",
+        "flow",
+        "moving",
+    ];
+
+    /// The metres that one unit of PoseNet's translation stands for where nothing else is said: the data's mean
+    /// displacement, so that the raw outputs stay near 1. Without the speed loss it is 1: nothing measured may
+    /// enter, not even by the start.
+    #[must_use]
+    pub fn first_unit(&self, mean_displacement_m: f64) -> f64 {
+        if self.loss.speed > 0.0 {
+            mean_displacement_m
+        } else {
+            1.0
+        }
+    }
+
+    /// Reads a TOML file.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::ConfigFile`] naming the line, or what [`Self::validate`] says.
+    pub fn read(path: &std::path::Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
+        let config: Self = toml::from_str(&text).map_err(|e| Error::ConfigFile {
+            path: path.to_owned(),
+            reason: e.to_string(),
+        })?;
+        config.validate()?;
+        Ok(config)
+    }
+
+    /// The configuration as TOML.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if a value has no TOML form.
+    pub fn to_toml(&self) -> Result<String, Error> {
+        toml::to_string_pretty(self).map_err(|e| Error::Config {
+            field: "config",
+            expected: "values that TOML can hold".into(),
+            found: e.to_string(),
+        })
+    }
+
+    /// Switches a part of the depth network or a term of the loss on by its name, as the paper has it unless
+    /// it is on already.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a name that is none of [`Self::TERMS`].
+    pub fn with(&mut self, term: &str) -> Result<(), Error> {
+        let net = &mut self.depth_net;
+        match known(term, "with")? {
+            "hce" => {
+                net.hce.get_or_insert_with(HceConfig::default);
+            }
+            "attention" => {
+                // Not the paper's product, which starts at a quarter of the feature: from scratch it cost 7 to 9 % of
+                // abs_rel at 1,000 steps (docs/BENCHMARKS.md).
+                net.attention.get_or_insert(AttentionConfig {
+                    form: AttentionForm::Residual,
+                    ..AttentionConfig::default()
+                });
+            }
+            "aggregation" => net.aggregation = true,
+            term => self.loss.with(term)?,
+        }
+        Ok(())
+    }
+
+    /// Switches a part of the depth network or a term of the loss off by its name. Without the speed term
+    /// nothing measured fixes the scale: the views then follow PoseNet alone.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a name that is none of [`Self::TERMS`].
+    pub fn without(&mut self, term: &str) -> Result<(), Error> {
+        match known(term, "without")? {
+            "hce" => self.depth_net.hce = None,
+            "attention" => self.depth_net.attention = None,
+            "aggregation" => self.depth_net.aggregation = false,
+            term => self.loss.without(term)?,
+        }
+        if self.loss.speed == 0.0 {
+            self.view_motion = ViewMotion::PoseNet;
+        }
+        Ok(())
+    }
+
+    /// Steps of the optimiser in a run whose epochs have so many.
+    #[must_use]
+    pub fn steps_of(&self, steps_an_epoch: usize) -> usize {
+        let of_epochs = self.epochs * steps_an_epoch;
+        self.steps.unwrap_or(of_epochs.max(self.min_steps))
+    }
+
+    /// What is learned from a data set, by its place in `data.sets`.
+    #[must_use]
+    pub fn learn(&self, set: usize) -> Learn {
+        let own = self.data.sets.get(set).map(|set| set.learn);
+        own.unwrap_or(self.data.learn)
+    }
+
+    /// Samples of known depth a step.
+    #[must_use]
+    pub fn depth_batch(&self) -> usize {
+        match self.depth_batch {
+            0 => self.batch,
+            own => own,
+        }
+    }
+
+    /// The size of the images of batch number `number` of those whose depth is known.
+    #[must_use]
+    pub fn size_of_depth_batch(&self, number: usize) -> InputSize {
+        let others = &self.augmentation.sizes;
+        match others.is_empty() || number.is_multiple_of(2) {
+            true => self.size,
+            false => others[number / 2 % others.len()],
+        }
+    }
+
+    /// Whether anything in training reads how the vehicle turned, not only how far it went.
+    #[must_use]
+    pub fn reads_rotation(&self) -> bool {
+        match self.view_motion {
+            ViewMotion::Vehicle => true,
+            ViewMotion::PoseNet | ViewMotion::Distance => {
+                self.loss.speed > 0.0 && self.loss.rotation > 0.0
+            }
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Config`] naming the first setting that means nothing.
+    pub fn validate(&self) -> Result<(), Error> {
+        let fail = |field, expected: &str, found: String| {
+            Err(Error::Config {
+                field,
+                expected: expected.into(),
+                found,
+            })
+        };
+        self.size.validate()?;
+        self.depth_net.validate()?;
+        self.pose_net.encoder.validate()?;
+        self.flow_decoder.validate()?;
+        self.loss.validate()?;
+        self.validate_sets()?;
+        let sets = 0..self.data.sets.len().max(1);
+        if self.depth_net.uncertainty && !sets.into_iter().any(|set| self.learn(set).from_depth()) {
+            let expected = "false where nothing is learned from known depth: the head has nothing else to learn from";
+            return fail("depth_net.uncertainty", expected, "true".into());
+        }
+        if self.batch == 0 {
+            return fail("batch", "at least 1", "0".into());
+        }
+        if self.accumulate == 0 {
+            return fail("accumulate", "at least 1", "0".into());
+        }
+        if self.steps.unwrap_or(self.epochs) == 0 {
+            return fail("steps", "at least 1", "0".into());
+        }
+        if !(self.learning_rate > 0.0 && self.learning_rate.is_finite()) {
+            return fail("learning_rate", "above 0", self.learning_rate.to_string());
+        }
+        if let Some(focal) = self.canonical_focal_px
+            && !(focal > 0.0 && focal.is_finite())
+        {
+            return fail("canonical_focal_px", "above 0", focal.to_string());
+        }
+        if !(0.0..=1.0).contains(&self.learning_rate_drop) {
+            let found = self.learning_rate_drop.to_string();
+            return fail("learning_rate_drop", "0 to 1", found);
+        }
+        if !(0.0..=0.5).contains(&self.validation_share) {
+            return fail(
+                "validation_share",
+                "0 to 0.5",
+                self.validation_share.to_string(),
+            );
+        }
+        let weights = [
+            ("clip_norm", self.clip_norm),
+            ("weight_decay", self.weight_decay),
+            ("min_speed_mps", self.min_speed_mps),
+            ("checkpoint_minutes", self.checkpoint_minutes),
+            ("frame_distance_m", self.frame_distance_m),
+            ("pose_net.metres_per_unit", self.pose_net.metres_per_unit),
+        ];
+        for (field, weight) in weights {
+            if !(weight >= 0.0 && weight.is_finite()) {
+                return fail(field, "0 or more", weight.to_string());
+            }
+        }
+        let zoom = self.augmentation.zoom;
+        if !(1.0..=8.0).contains(&zoom) {
+            return fail("augmentation.zoom", "1 to 8", zoom.to_string());
+        }
+        for size in &self.augmentation.sizes {
+            size.validate()?;
+        }
+        for (field, share) in [
+            ("augmentation.jitter", self.augmentation.jitter),
+            (
+                "augmentation.brightness",
+                f64::from(self.augmentation.brightness),
+            ),
+            ("augmentation.hue", f64::from(self.augmentation.hue) * 2.0),
+        ] {
+            if !(0.0..=1.0).contains(&share) {
+                return fail(field, "0 to 1", share.to_string());
+            }
+        }
+        // Without the speed term a run learns from images alone; and PoseNet would have no loss at all where
+        // the vehicle's motion synthesises the views.
+        if self.loss.speed == 0.0 && self.view_motion != ViewMotion::PoseNet {
+            let found = format!("{:?}", self.view_motion).to_lowercase();
+            return fail("view_motion", "posenet where loss.speed is 0", found);
+        }
+        if self.loss.affine > 0.0 && self.reprojection != Reprojection::Bidirectional {
+            let found = self.loss.affine.to_string();
+            return fail(
+                "loss.affine",
+                "0 where reprojection is not bidirectional: it compares both frames' depths",
+                found,
+            );
+        }
+        match (self.reprojection, self.frames.as_slice()) {
+            (_, []) => fail("frames", "at least one offset", "[]".into()),
+            (_, frames) if frames.contains(&0) => {
+                fail("frames", "offsets other than 0", format!("{frames:?}"))
+            }
+            (Reprojection::Bidirectional, frames) if frames != [1] => fail(
+                "frames",
+                "[1] for bidirectional reprojection",
+                format!("{frames:?}"),
+            ),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The term of this name.
+fn known(term: &str, field: &'static str) -> Result<&'static str, Error> {
+    let terms = TrainConfig::TERMS;
+    let found = terms.iter().find(|t| **t == term).copied();
+    found.ok_or_else(|| Error::Config {
+        field,
+        expected: format!("one of {}", terms.join(", ")),
+        found: term.to_owned(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_path_becomes_absolute() {
+        let set = DataSetConfig {
+            paths: vec!["c".into()],
+            validation: vec!["d".into()],
+            split: Some("e.txt".into()),
+            validation_split: Some("i.txt".into()),
+            ..DataSetConfig::default()
+        };
+        let mut data = DataConfig {
+            paths: vec!["a".into(), "/b".into()],
+            validation: vec!["f".into()],
+            split: Some("g.txt".into()),
+            validation_split: Some("h.txt".into()),
+            camera_ahead_s: None,
+            camera: "both".into(),
+            learn: Learn::default(),
+            sets: vec![set],
+        };
+        data.make_absolute();
+        let here = std::env::current_dir().unwrap();
+        assert_eq!(data.paths, [here.join("a"), "/b".into()]);
+        assert_eq!(data.validation, [here.join("f")]);
+        assert_eq!(data.split, Some(here.join("g.txt")));
+        assert_eq!(data.validation_split, Some(here.join("h.txt")));
+        assert_eq!(data.sets[0].validation_split, Some(here.join("i.txt")));
+        assert_eq!(data.sets[0].paths, [here.join("c")]);
+        assert_eq!(data.sets[0].validation, [here.join("d")]);
+        assert_eq!(data.sets[0].split, Some(here.join("e.txt")));
+    }
+
+    /// A run is moved with its paths; what the program carries has none.
+    #[test]
+    fn the_name_of_an_embedded_network_stays() {
+        let mut config = Preset::Tiny.config();
+        config.init = Some("street".into());
+        let mut path = config.clone();
+        path.make_absolute();
+        let here = std::env::current_dir().unwrap();
+        assert_eq!(path.init, Some(here.join("street")));
+        config.init_sha256 = Some("ab".repeat(32));
+        let mut name = config.clone();
+        name.make_absolute();
+        assert_eq!(name, config);
+        let text = config.to_toml().unwrap();
+        assert_eq!(toml::from_str::<TrainConfig>(&text).unwrap(), config);
+    }
+
+    /// A run from before the key was there is read as one that has it.
+    #[test]
+    fn checkpoints_come_every_ten_minutes_unless_said_otherwise() {
+        let config = Preset::Tiny.config();
+        assert_eq!(config.checkpoint_minutes, 10.0);
+        let text = config.to_toml().unwrap();
+        let older: String = text
+            .lines()
+            .filter(|line| !line.starts_with("checkpoint_minutes"))
+            .map(|line| format!("{line}\n"))
+            .collect();
+        assert_ne!(older, text);
+        assert_eq!(toml::from_str::<TrainConfig>(&older).unwrap(), config);
+        let mut config = config;
+        config.checkpoint_minutes = -1.0;
+        let error = config.validate().unwrap_err().to_string();
+        assert!(error.contains("`checkpoint_minutes`"), "{error}");
+    }
+
+    #[test]
+    fn parts_of_the_network_go_on_and_off_by_name() {
+        let start = Preset::Light.config();
+        let mut config = start.clone();
+        for term in TrainConfig::TERMS {
+            config.with(term).unwrap();
+        }
+        config.validate().unwrap();
+        let net = &config.depth_net;
+        assert!(net.hce.is_some() && net.attention.is_some() && net.aggregation);
+        for term in ["hce", "attention", "aggregation"] {
+            config.without(term).unwrap();
+        }
+        assert_eq!(config.depth_net, start.depth_net);
+        let error = config.with("hope").unwrap_err().to_string();
+        assert!(error.contains("hce, attention, aggregation"), "{error}");
+    }
+
+    /// A short drive gets the least steps, a long one its epochs, and whoever names a number that number.
+    #[test]
+    fn a_short_drive_has_enough_steps() {
+        let mut config = Preset::Light.config();
+        assert_eq!((config.epochs, config.min_steps), (20, 1200));
+        assert_eq!(config.steps_of(34), 1200);
+        assert_eq!(config.steps_of(340), 6800);
+        config.min_steps = 0;
+        assert_eq!(config.steps_of(34), 680);
+        config.steps = Some(5);
+        assert_eq!(config.steps_of(34), 5);
+    }
+
+    /// Without the speed term the views follow PoseNet: `without` sees to it, and whoever says otherwise
+    /// afterwards is told.
+    #[test]
+    fn without_speed_the_views_follow_posenet() {
+        let mut config = Preset::Tiny.config();
+        assert_ne!(config.view_motion, ViewMotion::PoseNet);
+        assert_eq!(config.first_unit(0.7), 0.7);
+        config.without("speed").unwrap();
+        assert_eq!(config.first_unit(0.7), 1.0, "nothing measured enters");
+        config.validate().unwrap();
+        for motion in [ViewMotion::Distance, ViewMotion::Vehicle] {
+            config.view_motion = motion;
+            let error = config.validate().unwrap_err();
+            let Error::Config { field, found, .. } = &error else {
+                panic!("{error}");
+            };
+            assert_eq!(*field, "view_motion");
+            assert_eq!(*found, format!("{motion:?}").to_lowercase());
+            assert!(error.to_string().contains("posenet where loss.speed is 0"));
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! Safetensors files: reading and writing.
+
+use std::collections::HashMap;
+use std::fs;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+
+use deepfusion_fs::Partial;
+use half::{bf16, f16};
+use safetensors::tensor::{Dtype, Metadata, SafeTensorError, TensorView};
+
+use super::{WeightTensor, Weights};
+use crate::NetworkError;
+
+/// What kind of file holds weights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FileKind {
+    /// A safetensors file.
+    Safetensors,
+    /// What `torch.save` writes.
+    PyTorch,
+}
+
+impl FileKind {
+    /// Told by content, not by name: PyTorch writes a zip archive ("PK"), before version 1.6 a bare pickle (0x80, protocol);
+    /// a safetensors file starts with the length of its JSON header, whose first byte stands at offset 8.
+    ///
+    /// # Errors
+    /// [`NetworkError::Io`] for a file that cannot be read, [`NetworkError::Format`] for one that is neither.
+    pub fn of(path: &Path) -> Result<Self, NetworkError> {
+        let mut start = [0_u8; 9];
+        let mut file = fs::File::open(path).map_err(|source| io_error(path, "open", source))?;
+        let mut filled = 0;
+        while filled < start.len() {
+            match file.read(&mut start[filled..]) {
+                Ok(0) => break,
+                Ok(n) => filled += n,
+                Err(source) => return Err(io_error(path, "read", source)),
+            }
+        }
+        if filled == start.len() && start[8] == b'{' {
+            return Ok(Self::Safetensors);
+        }
+        if start.starts_with(b"PK") || start[0] == 0x80 {
+            return Ok(Self::PyTorch);
+        }
+        let seen = if filled == 0 {
+            "the file is empty".to_owned()
+        } else {
+            format!("it starts with the bytes {:02x?}", &start[..filled])
+        };
+        Err(format_error(path, seen))
+    }
+}
+
+/// Reads every float tensor of a safetensors file. f64, f16 and bf16 become f32; integers are skipped.
+///
+/// # Errors
+/// [`NetworkError::Io`] for a file that cannot be read, [`NetworkError::Format`] for one that is no such file.
+pub fn read_safetensors(path: &Path) -> Result<Weights, NetworkError> {
+    read_safetensors_under(path, "")
+}
+
+/// The same for the tensors alone whose names start with `prefix`, without it; there may be none. The others are not even
+/// read: a checkpoint holds the optimiser's state beside the networks.
+///
+/// # Errors
+/// As [`read_safetensors`].
+pub fn read_safetensors_under(path: &Path, prefix: &str) -> Result<Weights, NetworkError> {
+    if FileKind::of(path)? == FileKind::PyTorch {
+        return Err(format_error(
+            path,
+            "a PyTorch file, where safetensors are expected",
+        ));
+    }
+    let file = fs::File::open(path).map_err(|source| io_error(path, "open", source))?;
+    let length = file
+        .metadata()
+        .map_err(|source| io_error(path, "read", source))?
+        .len();
+    safetensors_of(file, length, path, prefix)
+}
+
+/// The float tensors of a safetensors file that is in memory; `origin` is what error messages call it.
+///
+/// # Errors
+/// [`NetworkError::Format`] for bytes that are no such file.
+pub fn read_bytes(origin: &str, bytes: &[u8]) -> Result<Weights, NetworkError> {
+    let length = bytes.len() as u64;
+    safetensors_of(std::io::Cursor::new(bytes), length, Path::new(origin), "")
+}
+
+/// Of `length` bytes; `path` is what error messages call them.
+fn safetensors_of(
+    mut file: impl Read + Seek,
+    length: u64,
+    path: &Path,
+    prefix: &str,
+) -> Result<Weights, NetworkError> {
+    let failed = |source| io_error(path, "read", source);
+    let cut_off = || format_error(path, "the file ends within its header or its tensors");
+    if length < 8 {
+        return Err(cut_off());
+    }
+    let mut start = [0_u8; 8];
+    file.read_exact(&mut start).map_err(failed)?;
+    let data = u64::from_le_bytes(start).saturating_add(8);
+    if data > length {
+        return Err(cut_off());
+    }
+    let mut header = vec![0; (data - 8) as usize];
+    file.read_exact(&mut header).map_err(failed)?;
+    let header: Metadata =
+        serde_json::from_slice(&header).map_err(|e| format_error(path, e.to_string()))?;
+    if header.data_len() as u64 != length - data {
+        return Err(cut_off());
+    }
+    let mut weights = Weights::new(path.display().to_string());
+    if let Some(metadata) = header.metadata() {
+        weights.metadata = metadata.clone().into_iter().collect();
+    }
+    let mut bytes = Vec::new();
+    for name in header.offset_keys() {
+        let (Some(short), Some(info)) = (name.strip_prefix(prefix), header.info(&name)) else {
+            continue;
+        };
+        let (begin, end) = info.data_offsets;
+        file.seek(SeekFrom::Start(data + begin as u64))
+            .map_err(failed)?;
+        bytes.resize(end - begin, 0);
+        file.read_exact(&mut bytes).map_err(failed)?;
+        let values = match info.dtype {
+            Dtype::F32 => floats(&bytes, f32::from_le_bytes),
+            Dtype::F64 => floats(&bytes, |b| f64::from_le_bytes(b) as f32),
+            Dtype::F16 => floats(&bytes, |b| f16::from_le_bytes(b).to_f32()),
+            Dtype::BF16 => floats(&bytes, |b| bf16::from_le_bytes(b).to_f32()),
+            _ => continue,
+        };
+        let shape = info.shape.clone();
+        weights
+            .tensors
+            .insert(short.to_owned(), WeightTensor { shape, values });
+    }
+    Ok(weights)
+}
+
+fn floats<const N: usize>(bytes: &[u8], convert: impl Fn([u8; N]) -> f32) -> Vec<f32> {
+    let (chunks, _) = bytes.as_chunks::<N>();
+    chunks.iter().map(|chunk| convert(*chunk)).collect()
+}
+
+/// Writes the tensors as f32 to a safetensors file. The file appears under its name only when it is
+/// complete and on the disk.
+///
+/// # Errors
+/// [`NetworkError::Io`] naming the file; what was written of it is removed.
+pub fn write_safetensors(path: &Path, weights: &Weights) -> Result<(), NetworkError> {
+    let bytes: Vec<(&String, &WeightTensor, Vec<u8>)> = weights
+        .tensors
+        .iter()
+        .map(|(name, tensor)| {
+            let bytes = tensor.values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            (name, tensor, bytes)
+        })
+        .collect();
+    let mut views = Vec::with_capacity(bytes.len());
+    for (name, tensor, bytes) in &bytes {
+        let view = TensorView::new(Dtype::F32, tensor.shape.clone(), bytes)
+            .map_err(|e| format_error(path, format!("tensor `{name}`: {e}")))?;
+        views.push((name.as_str(), view));
+    }
+    let metadata: HashMap<String, String> = weights.metadata.clone().into_iter().collect();
+    let part = Partial::beside(path);
+    safetensors::serialize_to_file(views, Some(metadata), part.path())
+        .map_err(|error| match error {
+            SafeTensorError::IoError(source) => io_error(path, "write", source),
+            other => format_error(path, other.to_string()),
+        })
+        .and_then(|()| {
+            part.publish()
+                .map_err(|source| io_error(path, "write", source))
+        })
+}
+
+fn io_error(path: &Path, action: &'static str, source: std::io::Error) -> NetworkError {
+    NetworkError::Io {
+        path: path.to_owned(),
+        action,
+        source,
+    }
+}
+
+fn format_error(path: &Path, reason: impl Into<String>) -> NetworkError {
+    NetworkError::Format {
+        path: path.to_owned(),
+        reason: reason.into(),
+    }
+}

@@ -1,0 +1,80 @@
+use std::path::PathBuf;
+
+/// What can go wrong on the way from a network's name to metres.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Neither a path nor an embedded network's name.
+    #[error("{}: no such file or folder, and no embedded network has this name", model.display())]
+    NoSuchModel {
+        /// What was given.
+        model: PathBuf,
+        /// The names there are.
+        known: Vec<&'static str>,
+    },
+    /// Something that runs networks and cannot run this one.
+    #[error("engine `{engine}`: {reason}")]
+    Engine {
+        /// Its name.
+        engine: &'static str,
+        /// What it says.
+        reason: String,
+    },
+    /// An image's values are not as many as the network takes.
+    #[error("an image of {found} values, where the network takes {expected}")]
+    ImageSize {
+        /// As many as the network takes.
+        expected: usize,
+        /// As many as there were.
+        found: usize,
+    },
+    /// A packed network.
+    #[error(transparent)]
+    Weights(#[from] deepfusion_weights::Error),
+    /// The configuration, the run's folder, or the networks' weights.
+    #[error(transparent)]
+    Model(#[from] deepfusion_model::Error),
+    /// ONNX Runtime, or the model made for it.
+    #[error(transparent)]
+    Onnx(#[from] deepfusion_onnx::Error),
+}
+
+impl Error {
+    /// What an engine said.
+    #[must_use]
+    pub fn engine(engine: &'static str, reason: &dyn std::fmt::Display) -> Self {
+        Self::Engine {
+            engine,
+            reason: reason.to_string(),
+        }
+    }
+
+    /// What to do about it, in a line.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::NoSuchModel { known, .. } => Some(match known.as_slice() {
+                [] => "give the folder that `train`, `demo` or `weights import` wrote; this build has no embedded network: \
+                       train one with deepfusion train --data DRIVE"
+                    .into(),
+                known => format!(
+                    "give the folder that `train`, `demo` or `weights import` wrote, or an embedded network: {}",
+                    known.join(", ")
+                ),
+            }),
+            Self::Engine { .. } => {
+                Some("`--engine burn` runs every network on every device".into())
+            }
+            Self::ImageSize { .. } => Some("3 × height × width values of the network's size".into()),
+            Self::Weights(error) => error.hint(),
+            Self::Model(error) => error.hint(),
+            Self::Onnx(error) => error.hint(),
+        }
+    }
+}
+
+impl From<deepfusion_model::NetworkError> for Error {
+    fn from(error: deepfusion_model::NetworkError) -> Self {
+        Self::Model(error.into())
+    }
+}

@@ -1,0 +1,262 @@
+use std::fmt;
+use std::path::Path;
+use std::sync::Arc;
+
+use deepfusion_data::RgbImage;
+use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_infer::Precision;
+use deepfusion_model::weights::Weights;
+use deepfusion_model::{InputSize, LOG_SCALE_BOUNDS, StoredNetwork, TrainConfig};
+
+use crate::{
+    DepthRunner, Error, FusedRunner, ModelSource, NetworkOutput, Prediction, PreparedImage,
+    Preparer,
+};
+
+/// A trained depth network, ready for images. It belongs to one thread: another one asks for [`Self::another`].
+#[derive(Debug)]
+pub struct DepthEstimator {
+    config: Arc<TrainConfig>,
+    runner: Box<dyn DepthRunner>,
+    /// For input sizes beside the one trained with; none of a network that has no use for them.
+    others: Option<OtherSizes>,
+    /// Steps it was trained for.
+    pub step: usize,
+}
+
+/// Input sizes beside the one trained with, for which runners are kept: a camera has one.
+const SIZES_KEPT: usize = 3;
+
+/// Runners for other input sizes, made when they are asked for.
+struct OtherSizes {
+    make: Arc<MakeRunner>,
+    /// The one used last stands last.
+    made: Vec<(InputSize, Box<dyn DepthRunner>)>,
+}
+
+type MakeRunner = dyn Fn(InputSize) -> Result<Box<dyn DepthRunner>, Error> + Send + Sync;
+
+impl fmt::Debug for OtherSizes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("OtherSizes").finish_non_exhaustive()
+    }
+}
+
+impl OtherSizes {
+    fn runner(&mut self, size: InputSize) -> Result<&mut dyn DepthRunner, Error> {
+        let found = match self.made.iter().position(|(of, _)| *of == size) {
+            Some(place) => self.made.remove(place),
+            None => (size, (self.make)(size)?),
+        };
+        if self.made.len() == SIZES_KEPT {
+            self.made.remove(0);
+        }
+        self.made.push(found);
+        let last = self.made.len() - 1;
+        Ok(&mut *self.made[last].1)
+    }
+}
+
+impl DepthEstimator {
+    /// A network by its path (a run's folder, a checkpoint in it, a packed file) or by the name of an embedded one, in the
+    /// fused engine and f32.
+    ///
+    /// # Errors
+    /// As [`ModelSource::named`] and [`ModelSource::load`].
+    pub fn load(model: impl AsRef<Path>) -> Result<Self, Error> {
+        let network = ModelSource::named(model.as_ref())?.load(None)?;
+        Self::of(network, |config, weights| {
+            let runner = FusedRunner::new(config, weights, Precision::F32)?;
+            Ok::<_, Error>(Box::new(runner) as Box<dyn DepthRunner>)
+        })
+    }
+
+    /// Of a network wherever it is stored; `runner` makes what runs it of its configuration and weights.
+    ///
+    /// A network with a canonical focal length runs at the input size that fits an image ([`crate::fitting`]): its weights
+    /// are kept, and `runner` is asked again for each other size.
+    ///
+    /// # Errors
+    /// The runner's own.
+    pub fn of<E: fmt::Display>(
+        network: StoredNetwork,
+        runner: impl Fn(&TrainConfig, Weights) -> Result<Box<dyn DepthRunner>, E>
+        + Send
+        + Sync
+        + 'static,
+    ) -> Result<Self, E> {
+        let StoredNetwork {
+            config,
+            weights,
+            step,
+        } = network;
+        let config = Arc::new(config);
+        let kept = config.canonical_focal_px.map(|_| weights.clone());
+        let own = runner(&config, weights)?;
+        let others = kept.map(|weights| {
+            let of = Arc::clone(&config);
+            let make = move |size: InputSize| {
+                let config = TrainConfig {
+                    size,
+                    ..of.as_ref().clone()
+                };
+                runner(&config, weights.clone()).map_err(|e| Error::engine("other size", &e))
+            };
+            OtherSizes {
+                make: Arc::new(make),
+                made: Vec::new(),
+            }
+        });
+        Ok(Self {
+            runner: own,
+            others,
+            config,
+            step,
+        })
+    }
+
+    /// Another estimator for another thread: it shares the packed weights and has buffers of its own.
+    ///
+    /// # Errors
+    /// As [`DepthRunner::another`].
+    pub fn another(&self) -> Result<Self, Error> {
+        let others = self.others.as_ref().map(|others| OtherSizes {
+            make: Arc::clone(&others.make),
+            made: Vec::new(),
+        });
+        let mut another = Self {
+            config: Arc::clone(&self.config),
+            runner: self.runner.another()?,
+            others,
+            step: self.step,
+        };
+        if let (Some(to), Some(from)) = (&mut another.others, &self.others) {
+            for (size, runner) in &from.made {
+                to.made.push((*size, runner.another()?));
+            }
+        }
+        Ok(another)
+    }
+
+    /// What runs the network at the size trained with.
+    pub fn runner(&mut self) -> &mut dyn DepthRunner {
+        &mut *self.runner
+    }
+
+    /// The same, for keeps.
+    #[must_use]
+    pub fn into_runner(self) -> Box<dyn DepthRunner> {
+        self.runner
+    }
+
+    /// What reports call that which runs the network.
+    #[must_use]
+    pub fn engine(&self) -> &'static str {
+        self.runner.name()
+    }
+
+    /// Whether it says how sure it is of each pixel ([`Prediction::sigma`]).
+    #[must_use]
+    pub fn knows_uncertainty(&self) -> bool {
+        self.config.depth_net.uncertainty && self.runner.tells_uncertainty()
+    }
+
+    /// The run's configuration.
+    #[must_use]
+    pub fn config(&self) -> &TrainConfig {
+        &self.config
+    }
+
+    /// The camera the network learned with, at the size of its images; `None` for imported weights.
+    #[must_use]
+    pub fn training_camera(&self) -> Option<Intrinsics> {
+        self.config.camera
+    }
+
+    /// What makes images this network's input.
+    #[must_use]
+    pub fn preparer(&self) -> Preparer {
+        Preparer {
+            size: self.config.size,
+            training_camera: self.config.camera,
+            canonical_focal_px: self.config.canonical_focal_px,
+        }
+    }
+
+    /// The metric depth of an image. `camera` is the image's own; an unknown one is taken for the one trained with, and
+    /// the metres are then as right as that guess.
+    ///
+    /// # Errors
+    /// As [`DepthRunner::run`].
+    pub fn estimate(
+        &mut self,
+        image: &RgbImage,
+        camera: Option<&Intrinsics>,
+    ) -> Result<Prediction, Error> {
+        self.predict(image, camera, true, true)
+    }
+
+    /// The same as metres at the image's own size, in place of what `depth` holds.
+    ///
+    /// # Errors
+    /// As [`DepthRunner::run`].
+    pub fn estimate_into(
+        &mut self,
+        image: &RgbImage,
+        camera: Option<&Intrinsics>,
+        depth: &mut DepthMap,
+    ) -> Result<(), Error> {
+        self.estimate(image, camera)?.depth_into(depth);
+        Ok(())
+    }
+
+    /// As [`Self::estimate`], with the correction for another focal length and the cut to the aspect ratio trained with as
+    /// the caller wants them: [`Preparer::prepare`], then [`Self::infer`].
+    ///
+    /// # Errors
+    /// As [`DepthRunner::run`].
+    pub fn predict(
+        &mut self,
+        image: &RgbImage,
+        camera: Option<&Intrinsics>,
+        focal_correction: bool,
+        crop: bool,
+    ) -> Result<Prediction, Error> {
+        let preparer = self.preparer();
+        self.infer(&preparer.prepare(image, camera, focal_correction, crop))
+    }
+
+    /// Runs the network on an image that [`Self::preparer`] prepared, on any thread.
+    ///
+    /// # Errors
+    /// As [`DepthRunner::run`].
+    pub fn infer(&mut self, image: &PreparedImage) -> Result<Prediction, Error> {
+        let runner = match &mut self.others {
+            Some(others) if image.size != self.config.size => others.runner(image.size)?,
+            _ => &mut *self.runner,
+        };
+        let mut output = NetworkOutput::default();
+        runner.run(&image.input, &mut output)?;
+        let NetworkOutput {
+            mut disparity,
+            mut log_scale,
+        } = output;
+        for d in &mut disparity {
+            *d = (f64::from(*d) / image.focal_factor) as f32;
+        }
+        // As the loss saw it: what lies beyond has never been learned.
+        let (low, high) = LOG_SCALE_BOUNDS;
+        for log_scale in log_scale.iter_mut().flatten() {
+            *log_scale = log_scale.clamp(low as f32, high as f32);
+        }
+        Ok(Prediction {
+            disparity,
+            log_scale,
+            width: image.size.width,
+            height: image.size.height,
+            window: image.window,
+            image_size: image.image_size,
+            focal_factor: image.focal_factor,
+        })
+    }
+}

@@ -1,0 +1,84 @@
+use std::time::Duration;
+
+use deepfusion_geometry::DepthRange;
+use deepfusion_infer::{Engine, Precision};
+use deepfusion_model::weights::Weights;
+use deepfusion_model::{TrainConfig, depth_graph_with_uncertainty};
+
+use crate::runner::check_image;
+use crate::{DepthRunner, Error, NetworkOutput, metric_disparity};
+
+/// The network laid out and packed once for this processor.
+///
+/// In f32 its sigmoid differs from the training framework's by rounding alone (below 1e-4 in the tests); in bf16 by what
+/// eight bits of mantissa lose.
+#[derive(Debug)]
+pub struct FusedRunner {
+    engine: Engine,
+    precision: Precision,
+    range: DepthRange,
+    uncertainty: bool,
+}
+
+impl FusedRunner {
+    /// The network of a configuration with these weights.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for weights of another network, [`Error::Engine`] where the processor has no bf16.
+    pub fn new(
+        config: &TrainConfig,
+        weights: Weights,
+        precision: Precision,
+    ) -> Result<Self, Error> {
+        let graph = depth_graph_with_uncertainty(&config.depth_net, weights)?;
+        let engine = Engine::new(graph, config.size.width, config.size.height, precision);
+        Ok(Self {
+            engine: engine.map_err(|e| Error::engine("fused", &e))?,
+            precision,
+            range: config.depth_net.range,
+            uncertainty: config.depth_net.uncertainty,
+        })
+    }
+
+    fn values(&self) -> usize {
+        let (width, height) = self.engine.size();
+        3 * width * height
+    }
+}
+
+impl DepthRunner for FusedRunner {
+    fn name(&self) -> &'static str {
+        match self.precision {
+            Precision::F32 => "fused",
+            Precision::Bf16 => "fused-bf16",
+        }
+    }
+
+    fn run(&mut self, image: &[f32], output: &mut NetworkOutput) -> Result<(), Error> {
+        check_image(image, self.values())?;
+        self.engine.run(image);
+        self.engine.read_output(0, &mut output.disparity);
+        metric_disparity(self.range, &mut output.disparity);
+        match self.uncertainty {
+            true => {
+                let log_scale = output.log_scale.get_or_insert_default();
+                self.engine.read_output(1, log_scale);
+            }
+            false => output.log_scale = None,
+        }
+        Ok(())
+    }
+
+    fn another(&self) -> Result<Box<dyn DepthRunner>, Error> {
+        let engine = self.engine.another();
+        Ok(Box::new(Self {
+            engine: engine.map_err(|e| Error::engine("fused", &e))?,
+            ..*self
+        }))
+    }
+
+    fn profile(&mut self, image: &[f32]) -> Option<Vec<(String, Duration)>> {
+        check_image(image, self.values()).ok()?;
+        Some(self.engine.profile(image))
+    }
+}

@@ -1,0 +1,38 @@
+//! Trained depth networks that run, without the framework that trains them: image and camera in, metres out.
+//!
+//! ```no_run
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! use deepfusion_runtime::DepthEstimator;
+//!
+//! let mut estimator = DepthEstimator::load("street")?;
+//! let photo = deepfusion_data::load_photo("street.jpg".as_ref())?;
+//! let depth = estimator.estimate(&photo.image, photo.intrinsics.as_ref())?.depth();
+//! println!("the middle is {:.1} m away", depth.data[depth.data.len() / 2]);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! [`ModelSource`] says which network is meant, [`DepthEstimator`] runs it over a [`DepthRunner`]: the fused engine
+//! ([`FusedRunner`]), ONNX Runtime ([`OrtRunner`]), or whatever else gives disparities. Every thread has an estimator of its
+//! own ([`DepthEstimator::another`]); they share one copy of the packed weights, and nothing is locked.
+
+mod error;
+mod estimator;
+mod fused;
+mod layer_maps;
+mod ort;
+mod prediction;
+mod prepare;
+mod runner;
+mod source;
+
+pub use deepfusion_infer::Precision;
+pub use error::Error;
+pub use estimator::DepthEstimator;
+pub use fused::FusedRunner;
+pub use layer_maps::{FeatureMap, LayerMaps};
+pub use ort::OrtRunner;
+pub use prediction::Prediction;
+pub use prepare::{PreparedImage, Preparer, fitting};
+pub use runner::{DepthRunner, NetworkOutput, metric_disparity};
+pub use source::{ModelSource, embedded, embedded_names, unpacked};

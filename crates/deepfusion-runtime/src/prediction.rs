@@ -1,0 +1,103 @@
+use deepfusion_geometry::{DepthMap, Intrinsics};
+
+/// The metric depth of an image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// Metric disparity, 1/m, at network size, row by row; focal correction applied.
+    pub disparity: Vec<f32>,
+    /// ln b at network size, b the Laplace scale of the error of ln depth; of a network that says so.
+    pub log_scale: Option<Vec<f32>>,
+    /// Width of `disparity`.
+    pub width: usize,
+    /// Height of `disparity`.
+    pub height: usize,
+    /// The part of the image that was looked at: x, y, width, height.
+    pub window: [u32; 4],
+    /// Size of the whole image.
+    pub image_size: [u32; 2],
+    /// What depth was multiplied by for another focal length than the one trained with.
+    pub focal_factor: f64,
+}
+
+impl Prediction {
+    /// Multiplies depth by `factor`.
+    pub fn scale_depth(&mut self, factor: f64) {
+        let disparity_factor = (1.0 / factor) as f32;
+        for disparity in &mut self.disparity {
+            *disparity *= disparity_factor;
+        }
+    }
+
+    /// Depth at the network's size, and the camera that sees it so; `camera` is the whole image's.
+    #[must_use]
+    pub fn network_depth(&self, camera: &Intrinsics) -> (DepthMap, Intrinsics) {
+        let [x, y, w, h] = self.window;
+        let depth = DepthMap {
+            width: self.width,
+            height: self.height,
+            data: self.disparity.iter().map(|d| 1.0 / d).collect(),
+        };
+        let k = camera.cropped(x, y, w, h);
+        (depth, k.resized(self.width as u32, self.height as u32))
+    }
+
+    /// Depth at the image's own size: disparity is enlarged (bilinear, half-pixel centres), then
+    /// inverted; 0 outside the window that was looked at.
+    #[must_use]
+    pub fn depth(&self) -> DepthMap {
+        let mut depth = DepthMap::empty(0, 0);
+        self.depth_into(&mut depth);
+        depth
+    }
+
+    /// The same in place of what `depth` holds, whatever its size.
+    pub fn depth_into(&self, depth: &mut DepthMap) {
+        self.enlarge(&self.disparity, |disparity| 1.0 / disparity, depth);
+    }
+
+    /// Standard deviation of depth in metres at the image's own size, √2·b·depth, 0 outside the window; `None` of a network
+    /// that does not say how sure it is. It is what the network expects, and not calibrated.
+    #[must_use]
+    pub fn sigma(&self) -> Option<DepthMap> {
+        self.sigma_of(&self.depth())
+    }
+
+    /// As [`Self::sigma`], where [`Self::depth`] is at hand.
+    #[must_use]
+    pub fn sigma_of(&self, depth: &DepthMap) -> Option<DepthMap> {
+        let relative = |log_scale: f32| std::f32::consts::SQRT_2 * log_scale.exp();
+        let mut sigma = DepthMap::empty(0, 0);
+        self.enlarge(self.log_scale.as_ref()?, relative, &mut sigma);
+        for (relative, depth) in sigma.data.iter_mut().zip(&depth.data) {
+            *relative *= depth;
+        }
+        Some(sigma)
+    }
+
+    /// Values at the image's own size, bilinear; `of` each in the window, 0 outside.
+    fn enlarge(&self, values: &[f32], of: impl Fn(f32) -> f32, map: &mut DepthMap) {
+        let [x0, y0, w, h] = self.window.map(|v| v as usize);
+        let [width, height] = self.image_size.map(|v| v as usize);
+        (map.width, map.height) = (width, height);
+        map.data.clear();
+        map.data.resize(width * height, 0.0);
+        let axis = |i: usize, to: usize, from: usize| {
+            let p = (i as f32 + 0.5) * from as f32 / to as f32 - 0.5;
+            let p = p.clamp(0.0, (from - 1) as f32);
+            let low = (p as usize).min(from.saturating_sub(2));
+            (low, (low + 1).min(from - 1), p - low as f32)
+        };
+        let columns: Vec<_> = (0..w).map(|x| axis(x, w, self.width)).collect();
+        for y in 0..h {
+            let (top, bottom, fy) = axis(y, h, self.height);
+            let (top, bottom) = (top * self.width, bottom * self.width);
+            let row = &mut map.data[(y0 + y) * self.image_size[0] as usize + x0..][..w];
+            for (depth, &(left, right, fx)) in row.iter_mut().zip(&columns) {
+                let d = values;
+                let upper = d[top + left] + (d[top + right] - d[top + left]) * fx;
+                let lower = d[bottom + left] + (d[bottom + right] - d[bottom + left]) * fx;
+                *depth = of(upper + (lower - upper) * fy);
+            }
+        }
+    }
+}

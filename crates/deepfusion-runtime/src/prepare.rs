@@ -1,0 +1,213 @@
+use deepfusion_data::{RgbImage, to_network_input};
+use deepfusion_geometry::Intrinsics;
+use deepfusion_model::InputSize;
+
+/// How far two aspect ratios may differ and still count as the same camera's.
+const ASPECT_TOLERANCE: f64 = 0.02;
+
+/// Makes a network's input of images. It knows the network's size and camera but not the network, so that any
+/// thread can prepare images while another one computes.
+#[derive(Debug, Clone, Copy)]
+pub struct Preparer {
+    /// Size of the network's input in training.
+    pub size: InputSize,
+    /// The camera the network learned with, at the size of its images; `None` for imported weights.
+    pub training_camera: Option<Intrinsics>,
+    /// The focal length in pixels that the network's depth is of, where it learned with many cameras.
+    pub canonical_focal_px: Option<f64>,
+}
+
+/// An image as the network takes it.
+#[derive(Debug, Clone)]
+pub struct PreparedImage {
+    /// 3×H×W at network size, in [0, 1], channel by channel.
+    pub input: Vec<f32>,
+    /// That size.
+    pub size: InputSize,
+    /// The part of the image that is looked at: x, y, width, height.
+    pub window: [u32; 4],
+    /// Size of the whole image.
+    pub image_size: [u32; 2],
+    /// What depth will be multiplied by for another focal length than the one trained with.
+    pub focal_factor: f64,
+}
+
+impl Preparer {
+    /// Resizes an image. With its camera, depth will be corrected for a focal length other than the one trained with,
+    /// unless `focal_correction` is off.
+    ///
+    /// A network with a canonical focal length has learned with cameras of many kinds: it is shown the whole image, at the
+    /// input size that fits the image's aspect ratio ([`fitting`]). To another, an image of another aspect ratio than the one
+    /// trained with is cut about its principal point, or stretched, as `crop` says.
+    #[must_use]
+    pub fn prepare(
+        &self,
+        image: &RgbImage,
+        camera: Option<&Intrinsics>,
+        focal_correction: bool,
+        crop: bool,
+    ) -> PreparedImage {
+        let (size, window) = match self.canonical_focal_px {
+            Some(_) => {
+                let (width, height) = image.dimensions();
+                (fitting(self.size, width, height), [0, 0, width, height])
+            }
+            None => (self.size, self.window(image, camera, crop)),
+        };
+        let camera_that_counts = camera.filter(|_| focal_correction);
+        PreparedImage {
+            input: to_network_input(image, window, size.width as u32, size.height as u32),
+            size,
+            window,
+            image_size: [image.width(), image.height()],
+            focal_factor: self.focal_factor(camera_that_counts, window, size),
+        }
+    }
+
+    /// What depth must be multiplied by for an image of this camera, at network size: f_y(test)/f_y(train) (SPEC 5), or
+    /// f_y(test)/f_c of a network with a canonical focal length. An unknown camera is taken for the one trained with.
+    fn focal_factor(&self, camera: Option<&Intrinsics>, window: [u32; 4], size: InputSize) -> f64 {
+        let at =
+            |k: Intrinsics, size: InputSize| k.resized(size.width as u32, size.height as u32).fy;
+        let [x, y, w, h] = window;
+        let test = camera.map(|k| at(k.cropped(x, y, w, h), size));
+        let train = self.training_camera.map(|k| at(k, self.size));
+        let Some(canonical) = self.canonical_focal_px else {
+            return match (test.or(train), train) {
+                (Some(test), Some(train)) => test / train,
+                _ => 1.0,
+            };
+        };
+        // The one trained with, of as many degrees from left to right.
+        let assumed = train.map(|fy| fy * size.width as f64 / self.size.width as f64);
+        test.or(assumed).map_or(1.0, |test| test / canonical)
+    }
+
+    /// The part of the image with the aspect ratio trained with: all of it where they agree, else cut
+    /// about the principal point.
+    fn window(&self, image: &RgbImage, camera: Option<&Intrinsics>, crop: bool) -> [u32; 4] {
+        let (width, height) = image.dimensions();
+        let whole = [0, 0, width, height];
+        let Some(train) = self.training_camera else {
+            return whole;
+        };
+        let wanted = f64::from(train.width) / f64::from(train.height);
+        let aspect = f64::from(width) / f64::from(height);
+        if !crop || (aspect / wanted - 1.0).abs() < ASPECT_TOLERANCE {
+            return whole;
+        }
+        let cut = |size: u32, keep: f64, centre: f64, share: f64| {
+            let keep = (keep.round() as u32).clamp(1, size);
+            let start = (centre - share * f64::from(keep)).round();
+            (start.clamp(0.0, f64::from(size - keep)) as u32, keep)
+        };
+        if aspect < wanted {
+            // Too tall: the principal row keeps its place in the image.
+            let centre = camera.map_or(f64::from(height) / 2.0, |k| k.cy);
+            let share = train.cy / f64::from(train.height);
+            let (y, h) = cut(height, f64::from(width) / wanted, centre, share);
+            [0, y, width, h]
+        } else {
+            let centre = camera.map_or(f64::from(width) / 2.0, |k| k.cx);
+            let share = train.cx / f64::from(train.width);
+            let (x, w) = cut(width, f64::from(height) * wanted, centre, share);
+            [x, 0, w, height]
+        }
+    }
+}
+
+/// The input size for an image of a network that has learned with many cameras: of all sizes that the encoder takes, the
+/// one that stretches the image least and has about as many pixels as the one trained with. `trained` where it fits.
+#[must_use]
+pub fn fitting(trained: InputSize, width: u32, height: u32) -> InputSize {
+    let aspect = f64::from(width) / f64::from(height);
+    let pixels = |size: InputSize| (size.width * size.height) as f64;
+    let cost = |size: InputSize| {
+        let stretched = (size.width as f64 / size.height as f64 / aspect).ln().abs();
+        stretched + 0.5 * (pixels(size) / pixels(trained)).ln().abs()
+    };
+    let sides = |most: usize| (64..=most).step_by(32);
+    let longest = 2 * trained.width.max(trained.height);
+    sides(longest)
+        .flat_map(|width| sides(longest).map(move |height| InputSize { width, height }))
+        .chain([trained])
+        .min_by(|a, b| cost(*a).total_cmp(&cost(*b)))
+        .unwrap_or(trained)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn size(width: usize, height: usize) -> InputSize {
+        InputSize { width, height }
+    }
+
+    #[test]
+    fn the_size_fits_the_image() {
+        let trained = size(320, 96);
+        for (image, expected) in [
+            ((1242, 375), trained),
+            ((640, 192), trained),
+            ((1920, 1080), size(224, 128)),
+            ((640, 480), size(192, 160)),
+            ((1000, 500), size(256, 128)),
+            ((1080, 1920), size(128, 224)),
+            ((9000, 300), size(640, 64)),
+        ] {
+            assert_eq!(fitting(trained, image.0, image.1), expected, "{image:?}");
+        }
+        assert_eq!(fitting(size(640, 192), 640, 480), size(384, 288));
+    }
+
+    /// A wall 10 m away is 10 m away, whatever the lens and the picture's shape: the factor is the focal length at the
+    /// size that the network sees.
+    #[test]
+    fn the_factor_is_that_of_the_fitted_size() {
+        let preparer = Preparer {
+            size: size(320, 96),
+            training_camera: Some(Intrinsics {
+                fx: 230.4,
+                fy: 230.4,
+                cx: 159.5,
+                cy: 47.5,
+                width: 320,
+                height: 96,
+            }),
+            canonical_focal_px: Some(185.0),
+        };
+        let camera = Intrinsics {
+            fx: 585.0,
+            fy: 585.0,
+            cx: 320.0,
+            cy: 240.0,
+            width: 640,
+            height: 480,
+        };
+        let image = RgbImage::new(640, 480);
+        for crop in [true, false] {
+            let known = preparer.prepare(&image, Some(&camera), true, crop);
+            assert_eq!(
+                (known.size, known.window),
+                (size(192, 160), [0, 0, 640, 480])
+            );
+            assert_eq!(known.input.len(), 3 * 192 * 160);
+            assert!((known.focal_factor - 585.0 / 3.0 / 185.0).abs() < 1e-9);
+        }
+        let unknown = preparer.prepare(&image, None, true, true);
+        assert!((unknown.focal_factor - 230.4 * 0.6 / 185.0).abs() < 1e-9);
+        let uncorrected = preparer.prepare(&image, Some(&camera), false, true);
+        assert_eq!(uncorrected.focal_factor, unknown.focal_factor);
+        // A network of one camera cuts.
+        let own = Preparer {
+            canonical_focal_px: None,
+            ..preparer
+        };
+        let cut = own.prepare(&image, Some(&camera), true, true);
+        assert_eq!(
+            (cut.size, cut.window[2..].to_vec()),
+            (size(320, 96), vec![640, 192])
+        );
+        assert!((cut.focal_factor - 0.5 * 585.0 / 230.4).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,141 @@
+//! Which trained network is meant: a path, or the name of one that the program carries.
+
+use std::path::{Path, PathBuf};
+
+use deepfusion_model::{CheckpointKind, RunFolder, StoredNetwork};
+use deepfusion_weights::{DEFAULT, Shipped};
+
+use crate::Error;
+
+/// Where a trained depth network comes from.
+#[derive(Debug)]
+pub enum ModelSource {
+    /// A run's folder, or a checkpoint in it.
+    Run {
+        /// As it was given.
+        given: PathBuf,
+        /// The folder.
+        folder: RunFolder,
+        /// The checkpoint meant: the one given, or the one the folder prefers.
+        kind: CheckpointKind,
+    },
+    /// A network without a run: an embedded one by its name, or a packed file with its card beside it.
+    Packed {
+        /// As it was given.
+        given: PathBuf,
+        /// The network.
+        network: Box<Shipped>,
+    },
+}
+
+impl ModelSource {
+    /// The network that is meant where none is named; `None` where this build has none.
+    ///
+    /// # Errors
+    /// As [`deepfusion_weights::find`] for one that is there.
+    pub fn embedded_default() -> Result<Option<Self>, Error> {
+        let network = embedded(Path::new(DEFAULT))?;
+        Ok(network.map(|network| Self::Packed {
+            given: DEFAULT.into(),
+            network,
+        }))
+    }
+
+    /// What a path or a name says: a path that is there comes first, then an embedded network's name.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchModel`] for neither; [`RunFolder::open`]'s and [`Shipped::read`]'s for a path that holds no network.
+    pub fn named(model: &Path) -> Result<Self, Error> {
+        let given = model.to_owned();
+        if Shipped::is_at(model) {
+            let network = Box::new(Shipped::read(model)?);
+            return Ok(Self::Packed { given, network });
+        }
+        // A checkpoint that is named and not there is reported as one: its folder may be a run.
+        if !model.exists() && !names_a_checkpoint(model) {
+            return match embedded(model)? {
+                Some(network) => Ok(Self::Packed { given, network }),
+                None => Err(Error::NoSuchModel {
+                    model: given,
+                    known: embedded_names(),
+                }),
+            };
+        }
+        let (folder, kind) = RunFolder::open(model)?;
+        let kind = kind.unwrap_or_else(|| folder.preferred());
+        Ok(Self::Run {
+            given,
+            folder,
+            kind,
+        })
+    }
+
+    /// As it was given: a path, or a name.
+    #[must_use]
+    pub fn given(&self) -> &Path {
+        match self {
+            Self::Run { given, .. } | Self::Packed { given, .. } => given,
+        }
+    }
+
+    /// The run's folder, where there is one.
+    #[must_use]
+    pub fn folder(&self) -> Option<&Path> {
+        match self {
+            Self::Run { folder, .. } => Some(folder.path()),
+            Self::Packed { .. } => None,
+        }
+    }
+
+    /// Its configuration and weights; `set` names one of the data sets it learned from, where it learned several.
+    ///
+    /// # Errors
+    /// As [`StoredNetwork::of_checkpoint`] and [`StoredNetwork::packed`].
+    pub fn load(&self, set: Option<&str>) -> Result<StoredNetwork, deepfusion_model::Error> {
+        match self {
+            Self::Run { folder, kind, .. } => StoredNetwork::of_checkpoint(folder, *kind, set),
+            Self::Packed { network, .. } => unpacked(network, set),
+        }
+    }
+
+    /// SHA-256 of a packed network's weights; none of a run's, whose checkpoints change.
+    #[must_use]
+    pub fn packed_sha256(&self) -> Option<&str> {
+        match self {
+            Self::Run { .. } => None,
+            Self::Packed { network, .. } => Some(&network.card.sha256),
+        }
+    }
+}
+
+/// The embedded network that a path names which is not there, if it is the name of one.
+///
+/// # Errors
+/// As [`deepfusion_weights::find`] for one that is there.
+pub fn embedded(model: &Path) -> Result<Option<Box<Shipped>>, deepfusion_weights::Error> {
+    let name = deepfusion_weights::names().find(|name| Path::new(name) == model);
+    let network = name.map(deepfusion_weights::find).transpose()?;
+    Ok(network.map(Box::new))
+}
+
+/// The names of the embedded networks.
+#[must_use]
+pub fn embedded_names() -> Vec<&'static str> {
+    deepfusion_weights::names().collect()
+}
+
+/// A packed network's configuration and weights; `set` as in [`ModelSource::load`].
+///
+/// # Errors
+/// As [`StoredNetwork::packed`].
+pub fn unpacked(
+    network: &Shipped,
+    set: Option<&str>,
+) -> Result<StoredNetwork, deepfusion_model::Error> {
+    let Shipped { card, bytes } = network;
+    StoredNetwork::packed(&card.name, card.config.clone(), bytes, card.steps, set)
+}
+
+fn names_a_checkpoint(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e == "safetensors")
+}

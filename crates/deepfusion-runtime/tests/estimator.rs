@@ -1,0 +1,117 @@
+//! Estimators of one network, on one thread and on many.
+
+use std::error::Error;
+use std::path::Path;
+
+use deepfusion_data::RgbImage;
+use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_runtime::{DepthEstimator, DepthRunner, Error as RuntimeError, ModelSource};
+use rayon::prelude::*;
+
+type Result<T = ()> = std::result::Result<T, Box<dyn Error>>;
+
+/// A picture with something in it.
+fn picture(width: u32, height: u32, seed: u32) -> RgbImage {
+    RgbImage::from_fn(width, height, |x, y| {
+        let wave = |k: u32| ((x * k + y * 3 + seed * 17) % 251) as u8;
+        image::Rgb([wave(1), wave(2), wave(5)])
+    })
+}
+
+fn camera(width: u32, height: u32) -> Intrinsics {
+    Intrinsics::centred(0.6 * f64::from(width), (width, height))
+}
+
+fn tiny() -> Result<DepthEstimator> {
+    Ok(DepthEstimator::load("tiny")?)
+}
+
+#[test]
+fn another_estimator_gives_the_same_bits() -> Result {
+    let mut first = tiny()?;
+    // Its own size, and one that is made when it is asked for.
+    for (width, height) in [(640, 192), (320, 240)] {
+        let (image, k) = (picture(width, height, 1), camera(width, height));
+        let expected = first.estimate(&image, Some(&k))?;
+        let mut second = first.another()?;
+        // What it saw before leaves no trace.
+        second.estimate(&picture(width, height, 9), Some(&k))?;
+        assert_eq!(second.estimate(&image, Some(&k))?, expected);
+    }
+    Ok(())
+}
+
+/// Each task of a pool has an estimator of its own, whose work goes to the same pool. With one estimator behind a lock, a
+/// thread that waits for its own parallel work takes another task, which waits for the lock: for ever.
+#[test]
+fn tasks_of_a_pool_may_all_predict() -> Result {
+    let first = tiny()?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build()?;
+    let k = camera(160, 96);
+    let expected: Vec<_> = (0..8)
+        .map(|seed| {
+            Ok(first
+                .another()?
+                .estimate(&picture(160, 96, seed), Some(&k))?)
+        })
+        .collect::<Result<_>>()?;
+    let found: Vec<_> = pool.install(|| {
+        let tasks = (0..8_u32).into_par_iter().map_init(
+            || first.another(),
+            |estimator, seed| match estimator {
+                Ok(estimator) => estimator.estimate(&picture(160, 96, seed), Some(&k)).ok(),
+                Err(_) => None,
+            },
+        );
+        tasks.collect()
+    });
+    assert!(found.into_iter().eq(expected.into_iter().map(Some)));
+    Ok(())
+}
+
+#[test]
+fn a_buffer_is_used_again_whatever_it_held() -> Result {
+    let mut estimator = tiny()?;
+    let mut depth = DepthMap::empty(3, 5);
+    for (width, height) in [(640, 192), (160, 96), (320, 96)] {
+        let (image, k) = (picture(width, height, 2), camera(width, height));
+        estimator.estimate_into(&image, Some(&k), &mut depth)?;
+        let expected = estimator.estimate(&image, Some(&k))?.depth();
+        assert_eq!(
+            (depth.width, depth.height),
+            (width as usize, height as usize)
+        );
+        assert!(depth.data == expected.data);
+        assert!(
+            depth
+                .data
+                .iter()
+                .all(|metres| *metres > 0.0 && metres.is_finite())
+        );
+    }
+    Ok(())
+}
+
+#[test]
+fn an_image_of_another_size_is_refused() -> Result {
+    let mut estimator = tiny()?;
+    let runner: &mut dyn DepthRunner = estimator.runner();
+    let error = runner.disparity(&[0.5; 12]).unwrap_err();
+    assert!(
+        matches!(error, RuntimeError::ImageSize { found: 12, .. }),
+        "{error}"
+    );
+    assert!(error.hint().is_some());
+    Ok(())
+}
+
+#[test]
+fn a_name_that_is_none_says_which_there_are() {
+    let error = ModelSource::named(Path::new("no-such-network")).unwrap_err();
+    assert!(error.to_string().contains("no-such-network"), "{error}");
+    assert!(error.hint().is_some_and(|hint| hint.contains("street")));
+    // A folder that is no run.
+    let folder = tempfile::tempdir().unwrap();
+    let error = DepthEstimator::load(folder.path()).unwrap_err();
+    assert!(error.hint().is_some(), "{error}");
+}

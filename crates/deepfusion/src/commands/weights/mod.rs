@@ -1,6 +1,0 @@
-//! `deepfusion weights …`: what is embedded, what can be brought in, and how a run becomes a file to embed.
-
-mod figures;
-pub mod import;
-pub mod list;
-pub mod pack;

@@ -1,0 +1,117 @@
+//! Metric depth from one camera and a speed signal.
+//!
+//! DeepFusion learns depth in metres from the video of a vehicle that knows its speed, without depth labels, and turns each
+//! image into metres, a point cloud and 3D targets. This crate is the library; the command `deepfusion` is built on it.
+//!
+//! # From an image to metres
+//!
+//! A network comes with the library. It learned from simulated streets alone, so its weights carry no licence but this
+//! project's. [`DepthEstimator`] runs it, or a network that you trained.
+//!
+//! ```
+//! use deepfusion::{DepthEstimator, sim};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let street = sim::Simulation::new(&sim::SimConfig { frames: 1, ..Default::default() })?;
+//! let (image, camera) = (street.frame(0).rgb, street.intrinsics()); // or data::load_photo("street.jpg")
+//! let mut estimator = DepthEstimator::load("tiny")?; // `street` is the better one; or a run's folder
+//! let depth = estimator.estimate(&image, Some(&camera))?.depth();
+//! let middle = depth.data[depth.data.len() / 2 + depth.width / 2];
+//! println!("{}x{} pixels, {middle:.1} m in the middle", depth.width, depth.height);
+//! # assert!(middle > 0.1 && middle < 90.0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # From a drive to a trained run
+//!
+//! [`Dataset`](data::Dataset) opens recordings of any known layout: KITTI, a folder of images or a video with a table of
+//! speeds, a ROS bag, and more. Needs the feature `train`, which is on by default.
+//!
+#![cfg_attr(feature = "train", doc = "```")]
+#![cfg_attr(not(feature = "train"), doc = "```ignore")]
+//! use deepfusion::data::{Dataset, OpenOptions};
+//! use deepfusion::model::{Preset, RunFolder};
+//! use deepfusion::train::{Control, Device, SampleSet, Trainer};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # use deepfusion::sim::{SimConfig, Simulation, write_kitti};
+//! # let folder = tempfile::tempdir()?;
+//! # let small = SimConfig { frames: 12, width: 320, height: 96, ..Default::default() };
+//! # let drive = write_kitti(&Simulation::new(&small)?, folder.path(), &mut |_, _| ())?;
+//! # let run = folder.path().join("run");
+//! let mut config = Preset::Tiny.config();
+//! config.steps = Some(2); // thousands, to learn something
+//! # (config.batch, config.size.width, config.validation_share) = (2, 64, 0.2);
+//! # config.size.height = 64;
+//! let drives = Dataset::open(&drive, &OpenOptions::default())?;
+//! let (samples, held_out, _skipped) = SampleSet::split(&config, drives, None)?;
+//! let run = RunFolder::create(&run)?;
+//! let mut trainer = Trainer::create(config, run, (samples, held_out), &Device::flex(), Ok)?;
+//! let summary = trainer.run(&mut |_event| Control::Continue)?;
+//! assert_eq!(summary.step, 2);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # From a bag to its streams
+//!
+//! ```
+//! use deepfusion::bags::{Bag, Selection};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # use deepfusion::sim::{BagSettings, SimConfig, Simulation, write_bag};
+//! # let folder = tempfile::tempdir()?;
+//! # let small = SimConfig { frames: 4, width: 160, height: 96, ..Default::default() };
+//! # let street = Simulation::new(&small)?;
+//! # let path = write_bag(&street, folder.path(), &BagSettings::default(), &mut |_, _| ())?;
+//! let bag = Bag::open(&path)?;
+//! for topic in bag.topics()? {
+//!     println!("{}  {}  {} messages", topic.name, topic.type_name, topic.count);
+//! }
+//! let first = bag.messages(Selection::all())?.next().transpose()?;
+//! assert!(first.is_some());
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Where things are
+//!
+//! | Module | What it holds |
+//! |---|---|
+//! | [`runtime`] | trained networks that run: [`DepthEstimator`] over the fused engine or ONNX Runtime; no training framework |
+//! | [`model`] | configurations, weights as safetensors, runs on disk |
+//! | [`weights`] | the networks inside the library |
+//! | [`data`] | recordings as datasets, frames and ground truth; what is wrong with them |
+//! | [`motion`] | how a vehicle moved, from inertial unit, CAN, GPS |
+//! | [`bags`] | ROS bags, read and written |
+//! | [`eval`] | the field's metrics and protocols; odometry; intervals and their coverage |
+//! | [`perception`] | a depth image to 3D targets, tracks, free space |
+//! | [`geometry`] | cameras, motions, depth images; `cloud`: point clouds and their files |
+//! | [`sim`] | streets with exact depth, to learn from and to test on |
+//! | [`onnx`], [`render`] | networks as ONNX files; pictures, charts and reports |
+#![cfg_attr(
+    feature = "train",
+    doc = "| [`train`], [`nn`] | learning from a drive: losses, trainer, checkpoints; the networks in Burn |"
+)]
+//!
+//! Coordinates are a camera's: x right, y down, z ahead, in metres. A transform is named `target_from_source`.
+
+pub use deepfusion_data as data;
+pub use deepfusion_eval as eval;
+pub use deepfusion_geometry as geometry;
+pub use deepfusion_model as model;
+pub use deepfusion_motion as motion;
+#[cfg(feature = "train")]
+pub use deepfusion_nn as nn;
+pub use deepfusion_onnx as onnx;
+pub use deepfusion_perception as perception;
+pub use deepfusion_render as render;
+pub use deepfusion_rosbag as bags;
+pub use deepfusion_runtime as runtime;
+pub use deepfusion_sim as sim;
+#[cfg(feature = "train")]
+pub use deepfusion_train as train;
+pub use deepfusion_weights as weights;
+
+pub use deepfusion_runtime::{DepthEstimator, Prediction};
