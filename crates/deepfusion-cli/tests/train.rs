@@ -483,6 +483,26 @@ fn imported_encoders_start_a_preset_with_other_parts() {
     assert!(!config.contains("metres_per_unit = 1.0"), "{config}");
 }
 
+/// Monodepth2's preset has the shapes of the embedded network, and means other images and other depths by them.
+#[test]
+fn weights_that_were_learned_otherwise_are_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
+    let start =
+        "train --data sim --preset monodepth2 --init street --size 96x64 --batch 1 --steps 1";
+    let run = ok(at, &format!("{start} --out as-the-preset"));
+    let warned = ["normalised as imagenet", "depths of 0.1 to 90 m"];
+    for words in warned {
+        assert!(run.stderr.contains(words), "{words}: {}", run.stderr);
+    }
+    let kept = "--set depth_net.encoder.normalisation=imagenet --set depth_net.range.max_m=90";
+    let run = ok(at, &format!("{start} {kept} --out as-the-network"));
+    for words in warned {
+        assert!(!run.stderr.contains(words), "{words}: {}", run.stderr);
+    }
+}
+
 #[test]
 fn weights_and_bench_tell_what_they_do() {
     let folder = tempfile::tempdir().unwrap();

@@ -178,7 +178,7 @@ impl Start {
         match self {
             Self::Nothing => Ok(model),
             Self::Packed { network, path } => {
-                warn_of_other_meaning(&unpacked_config(network)?, model.config());
+                warn_of_other_meaning(&unpacked_config(network)?, model.config(), true);
                 let weights = unpacked_weights(network)?;
                 let (depth_net, new_head) = model.depth_net.with_weights(&weights)?;
                 model.depth_net = depth_net;
@@ -197,7 +197,8 @@ impl Start {
             }
             Self::Path(path) => {
                 if let Some((folder, kind)) = run_of(path)? {
-                    warn_of_other_meaning(&folder.read_config()?, model.config());
+                    let learned = !folder.read_state(kind)?.encoders_only;
+                    warn_of_other_meaning(&folder.read_config()?, model.config(), learned);
                     let (model, anew) = folder.load_networks(kind, model.config(), &device)?;
                     let from = folder.checkpoint_path(kind);
                     say(&match anew.as_slice() {
@@ -236,10 +237,11 @@ fn unpacked_weights(network: &Shipped) -> Result<Weights, ModelError> {
     Ok(read_bytes(origin, &network.bytes)?)
 }
 
-/// Weights may fit a network that reads images or says depths in another way than the one they were learned in.
-fn warn_of_other_meaning(theirs: &TrainConfig, own: &TrainConfig) {
-    let (from, to) = (&theirs.depth_net, &own.depth_net);
-    let (was, is) = (from.encoder.normalisation, to.encoder.normalisation);
+/// Weights may fit a network that reads images or says depths in another way than the one they were learned in. Where the encoders
+/// alone have learned, there are no depths yet.
+fn warn_of_other_meaning(theirs: &TrainConfig, own: &TrainConfig, depth_learned: bool) {
+    let of = |config: &TrainConfig| config.depth_net.encoder.normalisation;
+    let (was, is) = (of(theirs), of(own));
     if was != is {
         let name = |n: InputNormalisation| format!("{n:?}").to_lowercase();
         tracing::warn!(
@@ -250,15 +252,17 @@ fn warn_of_other_meaning(theirs: &TrainConfig, own: &TrainConfig) {
             name(was)
         );
     }
-    if theirs.data.sets.is_empty() && own.data.sets.is_empty() && from.range != to.range {
+    let one_range = theirs.data.sets.len() <= 1 && own.data.sets.len() <= 1;
+    let (was, is) = (theirs.factors(0).0, own.factors(0).0);
+    if depth_learned && one_range && was != is {
         tracing::warn!(
             "the weights to start from say depths of {} to {} m, this configuration of {} to {} m: \
              --set depth_net.range.max_m={} keeps their metres",
-            from.range.min_m,
-            from.range.max_m,
-            to.range.min_m,
-            to.range.max_m,
-            from.range.max_m
+            was.min_m,
+            was.max_m,
+            is.min_m,
+            is.max_m,
+            was.max_m
         );
     }
 }

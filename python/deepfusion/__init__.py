@@ -1,0 +1,90 @@
+"""Metric depth from one camera and a speed signal.
+
+Arrays are NumPy's. Depth is camera z in metres, 0 where there is none; images are H x W x 3, uint8, RGB.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from . import _native
+from ._native import Dataset, DeepFusionError, Frame, Model, Prediction, __version__
+
+__all__ = [
+    "Dataset",
+    "DeepFusionError",
+    "Frame",
+    "Model",
+    "Prediction",
+    "doctor",
+    "evaluate",
+    "load",
+    "networks",
+    "simulate",
+    "__version__",
+]
+
+
+def load(model: Any = "street", *, precision: str = "f32") -> Model:
+    """A trained network: a run's folder, a checkpoint in it, a packed file, or the name of an embedded one (`networks()`).
+
+    `precision` is "f32", or "bf16" on processors with AMX or AVX512-BF16.
+    """
+    return _native.load(model, precision)
+
+
+def networks() -> list[str]:
+    """The names of the networks inside the package."""
+    return _native.networks()
+
+
+def evaluate(
+    predictions: Sequence[Any],
+    ground_truth: Sequence[Any],
+    *,
+    kind: str = "depth",
+    crop: str = "none",
+    cap: float = 80.0,
+    min_depth: float = 1e-3,
+    names: Sequence[str] | None = None,
+) -> dict[str, Any]:
+    """The field's seven metrics, unscaled and median-scaled: what `deepfusion eval --json` prints.
+
+    `predictions` are H x W arrays of metres (`kind="depth"`) or of 1/m (`kind="disparity"`), of any size; `ground_truth`
+    H x W arrays of metres, 0 where nothing was measured. `crop` is "none" or "garg".
+    """
+    if len(predictions) != len(ground_truth):
+        raise ValueError(f"{len(predictions)} predictions for {len(ground_truth)} images of ground truth")
+    if names is None:
+        names = [f"{i:010}" for i in range(len(ground_truth))]
+    if len(names) != len(ground_truth):
+        raise ValueError(f"{len(names)} names for {len(ground_truth)} images")
+    pairs = [
+        (name, np.ascontiguousarray(p, dtype=np.float64), np.ascontiguousarray(t, dtype=np.float64))
+        for name, p, t in zip(names, predictions, ground_truth)
+    ]
+    return json.loads(_native.evaluate(pairs, kind, crop, cap, min_depth))
+
+
+def simulate(
+    out: Any,
+    *,
+    frames: int = 100,
+    seed: int = 1,
+    scene: str = "urban",
+    moving_cars: int = 0,
+    size: tuple[int, int] = (640, 192),
+    scan_every: int = 1,
+) -> str:
+    """Writes a simulated drive with exact depth in KITTI's layout into `out`, and gives the drive's folder."""
+    width, height = size
+    return _native.simulate(out, frames, seed, scene, moving_cars, width, height, scan_every)
+
+
+def doctor(path: Any) -> dict[str, Any]:
+    """Every reason why training on a recording would fail or give a wrong scale: `deepfusion doctor PATH`."""
+    return json.loads(_native.doctor(path))

@@ -1,0 +1,165 @@
+//! Recordings.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use deepfusion::data::{self, CameraChoice, GtKind, OpenOptions};
+use numpy::ndarray::{Array2, Array3};
+use numpy::{IntoPyArray, PyArray2, PyArray3};
+use pyo3::exceptions::{PyIndexError, PyValueError};
+use pyo3::prelude::*;
+
+use crate::error::{raise, with_hint};
+use crate::model::image_array;
+
+/// A recording of any known layout: one drive, one camera.
+#[pyclass(frozen, module = "deepfusion")]
+pub struct Dataset {
+    inner: Arc<data::Dataset>,
+}
+
+#[pymethods]
+impl Dataset {
+    #[new]
+    #[pyo3(signature = (path, *, camera="2", drive=0))]
+    fn new(py: Python<'_>, path: PathBuf, camera: &str, drive: usize) -> PyResult<Self> {
+        let camera: CameraChoice = camera.parse().map_err(|_| {
+            PyValueError::new_err(format!("camera: expected \"2\" or \"3\", found {camera:?}"))
+        })?;
+        let options = OpenOptions {
+            camera,
+            ..OpenOptions::default()
+        };
+        let mut all = py
+            .detach(|| data::Dataset::open(&path, &options))
+            .map_err(raise)?;
+        if drive >= all.len() {
+            let message = format!("{}: drive {drive} of {}", path.display(), all.len());
+            let hint = "drives are counted from 0; give the folder of one drive".to_owned();
+            return Err(with_hint(message, Some(hint)));
+        }
+        Ok(Self {
+            inner: Arc::new(all.swap_remove(drive)),
+        })
+    }
+
+    fn __len__(&self) -> usize {
+        self.inner.selected().len()
+    }
+
+    fn __getitem__(&self, index: isize) -> PyResult<Frame> {
+        let frames = self.inner.selected();
+        let from_end = |i: isize| frames.len().checked_add_signed(i);
+        let place = match index {
+            0.. => Some(index.unsigned_abs()),
+            _ => from_end(index),
+        };
+        let found = place.and_then(|place| frames.get(place));
+        let found = found
+            .ok_or_else(|| PyIndexError::new_err(format!("frame {index} of {}", frames.len())))?;
+        Ok(Frame {
+            dataset: Arc::clone(&self.inner),
+            index: *found,
+        })
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    #[getter]
+    fn layout(&self) -> &'static str {
+        self.inner.kind().label()
+    }
+
+    fn motion<'py>(
+        &self,
+        py: Python<'py>,
+        source: usize,
+        target: usize,
+    ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let frames = self.inner.selected();
+        let place = |i: usize| {
+            let place = frames.get(i).copied();
+            place.ok_or_else(|| PyIndexError::new_err(format!("frame {i} of {}", frames.len())))
+        };
+        let (source, target) = (place(source)?, place(target)?);
+        let motion = py.detach(|| self.inner.camera_motion(target, source));
+        Ok(motion.map(|target_from_source| {
+            let m = target_from_source.matrix();
+            Array2::from_shape_fn((4, 4), |(row, column)| m[(row, column)]).into_pyarray(py)
+        }))
+    }
+
+    fn __repr__(&self) -> String {
+        let (name, frames) = (self.inner.name(), self.__len__());
+        format!("Dataset({name:?}, {frames} frames, {})", self.layout())
+    }
+}
+
+/// One frame of a recording.
+#[pyclass(frozen, module = "deepfusion")]
+pub struct Frame {
+    dataset: Arc<data::Dataset>,
+    index: usize,
+}
+
+impl Frame {
+    fn facts(&self) -> &data::Frame {
+        &self.dataset.frames()[self.index]
+    }
+}
+
+#[pymethods]
+impl Frame {
+    #[getter]
+    fn image<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        let image = py
+            .detach(|| self.dataset.load_image(self.index))
+            .map_err(raise)?;
+        let (width, height) = image.dimensions();
+        let shape = (height as usize, width as usize, 3);
+        let array = Array3::from_shape_vec(shape, image.into_raw());
+        let array = array.map_err(|e| PyValueError::new_err(e.to_string()))?;
+        Ok(array.into_pyarray(py))
+    }
+
+    #[getter]
+    fn number(&self) -> u64 {
+        self.facts().number
+    }
+
+    #[getter]
+    fn time_s(&self) -> Option<f64> {
+        self.facts().time_s
+    }
+
+    #[getter]
+    fn speed_mps(&self) -> Option<f64> {
+        self.facts().speed_mps
+    }
+
+    #[getter]
+    fn intrinsics(&self) -> (f64, f64, f64, f64) {
+        let k = self.dataset.intrinsics(self.index);
+        (k.fx, k.fy, k.cx, k.cy)
+    }
+
+    #[pyo3(signature = (kind="z"))]
+    fn ground_truth(&self, py: Python<'_>, kind: &str) -> PyResult<Option<Py<PyArray2<f32>>>> {
+        let kind = match kind {
+            "z" => GtKind::Z,
+            "velodyne" => GtKind::Velodyne,
+            other => {
+                let message = format!("kind: expected \"z\" or \"velodyne\", found {other:?}");
+                return Err(PyValueError::new_err(message));
+            }
+        };
+        let truth = py.detach(|| self.dataset.ground_truth(self.index, kind));
+        let truth = truth.map_err(raise)?;
+        truth
+            .map(|depth| image_array(py, depth.height, depth.width, depth.data))
+            .transpose()
+    }
+}

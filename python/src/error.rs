@@ -1,0 +1,55 @@
+//! Errors of the library as Python's.
+
+use deepfusion::{data, eval, geometry, model, runtime, sim};
+use pyo3::exceptions::PyException;
+use pyo3::prelude::*;
+
+pyo3::create_exception!(
+    deepfusion,
+    DeepFusionError,
+    PyException,
+    "What went wrong, with the file, frame or field; `hint` says what to do about it."
+);
+
+/// An error that knows a remedy.
+pub trait Hinted: std::fmt::Display {
+    /// What to do about it.
+    fn remedy(&self) -> Option<String>;
+}
+
+macro_rules! hinted {
+    ($($error:ty),* $(,)?) => {
+        $(impl Hinted for $error {
+            fn remedy(&self) -> Option<String> {
+                self.hint().map(Into::into)
+            }
+        })*
+    };
+}
+hinted!(
+    data::Error,
+    eval::Error,
+    geometry::cloud::Error,
+    model::Error,
+    runtime::Error,
+    sim::Error,
+);
+
+/// A library's error as an exception: its message, and its remedy as `hint` and as a note.
+pub fn raise(error: impl Hinted) -> PyErr {
+    with_hint(error.to_string(), error.remedy())
+}
+
+/// An exception with this message and remedy.
+pub fn with_hint(message: String, hint: Option<String>) -> PyErr {
+    let error = DeepFusionError::new_err(message);
+    Python::attach(|py| {
+        let value = error.value(py);
+        // The message stands without them.
+        let _ = value.setattr("hint", hint.clone());
+        if let Some(hint) = hint {
+            let _ = value.call_method1("add_note", (format!("hint: {hint}"),));
+        }
+    });
+    error
+}

@@ -1,0 +1,27 @@
+//! The Python module `deepfusion._native`. `deepfusion/__init__.py` is what people import; `_native.pyi` has the types.
+
+mod dataset;
+mod error;
+mod measure;
+mod model;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::dataset::{Dataset, Frame};
+    #[pymodule_export]
+    use super::error::DeepFusionError;
+    #[pymodule_export]
+    use super::measure::{doctor, evaluate, simulate};
+    #[pymodule_export]
+    use super::model::{Model, Prediction, load, networks};
+
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,0 +1,268 @@
+//! Trained networks and what they say of an image.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use deepfusion::data::{RgbImage, load_photo};
+use deepfusion::geometry::Intrinsics;
+use deepfusion::geometry::cloud::PointCloud;
+use deepfusion::model::TrainConfig;
+use deepfusion::model::weights::Weights;
+use deepfusion::runtime::{
+    DepthEstimator, DepthRunner, Error, FusedRunner, ModelSource, Precision, embedded_names,
+};
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+
+use crate::error::{raise, with_hint};
+
+/// The names of the networks inside the package.
+#[pyfunction]
+pub fn networks() -> Vec<&'static str> {
+    embedded_names()
+}
+
+/// A trained network by its path or name.
+#[pyfunction]
+pub fn load(py: Python<'_>, model: PathBuf, precision: &str) -> PyResult<Model> {
+    let precision = match precision {
+        "f32" => Precision::F32,
+        "bf16" => Precision::Bf16,
+        other => {
+            let message = format!("precision: expected \"f32\" or \"bf16\", found {other:?}");
+            return Err(PyValueError::new_err(message));
+        }
+    };
+    let runner = move |config: &TrainConfig, weights: Weights| {
+        let runner = FusedRunner::new(config, weights, precision)?;
+        Ok::<_, Error>(Box::new(runner) as Box<dyn DepthRunner>)
+    };
+    let open = || {
+        let network = ModelSource::named(&model)?.load(None)?;
+        DepthEstimator::of(network, runner)
+    };
+    py.detach(open).map(Model::new).map_err(raise)
+}
+
+/// A trained network.
+#[pyclass(frozen, module = "deepfusion")]
+pub struct Model {
+    estimator: Mutex<DepthEstimator>,
+}
+
+impl Model {
+    fn new(estimator: DepthEstimator) -> Self {
+        Self {
+            estimator: Mutex::new(estimator),
+        }
+    }
+
+    /// Whatever thread held it before: an estimator keeps nothing from image to image.
+    fn with<R>(&self, work: impl FnOnce(&mut DepthEstimator) -> R) -> R {
+        work(
+            &mut self
+                .estimator
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner),
+        )
+    }
+}
+
+#[pymethods]
+impl Model {
+    #[pyo3(signature = (image, intrinsics=None, *, focal_correction=true, stretch=false))]
+    fn predict(
+        &self,
+        py: Python<'_>,
+        image: &Bound<'_, PyAny>,
+        intrinsics: Option<[f64; 4]>,
+        focal_correction: bool,
+        stretch: bool,
+    ) -> PyResult<Prediction> {
+        let (image, from_file) = image_of(image)?;
+        let size = image.dimensions();
+        let given = intrinsics
+            .map(|numbers| checked(numbers, size))
+            .transpose()?;
+        let camera = given.or(from_file);
+        // The lock is taken without the interpreter's: another thread that holds it may be waiting for that.
+        let prediction = py.detach(|| {
+            self.with(|estimator| {
+                estimator.predict(&image, camera.as_ref(), focal_correction, !stretch)
+            })
+        });
+        Ok(Prediction {
+            prediction: prediction.map_err(raise)?,
+            image,
+            camera,
+            depth: PyOnceLock::new(),
+        })
+    }
+
+    fn another(&self, py: Python<'_>) -> PyResult<Self> {
+        let another = py.detach(|| self.with(|estimator| estimator.another()));
+        another.map(Self::new).map_err(raise)
+    }
+
+    #[getter]
+    fn size(&self, py: Python<'_>) -> (usize, usize) {
+        let size = py.detach(|| self.with(|estimator| estimator.config().size));
+        (size.width, size.height)
+    }
+
+    #[getter]
+    fn step(&self, py: Python<'_>) -> usize {
+        py.detach(|| self.with(|estimator| estimator.step))
+    }
+
+    #[getter]
+    fn engine(&self, py: Python<'_>) -> &'static str {
+        py.detach(|| self.with(|estimator| estimator.engine()))
+    }
+}
+
+/// A camera that can be one, of an image of this size.
+fn checked([fx, fy, cx, cy]: [f64; 4], size: (u32, u32)) -> PyResult<Intrinsics> {
+    let finite = [fx, fy, cx, cy].iter().all(|v| v.is_finite());
+    if !(finite && fx > 0.0 && fy > 0.0) {
+        let found = format!("intrinsics: {:?} is no camera", (fx, fy, cx, cy));
+        let hint = "fx, fy, cx, cy in pixels of this image; fx and fy above 0".to_owned();
+        return Err(with_hint(found, Some(hint)));
+    }
+    Ok(Intrinsics::from_numbers([fx, fy, cx, cy], size))
+}
+
+/// An image from an array, a PIL image, or a file; of a file with what its EXIF says of the lens.
+fn image_of(image: &Bound<'_, PyAny>) -> PyResult<(RgbImage, Option<Intrinsics>)> {
+    if let Ok(array) = image.extract::<PyReadonlyArray3<'_, u8>>() {
+        return Ok((of_array(&array)?, None));
+    }
+    if let Ok(path) = image.extract::<PathBuf>() {
+        return of_file(image.py(), &path);
+    }
+    // PIL's way, which others have as well.
+    let py = image.py();
+    let rgb = match image.hasattr("convert")? {
+        true => image.call_method1("convert", ("RGB",))?,
+        false => image.clone(),
+    };
+    let array = py.import("numpy")?.call_method1("asarray", (rgb,))?;
+    match array.extract::<PyReadonlyArray3<'_, u8>>() {
+        Ok(array) => Ok((of_array(&array)?, None)),
+        Err(_) => Err(PyTypeError::new_err(
+            "image: expected an H x W x 3 array of uint8, a PIL image, or a path",
+        )),
+    }
+}
+
+fn of_array(array: &PyReadonlyArray3<'_, u8>) -> PyResult<RgbImage> {
+    let [height, width, channels] = [0, 1, 2].map(|axis| array.shape()[axis]);
+    let size = u32::try_from(width).ok().zip(u32::try_from(height).ok());
+    let (Some((w, h)), 3, true) = (size, channels, width > 0 && height > 0) else {
+        let message = format!("image: expected H x W x 3, found {height} x {width} x {channels}");
+        return Err(PyValueError::new_err(message));
+    };
+    let bytes: Vec<u8> = match array.as_slice() {
+        Ok(bytes) if array.is_c_contiguous() => bytes.to_vec(),
+        // Rows or channels in another order, a part of a larger array.
+        _ => array.as_array().iter().copied().collect(),
+    };
+    RgbImage::from_raw(w, h, bytes)
+        .ok_or_else(|| PyValueError::new_err("image: its size is not that of its bytes"))
+}
+
+fn of_file(py: Python<'_>, path: &Path) -> PyResult<(RgbImage, Option<Intrinsics>)> {
+    let photo = py.detach(|| load_photo(path)).map_err(raise)?;
+    Ok((photo.image, photo.intrinsics))
+}
+
+/// Positions and colours, N×3 each.
+type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
+
+/// The metric depth of an image.
+#[pyclass(frozen, module = "deepfusion")]
+pub struct Prediction {
+    prediction: deepfusion::Prediction,
+    image: RgbImage,
+    camera: Option<Intrinsics>,
+    /// Made once: whoever asks again gets the same array.
+    depth: PyOnceLock<Py<PyArray2<f32>>>,
+}
+
+#[pymethods]
+impl Prediction {
+    #[getter]
+    fn depth(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f32>>> {
+        let array = self.depth.get_or_try_init(py, || {
+            let depth = py.detach(|| self.prediction.depth());
+            image_array(py, depth.height, depth.width, depth.data)
+        })?;
+        Ok(array.clone_ref(py))
+    }
+
+    #[getter]
+    fn sigma(&self, py: Python<'_>) -> PyResult<Option<Py<PyArray2<f32>>>> {
+        let sigma = py.detach(|| self.prediction.sigma());
+        sigma
+            .map(|sigma| image_array(py, sigma.height, sigma.width, sigma.data))
+            .transpose()
+    }
+
+    #[getter]
+    fn disparity(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f32>>> {
+        let p = &self.prediction;
+        image_array(py, p.height, p.width, p.disparity.clone())
+    }
+
+    #[getter]
+    fn intrinsics(&self) -> Option<(f64, f64, f64, f64)> {
+        self.camera.map(|k| (k.fx, k.fy, k.cx, k.cy))
+    }
+
+    #[pyo3(signature = (max_depth=80.0))]
+    fn cloud<'py>(&self, py: Python<'py>, max_depth: f32) -> PyResult<Points<'py>> {
+        let Some(camera) = self.camera else {
+            return Err(with_hint(
+                "a cloud needs the camera, and none is known of this image".into(),
+                Some("predict(image, intrinsics=(fx, fy, cx, cy))".into()),
+            ));
+        };
+        let make = || {
+            let depth = self.prediction.depth();
+            PointCloud::from_depth(&depth, &camera, Some(&self.image), max_depth)
+        };
+        let cloud = py.detach(make).map_err(raise)?;
+        let points = cloud.xyz.len();
+        let rgb = cloud.rgb.unwrap_or_default();
+        Ok((
+            columns(py, points, cloud.xyz.into_flattened())?,
+            columns(py, rgb.len(), rgb.into_flattened())?,
+        ))
+    }
+}
+
+/// N×3, without a copy.
+fn columns<T: numpy::Element>(
+    py: Python<'_>,
+    rows: usize,
+    values: Vec<T>,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let array = Array2::from_shape_vec((rows, 3), values);
+    let array = array.map_err(|e| PyValueError::new_err(e.to_string()))?;
+    Ok(array.into_pyarray(py))
+}
+
+/// H×W, without a copy.
+pub fn image_array(
+    py: Python<'_>,
+    height: usize,
+    width: usize,
+    values: Vec<f32>,
+) -> PyResult<Py<PyArray2<f32>>> {
+    let array = Array2::from_shape_vec((height, width), values);
+    let array = array.map_err(|e| PyValueError::new_err(e.to_string()))?;
+    Ok(array.into_pyarray(py).unbind())
+}

@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# Builds the package into a fresh virtual environment, as `pip install .` does for a user, and runs its tests there.
+#
+#   python/test.sh [FOLDER]     default: a temporary one
+set -euo pipefail
+cd "$(dirname "$0")"
+venv=${1:-$(mktemp -d)}
+python3 -m venv "$venv"
+"$venv/bin/pip" install --quiet --upgrade pip
+"$venv/bin/pip" install --quiet '.[test]'
+# Not from this folder: its sources hold no extension module.
+tests=$PWD/tests
+cd "$venv"
+"$venv/bin/python" -m pytest -q "$tests"

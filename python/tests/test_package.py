@@ -1,0 +1,167 @@
+"""The package on simulated streets, whose depth is known."""
+
+import json
+import os
+import shutil
+import subprocess
+import threading
+from pathlib import Path
+
+import deepfusion
+import numpy as np
+import pytest
+from PIL import Image
+
+
+@pytest.fixture(scope="session")
+def drive(tmp_path_factory):
+    out = tmp_path_factory.mktemp("street")
+    return deepfusion.simulate(out, frames=3, seed=5, moving_cars=2, size=(320, 96), scan_every=2)
+
+
+@pytest.fixture(scope="session")
+def model():
+    return deepfusion.load("tiny")
+
+
+def test_networks_are_in_the_package():
+    assert {"street", "tiny"} <= set(deepfusion.networks())
+    assert deepfusion.__version__.count(".") == 2
+
+
+def test_image_to_metres(drive, model):
+    frame = deepfusion.Dataset(drive)[0]
+    prediction = model.predict(frame.image, frame.intrinsics)
+    depth = prediction.depth
+    assert depth.shape == frame.image.shape[:2] and depth.dtype == np.float32
+    assert np.isfinite(depth).all() and depth.min() > 0
+    assert prediction.depth is depth, "one array, made once"
+    xyz, rgb = prediction.cloud(max_depth=40)
+    assert xyz.shape == rgb.shape and xyz.shape[1] == 3
+    assert len(xyz) == (depth <= 40).sum()
+    # Row by row: z is the depth itself.
+    assert np.array_equal(xyz[:, 2], depth[depth <= 40])
+    assert np.array_equal(rgb, frame.image[depth <= 40])
+
+
+def test_every_kind_of_image_is_the_same_image(drive, model, tmp_path):
+    frame = deepfusion.Dataset(drive)[1]
+    expected = model.predict(frame.image, frame.intrinsics).depth
+    picture = Image.fromarray(frame.image)
+    file = tmp_path / "street.png"
+    picture.save(file)
+    for same in [picture, file, str(file), np.asfortranarray(frame.image)]:
+        assert np.array_equal(model.predict(same, frame.intrinsics).depth, expected)
+    mirrored = model.predict(frame.image[:, ::-1], frame.intrinsics).depth
+    assert not np.array_equal(mirrored, expected)
+
+
+def test_a_recording(drive):
+    recording = deepfusion.Dataset(drive)
+    assert len(recording) == 3 and recording.layout == "KITTI raw"
+    frames = list(recording)
+    assert [frame.number for frame in frames] == [0, 1, 2]
+    assert frames[0].time_s < frames[1].time_s and frames[0].speed_mps > 0
+    assert recording[-1].number == 2
+    with pytest.raises(IndexError):
+        recording[3]
+    # The camera drives ahead: what it saw at z comes nearer.
+    motion = recording.motion(0, 1)
+    distance = np.linalg.norm(motion[:3, 3])
+    assert motion[2, 3] < 0 and 0.1 < distance < 3
+    assert np.allclose(motion @ recording.motion(1, 0), np.eye(4), atol=1e-6)
+    # The scan is exact, and only every second frame has one.
+    truth = frames[0].ground_truth()
+    assert truth.shape == frames[0].image.shape[:2] and (truth > 0).sum() > 100
+    assert frames[1].ground_truth() is None
+
+
+def test_the_metrics_are_the_fields():
+    rng = np.random.default_rng(3)
+    truth = rng.uniform(1, 70, (20, 30))
+    truth[rng.random(truth.shape) < 0.5] = 0
+    predicted = np.where(truth > 0, truth, 5) * rng.uniform(0.8, 1.3, truth.shape)
+    report = deepfusion.evaluate([predicted], [truth])
+    known = truth > 0
+    error = np.abs(predicted[known].clip(1e-3, 80) - truth[known])
+    assert report["unscaled"]["abs_rel"] == pytest.approx((error / truth[known]).mean(), rel=1e-9)
+    assert report["unscaled"]["rmse"] == pytest.approx(np.sqrt((error**2).mean()), rel=1e-9)
+    ratio = np.median(truth[known]) / np.median(predicted[known])
+    assert report["scale"]["median"] == pytest.approx(ratio, rel=1e-9)
+    inverse = deepfusion.evaluate([1 / predicted], [truth], kind="disparity")
+    assert inverse["unscaled"]["abs_rel"] == pytest.approx(report["unscaled"]["abs_rel"], rel=1e-6)
+
+
+def test_errors_say_what_to_do(drive, model, tmp_path):
+    with pytest.raises(deepfusion.DeepFusionError) as caught:
+        deepfusion.load("no-such-network")
+    assert "no-such-network" in str(caught.value) and "street" in caught.value.hint
+    with pytest.raises(deepfusion.DeepFusionError, match="nowhere"):
+        deepfusion.Dataset(tmp_path / "nowhere")
+    image = deepfusion.Dataset(drive)[0].image
+    with pytest.raises(deepfusion.DeepFusionError, match="no camera"):
+        model.predict(image, (0.0, 500.0, 1.0, 1.0))
+    with pytest.raises(deepfusion.DeepFusionError, match="camera"):
+        model.predict(image).cloud()
+    for wrong in [image[:, :, 0], image.astype(np.float32), image[:, :, :2], 7]:
+        with pytest.raises((TypeError, ValueError)):
+            model.predict(wrong)
+    with pytest.raises(ValueError, match="crop"):
+        deepfusion.evaluate([np.ones((4, 4))], [np.ones((4, 4))], crop="eigen")
+    with pytest.raises(ValueError, match="1 predictions"):
+        deepfusion.evaluate([np.ones((4, 4))], [])
+    (tmp_path / "broken.png").write_bytes(b"no picture")
+    with pytest.raises(deepfusion.DeepFusionError, match="broken.png"):
+        model.predict(tmp_path / "broken.png")
+
+
+def test_threads(drive, model):
+    """Another estimator a thread gives the same; the interpreter is free while they work."""
+    frames = list(deepfusion.Dataset(drive))
+    expected = [model.predict(f.image, f.intrinsics).depth for f in frames]
+    found = [None] * len(frames)
+
+    def work(i, estimator):
+        found[i] = estimator.predict(frames[i].image, frames[i].intrinsics).depth
+
+    for estimators in [[model] * 3, [model.another() for _ in frames]]:
+        threads = [threading.Thread(target=work, args=(i, e)) for i, e in enumerate(estimators)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert all(np.array_equal(a, b) for a, b in zip(expected, found))
+
+
+def test_doctor(drive, tmp_path):
+    report = deepfusion.doctor(drive)
+    assert report["drives"][0]["frames"] == 3
+    assert deepfusion.doctor(tmp_path)["recording"]
+
+
+@pytest.mark.skipif(
+    not (os.environ.get("DEEPFUSION") or shutil.which("deepfusion")), reason="the command is not there (DEEPFUSION)"
+)
+def test_the_command_gives_the_same_bytes(drive, model, tmp_path):
+    command = os.environ.get("DEEPFUSION") or shutil.which("deepfusion")
+    frame = deepfusion.Dataset(drive)[0]
+    out = tmp_path / "depth"
+    arguments = ["predict", drive, "--model", "tiny", "--save", "npy", "--out", out, "--quiet"]
+    subprocess.run([command, *arguments], check=True)
+    file = sorted(Path(out).glob("*_depth.npy"))[0]
+    assert np.array_equal(np.load(file), model.predict(frame.image, frame.intrinsics).depth)
+    gt = tmp_path / "gt.npz"
+    subprocess.run([command, "data", "export-gt", drive, "--out", gt, "--quiet"], check=True)
+    evaluated = subprocess.run(
+        [command, "eval", "--model", "tiny", "--data", drive, "--crop", "none", "--json", "--quiet"],
+        check=True,
+        capture_output=True,
+    )
+    theirs = json.loads(evaluated.stdout)
+    scans = [f for f in deepfusion.Dataset(drive) if f.ground_truth() is not None]
+    ours = deepfusion.evaluate(
+        [model.predict(f.image, f.intrinsics, stretch=True).disparity for f in scans],
+        [f.ground_truth() for f in scans],
+        kind="disparity",
+    )
+    assert ours["unscaled"] == theirs["unscaled"]
