@@ -20,8 +20,8 @@ fn main() -> Result<()> {
     let steps = arguments.next().map_or(Ok(300), |s| s.parse())?;
 
     let start = ModelSource::named("street".as_ref())?.load(None)?;
+    // The preset that the network was built from.
     let mut config = Preset::Light.config_on(Compute::Processor);
-    config.depth_net = start.config.depth_net.clone();
     config.canonical_focal_px = start.config.canonical_focal_px;
     config.view_motion = ViewMotion::Vehicle;
     config.learning_rate = 5e-5;
