@@ -3,8 +3,10 @@
 #
 #   python/test.sh [FOLDER]     default: a temporary one
 set -euo pipefail
+# From where the caller stands.
+if [ -n "${DEEPFUSION:-}" ]; then export DEEPFUSION=$(realpath "$DEEPFUSION"); fi
+venv=$(realpath -m "${1:-$(mktemp -d)}")
 cd "$(dirname "$0")"
-venv=${1:-$(mktemp -d)}
 python3 -m venv "$venv"
 "$venv/bin/pip" install --quiet --upgrade pip
 "$venv/bin/pip" install --quiet '.[test]'

@@ -29,12 +29,13 @@ __all__ = [
 ]
 
 
-def load(model: Any = "street", *, precision: str = "f32") -> Model:
+def load(model: Any = "street", *, precision: str = "f32", data_set: str | None = None) -> Model:
     """A trained network: a run's folder, a checkpoint in it, a packed file, or the name of an embedded one (`networks()`).
 
-    `precision` is "f32", or "bf16" on processors with AMX or AVX512-BF16.
+    `precision` is "f32", or "bf16" on processors with AMX or AVX512-BF16. `data_set` names one of the data sets that a run
+    learned from, where it learned several: its metres are meant (`--data-set` on the command line).
     """
-    return _native.load(model, precision)
+    return _native.load(model, precision, data_set)
 
 
 def networks() -> list[str]:

@@ -27,7 +27,12 @@ pub fn networks() -> Vec<&'static str> {
 
 /// A trained network by its path or name.
 #[pyfunction]
-pub fn load(py: Python<'_>, model: PathBuf, precision: &str) -> PyResult<Model> {
+pub fn load(
+    py: Python<'_>,
+    model: PathBuf,
+    precision: &str,
+    data_set: Option<String>,
+) -> PyResult<Model> {
     let precision = match precision {
         "f32" => Precision::F32,
         "bf16" => Precision::Bf16,
@@ -41,7 +46,7 @@ pub fn load(py: Python<'_>, model: PathBuf, precision: &str) -> PyResult<Model> 
         Ok::<_, Error>(Box::new(runner) as Box<dyn DepthRunner>)
     };
     let open = || {
-        let network = ModelSource::named(&model)?.load(None)?;
+        let network = ModelSource::named(&model)?.load(data_set.as_deref())?;
         DepthEstimator::of(network, runner)
     };
     py.detach(open).map(Model::new).map_err(raise)

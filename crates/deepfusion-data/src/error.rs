@@ -435,7 +435,7 @@ impl Error {
             Self::UnknownLayout { found, .. }
                 if cfg!(not(feature = "ros2")) && found.ends_with(WITHOUT_ROS2) =>
             {
-                "build with `--features ros2` to read the bags of ROS 2: cargo install --path crates/deepfusion --features ros2"
+                "build with `--features ros2` to read the bags of ROS 2: cargo install --path crates/deepfusion-cli --features ros2"
             }
             Self::UnknownLayout { .. } => {
                 "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"

@@ -63,7 +63,11 @@ impl Error {
                 ),
             }),
             Self::Engine { .. } => {
-                Some("`--engine burn` runs every network on every device".into())
+                Some(
+                    "f32 in the fused engine runs on every processor; with the training framework, `--engine burn` runs \
+                     every network on every device"
+                        .into(),
+                )
             }
             Self::ImageSize { .. } => Some("3 × height × width values of the network's size".into()),
             Self::Weights(error) => error.hint(),

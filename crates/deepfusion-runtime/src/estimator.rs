@@ -59,7 +59,8 @@ impl OtherSizes {
 
 impl DepthEstimator {
     /// A network by its path (a run's folder, a checkpoint in it, a packed file) or by the name of an embedded one, in the
-    /// fused engine and f32.
+    /// fused engine and f32. A run that learned several data sets has metres of each: [`ModelSource::load`] takes the name of
+    /// one, for [`Self::of`].
     ///
     /// # Errors
     /// As [`ModelSource::named`] and [`ModelSource::load`].

@@ -19,10 +19,14 @@ fn main() -> Result<()> {
     let run = PathBuf::from(arguments.next().context(usage)?);
     let steps = arguments.next().map_or(Ok(300), |s| s.parse())?;
 
-    let start = ModelSource::named("street".as_ref())?.load(None)?;
+    let source = ModelSource::named("street".as_ref())?;
+    let start = source.load(None)?;
     // The preset that the network was built from.
     let mut config = Preset::Light.config_on(Compute::Processor);
     config.canonical_focal_px = start.config.canonical_focal_px;
+    // What the run began from belongs to what it saw.
+    config.init = Some("street".into());
+    config.init_sha256 = source.packed_sha256().map(Into::into);
     config.view_motion = ViewMotion::Vehicle;
     config.learning_rate = 5e-5;
     config.steps = Some(steps);

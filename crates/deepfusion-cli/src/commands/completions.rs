@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use clap::CommandFactory;
+use clap::error::ErrorKind;
 use clap_complete::{Shell, generate};
 use clap_mangen::Man;
 use deepfusion_data::write_atomically;
@@ -24,6 +25,12 @@ pub fn run(args: &CompletionsArgs) -> Result<()> {
             return args.out.as_deref().map_or(Ok(()), manual);
         }
     };
+    if args.out.is_some() {
+        let message = "--out is for pages of the manual; a shell's script goes to stdout";
+        Cli::command()
+            .error(ErrorKind::ArgumentConflict, message)
+            .exit();
+    }
     let mut script = Vec::new();
     generate(shell, &mut Cli::command(), "deepfusion", &mut script);
     output::print(&String::from_utf8_lossy(&script))

@@ -252,16 +252,19 @@ fn warn_of_other_meaning(theirs: &TrainConfig, own: &TrainConfig, depth_learned:
             name(was)
         );
     }
-    let one_range = theirs.data.sets.len() <= 1 && own.data.sets.len() <= 1;
+    // A range that a data set names is meant.
+    let own_range = own.data.sets.iter().any(|set| set.range.is_some());
+    let one_range = theirs.data.sets.len() <= 1 && !own_range;
     let (was, is) = (theirs.factors(0).0, own.factors(0).0);
     if depth_learned && one_range && was != is {
         tracing::warn!(
             "the weights to start from say depths of {} to {} m, this configuration of {} to {} m: \
-             --set depth_net.range.max_m={} keeps their metres",
+             --set depth_net.range.min_m={} --set depth_net.range.max_m={} keeps their metres",
             was.min_m,
             was.max_m,
             is.min_m,
             is.max_m,
+            was.min_m,
             was.max_m
         );
     }

@@ -22,7 +22,7 @@ pub struct UsedCheckpoint {
 }
 
 impl UsedCheckpoint {
-    /// That of a estimator's network.
+    /// That of an estimator's network.
     pub fn of(estimator: &DepthEstimator, model: &ModelSource) -> Self {
         let step = estimator.step;
         match model {
