@@ -144,7 +144,8 @@ fn safetensors_of(
     Ok(weights)
 }
 
-fn floats<const N: usize>(bytes: &[u8], convert: impl Fn([u8; N]) -> f32) -> Vec<f32> {
+/// Packed numbers of `N` bytes each, converted; a rest that is shorter is left out.
+pub fn floats<const N: usize>(bytes: &[u8], convert: impl Fn([u8; N]) -> f32) -> Vec<f32> {
     let (chunks, _) = bytes.as_chunks::<N>();
     chunks.iter().map(|chunk| convert(*chunk)).collect()
 }

@@ -6,7 +6,9 @@ mod file;
 
 use std::collections::BTreeMap;
 
-pub use file::{FileKind, read_bytes, read_safetensors, read_safetensors_under, write_safetensors};
+pub use file::{
+    FileKind, floats, read_bytes, read_safetensors, read_safetensors_under, write_safetensors,
+};
 
 /// One tensor's values, row-major.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use burn::store::pytorch_reader::{DType as TorchDType, PytorchReader};
 use burn::tensor::{bf16, f16};
-use deepfusion_model::weights::{FileKind, read_safetensors};
+use deepfusion_model::weights::{FileKind, floats, read_safetensors};
 
 use super::{WeightTensor, Weights};
 use crate::Error;
@@ -43,11 +43,6 @@ fn read_pytorch(path: &Path) -> Result<Weights, Error> {
         weights.tensors.insert(name, WeightTensor { shape, values });
     }
     Ok(weights)
-}
-
-fn floats<const N: usize>(bytes: &[u8], convert: impl Fn([u8; N]) -> f32) -> Vec<f32> {
-    let (chunks, _) = bytes.as_chunks::<N>();
-    chunks.iter().map(|chunk| convert(*chunk)).collect()
 }
 
 fn format_error(path: &Path, reason: impl Into<String>) -> Error {
