@@ -1,6 +1,6 @@
 //! Errors of the library as Python's.
 
-use deepfusion::{data, eval, geometry, model, runtime, sim};
+use deepfusion::Hint;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
@@ -11,33 +11,9 @@ pyo3::create_exception!(
     "What went wrong, with the file, frame or field; `hint` says what to do about it."
 );
 
-/// An error that knows a remedy.
-pub trait Hinted: std::fmt::Display {
-    /// What to do about it.
-    fn remedy(&self) -> Option<String>;
-}
-
-macro_rules! hinted {
-    ($($error:ty),* $(,)?) => {
-        $(impl Hinted for $error {
-            fn remedy(&self) -> Option<String> {
-                self.hint().map(Into::into)
-            }
-        })*
-    };
-}
-hinted!(
-    data::Error,
-    eval::Error,
-    geometry::cloud::Error,
-    model::Error,
-    runtime::Error,
-    sim::Error,
-);
-
 /// A library's error as an exception: its message, and its remedy as `hint` and as a note.
-pub fn raise(error: impl Hinted) -> PyErr {
-    with_hint(error.to_string(), error.remedy())
+pub fn raise(error: impl Hint) -> PyErr {
+    with_hint(error.to_string(), error.hint())
 }
 
 /// An exception with this message and remedy.

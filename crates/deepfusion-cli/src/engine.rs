@@ -1,6 +1,5 @@
 //! What runs a trained network: the choice made on the command line.
 
-use anyhow::Result;
 use deepfusion_infer::Precision;
 use deepfusion_model::TrainConfig;
 use deepfusion_model::weights::Weights;
@@ -9,6 +8,7 @@ use deepfusion_runtime::{DepthEstimator, DepthRunner, FusedRunner, ModelSource, 
 use crate::allocator;
 use crate::cli::{DeviceChoice, EngineArgs, EngineChoice, PrecisionChoice};
 use crate::error::CliError;
+use crate::failure::Result;
 
 /// Loads a network with the engine asked for.
 pub fn load(model: &ModelSource, args: &EngineArgs) -> Result<DepthEstimator> {

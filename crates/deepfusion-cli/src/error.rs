@@ -1,13 +1,9 @@
-//! How failures are told: `error: …`, what caused it, `hint: …`.
+//! The failures that only the command line knows.
 
-use std::io::Write;
 use std::path::PathBuf;
-use std::process::ExitCode;
-
-use anstyle::{AnsiColor, Style};
 
 use crate::cli::Shard;
-use crate::interrupt;
+use crate::failure::{Exit, Reportable};
 
 /// Failures that only the command line knows.
 #[derive(Debug, thiserror::Error)]
@@ -286,8 +282,17 @@ pub enum CliError {
     NoUncertainty,
 }
 
-impl CliError {
-    fn hint(&self) -> Option<String> {
+impl Reportable for CliError {
+    fn exit(&self) -> Exit {
+        match self {
+            Self::Interrupted { .. } | Self::Stopped { .. } | Self::Ended { .. } => Exit::Stopped,
+            // Clap could not miss it: whether it is needed depends on what is embedded.
+            Self::NoModelGiven => Exit::WrongArguments,
+            _ => Exit::Failed,
+        }
+    }
+
+    fn remedy(&self) -> Option<String> {
         match self {
             Self::Exists { remedy, .. } => Some((*remedy).to_owned()),
             Self::NoBackend { device } => Some(format!(
@@ -401,167 +406,4 @@ fn some_failed(failures: &[String], total: usize, interrupted: bool) -> String {
         text += &format!("\n  and {more} more, in the manifest");
     }
     text
-}
-
-/// A failure and its causes in one line.
-pub fn told(problem: &anyhow::Error) -> String {
-    let mut text = problem.to_string();
-    for cause in problem.chain().skip(1).map(ToString::to_string) {
-        // Many messages already hold their cause's.
-        if !text.contains(&cause) {
-            text += &format!(": {cause}");
-        }
-    }
-    text
-}
-
-/// Prints a failure on stderr; the exit code is 1, [`interrupt::EXIT_CODE`] for work that was asked to stop, or 2 for a missing argument.
-pub fn report(problem: &anyhow::Error) -> ExitCode {
-    const ERROR: Style = AnsiColor::Red.on_default().bold();
-    const HINT: Style = AnsiColor::Cyan.on_default().bold();
-    let mut told = problem.to_string();
-    let mut text = format!("{ERROR}error:{ERROR:#} {told}\n");
-    for cause in problem.chain().skip(1) {
-        let cause = cause.to_string();
-        // Many messages already hold their cause's.
-        if !told.contains(&cause) {
-            text += &format!("  because: {cause}\n");
-            told = cause;
-        }
-    }
-    let hint = hint_of(problem).unwrap_or_else(|| general_hint(problem));
-    text += &format!("{HINT}hint:{HINT:#} {hint}\n");
-    // Where nobody reads it any more, the code still tells.
-    let _ = anstream::stderr().write_all(text.as_bytes());
-    if was_stopped(problem) {
-        ExitCode::from(interrupt::EXIT_CODE)
-    } else if lacks_an_argument(problem) {
-        ExitCode::from(WRONG_ARGUMENTS)
-    } else {
-        ExitCode::FAILURE
-    }
-}
-
-/// The exit code of wrong arguments, clap's.
-const WRONG_ARGUMENTS: u8 = 2;
-
-/// Whether an argument is missing that clap could not miss: whether it is needed depends on what is embedded.
-fn lacks_an_argument(problem: &anyhow::Error) -> bool {
-    matches!(problem.downcast_ref(), Some(CliError::NoModelGiven))
-}
-
-/// Whether nothing failed, but the work was asked to stop.
-fn was_stopped(problem: &anyhow::Error) -> bool {
-    problem.chain().any(|cause| {
-        let ours = matches!(
-            cause.downcast_ref(),
-            Some(CliError::Interrupted { .. } | CliError::Stopped { .. } | CliError::Ended { .. })
-        );
-        // Compiled in or not, the error is the same type.
-        let viewers = matches!(
-            cause.downcast_ref(),
-            Some(deepfusion_view::Error::Stopped { .. })
-        );
-        ours || viewers
-    })
-}
-
-/// What to do about an error that knows no remedy of its own: the system's reason decides.
-fn general_hint(problem: &anyhow::Error) -> String {
-    use std::io::ErrorKind;
-    let kind = problem.chain().find_map(|cause| {
-        let error = cause.downcast_ref::<std::io::Error>();
-        error.map(std::io::Error::kind)
-    });
-    match kind {
-        Some(ErrorKind::NotFound) => "check the spelling, and that the disk is mounted",
-        Some(ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem) => {
-            "check the permissions, or choose a place that you may write to"
-        }
-        Some(ErrorKind::StorageFull | ErrorKind::QuotaExceeded) => {
-            "the disk is full: free some space and run the same again"
-        }
-        Some(_) => "the system gave this reason: look at the disk or the network that the file is on",
-        None => {
-            "where the message names no input of yours to mend, it is a fault of the program: please report it with the command"
-        }
-    }
-    .to_owned()
-}
-
-/// The first remedy that an error of the chain knows.
-pub fn hint_of(problem: &anyhow::Error) -> Option<String> {
-    problem.chain().find_map(|cause| {
-        macro_rules! hint_from {
-            ($($error:ty),* $(,)?) => {
-                $(if let Some(error) = cause.downcast_ref::<$error>() { return error.hint(); })*
-            };
-        }
-        hint_from!(
-            CliError,
-            deepfusion_geometry::cloud::Error,
-            deepfusion_compare::Error,
-            deepfusion_data::Error,
-            deepfusion_eval::Error,
-            deepfusion_instances::Error,
-            deepfusion_eval::odometry::PoseFileError,
-            deepfusion_eval::odometry::TrackError,
-            deepfusion_model::Error,
-            deepfusion_model::NetworkError,
-            deepfusion_runtime::Error,
-            deepfusion_onnx::Error,
-            deepfusion_perception::Error,
-            deepfusion_render::Error,
-            deepfusion_sim::Error,
-            deepfusion_view::Error,
-            deepfusion_weights::Error,
-        );
-        #[cfg(feature = "train")]
-        hint_from!(deepfusion_train::Error);
-        None
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::io::{Error as IoError, ErrorKind};
-
-    /// No error leaves its reader without a next step, whatever kind it is.
-    #[test]
-    fn every_error_has_a_hint() {
-        let full = anyhow::Error::new(IoError::from(ErrorKind::StorageFull)).context("log.csv");
-        assert!(general_hint(&full).contains("disk is full"));
-        let foreign = anyhow::anyhow!("a library's own words");
-        assert_eq!(hint_of(&foreign), None);
-        assert!(general_hint(&foreign).contains("report"));
-        let config = deepfusion_model::Error::Config {
-            field: "batch",
-            expected: "at least 1".into(),
-            found: "0".into(),
-        };
-        assert!(hint_of(&config.into()).unwrap().contains("batch"));
-        let images = CliError::NoImages { input: "x".into() };
-        assert!(hint_of(&images.into()).is_some());
-    }
-
-    /// `train && eval` and a scheduler tell by the code alone.
-    #[test]
-    fn what_was_stopped_is_neither_done_nor_failed() {
-        let go_on = String::new();
-        let (step, steps) = (3, 9);
-        let stopped = [
-            CliError::Stopped { step, steps, go_on },
-            CliError::Ended { what: "the demo" },
-            CliError::Interrupted { done: 1, total: 2 },
-        ];
-        for error in stopped {
-            assert!(was_stopped(&error.into()));
-        }
-        let path = PathBuf::from("a.rrd");
-        let (done, total) = (1, 2);
-        let view = deepfusion_view::Error::Stopped { path, done, total };
-        assert!(was_stopped(&anyhow::Error::new(view).context("view")));
-        assert!(!was_stopped(&CliError::NoCamera.into()));
-    }
 }

@@ -5,9 +5,8 @@ use std::io::Write;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::Result;
-
 use crate::error::CliError;
+use crate::failure::Result;
 
 /// The exit code of work that was asked to stop before it was done: what shells give for a program that Ctrl-C ended.
 pub const EXIT_CODE: u8 = 130;

@@ -14,6 +14,7 @@ mod cli;
 mod commands;
 mod engine;
 mod error;
+mod failure;
 mod interrupt;
 mod model;
 mod output;
@@ -31,7 +32,7 @@ fn main() -> ExitCode {
     progress::set_quiet(cli.quiet);
     match in_pool(|| commands::run(cli.command)) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(problem) => error::report(&problem),
+        Err(failure) => failure.report(),
     }
 }
 

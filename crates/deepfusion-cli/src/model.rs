@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result};
 use deepfusion_compare::{MetricScale, sha256_of_file};
 use deepfusion_eval::IntervalFactors;
 use deepfusion_runtime::ModelSource;
@@ -10,6 +9,7 @@ use sha2::{Digest, Sha256};
 
 use crate::commands::uncertainty;
 use crate::error::CliError;
+use crate::failure::{Context, Result};
 use crate::output;
 use crate::progress::say;
 

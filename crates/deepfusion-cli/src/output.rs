@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use anyhow::{Context, Result};
+use crate::failure::{Context, Result};
 
 /// Warnings of all crates on stderr.
 pub fn init_logging() {

@@ -7,6 +7,7 @@ use deepfusion_compare::{
     SavedEvaluation, Verdict, published_tables, run_tables, sha256_of_file,
 };
 use deepfusion_eval::{Crop, Evaluator, Grid, Prediction, Protocol, Report};
+use deepfusion_hint::Hint;
 use deepfusion_render::HtmlReport;
 
 /// An evaluation of four pixels of two images; `factor` is how wrong the method is, `shift` makes another ground truth.

@@ -1,4 +1,5 @@
 use crate::layout::WITHOUT_ROS2;
+use deepfusion_hint::Hint;
 use std::path::{Path, PathBuf};
 
 /// What can go wrong with a recording.
@@ -420,10 +421,10 @@ impl Error {
             _ => Self::File { path, source },
         }
     }
+}
 
-    /// What to do about it, in one line.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         use std::io::ErrorKind;
         let text = match self {
             Self::NoSuchPath { .. } => "check the spelling, and that the disk is mounted",

@@ -1,4 +1,5 @@
 use super::*;
+use deepfusion_hint::Hint;
 use std::fs;
 
 fn read(name: &str, text: &str) -> Result<GpsLog> {

@@ -1,5 +1,6 @@
 use super::*;
 use crate::Error;
+use deepfusion_hint::Hint;
 use std::fs;
 
 fn read(files: &[(&str, &str)]) -> Result<SpeedLog> {

@@ -30,6 +30,7 @@ pub fn write_unsynced<E: From<Error>>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_hint::Hint;
     use std::io::Write as _;
 
     #[test]

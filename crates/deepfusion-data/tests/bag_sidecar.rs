@@ -5,6 +5,7 @@ mod bag;
 
 use bag::{CAMERA, TinyBag};
 use deepfusion_data::{Dataset, Error, OpenOptions, inspect};
+use deepfusion_hint::Hint;
 use deepfusion_rosbag::msg::Frame;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -9,6 +9,7 @@ mod folder;
 use bag::{CAMERA, TinyBag};
 use common::{TinyDrive, packet};
 use deepfusion_data::{Dataset, OpenOptions, convert_to_bag, convert_to_kitti, inspect};
+use deepfusion_hint::Hint;
 use deepfusion_rosbag::Compression;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -3,6 +3,7 @@
 mod common;
 
 use deepfusion_data::{Dataset, DatasetKind, Error, OpenOptions, inspect};
+use deepfusion_hint::Hint;
 use ndarray::{Array1, Array2};
 use ndarray_npy::WriteNpyExt;
 use std::fs;

@@ -5,6 +5,7 @@ mod common;
 use common::TinyDrive;
 use deepfusion_data::kitti::{Calibration, find_drives};
 use deepfusion_data::{Camera, CameraChoice, Dataset, Error, OpenOptions, inspect};
+use deepfusion_hint::Hint;
 use proptest::prelude::*;
 use std::fs;
 use std::path::Path;

@@ -9,6 +9,7 @@ use deepfusion_data::{
     CameraChoice, Dataset, DatasetKind, Error, GtKind, OpenOptions, Snippet, VehicleMotion, inspect,
 };
 use deepfusion_geometry::Se3;
+use deepfusion_hint::Hint;
 use folder::{picture, write_drive, write_images};
 use image::{ImageBuffer, Luma};
 use nalgebra::Vector3;

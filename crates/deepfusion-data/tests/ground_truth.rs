@@ -9,6 +9,7 @@ use deepfusion_data::{
 };
 use deepfusion_geometry::DepthMap;
 use deepfusion_geometry::cloud::PointCloud;
+use deepfusion_hint::Hint;
 use ndarray::Array2;
 use ndarray_npy::NpzReader;
 use std::fs::{self, File};

@@ -4,6 +4,7 @@ mod common;
 
 use common::{TinyDrive, packet};
 use deepfusion_data::{CameraChoice, Dataset, Error, OpenOptions, Snippet, Split, hold_out};
+use deepfusion_hint::Hint;
 use nalgebra::Vector3;
 use std::fs;
 use std::path::Path;

@@ -6,6 +6,7 @@ use common::{TinyDrive, real_data, wall};
 use deepfusion_data::kitti::{Calibration, depth_map};
 use deepfusion_data::{Camera, Dataset, Error, GtKind, MovingSource, OpenOptions};
 use deepfusion_geometry::cloud::PointCloud;
+use deepfusion_hint::Hint;
 use std::fs;
 use std::path::Path;
 

@@ -1,6 +1,7 @@
 //! Images: resized as PIL does, truncated ones refused.
 
 use deepfusion_data::{Error, image_size, load_rgb, resize_rgb, to_chw, to_network_input};
+use deepfusion_hint::Hint;
 use image::{Rgb, RgbImage};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};

@@ -3,6 +3,7 @@
 mod common;
 
 use deepfusion_data::{Dataset, DatasetKind, GtKind, OpenOptions, inspect};
+use deepfusion_hint::Hint;
 use image::{ImageBuffer, Luma, RgbImage};
 use std::fs;
 use std::path::Path;

@@ -7,6 +7,7 @@ mod folder;
 use deepfusion_data::{
     Dataset, DatasetKind, FrameImage, OpenOptions, RgbImage, Shown, inspect, shown_for,
 };
+use deepfusion_hint::Hint;
 use image::Rgb;
 use ndarray::Array1;
 use ndarray_npy::WriteNpyExt;

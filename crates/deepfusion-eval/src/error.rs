@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
 /// What can go wrong while arrays are read and compared.
@@ -112,10 +113,8 @@ pub enum Error {
 /// A result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-impl Error {
-    /// A one-line remedy, where there is one.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         match self {
             Self::InvalidPrediction { kind, .. } => Some(format!(
                 "a network's {kind} is positive everywhere; where these values mean \"no prediction\", pass --allow-holes: \

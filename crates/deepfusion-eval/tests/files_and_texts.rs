@@ -5,6 +5,7 @@ use std::path::Path;
 use deepfusion_eval::{
     ArraySet, Error, Evaluator, Grid, Prediction, Protocol, Report, match_names,
 };
+use deepfusion_hint::Hint;
 use ndarray::{Array2, Array3, array};
 use ndarray_npy::{NpzWriter, write_npy};
 

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use deepfusion_eval::odometry::{OdometryReport, PoseFile, TrackPair, kitti_text};
 use deepfusion_geometry::Se3;
+use deepfusion_hint::Hint;
 use serde_json::Value;
 
 fn cases() -> Vec<Value> {

@@ -3,6 +3,7 @@
 use deepfusion_eval::{
     Crop, Error, Evaluator, Grid, Holes, Metrics, Prediction, Protocol, Report, Sample,
 };
+use deepfusion_hint::Hint;
 use proptest::prelude::*;
 
 const WIDTH: usize = 16;

@@ -1,3 +1,5 @@
+use deepfusion_hint::Hint;
+
 /// What can go wrong before a network runs; running it cannot fail.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
@@ -38,4 +40,11 @@ pub enum Error {
     /// A precision that this processor has no instructions for.
     #[error("bf16 needs a processor with AMX or AVX512-BF16; this one has neither")]
     NoBf16,
+}
+
+impl Hint for Error {
+    /// The messages say it themselves.
+    fn hint(&self) -> Option<String> {
+        None
+    }
 }

@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
 /// What can go wrong with a model of instances.
@@ -42,10 +43,8 @@ pub enum Error {
 /// [`std::result::Result`] with this crate's error.
 pub type Result<T> = std::result::Result<T, Error>;
 
-impl Error {
-    /// A one-line remedy, where there is one.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         match self {
             Self::File { .. } => Some("a model is a file that a training framework exported as ONNX".into()),
             Self::Runtime { source, .. } => source.hint(),

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use deepfusion_hint::Hint;
 use deepfusion_instances::{Error, InstanceModel, Kind, Limits};
 use deepfusion_onnx::runtime::find;
 use image::{Rgb, RgbImage};

@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
 use crate::NetworkError;
@@ -72,10 +73,10 @@ impl Error {
             source,
         }
     }
+}
 
-    /// What to do about it, in a line.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         match self {
             Self::Config { field: "--data-set", .. } => {
                 Some("give the name of the data set whose metres are meant: --data-set NAME".into())

@@ -10,6 +10,7 @@
 #[path = "../tests/support/mod.rs"]
 mod support;
 
+use deepfusion_hint::Hint;
 use deepfusion_motion::comma::CommaSegment;
 use deepfusion_motion::{
     FusedTrack, IdentifyConfig, MotionConfig, OffsetConfig, VehicleRates, identify, time_offset,
@@ -42,7 +43,10 @@ fn comma(folder: &Path, vehicle: &Path) -> Result<(), Box<dyn std::error::Error>
         };
         match identify(&segment.sensors.speed_mps, steering, imu.yaw_rate(), &known) {
             Ok(found) => println!("steering ratio {:?}", found.steering_ratio),
-            Err(error) => println!("steering ratio: {error}; {}", error.hint()),
+            Err(error) => println!(
+                "steering ratio: {error}; {}",
+                error.hint().unwrap_or_default()
+            ),
         }
     }
     // The tyres, from the first half's positions; what it is worth, on the second half.
@@ -110,7 +114,7 @@ fn kitti_drive(drive: &Path, frames: usize) -> Result<(), Box<dyn std::error::Er
         &OffsetConfig::default(),
     ) {
         Ok(offset) => println!("clock offset {offset:.4?}"),
-        Err(error) => println!("{error}; {}", error.hint()),
+        Err(error) => println!("{error}; {}", error.hint().unwrap_or_default()),
     }
     Ok(())
 }

@@ -119,6 +119,7 @@ impl Bicycle {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_hint::Hint;
 
     fn constant(value: f64) -> Signal {
         Signal::new((0..=100).map(|i| (f64::from(i) * 0.02, value)))

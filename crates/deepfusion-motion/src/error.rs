@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
 /// What can go wrong while a vehicle's sensors are read and fused.
@@ -115,10 +116,10 @@ impl Error {
             source,
         }
     }
+}
 
-    /// What to do about it, in one line.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         let text = match self {
             Self::Config { field, .. } => {
                 return Some(format!("correct {field} in the configuration"));

@@ -22,6 +22,7 @@ mod fit;
 mod problem;
 
 use crate::{Bicycle, Signal};
+use deepfusion_hint::Hint;
 use fit::Fit;
 
 /// What is known of the vehicle already, and what counts as enough.
@@ -138,16 +139,14 @@ impl std::fmt::Display for Why {
     }
 }
 
-impl Unidentifiable {
-    /// What to do about it, in one line.
-    #[must_use]
-    pub fn hint(&self) -> String {
-        match self.why {
+impl Hint for Unidentifiable {
+    fn hint(&self) -> Option<String> {
+        let text = match self.why {
             Why::Straight => "use a drive with bends, or give wheelbase and steering ratio",
             Why::OnlyTheProduct => "give one of the two, or add a parking manoeuvre to the drive",
             Why::TooUncertain => "check the streams' clocks and units, or use a longer drive",
-        }
-        .to_owned()
+        };
+        Some(text.to_owned())
     }
 }
 

@@ -18,6 +18,7 @@ mod correlation;
 
 use crate::{FusedTrack, ImageMotion, MotionModel, Signal, VehicleTrack};
 use correlation::Channel;
+use deepfusion_hint::Hint;
 
 /// The vehicle's side of the comparison, on the vehicle's clock: whatever of it is measured.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -138,11 +139,9 @@ pub enum NoTimeOffset {
     Config,
 }
 
-impl NoTimeOffset {
-    /// What to do about it, in one line.
-    #[must_use]
-    pub fn hint(&self) -> String {
-        match self {
+impl Hint for NoTimeOffset {
+    fn hint(&self) -> Option<String> {
+        let text = match self {
             Self::TooFewPairs { .. } => {
                 "use a longer drive, and check that both clocks count from the same event"
             }
@@ -151,8 +150,8 @@ impl NoTimeOffset {
                 "the clocks may be further apart: search wider, or check the yaw rate's sign"
             }
             Self::Config => "the defaults are 1 s and 4 s",
-        }
-        .to_owned()
+        };
+        Some(text.to_owned())
     }
 }
 

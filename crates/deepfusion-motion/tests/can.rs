@@ -1,5 +1,6 @@
 //! Signals decoded from CAN frames, against cantools (`tests/reference/dbc.py`).
 
+use deepfusion_hint::Hint;
 use deepfusion_motion::Error;
 use deepfusion_motion::can::{CanId, Dbc};
 use proptest::prelude::*;

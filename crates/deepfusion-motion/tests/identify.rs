@@ -1,5 +1,6 @@
 //! Wheelbase and steering ratio from drives whose parameters are known.
 
+use deepfusion_hint::Hint;
 use deepfusion_motion::{Bicycle, IdentifyConfig, Signal, Unidentifiable, Why, identify};
 use proptest::prelude::*;
 
@@ -112,7 +113,7 @@ fn a_road_shows_only_the_product_and_one_when_the_other_is_known() {
         (product.value / (2.7 * 15.4) - 1.0).abs() < 0.01,
         "{product:?}"
     );
-    assert!(error.hint().contains("give one"));
+    assert!(error.hint().unwrap().contains("give one"));
 
     let ratio_known = IdentifyConfig {
         steering_ratio: Some(15.4),

@@ -1,6 +1,7 @@
 //! The inertial unit and the fusion on a drive whose motion is known: slopes, a crooked mount, biases.
 
 use deepfusion_geometry::Se3;
+use deepfusion_hint::Hint;
 use deepfusion_motion::{
     Bicycle, Error, FusedTrack, FusionConfig, ImuConfig, ImuMount, ImuSample, ImuTrack,
     MotionConfig, MotionModel, Signal, VehicleSensors,

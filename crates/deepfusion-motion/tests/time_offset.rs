@@ -2,6 +2,7 @@
 
 mod support;
 
+use deepfusion_hint::Hint;
 use deepfusion_motion::{
     FusedTrack, GreyFrame, ImageMotion, MotionConfig, NoTimeOffset, OffsetConfig, Signal,
     TimeOffset, VehicleRates, image_motions, time_offset,
@@ -153,7 +154,7 @@ fn straight_at_one_speed_there_is_no_offset() {
     let (pictures, rates) = ideal(|_| 0.0, |_| 10.0, 0.02, 0.0);
     let error = time_offset(&pictures, &rates, &OffsetConfig::default()).unwrap_err();
     assert_eq!(error, NoTimeOffset::NothingChanges);
-    assert!(error.hint().contains("bends"));
+    assert!(error.hint().unwrap().contains("bends"));
 }
 
 #[test]

@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
 /// What can go wrong when a model is written, read or run.
@@ -69,10 +70,8 @@ pub enum Error {
     },
 }
 
-impl Error {
-    /// A one-line remedy, where there is one.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         let hint = match self {
             Self::Decode(_) => "is it complete? A partial copy ends early",
             Self::Node { .. } | Self::Model { .. } => {

@@ -6,6 +6,7 @@ mod support;
 use std::path::Path;
 
 use deepfusion_geometry::DepthRange;
+use deepfusion_hint::Hint;
 use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
 use deepfusion_onnx::check::{deviation, pictures};
 use deepfusion_onnx::runtime::{OrtEngine, find};

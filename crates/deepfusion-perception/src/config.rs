@@ -156,6 +156,7 @@ impl Default for PerceptionConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_hint::Hint;
 
     #[test]
     fn settings_that_cannot_be_are_named() {

@@ -1,3 +1,5 @@
+use deepfusion_hint::Hint;
+
 /// What can go wrong with a depth image.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -41,10 +43,8 @@ pub enum Error {
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-impl Error {
-    /// What to do about it, in one line.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         match self {
             Self::Size { .. } => Some(
                 "intrinsics belong to one image size: resize them with the image (Intrinsics::resized)".into(),

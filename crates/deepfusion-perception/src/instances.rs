@@ -117,6 +117,7 @@ impl Instance {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_hint::Hint;
 
     #[test]
     fn what_shows_through_a_mask_is_left_out() {

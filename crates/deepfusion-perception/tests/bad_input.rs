@@ -1,6 +1,7 @@
 //! Depth images that are none.
 
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use deepfusion_hint::Hint;
 use deepfusion_perception::{Error, Perception, PerceptionConfig, Stamp};
 use proptest::prelude::*;
 

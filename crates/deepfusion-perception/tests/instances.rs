@@ -5,6 +5,7 @@ mod blocks;
 
 use blocks::{CARS, SIZE, camera, scene};
 use deepfusion_geometry::Se3;
+use deepfusion_hint::Hint;
 use deepfusion_perception::{Error, Instance, Perception, PerceptionConfig, Run, Stamp, Target};
 
 /// The pixels that see a block, as a model would draw them.

@@ -1,3 +1,5 @@
+use deepfusion_hint::Hint;
+
 /// What can go wrong while a picture or a report is made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -31,10 +33,8 @@ pub enum Error {
 /// A result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-impl Error {
-    /// A one-line remedy, where there is one.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         match self {
             Self::Data(inner) => inner.hint(),
             Self::Log { .. } => {

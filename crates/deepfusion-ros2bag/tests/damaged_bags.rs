@@ -4,6 +4,7 @@
 mod common;
 
 use common::{reference, sha256};
+use deepfusion_hint::Hint;
 use deepfusion_ros2bag::Ros2Bag;
 use deepfusion_rosbag::{Error, MessageSource, Selection};
 use std::collections::HashSet;

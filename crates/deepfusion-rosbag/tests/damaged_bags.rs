@@ -3,6 +3,7 @@
 mod common;
 
 use common::{reference, sha256};
+use deepfusion_hint::Hint;
 use deepfusion_rosbag::msg::{Header, Imu, PointCloud2, RosMessage};
 use deepfusion_rosbag::{
     Bag, BagOptions, BagWriter, Compression, Error, Selection, Time, WriterOptions,

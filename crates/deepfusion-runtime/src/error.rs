@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
 /// What can go wrong on the way from a network's name to metres.
@@ -48,10 +49,10 @@ impl Error {
             reason: reason.to_string(),
         }
     }
+}
 
-    /// What to do about it, in a line.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         match self {
             Self::NoSuchModel { known, .. } => Some(match known.as_slice() {
                 [] => "give the folder that `train`, `demo` or `weights import` wrote; this build has no embedded network: \

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use deepfusion_data::RgbImage;
 use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_hint::Hint;
 use deepfusion_runtime::{DepthEstimator, DepthRunner, Error as RuntimeError, ModelSource};
 use rayon::prelude::*;
 

@@ -208,6 +208,7 @@ impl SimConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_hint::Hint;
 
     #[test]
     fn every_bad_field_is_named() {

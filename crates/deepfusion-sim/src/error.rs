@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
 /// What can go wrong while a drive is made or written.
@@ -50,10 +51,8 @@ pub enum Error {
     },
 }
 
-impl Error {
-    /// A one-line remedy, where there is one.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         match self {
             Self::Config {
                 field, expected, ..

@@ -1,6 +1,7 @@
 //! What is written is a KITTI drive: the project's own reader opens it and finds the same truth.
 
 use deepfusion_data::{Dataset, GtKind, OpenOptions, load_rgb, read_depth_png};
+use deepfusion_hint::Hint;
 use deepfusion_sim::{Error, SimConfig, Simulation, write_kitti};
 use std::fs;
 use std::path::Path;

@@ -1,6 +1,7 @@
 //! What moves in a bag: velocities at pixels, and the topic of dynamic points.
 
 use deepfusion_data::{Dataset, GtKind, MovingSource, OpenOptions};
+use deepfusion_hint::Hint;
 use deepfusion_rosbag::Compression;
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, topic, write_bag};
 use nalgebra::Vector3;

@@ -1,4 +1,5 @@
 use crate::SharedFrames;
+use deepfusion_hint::Hint;
 
 /// What can go wrong while learning.
 #[derive(Debug, thiserror::Error)]
@@ -79,10 +80,8 @@ pub enum Error {
     Model(#[from] deepfusion_model::Error),
 }
 
-impl Error {
-    /// What to do about it, in a line.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         match self {
             Self::NoSamples { .. } => Some(
                 "training needs consecutive frames of a moving camera, with time stamps and speeds; \

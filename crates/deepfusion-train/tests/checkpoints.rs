@@ -3,6 +3,7 @@
 mod support;
 
 use burn::tensor::Device;
+use deepfusion_hint::Hint;
 use deepfusion_model::Error as ModelError;
 use deepfusion_nn::weights::{self, Weights};
 use deepfusion_nn::{DepthNetConfig, PoseNetConfig, ResNetDepth};

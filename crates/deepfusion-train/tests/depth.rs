@@ -4,6 +4,7 @@ mod support;
 
 use burn::tensor::Device;
 use deepfusion_data::{Dataset, OpenOptions};
+use deepfusion_hint::Hint;
 use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_nn::{InputSize, weights};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};

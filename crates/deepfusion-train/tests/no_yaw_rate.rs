@@ -1,6 +1,7 @@
 //! A recording without a yaw rate: what may be trained on it.
 
 use deepfusion_data::{Dataset, OpenOptions, RgbImage};
+use deepfusion_hint::Hint;
 use deepfusion_train::{Error, Preset, SampleSet, TrainConfig, ViewMotion};
 use std::fs;
 

@@ -3,6 +3,7 @@
 mod support;
 
 use burn::tensor::Device;
+use deepfusion_hint::Hint;
 use deepfusion_train::{
     BatchLoader, Control, Error, Model, RunFolder, SampleSet, Schedule, TrainConfig, TrainEvent,
     TrainSummary, Trainer, ViewMotion, losses, validation_loss,

@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
@@ -111,10 +112,10 @@ impl Error {
             problem: problem.into(),
         }
     }
+}
 
-    /// What to do about it, if that is known.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         match self {
             Self::NoSuchFolder { .. } => {
                 Some("give the folder that `predict --out` or `perceive --out` wrote".into())

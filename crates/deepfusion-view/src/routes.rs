@@ -14,6 +14,7 @@
 
 use std::path::Path;
 
+use deepfusion_hint::Hint;
 use deepfusion_render::{ColourMap, DepthScale};
 use serde_json::{Value, json};
 

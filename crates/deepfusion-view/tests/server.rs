@@ -5,6 +5,7 @@ mod support;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 
+use deepfusion_hint::Hint;
 use deepfusion_view::{Error, Folder, Server, Settings};
 use serde_json::{Value, json};
 use support::{CAMERA, Running, SIZE, any_port, results, steps, write_frame, write_sidecar};

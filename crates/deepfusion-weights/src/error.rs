@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
 /// What can go wrong with packed networks.
@@ -84,9 +85,21 @@ pub enum Error {
 }
 
 impl Error {
-    /// What to do about it, in a line.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+    pub(crate) fn io(
+        path: &std::path::Path,
+        action: &'static str,
+    ) -> impl Fn(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io {
+            path: path.clone(),
+            action,
+            source,
+        }
+    }
+}
+
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         let hint = match self {
             Self::NotEmbedded { known, .. } if known.is_empty() => {
                 "train one (deepfusion train --data DRIVE) and give its folder: --model RUN"
@@ -120,18 +133,6 @@ impl Error {
             Self::Io { .. } => "check the path; NAME.safetensors and NAME.toml belong together",
         };
         Some(hint.to_owned())
-    }
-
-    pub(crate) fn io(
-        path: &std::path::Path,
-        action: &'static str,
-    ) -> impl Fn(std::io::Error) -> Self {
-        let path = path.to_owned();
-        move |source| Self::Io {
-            path: path.clone(),
-            action,
-            source,
-        }
     }
 }
 

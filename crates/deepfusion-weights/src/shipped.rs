@@ -158,6 +158,7 @@ mod tests {
     use crate::card::tests::card;
     use crate::scan::{list, scan};
     use crate::{Tensor, pack};
+    use deepfusion_hint::Hint;
 
     fn street() -> Shipped {
         let tensor = Tensor {

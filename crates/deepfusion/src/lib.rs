@@ -114,4 +114,5 @@ pub use deepfusion_sim as sim;
 pub use deepfusion_train as train;
 pub use deepfusion_weights as weights;
 
+pub use deepfusion_hint::Hint;
 pub use deepfusion_runtime::{DepthEstimator, Prediction};

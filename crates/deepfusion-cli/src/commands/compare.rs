@@ -3,7 +3,6 @@
 use std::io::Write as _;
 use std::path::Path;
 
-use anyhow::Result;
 use deepfusion_compare::{Evaluation, Tables, published_tables, run_tables};
 use deepfusion_data::{CameraChoice, Dataset, GtKind, RgbImage, save_png};
 use deepfusion_render::{
@@ -17,6 +16,7 @@ use super::{eval, run_report};
 use crate::cli::{CompareArgs, TableFormat};
 use crate::engine;
 use crate::error::CliError;
+use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
 

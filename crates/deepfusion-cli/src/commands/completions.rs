@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use anyhow::Result;
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 use clap_complete::{Shell, generate};
@@ -10,6 +9,7 @@ use clap_mangen::Man;
 use deepfusion_data::write_atomically;
 
 use crate::cli::{Cli, CompletionsArgs, CompletionsKind};
+use crate::failure::Result;
 use crate::output;
 
 /// `deepfusion completions`.

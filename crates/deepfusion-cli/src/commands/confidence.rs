@@ -3,7 +3,6 @@
 use std::io::Write;
 use std::path::Path;
 
-use anyhow::Result;
 use deepfusion_data::{Dataset, write_atomically};
 use deepfusion_perception::{ConfidenceModel, Evidence, Reliability};
 use deepfusion_runtime::DepthEstimator;
@@ -13,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::division::divide;
 use super::evaluate::{Evaluated, Place, Truth};
 use super::known_pixels::known_pixels;
+use crate::failure::{Failure, Result};
 
 /// The file in a run's folder.
 const FILE: &str = "confidence.toml";
@@ -43,9 +43,11 @@ impl Confidence {
     pub fn read(run: &Path) -> Result<Option<Self>> {
         let path = run.join(FILE);
         match std::fs::read_to_string(&path) {
-            Ok(text) => Ok(Some(toml::from_str(&text).map_err(|e| {
-                anyhow::Error::new(e).context(path.display().to_string())
-            })?)),
+            Ok(text) => {
+                Ok(Some(toml::from_str(&text).map_err(|e| {
+                    Failure::from(e).context(path.display().to_string())
+                })?))
+            }
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(e) => Err(deepfusion_data::Error::file(&path, e).into()),
         }

@@ -1,10 +1,9 @@
 //! `deepfusion config`: what can be configured.
 
-use anyhow::Result;
-
 use deepfusion_model::Preset;
 
 use crate::cli::ShowArgs;
+use crate::failure::Result;
 use crate::output;
 
 /// `deepfusion config show`.

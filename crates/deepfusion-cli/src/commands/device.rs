@@ -1,11 +1,11 @@
 #[cfg(feature = "train")]
-use anyhow::Result;
 #[cfg(feature = "train")]
 use burn::tensor::Device;
 
 use crate::cli::DeviceChoice;
 #[cfg(feature = "train")]
 use crate::error::CliError;
+use crate::failure::Result;
 
 /// The device asked for, where this build has its backend.
 #[cfg(feature = "train")]

@@ -1,6 +1,5 @@
 use std::path::Path;
 
-use anyhow::Result;
 use deepfusion_compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
 use deepfusion_data::{CameraChoice, Dataset, GtKind, OpenOptions, RgbImage};
 use deepfusion_eval::{
@@ -25,6 +24,7 @@ use super::used_checkpoint::UsedCheckpoint;
 use crate::cli::{CameraIntrinsics, EvalArgs, PrecisionChoice, PredKind};
 use crate::engine;
 use crate::error::CliError;
+use crate::failure::Result;
 use crate::model::{self, ModelFacts};
 use crate::output;
 use crate::progress::{Progress, say};

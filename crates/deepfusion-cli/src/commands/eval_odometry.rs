@@ -1,7 +1,6 @@
 use std::io::Write as _;
 use std::path::Path;
 
-use anyhow::Result;
 use deepfusion_data::{
     Camera, CameraPath, Dataset, DatasetKind, Error, OpenOptions, write_atomically,
 };
@@ -18,6 +17,7 @@ use super::evaluate::open_recordings;
 use crate::allocator;
 use crate::cli::EvalOdometryArgs;
 use crate::error::CliError;
+use crate::failure::Result;
 use crate::model::ModelFacts;
 use crate::output;
 use crate::progress::Progress;

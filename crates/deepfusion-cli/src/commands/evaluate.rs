@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use deepfusion_data::{
     CameraChoice, Dataset, DatasetKind, GtKind, OpenOptions, Split, SplitCoverage,
     ground_truth_names,
@@ -16,6 +15,7 @@ use deepfusion_geometry::DepthMap;
 
 use super::remarks;
 use crate::error::CliError;
+use crate::failure::Result;
 
 /// Opens the recordings at several paths, each drive and camera a data set, and tells what was noticed.
 pub fn open_datasets(

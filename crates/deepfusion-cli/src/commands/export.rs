@@ -2,7 +2,6 @@ use std::fs;
 use std::io::Write;
 use std::path::Path;
 
-use anyhow::{Context, Result};
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_fs::Partial;
 use deepfusion_model::{InputSize, TrainConfig, depth_graph};
@@ -15,6 +14,7 @@ use serde::Serialize;
 
 use crate::cli::ExportArgs;
 use crate::error::CliError;
+use crate::failure::{Context, Result};
 use crate::model;
 use crate::output;
 use crate::progress::say;

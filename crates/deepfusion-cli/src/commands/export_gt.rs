@@ -1,9 +1,9 @@
-use anyhow::Result;
 use deepfusion_data::{Dataset, OpenOptions, export_gt};
 
 use super::evaluate::{check_used, expected_frames, open_recordings, read_split};
 use crate::cli::ExportGtArgs;
 use crate::error::CliError;
+use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
 

@@ -1,11 +1,11 @@
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use deepfusion_data::{
     Dataset, GtKind, OpenOptions, ground_truth_names, inspect_with, overlay, save_png,
 };
 
 use crate::cli::{CameraIntrinsics, InspectArgs};
+use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
 

@@ -49,9 +49,8 @@ mod view;
 mod view_rerun;
 mod weights;
 
-use anyhow::Result;
-
 use crate::cli::{Command, ConfigCommand, DataCommand, WeightsCommand};
+use crate::failure::Result;
 
 /// Runs what was asked for.
 pub fn run(command: Option<Command>) -> Result<()> {

@@ -1,5 +1,4 @@
-use anyhow::Result;
-
+use crate::failure::Result;
 use crate::output;
 
 const OVERVIEW: &str = "\

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
 use deepfusion_data::RgbImage;
 use deepfusion_render::{DepthPanel, depth_panel, sample_panel};
 use deepfusion_train::log::{CsvLog, CsvRecord, TensorBoardLog};
 use deepfusion_train::{Control, Lesson, LossTerms, SamplePanel, TrainEvent};
 
 use super::outlook::Outlook;
+use crate::failure::{Context, Failure, Result};
 use crate::interrupt;
 use crate::progress::{Progress, say};
 
@@ -25,7 +25,7 @@ pub struct Recorder {
     last_line: Instant,
     outlook: Option<Outlook>,
     /// The first failure to write a log: training goes on, the command ends with it.
-    failure: Option<anyhow::Error>,
+    failure: Option<Failure>,
 }
 
 impl Recorder {

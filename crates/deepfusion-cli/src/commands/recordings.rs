@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use deepfusion_data::{Camera, CameraChoice, Dataset, OpenOptions};
 use deepfusion_model::{DataSetConfig, Error as ModelError, TrainConfig};
 
 use super::evaluate::{open_quietly, open_recordings, read_split};
+use crate::failure::Result;
 
 /// Cameras as configurations name them.
 pub fn camera_word(camera: CameraChoice) -> &'static str {

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use clap::ValueEnum;
 use deepfusion_model::{Learn, TrainConfig, ViewMotion};
 
@@ -11,6 +10,7 @@ use super::recordings::camera_word;
 use super::start;
 use crate::cli::TrainArgs;
 use crate::error::CliError;
+use crate::failure::{Failure, Result};
 
 /// A run's configuration with what was asked for: it may be made longer, and its recordings may have moved; all else must be as
 /// the run has it.
@@ -276,16 +276,10 @@ fn told(path: &Path) -> String {
 }
 
 /// Where an error is that one of the run's recordings is not there, one that says how to tell where it is now.
-pub fn where_recordings_are(
-    error: anyhow::Error,
-    config: &TrainConfig,
-    run: &Path,
-) -> anyhow::Error {
-    let missing = error.chain().find_map(|cause| match cause.downcast_ref() {
-        Some(deepfusion_data::Error::NoSuchPath { path }) => Some(path.clone()),
-        _ => None,
-    });
-    let Some(path) = missing else { return error };
+pub fn where_recordings_are(error: Failure, config: &TrainConfig, run: &Path) -> Failure {
+    let Some(path) = error.missing().map(Path::to_owned) else {
+        return error;
+    };
     // What is missing may lie within what was given.
     let within = |given: &PathBuf| path.starts_with(given);
     let data = &config.data;
@@ -491,12 +485,9 @@ mod tests {
         config.data.validation = vec!["/data/val".into()];
         let told = |path: &str| {
             let missing = std::io::Error::from(std::io::ErrorKind::NotFound);
-            let error = deepfusion_data::Error::file(Path::new(path), missing).into();
-            let error = where_recordings_are(error, &config, Path::new("runs/a"));
-            (
-                error.to_string(),
-                crate::error::hint_of(&error).unwrap_or_default(),
-            )
+            let error = deepfusion_data::Error::file(Path::new(path), missing);
+            let error = where_recordings_are(error.into(), &config, Path::new("runs/a"));
+            (error.to_string(), error.hint().unwrap_or_default())
         };
         let (text, hint) = told("/data/street");
         assert!(

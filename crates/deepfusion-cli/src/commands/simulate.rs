@@ -1,7 +1,7 @@
-use anyhow::Result;
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 
 use crate::cli::{SceneChoice, SensorsChoice, SimulateArgs, SimulateFormat, Size};
+use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
 

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use burn::tensor::Device;
 use deepfusion_model::weights::{Weights, read_bytes};
 use deepfusion_model::{
@@ -15,6 +14,7 @@ use deepfusion_weights::Shipped;
 
 use crate::cli::TrainArgs;
 use crate::error::CliError;
+use crate::failure::Result;
 use crate::progress::say;
 
 /// The weights of a new run before its first step.
@@ -327,7 +327,7 @@ mod tests {
     fn what_is_neither_there_nor_embedded_is_told_with_both() {
         let error = Start::named(Path::new("no-such-network")).unwrap_err();
         assert!(error.to_string().contains("no-such-network"), "{error}");
-        let hint = crate::error::hint_of(&error).unwrap();
+        let hint = error.hint().unwrap();
         assert!(hint.contains("folder"), "{hint}");
         for name in embedded_names() {
             assert!(hint.contains(name), "{hint}");

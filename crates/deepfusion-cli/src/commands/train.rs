@@ -1,6 +1,5 @@
 use std::collections::HashSet;
 
-use anyhow::Result;
 use deepfusion_data::{CameraChoice, Dataset, speed_unit_warning};
 use deepfusion_model::{
     DataConfig, Error as ModelError, InputSize, Learn, Preset, RunFolder, TrainConfig,
@@ -15,6 +14,7 @@ use super::{device, remarks, resume};
 use crate::allocator;
 use crate::cli::{PresetChoice, TrainArgs};
 use crate::error::CliError;
+use crate::failure::Result;
 use crate::progress::say;
 use crate::{interrupt, output};
 

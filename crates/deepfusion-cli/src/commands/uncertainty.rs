@@ -3,7 +3,6 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
 use deepfusion_data::{Dataset, write_atomically};
 use deepfusion_eval::{IntervalFactors, IntervalSample, Protocol};
 use deepfusion_geometry::DepthMap;
@@ -13,6 +12,7 @@ use deepfusion_runtime::{DepthEstimator, Prediction};
 use super::evaluate::{Evaluated, Place, Truth};
 use super::known_pixels::known_pixels;
 use crate::error::CliError;
+use crate::failure::{Context, Result};
 use crate::model::ModelFacts;
 use crate::progress::say;
 

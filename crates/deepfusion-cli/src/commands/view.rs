@@ -1,10 +1,10 @@
 use std::io::IsTerminal;
 use std::process::{Command, Stdio};
 
-use anyhow::Result;
 use deepfusion_view::{Folder, Server, Settings};
 
 use crate::cli::ViewArgs;
+use crate::failure::Result;
 use crate::progress::say;
 use crate::{interrupt, output};
 

@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
-use anyhow::Result;
-
 use crate::cli::ViewArgs;
 use crate::error::CliError;
+use crate::failure::Result;
 
 /// Writes the folder's frames to `file`.
 #[cfg(feature = "rerun")]

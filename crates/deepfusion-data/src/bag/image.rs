@@ -65,6 +65,7 @@ pub(super) fn decode(bag: &dyn MessageSource, message: &Message<'_>) -> Result<R
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_hint::Hint;
     use deepfusion_rosbag::msg::Header;
     use deepfusion_rosbag::{Bag, BagWriter, WriterOptions};
     use std::borrow::Cow;

@@ -5,6 +5,7 @@ use super::median;
 use crate::speed_check::PLAUSIBLE_M;
 use crate::{Dataset, GtKind};
 use deepfusion_geometry::DepthMap;
+use deepfusion_hint::Hint;
 use nalgebra::{Matrix3, Vector3};
 
 /// Frames looked at.

@@ -3,6 +3,7 @@
 use super::finding::{Outcome, Severity};
 use super::survey::Survey;
 use crate::{Dataset, Error, Result};
+use deepfusion_hint::Hint;
 
 pub(super) const CHECK: &str = "opening";
 /// Pairs slower than this do not train (SPEC 3.5).

@@ -151,6 +151,7 @@ fn scheme(text: &str) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_hint::Hint;
 
     fn input(text: &str, system: &str) -> String {
         Address::parse(text)

@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
 /// Two paths that cannot be compared.
@@ -40,10 +41,8 @@ pub enum TrackError {
     },
 }
 
-impl TrackError {
-    /// What to do about it, in one line.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for TrackError {
+    fn hint(&self) -> Option<String> {
         Some(
             match self {
                 Self::Lengths { .. } => {
@@ -87,10 +86,8 @@ pub enum PoseFileError {
     },
 }
 
-impl PoseFileError {
-    /// What to do about it, in one line.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for PoseFileError {
+    fn hint(&self) -> Option<String> {
         Some(
             match self {
                 Self::Io { source, .. } => match source.kind() {

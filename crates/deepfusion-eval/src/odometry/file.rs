@@ -135,6 +135,7 @@ fn nearest(times_s: &[f64], time_s: f64) -> Option<usize> {
 mod tests {
     use super::super::{kitti_text, tum_text};
     use super::*;
+    use deepfusion_hint::Hint;
     use nalgebra::Vector3;
     use proptest::prelude::*;
 

@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
 /// What can go wrong with a cloud or its file.
@@ -43,10 +44,8 @@ pub enum Error {
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-impl Error {
-    /// What to do about it, in one line.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
         match self {
             Self::File { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => {
                 Some("the disk is full: free some space and run again".into())

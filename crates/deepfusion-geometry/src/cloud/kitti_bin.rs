@@ -57,6 +57,7 @@ impl PointCloud {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_hint::Hint;
 
     #[test]
     fn a_scan_survives_the_file() {

@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::path::PathBuf;
 
 /// What can go wrong when a network is configured, or when weights are read, written or fitted
@@ -113,9 +114,21 @@ pub enum NetworkError {
 }
 
 impl NetworkError {
-    /// A one-line remedy, where there is one.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+    pub(crate) fn config(
+        field: &'static str,
+        expected: impl Into<String>,
+        found: impl std::fmt::Debug,
+    ) -> Self {
+        Self::Config {
+            field,
+            expected: expected.into(),
+            found: format!("{found:?}"),
+        }
+    }
+}
+
+impl Hint for NetworkError {
+    fn hint(&self) -> Option<String> {
         let hint = match self {
             Self::Config { .. } | Self::Graph(_) => return None,
             Self::InputSize { width, height } => {
@@ -146,18 +159,6 @@ impl NetworkError {
             }
         };
         Some(hint.to_owned())
-    }
-
-    pub(crate) fn config(
-        field: &'static str,
-        expected: impl Into<String>,
-        found: impl std::fmt::Debug,
-    ) -> Self {
-        Self::Config {
-            field,
-            expected: expected.into(),
-            found: format!("{found:?}"),
-        }
     }
 }
 

@@ -118,6 +118,7 @@ fn merge(base: &mut Table, over: Table) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_hint::Hint;
 
     fn read(text: &str) -> Result<TrainConfig, Error> {
         let folder = tempfile::tempdir().unwrap();

@@ -151,6 +151,7 @@ fn join_imu(accelerometer: &Stream, gyro: &Stream) -> Vec<ImuSample> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_hint::Hint;
     use ndarray::{Array1, Array2};
     use ndarray_npy::write_npy;
     use std::fs;

@@ -1,5 +1,6 @@
 use super::*;
 use crate::{AttentionConfig, HceConfig, InputSize, ResNetDepth};
+use deepfusion_hint::Hint;
 
 #[test]
 fn sizes_that_do_not_halve_five_times_are_refused_with_the_nearest_that_does() {

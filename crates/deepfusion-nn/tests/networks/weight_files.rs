@@ -5,6 +5,7 @@ use std::fs;
 use crate::common::{images, manifest, unpack, values};
 use burn::module::Module;
 use burn::tensor::Device;
+use deepfusion_hint::Hint;
 use deepfusion_nn::weights::{
     self, Monodepth2Files, WeightTensor, Weights, load_monodepth2, load_torchvision_resnet,
 };

@@ -1,3 +1,4 @@
+use deepfusion_hint::Hint;
 use std::borrow::Cow;
 
 /// What can be wrong within a message.
@@ -78,10 +79,10 @@ impl MessageError {
         }
         self
     }
+}
 
-    /// What to do about it, in one line.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+impl Hint for MessageError {
+    fn hint(&self) -> Option<String> {
         let text = match self {
             Self::Short { .. } | Self::Long { .. } | Self::Text { .. } => {
                 "the message is damaged, or was recorded with another definition than its MD5 says"

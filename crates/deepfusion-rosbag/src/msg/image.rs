@@ -247,6 +247,7 @@ impl Image<'_> {
 mod tests {
     use super::*;
     use crate::msg::Header;
+    use deepfusion_hint::Hint;
 
     fn image<'a>(encoding: &str, width: u32, height: u32, step: u32, data: &'a [u8]) -> Image<'a> {
         Image {

@@ -7,7 +7,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result};
 use burn::tensor::Device;
 use deepfusion_data::{CameraChoice, GtKind};
 use deepfusion_eval::{GroundTruth, Protocol, Report};
@@ -26,6 +25,7 @@ use super::recordings::{camera_word, training_recordings};
 use super::{device, resume, train};
 use crate::cli::{AblateArgs, DeviceChoice, EngineArgs, PresetChoice};
 use crate::error::CliError;
+use crate::failure::{Context, Result};
 use crate::progress::{Progress, say};
 use crate::{engine, interrupt, output};
 

@@ -6,7 +6,6 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use anyhow::Result;
 use deepfusion_data::{RgbImage, decode_rgb, resize_rgb, to_network_input};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
@@ -23,6 +22,7 @@ use serde::Serialize;
 use self::modules::{Module, Modules};
 use super::device;
 use crate::cli::{BenchArgs, PresetChoice};
+use crate::failure::Result;
 use crate::model;
 use crate::pipeline::{self, Threads};
 use crate::{engine, output};

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::Result;
 use clap::{Parser, ValueEnum};
 use deepfusion_data::{Dataset, OpenOptions, Split, write_atomically};
 use deepfusion_model::{TrainConfig, ViewMotion};
@@ -20,6 +19,7 @@ use crate::commands::evaluate::Evaluated;
 use crate::commands::recorder::clock;
 use crate::commands::start::Start;
 use crate::commands::{perceive, run_report};
+use crate::failure::Result;
 use crate::progress::say;
 
 /// Frames of the drive along the new street, ten a second, and how many of them have a scan.

@@ -1,6 +1,5 @@
 //! From scratch: six simulated streets, a small network that knows nothing, and a seventh street to be measured on.
 
-use anyhow::Result;
 use deepfusion_data::{CameraChoice, Dataset, OpenOptions};
 use deepfusion_model::{CompareAt, InputSize, Preset, Reprojection, TrainConfig, ViewMotion};
 use deepfusion_render::HtmlReport;
@@ -11,6 +10,7 @@ use super::{Demo, TEST_SEED, measure};
 use crate::commands::evaluate::open_datasets;
 use crate::commands::recorder::clock;
 use crate::commands::run_report;
+use crate::failure::Result;
 use crate::progress::say;
 
 /// Streets that are trained on, each filmed at its own rate: one street alone is learned by heart. At few

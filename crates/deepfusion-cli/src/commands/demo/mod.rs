@@ -9,7 +9,6 @@ mod page;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::Result;
 use burn::tensor::Device;
 use deepfusion_data::{Dataset, GtKind};
 use deepfusion_eval::{Crop, GroundTruth, Protocol};
@@ -25,6 +24,7 @@ use super::evaluate::{Evaluated, Truth, evaluate_datasets, trivial_from_datasets
 use super::recorder::clock;
 use super::{device, train};
 use crate::cli::{DemoArgs, EngineArgs};
+use crate::failure::Result;
 use crate::progress::{Progress, say};
 use crate::{engine, interrupt, output};
 

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use deepfusion_data::{Dataset, RgbImage, save_png, write_atomically, write_depth_png};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
@@ -13,6 +12,7 @@ use deepfusion_render::{
 use deepfusion_runtime::DepthEstimator;
 
 use super::{DEMO, Demo};
+use crate::failure::Result;
 use crate::interrupt;
 
 /// How both ways measure.

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 use std::process::{Command, Stdio};
 
-use anyhow::Result;
 use serde::Serialize;
 
+use crate::failure::Result;
 use crate::output;
 
 /// What was found.

@@ -7,12 +7,12 @@ mod report;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use anyhow::Result;
 use deepfusion_data::doctor::{Diagnosis, Outcome, Severity, doctor_with};
 use deepfusion_data::{DatasetKind, OpenOptions};
 
 use crate::cli::{CameraIntrinsics, DoctorArgs};
 use crate::error::CliError;
+use crate::failure::Result;
 use crate::output;
 use crate::progress::say;
 

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use anyhow::Result;
 use deepfusion_data::doctor::{Diagnosis, DriveDiagnosis, Line};
 use deepfusion_data::{Camera, CameraChoice, Dataset, GtKind, OpenOptions, overlay};
 use deepfusion_render::{HtmlReport, LineChart, PictureFormat};
 
 use super::lines;
+use crate::failure::Result;
 
 /// Writes the page.
 pub fn write(path: &Path, options: &OpenOptions, diagnosis: &Diagnosis, file: &Path) -> Result<()> {

@@ -1,6 +1,5 @@
 //! The boxes of a drive's `tracklet_labels.xml`, as the camera of each frame sees them.
 
-use anyhow::Result;
 use deepfusion_data::kitti::{Calibration, Tracklet};
 use deepfusion_data::{Dataset, Error};
 use deepfusion_geometry::{Intrinsics, Se3};
@@ -8,6 +7,7 @@ use deepfusion_perception::Label;
 use nalgebra::Vector3;
 
 use super::{Witness, counts};
+use crate::failure::Result;
 
 /// Pixels of a box in an image of 640×192 from which on it counts, where every pixel's depth is known.
 const LEAST_PIXELS: f64 = 50.0;

@@ -8,7 +8,6 @@ mod table;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::Result;
 use deepfusion_data::{Dataset, OpenOptions, RgbImage, kitti::GtKind, read_depth_png, save_png};
 use deepfusion_eval::IntervalFactors;
 use deepfusion_geometry::{DepthMap, Intrinsics};
@@ -28,6 +27,7 @@ use super::scene::{MotionTracker, working_depth};
 use super::uncertainty;
 use crate::cli::{EvalTargetsArgs, TargetDepth};
 use crate::error::CliError;
+use crate::failure::Result;
 use crate::model::ModelFacts;
 use crate::progress::Progress;
 use crate::{engine, output};

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use deepfusion_data::{Error, image_size};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
@@ -11,6 +10,7 @@ use nalgebra::{Matrix3, Matrix3x4, Vector3};
 
 use super::labels::pixels_within;
 use super::{Witness, counts};
+use crate::failure::Result;
 
 /// Points of the scan from which on a label counts.
 const LEAST_POINTS: usize = 15;

@@ -2,12 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
 use crossbeam_channel::bounded;
 use deepfusion_data::{Address, LiveFrame, LiveSource, Taken};
 
 use super::figures::Figures;
 use crate::cli::LiveArgs;
+use crate::failure::Result;
 use crate::interrupt;
 
 /// Ctrl-C is looked at this often while nothing comes.

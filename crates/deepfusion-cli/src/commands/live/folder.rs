@@ -2,9 +2,8 @@
 
 use std::path::Path;
 
-use anyhow::Result;
-
 use crate::error::CliError;
+use crate::failure::Result;
 
 /// What the names of frames begin with.
 const PREFIX: &str = "live-";

@@ -10,13 +10,13 @@ pub use self::folder::{VIDEO, make_room};
 use std::io::IsTerminal;
 use std::time::UNIX_EPOCH;
 
-use anyhow::Result;
 use deepfusion_data::{Address, LiveFrame};
 use serde::{Deserialize, Serialize};
 
 use super::predict::inputs::Input;
 use crate::cli::LiveArgs;
 use crate::error::CliError;
+use crate::failure::Result;
 
 /// The live source among the arguments, if they name one; it is then alone, and options of live sources are for it.
 pub fn source(inputs: &[String], args: &LiveArgs) -> Result<Option<Address>, CliError> {

@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use anyhow::Result;
 use deepfusion_eval::IntervalFactors;
 use deepfusion_perception::{
     ConfidenceModel, Perception, PerceptionConfig, VehicleShape, time_to_collision,
@@ -20,6 +19,7 @@ use crate::commands::predict::{Loaded, Seen};
 use crate::commands::scene::{Motion, ScaleWatch, working_depth};
 use crate::commands::uncertainty;
 use crate::error::CliError;
+use crate::failure::Result;
 use crate::model::ModelFacts;
 
 /// A frame that is loaded, and when that began.

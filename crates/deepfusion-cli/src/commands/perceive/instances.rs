@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use anyhow::Result;
 use deepfusion_data::RgbImage;
 use deepfusion_geometry::DepthMap;
 use deepfusion_instances::InstanceModel;
 use deepfusion_perception::{Instance, Run};
 
 use crate::cli::InstanceArgs;
+use crate::failure::Result;
 
 /// Finds things by their look, where the user gave a model for that.
 pub struct Spotter(Option<InstanceModel>);

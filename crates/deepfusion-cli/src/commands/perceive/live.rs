@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use anyhow::Result;
 use deepfusion_data::{Address, LiveFrame};
 use deepfusion_geometry::Se3;
 use deepfusion_perception::Stamp;
@@ -12,6 +11,7 @@ use super::Work;
 use super::eyes::{Begun, Eyes, Found};
 use crate::commands::live::{self, Feed, LiveMark};
 use crate::commands::scene::Motion;
+use crate::failure::Result;
 use crate::output;
 use crate::progress::say;
 

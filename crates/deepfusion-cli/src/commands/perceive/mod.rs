@@ -10,7 +10,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
 use deepfusion_perception::PerceptionConfig;
 
 use self::eyes::{Begun, Eyes, Found};
@@ -20,7 +19,8 @@ use super::predict::Job;
 use super::predict::inputs::{self, Input};
 use super::scene::{MotionTracker, ScaleWatch};
 use crate::cli::{PerceiveArgs, PredictionArgs};
-use crate::error::{CliError, hint_of, told};
+use crate::error::CliError;
+use crate::failure::{Context, Failure, Result};
 use crate::model;
 use crate::pipeline::{self, Threads};
 use crate::progress::say;
@@ -106,8 +106,8 @@ struct Outcome {
     done: usize,
     targets: usize,
     latency_ms: Vec<f64>,
-    unreadable: Vec<anyhow::Error>,
-    fatal: Option<anyhow::Error>,
+    unreadable: Vec<Failure>,
+    fatal: Option<Failure>,
 }
 
 struct Work<'a> {
@@ -220,8 +220,8 @@ impl Work<'_> {
         let total = self.all.len();
         if !outcome.unreadable.is_empty() {
             return Err(CliError::SomeFailed {
-                hint: outcome.unreadable.iter().find_map(hint_of),
-                failures: outcome.unreadable.iter().map(told).collect(),
+                hint: outcome.unreadable.iter().find_map(Failure::hint),
+                failures: outcome.unreadable.iter().map(Failure::one_line).collect(),
                 total,
                 interrupted: interrupt::asked(),
             }

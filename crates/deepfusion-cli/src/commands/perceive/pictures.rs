@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use deepfusion_data::{RgbImage, save_png, write_unsynced};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
@@ -13,6 +12,7 @@ use deepfusion_render::{birds_eye, box_overlay, target_segments};
 use deepfusion_runtime::Prediction;
 
 use crate::cli::PerceiveSave;
+use crate::failure::{Failure, Result};
 
 /// Cells of the free space and how far it reaches, metres.
 const GRID: (f32, f32) = (0.25, 50.0);
@@ -140,7 +140,7 @@ impl Picture {
             Self::Image(picture) => save_png(picture, path)?,
             Self::Cloud(cloud) => {
                 let pcd = path.extension().is_some_and(|ending| ending == "pcd");
-                write_unsynced::<anyhow::Error>(path, |out| match pcd {
+                write_unsynced::<Failure>(path, |out| match pcd {
                     true => Ok(cloud.write_pcd(out)?),
                     false => Ok(cloud.write_ply(out)?),
                 })?;

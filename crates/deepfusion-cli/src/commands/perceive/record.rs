@@ -3,12 +3,12 @@
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use deepfusion_data::write_unsynced;
 use deepfusion_perception::{Collision, Surroundings, Target};
 use serde::Serialize;
 
 use super::super::scene::{Motion, Scale};
+use crate::failure::Result;
 
 /// A frame's targets; everything in the camera's axes (x right, y down, z forward), metres and seconds.
 #[derive(Debug, Clone, Serialize)]

@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-use anyhow::Result;
 use deepfusion_data::{Camera, CameraCalibration, Lens, RgbImage, kitti::Calibration};
 use deepfusion_geometry::Intrinsics;
 use sha2::{Digest, Sha256};
 
 use crate::cli::{CameraIntrinsics, PredictionArgs};
 use crate::error::CliError;
+use crate::failure::Result;
 
 /// Where the inputs' camera comes from.
 #[derive(Debug, Clone)]

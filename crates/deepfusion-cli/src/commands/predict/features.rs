@@ -1,11 +1,12 @@
 //! The picture of what a network sees: its encoder's features and attention on the image (the paper's Fig. 5).
 
-use anyhow::Result;
 use deepfusion_data::{RgbImage, resize_rgb};
 use deepfusion_geometry::DepthMap;
 use deepfusion_render::{DepthScale, Tile, depth_picture, feature_picture, feature_range, sheet};
 use deepfusion_runtime::{FeatureMap, LayerMaps};
 use image::imageops::crop_imm;
+
+use crate::failure::Result;
 
 /// Width of each picture of the sheet, in pixels: captions need some.
 const WIDTH: u32 = 480;

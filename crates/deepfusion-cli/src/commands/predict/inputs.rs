@@ -4,11 +4,11 @@ use std::collections::HashSet;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::Result;
 use deepfusion_data::{Dataset, DatasetKind, OpenOptions};
 
 use crate::commands::remarks;
 use crate::error::CliError;
+use crate::failure::Result;
 
 /// The endings of images.
 const IMAGES: [&str; 3] = ["png", "jpg", "jpeg"];

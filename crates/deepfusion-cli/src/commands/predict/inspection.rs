@@ -2,7 +2,7 @@
 
 #[cfg(feature = "train")]
 mod imp {
-    use anyhow::Result;
+    use crate::failure::Result;
     use deepfusion_model::StoredNetwork;
 
     use crate::cli::DeviceChoice;
@@ -17,7 +17,7 @@ mod imp {
 
 #[cfg(not(feature = "train"))]
 mod imp {
-    use anyhow::Result;
+    use crate::failure::Result;
     use deepfusion_model::{InputSize, StoredNetwork};
     use deepfusion_runtime::LayerMaps;
 

@@ -4,11 +4,10 @@ use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
-
 use super::manifest::{Manifest, State};
 use super::sidecar::Sidecar;
-use crate::error::{CliError, hint_of, told};
+use crate::error::CliError;
+use crate::failure::{Failure, Result};
 use crate::interrupt;
 use crate::progress::Progress;
 
@@ -25,9 +24,9 @@ struct Book {
     manifest: Manifest,
     /// By place in the manifest; empty where nobody wants them.
     sidecars: Vec<Option<Sidecar>>,
-    failures: Vec<(usize, anyhow::Error)>,
+    failures: Vec<(usize, Failure)>,
     /// What ended the run: no later image would fare better.
-    stop: Option<anyhow::Error>,
+    stop: Option<Failure>,
     done: usize,
     written: Instant,
     progress: Progress,
@@ -79,17 +78,17 @@ impl<'a> Ledger<'a> {
     }
 
     /// An image cannot be predicted; the others can.
-    pub fn failed(&self, image: usize, error: anyhow::Error) {
+    pub fn failed(&self, image: usize, error: Failure) {
         let mut book = self.lock();
         let entry = &mut book.manifest.images[image];
         entry.state = State::Failed;
-        entry.error = Some(told(&error));
+        entry.error = Some(error.one_line());
         book.failures.push((image, error));
         self.tell(&mut book);
     }
 
     /// Outputs cannot be written: the run ends.
-    pub fn stop(&self, error: anyhow::Error) {
+    pub fn stop(&self, error: Failure) {
         self.lock().stop.get_or_insert(error);
     }
 
@@ -113,8 +112,8 @@ impl<'a> Ledger<'a> {
         } else if failed == 1 && total == 1 {
             Err(book.failures.remove(0).1)
         } else if failed > 0 {
-            let hint = book.failures.iter().find_map(|(_, error)| hint_of(error));
-            let failures = book.failures.iter().map(|(_, error)| told(error)).collect();
+            let hint = book.failures.iter().find_map(|(_, error)| error.hint());
+            let failures = book.failures.iter().map(|(_, e)| e.one_line()).collect();
             Err(CliError::SomeFailed {
                 failures,
                 total,

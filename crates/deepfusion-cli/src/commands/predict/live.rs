@@ -2,7 +2,6 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use anyhow::Result;
 use deepfusion_data::{Address, LiveFrame, shown_for};
 use deepfusion_runtime::ModelSource;
 
@@ -13,6 +12,7 @@ use crate::cli::{PredictArgs, Shard};
 use crate::commands::live::{self, Feed, LiveMark};
 use crate::commands::scene::ScaleWatch;
 use crate::error::CliError;
+use crate::failure::Result;
 use crate::progress::say;
 use crate::{engine, interrupt, output};
 

@@ -4,7 +4,6 @@ use std::collections::HashSet;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -12,6 +11,7 @@ use super::inputs::Input;
 use super::sidecar::{MadeWith, write_json};
 use crate::cli::Shard;
 use crate::error::CliError;
+use crate::failure::Result;
 
 /// The manifest of one shard.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

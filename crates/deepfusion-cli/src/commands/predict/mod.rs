@@ -16,7 +16,6 @@ mod watcher;
 
 use std::sync::Once;
 
-use anyhow::{Context, Result};
 use deepfusion_compare::MetricScale;
 use deepfusion_data::{LiveFrame, RgbImage, load_photo};
 use deepfusion_eval::IntervalFactors;
@@ -40,6 +39,7 @@ use super::uncertainty;
 use crate::cli::{Outputs, PredictArgs, PredictionArgs, Save, Shard};
 use crate::engine;
 use crate::error::CliError;
+use crate::failure::{Context, Result};
 use crate::model::{self, ModelFacts};
 use crate::pipeline::{self, Threads};
 use crate::progress::say;

@@ -3,7 +3,6 @@
 use std::io::Write;
 use std::path::Path;
 
-use anyhow::Result;
 use deepfusion_data::{RgbImage, save_png, write_depth_png, write_unsynced};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
@@ -14,6 +13,7 @@ use super::features;
 use crate::cli::Save;
 use crate::commands::uncertainty;
 use crate::error::CliError;
+use crate::failure::{Failure, Result};
 
 /// The name of an output.
 pub fn file_name(name: &str, save: Save) -> String {
@@ -120,7 +120,7 @@ enum CloudError {
 }
 
 impl CloudError {
-    fn into_inner(self) -> anyhow::Error {
+    fn into_inner(self) -> Failure {
         match self {
             Self::File(error) => error.into(),
             Self::Cloud(error) => error.into(),

@@ -2,7 +2,6 @@
 
 use std::collections::HashSet;
 
-use anyhow::Result;
 use deepfusion_fs::Partial;
 use serde::de::IgnoredAny;
 
@@ -11,6 +10,7 @@ use super::inputs::Input;
 use super::outputs::file_name;
 use super::sidecar::{FileMark, Sidecar};
 use crate::error::CliError;
+use crate::failure::Result;
 
 /// The sidecar of an image that is done; `None` where there is work to do.
 ///

@@ -4,7 +4,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
-use anyhow::Result;
 use clap::ValueEnum;
 use deepfusion_compare::MetricScale;
 use deepfusion_data::{LiveFrame, write_atomically};
@@ -18,6 +17,7 @@ use super::super::live::LiveMark;
 use super::super::scene::Scale;
 use super::camera::CameraSource;
 use crate::cli::{Outputs, PredictionArgs, Save};
+use crate::failure::Result;
 use crate::model::ModelFacts;
 
 /// A prediction's description.

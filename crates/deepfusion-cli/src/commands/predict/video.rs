@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::Result;
 use deepfusion_data::{Shown, can_write_video, shown_for, write_video};
 
 use super::inputs::Input;
@@ -11,6 +10,7 @@ use super::manifest::Manifest;
 use super::outputs::file_name;
 use crate::cli::{PredictArgs, Save, Shard};
 use crate::error::CliError;
+use crate::failure::Result;
 use crate::progress::say;
 
 /// What the video of images that are of no recording is called.

@@ -1,6 +1,5 @@
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use burn::tensor::Device;
 use deepfusion_nn::weights::{Monodepth2Files, detect_resnet, load_monodepth2, read};
 use deepfusion_nn::{
@@ -10,6 +9,7 @@ use deepfusion_train::{
     Checkpoint, CheckpointKind, Checkpoints, Model, Preset, RunFolder, TrainConfig,
 };
 
+use crate::failure::Result;
 use crate::output;
 use crate::progress::say;
 

@@ -1,7 +1,7 @@
-use anyhow::Result;
 use deepfusion_weights::{Card, DEFAULT, Figure};
 use serde::Serialize;
 
+use crate::failure::Result;
 use crate::output;
 
 /// What can be imported: name, files, what it gives, terms.

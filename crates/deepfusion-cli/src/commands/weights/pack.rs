@@ -1,4 +1,3 @@
-use anyhow::{Context, Result};
 use deepfusion_compare::sha256_of_file;
 use deepfusion_data::to_network_input;
 use deepfusion_infer::Precision;
@@ -13,6 +12,7 @@ use super::list::Listed;
 use crate::cli::PackArgs;
 use crate::commands::uncertainty;
 use crate::error::CliError;
+use crate::failure::{Context, Result};
 use crate::output;
 use crate::progress::say;
 

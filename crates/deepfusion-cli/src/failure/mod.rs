@@ -1,0 +1,244 @@
+//! How a command fails: `error: …`, what caused it, `hint: …`, and the exit code.
+
+mod context;
+mod libraries;
+
+use std::error::Error;
+use std::fmt;
+use std::io::{ErrorKind, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+use anstyle::{AnsiColor, Style};
+
+use crate::interrupt;
+
+pub use context::Context;
+
+/// What a command returns.
+pub type Result<T, E = Failure> = std::result::Result<T, E>;
+
+/// An error that a command can end with, in the words of the command line: a library knows settings, this one the options that
+/// set them.
+pub trait Reportable: Error + Send + Sync + 'static {
+    /// What is wrong.
+    fn message(&self) -> String {
+        self.to_string()
+    }
+
+    /// What to do about it, where that is known.
+    fn remedy(&self) -> Option<String>;
+
+    /// How the program ends.
+    fn exit(&self) -> Exit {
+        Exit::Failed
+    }
+
+    /// The file or folder that is not there, where that is the error.
+    fn missing(&self) -> Option<&Path> {
+        None
+    }
+}
+
+/// How the program ends. `train && eval` and a scheduler tell by the code alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// Something failed.
+    Failed,
+    /// An argument is missing or wrong: clap's code.
+    WrongArguments,
+    /// Nothing failed, but the work was asked to stop.
+    Stopped,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        match exit {
+            Exit::Failed => Self::FAILURE,
+            Exit::WrongArguments => Self::from(2),
+            Exit::Stopped => Self::from(interrupt::EXIT_CODE),
+        }
+    }
+}
+
+/// Why a command did not do what it was asked for: an error, and what was being done about which file.
+#[derive(Debug)]
+pub struct Failure {
+    error: Box<dyn Reportable>,
+    /// The innermost first.
+    contexts: Vec<String>,
+}
+
+impl<E: Reportable> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self {
+            error: Box::new(error),
+            contexts: Vec::new(),
+        }
+    }
+}
+
+/// What is wrong, without its causes.
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.chain()[0])
+    }
+}
+
+impl Failure {
+    /// The same failure of something larger.
+    #[must_use]
+    pub fn context(mut self, what: impl Into<String>) -> Self {
+        self.contexts.push(what.into());
+        self
+    }
+
+    /// The error's own remedy, if it knows one.
+    pub fn hint(&self) -> Option<String> {
+        self.error.remedy()
+    }
+
+    /// The file or folder that is not there, where that is the error.
+    pub fn missing(&self) -> Option<&Path> {
+        self.error.missing()
+    }
+
+    /// The failure and its causes in one line.
+    pub fn one_line(&self) -> String {
+        let mut chain = self.chain().into_iter();
+        let mut text = chain.next().unwrap_or_default();
+        for cause in chain {
+            // Many messages already hold their cause's.
+            if !text.contains(&cause) {
+                text += &format!(": {cause}");
+            }
+        }
+        text
+    }
+
+    /// Prints it on stderr and says how the program ends.
+    pub fn report(&self) -> ExitCode {
+        const ERROR: Style = AnsiColor::Red.on_default().bold();
+        const HINT: Style = AnsiColor::Cyan.on_default().bold();
+        let mut chain = self.chain().into_iter();
+        let mut last = chain.next().unwrap_or_default();
+        let mut text = format!("{ERROR}error:{ERROR:#} {last}\n");
+        for cause in chain {
+            // Many messages already hold their cause's.
+            if !last.contains(&cause) {
+                text += &format!("  because: {cause}\n");
+                last = cause;
+            }
+        }
+        let hint = self
+            .hint()
+            .unwrap_or_else(|| self.general_hint().to_owned());
+        text += &format!("{HINT}hint:{HINT:#} {hint}\n");
+        // Where nobody reads it any more, the code still tells.
+        let _ = anstream::stderr().write_all(text.as_bytes());
+        self.error.exit().into()
+    }
+
+    /// What is wrong and its causes, the outermost first.
+    fn chain(&self) -> Vec<String> {
+        let mut chain: Vec<String> = self.contexts.iter().rev().cloned().collect();
+        chain.push(self.error.message());
+        chain.extend(self.causes().skip(1).map(ToString::to_string));
+        chain
+    }
+
+    /// The error and what caused it.
+    fn causes(&self) -> impl Iterator<Item = &(dyn Error + 'static)> {
+        let error: &(dyn Error + 'static) = &*self.error;
+        std::iter::successors(Some(error), |&error| error.source())
+    }
+
+    /// What to do about an error that knows no remedy of its own: the system's reason decides.
+    fn general_hint(&self) -> &'static str {
+        // The standard library's own type is the one that a chain of foreign errors can be asked for.
+        let mut system = self.causes().filter_map(|cause| cause.downcast_ref());
+        match system.next().map(std::io::Error::kind) {
+            Some(ErrorKind::NotFound) => "check the spelling, and that the disk is mounted",
+            Some(ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem) => {
+                "check the permissions, or choose a place that you may write to"
+            }
+            Some(ErrorKind::StorageFull | ErrorKind::QuotaExceeded) => {
+                "the disk is full: free some space and run the same again"
+            }
+            Some(_) => {
+                "the system gave this reason: look at the disk or the network that the file is on"
+            }
+            None => {
+                "where the message names no input of yours to mend, it is a fault of the program: please report it with the command"
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::CliError;
+    use std::path::PathBuf;
+
+    /// No error leaves its reader without a next step, whatever kind it is.
+    #[test]
+    fn every_error_has_a_hint() {
+        let full = std::io::Error::from(ErrorKind::StorageFull);
+        let full = Failure::from(full).context("log.csv");
+        assert_eq!(full.hint(), None);
+        assert!(full.general_hint().contains("disk is full"));
+        let wrapped = Failure::from(deepfusion_data::Error::File {
+            path: "log.csv".into(),
+            source: ErrorKind::QuotaExceeded.into(),
+        });
+        assert_eq!(wrapped.hint(), None);
+        assert!(wrapped.general_hint().contains("disk is full"));
+        let foreign = "?".parse::<toml::Table>().unwrap_err();
+        let foreign = Failure::from(foreign);
+        assert_eq!(foreign.hint(), None);
+        assert!(foreign.general_hint().contains("report"));
+        let config = deepfusion_model::Error::Config {
+            field: "batch",
+            expected: "at least 1".into(),
+            found: "0".into(),
+        };
+        assert!(Failure::from(config).hint().unwrap().contains("batch"));
+        let images = CliError::NoImages { input: "x".into() };
+        assert!(Failure::from(images).hint().is_some());
+    }
+
+    #[test]
+    fn causes_follow_the_failure_and_are_not_said_twice() {
+        let system = std::io::Error::from(ErrorKind::NotFound);
+        let said = system.to_string();
+        let failure = Failure::from(system).context("log.csv").context("run");
+        assert_eq!(failure.to_string(), "run");
+        assert_eq!(failure.one_line(), format!("run: log.csv: {said}"));
+        let path = PathBuf::from("a.png");
+        let error = deepfusion_data::Error::file(&path, ErrorKind::PermissionDenied.into());
+        let message = error.to_string();
+        assert_eq!(Failure::from(error).one_line(), message);
+    }
+
+    #[test]
+    fn what_was_stopped_is_neither_done_nor_failed() {
+        let go_on = String::new();
+        let (step, steps) = (3, 9);
+        let stopped = [
+            CliError::Stopped { step, steps, go_on },
+            CliError::Ended { what: "the demo" },
+            CliError::Interrupted { done: 1, total: 2 },
+        ];
+        for error in stopped {
+            assert_eq!(error.exit(), Exit::Stopped);
+        }
+        let path = PathBuf::from("a.rrd");
+        let (done, total) = (1, 2);
+        let view = deepfusion_view::Error::Stopped { path, done, total };
+        let view = Failure::from(view).context("view");
+        assert_eq!(view.error.exit(), Exit::Stopped);
+        assert_eq!(CliError::NoCamera.exit(), Exit::Failed);
+        assert_eq!(CliError::NoModelGiven.exit(), Exit::WrongArguments);
+    }
+}
