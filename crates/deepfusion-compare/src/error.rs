@@ -46,16 +46,12 @@ impl Hint for Error {
         match self {
             Self::Data(inner) => inner.hint(),
             Self::NotAnEvaluation { .. } => Some(
-                "give a run's folder, a file of its eval/ folder, or what `eval --json` printed"
-                    .into(),
+                "give a run's folder, a file of its eval/ folder, or an evaluation as JSON".into(),
             ),
             Self::Version { .. } => {
                 Some("use the program's version that wrote it, or evaluate again".into())
             }
-            Self::NotEvaluated { path } => Some(format!(
-                "measure it first: deepfusion eval --model {} --data PATH",
-                path.display()
-            )),
+            Self::NotEvaluated { .. } => Some("measure it first: `deepfusion eval`".into()),
             Self::Csv(_) | Self::Published(_) => None,
         }
     }

@@ -20,8 +20,6 @@ use std::path::{Path, PathBuf};
 const VIDEO: &str = "video.hevc";
 const SPEED: &str = "processed_log/CAN/speed";
 const FRAME_TIMES: &str = "global_pose/frame_times";
-const CAMERA_REMEDY: &str = "comma2k19's own code gives 910, 910, 582, 437 for its 1164x874 videos: set \
-     intrinsics = [910, 910, 582, 437] in dataset.toml";
 
 /// Streams beside the images: folder with `t`, kind.
 const STREAMS: [(&str, &str); 5] = [
@@ -53,7 +51,13 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     }
     let config = FolderConfig::read(folder)?;
     let video = VideoFrames::probe(&folder.join(VIDEO), &config)?;
-    let calibration = find_camera(folder, &config, options, video.size(), CAMERA_REMEDY)?;
+    let calibration = find_camera(
+        folder,
+        &config,
+        options,
+        video.size(),
+        DatasetKind::Comma2k19,
+    )?;
     let times = frame_times(folder)?;
     let mut remarks = Vec::new();
     if times.len() != video.len() {

@@ -1,3 +1,4 @@
+use crate::DatasetKind;
 use crate::layout::WITHOUT_ROS2;
 use deepfusion_hint::Hint;
 use std::path::{Path, PathBuf};
@@ -95,6 +96,28 @@ pub enum Error {
         problem: String,
         /// What to do.
         remedy: String,
+    },
+    /// Nothing says what the camera of images in files is.
+    #[error("{}: missing, it holds the camera's fx, fy, cx, cy", path.display())]
+    NoCameraFile {
+        /// Where a calibration is looked for first.
+        path: PathBuf,
+        /// The layout.
+        layout: DatasetKind,
+    },
+    /// Neither a bag nor the file beside it says what the camera is.
+    #[error("{}: nothing says what the camera is: no CameraInfo with a K", path.display())]
+    NoBagCamera {
+        /// The bag.
+        path: PathBuf,
+        /// The file beside it, which may say it.
+        config: PathBuf,
+    },
+    /// Intrinsics given for a layout that has its own.
+    #[error("{}: KITTI raw brings its own calibration", path.display())]
+    OwnCalibration {
+        /// The recording.
+        path: PathBuf,
     },
     /// A `dataset.toml` cannot be used.
     #[error("{}: {problem}", path.display())]
@@ -239,6 +262,14 @@ pub enum Error {
         problem: String,
         /// What to do.
         remedy: &'static str,
+    },
+    /// A live source gives no frame for longer than is waited for.
+    #[error("{address}: ffmpeg {problem}")]
+    Silent {
+        /// The source, without its password.
+        address: String,
+        /// For how long, after how many frames, and what ffmpeg said.
+        problem: String,
     },
     /// A calibration file lacks a field or has a bad one.
     #[error("{}: {field}: {problem}", path.display())]
@@ -421,6 +452,17 @@ impl Error {
             _ => Self::File { path, source },
         }
     }
+
+    /// Whether a bag of ROS 2 was given, and this program was built without its reader (the feature `ros2`).
+    #[must_use]
+    pub fn needs_ros2(&self) -> bool {
+        match self {
+            Self::UnknownLayout { found, .. } => {
+                cfg!(not(feature = "ros2")) && found.ends_with(WITHOUT_ROS2)
+            }
+            _ => false,
+        }
+    }
 }
 
 impl Hint for Error {
@@ -433,10 +475,8 @@ impl Hint for Error {
                 ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
                 _ => return None,
             },
-            Self::UnknownLayout { found, .. }
-                if cfg!(not(feature = "ros2")) && found.ends_with(WITHOUT_ROS2) =>
-            {
-                "build with `--features ros2` to read the bags of ROS 2: cargo install --path crates/deepfusion-cli --features ros2"
+            Self::UnknownLayout { .. } if self.needs_ros2() => {
+                "build with the feature `ros2` to read the bags of ROS 2"
             }
             Self::UnknownLayout { .. } => {
                 "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
@@ -446,7 +486,32 @@ impl Hint for Error {
             Self::NoTimes { .. } => "give the frames times: timestamps.txt, or fps in dataset.toml",
             Self::Bag(error) => return error.hint(),
             Self::Motion { source, .. } => return source.hint(),
-            Self::OneCamera { .. } => "leave --camera out, or give 2",
+            Self::OneCamera { .. } => "ask for camera 2",
+            Self::NoCameraFile {
+                layout: DatasetKind::RgbD,
+                ..
+            } => {
+                "put camera-intrinsics.txt there; 7-Scenes publishes 585, 585, 320, 240 for its 640x480 images: \
+                 intrinsics = [585, 585, 320, 240] in dataset.toml"
+            }
+            Self::NoCameraFile {
+                layout: DatasetKind::Comma2k19,
+                ..
+            } => {
+                "comma2k19's own code gives 910, 910, 582, 437 for its 1164x874 videos: set \
+                 intrinsics = [910, 910, 582, 437] in dataset.toml"
+            }
+            Self::NoCameraFile { .. } => {
+                "put calibration.yaml (OpenCV, ROS or Kalibr) or intrinsics.txt (fx, fy, cx, cy) there, or set \
+                 intrinsics = [fx, fy, cx, cy] in dataset.toml"
+            }
+            Self::NoBagCamera { config, .. } => {
+                return Some(format!(
+                    "[camera] fx, fy, cx, cy, width, height or calibration = \"camera.yaml\" in {}",
+                    config.display()
+                ));
+            }
+            Self::OwnCalibration { .. } => "open it without intrinsics",
             Self::CameraFile { remedy, .. }
             | Self::Columns { remedy, .. }
             | Self::NoTrack { remedy, .. }
@@ -459,7 +524,8 @@ impl Hint for Error {
                 "both must count from the same moment; start_s in dataset.toml is the first frame's time on the speeds' clock"
             }
             Self::NoPath { .. } => "KITTI raw with oxts and RGB-D folders with poses have one",
-            Self::DepthKind { .. } => "leave --gt-depth out, or give z",
+            Self::DepthKind { .. } => "take camera z from them",
+            Self::Silent { .. } => "is the source sending? A longer timeout waits for it",
             Self::Program { remedy, .. } => remedy,
             Self::Missing { remedy, .. } => remedy,
             Self::NoImages { .. } => {

@@ -12,8 +12,6 @@ use std::path::{Path, PathBuf};
 
 /// Folders in which the images are looked for; then the recording's folder itself.
 const FOLDERS: [&str; 2] = ["images", "frames"];
-pub(crate) const CAMERA_REMEDY: &str = "put calibration.yaml (OpenCV, ROS or Kalibr) or intrinsics.txt (fx, fy, cx, cy) \
-     there, or set intrinsics = [fx, fy, cx, cy] in dataset.toml";
 pub(crate) const SPEED_REMEDY: &str = "training needs speed.csv (time_s,speed_mps) beside the images; evaluation and prediction do not";
 
 /// Whether a folder is one of images.
@@ -36,7 +34,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         });
     };
     let size = image_size(first)?;
-    let calibration = find_camera(folder, &config, options, size, CAMERA_REMEDY)?;
+    let calibration = find_camera(folder, &config, options, size, DatasetKind::Folder)?;
     let images = timed_images(folder, images, &config, &mut remarks)?;
     let stems = images
         .iter()

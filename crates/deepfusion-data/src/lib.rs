@@ -52,7 +52,7 @@ mod write;
 
 pub use agreement::DynamicAgreement;
 pub use bag::{DopplerEgo, ego_velocity, ground_radial};
-pub use calibration::CameraCalibration;
+pub use calibration::{CameraCalibration, GIVEN_INTRINSICS};
 pub use camera::{Camera, CameraChoice};
 pub use convert::{Converted, convert_to_bag, convert_to_kitti};
 pub use dataset::{Dataset, DatasetParts, OpenOptions};

@@ -16,8 +16,6 @@ use std::path::{Path, PathBuf};
 /// Millimetres, and the value of pixels without depth.
 const UNIT_M: f64 = 0.001;
 const INVALID: u16 = 65_535;
-const CAMERA_REMEDY: &str = "put camera-intrinsics.txt there; 7-Scenes publishes 585, 585, 320, 240 for its 640x480 images: \
-     intrinsics = [585, 585, 320, 240] in dataset.toml, or --intrinsics 585,585,320,240";
 
 /// The sequences at a path: the folder itself, or the folders in it.
 pub(crate) fn find(folder: &Path) -> Result<Vec<PathBuf>> {
@@ -65,7 +63,7 @@ fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         });
     };
     let size = image_size(first)?;
-    let calibration = find_camera(folder, &config, options, size, CAMERA_REMEDY)?;
+    let calibration = find_camera(folder, &config, options, size, DatasetKind::RgbD)?;
     let (mut depth, mut world_from_cam) = (BTreeMap::new(), BTreeMap::new());
     for &number in colour.keys() {
         let part = |ending: &str| folder.join(format!("frame-{number:06}.{ending}"));

@@ -111,7 +111,7 @@ impl SpeedLog {
         } else {
             remarks.push(format!(
                 "{}: no yaw rate, here or in imu.csv: how the car turned is unknown, which \
-                 `--view-motion vehicle` and a rotation loss need",
+                 view_motion = \"vehicle\" and a rotation loss need",
                 name(&path)
             ));
         }

@@ -117,17 +117,17 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::InvalidPrediction { kind, .. } => Some(format!(
-                "a network's {kind} is positive everywhere; where these values mean \"no prediction\", pass --allow-holes: \
+                "a network's {kind} is positive everywhere; where these values mean \"no prediction\", allow holes: \
                  they are left out and counted as missing_rate"
             )),
             Self::Shape { .. } => Some("arrays are H×W, row by row".into()),
             Self::Protocol { field, expected, .. } => Some(format!("set {field} to {expected}")),
             Self::NothingToEvaluate { .. } => Some(
-                "check that the ground truth is in metres and 0 where there is none, and that --crop and --cap leave pixels"
+                "check that the ground truth is in metres and 0 where there is none, and that crop and cap leave pixels"
                     .into(),
             ),
             Self::Intervals { .. } => {
-                Some("write them anew with `eval --calibrate-uncertainty`".into())
+                Some("calibrate the network's uncertainty anew".into())
             }
             Self::Io { source, .. } => match source.kind() {
                 std::io::ErrorKind::NotFound => Some("check the spelling, and that the disk is mounted".into()),

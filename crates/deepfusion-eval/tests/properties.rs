@@ -127,7 +127,7 @@ fn predictions_that_are_no_depth_are_refused_or_counted() {
             text.contains("`0000000007`") && text.contains("column 3, row 1"),
             "{text}"
         );
-        assert!(error.hint().unwrap().contains("--allow-holes"));
+        assert!(error.hint().unwrap().contains("allow holes"));
 
         let mut evaluator = Evaluator::new(Protocol {
             holes: Holes::Skip,

@@ -54,7 +54,7 @@ impl Hint for Error {
                     .into(),
             ),
             Self::Class { known, .. } if known.is_empty() => {
-                Some("the file names no classes: leave --classes out, and all are taken".into())
+                Some("the file names no classes: ask for none, and all are taken".into())
             }
             Self::Class { known, .. } => Some(format!("it knows {}", known.join(", "))),
         }

@@ -16,6 +16,20 @@ pub enum Error {
         /// What was found.
         found: String,
     },
+    /// A run of several data sets, and none of them named, or none of that name.
+    #[error("data set: expected {expected}, found {found}")]
+    DataSet {
+        /// The names there are.
+        expected: String,
+        /// The name asked for, or "none".
+        found: String,
+    },
+    /// A preset set as if it were one of its keys: its name alone would change.
+    #[error("{assignment}: a preset is chosen as a whole, or in the file")]
+    PresetAsKey {
+        /// What was asked for: preset=NAME.
+        assignment: String,
+    },
     /// A key that cannot be set so.
     #[error("{assignment}: {reason}")]
     Setting {
@@ -52,6 +66,14 @@ pub enum Error {
         /// What to do about it.
         remedy: String,
     },
+    /// A checkpoint that training cannot go on from; its weights are whole.
+    #[error("{path}: {reason}")]
+    NotResumable {
+        /// The file.
+        path: PathBuf,
+        /// What it lacks.
+        reason: &'static str,
+    },
     /// A folder that already holds a run.
     #[error("{path}: there is a run here already")]
     RunExists {
@@ -78,19 +100,15 @@ impl Error {
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::Config { field: "--data-set", .. } => {
-                Some("give the name of the data set whose metres are meant: --data-set NAME".into())
-            }
+            Self::DataSet { .. } => Some("give the name of the data set whose metres are meant".into()),
             Self::Config { field: "data" | "data.paths", .. } => Some(
-                "give recordings with --data, or as data.paths or [[data.sets]] in the config file, one of the three".into(),
+                "give recordings as data.paths or as [[data.sets]], one of the two".into(),
             ),
             Self::Config { field: "view_motion", .. } => Some(
-                "without the speed loss nothing measured may enter: take --view-motion posenet, or keep the speed loss".into(),
+                "without the speed loss nothing measured may enter: take view_motion = \"posenet\", or keep the speed loss".into(),
             ),
-            Self::Config { field, .. } => Some(format!(
-                "set `{field}` so in the config file, or by its option; --help lists them"
-            )),
-            Self::Setting { .. } => Some(
+            Self::Config { field, .. } => Some(format!("set `{field}` so in the configuration")),
+            Self::Setting { .. } | Self::PresetAsKey { .. } => Some(
                 "`deepfusion config show` prints every key and what it means".into(),
             ),
             Self::ConfigFile { .. } => Some(
@@ -106,9 +124,8 @@ impl Hint for Error {
                 _ => None,
             },
             Self::Checkpoint { remedy, .. } => Some(remedy.clone()),
-            Self::RunExists { .. } => Some(
-                "continue it with --resume, or choose another folder with --out".into(),
-            ),
+            Self::NotResumable { .. } => Some("start a new run from these weights".into()),
+            Self::RunExists { .. } => Some("resume it, or choose another folder".into()),
             Self::Network(error) => error.hint(),
         }
     }

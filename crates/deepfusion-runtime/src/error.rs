@@ -55,8 +55,7 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::NoSuchModel { known, .. } => Some(match known.as_slice() {
-                [] => "give the folder that `train`, `demo` or `weights import` wrote; this build has no embedded network: \
-                       train one with deepfusion train --data DRIVE"
+                [] => "give the folder that `train`, `demo` or `weights import` wrote; this build has no embedded network"
                     .into(),
                 known => format!(
                     "give the folder that `train`, `demo` or `weights import` wrote, or an embedded network: {}",
@@ -65,7 +64,7 @@ impl Hint for Error {
             }),
             Self::Engine { .. } => {
                 Some(
-                    "f32 in the fused engine runs on every processor; with the training framework, `--engine burn` runs \
+                    "f32 in the fused engine runs on every processor; with the training framework, Burn runs \
                      every network on every device"
                         .into(),
                 )

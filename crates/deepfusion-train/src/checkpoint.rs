@@ -91,10 +91,9 @@ impl Checkpoints for RunFolder {
             return Ok((model, None, state));
         }
         if new_decoder {
-            return Err(ModelError::Checkpoint {
+            return Err(ModelError::NotResumable {
                 path,
-                reason: "it has no flow decoder, and this configuration trains one".into(),
-                remedy: "start a new run from these weights with --init".into(),
+                reason: "it has no flow decoder, and this configuration trains one",
             }
             .into());
         }

@@ -54,6 +54,15 @@ pub enum Error {
         /// The drives and frame numbers of its batch.
         frames: String,
     },
+    /// A precision that the device, or this processor, does not have.
+    #[error(
+        "setting `precision`: expected \"f32\" (bf16 needs a processor with AVX512-BF16 or AMX, and it as the device), \
+         found {found}"
+    )]
+    Precision {
+        /// The one asked for.
+        found: &'static str,
+    },
     /// The loader's threads could not be started.
     #[error("no threads to load images with: {reason}")]
     Threads {
@@ -99,26 +108,27 @@ impl Hint for Error {
                     .into(),
             ),
             Self::SharedFrames { .. } => Some(
-                "validate on other drives (--val-data) or other frames (--val-split), or leave both out: the end of each drive \
+                "validate on other drives or other frames, or on none that are named: the end of each drive \
                  is held out then"
                     .into(),
             ),
             Self::NotFinite { .. } | Self::GradientsNotFinite { .. } => Some(
                 "the last good checkpoint is kept; look at the frames named above, or lower the \
-                 learning rate, and continue with --resume"
+                 learning rate, and resume"
                     .into(),
             ),
+            Self::Precision { .. } => Some("set `precision` so in the configuration".into()),
             Self::Threads { .. } => Some(
                 "the system allows this user too few threads or too little memory; see `ulimit -u`"
                     .into(),
             ),
             Self::Loader { .. } => Some(
                 "this is a fault of the program: please report it with the lines above; what was saved is whole, and \
-                 --resume goes on from there"
+                 the run can be resumed from there"
                     .into(),
             ),
             Self::NoValidation => Some(
-                "give longer drives or --val-data; `validation_share = 0` in a config file trains without validation \
+                "give longer drives or some to validate on; `validation_share = 0` trains without validation \
                  and chooses no `best`"
                     .into(),
             ),

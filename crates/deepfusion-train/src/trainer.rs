@@ -126,10 +126,9 @@ impl Trainer {
         check_samples(&config, &train, &validation)?;
         let device = device.clone().autodiff();
         let (model, adam, state) = folder.load(CheckpointKind::Last, &config, &device)?;
-        let adam = adam.ok_or_else(|| ModelError::Checkpoint {
+        let adam = adam.ok_or_else(|| ModelError::NotResumable {
             path: folder.checkpoint_path(CheckpointKind::Last),
-            reason: "it has no optimiser state to go on with".into(),
-            remedy: "start a new run from these weights with --init".into(),
+            reason: "it has no optimiser state to go on with",
         })?;
         Ok(Self {
             config,
@@ -516,22 +515,17 @@ fn first_unit(config: &TrainConfig, set: &SampleSet) -> f64 {
 }
 
 /// # Errors
-/// [`Error::Model`] where the device cannot do what the configuration asks for.
+/// [`Error::Precision`] where the device cannot do what the configuration asks for.
 fn check_precision(config: &TrainConfig, device: &Device) -> Result<(), Error> {
     if supports(device, config.precision) {
         return Ok(());
     }
-    Err(ModelError::Config {
-        field: "precision",
-        expected: "\"f32\" (bf16 needs a processor with AVX512-BF16 or AMX, and --device cpu)"
-            .into(),
+    Err(Error::Precision {
         found: match config.precision {
             Precision::F32 => "f32",
             Precision::Bf16 => "bf16",
-        }
-        .into(),
-    }
-    .into())
+        },
+    })
 }
 
 /// # Errors

@@ -62,7 +62,7 @@ fn a_run_starts_from_the_flow_decoder_too_or_says_that_it_is_new() {
         .load(CheckpointKind::Last, with.config(), &device)
         .unwrap_err();
     assert!(error.to_string().contains("no flow decoder"), "{error}");
-    assert!(error.hint().unwrap().contains("--init"));
+    assert!(error.hint().unwrap().contains("new run from these weights"));
 }
 
 #[test]

@@ -91,7 +91,7 @@ fn nothing_held_out_is_an_error_unless_it_was_asked_for() {
     };
     let error = start("a", &config, &train).unwrap_err();
     assert!(matches!(error, Error::NoValidation), "{error}");
-    assert!(error.hint().unwrap().contains("--val-data"));
+    assert!(error.hint().unwrap().contains("longer drives"));
     let error = start("b", &config, &nothing).unwrap_err();
     assert!(matches!(error, Error::NoSamples { .. }), "{error}");
     config.validation_share = 0.0;

@@ -118,17 +118,16 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
             Self::NoSuchFolder { .. } => {
-                Some("give the folder that `predict --out` or `perceive --out` wrote".into())
+                Some("give the folder that `predict` or `perceive` wrote".into())
             }
             Self::NotAFolder { path } => {
                 let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
                 let folder = folder.unwrap_or(std::path::Path::new("."));
                 Some(format!("give its folder: {}", folder.display()))
             }
-            Self::NothingToShow { path } => Some(format!(
-                "make something to look at first: deepfusion predict --model RUN IMAGES --out {}",
-                path.display()
-            )),
+            Self::NothingToShow { .. } => {
+                Some("make something to look at first: `deepfusion predict`".into())
+            }
             Self::OtherKind { .. } => {
                 Some("give two folders of predictions, or two of training runs".into())
             }
@@ -141,13 +140,13 @@ impl Hint for Error {
             | Self::Encoding { .. } => None,
             Self::Picture(error) => error.hint(),
             Self::PortInUse { .. } => {
-                Some("give another --port, or --port 0 for any that is free".into())
+                Some("give another port, or port 0 for any that is free".into())
             }
             Self::Listen { source, .. } => Some(match source.kind() {
                 std::io::ErrorKind::PermissionDenied => {
-                    "ports below 1024 belong to the system: give --port 8765".into()
+                    "ports below 1024 belong to the system: give 8765".into()
                 }
-                _ => "give --host an address of this machine, such as 127.0.0.1 or 0.0.0.0".into(),
+                _ => "give an address of this machine, such as 127.0.0.1 or 0.0.0.0".into(),
             }),
         }
     }

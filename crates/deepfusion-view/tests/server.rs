@@ -339,7 +339,7 @@ fn a_port_in_use_is_named() {
         error.to_string().contains(&server.address.to_string()),
         "{error}"
     );
-    assert!(error.hint().unwrap().contains("--port"), "{error}");
+    assert!(error.hint().unwrap().contains("another port"), "{error}");
 }
 
 #[test]

@@ -102,7 +102,7 @@ impl Hint for Error {
     fn hint(&self) -> Option<String> {
         let hint = match self {
             Self::NotEmbedded { known, .. } if known.is_empty() => {
-                "train one (deepfusion train --data DRIVE) and give its folder: --model RUN"
+                "train one (`deepfusion train`) and give its folder"
             }
             Self::NotEmbedded { known, .. } => {
                 return Some(format!(
@@ -124,9 +124,7 @@ impl Hint for Error {
                 "the training that made it had diverged; take an earlier checkpoint"
             }
             Self::Tensors { .. } => return None,
-            Self::Exists { .. } => {
-                "choose another folder or --name, or give --overwrite to replace it"
-            }
+            Self::Exists { .. } => "choose another folder or name, or allow it to be replaced",
             Self::Io {
                 action: "write", ..
             } => "check the folder, its permissions and the free space",

@@ -1,7 +1,9 @@
-//! What the command line says of the libraries' errors.
+//! What the command line says of the libraries' errors: a library names a setting, this the option that sets it.
 
+use std::io::ErrorKind;
 use std::path::Path;
 
+use deepfusion_data::{DatasetKind, GIVEN_INTRINSICS};
 use deepfusion_hint::Hint;
 
 use super::{Exit, Reportable};
@@ -18,28 +20,48 @@ macro_rules! as_the_library_says {
 }
 
 as_the_library_says!(
-    deepfusion_compare::Error,
-    deepfusion_eval::Error,
     deepfusion_eval::odometry::PoseFileError,
     deepfusion_eval::odometry::TrackError,
     deepfusion_geometry::cloud::Error,
     deepfusion_infer::Error,
-    deepfusion_instances::Error,
-    deepfusion_model::Error,
     deepfusion_model::NetworkError,
     deepfusion_motion::Error,
     deepfusion_onnx::Error,
     deepfusion_perception::Error,
-    deepfusion_render::Error,
     deepfusion_rosbag::Error,
-    deepfusion_runtime::Error,
     deepfusion_sim::Error,
-    deepfusion_weights::Error,
 );
 
 impl Reportable for deepfusion_data::Error {
+    fn message(&self) -> String {
+        match self {
+            Self::CameraFile { .. } | Self::FrameSize { .. } => {
+                self.to_string()
+                    .replacen(GIVEN_INTRINSICS, "--intrinsics", 1)
+            }
+            _ => self.to_string(),
+        }
+    }
+
     fn remedy(&self) -> Option<String> {
-        self.hint()
+        let hint = self.hint();
+        let or = |option: &str| hint.as_ref().map(|hint| format!("{hint}, or {option}"));
+        match self {
+            Self::UnknownLayout { .. } if self.needs_ros2() => Some(
+                "build with `--features ros2` to read the bags of ROS 2: cargo install --path crates/deepfusion-cli --features ros2"
+                    .into(),
+            ),
+            Self::NoCameraFile {
+                layout: DatasetKind::RgbD,
+                ..
+            } => or("--intrinsics 585,585,320,240"),
+            Self::NoBagCamera { .. } => or("--intrinsics fx,fy,cx,cy"),
+            Self::OwnCalibration { .. } => Some("leave --intrinsics out".into()),
+            Self::OneCamera { .. } => Some("leave --camera out, or give 2".into()),
+            Self::DepthKind { .. } => Some("leave --gt-depth out, or give z".into()),
+            Self::Silent { .. } => Some("is the source sending? --timeout S waits longer".into()),
+            _ => hint,
+        }
     }
 
     fn missing(&self) -> Option<&Path> {
@@ -50,10 +72,197 @@ impl Reportable for deepfusion_data::Error {
     }
 }
 
+impl Reportable for deepfusion_eval::Error {
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::InvalidPrediction { kind, .. } => Some(format!(
+                "a network's {kind} is positive everywhere; where these values mean \"no prediction\", pass --allow-holes: \
+                 they are left out and counted as missing_rate"
+            )),
+            Self::NothingToEvaluate { .. } => Some(
+                "check that the ground truth is in metres and 0 where there is none, and that --crop and --cap leave pixels"
+                    .into(),
+            ),
+            Self::Intervals { .. } => {
+                Some("write them anew with `eval --calibrate-uncertainty`".into())
+            }
+            _ => self.hint(),
+        }
+    }
+}
+
+impl Reportable for deepfusion_compare::Error {
+    fn message(&self) -> String {
+        match self {
+            Self::Data(error) => error.message(),
+            _ => self.to_string(),
+        }
+    }
+
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::Data(error) => error.remedy(),
+            Self::NotAnEvaluation { .. } => Some(
+                "give a run's folder, a file of its eval/ folder, or what `eval --json` printed"
+                    .into(),
+            ),
+            Self::NotEvaluated { path } => Some(format!(
+                "measure it first: deepfusion eval --model {} --data PATH",
+                path.display()
+            )),
+            _ => self.hint(),
+        }
+    }
+}
+
+impl Reportable for deepfusion_instances::Error {
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::Class { known, .. } if known.is_empty() => {
+                Some("the file names no classes: leave --classes out, and all are taken".into())
+            }
+            _ => self.hint(),
+        }
+    }
+}
+
+impl Reportable for deepfusion_model::Error {
+    fn message(&self) -> String {
+        match self {
+            Self::DataSet { expected, found } => {
+                format!("setting `--data-set`: expected {expected}, found {found}")
+            }
+            Self::PresetAsKey { assignment } => {
+                format!("{assignment}: a preset is chosen with --preset or in the file")
+            }
+            _ => self.to_string(),
+        }
+    }
+
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::DataSet { .. } => {
+                Some("give the name of the data set whose metres are meant: --data-set NAME".into())
+            }
+            Self::Config { field: "data" | "data.paths", .. } => Some(
+                "give recordings with --data, or as data.paths or [[data.sets]] in the config file, one of the three".into(),
+            ),
+            Self::Config { field: "view_motion", .. } => Some(
+                "without the speed loss nothing measured may enter: take --view-motion posenet, or keep the speed loss".into(),
+            ),
+            Self::Config { field, .. } => Some(option_of(field)),
+            Self::NotResumable { .. } => {
+                Some("start a new run from these weights with --init".into())
+            }
+            Self::RunExists { .. } => {
+                Some("continue it with --resume, or choose another folder with --out".into())
+            }
+            _ => self.hint(),
+        }
+    }
+}
+
+/// Where a key of the configuration is set.
+fn option_of(field: &str) -> String {
+    format!("set `{field}` so in the config file, or by its option; --help lists them")
+}
+
+impl Reportable for deepfusion_render::Error {
+    fn message(&self) -> String {
+        match self {
+            Self::Data(error) => error.message(),
+            _ => self.to_string(),
+        }
+    }
+
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::Data(error) => error.remedy(),
+            _ => self.hint(),
+        }
+    }
+}
+
+impl Reportable for deepfusion_runtime::Error {
+    fn message(&self) -> String {
+        match self {
+            Self::Model(error) => error.message(),
+            _ => self.to_string(),
+        }
+    }
+
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::NoSuchModel { known, .. } if known.is_empty() => self
+                .hint()
+                .map(|hint| format!("{hint}: train one with deepfusion train --data DRIVE")),
+            Self::Engine { .. } => Some(
+                "f32 in the fused engine runs on every processor; with the training framework, `--engine burn` runs \
+                 every network on every device"
+                    .into(),
+            ),
+            Self::Weights(error) => error.remedy(),
+            Self::Model(error) => error.remedy(),
+            _ => self.hint(),
+        }
+    }
+}
+
+impl Reportable for deepfusion_weights::Error {
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::NotEmbedded { known, .. } if known.is_empty() => Some(
+                "train one (deepfusion train --data DRIVE) and give its folder: --model RUN".into(),
+            ),
+            Self::Exists { .. } => {
+                Some("choose another folder or --name, or give --overwrite to replace it".into())
+            }
+            _ => self.hint(),
+        }
+    }
+}
+
 #[cfg(feature = "train")]
 impl Reportable for deepfusion_train::Error {
+    fn message(&self) -> String {
+        match self {
+            Self::Data(error) => error.message(),
+            Self::Model(error) => error.message(),
+            Self::Precision { found } => format!(
+                "setting `precision`: expected \"f32\" (bf16 needs a processor with AVX512-BF16 or AMX, and --device cpu), \
+                 found {found}"
+            ),
+            _ => self.to_string(),
+        }
+    }
+
     fn remedy(&self) -> Option<String> {
-        self.hint()
+        match self {
+            Self::Data(error) => error.remedy(),
+            Self::Model(error) => error.remedy(),
+            Self::Precision { .. } => Some(option_of("precision")),
+            Self::SharedFrames { .. } => Some(
+                "validate on other drives (--val-data) or other frames (--val-split), or leave both out: the end of each drive \
+                 is held out then"
+                    .into(),
+            ),
+            Self::NotFinite { .. } | Self::GradientsNotFinite { .. } => Some(
+                "the last good checkpoint is kept; look at the frames named above, or lower the \
+                 learning rate, and continue with --resume"
+                    .into(),
+            ),
+            Self::Loader { .. } => Some(
+                "this is a fault of the program: please report it with the lines above; what was saved is whole, and \
+                 --resume goes on from there"
+                    .into(),
+            ),
+            Self::NoValidation => Some(
+                "give longer drives or --val-data; `validation_share = 0` in a config file trains without validation \
+                 and chooses no `best`"
+                    .into(),
+            ),
+            _ => self.hint(),
+        }
     }
 
     fn missing(&self) -> Option<&Path> {
@@ -65,8 +274,34 @@ impl Reportable for deepfusion_train::Error {
 }
 
 impl Reportable for deepfusion_view::Error {
+    fn message(&self) -> String {
+        match self {
+            Self::Picture(error) => error.message(),
+            _ => self.to_string(),
+        }
+    }
+
     fn remedy(&self) -> Option<String> {
-        self.hint()
+        match self {
+            Self::NoSuchFolder { .. } => {
+                Some("give the folder that `predict --out` or `perceive --out` wrote".into())
+            }
+            Self::NothingToShow { path } => Some(format!(
+                "make something to look at first: deepfusion predict --model RUN IMAGES --out {}",
+                path.display()
+            )),
+            Self::Picture(error) => error.remedy(),
+            Self::PortInUse { .. } => {
+                Some("give another --port, or --port 0 for any that is free".into())
+            }
+            Self::Listen { source, .. } => Some(match source.kind() {
+                ErrorKind::PermissionDenied => {
+                    "ports below 1024 belong to the system: give --port 8765".into()
+                }
+                _ => "give --host an address of this machine, such as 127.0.0.1 or 0.0.0.0".into(),
+            }),
+            _ => self.hint(),
+        }
     }
 
     fn exit(&self) -> Exit {

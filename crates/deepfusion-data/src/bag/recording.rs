@@ -8,6 +8,7 @@ use super::profile;
 use super::scan::{Scan, SeenScan};
 use super::topics::{Role, Topics};
 use super::{image, sensors, source};
+use crate::calibration::GIVEN_INTRINSICS;
 use crate::clock::{on_the_vehicles_clock, seconds};
 use crate::kitti::GtKind;
 use crate::recording::{CalibrationPlace, Recording};
@@ -267,7 +268,7 @@ fn camera(
     let pinhole = |intrinsics: Intrinsics| Lens::new(intrinsics, &Distortion::default());
     let (lens, place) = if let Some(numbers) = options.intrinsics {
         let given = Intrinsics::from_numbers(numbers, (width, height));
-        (pinhole(given), place(bag, "--intrinsics"))
+        (pinhole(given), place(bag, GIVEN_INTRINSICS))
     } else if let Some(camera) = config.camera {
         (pinhole(camera.intrinsics()), place(&config.path, "camera"))
     } else if let Some(file) = &config.calibration {
@@ -279,13 +280,9 @@ fn camera(
         let printed = profile::UMAD_CAMERA.intrinsics();
         (pinhole(printed), place(&config.path, "profile"))
     } else {
-        return Err(Error::CameraFile {
+        return Err(Error::NoBagCamera {
             path: bag.to_owned(),
-            problem: "nothing says what the camera is: no CameraInfo with a K".into(),
-            remedy: format!(
-                "[camera] fx, fy, cx, cy, width, height or calibration = \"camera.yaml\" in {}, or --intrinsics fx,fy,cx,cy",
-                config.path.display()
-            ),
+            config: config.path.clone(),
         });
     };
     let lens = lens.map_err(|problem| Error::CameraFile {

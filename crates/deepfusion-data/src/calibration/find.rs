@@ -1,7 +1,7 @@
 //! Where a recording's camera is looked for.
 
 use crate::config::FolderConfig;
-use crate::{CameraCalibration, Error, OpenOptions, Result};
+use crate::{CameraCalibration, DatasetKind, Error, OpenOptions, Result};
 use std::path::Path;
 
 /// Names under which a calibration is looked for beside the images, in this order.
@@ -16,20 +16,24 @@ const NAMES: [&str; 8] = [
     "calibration.txt",
 ];
 
-/// The camera of images of a size: given on the command line or in `dataset.toml`, or read from a file beside
+/// What errors name in the place of a calibration's file or field where the caller gave the intrinsics
+/// ([`OpenOptions::intrinsics`]).
+pub const GIVEN_INTRINSICS: &str = "given intrinsics";
+
+/// The camera of images of a size: given by the caller or in `dataset.toml`, or read from a file beside
 /// them, or in the folder above.
 ///
 /// # Errors
-/// [`Error::Missing`] where nothing says it, with `remedy`; [`Error::CameraFile`], [`Error::Config`].
+/// [`Error::NoCameraFile`] where nothing says it; [`Error::CameraFile`], [`Error::Config`].
 pub(crate) fn find_camera(
     folder: &Path,
     config: &FolderConfig,
     options: &OpenOptions,
     size: (u32, u32),
-    remedy: &'static str,
+    layout: DatasetKind,
 ) -> Result<CameraCalibration> {
     if let Some(given) = options.intrinsics {
-        return CameraCalibration::given(given, size, Path::new("--intrinsics"));
+        return CameraCalibration::given(given, size, Path::new(GIVEN_INTRINSICS));
     }
     if let Some(given) = config.intrinsics {
         return CameraCalibration::given(given, size, &config.path);
@@ -43,10 +47,9 @@ pub(crate) fn find_camera(
     }
     match file {
         Some(file) => CameraCalibration::read(&file, size),
-        None => Err(Error::Missing {
+        None => Err(Error::NoCameraFile {
             path: folder.join(NAMES[0]),
-            what: "the camera's fx, fy, cx, cy",
-            remedy,
+            layout,
         }),
     }
 }

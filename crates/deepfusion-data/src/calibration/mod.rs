@@ -9,6 +9,7 @@ use crate::{Error, Lens, Result};
 use deepfusion_geometry::{Distortion, Intrinsics};
 use std::path::{Path, PathBuf};
 
+pub use find::GIVEN_INTRINSICS;
 pub(crate) use find::find_camera;
 
 /// What a calibration file says of a camera.

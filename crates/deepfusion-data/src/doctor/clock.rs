@@ -45,7 +45,7 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
                 1e3 * error
             ),
             format!(
-                "clock.camera_ahead_s = {camera_ahead_s:.3} in the file beside the recording, or --clock-offset {:.0}. Better: one \
+                "clock.camera_ahead_s = {camera_ahead_s:.3} in the file beside the recording, or a clock offset of {:.0} ms given. Better: one \
                  clock for all (PTP, trigger)",
                 1e3 * camera_ahead_s
             ),

@@ -33,6 +33,7 @@ pub use finding::{Figure, Finding, Limit, Outcome, Severity, Status};
 pub use plots::{DrivePlots, Line};
 
 use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions};
+use deepfusion_hint::Hint;
 use deepfusion_motion::TimeOffset;
 use serde::Serialize;
 use std::path::Path;
@@ -68,6 +69,19 @@ pub struct DriveDiagnosis {
 }
 
 impl Diagnosis {
+    /// Of a recording that cannot be opened: why, and what to do about it.
+    #[must_use]
+    pub fn unopened(why: String, remedy: Option<String>) -> Self {
+        let others = CHECKS.iter().filter(|check| **check != opening::CHECK);
+        let skipped =
+            |check: &&'static str| Outcome::skipped(check, "the recording cannot be opened");
+        let failed = std::iter::once(opening::failed(why, remedy));
+        Self {
+            recording: failed.chain(others.map(skipped)).collect(),
+            drives: Vec::new(),
+        }
+    }
+
     /// All findings with the drive they are about, the worst first.
     #[must_use]
     pub fn findings(&self) -> Vec<(Option<&str>, &Finding)> {
@@ -117,18 +131,19 @@ const CHECKS: [&str; 18] = [
 /// is a finding, not an error.
 #[must_use]
 pub fn doctor(path: &Path, intrinsics: Option<[f64; 4]>) -> Diagnosis {
-    doctor_with(
-        path,
-        &OpenOptions {
-            intrinsics,
-            ..OpenOptions::default()
-        },
-    )
+    let options = OpenOptions {
+        intrinsics,
+        ..OpenOptions::default()
+    };
+    doctor_with(path, &options).unwrap_or_else(|e| Diagnosis::unopened(e.to_string(), e.hint()))
 }
 
 /// [`doctor`] with a camera or a clock offset given; camera and split of the options are not looked at.
-#[must_use]
-pub fn doctor_with(path: &Path, options: &OpenOptions) -> Diagnosis {
+///
+/// # Errors
+/// Those of [`Dataset::open`]: a recording that cannot be opened is a finding in the words of whoever asks
+/// ([`Diagnosis::unopened`]).
+pub fn doctor_with(path: &Path, options: &OpenOptions) -> Result<Diagnosis, Error> {
     let open = |camera| {
         let options = OpenOptions {
             camera,
@@ -140,27 +155,13 @@ pub fn doctor_with(path: &Path, options: &OpenOptions) -> Diagnosis {
     let datasets = match open(CameraChoice::Left) {
         Err(Error::NoImages { .. }) => open(CameraChoice::Right),
         other => other,
-    };
-    match datasets {
-        Err(error) => {
-            let others = CHECKS.iter().filter(|check| **check != opening::CHECK);
-            let skipped =
-                |check: &&'static str| Outcome::skipped(check, "the recording cannot be opened");
-            let recording = std::iter::once(opening::failed(&error)).chain(others.map(skipped));
-            Diagnosis {
-                recording: recording.collect(),
-                drives: Vec::new(),
-            }
-        }
-        Ok(datasets) => {
-            let trains = datasets.iter().any(|d| opening::pairs(d).is_ok());
-            let drives = datasets.iter().map(|d| examine_among(d, trains));
-            Diagnosis {
-                drives: drives.collect(),
-                recording: vec![stereo::check(path, options)],
-            }
-        }
-    }
+    }?;
+    let trains = datasets.iter().any(|d| opening::pairs(d).is_ok());
+    let drives = datasets.iter().map(|d| examine_among(d, trains));
+    Ok(Diagnosis {
+        drives: drives.collect(),
+        recording: vec![stereo::check(path, options)],
+    })
 }
 
 /// Examines one drive.

@@ -18,12 +18,10 @@ pub(super) fn pairs(dataset: &Dataset) -> Result<usize> {
 }
 
 /// Of a recording that cannot be opened.
-pub(super) fn failed(error: &Error) -> Outcome {
+pub(super) fn failed(why: String, remedy: Option<String>) -> Outcome {
     let mut outcome = Outcome::new(CHECK);
-    let remedy = error
-        .hint()
-        .unwrap_or_else(|| "correct what the message names".into());
-    outcome.find(Severity::Error, None, error.to_string(), remedy);
+    let remedy = remedy.unwrap_or_else(|| "correct what the message names".into());
+    outcome.find(Severity::Error, None, why, remedy);
     outcome
 }
 

@@ -35,10 +35,8 @@ pub(crate) struct KittiRecording {
 /// Opens the cameras of the drives found at `path`.
 pub(crate) fn open(path: &Path, drives: &[Drive], options: &OpenOptions) -> Result<Vec<Dataset>> {
     if options.intrinsics.is_some() {
-        return Err(Error::CameraFile {
+        return Err(Error::OwnCalibration {
             path: path.to_owned(),
-            problem: "KITTI raw brings its own calibration".into(),
-            remedy: "leave --intrinsics out".into(),
         });
     }
     let selection = Selection::new(options);

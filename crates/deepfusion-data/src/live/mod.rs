@@ -137,10 +137,10 @@ impl LiveSource {
         };
         let said = self.address.without_password(&quoted(&self.ffmpeg.said()));
         let seconds = self.timeout.as_secs_f64();
-        self.error(
-            format!("gave no frame for {seconds} s{before}{said}"),
-            "is the source sending? --timeout S waits longer",
-        )
+        Error::Silent {
+            address: self.address.to_string(),
+            problem: format!("gave no frame for {seconds} s{before}{said}"),
+        }
     }
 
     fn error(&self, problem: String, remedy: &'static str) -> Error {

@@ -10,7 +10,7 @@ pub use encode::{Shown, can_write_video, shown_for, write_video};
 use crate::calibration::find_camera;
 use crate::clock::{TimeUnit, seconds};
 use crate::config::FolderConfig;
-use crate::folder::{CAMERA_REMEDY, NO_MOUNT};
+use crate::folder::NO_MOUNT;
 use crate::frame_times::{TimedImage, from_start, numbers_by_time};
 use crate::plain::PlainParts;
 use crate::speed_log::SpeedLog;
@@ -78,7 +78,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     let folder = file.parent().unwrap_or(Path::new(".")).to_owned();
     let config = FolderConfig::read(&folder)?;
     let video = VideoFrames::probe(&file, &config)?;
-    let calibration = find_camera(&folder, &config, options, video.size(), CAMERA_REMEDY)?;
+    let calibration = find_camera(&folder, &config, options, video.size(), DatasetKind::Video)?;
     let mut remarks = Vec::new();
     let times = match (&video.probed.times_ns, config.fps) {
         (_, Some(fps)) => {

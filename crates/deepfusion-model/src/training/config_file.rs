@@ -44,7 +44,7 @@ impl TrainConfig {
     /// an optional one away. What comes out is not validated.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a key that there is none of, and for a value that it cannot have.
+    /// [`Error::Setting`] for a key that there is none of, and for a value that it cannot have; [`Error::PresetAsKey`].
     pub fn set(&mut self, assignment: &str) -> Result<(), Error> {
         let wrong = |reason: String| Error::Setting {
             assignment: assignment.to_owned(),
@@ -56,9 +56,9 @@ impl TrainConfig {
         let (key, value) = (key.trim(), value.trim());
         if key == "preset" {
             // Its name alone would change, and none of its settings.
-            return Err(wrong(
-                "a preset is chosen with --preset or in the file".into(),
-            ));
+            return Err(Error::PresetAsKey {
+                assignment: assignment.to_owned(),
+            });
         }
         let mut parts: Vec<&str> = key.split('.').collect();
         let last = parts.pop().unwrap_or_default();
@@ -212,7 +212,6 @@ mod tests {
             ("batch=none", "batch"),
             ("batsch=none", "batsch"),
             ("batch.size=3", "no table"),
-            ("preset=tiny", "--preset"),
         ] {
             let error = config.set(assignment).unwrap_err();
             assert!(matches!(error, Error::Setting { .. }));
@@ -220,6 +219,9 @@ mod tests {
             assert!(text.contains(reason) && text.contains(assignment), "{text}");
             assert!(error.hint().is_some());
         }
+        let error = config.set("preset=tiny").unwrap_err();
+        assert!(matches!(error, Error::PresetAsKey { .. }), "{error}");
+        assert!(error.to_string().contains("preset=tiny"), "{error}");
         assert_eq!(config, expected, "what failed changed nothing");
     }
 }

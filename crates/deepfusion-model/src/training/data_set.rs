@@ -134,7 +134,7 @@ impl TrainConfig {
     /// metres of that set's cameras. A run without sets is its own; of one with a single set, that is meant.
     ///
     /// # Errors
-    /// [`Error::Config`] where the run has several sets and none is named, or none of that name.
+    /// [`Error::DataSet`] where the run has several sets and none is named, or none of that name.
     pub fn for_set(mut self, name: Option<&str>) -> Result<Self, Error> {
         let names = || -> Vec<&str> { self.data.sets.iter().map(|s| s.name.as_str()).collect() };
         let found = match (self.data.sets.as_slice(), name) {
@@ -151,8 +151,7 @@ impl TrainConfig {
                     names.join(", ")
                 ),
             };
-            return Err(Error::Config {
-                field: "--data-set",
+            return Err(Error::DataSet {
                 expected,
                 found: name.unwrap_or("none").to_owned(),
             });

@@ -100,7 +100,7 @@ pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
             Err(e) => problems.push(e.to_string()),
         },
         Some(_) => {}
-        None => problems.push("no depth was saved: predict it with --save depth-png or npy".into()),
+        None => problems.push("no depth was saved, neither as depth-png nor as npy".into()),
     }
     frame["problems"] = json!(problems);
     frame

@@ -12,7 +12,7 @@ use deepfusion_data::{DatasetKind, OpenOptions};
 
 use crate::cli::{CameraIntrinsics, DoctorArgs};
 use crate::error::CliError;
-use crate::failure::Result;
+use crate::failure::{Reportable, Result};
 use crate::output;
 use crate::progress::say;
 
@@ -26,7 +26,8 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
         camera_ahead_s: args.camera_ahead_s,
         ..OpenOptions::default()
     };
-    let diagnosis = doctor_with(path, &options);
+    let diagnosis = doctor_with(path, &options)
+        .unwrap_or_else(|error| Diagnosis::unopened(error.message(), error.remedy()));
     if args.json {
         output::print_json(&as_json(&diagnosis))?;
     } else {
