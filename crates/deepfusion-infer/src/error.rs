@@ -2,6 +2,7 @@ use deepfusion_hint::Hint;
 
 /// What can go wrong before a network runs; running it cannot fail.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A graph that means no network.
     #[error("network graph, node {node} ({name}): {reason}")]

@@ -3,6 +3,7 @@ use std::path::PathBuf;
 
 /// What can go wrong with a model of instances.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The file cannot be read.
     #[error("{}: {source}", path.display())]

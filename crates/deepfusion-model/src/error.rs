@@ -5,6 +5,7 @@ use crate::NetworkError;
 
 /// What can go wrong with a configuration, or with a run on disk.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A setting that means nothing.
     #[error("setting `{field}`: expected {expected}, found {found}")]

@@ -117,6 +117,7 @@ pub struct Unidentifiable {
 
 /// A reason of [`Unidentifiable`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Why {
     /// The drive is too straight: the figure is the seconds of turning.
     Straight,

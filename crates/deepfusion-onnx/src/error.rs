@@ -3,6 +3,7 @@ use std::path::PathBuf;
 
 /// What can go wrong when a model is written, read or run.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// Bytes that are no ONNX file.
     #[error("not an ONNX file: {0}")]

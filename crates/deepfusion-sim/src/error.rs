@@ -3,6 +3,7 @@ use std::path::PathBuf;
 
 /// What can go wrong while a drive is made or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A value of the configuration is out of its range.
     #[error("simulator setting `{field}` is {value}, expected {expected}")]

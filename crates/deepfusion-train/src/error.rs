@@ -3,6 +3,7 @@ use deepfusion_hint::Hint;
 
 /// What can go wrong while learning.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// Nothing to learn from.
     #[error("no training sample in {data}: {reason}")]

@@ -3,6 +3,7 @@ use std::path::PathBuf;
 
 /// What can go wrong with packed networks.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A name that no embedded network has.
     #[error(

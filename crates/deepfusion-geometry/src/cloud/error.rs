@@ -3,6 +3,7 @@ use std::path::PathBuf;
 
 /// What can go wrong with a cloud or its file.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A file could not be opened, read or written.
     #[error("{}: {source}", path.display())]

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 /// What can go wrong when a network is configured, or when weights are read, written or fitted
 /// into a network.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum NetworkError {
     /// A configuration value outside what the network can be built with.
     #[error("network config: `{field}` is {found}, expected {expected}")]
