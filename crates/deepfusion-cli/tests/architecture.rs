@@ -1,5 +1,11 @@
 //! The crates and their arrows, as ARCHITECTURE.md and its drawing say them. `UPDATE_REFERENCE=1` draws anew.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,11 @@
 //! Bags through the program alone: written, looked into, converted, trained on, measured.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use std::path::Path;

@@ -1,5 +1,11 @@
 //! Prediction in bulk: shards, runs that were stopped, images that cannot be read.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use std::collections::BTreeMap;

@@ -1,5 +1,11 @@
 //! A run's report, its kept evaluations and their comparison, through the program alone.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use std::fs;

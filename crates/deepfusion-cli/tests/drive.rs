@@ -1,5 +1,11 @@
 //! From a simulated drive to numbers, through the program alone.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use std::path::Path;

@@ -1,6 +1,12 @@
 //! Live sources through the program alone: streams on standard input and of a server in this test. What needs ffmpeg is
 //! skipped, and says so, where there is none.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 #[path = "support/streams.rs"]
 mod streams;
 mod support;

@@ -1,5 +1,11 @@
 //! The paper's network from configuration to file: training, resuming, prediction in both engines, features, export.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use std::fs;

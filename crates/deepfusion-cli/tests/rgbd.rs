@@ -1,5 +1,11 @@
 //! RGB-D folders through the program: the colour images are looked at, by the folder's own camera.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use std::path::Path;

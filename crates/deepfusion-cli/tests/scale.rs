@@ -1,5 +1,11 @@
 //! The watch over a drive's metres, through the program alone.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use std::fs;

@@ -1,5 +1,11 @@
 //! Networks without a run: packed from one, embedded in the program, or neither.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use std::fs;

@@ -1,5 +1,11 @@
 //! Splits: how much of one was used, and that nothing is both learned from and validated on.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use std::fs;

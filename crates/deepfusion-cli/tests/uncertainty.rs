@@ -1,5 +1,11 @@
 //! A network that says how sure it is: learned, calibrated, packed, written.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use std::fs;

@@ -1,5 +1,11 @@
 //! Run folders and files of evaluations, as tables in every form.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use std::path::{Path, PathBuf};
 
 use deepfusion_compare::{

@@ -5,6 +5,12 @@
 //! `benches/peers/image_to_tensor.py` measures the same files: JPEG of quality 92 with half the colour
 //! resolution (what KITTI's copies in JPEG usually are) and with all of it, and PNG.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a benchmark ends where it cannot run"
+)]
+
 use criterion::{Criterion, criterion_main};
 use deepfusion_data::{RgbImage, decode_rgb, to_network_input};
 use std::hint::black_box;

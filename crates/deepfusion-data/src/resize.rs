@@ -74,6 +74,10 @@ impl Resizer {
         self.narrowed.resize(3 * width as usize * h as usize, 0);
         let whole = (image.width(), image.height());
         let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Lanczos3));
+        #[expect(
+            clippy::expect_used,
+            reason = "the buffers were made for these sizes, and none of them is empty"
+        )]
         let mut pass = |from: &[u8], size, part, to: &mut [u8], height| {
             let from = view(from, size, part);
             let mut to = TypedImage::<U8x3>::from_buffer(width, height, to)
@@ -96,6 +100,10 @@ impl Resizer {
 }
 
 /// A part (x, y, width, height) of an image's RGB bytes.
+#[expect(
+    clippy::expect_used,
+    reason = "whole and part are of the caller's image"
+)]
 fn view(
     bytes: &[u8],
     (width, height): (u32, u32),

@@ -1,5 +1,11 @@
 //! Which of a bag's sources drives, and the files beside a bag.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 #[path = "common/bag.rs"]
 mod bag;
 

@@ -1,5 +1,11 @@
 //! A clock that is off and a speed that reads too fast, said once and taken out once, in every layout.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 #[path = "common/bag.rs"]
 mod bag;
 mod common;

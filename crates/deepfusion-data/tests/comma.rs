@@ -1,5 +1,11 @@
 //! comma2k19 segments.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod common;
 
 use deepfusion_data::{Dataset, DatasetKind, Error, OpenOptions, inspect};

@@ -1,5 +1,11 @@
 //! Opening recordings: every layout, and every reason not to.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod common;
 
 use common::TinyDrive;

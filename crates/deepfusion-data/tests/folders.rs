@@ -1,5 +1,11 @@
 //! Folders of images with tables beside them.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod common;
 #[path = "common/folder.rs"]
 mod folder;

@@ -1,5 +1,11 @@
 //! Velodyne ground truth against NumPy (`tests/reference/velodyne_numpy.py`), and its array file.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod common;
 
 use common::TinyDrive;

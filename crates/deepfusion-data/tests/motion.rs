@@ -1,5 +1,11 @@
 //! Snippets and ego-motion, on drives written here and on KITTI's.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod common;
 
 use common::{TinyDrive, packet};

@@ -1,5 +1,11 @@
 //! What moves: KITTI's tracklets beside the car's own motion, and the simulator's masks.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod common;
 
 use common::{TinyDrive, real_data, wall};

@@ -1,5 +1,11 @@
 //! Folders of colour, depth and pose files.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod common;
 
 use deepfusion_data::{Dataset, DatasetKind, GtKind, OpenOptions, inspect};

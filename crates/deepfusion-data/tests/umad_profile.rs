@@ -1,5 +1,11 @@
 //! UMAD's camera as its paper prints it: used where a bag says nothing else, and flagged.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use deepfusion_data::doctor::{Severity, doctor};
 use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_rosbag::msg::{Header, Image, TwistStamped};

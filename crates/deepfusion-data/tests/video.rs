@@ -1,5 +1,11 @@
 //! Videos, read by the machine's ffmpeg where it has one.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod common;
 #[path = "common/folder.rs"]
 mod folder;

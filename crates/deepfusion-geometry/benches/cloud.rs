@@ -1,6 +1,12 @@
 //! Metric disparity of 640×192 to a coloured cloud: `cargo bench -p deepfusion-geometry`. Its peer is
 //! `benches/peers/cloud_numpy.py`, on the same numbers.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a benchmark ends where it cannot run"
+)]
+
 use criterion::{Criterion, criterion_main};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};

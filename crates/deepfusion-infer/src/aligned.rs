@@ -36,6 +36,10 @@ impl<T: Element> Aligned<T> {
     ///
     /// # Panics
     /// When there is no memory for them.
+    #[expect(
+        clippy::expect_used,
+        reason = "as `vec!`: no memory for what follows from a network in memory"
+    )]
     pub(crate) fn zeros(len: usize) -> Self {
         Self::try_zeros(len).expect("memory for a network's weights")
     }

@@ -1,5 +1,10 @@
 //! The scale monitor's work for each frame of a street: the frame's texture, and the pair's costs.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a benchmark ends where it cannot run"
+)]
 #![allow(missing_docs)]
 
 use criterion::{Criterion, criterion_group, criterion_main};

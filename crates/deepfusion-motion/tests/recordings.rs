@@ -1,5 +1,11 @@
 //! Distance and heading on real drives, against positions from satellites.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use deepfusion_motion::comma::CommaSegment;

@@ -1,5 +1,11 @@
 //! The clocks' offset on simulated drives, where it is known, and on KITTI, where it should be none.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use deepfusion_hint::Hint;

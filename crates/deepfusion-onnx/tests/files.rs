@@ -1,5 +1,11 @@
 //! What is written is what is read, and nothing else is read.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};

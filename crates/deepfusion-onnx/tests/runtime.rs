@@ -1,4 +1,10 @@
 //! Files in ONNX Runtime, where this machine has one; what is said where it has none.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
 #![cfg(feature = "runtime")]
 
 mod support;

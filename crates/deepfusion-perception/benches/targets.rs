@@ -1,5 +1,10 @@
 //! The targets of one depth image of a street, and of a drive with tracking.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a benchmark ends where it cannot run"
+)]
 #![allow(missing_docs)]
 
 use criterion::{Criterion, criterion_group, criterion_main};

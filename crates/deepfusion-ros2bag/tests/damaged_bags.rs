@@ -1,5 +1,11 @@
 //! Bags that were cut off, hurt or never finished: what is whole is read, what is not is said.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 #[path = "../../deepfusion-rosbag/tests/common/mod.rs"]
 mod common;
 

@@ -1,6 +1,12 @@
 //! Opening a bag and decoding every message of it: `cargo bench -p deepfusion-rosbag`. The same beside PyPI's `rosbags`,
 //! with the ratios: `python benches/peers/rosbags_read.py`.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a benchmark ends where it cannot run"
+)]
+
 mod recordings;
 
 use criterion::{Criterion, Throughput, criterion_main};

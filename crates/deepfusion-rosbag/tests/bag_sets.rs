@@ -1,5 +1,11 @@
 //! Several bags as one stream.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod common;
 
 use common::sha256;

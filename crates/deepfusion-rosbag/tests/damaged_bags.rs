@@ -1,5 +1,11 @@
 //! Bags that were cut, changed, or never finished: no panic, and what lies before the break is there.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod common;
 
 use common::{reference, sha256};

@@ -1,5 +1,11 @@
 //! Bags that PyPI's `rosbags` wrote, read to the values that it reads (`reference/rosbags_reference.py`); exactly.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod common;
 
 use common::{lines, number, read_json, real_bags, reference, sha256};

@@ -1,6 +1,12 @@
 //! Bags that we write: the bytes that `reference/check_written.py` saw PyPI's `rosbags` accept, value by value, and
 //! read back by ourselves.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod common;
 #[path = "common/written.rs"]
 mod written;

@@ -1,5 +1,11 @@
 //! The doctor is silent on clean drives, and names every fault that is planted into one.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod doctor_faults;
 
 use deepfusion_data::doctor::{Diagnosis, Finding, Outcome, Severity, doctor};

@@ -1,6 +1,12 @@
 //! The promises of the endless mode: a view hangs on the settings and its index alone, and its depth is exact
 //! whatever the weather and the camera do to its colours.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use deepfusion_sim::{Endless, EndlessConfig, Scene, View, Weather};
 use nalgebra::Vector3;
 use std::collections::HashSet;

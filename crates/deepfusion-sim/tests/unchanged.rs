@@ -1,5 +1,11 @@
 //! Drives of a configuration are what they were in every version: pictures, depths and boxes, byte for byte.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use deepfusion_sim::{Scene, Sensors, SimConfig, Simulation};
 
 /// FNV-1a, 64 bits.

@@ -1,6 +1,12 @@
 //! The flow decoder in both directions, forward and backward: `cargo bench -p deepfusion-train --bench flow`. The peer is
 //! `benches/peers/torch_flow.py`.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a benchmark ends where it cannot run"
+)]
+
 use burn::module::Module;
 use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{Criterion, criterion_group};

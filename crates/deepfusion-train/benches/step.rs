@@ -1,6 +1,12 @@
 //! Training steps and inference on random images: `cargo bench -p deepfusion-train`. The peers are
 //! `benches/peers/torch_step.py` and, for the whole step, `torch_light_step.py` and `torch_full_step.py` beside it.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a benchmark ends where it cannot run"
+)]
+
 use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{BatchSize, Criterion, criterion_group};
 use deepfusion_infer::{Engine, Precision};

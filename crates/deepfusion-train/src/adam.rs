@@ -99,6 +99,7 @@ impl ModuleVisitor for Collect<'_> {
     }
 }
 
+#[expect(clippy::expect_used, reason = "the type that the networks have")]
 fn to_vec<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     let data = tensor.into_data();
     data.try_into_vec::<f32>()

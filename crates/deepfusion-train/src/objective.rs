@@ -93,6 +93,7 @@ impl Model {
                 smooth.push(rough.mul_scalar(weight));
             }
         }
+        #[expect(clippy::expect_used, reason = "one for each scale")]
         let output = finest_output.expect("the decoder has four scales");
         sum.terms.valid_share = share(&output.valid);
         sum.terms.explained_share = share(&output.explained);
@@ -115,6 +116,7 @@ impl Model {
                 sum.terms.agreement = sum.add(Some(apart), settings.flow.agreement);
             }
         }
+        #[expect(clippy::expect_used, reason = "the reprojection was added")]
         let total = sum.total.expect("the reprojection is always a part of it");
         sum.terms.total = number(&total);
         BatchLoss {
@@ -155,6 +157,7 @@ impl Model {
         let likelihood =
             log_scale.map(|b| losses::uncertainty(inverse[0].clone(), b, &batch.truth));
         sum.terms.uncertainty = sum.add(likelihood, 1.0);
+        #[expect(clippy::expect_used, reason = "the depth was added")]
         let total = sum.total.expect("it was added");
         sum.terms.total = number(&total);
         DepthPass {
@@ -422,6 +425,7 @@ fn number(value: &Tensor<1>) -> f64 {
 }
 
 /// The mean of a loss over views.
+#[expect(clippy::expect_used, reason = "as many as sources")]
 fn mean_of<T>(views: impl ExactSizeIterator<Item = T>, loss: impl Fn(T) -> Tensor<1>) -> Tensor<1> {
     let count = views.len() as f64;
     views

@@ -1,5 +1,11 @@
 //! The affine invariant loss inside the whole: it neither sees nor moves the scale of depth or motion.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use burn::tensor::{Device, Tensor};

@@ -1,5 +1,11 @@
 //! What a run goes on from, and what another one starts from.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use burn::tensor::Device;

@@ -1,5 +1,11 @@
 //! Learning from known depth: of simulated views, of recordings, and beside a video's own motion.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use burn::tensor::Device;

@@ -1,5 +1,11 @@
 //! Against the simulator, which knows the truth.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use burn::tensor::{Device, Tensor, TensorData};

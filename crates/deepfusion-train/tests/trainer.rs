@@ -1,5 +1,11 @@
 //! What the trainer tells of a run, and what ends one.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use burn::tensor::Device;

@@ -1,4 +1,10 @@
 //! The page in a real browser: what it shows is what the files hold. Without a Chromium this says so and passes.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
 #![cfg(unix)]
 
 #[path = "support/browser.rs"]

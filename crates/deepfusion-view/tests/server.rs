@@ -1,5 +1,11 @@
 //! What the server answers, to a plain client.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use std::io::{Read, Write};

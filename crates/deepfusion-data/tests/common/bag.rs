@@ -1,4 +1,10 @@
 //! A small bag: grey pictures, and whatever a test's vehicle says.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
 use deepfusion_rosbag::msg::{

@@ -58,6 +58,7 @@ struct Finish<'a> {
 impl<'a> Finish<'a> {
     /// # Panics
     /// Without AVX-512; [`has_dot`] must hold.
+    #[expect(clippy::expect_used, reason = "asked before an engine of bf16 is made")]
     fn new(geometry: &'a Geometry, bias: &'a [f32], arena: Shared<'a, Bf16>) -> Self {
         let simd = V4::try_new();
         Self {

@@ -45,6 +45,7 @@ impl ConvShape {
         self.out_size(self.in_width, self.kernel_width)
     }
 
+    #[expect(clippy::expect_used, reason = "an image in memory")]
     fn out_size(&self, size: usize, kernel: usize) -> usize {
         let padded = self.padding.checked_mul(2);
         let padded = padded.and_then(|p| size.checked_add(p));

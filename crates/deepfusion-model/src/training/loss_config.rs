@@ -154,6 +154,7 @@ impl LossConfig {
 
     /// The same with every term on.
     #[must_use]
+    #[expect(clippy::expect_used, reason = "a list of its own names")]
     pub fn with_every_term(mut self) -> Self {
         for term in Self::TERMS {
             self.with(term).expect("TERMS are the names that it takes");

@@ -1,5 +1,11 @@
 //! Real recordings for tests and the example: where they are, and how a motion is compared with a
 //! reference.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
 #![allow(dead_code)] // Each test uses its part.
 
 pub mod kitti;

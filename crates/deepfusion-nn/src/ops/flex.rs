@@ -20,6 +20,10 @@ impl Values {
         Self(tensor.to_contiguous())
     }
 
+    #[expect(
+        clippy::expect_used,
+        reason = "made contiguous, and of the type that the networks have"
+    )]
     fn slice(&self) -> &[f32] {
         self.0
             .as_slice::<f32>()
@@ -53,6 +57,7 @@ unsafe fn written<R>(
 }
 
 /// How many values a tensor of these sizes holds.
+#[expect(clippy::expect_used, reason = "the size of what is in memory")]
 fn count(sizes: &[usize]) -> usize {
     let all = sizes.iter().try_fold(1_usize, |all, n| all.checked_mul(*n));
     all.expect("sizes of a tensor, which is in memory or as large as one that is")

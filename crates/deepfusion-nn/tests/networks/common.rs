@@ -1,6 +1,12 @@
 //! What the tests against PyTorch share: the formula of the weights, the names and shapes of real files,
 //! and the expected values. The counterpart is `tests/reference/networks.py`.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -4,6 +4,12 @@
 //! rounding. Tolerance: 1e-4 of each tensor's root mean square; measured, the largest: 3.6e-5. Nowhere is a sum so near to
 //! a ReLU's kink that rounding would carry it over (the generator prints how near).
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use burn::module::{Module, ModuleVisitor, Param};
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use deepfusion_nn::layers::freeze_statistics;

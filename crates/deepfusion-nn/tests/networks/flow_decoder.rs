@@ -4,6 +4,12 @@
 //! The reference (tests/reference/flow_decoder.py) is in double precision, so the difference is float32 rounding.
 //! Tolerance: 1e-4 of each tensor's root mean square; measured, the largest of 38: 9.0e-6.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use crate::common::{formula, largest_difference, reference, uniform};
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_nn::weights::{self, WeightTensor, Weights};

@@ -3,6 +3,12 @@
 //! The reference (tests/reference/operations.py) is in double precision, so the difference is float32
 //! rounding. Tolerance: 1e-4 of each tensor's root mean square; measured, the largest of 260: 4.9e-6.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use crate::common::{largest_difference, reference, uniform};
 use burn::tensor::{Device, Tensor};
 use deepfusion_nn::ops::{self, ConvOptions};

@@ -1,5 +1,11 @@
 //! One training step's statistics and gradients beside PyTorch's, and the modes of the batch norms.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use crate::common::{images, manifest, values, write_listed};
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};

@@ -1,5 +1,11 @@
 //! Weights to files and back, and what happens with files that do not fit.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use std::fs;
 
 use crate::common::{images, manifest, unpack, values};

@@ -1,4 +1,10 @@
 //! Small random networks.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
 #![allow(dead_code)] // Not every test uses all of it.
 
 use deepfusion_geometry::DepthRange;

@@ -1,5 +1,11 @@
 //! The bags that reading is measured on, and reading them: for the bench and for the example that the peer runs.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a benchmark ends where it cannot run"
+)]
+
 use deepfusion_rosbag::msg::{
     Float64, Header, Image, Imu, PointCloud2, Quaternion, RosMessage, Vector3,
 };

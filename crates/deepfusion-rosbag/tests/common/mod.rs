@@ -1,4 +1,10 @@
 //! What several tests share: messages as the lines that the reference scripts write.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
 #![allow(dead_code)]
 
 use deepfusion_rosbag::msg::*;

@@ -1,5 +1,11 @@
 //! A recording with every message type, made of formulas: what the writer's tests write.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use super::Lines;
 use deepfusion_rosbag::msg::*;
 use deepfusion_rosbag::{BagWriter, Compression, ConnectionId, Time, WriterOptions};

@@ -99,6 +99,9 @@ fn contradictory(back_again: &Tensor<4, Bool>, in_view: &Tensor<4, Bool>) -> Ten
 /// - `views`: the flow's and the reversed flow's, N and N, or one view that holds both along the batch
 /// - `flows`, `images`: of each view, `[N, 2, H, W]` and `[N, C, H, W]`
 /// - output: one value
+///
+/// # Panics
+/// Without a view.
 #[must_use]
 pub fn flow(
     views: &[FlowView],
@@ -122,6 +125,7 @@ pub fn flow(
     loss
 }
 
+#[expect(clippy::expect_used, reason = "documented where it is called")]
 fn sum(terms: impl Iterator<Item = Tensor<1>>) -> Tensor<1> {
     terms
         .reduce(|a, b| a + b)

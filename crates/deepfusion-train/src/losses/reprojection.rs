@@ -36,6 +36,10 @@ pub struct ReprojectionOutput {
 /// # Panics
 /// Without a view.
 #[must_use]
+#[expect(
+    clippy::expect_used,
+    reason = "documented, and a validated configuration has a source"
+)]
 pub fn reprojection(views: Vec<View>, automask: bool) -> ReprojectionOutput {
     let mut merged: Option<ReprojectionOutput> = None;
     for view in views {

@@ -1,4 +1,10 @@
 //! A small folder of results, a server on it, and a plain client.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
 #![allow(dead_code)]
 
 use std::io::{Read, Write};
