@@ -39,9 +39,10 @@ pub fn asked() -> bool {
 
 /// Ends what cannot be gone on with, where the work was asked to stop.
 pub fn check(what: &'static str) -> Result<()> {
-    match asked() {
-        true => Err(CliError::Ended { what }.into()),
-        false => Ok(()),
+    if asked() {
+        Err(CliError::Ended { what }.into())
+    } else {
+        Ok(())
     }
 }
 

@@ -149,9 +149,12 @@ fn trivial_rows(members: &[&Evaluation]) -> Vec<(String, Metrics, Metrics)> {
         }
     }
     let one = rows.len() == 1;
-    let named = |(names, unscaled, scaled): (Vec<&str>, Metrics, Metrics)| match one {
-        true => ("trivial".to_owned(), unscaled, scaled),
-        false => (format!("trivial of {}", names.join(", ")), unscaled, scaled),
+    let named = |(names, unscaled, scaled): (Vec<&str>, Metrics, Metrics)| {
+        if one {
+            ("trivial".to_owned(), unscaled, scaled)
+        } else {
+            (format!("trivial of {}", names.join(", ")), unscaled, scaled)
+        }
     };
     rows.into_iter().map(named).collect()
 }
@@ -161,9 +164,12 @@ fn metric_table(
     trivial: &[(String, Metrics, Metrics)],
     median_scaled: bool,
 ) -> Table {
-    let metrics = |r: &Report| match median_scaled {
-        true => r.median_scaled,
-        false => r.unscaled,
+    let metrics = |r: &Report| {
+        if median_scaled {
+            r.median_scaled
+        } else {
+            r.unscaled
+        }
     };
     let figures: Vec<(&str, _)> = members
         .iter()
@@ -211,12 +217,13 @@ fn metric_table(
             ..Row::default()
         });
     }
-    let notes = match trivial.is_empty() || median_scaled {
-        true => Vec::new(),
-        false => vec![
+    let notes = if trivial.is_empty() || median_scaled {
+        Vec::new()
+    } else {
+        vec![
             "Trivial: the mean depth of each pixel over the training scans; it is not ranked."
                 .to_owned(),
-        ],
+        ]
     };
     Table {
         title: String::new(),
@@ -332,9 +339,10 @@ fn point_table(ground: &str, members: &[&Evaluation]) -> Option<Table> {
         Some(Row {
             cells,
             ranked: points.in_space,
-            flags: match points.in_space {
-                true => Vec::new(),
-                false => vec![Flag::remark("distances along z: the camera was not known")],
+            flags: if points.in_space {
+                Vec::new()
+            } else {
+                vec![Flag::remark("distances along z: the camera was not known")]
             },
             source: None,
         })

@@ -238,9 +238,10 @@ impl FolderConfig {
     ) -> Result<Option<PathBuf>> {
         if let Some(name) = named {
             let path = folder.join(name);
-            return match path.exists() {
-                true => Ok(Some(path)),
-                false => Err(self.error(format!("{key}: there is no {}", path.display()))),
+            return if path.exists() {
+                Ok(Some(path))
+            } else {
+                Err(self.error(format!("{key}: there is no {}", path.display())))
             };
         }
         let mut paths = usual.iter().map(|name| folder.join(name));

@@ -26,9 +26,12 @@ impl DepthImages {
                 truncated: false,
             });
         };
-        let metres = |value: &u16| match Some(*value) == self.invalid {
-            true => 0.0,
-            false => (f64::from(*value) * self.unit_m) as f32,
+        let metres = |value: &u16| {
+            if Some(*value) == self.invalid {
+                0.0
+            } else {
+                (f64::from(*value) * self.unit_m) as f32
+            }
         };
         Ok(DepthMap {
             width: image.width() as usize,

@@ -585,8 +585,9 @@ impl Hint for Error {
 
 /// How far apart the frames of a step were to be, if they were.
 fn a_step(frame_distance_m: f64) -> String {
-    match frame_distance_m > 0.0 {
-        true => format!(", {frame_distance_m} m a step"),
-        false => String::new(),
+    if frame_distance_m > 0.0 {
+        format!(", {frame_distance_m} m a step")
+    } else {
+        String::new()
     }
 }

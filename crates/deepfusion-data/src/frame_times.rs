@@ -102,9 +102,10 @@ fn have_numbers(images: &[PathBuf]) -> bool {
 
 /// By number where all names are numbers, by name otherwise.
 fn in_order(mut images: Vec<PathBuf>) -> Vec<PathBuf> {
-    match have_numbers(&images) {
-        true => images.sort_by_cached_key(|path| (number(path), path.clone())),
-        false => images.sort(),
+    if have_numbers(&images) {
+        images.sort_by_cached_key(|path| (number(path), path.clone()))
+    } else {
+        images.sort()
     }
     images
 }
@@ -229,10 +230,11 @@ fn from_list(path: &Path, images: usize, config: &FolderConfig) -> Result<Vec<i6
     }
     let mut times = Vec::with_capacity(lines.len());
     for (line, text) in &lines {
-        let ns = match dates {
-            true => parse_date_time(text),
+        let ns = if dates {
+            parse_date_time(text)
+        } else {
             // A line that is no number has kept the unit from being known: it is the one to be named.
-            false => number(text).and_then(|_| unit.unwrap_or(TimeUnit::Seconds).nanoseconds(text)),
+            number(text).and_then(|_| unit.unwrap_or(TimeUnit::Seconds).nanoseconds(text))
         };
         let ns = ns.ok_or_else(|| bad(*line, describe(text.trim(), "a time")))?;
         if times.last().is_some_and(|last| ns <= *last) {

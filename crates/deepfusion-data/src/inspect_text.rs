@@ -96,10 +96,7 @@ impl fmt::Display for Inspection {
 
 /// A value that one decimal shows as 0 or −0 as 0.
 fn unsigned_zero(value: f64) -> f64 {
-    match value.abs() < 0.05 {
-        true => 0.0,
-        false => value,
-    }
+    if value.abs() < 0.05 { 0.0 } else { value }
 }
 
 /// `, missing 3, 7-9` with the first few ranges.
@@ -107,9 +104,12 @@ fn missing(ranges: &[[u64; 2]]) -> String {
     if ranges.is_empty() {
         return String::new();
     }
-    let show = |[from, to]: &[u64; 2]| match from == to {
-        true => from.to_string(),
-        false => format!("{from}-{to}"),
+    let show = |[from, to]: &[u64; 2]| {
+        if from == to {
+            from.to_string()
+        } else {
+            format!("{from}-{to}")
+        }
     };
     let shown: Vec<String> = ranges.iter().take(6).map(show).collect();
     let more = if ranges.len() > shown.len() {

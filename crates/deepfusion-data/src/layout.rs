@@ -39,9 +39,10 @@ impl Layout {
             return Ok(Self::Bags(vec![given]));
         }
         if !real.is_dir() {
-            return match video::is_video(&real) {
-                true => Ok(Self::Video(real)),
-                false => Err(unknown(describe_file(&real))),
+            return if video::is_video(&real) {
+                Ok(Self::Video(real))
+            } else {
+                Err(unknown(describe_file(&real)))
             };
         }
         if let Some(drive) = layout::drive_around(&real) {
@@ -110,9 +111,10 @@ fn named(path: &Path, real: &Path) -> PathBuf {
 }
 
 /// Why a ROS 2 bag is no recording here.
-pub(crate) const WITHOUT_ROS2: &str = match cfg!(feature = "ros2") {
-    true => "",
-    false => ", and this program was built without the feature `ros2`",
+pub(crate) const WITHOUT_ROS2: &str = if cfg!(feature = "ros2") {
+    ""
+} else {
+    ", and this program was built without the feature `ros2`"
 };
 
 fn describe_file(path: &Path) -> String {
@@ -157,9 +159,10 @@ fn describe_folder(folder: &Path) -> Result<String> {
     }
     if !kinds.is_empty() {
         let list: Vec<String> = kinds.iter().map(|(k, n)| format!("{n} {k}")).collect();
-        let without = match kinds.contains_key("ROS 2 bags") {
-            true => WITHOUT_ROS2,
-            false => "",
+        let without = if kinds.contains_key("ROS 2 bags") {
+            WITHOUT_ROS2
+        } else {
+            ""
         };
         return Ok(format!(
             "it holds {} and nothing that says how to read them{without}",

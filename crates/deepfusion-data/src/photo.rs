@@ -69,9 +69,12 @@ mod tests {
 
     /// A JPEG of 64×48, left half red and right half blue, with these fields.
     fn jpeg(fields: &[(Tag, u16)]) -> Vec<u8> {
-        let half = |x: u32, _| match x < 32 {
-            true => Rgb([220, 20, 20]),
-            false => Rgb([20, 20, 220]),
+        let half = |x: u32, _| {
+            if x < 32 {
+                Rgb([220, 20, 20])
+            } else {
+                Rgb([20, 20, 220])
+            }
         };
         let mut plain = Vec::new();
         RgbImage::from_fn(64, 48, half)

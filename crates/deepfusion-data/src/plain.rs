@@ -234,9 +234,10 @@ impl Recording for PlainRecording {
         };
         let k = self.lens.intrinsics();
         // One of another size is told by the data set, which knows the frame.
-        match image.dimensions() == (k.width, k.height) {
-            true => self.lens.correct(image),
-            false => Ok(image),
+        if image.dimensions() == (k.width, k.height) {
+            self.lens.correct(image)
+        } else {
+            Ok(image)
         }
     }
 

@@ -66,16 +66,15 @@ impl SpeedLog {
             return Ok(None);
         };
         let mut remarks = Vec::new();
-        let (measured, table) = match gps_log::is_gps(&path) {
-            true => (of_track(&path, config, &mut remarks)?, None),
-            false => {
-                let table = Table::read(&path)?;
-                let ns = times(&table, config, &mut remarks, &name(&path))?;
-                let column = table.require(&SPEEDS, "time_s,speed_mps")?;
-                let factor = speed_factor(&table, column, config)? * config.speed_scale();
-                let values = scaled(table.numbers(column)?, factor);
-                (Samples { ns, values }, Some(table))
-            }
+        let (measured, table) = if gps_log::is_gps(&path) {
+            (of_track(&path, config, &mut remarks)?, None)
+        } else {
+            let table = Table::read(&path)?;
+            let ns = times(&table, config, &mut remarks, &name(&path))?;
+            let column = table.require(&SPEEDS, "time_s,speed_mps")?;
+            let factor = speed_factor(&table, column, config)? * config.speed_scale();
+            let values = scaled(table.numbers(column)?, factor);
+            (Samples { ns, values }, Some(table))
         };
         let mut streams = vec![stream(&path, "speed", &measured.ns)];
         let (mut yaw_rates_radps, mut vehicle) = (None, None);
@@ -172,9 +171,10 @@ impl Samples {
         let mut steps: Vec<f64> = steps.collect();
         steps.sort_by(f64::total_cmp);
         let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-        let most = most.unwrap_or(match usual > SLOW_S {
-            true => (3.0 * usual).min(MOST_BRIDGED_S),
-            false => MAX_GAP_S,
+        let most = most.unwrap_or(if usual > SLOW_S {
+            (3.0 * usual).min(MOST_BRIDGED_S)
+        } else {
+            MAX_GAP_S
         });
         let (mut ns, mut values) = (Vec::new(), Vec::new());
         let (mut filled, mut longest, mut left) = (0, 0.0_f64, 0);
@@ -251,9 +251,10 @@ fn of_track(path: &Path, config: &FolderConfig, remarks: &mut Vec<String>) -> Re
     }
     let mut sigmas: Vec<f64> = log.speeds.iter().map(|s| s.sigma_mps).collect();
     sigmas.sort_by(f64::total_cmp);
-    let from = match log.measured {
-        true => "as the receiver measured them",
-        false => "from its positions, smoothed",
+    let from = if log.measured {
+        "as the receiver measured them"
+    } else {
+        "from its positions, smoothed"
     };
     remarks.push(format!(
         "{name}: speeds {from}, sure to {:.2} m/s in the middle",

@@ -137,9 +137,10 @@ impl Table {
 /// `'x' is not a number`, short however long the word is.
 pub(crate) fn describe(word: &str, expected: &str) -> String {
     let shown: String = word.chars().take(40).collect();
-    match shown.is_empty() {
-        true => format!("empty, expected {expected}"),
-        false => format!("'{shown}' is not {expected}"),
+    if shown.is_empty() {
+        format!("empty, expected {expected}")
+    } else {
+        format!("'{shown}' is not {expected}")
     }
 }
 

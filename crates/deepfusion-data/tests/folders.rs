@@ -163,9 +163,10 @@ fn same(kitti: &Dataset, a: &Snippet, b: &Snippet) -> f64 {
         assert!((x.distance_m - y.distance_m).abs() < 1e-8, "{x:?} {y:?}");
         let apart = |source_from_target: Se3, vehicle: VehicleMotion| {
             let earlier_from_later = vehicle.camera0_from_camera1(&mount);
-            let between = match x_is_later {
-                true => source_from_target * earlier_from_later,
-                false => source_from_target * earlier_from_later.inverse(),
+            let between = if x_is_later {
+                source_from_target * earlier_from_later
+            } else {
+                source_from_target * earlier_from_later.inverse()
             };
             between.translation().norm() + between.angle()
         };

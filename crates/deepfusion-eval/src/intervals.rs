@@ -129,9 +129,10 @@ impl IntervalFactors {
             let own: Vec<&IntervalSample> = of_range.collect();
             FactorRange {
                 to_m,
-                factors: match own.len() < FEWEST {
-                    true => together,
-                    false => LEVELS.map(|level| conformal(&own, level)),
+                factors: if own.len() < FEWEST {
+                    together
+                } else {
+                    LEVELS.map(|level| conformal(&own, level))
                 },
                 pixels: own.len(),
             }

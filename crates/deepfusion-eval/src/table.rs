@@ -134,9 +134,10 @@ impl Report {
 
 /// A line a level.
 fn interval_lines(f: &mut fmt::Formatter<'_>, intervals: &Intervals) -> fmt::Result {
-    let whose = match intervals.calibrated {
-        true => "calibrated",
-        false => "as the network says, not calibrated",
+    let whose = if intervals.calibrated {
+        "calibrated"
+    } else {
+        "as the network says, not calibrated"
     };
     for row in &intervals.levels {
         writeln!(

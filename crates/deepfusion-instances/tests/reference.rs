@@ -73,10 +73,13 @@ fn check(name: &str, kind: Kind, colours: Colours) -> usize {
             };
             (bounds[0] - l).abs() + (bounds[1] - t).abs()
         };
-        let in_image = |bounds: [f32; 4]| match with_masks {
-            true => in_size(bounds, &letterbox, size),
-            // Its program divides by one ratio and does not cut boxes at the image's edge.
-            false => bounds.map(|b| b / ratio),
+        let in_image = |bounds: [f32; 4]| {
+            if with_masks {
+                in_size(bounds, &letterbox, size)
+            } else {
+                // Its program divides by one ratio and does not cut boxes at the image's edge.
+                bounds.map(|b| b / ratio)
+            }
         };
         let nearest = (0..found.len())
             .min_by(|a, b| {

@@ -99,9 +99,10 @@ fn speeds(fixes: &[Fix]) -> Vec<FixSpeed> {
         let (var_x, var_y) = (east.covariance[(1, 1)], north.covariance[(1, 1)]);
         let speed = x.hypot(y);
         // Along the way it goes; of one that stands, either.
-        let variance = match speed > 1e-6 {
-            true => (x * x * var_x + y * y * var_y) / (speed * speed),
-            false => var_x.max(var_y),
+        let variance = if speed > 1e-6 {
+            (x * x * var_x + y * y * var_y) / (speed * speed)
+        } else {
+            var_x.max(var_y)
         };
         FixSpeed {
             time_s: fix.time_s,

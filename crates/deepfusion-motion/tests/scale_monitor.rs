@@ -74,9 +74,10 @@ fn readings(drive: &Drive, zoom: f64, speed: f64, config: ScaleMonitorConfig) ->
         .iter()
         .enumerate()
         .map(|(i, image)| {
-            let seen = match i < FRAMES[0] {
-                true => image.clone(),
-                false => zoomed(image, zoom),
+            let seen = if i < FRAMES[0] {
+                image.clone()
+            } else {
+                zoomed(image, zoom)
             };
             Arc::new(RoadTexture::from(&seen))
         })

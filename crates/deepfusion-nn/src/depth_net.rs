@@ -116,9 +116,10 @@ impl DepthNet {
             uncertainty,
         };
         // The encoder has seen to its own; the context encoding has batch norms, too.
-        Ok(match config.encoder.frozen_statistics {
-            true => freeze_statistics(net, true),
-            false => net,
+        Ok(if config.encoder.frozen_statistics {
+            freeze_statistics(net, true)
+        } else {
+            net
         })
     }
 

@@ -59,9 +59,10 @@ impl DepthModel {
                     let reason = format!(
                         "{} channels at {}, expected one at the image's size",
                         shape.channels,
-                        match shape.pooled {
-                            true => "a single pixel".to_owned(),
-                            false => format!("1/{} of the image's size", 1_u64 << shape.halvings),
+                        if shape.pooled {
+                            "a single pixel".to_owned()
+                        } else {
+                            format!("1/{} of the image's size", 1_u64 << shape.halvings)
                         }
                     );
                     return fail("outputs", reason);

@@ -38,9 +38,12 @@ pub fn depth_panel(panel: &DepthPanel<'_>) -> Result<RgbImage> {
     let known = panel.truth.iter().filter(|t| t.is_finite()).count();
     let mean = panel.error.iter().map(|e| e.abs()).sum::<f32>() / known.max(1) as f32;
     let places: Vec<usize> = (0..panel.error.len()).collect();
-    let error = |i: &usize| match panel.truth[*i].is_finite() {
-        true => ColourMap::Diverging.colour(0.5 + 0.5 * panel.error[*i] / WORST_FACTOR.ln()),
-        false => NOTHING,
+    let error = |i: &usize| {
+        if panel.truth[*i].is_finite() {
+            ColourMap::Diverging.colour(0.5 + 0.5 * panel.error[*i] / WORST_FACTOR.ln())
+        } else {
+            NOTHING
+        }
     };
     let tiles = [
         Tile::new("image", picture_from_chw("image", panel.image, size)?),

@@ -43,9 +43,12 @@ pub fn sample_panel(panel: &SamplePanel<'_>) -> Result<RgbImage> {
     if let Some(moving) = panel.moving {
         require_size("moving pixels", moving.len(), size)?;
     }
-    let masked = |i: &usize| match moves(*i) {
-        true => Rgb([200, 30, 30]),
-        false => Rgb([(panel.mask[*i].clamp(0.0, 1.0) * 255.0) as u8; 3]),
+    let masked = |i: &usize| {
+        if moves(*i) {
+            Rgb([200, 30, 30])
+        } else {
+            Rgb([(panel.mask[*i].clamp(0.0, 1.0) * 255.0) as u8; 3])
+        }
     };
     let places: Vec<usize> = (0..panel.mask.len()).collect();
     let mut tiles = vec![

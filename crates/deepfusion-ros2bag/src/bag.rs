@@ -12,9 +12,10 @@ use std::path::{Path, PathBuf};
 /// Whether a path is a bag of ROS 2: an `.mcap` or `.db3` file, or a folder with the recorder's `metadata.yaml`.
 #[must_use]
 pub fn is_ros2_bag(path: &Path) -> bool {
-    match path.is_dir() {
-        true => metadata::is_bag(path),
-        false => path.is_file() && Kind::of(path).is_some(),
+    if path.is_dir() {
+        metadata::is_bag(path)
+    } else {
+        path.is_file() && Kind::of(path).is_some()
     }
 }
 
@@ -77,9 +78,10 @@ impl Ros2Bag {
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let metadata = std::fs::metadata(path).map_err(|e| Error::file(path, e))?;
-        let named = match metadata.is_dir() {
-            true => metadata::files(path)?,
-            false => vec![path.to_owned()],
+        let named = if metadata.is_dir() {
+            metadata::files(path)?
+        } else {
+            vec![path.to_owned()]
         };
         let (there, missing): (Vec<_>, Vec<_>) = named.into_iter().partition(|file| file.is_file());
         let files = there.iter().map(|file| open_file(file));

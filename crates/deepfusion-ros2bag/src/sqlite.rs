@@ -143,13 +143,14 @@ fn connect(path: &Path) -> rusqlite::Result<Connection> {
         Path::new(&name).exists()
     };
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let database = match beside("-wal") || beside("-journal") {
-        true => Connection::open_with_flags(path, flags)?,
+    let database = if beside("-wal") || beside("-journal") {
+        Connection::open_with_flags(path, flags)?
+    } else {
         // Nobody writes to it: no locks are needed, which a read-only disk could not hold.
-        false => match uri(path) {
+        match uri(path) {
             Some(uri) => Connection::open_with_flags(uri, flags | OpenFlags::SQLITE_OPEN_URI)?,
             None => Connection::open_with_flags(path, flags)?,
-        },
+        }
     };
     database.set_limit(Limit::SQLITE_LIMIT_LENGTH, MOST_BYTES as i32)?;
     // A file from elsewhere must not bring code of its own: views, triggers.

@@ -67,9 +67,10 @@ impl Ahead {
             (jobs, queue)
         });
         // Where the system has no thread to give, chunks are opened on demand.
-        match self.workers.is_empty() || jobs.send(job).is_err() {
-            true => Ticket::OnDemand,
-            false => Ticket::Ahead(ticket),
+        if self.workers.is_empty() || jobs.send(job).is_err() {
+            Ticket::OnDemand
+        } else {
+            Ticket::Ahead(ticket)
         }
     }
 

@@ -53,9 +53,10 @@ impl Header {
                 "an LZ4 frame of another version, or with a dictionary",
             ));
         }
-        let content_size = match bit(3) {
-            true => Some(u64::from_le_bytes(rest.array()?)),
-            false => None,
+        let content_size = if bit(3) {
+            Some(u64::from_le_bytes(rest.array()?))
+        } else {
+            None
         };
         let descriptor = &descriptor[..descriptor.len() - rest.0.len()];
         let [checksum] = rest.array()?;

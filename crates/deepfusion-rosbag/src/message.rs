@@ -126,9 +126,10 @@ impl<'bag> Message<'bag> {
         let data = self.data();
         let word = |at: usize, big: bool| {
             let bytes = *data.get(at..)?.first_chunk()?;
-            Some(match big {
-                true => u32::from_be_bytes(bytes),
-                false => u32::from_le_bytes(bytes),
+            Some(if big {
+                u32::from_be_bytes(bytes)
+            } else {
+                u32::from_le_bytes(bytes)
             })
         };
         let (at, big) = match self.serialization {
@@ -175,9 +176,12 @@ impl<'bag> Message<'bag> {
     fn wrong_type<'m, T: RosMessage<'m>>(&self) -> Error {
         let connection = self.connection;
         let same_name = connection.type_name == T::TYPE;
-        let name = |name: &str, md5: &str| match same_name {
-            true => format!("{name} of MD5 {md5}"),
-            false => name.to_owned(),
+        let name = |name: &str, md5: &str| {
+            if same_name {
+                format!("{name} of MD5 {md5}")
+            } else {
+                name.to_owned()
+            }
         };
         Error::WrongType {
             path: self.path.to_owned(),

@@ -144,9 +144,10 @@ impl<'bag> Messages<'bag> {
         let opened = self.ahead.redeem(ticket, info)?;
         let wanted = |place: u32| self.wanted[place as usize];
         let places = self.bag.places();
-        let mut entries = match info.scanned {
-            true => entry::walk(opened.content.bytes(file)).entries(places),
-            false => entry::indexed(file, opened.end, info, places, wanted)?,
+        let mut entries = if info.scanned {
+            entry::walk(opened.content.bytes(file)).entries(places)
+        } else {
+            entry::indexed(file, opened.end, info, places, wanted)?
         };
         // A chunk that begins before the index says has come too late to keep the order.
         if let Some(early) = entries.iter().find(|e| e.time < info.first) {
@@ -170,9 +171,10 @@ impl<'bag> Messages<'bag> {
     }
 
     fn chunk_error(&self, info: &ChunkInfo, fault: Fault) -> Error {
-        let problem = match fault.offset == info.position {
-            true => fault.problem,
-            false => format!("byte {}: {}", fault.offset, fault.problem),
+        let problem = if fault.offset == info.position {
+            fault.problem
+        } else {
+            format!("byte {}: {}", fault.offset, fault.problem)
         };
         Error::Chunk {
             path: self.bag.path().to_owned(),

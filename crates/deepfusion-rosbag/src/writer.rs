@@ -197,9 +197,10 @@ impl BagWriter {
             time,
             message,
         );
-        match self.chunk.content.len() >= self.options.chunk_bytes {
-            true => self.close_chunk(),
-            false => Ok(()),
+        if self.chunk.content.len() >= self.options.chunk_bytes {
+            self.close_chunk()
+        } else {
+            Ok(())
         }
     }
 
@@ -288,14 +289,15 @@ impl BagWriter {
     }
 
     fn check(&self, what: &str, bytes: usize, limit: usize) -> Result<()> {
-        match bytes > limit {
-            true => Err(Error::TooLarge {
+        if bytes > limit {
+            Err(Error::TooLarge {
                 path: self.path.clone(),
                 what: what.to_owned(),
                 bytes: bytes as u64,
                 limit: limit as u64,
-            }),
-            false => Ok(()),
+            })
+        } else {
+            Ok(())
         }
     }
 }

@@ -59,12 +59,11 @@ impl DepthRunner for FusedRunner {
         self.engine.run(image);
         self.engine.read_output(0, &mut output.disparity);
         metric_disparity(self.range, &mut output.disparity);
-        match self.uncertainty {
-            true => {
-                let log_scale = output.log_scale.get_or_insert_default();
-                self.engine.read_output(1, log_scale);
-            }
-            false => output.log_scale = None,
+        if self.uncertainty {
+            let log_scale = output.log_scale.get_or_insert_default();
+            self.engine.read_output(1, log_scale);
+        } else {
+            output.log_scale = None
         }
         Ok(())
     }

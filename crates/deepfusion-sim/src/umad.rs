@@ -141,9 +141,10 @@ fn write_messages(
         speed: bag.add_connection::<TwistStamped>(topic::SPEED)?,
         steering: bag.add_connection::<AckermannDriveStamped>(topic::STEERING)?,
         truth: bag.add_connection::<Odometry>(topic::TRUTH)?,
-        true_depth: match settings.true_depth {
-            true => Some(bag.add_connection::<CompressedImage<'_>>(topic::TRUE_DEPTH)?),
-            false => None,
+        true_depth: if settings.true_depth {
+            Some(bag.add_connection::<CompressedImage<'_>>(topic::TRUE_DEPTH)?)
+        } else {
+            None
         },
     };
     let frames = simulation.frames();
@@ -151,9 +152,10 @@ fn write_messages(
     let mut scans = 0;
     for first in (0..frames).step_by(BATCH) {
         let last = (first + BATCH).min(frames);
-        let until_s = match last == frames {
-            true => f64::INFINITY,
-            false => simulation.time_s(last),
+        let until_s = if last == frames {
+            f64::INFINITY
+        } else {
+            simulation.time_s(last)
         };
         // Readings first: within a chunk's length order does not matter, readers sort by time.
         vehicle.write(&mut bag, &topics, until_s)?;

@@ -217,9 +217,10 @@ impl Adam {
                 }));
             }
             let moments = moments.entry(parameter.to_owned()).or_default();
-            match name.starts_with("m.") {
-                true => moments.first = tensor.values,
-                false => moments.second = tensor.values,
+            if name.starts_with("m.") {
+                moments.first = tensor.values
+            } else {
+                moments.second = tensor.values
             }
         }
         for (name, moments) in &moments {

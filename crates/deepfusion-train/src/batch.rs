@@ -225,9 +225,10 @@ impl Maker {
                 .collect(),
             offsets: self.config.frames.clone(),
             names: samples.iter().map(|s| self.set.name(*s)).collect(),
-            factors: match self.config.has_factors() {
-                false => Vec::new(),
-                true => samples.iter().map(|s| self.factors(*s)).collect(),
+            factors: if !self.config.has_factors() {
+                Vec::new()
+            } else {
+                samples.iter().map(|s| self.factors(*s)).collect()
             },
         })
     }

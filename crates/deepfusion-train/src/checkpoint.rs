@@ -139,9 +139,10 @@ fn take_flow_decoder(model: &mut Model, saved: &Weights) -> Result<bool, Error> 
         return Ok(false);
     };
     let missing = saved.tensors.is_empty();
-    model.flow_decoder = Some(match missing {
-        true => decoder,
-        false => weights::apply(decoder, saved)?,
+    model.flow_decoder = Some(if missing {
+        decoder
+    } else {
+        weights::apply(decoder, saved)?
     });
     Ok(missing)
 }

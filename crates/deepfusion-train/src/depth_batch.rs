@@ -181,9 +181,10 @@ fn item(config: &TrainConfig, view: &DepthView, draw: usize, augment: bool) -> R
         .then(|| Jitter::draw(&config.augmentation, &mut rng))
         .flatten();
     let (width, height) = (config.size.width, config.size.height);
-    let window = match augment {
-        true => Window::draw(&view.camera, config, &mut rng),
-        false => Window::centred(&view.camera, config),
+    let window = if augment {
+        Window::draw(&view.camera, config, &mut rng)
+    } else {
+        Window::centred(&view.camera, config)
     };
     let (image, depth) = (window.of_image(&view.image), window.of_depth(&view.depth));
     let mut clean = to_chw(&resize_rgb(&image, width as u32, height as u32));
@@ -202,9 +203,12 @@ fn item(config: &TrainConfig, view: &DepthView, draw: usize, augment: bool) -> R
     let is_far = |d: f32| d >= farthest || (d == 0.0 && view.sky);
     let flags = |of: &dyn Fn(f32) -> bool| depth.iter().map(|d| f32::from(of(*d))).collect();
     let (known, far) = (flags(&|d| d > 0.0 && !is_far(d)), flags(&is_far));
-    let log = |d: &f32| match is_far(*d) {
-        true => farthest.ln(),
-        false => d.max(nearest).ln(),
+    let log = |d: &f32| {
+        if is_far(*d) {
+            farthest.ln()
+        } else {
+            d.max(nearest).ln()
+        }
     };
     Ok(Item {
         log_depth: depth.iter().map(log).collect(),

@@ -137,9 +137,10 @@ impl Model {
         let DepthOutput {
             disparities,
             log_scale,
-        } = match alone {
-            true => self.depth_net.forward_for_uncertainty(images),
-            false => self.depth_net.forward_with_uncertainty(images),
+        } = if alone {
+            self.depth_net.forward_for_uncertainty(images)
+        } else {
+            self.depth_net.forward_with_uncertainty(images)
         };
         let [_, _, height, width] = batch.clean.dims();
         let full_size = |(scale, disparity): (usize, &Tensor<4>)| {

@@ -38,9 +38,10 @@ pub fn shared_frames(train: &SampleSet, validation: &SampleSet) -> Vec<SharedFra
             continue;
         };
         let (targets, sources) = drives.entry(dataset.name().to_owned()).or_default();
-        match is_target {
-            true => *targets += 1,
-            false => *sources += 1,
+        if *is_target {
+            *targets += 1;
+        } else {
+            *sources += 1;
         }
     }
     let shared = drives.into_iter();

@@ -508,9 +508,10 @@ fn next<T>(batch: impl FnOnce() -> Option<Result<T, Error>>) -> Result<T, Error>
 
 /// The metres of a unit of PoseNet's translation; where there is no video it says nothing, and 1 will do.
 fn first_unit(config: &TrainConfig, set: &SampleSet) -> f64 {
-    match set.samples.is_empty() {
-        true => 1.0,
-        false => config.first_unit(set.mean_displacement_m()),
+    if set.samples.is_empty() {
+        1.0
+    } else {
+        config.first_unit(set.mean_displacement_m())
     }
 }
 

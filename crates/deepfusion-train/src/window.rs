@@ -86,9 +86,10 @@ fn largest(camera: &Intrinsics, config: &TrainConfig) -> [u32; 2] {
         return [camera.width, camera.height];
     }
     let side = |value: f64, most: u32| (value.round() as u32).clamp(1, most);
-    match aspect < wanted {
-        true => [camera.width, side(width / wanted, camera.height)],
-        false => [side(height * wanted, camera.width), camera.height],
+    if aspect < wanted {
+        [camera.width, side(width / wanted, camera.height)]
+    } else {
+        [side(height * wanted, camera.width), camera.height]
     }
 }
 

@@ -15,13 +15,12 @@ fn title(table: &str) -> String {
 
 fn row(key: &ConfigKey, value: Option<&toml::Value>) -> String {
     let escape = |text: &str| text.replace('|', "\\|");
-    let meaning = match key.words.is_empty() {
-        true => format!("{} ({})", escape(&key.meaning), key.kind),
-        false => {
-            let word = |(word, means): &(String, String)| format!("`{word}`: {}", escape(means));
-            let words: Vec<String> = key.words.iter().map(word).collect();
-            format!("{}<br>{}", escape(&key.meaning), words.join("<br>"))
-        }
+    let meaning = if key.words.is_empty() {
+        format!("{} ({})", escape(&key.meaning), key.kind)
+    } else {
+        let word = |(word, means): &(String, String)| format!("`{word}`: {}", escape(means));
+        let words: Vec<String> = key.words.iter().map(word).collect();
+        format!("{}<br>{}", escape(&key.meaning), words.join("<br>"))
     };
     let default = value.map(ToString::to_string).or(key.default.clone());
     let default = default.map_or_else(String::new, |value| format!("`{value}`"));

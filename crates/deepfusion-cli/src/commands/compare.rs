@@ -152,9 +152,10 @@ fn spread(datasets: &[Dataset], count: usize) -> Vec<(usize, usize)> {
         .collect()
     };
     let known = all(&|dataset, frame| dataset.has_ground_truth(frame));
-    let frames = match known.len() >= count {
-        true => known,
-        false => all(&|_, _| true),
+    let frames = if known.len() >= count {
+        known
+    } else {
+        all(&|_, _| true)
     };
     let count = count.min(frames.len());
     // The middles of equal stretches.

@@ -117,9 +117,10 @@ pub fn calibrate(
         path.display()
     ));
     // One frame has no other half: it is told of itself.
-    let judged = match held_out.is_empty() {
-        true => &learned,
-        false => &held_out,
+    let judged = if held_out.is_empty() {
+        &learned
+    } else {
+        &held_out
     };
     Ok(Some(mirrored.reliability(&told(judged, true), BINS)))
 }

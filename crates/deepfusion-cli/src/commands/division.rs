@@ -36,9 +36,10 @@ fn by_drives<D: PartialEq>(images: &[(D, u64)]) -> Option<Division> {
     drives.sort_by_key(|(_, of_drive)| std::cmp::Reverse(of_drive.len()));
     let (mut learned, mut held_out) = (Vec::new(), Vec::new());
     for (_, of_drive) in drives {
-        match learned.len() <= held_out.len() {
-            true => learned.extend(of_drive),
-            false => held_out.extend(of_drive),
+        if learned.len() <= held_out.len() {
+            learned.extend(of_drive)
+        } else {
+            held_out.extend(of_drive)
         }
     }
     let least = LEAST_SHARE * images.len() as f64;

@@ -297,9 +297,10 @@ fn page(
     let number = |v: f64| format!("{v:.3}");
     let trivial = report.trivial.as_ref().map(|t| t.unscaled.abs_rel);
     let names: Vec<_> = args.data.iter().map(|p| output::name_of(p)).collect();
-    let on = match names.is_empty() {
-        true => String::new(),
-        false => format!(" on {}", names.join(", ")),
+    let on = if names.is_empty() {
+        String::new()
+    } else {
+        format!(" on {}", names.join(", "))
     };
     let images = match report.expected {
         Some(expected) => format!("{} of the split's {expected}", report.n),

@@ -51,9 +51,10 @@ pub fn open_quietly(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Data
 /// The crop of the recordings' field: Garg's where all of them are KITTI raw, which its tables use; else the whole image.
 pub fn default_crop(datasets: &[Dataset]) -> Crop {
     let kitti = |d: &Dataset| d.kind() == DatasetKind::KittiRaw;
-    match datasets.iter().all(kitti) {
-        true => Crop::Garg,
-        false => Crop::None,
+    if datasets.iter().all(kitti) {
+        Crop::Garg
+    } else {
+        Crop::None
     }
 }
 
@@ -88,15 +89,16 @@ pub fn expected_frames(
         return Ok(None);
     };
     let coverage = split.coverage(datasets);
-    match strict && !coverage.is_complete() {
-        true => Err(CliError::Incomplete {
+    if strict && !coverage.is_complete() {
+        Err(CliError::Incomplete {
             split: split.path.clone(),
             found: coverage.found,
             expected: coverage.expected,
             what: "are in the recordings given",
         }
-        .into()),
-        false => Ok(Some(coverage.expected)),
+        .into())
+    } else {
+        Ok(Some(coverage.expected))
     }
 }
 

@@ -34,10 +34,11 @@ Every command explains itself: deepfusion train --help
 /// `deepfusion` alone: what it can do, with examples to copy.
 pub fn run() -> Result<()> {
     output::print(OVERVIEW)?;
-    match cfg!(feature = "train") {
-        true => Ok(()),
-        false => output::print(
+    if cfg!(feature = "train") {
+        Ok(())
+    } else {
+        output::print(
             "\nThis build is without training: demo, train, ablate, eval-odometry, export and weights import are left out.\n",
-        ),
+        )
     }
 }

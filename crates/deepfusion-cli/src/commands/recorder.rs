@@ -82,9 +82,10 @@ impl Recorder {
                     String::new()
                 };
                 // Images that are learned from by their depth have not moved.
-                let moved = match mean_displacement_m > 0.0 {
-                    true => format!(", mean displacement {mean_displacement_m:.3} m"),
-                    false => String::new(),
+                let moved = if mean_displacement_m > 0.0 {
+                    format!(", mean displacement {mean_displacement_m:.3} m")
+                } else {
+                    String::new()
                 };
                 say(&format!(
                     "{samples} training samples, {validation_samples} held out{moved}; {steps} steps{going_on}"

@@ -105,8 +105,9 @@ fn recordings(
         camera_ahead_s,
         ..OpenOptions::default()
     };
-    match tell {
-        true => open_recordings(paths, &options),
-        false => open_quietly(paths, &options),
+    if tell {
+        open_recordings(paths, &options)
+    } else {
+        open_quietly(paths, &options)
     }
 }

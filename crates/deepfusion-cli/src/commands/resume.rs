@@ -161,9 +161,10 @@ fn move_recordings(
     for ((option, kept), split) in kept.into_iter().zip(splits) {
         let Some(split) = split else { continue };
         if kept.is_none() {
-            let found = match sets {
-                true => of_sets.clone(),
-                false => "has none".into(),
+            let found = if sets {
+                of_sets.clone()
+            } else {
+                "has none".into()
             };
             return contradicts(option, told(split), found);
         }
@@ -251,9 +252,10 @@ fn camera_of(config: &TrainConfig) -> String {
 }
 
 fn same(option: &str, asked: String, found: String) -> Result<()> {
-    match asked == found {
-        true => Ok(()),
-        false => contradicts(option, asked, format!("has {found}")),
+    if asked == found {
+        Ok(())
+    } else {
+        contradicts(option, asked, format!("has {found}"))
     }
 }
 

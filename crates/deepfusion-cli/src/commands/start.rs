@@ -182,9 +182,10 @@ impl Start {
                 let weights = unpacked_weights(network)?;
                 let (depth_net, new_head) = model.depth_net.with_weights(&weights)?;
                 model.depth_net = depth_net;
-                let new = match new_head {
-                    true => "PoseNet, the head for uncertainty",
-                    false => "PoseNet",
+                let new = if new_head {
+                    "PoseNet, the head for uncertainty"
+                } else {
+                    "PoseNet"
                 };
                 say(&match path {
                     Some(path) => format!("starts from {}; new: {new}", path.display()),

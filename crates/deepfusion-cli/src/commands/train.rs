@@ -234,9 +234,10 @@ pub fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
             warn_of_speed(dataset);
         }
     }
-    let validation = match validates(config) {
-        true => Some(open_part(config, Part::Validation, true)?),
-        false => None,
+    let validation = if validates(config) {
+        Some(open_part(config, Part::Validation, true)?)
+    } else {
+        None
     };
     let apart = validation.is_some();
     let (train, validation, skipped) = SampleSet::split_sets(config, train, validation)?;

@@ -112,9 +112,10 @@ impl Can {
 
     /// What a frame of this time says. Remote requests and error frames carry no values, whatever their bytes.
     pub(super) fn read(&self, frame: &Frame, time_ns: i64) -> CanReading {
-        let id = match frame.is_extended {
-            true => Some(CanId::Extended { extended: frame.id }),
-            false => u16::try_from(frame.id).ok().map(CanId::Standard),
+        let id = if frame.is_extended {
+            Some(CanId::Extended { extended: frame.id })
+        } else {
+            u16::try_from(frame.id).ok().map(CanId::Standard)
         };
         let Some(id) = id.filter(|_| !frame.is_rtr && !frame.is_error) else {
             return CanReading::default();
@@ -215,9 +216,10 @@ impl<'de> Deserialize<'de> for SignalConfig {
                 self,
                 name: &str,
             ) -> std::result::Result<Self::Value, E> {
-                match name.is_empty() {
-                    true => Err(E::invalid_length(0, &self)),
-                    false => Ok(SignalConfig::Named(name.to_owned())),
+                if name.is_empty() {
+                    Err(E::invalid_length(0, &self))
+                } else {
+                    Ok(SignalConfig::Named(name.to_owned()))
                 }
             }
 

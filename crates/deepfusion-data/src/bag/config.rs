@@ -234,9 +234,10 @@ impl BagConfig {
             ));
         }
         let known = self.profile.as_deref().is_none_or(|p| p == "umad");
-        match known {
-            true => Ok(()),
-            false => Err(self.wrong("profile: the only one there is is \"umad\"".into())),
+        if known {
+            Ok(())
+        } else {
+            Err(self.wrong("profile: the only one there is is \"umad\"".into()))
         }
     }
 

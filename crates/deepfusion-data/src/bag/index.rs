@@ -213,9 +213,10 @@ fn steering(message: &Message<'_>) -> Result<f64> {
 
 /// A bare number.
 fn number(message: &Message<'_>) -> Result<f64> {
-    Ok(match message.is::<Float32>() {
-        true => f64::from(message.decode::<Float32>()?.data),
-        false => message.decode::<Float64>()?.data,
+    Ok(if message.is::<Float32>() {
+        f64::from(message.decode::<Float32>()?.data)
+    } else {
+        message.decode::<Float64>()?.data
     })
 }
 

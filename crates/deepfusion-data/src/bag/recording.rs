@@ -213,9 +213,10 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
     });
     let recording = BagRecording {
         streams: streams(bag.as_ref(), &topics, &index)?,
-        folder: match path.is_dir() {
-            true => path.to_owned(),
-            false => path.parent().unwrap_or(path).to_owned(),
+        folder: if path.is_dir() {
+            path.to_owned()
+        } else {
+            path.parent().unwrap_or(path).to_owned()
         },
         bag: Arc::clone(&bag),
         topics: topics.clone(),
@@ -446,9 +447,10 @@ impl BagScans {
             return Se3::identity();
         };
         let earlier_from_later = motion.camera0_from_camera1(&self.cam_from_vehicle);
-        match frame_s <= scan_s {
-            true => earlier_from_later,
-            false => earlier_from_later.inverse(),
+        if frame_s <= scan_s {
+            earlier_from_later
+        } else {
+            earlier_from_later.inverse()
         }
     }
 
@@ -709,12 +711,13 @@ impl Recording for BagRecording {
                 });
             }
         }
-        match paths.is_empty() {
-            true => Err(Error::NoPath {
+        if paths.is_empty() {
+            Err(Error::NoPath {
                 drive: dataset.name().to_owned(),
                 layout: self.kind().label(),
-            }),
-            false => Ok(paths),
+            })
+        } else {
+            Ok(paths)
         }
     }
 }

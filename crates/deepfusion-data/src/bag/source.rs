@@ -60,9 +60,10 @@ pub(super) fn open(path: &Path) -> Result<Arc<dyn MessageSource>> {
 
 /// A bag's name: the file's without its ending, or the folder's.
 pub(super) fn name(path: &Path) -> String {
-    let name = match path.is_dir() {
-        true => path.file_name(),
-        false => path.file_stem(),
+    let name = if path.is_dir() {
+        path.file_name()
+    } else {
+        path.file_stem()
     };
     name.unwrap_or_default().to_string_lossy().into_owned()
 }

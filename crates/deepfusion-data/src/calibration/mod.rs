@@ -48,9 +48,10 @@ impl CameraCalibration {
         let text = String::from_utf8_lossy(&text);
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
         let yaml = ["yaml", "yml"].contains(&extension.to_ascii_lowercase().as_str());
-        let numbers = match yaml {
-            true => yaml::parse(&text),
-            false => numbers::parse(&text),
+        let numbers = if yaml {
+            yaml::parse(&text)
+        } else {
+            numbers::parse(&text)
         };
         let numbers = numbers.map_err(|refusal| Error::CameraFile {
             path: path.to_owned(),
@@ -95,9 +96,10 @@ impl CameraCalibration {
     pub(crate) fn place(&self) -> CalibrationPlace {
         CalibrationPlace {
             file: self.path.clone(),
-            field: match self.size_in_file {
-                true => "the image's size",
-                false => "the first image's size, for want of one",
+            field: if self.size_in_file {
+                "the image's size"
+            } else {
+                "the first image's size, for want of one"
             },
         }
     }

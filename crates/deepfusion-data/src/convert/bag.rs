@@ -60,9 +60,10 @@ pub fn convert_to_bag(
         None => None,
     };
     let has_depth = (0..times.len()).any(|frame| dataset.has_ground_truth(frame));
-    let cloud_topic = match has_depth {
-        true => Some(bag.add_connection::<PointCloud2<'_>>("/lidar/points")?),
-        false => None,
+    let cloud_topic = if has_depth {
+        Some(bag.add_connection::<PointCloud2<'_>>("/lidar/points")?)
+    } else {
+        None
     };
     if let (Some(topic), Some(track)) = (speed_topic, dataset.track()) {
         for (seq, &time_s) in track.times_s().iter().enumerate() {

@@ -69,11 +69,12 @@ pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Es
     let rates = VehicleRates::from(track);
     let offset = settled(survey, pairs, &rates)?;
     let (value, error) = (offset.vehicle_minus_camera_s, offset.std_error_s);
-    match error.is_nan() || error >= SURE_S {
-        true => Err(format!(
+    if error.is_nan() || error >= SURE_S {
+        Err(format!(
             "the estimate {value:.2} s has a standard error of {error:.2} s"
-        )),
-        false => Ok(Estimate { offset, rates }),
+        ))
+    } else {
+        Ok(Estimate { offset, rates })
     }
 }
 
@@ -106,9 +107,10 @@ fn settled(
             break;
         }
     }
-    match rates.pitch_rate_radps.is_some() {
-        true => Ok(refined(survey, pairs, offset)),
-        false => Ok(offset),
+    if rates.pitch_rate_radps.is_some() {
+        Ok(refined(survey, pairs, offset))
+    } else {
+        Ok(offset)
     }
 }
 
@@ -190,8 +192,9 @@ fn pictures(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Vec<ImageMotion> {
         })
     };
     let turned: Vec<ImageMotion> = pairs.iter().filter_map(turned).collect();
-    match 2 * turned.len() > whole.len() {
-        true => turned,
-        false => whole,
+    if 2 * turned.len() > whole.len() {
+        turned
+    } else {
+        whole
     }
 }

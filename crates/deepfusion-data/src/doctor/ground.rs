@@ -191,9 +191,10 @@ fn plane(points: &[Vector3<f64>], up: &Vector3<f64>) -> Option<(Vector3<f64>, f6
 fn inner_range(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let at = |share: f64| values[((values.len() - 1) as f64 * share) as usize];
-    match values.is_empty() {
-        true => 0.0,
-        false => at(0.95) - at(0.05),
+    if values.is_empty() {
+        0.0
+    } else {
+        at(0.95) - at(0.05)
     }
 }
 

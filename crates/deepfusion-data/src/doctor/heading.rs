@@ -63,9 +63,10 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
             continue;
         }
         let limit = WARN_DEG.max(3.0 * error);
-        let severity = match off.abs() > ERROR_DEG {
-            true => Severity::Error,
-            false => Severity::Warning,
+        let severity = if off.abs() > ERROR_DEG {
+            Severity::Error
+        } else {
+            Severity::Warning
         };
         let figure = Figure::new(quantity, off, "degrees", Limit::Within(-limit, limit));
         outcome.judge(severity, figure, || {

@@ -45,9 +45,10 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
             error,
             Error::OneFrame { .. } | Error::Standing { .. } | Error::NoPairs { .. }
         );
-        let (severity, what) = match harmless && others_train {
-            true => (Severity::Warning, "training leaves this drive out"),
-            false => (Severity::Error, "no pair of frames can train"),
+        let (severity, what) = if harmless && others_train {
+            (Severity::Warning, "training leaves this drive out")
+        } else {
+            (Severity::Error, "no pair of frames can train")
         };
         outcome.find(severity, None, format!("{what}: {error}"), remedy);
     }
@@ -63,15 +64,15 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
     }
     for remark in survey.dataset.remarks() {
         let damaged = remark.contains("damaged") || remark.contains("cannot be read");
-        let severity = match damaged {
-            true => Severity::Warning,
-            false => Severity::Note,
+        let severity = if damaged {
+            Severity::Warning
+        } else {
+            Severity::Note
         };
-        let remedy = match damaged {
-            true => {
-                "copy the bag again; `rosbag reindex` (`ros2 bag reindex`) repairs one whose recording was cut off"
-            }
-            false => "see that it is so, or say otherwise in the file beside the recording",
+        let remedy = if damaged {
+            "copy the bag again; `rosbag reindex` (`ros2 bag reindex`) repairs one whose recording was cut off"
+        } else {
+            "see that it is so, or say otherwise in the file beside the recording"
         };
         outcome.find(severity, None, remark.clone(), remedy);
     }

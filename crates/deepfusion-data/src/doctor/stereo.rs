@@ -41,9 +41,10 @@ pub(super) fn check(path: &Path, options: &OpenOptions) -> Outcome {
     }
     if moved.len() < LEAST_POINTS {
         let cameras = [Camera::Left, Camera::Right];
-        let why = match cameras.iter().all(|camera| is(*camera).next().is_some()) {
-            true => "too few points are seen by both cameras",
-            false => "one camera",
+        let why = if cameras.iter().all(|camera| is(*camera).next().is_some()) {
+            "too few points are seen by both cameras"
+        } else {
+            "one camera"
         };
         return Outcome::skipped(CHECK, why);
     }

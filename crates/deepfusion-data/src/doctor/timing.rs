@@ -41,9 +41,10 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     );
     // A number that is missing is a frame that is missing; where numbers go on, the time tells.
     let lost_in = |apart: f64, numbers: u64| {
-        let by_time = match apart > GAP * usual * numbers as f64 {
-            true => (apart / usual).round() - numbers as f64,
-            false => 0.0,
+        let by_time = if apart > GAP * usual * numbers as f64 {
+            (apart / usual).round() - numbers as f64
+        } else {
+            0.0
         };
         numbers as f64 - 1.0 + by_time.max(0.0)
     };

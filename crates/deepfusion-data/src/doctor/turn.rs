@@ -46,16 +46,13 @@ pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
         Limit::AtLeast(0.5),
     );
     let mirrored = correlation < -0.5;
-    outcome.judge(if mirrored { Severity::Error } else { Severity::Warning }, figure, || match mirrored {
-        true => (
-            "the picture turns right where the vehicle turns left: the images are mirrored, or the yaw rate has the wrong sign".into(),
-            "mirror the images back, or negate the yaw rate (positive is to the left, z up)".into(),
-        ),
-        false => (
-            "the picture's turns do not follow the vehicle's: clock, yaw rate or camera are not of this drive".into(),
-            "compare the time stamps and the yaw rate's unit (rad/s) and axis (z up)".into(),
-        ),
-    });
+    outcome.judge(if mirrored { Severity::Error } else { Severity::Warning }, figure, || if mirrored { (
+        "the picture turns right where the vehicle turns left: the images are mirrored, or the yaw rate has the wrong sign".into(),
+        "mirror the images back, or negate the yaw rate (positive is to the left, z up)".into(),
+    ) } else { (
+        "the picture's turns do not follow the vehicle's: clock, yaw rate or camera are not of this drive".into(),
+        "compare the time stamps and the yaw rate's unit (rad/s) and axis (z up)".into(),
+    ) });
     if correlation >= SURE {
         let figure = Figure::new(
             "turns in the picture over the vehicle's",

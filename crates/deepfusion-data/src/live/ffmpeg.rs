@@ -57,9 +57,10 @@ impl Ffmpeg {
             ])
             .args(["-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24"])
             .args(["-flush_packets", "1", "pipe:1"])
-            .stdin(match address.is_stdin() {
-                true => Stdio::inherit(),
-                false => Stdio::null(),
+            .stdin(if address.is_stdin() {
+                Stdio::inherit()
+            } else {
+                Stdio::null()
             })
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
@@ -210,9 +211,10 @@ impl End {
 
 /// What it said, to be put behind what happened.
 pub(super) fn quoted(said: &[String]) -> String {
-    match said.is_empty() {
-        true => String::new(),
-        false => format!(", saying\n  {}", said.join("\n  ")),
+    if said.is_empty() {
+        String::new()
+    } else {
+        format!(", saying\n  {}", said.join("\n  "))
     }
 }
 

@@ -50,9 +50,10 @@ pub(super) fn ensure(video: &Path, cache: &Path, frames: usize) -> Result<()> {
         let _ = std::fs::remove_dir_all(&part);
     }
     // Another process may have been quicker.
-    match Origin::read(cache).as_ref() == Some(&origin) {
-        true => Ok(()),
-        false => made,
+    if Origin::read(cache).as_ref() == Some(&origin) {
+        Ok(())
+    } else {
+        made
     }
 }
 

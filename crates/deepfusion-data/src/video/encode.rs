@@ -123,14 +123,15 @@ fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
         ];
         let done = output("ffmpeg", &arguments, (video, WRITE), aside)?;
         // It goes on after a picture that it cannot read, or ends there, and calls both a success.
-        match done.complaint.is_empty() {
-            true => Ok(()),
-            false => Err(Error::Program {
+        if done.complaint.is_empty() {
+            Ok(())
+        } else {
+            Err(Error::Program {
                 path: video.to_owned(),
                 program: "ffmpeg",
                 problem: format!("made only a part of it: {}", done.complaint),
                 remedy: "see whether the disk is full and the pictures can be opened",
-            }),
+            })
         }
     };
     in_either_words(with)

@@ -71,9 +71,10 @@ pub(crate) fn in_folder(folder: &Path) -> Result<Option<InFolder>> {
 
 /// Opens a video file, or the video of a folder.
 pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
-    let file = match place.is_dir() {
-        true => in_folder(place)?.map_or_else(|| place.to_owned(), |found| found.file),
-        false => place.to_owned(),
+    let file = if place.is_dir() {
+        in_folder(place)?.map_or_else(|| place.to_owned(), |found| found.file)
+    } else {
+        place.to_owned()
     };
     let folder = file.parent().unwrap_or(Path::new(".")).to_owned();
     let config = FolderConfig::read(&folder)?;
@@ -159,9 +160,10 @@ fn begun(created_ns: i64, times: &[Option<i64>], log: (i64, i64)) -> Option<i64>
         end.saturating_sub(start.max(log.0)).max(0)
     };
     let from_end = created_ns.saturating_sub(length);
-    Some(match within(from_end) > within(created_ns) {
-        true => from_end,
-        false => created_ns,
+    Some(if within(from_end) > within(created_ns) {
+        from_end
+    } else {
+        created_ns
     })
 }
 

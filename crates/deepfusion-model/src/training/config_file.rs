@@ -75,9 +75,10 @@ impl TrainConfig {
         }
         if value == NONE {
             if inner.remove(last).is_none() {
-                return match crate::config_keys().iter().any(|k| k.key == key) {
-                    true => Ok(()),
-                    false => Err(wrong(format!("there is no key `{key}`"))),
+                return if crate::config_keys().iter().any(|k| k.key == key) {
+                    Ok(())
+                } else {
+                    Err(wrong(format!("there is no key `{key}`")))
                 };
             }
         } else {

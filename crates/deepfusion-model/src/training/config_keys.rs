@@ -49,9 +49,10 @@ impl ConfigKey {
         let end = self.meaning.find(". ").unwrap_or(self.meaning.len());
         let sentence = self.meaning[..end].trim_end_matches('.');
         let words: Vec<&str> = self.words.iter().map(|(word, _)| &**word).collect();
-        match words.is_empty() {
-            true => sentence.to_owned(),
-            false => format!("{sentence} [{}]", words.join(" | ")),
+        if words.is_empty() {
+            sentence.to_owned()
+        } else {
+            format!("{sentence} [{}]", words.join(" | "))
         }
     }
 }
@@ -149,9 +150,10 @@ fn as_toml(value: &Value) -> Option<String> {
 /// The shortest decimal of a number that may have come from 32 bits.
 fn shortest(number: f64) -> String {
     let single = number as f32;
-    match f64::from(single) == number {
-        true => format!("{single:?}"),
-        false => format!("{number:?}"),
+    if f64::from(single) == number {
+        format!("{single:?}")
+    } else {
+        format!("{number:?}")
     }
 }
 

@@ -378,9 +378,10 @@ impl TrainConfig {
     #[must_use]
     pub fn size_of_depth_batch(&self, number: usize) -> InputSize {
         let others = &self.augmentation.sizes;
-        match others.is_empty() || number.is_multiple_of(2) {
-            true => self.size,
-            false => others[number / 2 % others.len()],
+        if others.is_empty() || number.is_multiple_of(2) {
+            self.size
+        } else {
+            others[number / 2 % others.len()]
         }
     }
 

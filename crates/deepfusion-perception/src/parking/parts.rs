@@ -174,9 +174,10 @@ impl Part {
     pub fn cars(&self, row: &Row, view: &View) -> Vec<(f32, Vec<&Seen>)> {
         let [from, to] = self.along;
         let width = to - from;
-        let count = match width > WIDEST_M {
-            true => ((width + 0.5) / BAY_M).round().max(1.0) as usize,
-            false => 1,
+        let count = if width > WIDEST_M {
+            ((width + 0.5) / BAY_M).round().max(1.0) as usize
+        } else {
+            1
         };
         if count > MOST_CARS || self.depth() < DEPTH_M[usize::from(count > 1)] {
             return Vec::new();

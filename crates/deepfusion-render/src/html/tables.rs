@@ -218,9 +218,10 @@ fn sharp_rows(sharpness: &Sharpness) -> Vec<Vec<String>> {
 
 /// What intervals of each level hold.
 fn interval_rows(intervals: &Intervals) -> Vec<Vec<String>> {
-    let whose = match intervals.calibrated {
-        true => "",
-        false => ", not calibrated",
+    let whose = if intervals.calibrated {
+        ""
+    } else {
+        ", not calibrated"
     };
     let row = |row: &IntervalRow| {
         let percent = |v: f64| format!("{:.1} %", 100.0 * v);

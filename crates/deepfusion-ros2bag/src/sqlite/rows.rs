@@ -166,16 +166,17 @@ impl<'a> Rows<'a> {
         let file = self.file;
         let channel = &file.channels[key.topic as usize];
         let bytes = bytes(&file.database(), key.id).map_err(|e| failed(&file.path, &e))?;
-        let bytes = match bytes.starts_with(&ZSTD) {
-            true => unpack(&bytes).map_err(|problem| {
+        let bytes = if bytes.starts_with(&ZSTD) {
+            unpack(&bytes).map_err(|problem| {
                 let topic = &channel.connection.topic;
                 error(
                     &file.path,
                     format!("{topic}, row {}: {problem}", key.id),
                     "the message is damaged",
                 )
-            })?,
-            false => bytes,
+            })?
+        } else {
+            bytes
         };
         let range = 0..bytes.len();
         Ok(Message::held(

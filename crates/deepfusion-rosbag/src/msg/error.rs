@@ -72,9 +72,10 @@ impl MessageError {
     #[must_use]
     pub(crate) fn within(mut self, outer: &str) -> Self {
         if let Self::Short { field, .. } | Self::Text { field } = &mut self {
-            *field = match field.is_empty() {
-                true => outer.to_owned(),
-                false => format!("{outer}.{field}"),
+            *field = if field.is_empty() {
+                outer.to_owned()
+            } else {
+                format!("{outer}.{field}")
             };
         }
         self

@@ -21,9 +21,10 @@ impl<'a> Wire<'a> for Header {
     fn read(reader: &mut Reader<'a>) -> Result<Self, MessageError> {
         let within = |field: &'static str| move |error: MessageError| error.within(field);
         Ok(Self {
-            seq: match reader.is_cdr() {
-                true => 0,
-                false => u32::read(reader).map_err(within("seq"))?,
+            seq: if reader.is_cdr() {
+                0
+            } else {
+                u32::read(reader).map_err(within("seq"))?
             },
             stamp: Time::read(reader).map_err(within("stamp"))?,
             frame_id: String::read(reader).map_err(within("frame_id"))?,

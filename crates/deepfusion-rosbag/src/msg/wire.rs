@@ -74,9 +74,10 @@ impl<'a> Reader<'a> {
     /// than there are bytes for.
     fn length(&mut self, item: usize) -> Result<usize, MessageError> {
         let length = u32::read(self)? as usize;
-        match length.saturating_mul(item) > self.rest.len() {
-            true => Err(self.short(length as u64 * item as u64)),
-            false => Ok(length),
+        if length.saturating_mul(item) > self.rest.len() {
+            Err(self.short(length as u64 * item as u64))
+        } else {
+            Ok(length)
         }
     }
 }
@@ -178,9 +179,10 @@ impl<'a> Wire<'a> for Time {
         let (sec, nsec) = (u32::read(reader)?, u32::read(reader)?);
         // ROS 2 counts seconds with a sign; what lies before 1970 is no time of a recording.
         let before_1970 = reader.is_cdr() && sec > i32::MAX as u32;
-        Ok(match before_1970 {
-            true => Self::ZERO,
-            false => Self { sec, nsec },
+        Ok(if before_1970 {
+            Self::ZERO
+        } else {
+            Self { sec, nsec }
         })
     }
 

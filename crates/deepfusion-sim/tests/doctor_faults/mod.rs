@@ -80,9 +80,12 @@ impl Drive {
         p[3] *= k[0] / before[0];
         (p[0], p[2], p[5], p[6]) = (k[0], k[2], k[4], k[5]);
         let words: Vec<String> = p.iter().map(|v| format!("{v:.9e}")).collect();
-        let lines = text.lines().map(|l| match l.starts_with("P_rect_02:") {
-            true => format!("P_rect_02: {}\n", words.join(" ")),
-            false => format!("{l}\n"),
+        let lines = text.lines().map(|l| {
+            if l.starts_with("P_rect_02:") {
+                format!("P_rect_02: {}\n", words.join(" "))
+            } else {
+                format!("{l}\n")
+            }
         });
         std::fs::write(&path, lines.collect::<String>()).unwrap();
     }
@@ -121,13 +124,13 @@ impl Drive {
             let mut values: Vec<f64> = words.iter().map(|w| w.parse().unwrap()).collect();
             let before = values.clone();
             change(number, &mut values);
-            let told = words
-                .iter()
-                .enumerate()
-                .map(|(i, word)| match values[i] == before[i] {
-                    true => (*word).to_owned(),
-                    false => format!("{:.9}", values[i]),
-                });
+            let told = words.iter().enumerate().map(|(i, word)| {
+                if values[i] == before[i] {
+                    (*word).to_owned()
+                } else {
+                    format!("{:.9}", values[i])
+                }
+            });
             std::fs::write(&path, told.collect::<Vec<_>>().join(" ")).unwrap();
         }
     }

@@ -83,9 +83,10 @@ pub fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
         path: None,
     };
     let own = estimator.config();
-    let precision = match supports(&demo.device, Precision::Bf16) {
-        true => Precision::Bf16,
-        false => Precision::F32,
+    let precision = if supports(&demo.device, Precision::Bf16) {
+        Precision::Bf16
+    } else {
+        Precision::F32
     };
     let mut config = TrainConfig {
         view_motion: ViewMotion::Vehicle,

@@ -36,9 +36,10 @@ const DEMO: &str = "the demo";
 
 /// `deepfusion demo`.
 pub fn run(args: &DemoArgs) -> Result<()> {
-    let embedded = match args.from_scratch {
-        true => None,
-        false => Some(Box::new(deepfusion_weights::find(DEFAULT)?)),
+    let embedded = if args.from_scratch {
+        None
+    } else {
+        Some(Box::new(deepfusion_weights::find(DEFAULT)?))
     };
     let demo = Demo {
         args,
@@ -104,9 +105,10 @@ impl Demo<'_> {
             self.model().display(),
             self.out.join("cloud.ply").display(),
         ));
-        match self.args.json {
-            true => output::print_json(report),
-            false => output::print(&format!("{}\n", page.display())),
+        if self.args.json {
+            output::print_json(report)
+        } else {
+            output::print(&format!("{}\n", page.display()))
         }
     }
 }

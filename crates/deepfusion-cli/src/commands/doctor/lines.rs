@@ -66,9 +66,10 @@ fn told(checks: &[Checked<'_>]) -> String {
         }
     }
     for (why, drives) in reasons {
-        parts.push(match drives.len() == checks.len() {
-            true => format!("not checked: {why}"),
-            false => format!("not checked in {}: {why}", drives.join(", ")),
+        parts.push(if drives.len() == checks.len() {
+            format!("not checked: {why}")
+        } else {
+            format!("not checked in {}: {why}", drives.join(", "))
         });
     }
     parts.join("; ")

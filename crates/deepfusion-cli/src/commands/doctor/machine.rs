@@ -37,9 +37,10 @@ struct Tool {
 /// Tells it.
 pub fn run(json: bool) -> Result<()> {
     let machine = Machine::look();
-    match json {
-        true => output::print_json(&machine),
-        false => output::print(&machine.told()),
+    if json {
+        output::print_json(&machine)
+    } else {
+        output::print(&machine.told())
     }
 }
 
@@ -69,9 +70,10 @@ impl Machine {
             Some(mb) => format!("{:.1} GB", mb as f64 / 1024.0),
             None => "unknown".into(),
         };
-        let simd = match self.simd.is_empty() {
-            true => "no vector instructions that are made use of".into(),
-            false => self.simd.join(", "),
+        let simd = if self.simd.is_empty() {
+            "no vector instructions that are made use of".into()
+        } else {
+            self.simd.join(", ")
         };
         line("processor", format!("{} threads; {simd}", self.cores));
         let (free, total) = (
@@ -99,9 +101,10 @@ impl Machine {
                 "`--engine ort` alone needs it",
             ),
         ] {
-            match tool.found {
-                true => line(name, tool.what.clone()),
-                false => line(name, format!("not usable: {} ({remedy})", tool.what)),
+            if tool.found {
+                line(name, tool.what.clone())
+            } else {
+                line(name, format!("not usable: {} ({remedy})", tool.what))
             }
         }
         line(

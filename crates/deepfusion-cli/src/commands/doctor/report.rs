@@ -27,9 +27,10 @@ pub fn write(path: &Path, options: &OpenOptions, diagnosis: &Diagnosis, file: &P
         })
         .collect();
     report = report.section("Findings");
-    report = match rows.is_empty() {
-        true => report.paragraph("None: every figure keeps to its limit."),
-        false => report.table(&["finding", "measured", "remedy", "drive", "frame"], &rows),
+    report = if rows.is_empty() {
+        report.paragraph("None: every figure keeps to its limit.")
+    } else {
+        report.table(&["finding", "measured", "remedy", "drive", "frame"], &rows)
     };
     let checks: Vec<_> = super::outcomes(diagnosis).collect();
     let rows = lines::rows(&checks).into_iter();
@@ -77,9 +78,10 @@ fn pictures(
         return Ok(report);
     }
     let options = OpenOptions {
-        camera: match drive.camera == Camera::Left.number() {
-            true => CameraChoice::Left,
-            false => CameraChoice::Right,
+        camera: if drive.camera == Camera::Left.number() {
+            CameraChoice::Left
+        } else {
+            CameraChoice::Right
         },
         ..options.clone()
     };

@@ -140,9 +140,12 @@ impl Picture {
             Self::Image(picture) => save_png(picture, path)?,
             Self::Cloud(cloud) => {
                 let pcd = path.extension().is_some_and(|ending| ending == "pcd");
-                write_unsynced::<Failure>(path, |out| match pcd {
-                    true => Ok(cloud.write_pcd(out)?),
-                    false => Ok(cloud.write_ply(out)?),
+                write_unsynced::<Failure>(path, |out| {
+                    if pcd {
+                        Ok(cloud.write_pcd(out)?)
+                    } else {
+                        Ok(cloud.write_ply(out)?)
+                    }
                 })?;
             }
         }

@@ -101,9 +101,10 @@ fn frames_of(mut recordings: Vec<Dataset>, used: &HashSet<String>) -> Vec<Input>
         let dataset = Arc::new(dataset);
         for index in dataset.selected() {
             let frame = &dataset.frames()[*index];
-            let name = match alone {
-                true => format!("{:010}", frame.number),
-                false => format!("{}-{:010}", dataset.name(), frame.number),
+            let name = if alone {
+                format!("{:010}", frame.number)
+            } else {
+                format!("{}-{:010}", dataset.name(), frame.number)
             };
             inputs.push(Input {
                 path: frame.image.path().to_owned(),

@@ -49,9 +49,10 @@ pub fn run(args: &PredictArgs, model: &ModelSource, address: &Address) -> Result
         let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
         done.push((input.name, mark));
         drop(done);
-        match args.json {
-            true => output::print(&(serde_json::to_string(&sidecar)? + "\n")),
-            false => Ok(()),
+        if args.json {
+            output::print(&(serde_json::to_string(&sidecar)? + "\n"))
+        } else {
+            Ok(())
         }
     });
     let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);

@@ -130,9 +130,10 @@ pub fn run(args: &PredictArgs) -> Result<()> {
         output::print_json(&summary.sidecars)?;
     }
     summary.outcome?;
-    match args.video() {
-        true => video::write(out, &all),
-        false => Ok(()),
+    if args.video() {
+        video::write(out, &all)
+    } else {
+        Ok(())
     }
 }
 
@@ -258,9 +259,10 @@ impl<'a> Job<'a> {
             intervals: model.interval_factors()?,
             tell_assumed: Once::new(),
             scale: model.scale(set, !args.no_focal_correction, estimator.step)?,
-            inspector: match outputs.save.contains(&Save::Features) {
-                true => Some(inspection::open(&model.load(set)?, args.engine.device)?),
-                false => None,
+            inspector: if outputs.save.contains(&Save::Features) {
+                Some(inspection::open(&model.load(set)?, args.engine.device)?)
+            } else {
+                None
             },
             outputs,
         })
@@ -339,9 +341,10 @@ impl<'a> Job<'a> {
         let (args, image, prediction) = (self.args, &loaded.image, &seen.prediction);
         let depth = prediction.depth();
         let has_sigma = |save: &Save| *save == Save::Sigma || save.is_cloud();
-        let sigma = match self.outputs.save.iter().any(has_sigma) {
-            true => uncertainty::sigma(prediction, &depth, &self.intervals),
-            false => None,
+        let sigma = if self.outputs.save.iter().any(has_sigma) {
+            uncertainty::sigma(prediction, &depth, &self.intervals)
+        } else {
+            None
         };
         let mut files = Vec::new();
         for save in &self.outputs.save {

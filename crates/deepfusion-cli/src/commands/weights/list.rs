@@ -113,17 +113,19 @@ fn told(card: &Card) -> String {
     let size = card
         .size()
         .map_or(String::new(), |[w, h]| format!(" at {w}x{h}"));
-    let default = match card.name == DEFAULT {
-        true => " (taken where no --model is given)",
-        false => "",
+    let default = if card.name == DEFAULT {
+        " (taken where no --model is given)"
+    } else {
+        ""
     };
     let mut data = card.data.iter().take(NAMED).cloned().collect::<Vec<_>>();
     if card.data.len() > NAMED {
         data.push(format!("and {} more", card.data.len() - NAMED));
     }
-    let real = match card.simulated_only {
-        true => ", no real image among them",
-        false => "",
+    let real = if card.simulated_only {
+        ", no real image among them"
+    } else {
+        ""
     };
     let mut text = format!(
         "  {}{default}\n    network   {}{size}, {:.2} M parameters, {:.1} MB ({})\n    learned   {} steps, the {} checkpoint, {}\n    \
