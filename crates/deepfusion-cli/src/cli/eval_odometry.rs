@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args};
 use deepfusion_data::CameraChoice;
 
-use super::DeviceChoice;
+use super::ComputeDevice;
 use super::values::milliseconds;
 
 /// `deepfusion eval-odometry`.
@@ -53,7 +53,7 @@ pub struct EvalOdometryArgs {
     pub out: Option<PathBuf>,
     /// Where to compute.
     #[arg(long, value_enum, default_value_t)]
-    pub device: DeviceChoice,
+    pub device: ComputeDevice,
     /// Print as JSON.
     #[arg(long)]
     pub json: bool,

@@ -2,14 +2,12 @@
 
 use anyhow::Result;
 
-use deepfusion_model::Preset;
-
 use crate::cli::ShowArgs;
 use crate::output;
 
 /// `deepfusion config show`.
 pub fn show(args: &ShowArgs) -> Result<()> {
-    let mut config = Preset::from(args.preset).config_on(args.device.compute());
+    let mut config = args.preset.config_on(args.device.compute());
     for assignment in &args.set {
         config.set(assignment)?;
     }

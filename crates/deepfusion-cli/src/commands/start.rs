@@ -308,8 +308,8 @@ mod tests {
     #[test]
     fn layers_and_range_decide() {
         let net = |preset: Preset| preset.config().depth_net;
-        for (a, _) in Preset::ALL {
-            for (b, _) in Preset::ALL {
+        for a in Preset::ALL {
+            for b in Preset::ALL {
                 assert_eq!(same_layers(&net(a), &net(b)), a == b, "{a}, {b}");
             }
         }

@@ -21,6 +21,16 @@ pub enum Learn {
 }
 
 impl Learn {
+    /// Its name, on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OwnMotion => "self",
+            Self::Depth => "depth",
+            Self::Both => "both",
+        }
+    }
+
     /// Whether pairs of frames are learned from.
     #[must_use]
     pub fn from_motion(self) -> bool {

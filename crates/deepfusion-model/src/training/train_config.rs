@@ -44,6 +44,18 @@ pub enum ViewMotion {
     Vehicle,
 }
 
+impl ViewMotion {
+    /// Its name, on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PoseNet => "posenet",
+            Self::Distance => "distance",
+            Self::Vehicle => "vehicle",
+        }
+    }
+}
+
 /// What is done to the images before the networks see them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

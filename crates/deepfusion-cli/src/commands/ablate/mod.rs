@@ -24,7 +24,7 @@ use super::evaluate::{
 };
 use super::recordings::{camera_word, training_recordings};
 use super::{device, resume, train};
-use crate::cli::{AblateArgs, DeviceChoice, EngineArgs, PresetChoice};
+use crate::cli::{AblateArgs, ComputeDevice, EngineArgs};
 use crate::error::CliError;
 use crate::progress::{Progress, say};
 use crate::{engine, interrupt, output};
@@ -112,7 +112,7 @@ fn new_plan(args: &AblateArgs) -> Result<Plan> {
     let mut config = match &args.config {
         Some(path) => TrainConfig::read_over_preset(path, args.device.compute())?,
         None => {
-            let preset = Preset::from(args.preset.unwrap_or(PresetChoice::Light));
+            let preset = args.preset.unwrap_or(Preset::Light);
             let mut config = preset.config_on(args.device.compute());
             // A measured motion in the warp would teach the rows without the speed loss, too; and masks of what moves
             // are no part of the flow loss.
@@ -127,9 +127,7 @@ fn new_plan(args: &AblateArgs) -> Result<Plan> {
     for term in &args.without {
         config.without(term)?;
     }
-    if let Some(choice) = args.view_motion {
-        config.view_motion = choice.into();
-    }
+    config.view_motion = args.view_motion.unwrap_or(config.view_motion);
     if let Some(size) = args.size {
         config.size.width = size.width as usize;
         config.size.height = size.height as usize;
@@ -198,7 +196,7 @@ fn one_run(
     row: Row,
     config: TrainConfig,
     plan: &Plan,
-    device: DeviceChoice,
+    device: ComputeDevice,
 ) -> Result<Outcome> {
     let done = folder.join("result.json");
     if done.exists() {
@@ -267,7 +265,7 @@ fn spent(folder: &Path, seconds: f64) -> Result<f64> {
 }
 
 /// The run's last checkpoint, measured like `eval` does: equal budgets are compared, and not choices of a checkpoint.
-fn measure(run: &Path, plan: &Plan, device: DeviceChoice) -> Result<Report> {
+fn measure(run: &Path, plan: &Plan, device: ComputeDevice) -> Result<Report> {
     let checkpoint = ModelSource::named(&run.join("last.safetensors"))?;
     let mut estimator = engine::load(&checkpoint, &EngineArgs::on(device))?;
     let (train_sets, eval_sets) = open_eval_data(plan)?;

@@ -22,7 +22,7 @@ use serde::Serialize;
 
 use self::modules::{Module, Modules};
 use super::device;
-use crate::cli::{BenchArgs, PresetChoice};
+use crate::cli::BenchArgs;
 use crate::model;
 use crate::pipeline::{self, Threads};
 use crate::{engine, output};
@@ -163,7 +163,7 @@ fn network(args: &BenchArgs) -> Result<(String, TrainConfig, Box<dyn DepthRunner
         let name = model.given().display().to_string();
         return Ok((name, config, estimator.into_runner()));
     }
-    let preset = Preset::from(args.preset.unwrap_or(PresetChoice::Tiny));
+    let preset = args.preset.unwrap_or(Preset::Tiny);
     let mut config = preset.config();
     if let Some(size) = args.size {
         config.size.width = size.width as usize;

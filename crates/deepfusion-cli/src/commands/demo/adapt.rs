@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Result;
-use clap::{Parser, ValueEnum};
+use clap::Parser;
 use deepfusion_data::{Dataset, OpenOptions, Split, write_atomically};
 use deepfusion_model::{TrainConfig, ViewMotion};
 use deepfusion_nn::ops::{Precision, supports};
@@ -19,7 +19,7 @@ use crate::cli::PerceiveArgs;
 use crate::commands::evaluate::Evaluated;
 use crate::commands::recorder::clock;
 use crate::commands::start::Start;
-use crate::commands::{perceive, run_report};
+use crate::commands::{device, perceive, run_report};
 use crate::progress::say;
 
 /// Frames of the drive along the new street, ten a second, and how many of them have a scan.
@@ -172,8 +172,7 @@ impl Parts {
 /// 3D targets of the whole drive, followed over time, with pictures: the program's own command, which takes the embedded
 /// network where none is named.
 fn perceive(demo: &Demo, drive: &Path, out: &Path) -> Result<()> {
-    let device = demo.args.device.to_possible_value();
-    let device = device.map_or_else(String::new, |value| value.get_name().to_owned());
+    let device = device::name(demo.args.device);
     let words = [
         "perceive".as_ref(),
         drive.as_os_str(),

@@ -23,7 +23,7 @@ pub fn run(args: &PackArgs) -> Result<()> {
         return Err(CliError::PackedAlready { path }.into());
     }
     let (folder, given) = RunFolder::open(&args.model)?;
-    let asked = args.checkpoint.map(Into::into).or(given);
+    let asked = args.checkpoint.or(given);
     let kind = asked.unwrap_or_else(|| folder.preferred());
     let file = folder.checkpoint_path(kind);
     if folder.read_state(kind)?.encoders_only {
