@@ -53,7 +53,7 @@ mod write;
 pub use agreement::DynamicAgreement;
 pub use bag::{DopplerEgo, ego_velocity, ground_radial};
 pub use calibration::CameraCalibration;
-pub use camera::{Camera, CameraChoice};
+pub use camera::{Camera, Cameras};
 pub use convert::{Converted, convert_to_bag, convert_to_kitti};
 pub use dataset::{Dataset, DatasetParts, OpenOptions};
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};

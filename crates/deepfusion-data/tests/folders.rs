@@ -6,7 +6,7 @@ mod folder;
 
 use common::TinyDrive;
 use deepfusion_data::{
-    CameraChoice, Dataset, DatasetKind, Error, GtKind, OpenOptions, Snippet, VehicleMotion, inspect,
+    Cameras, Dataset, DatasetKind, Error, GtKind, OpenOptions, Snippet, VehicleMotion, inspect,
 };
 use deepfusion_geometry::Se3;
 use folder::{picture, write_drive, write_images};
@@ -292,7 +292,7 @@ fn a_camera_is_never_made_up() {
         "{text}"
     );
     let other = OpenOptions {
-        camera: CameraChoice::Right,
+        camera: Cameras::Right,
         ..options
     };
     let error = Dataset::open(root.path(), &other).unwrap_err();

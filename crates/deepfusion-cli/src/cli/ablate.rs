@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use deepfusion_data::CameraChoice;
+use deepfusion_data::Cameras;
 use deepfusion_model::{Preset, ViewMotion};
 
 use super::{ComputeDevice, Size, names};
@@ -83,7 +83,7 @@ pub struct AblateArgs {
         default_value = "2",
         conflicts_with = "resume"
     )]
-    pub camera: CameraChoice,
+    pub camera: Cameras,
     /// Folder of the table and its runs [default: runs/ablate-TIME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use deepfusion_data::{CameraChoice, GtKind};
+use deepfusion_data::{Cameras, GtKind};
 use deepfusion_rosbag::Compression;
 
 use super::values::milliseconds;
@@ -64,7 +64,7 @@ pub struct ConvertArgs {
     pub intrinsics: Option<CameraIntrinsics>,
     /// Which camera.
     #[arg(long, value_name = "2|3", default_value = "2")]
-    pub camera: CameraChoice,
+    pub camera: Cameras,
     /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
     #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
     pub camera_ahead_s: Option<f64>,
@@ -99,7 +99,7 @@ pub struct ExportGtArgs {
     pub gt_depth: GtKind,
     /// Which camera.
     #[arg(long, value_name = "2|3|both", default_value = "2")]
-    pub camera: CameraChoice,
+    pub camera: Cameras,
     /// File to write.
     #[arg(long, value_name = "FILE.npz")]
     pub out: PathBuf,

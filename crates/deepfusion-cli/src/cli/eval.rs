@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
-use deepfusion_data::{CameraChoice, GtKind};
+use deepfusion_data::{Cameras, GtKind};
 use deepfusion_eval::{Crop, GroundTruth, Holes, Protocol, Scaling};
 
 use super::values::{milliseconds, positive, scaling};
@@ -36,7 +36,7 @@ pub struct EvalArgs {
         default_value = "2",
         conflicts_with = "pred"
     )]
-    pub camera: CameraChoice,
+    pub camera: Cameras,
     /// The camera of recordings without a calibration, in pixels of their images.
     #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "pred")]
     pub intrinsics: Option<CameraIntrinsics>,

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use deepfusion_data::CameraChoice;
+use deepfusion_data::Cameras;
 use deepfusion_model::{Compute, Learn, Preset, TrainConfig, ViewMotion};
 
 use super::values::milliseconds;
@@ -59,7 +59,7 @@ pub struct TrainArgs {
     pub learn: Option<Learn>,
     /// Which cameras [default: 2].
     #[arg(long, value_name = "2|3|both")]
-    pub camera: Option<CameraChoice>,
+    pub camera: Option<Cameras>,
     /// Train on the frames of this split file only (lines "folder index side").
     #[arg(long, value_name = "FILE")]
     pub split: Option<PathBuf>,

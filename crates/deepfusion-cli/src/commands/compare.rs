@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use deepfusion_compare::{Evaluation, Tables, published_tables, run_tables};
-use deepfusion_data::{CameraChoice, Dataset, GtKind, RgbImage, save_png};
+use deepfusion_data::{Cameras, Dataset, GtKind, RgbImage, save_png};
 use deepfusion_render::{
     DepthScale, HtmlReport, PictureFormat, Tile, depth_legend, depth_picture, model_sheet,
     shrink_depth, shrink_picture, sparse_depth_picture,
@@ -86,7 +86,7 @@ fn pictures(args: &CompareArgs, recording: &Path) -> Result<Vec<Vec<Tile>>> {
     if let Some(file) = args.runs.iter().find(|p| !p.is_dir()) {
         return Err(CliError::NoModel { path: file.clone() }.into());
     }
-    let datasets = open_datasets(&[recording.to_owned()], None, CameraChoice::default())?;
+    let datasets = open_datasets(&[recording.to_owned()], None, Cameras::default())?;
     let frames = spread(&datasets, usize::from(args.picture_count));
     if frames.is_empty() {
         return Err(CliError::NoImages {

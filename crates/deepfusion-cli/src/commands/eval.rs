@@ -2,7 +2,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use deepfusion_compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
-use deepfusion_data::{CameraChoice, Dataset, GtKind, OpenOptions, RgbImage};
+use deepfusion_data::{Cameras, Dataset, GtKind, OpenOptions, RgbImage};
 use deepfusion_eval::{
     ArraySet, Crop, Grid, Prediction, Protocol, Report, Sample, TrivialBaseline, match_names,
 };
@@ -342,9 +342,9 @@ fn saved(
             split: args.split.as_ref().map(absolute),
             gt: args.gt.as_ref().map(absolute),
             camera: match args.camera {
-                CameraChoice::Left => "2",
-                CameraChoice::Right => "3",
-                CameraChoice::Both => "both",
+                Cameras::Left => "2",
+                Cameras::Right => "3",
+                Cameras::Both => "both",
             }
             .into(),
             engine: format!("{} {precision}", estimator.engine()),

@@ -1,7 +1,7 @@
 use std::collections::HashSet;
 
 use anyhow::Result;
-use deepfusion_data::{CameraChoice, Dataset, speed_unit_warning};
+use deepfusion_data::{Cameras, Dataset, speed_unit_warning};
 use deepfusion_model::{
     DataConfig, Error as ModelError, InputSize, Learn, Preset, RunFolder, TrainConfig,
 };
@@ -209,7 +209,7 @@ fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), Mode
     if let Some(camera) = args.camera {
         data.camera = camera_word(camera).into();
     } else if data.camera.is_empty() && data.sets.is_empty() {
-        data.camera = camera_word(CameraChoice::default()).into();
+        data.camera = camera_word(Cameras::default()).into();
     }
     if data.paths.is_empty() && data.sets.is_empty() {
         return Err(ModelError::Config {

@@ -32,7 +32,7 @@ mod turn;
 pub use finding::{Figure, Finding, Limit, Outcome, Severity, Status};
 pub use plots::{DrivePlots, Line};
 
-use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions};
+use crate::{Cameras, Dataset, DatasetKind, Error, OpenOptions};
 use deepfusion_motion::TimeOffset;
 use serde::Serialize;
 use std::path::Path;
@@ -137,8 +137,8 @@ pub fn doctor_with(path: &Path, options: &OpenOptions) -> Diagnosis {
         };
         Dataset::open(path, &options)
     };
-    let datasets = match open(CameraChoice::Left) {
-        Err(Error::NoImages { .. }) => open(CameraChoice::Right),
+    let datasets = match open(Cameras::Left) {
+        Err(Error::NoImages { .. }) => open(Cameras::Right),
         other => other,
     };
     match datasets {

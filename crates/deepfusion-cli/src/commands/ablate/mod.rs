@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use burn::tensor::Device;
-use deepfusion_data::{CameraChoice, GtKind};
+use deepfusion_data::{Cameras, GtKind};
 use deepfusion_eval::{GroundTruth, Protocol, Report};
 use deepfusion_model::{CheckpointKind, Preset, RunFolder, TrainConfig, ViewMotion};
 use deepfusion_runtime::ModelSource;
@@ -299,7 +299,7 @@ fn open_eval_data(plan: &Plan) -> Result<(Datasets, Datasets)> {
     };
     let eval = match plan.eval_data.as_slice() {
         [] => trained_on()?,
-        paths => open_datasets(paths, None, CameraChoice::default())?,
+        paths => open_datasets(paths, None, Cameras::default())?,
     };
     let train = trained_on()?;
     Ok((train, eval))

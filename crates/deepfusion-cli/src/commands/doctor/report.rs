@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use deepfusion_data::doctor::{Diagnosis, DriveDiagnosis, Line};
-use deepfusion_data::{Camera, CameraChoice, Dataset, GtKind, OpenOptions, overlay};
+use deepfusion_data::{Camera, Cameras, Dataset, GtKind, OpenOptions, overlay};
 use deepfusion_render::{HtmlReport, LineChart, PictureFormat};
 
 use super::lines;
@@ -78,8 +78,8 @@ fn pictures(
     }
     let options = OpenOptions {
         camera: match drive.camera == Camera::Left.number() {
-            true => CameraChoice::Left,
-            false => CameraChoice::Right,
+            true => Cameras::Left,
+            false => Cameras::Right,
         },
         ..options.clone()
     };
