@@ -500,7 +500,7 @@ pub fn hint_of(problem: &anyhow::Error) -> Option<String> {
         hint_from!(
             CliError,
             deepfusion_geometry::cloud::Error,
-            deepfusion_compare::Error,
+            deepfusion_eval::compare::Error,
             deepfusion_data::Error,
             deepfusion_eval::Error,
             deepfusion_instances::Error,

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use deepfusion_compare::{MetricScale, sha256_of_file};
 use deepfusion_eval::IntervalFactors;
+use deepfusion_eval::compare::{MetricScale, sha256_of_file};
 use deepfusion_runtime::ModelSource;
 use sha2::{Digest, Sha256};
 

@@ -4,8 +4,8 @@ use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_compare::{Evaluation, Tables, published_tables, run_tables};
 use deepfusion_data::{Cameras, Dataset, GtKind, RgbImage, save_png};
+use deepfusion_eval::compare::{Evaluation, Tables, published_tables, run_tables};
 use deepfusion_render::{
     DepthScale, HtmlReport, PictureFormat, Tile, depth_legend, depth_picture, model_sheet,
     shrink_depth, shrink_picture, sparse_depth_picture,
@@ -64,7 +64,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 fn html(args: &CompareArgs, tables: &Tables, rows: &[Vec<Tile>]) -> Result<String> {
     let names: Vec<_> = args.runs.iter().map(|p| output::name_of(p)).collect();
     let mut page = HtmlReport::new("Depth, side by side", names.join(", ")).wide();
-    page = tables.add_to(page);
+    page = page.comparison(tables);
     if let (false, Some(recording)) = (rows.is_empty(), &args.pictures) {
         page = page
             .section(&format!("Pictures of {}", output::name_of(recording)))

@@ -1,8 +1,8 @@
 use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
 use deepfusion_data::{Cameras, Dataset, GtKind, OpenOptions, RgbImage};
+use deepfusion_eval::compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
 use deepfusion_eval::{
     ArraySet, Crop, Grid, Prediction, Protocol, Report, Sample, TrivialBaseline, match_names,
 };

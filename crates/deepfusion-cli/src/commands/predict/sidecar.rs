@@ -6,8 +6,8 @@ use std::time::UNIX_EPOCH;
 
 use anyhow::Result;
 use clap::ValueEnum;
-use deepfusion_compare::MetricScale;
 use deepfusion_data::{LiveFrame, write_atomically};
+use deepfusion_eval::compare::MetricScale;
 use deepfusion_fs::Content;
 use deepfusion_runtime::DepthEstimator;
 use deepfusion_runtime::ModelSource;

@@ -1,6 +1,6 @@
 use anyhow::{Context, Result};
-use deepfusion_compare::sha256_of_file;
 use deepfusion_data::to_network_input;
+use deepfusion_eval::compare::sha256_of_file;
 use deepfusion_infer::Precision;
 use deepfusion_model::depth_graph_with_uncertainty;
 use deepfusion_model::{RunFolder, StoredNetwork, TrainConfig};
