@@ -173,7 +173,7 @@ fn track_name(dataset: &Dataset, path: &CameraPath, several: bool, cameras: bool
 
 /// A pose network sees pixels: another focal length shows it another motion.
 fn warn_of_focal_length(predictor: &PosePredictor, dataset: &Dataset) {
-    let (Some(train), Some(&frame)) = (predictor.config().camera, dataset.selected().first())
+    let (Some(train), Some(&frame)) = (predictor.training_camera(), dataset.selected().first())
     else {
         return;
     };

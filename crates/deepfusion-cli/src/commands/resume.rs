@@ -173,14 +173,12 @@ fn take_file(config: &mut TrainConfig, path: &Path, args: &TrainArgs) -> Result<
     // What a run fills in from its data, or the options say, is not the file's to say.
     let mut asked = file;
     asked.data.make_absolute();
-    asked.camera = config.camera;
     asked.init.clone_from(&config.init);
     asked.init_sha256.clone_from(&config.init_sha256);
     if asked.pose_net.metres_per_unit == 0.0 {
         asked.pose_net.metres_per_unit = config.pose_net.metres_per_unit;
     }
     for (asked, has) in asked.data.sets.iter_mut().zip(&config.data.sets) {
-        asked.trained_with = has.trained_with;
         if asked.metres_per_unit == 0.0 {
             asked.metres_per_unit = has.metres_per_unit;
         }

@@ -220,15 +220,12 @@ impl Start {
 /// The configuration of a packed network's run; its metres are no matter here, of whichever data set.
 fn unpacked_config(network: &Shipped) -> Result<TrainConfig, ModelError> {
     let origin = || network.card.name.clone().into();
-    network
-        .card
-        .config
-        .clone()
-        .try_into()
-        .map_err(|e: toml::de::Error| ModelError::ConfigFile {
-            path: origin(),
-            reason: e.to_string(),
-        })
+    let read = TrainConfig::from_run_table(network.card.config.clone());
+    let (config, _) = read.map_err(|e| ModelError::ConfigFile {
+        path: origin(),
+        reason: e.to_string(),
+    })?;
+    Ok(config)
 }
 
 /// Its tensors.

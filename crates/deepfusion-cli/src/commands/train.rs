@@ -26,7 +26,7 @@ pub fn run(args: &TrainArgs) -> Result<()> {
         _ => None,
     };
     let mut config = match &resumed {
-        Some(folder) => resume::with_options(&folder.read_config()?, args)?,
+        Some(folder) => resume::with_options(&folder.read_settings()?, args)?,
         None => start_config(args)?,
     };
     config.validate()?;
@@ -36,7 +36,7 @@ pub fn run(args: &TrainArgs) -> Result<()> {
     })?;
     let mut trainer = match resumed {
         Some(folder) => {
-            folder.write_config(&config)?;
+            folder.write_config(&config, &folder.read_findings()?)?;
             Trainer::resume(config, folder, sets, &device)?
         }
         None => {

@@ -113,7 +113,6 @@ impl Preset {
             checkpoint_minutes: 10.0,
             start_moving: false,
             view_motion: ViewMotion::PoseNet,
-            camera: None,
             canonical_focal_px: None,
             data: DataConfig::default(),
             loss: LossConfig {

@@ -14,7 +14,7 @@ use deepfusion_eval::{GroundTruth, Protocol, Report};
 use deepfusion_model::{CheckpointKind, Preset, RunFolder, TrainConfig, ViewMotion};
 use deepfusion_runtime::ModelSource;
 use deepfusion_train::Trainer;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use self::rows::Row;
 use self::table::RunResult;
@@ -41,7 +41,14 @@ struct Plan {
     /// Recordings to measure on; empty: those trained on.
     eval_data: Vec<PathBuf>,
     /// What all rows share.
+    #[serde(deserialize_with = "settings")]
     config: TrainConfig,
+}
+
+/// A configuration; one that came from a run of before may say what that run found out.
+fn settings<'de, D: Deserializer<'de>>(from: D) -> Result<TrainConfig, D::Error> {
+    let read = TrainConfig::from_run_table(toml::Table::deserialize(from)?);
+    Ok(read.map_err(serde::de::Error::custom)?.0)
 }
 
 const PLAN: &str = "ablate.toml";

@@ -29,10 +29,11 @@ pub fn run(args: &PackArgs) -> Result<()> {
     if folder.read_state(kind)?.encoders_only {
         return Err(CliError::NothingToPack { path: file }.into());
     }
-    let config = folder.read_config()?;
+    let (config, findings) = (folder.read_config()?, folder.read_findings()?);
     let (weights, state) = folder.load_depth_weights(kind)?;
     let network = StoredNetwork {
         config: config.clone(),
+        camera: findings.camera,
         weights,
         step: state.step,
     };
@@ -72,7 +73,9 @@ pub fn run(args: &PackArgs) -> Result<()> {
             .map(toml::Table::try_from)
             .transpose()
             .context("the factors of its intervals have no TOML form")?,
-        config: toml::Table::try_from(config.without_places())
+        config: config
+            .without_places()
+            .to_run_table(&findings)
             .context("the run's configuration has no TOML form")?,
     };
     let shipped = Shipped::new(card, bytes)?;
