@@ -140,6 +140,13 @@ fn new_plan(args: &AblateArgs) -> Result<Plan> {
         config.size.height = size.height as usize;
     }
     config.batch = args.batch.unwrap_or(config.batch);
+    for assignment in &args.set {
+        if let Some(reason) = decided_by_the_table(assignment) {
+            let (assignment, reason) = (assignment.clone(), reason.into());
+            return Err(deepfusion_model::Error::Setting { assignment, reason }.into());
+        }
+        config.set(assignment)?;
+    }
     config.data.paths.clone_from(&args.data);
     config.data.camera = camera_word(args.camera).into();
     // Every row begins anew.
@@ -154,6 +161,19 @@ fn new_plan(args: &AblateArgs) -> Result<Plan> {
         eval_data: args.eval_data.iter().map(absolute).collect(),
         config,
     })
+}
+
+/// Why a key cannot be set for all rows, where it cannot.
+fn decided_by_the_table(assignment: &str) -> Option<&'static str> {
+    let key = assignment.split('=').next().unwrap_or_default().trim();
+    match key {
+        "steps" | "epochs" | "min_steps" => Some("--budget says how long every run learns"),
+        "seed" => Some("--seeds says how often a row is run, and with which seeds"),
+        "init" | "init_sha256" => Some("every run begins from nothing"),
+        "data.paths" => Some("the recordings are those of --data"),
+        "data.camera" => Some("the cameras are those of --camera"),
+        _ => None,
+    }
 }
 
 /// The rows of these names; those of the paper's table where none is named.
