@@ -48,7 +48,6 @@ mod split;
 mod table;
 mod vehicle_log;
 mod video;
-mod write;
 
 pub use agreement::DynamicAgreement;
 pub use bag::{DopplerEgo, ego_velocity, ground_radial};
@@ -80,4 +79,3 @@ pub use snippet::{EgoMotion, Snippet, Source, hold_out};
 pub use speed_check::{SpeedWarning, grey_image, speed_unit_warning};
 pub use split::{Split, SplitCoverage, SplitEntry};
 pub use video::{Shown, can_write_video, shown_for, write_video};
-pub use write::{write_atomically, write_unsynced};

@@ -150,10 +150,7 @@ impl RunFolder {
         })?;
         let text = config.to_toml()? + &found;
         let path = self.config_path();
-        let failed = |e| Error::io(&path, "write", e);
-        deepfusion_fs::write_atomically(&path, failed, |file| {
-            std::io::Write::write_all(file, text.as_bytes()).map_err(failed)
-        })
+        deepfusion_fs::write(&path, text).map_err(|e| Error::io(&path, "write", e))
     }
 
     /// The configuration as the networks need it: what it leaves open is as the run found it.

@@ -1,6 +1,5 @@
 //! `deepfusion compare`: evaluations side by side.
 
-use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
@@ -50,13 +49,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         TableFormat::Html => html(args, &tables, &rows)?,
     };
     match &args.out {
-        Some(path) => Ok(deepfusion_data::write_atomically::<deepfusion_data::Error>(
-            path,
-            |file| {
-                file.write_all(text.as_bytes())
-                    .map_err(|e| deepfusion_data::Error::file(path, e))
-            },
-        )?),
+        Some(path) => output::write(path, text),
         None => output::print(&text),
     }
 }

@@ -1,10 +1,7 @@
-use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_data::{
-    Camera, CameraPath, Dataset, DatasetKind, Error, OpenOptions, write_atomically,
-};
+use deepfusion_data::{Camera, CameraPath, Dataset, DatasetKind, OpenOptions};
 use deepfusion_eval::odometry::{
     OdometryReport, PoseFile, TrackError, TrackPair, chain, from_first, kitti_text, tum_text,
 };
@@ -194,9 +191,9 @@ fn write_track(out: &Path, track: &TrackPair) -> Result<()> {
     let (truth, predicted) = (from_first(&track.truth), from_first(&track.predicted));
     for (what, poses) in [("truth", &truth), ("predicted", &predicted)] {
         let file = |kind: &str| out.join(format!("{}_{what}.{kind}", track.name));
-        write(&file("txt"), &kitti_text(poses))?;
+        output::write(&file("txt"), kitti_text(poses))?;
         if track.times_s.len() == poses.len() {
-            write(&file("tum"), &tum_text(poses, &track.times_s))?;
+            output::write(&file("tum"), tum_text(poses, &track.times_s))?;
         }
     }
     // From above: the first camera's x to the right, its z ahead.
@@ -209,13 +206,5 @@ fn write_track(out: &Path, track: &TrackPair) -> Result<()> {
         .path("truth", seen(&truth))
         .path("predicted, unscaled", seen(&predicted))
         .to_svg();
-    write(&out.join(format!("{}.svg", track.name)), &svg)
-}
-
-fn write(path: &Path, text: &str) -> Result<()> {
-    write_atomically::<Error>(path, |file| {
-        file.write_all(text.as_bytes())
-            .map_err(|e| Error::file(path, e))
-    })?;
-    Ok(())
+    output::write(&out.join(format!("{}.svg", track.name)), svg)
 }

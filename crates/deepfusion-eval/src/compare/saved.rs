@@ -1,4 +1,4 @@
-use std::io::{Read, Write};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::{ImageScore, Report};
@@ -145,9 +145,7 @@ impl SavedEvaluation {
         let path = folder.join(self.file_name());
         let failed = |e| Error::file(&path, e);
         let text = serde_json::to_string_pretty(self).map_err(|e| failed(e.into()))?;
-        deepfusion_fs::write_atomically(&path, failed, |file| {
-            writeln!(file, "{text}").map_err(failed)
-        })?;
+        deepfusion_fs::write(&path, text + "\n").map_err(failed)?;
         Ok(path)
     }
 

@@ -3,7 +3,6 @@
 mod rows;
 mod table;
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -362,9 +361,5 @@ fn write(path: &Path, text: &str) -> Result<()> {
     if let Some(parent) = path.parent() {
         std::fs::create_dir_all(parent).map_err(|e| deepfusion_data::Error::file(parent, e))?;
     }
-    deepfusion_data::write_atomically::<deepfusion_data::Error>(path, |file| {
-        file.write_all(text.as_bytes())
-            .map_err(|e| deepfusion_data::Error::file(path, e))
-    })?;
-    Ok(())
+    output::write(path, text)
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use clap::Parser;
-use deepfusion_data::{Dataset, OpenOptions, Split, write_atomically};
+use deepfusion_data::{Dataset, OpenOptions, Split};
 use deepfusion_model::{TrainConfig, ViewMotion};
 use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_render::{HtmlReport, PictureFormat};
@@ -20,6 +20,7 @@ use crate::commands::evaluate::Evaluated;
 use crate::commands::recorder::clock;
 use crate::commands::start::Start;
 use crate::commands::{device, perceive, run_report};
+use crate::output;
 use crate::progress::say;
 
 /// Frames of the drive along the new street, ten a second, and how many of them have a scan.
@@ -152,10 +153,7 @@ impl Parts {
                 format!("{} {:010} l\n", all.split_name(), frame.number)
             };
             let text: String = part.iter().map(line).collect();
-            write_atomically::<deepfusion_data::Error>(&path, |file| {
-                std::io::Write::write_all(file, text.as_bytes())
-                    .map_err(|e| deepfusion_data::Error::file(&path, e))
-            })?;
+            output::write(&path, text)?;
             Ok(path)
         };
         let learn = list("learned.txt", &frames[..LEARNED])?;
