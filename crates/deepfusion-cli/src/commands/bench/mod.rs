@@ -271,7 +271,10 @@ impl Bench {
 
     /// Ground, boxes and tracks of a picture that is seen again and again.
     fn targets(&self, repeats: usize) -> Result<f64> {
-        let mut perception = Perception::new(PerceptionConfig::default());
+        let mut perception = Perception::new(PerceptionConfig {
+            parking_rows: true,
+            ..PerceptionConfig::default()
+        });
         let mut time_s = 0.0;
         median(repeats, || {
             time_s += 0.1;
