@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use deepfusion::data::{self, CameraChoice, GtKind, OpenOptions};
+use deepfusion::data::{self, Cameras, GtKind, OpenOptions};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray2, PyArray3};
 use pyo3::exceptions::{PyIndexError, PyValueError};
@@ -23,7 +23,7 @@ impl Dataset {
     #[new]
     #[pyo3(signature = (path, *, camera="2", drive=0))]
     fn new(py: Python<'_>, path: PathBuf, camera: &str, drive: usize) -> PyResult<Self> {
-        let camera: CameraChoice = camera.parse().map_err(|_| {
+        let camera: Cameras = camera.parse().map_err(|_| {
             PyValueError::new_err(format!("camera: expected \"2\" or \"3\", found {camera:?}"))
         })?;
         let options = OpenOptions {

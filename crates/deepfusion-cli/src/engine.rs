@@ -6,7 +6,7 @@ use deepfusion_model::weights::Weights;
 use deepfusion_runtime::{DepthEstimator, DepthRunner, FusedRunner, ModelSource, OrtRunner};
 
 use crate::allocator;
-use crate::cli::{DeviceChoice, EngineArgs, EngineChoice, PrecisionChoice};
+use crate::cli::{ComputeDevice, Engine, EngineArgs};
 use crate::error::CliError;
 use crate::failure::Result;
 
@@ -25,32 +25,28 @@ pub fn runner(
     config: &TrainConfig,
     weights: Weights,
 ) -> Result<Box<dyn DepthRunner>> {
-    let on_cpu = args.device == DeviceChoice::Cpu;
+    let on_cpu = args.device == ComputeDevice::Cpu;
     let engine = match args.engine {
-        EngineChoice::Auto if on_cpu => EngineChoice::Fused,
-        EngineChoice::Auto => EngineChoice::Burn,
+        Engine::Auto if on_cpu => Engine::Fused,
+        Engine::Auto => Engine::Burn,
         chosen => chosen,
     };
-    if engine != EngineChoice::Burn && !on_cpu {
+    if engine != Engine::Burn && !on_cpu {
         return Err(CliError::OnlyOnCpu.into());
     }
-    if engine != EngineChoice::Fused && args.precision != PrecisionChoice::F32 {
+    if engine != Engine::Fused && args.precision != Precision::F32 {
         return Err(CliError::OnlyFused.into());
     }
-    if engine != EngineChoice::Ort && args.ort_lib.is_some() {
+    if engine != Engine::Ort && args.ort_lib.is_some() {
         return Err(CliError::OnlyOrt.into());
     }
     Ok(match engine {
-        EngineChoice::Burn | EngineChoice::Auto => in_burn(args, config, &weights)?,
-        EngineChoice::Fused => {
-            let precision = match args.precision {
-                PrecisionChoice::F32 => Precision::F32,
-                PrecisionChoice::Bf16 => Precision::Bf16,
-            };
-            let packed = || FusedRunner::new(config, weights, precision);
+        Engine::Burn | Engine::Auto => in_burn(args, config, &weights)?,
+        Engine::Fused => {
+            let packed = || FusedRunner::new(config, weights, args.precision);
             Box::new(allocator::without_hoarding(packed)?)
         }
-        EngineChoice::Ort => Box::new(OrtRunner::new(args.ort_lib.as_deref(), config, weights)?),
+        Engine::Ort => Box::new(OrtRunner::new(args.ort_lib.as_deref(), config, weights)?),
     })
 }
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use deepfusion_compare::{MetricScale, sha256_of_file};
 use deepfusion_eval::IntervalFactors;
+use deepfusion_eval::compare::{MetricScale, sha256_of_file};
 use deepfusion_runtime::ModelSource;
 use sha2::{Digest, Sha256};
 

@@ -42,6 +42,20 @@ pub fn print_json<T: serde::Serialize + ?Sized>(value: &T) -> Result<()> {
     print(&format!("{text}\n"))
 }
 
+/// Writes a file, whole or not at all.
+pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
+    let written = deepfusion_fs::write(path, bytes);
+    Ok(written.map_err(|e| deepfusion_data::Error::file(path, e))?)
+}
+
+/// The same without waiting for the disk: one of many files that something written later calls done.
+pub fn write_unsynced(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
+    let failed = |e| deepfusion_data::Error::file(path, e);
+    Ok(deepfusion_fs::write_unsynced(path, failed, |out| {
+        out.write_all(bytes.as_ref()).map_err(failed)
+    })?)
+}
+
 /// The folder a command writes to: the one asked for, or a new `runs/<command>-<time>`. It is made; a folder that holds
 /// something already is refused.
 pub fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf> {

@@ -15,7 +15,7 @@ fn the_table_grows_by_seeds_and_keeps_what_is_done() {
         at,
         "simulate --out sim --frames 10 --seed 3 --scan-every 4 --moving-cars 3",
     );
-    let settings = "--preset tiny --size 96x64 --batch 2 --budget 2";
+    let settings = "--preset tiny --size 96x64 --batch 2 --budget 2 --set loss.smoothness=0.02";
     ok(
         at,
         &format!("ablate --data sim {settings} --rows hce+speed+flow,none,minimum --out table"),
@@ -51,6 +51,7 @@ fn the_table_grows_by_seeds_and_keeps_what_is_done() {
             "{row}"
         );
         assert!(config(row).contains("view_motion = \"posenet\""), "{row}");
+        assert!(config(row).contains("\nsmoothness = 0.02\n"), "{row}");
     }
     let header = csv.lines().next().unwrap();
     for column in [
@@ -106,6 +107,14 @@ fn what_cannot_be_a_table_is_refused() {
         (
             "ablate --data sim --budget 1 --rows none --view-motion distance --out c",
             &["view_motion", "distance", "--view-motion posenet"],
+        ),
+        (
+            "ablate --data sim --budget 1 --set loss.smoothnes=0.1 --out d",
+            &["loss.smoothnes=0.1", "config show"],
+        ),
+        (
+            "ablate --data sim --budget 1 --set steps=3 --out e",
+            &["steps=3", "--budget"],
         ),
         ("ablate --out nothing --resume", &["nothing", "ablate.toml"]),
         (

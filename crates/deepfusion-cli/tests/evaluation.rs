@@ -6,7 +6,7 @@ use std::fs;
 
 use deepfusion_eval::odometry::PoseFile;
 use deepfusion_geometry::DepthRange;
-use deepfusion_train::{DataConfig, DataSetConfig, TrainConfig};
+use deepfusion_train::{DataConfig, DataSetConfig, RunFolder, TrainConfig};
 use serde_json::Value;
 use support::{fails, json, ok};
 
@@ -155,7 +155,8 @@ fn several_data_sets_are_learned_together() {
     };
     fs::write(at.join("both.toml"), config.to_toml().unwrap()).unwrap();
     ok(at, "train --config both.toml --out both");
-    let trained = TrainConfig::read(&at.join("both/config.toml")).unwrap();
+    let (both, _) = RunFolder::open(&at.join("both")).unwrap();
+    let trained = both.read_config().unwrap();
     let [road, yard] = [0, 1].map(|i| &trained.data.sets[i]);
     assert!(road.metres_per_unit > 1.5 * yard.metres_per_unit && yard.metres_per_unit > 0.0);
 

@@ -53,7 +53,8 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     assert!(tuned.stderr.contains(told), "{}", tuned.stderr);
     let unit = |run: &str| {
         let config = fs::read_to_string(at.join(run).join("config.toml")).unwrap();
-        let line = config.lines().find(|l| l.starts_with("metres_per_unit"));
+        // What was found stands behind what was set.
+        let line = config.lines().rfind(|l| l.starts_with("metres_per_unit"));
         line.unwrap().to_owned()
     };
     assert_eq!(unit("tuned"), unit("run"));

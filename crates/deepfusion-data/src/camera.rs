@@ -25,7 +25,7 @@ impl Camera {
 
 /// Which cameras to open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum CameraChoice {
+pub enum Cameras {
     /// Camera 2, the left one.
     #[default]
     #[serde(rename = "2")]
@@ -38,7 +38,7 @@ pub enum CameraChoice {
     Both,
 }
 
-impl CameraChoice {
+impl Cameras {
     /// The cameras chosen.
     #[must_use]
     pub fn cameras(self) -> &'static [Camera] {
@@ -50,7 +50,7 @@ impl CameraChoice {
     }
 }
 
-impl std::str::FromStr for CameraChoice {
+impl std::str::FromStr for Cameras {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {

@@ -7,7 +7,7 @@ use crate::recording::Recording;
 use crate::selection::Selection;
 use crate::split::Split;
 use crate::{
-    Camera, CameraChoice, CameraPath, DatasetKind, DynamicAgreement, Error, Frame, LidarMotion,
+    Camera, CameraPath, Cameras, DatasetKind, DynamicAgreement, Error, Frame, LidarMotion,
     MotionModel, MovingLabels, Result, ScanTruth, Stream, bag, image_size,
 };
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
@@ -21,7 +21,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Default)]
 pub struct OpenOptions {
     /// Which cameras.
-    pub camera: CameraChoice,
+    pub camera: Cameras,
     /// Only these frames are selected; their neighbours still serve as sources.
     pub split: Option<Split>,
     /// fx, fy, cx, cy in pixels of an undistorted image, instead of the recording's own. Not for KITTI

@@ -1,6 +1,6 @@
 //! KITTI's annotated depth: 16-bit grey PNG, depth = value / 256 metres, 0 = none.
 
-use crate::{Error, Result, picture, write_unsynced};
+use crate::{Error, Result, picture};
 use deepfusion_geometry::DepthMap;
 use image::{DynamicImage, ImageBuffer, Luma};
 use std::path::Path;
@@ -50,11 +50,15 @@ pub fn write_depth_png(depth: &DepthMap, path: &Path) -> Result<()> {
         let problem = format!("{} depths are no {width}x{height} map", depth.data.len());
         Error::file(path, std::io::Error::other(problem))
     })?;
-    write_unsynced(path, |out| {
-        image
-            .write_to(out, image::ImageFormat::Png)
-            .map_err(|e| picture::write_failed(path, e))
-    })
+    deepfusion_fs::write_unsynced(
+        path,
+        |e| Error::file(path, e),
+        |out| {
+            image
+                .write_to(out, image::ImageFormat::Png)
+                .map_err(|e| picture::write_failed(path, e))
+        },
+    )
 }
 
 #[cfg(test)]

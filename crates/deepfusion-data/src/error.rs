@@ -591,3 +591,28 @@ fn a_step(frame_distance_m: f64) -> String {
         String::new()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_full_disk_is_an_error_with_a_hint() {
+        use std::fs::File;
+        use std::io::{BufWriter, Write};
+        // /dev/full takes no byte.
+        let mut out = BufWriter::new(File::options().write(true).open("/dev/full").unwrap());
+        out.write_all(b"x").unwrap();
+        let error = Error::file(Path::new("depth.npz"), out.flush().unwrap_err());
+        assert!(error.hint().unwrap().contains("full"), "{error}");
+    }
+
+    #[test]
+    fn a_missing_folder_is_named() {
+        let path = Path::new("no/such/folder/a.png");
+        let error = crate::save_png(&image::RgbImage::new(1, 1), path).unwrap_err();
+        let message = error.to_string();
+        assert!(message.contains("no/such/folder/a.png"), "{message}");
+    }
+}

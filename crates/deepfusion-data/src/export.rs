@@ -1,7 +1,7 @@
 //! Ground truth of many frames in one `.npz`.
 
 use crate::kitti::GtKind;
-use crate::{Dataset, Error, Result, write_atomically};
+use crate::{Dataset, Error, Result};
 use ndarray::ArrayView2;
 use ndarray_npy::{NpzWriter, WriteNpyError, WriteNpzError};
 use std::collections::HashSet;
@@ -51,39 +51,43 @@ pub fn export_gt(
     let total: usize = datasets.iter().map(|d| d.selected().len()).sum();
     let names = ground_truth_names(datasets);
     let mut written = 0;
-    write_atomically(out, |file| {
-        let mut npz = NpzWriter::new_compressed(file);
-        let mut done = 0;
-        for (dataset, names) in datasets.iter().zip(&names) {
-            for (&frame, name) in dataset.selected().iter().zip(names) {
-                if let Some(truth) = dataset.scan_truth(frame, kind)? {
-                    let mut add = |name: &str, values: &[f32]| -> Result<()> {
-                        let size = (truth.depth.height, truth.depth.width);
-                        let array = ArrayView2::from_shape(size, values)
-                            .map_err(|e| failed(out, e.to_string()))?;
-                        npz.add_array(name, &array).map_err(|e| write_error(out, e))
-                    };
-                    add(name, &truth.depth.data)?;
-                    if let Some(velocity) = &truth.velocity_mps {
-                        add(&format!("{VELOCITY}{name}"), velocity)?;
+    deepfusion_fs::write_atomically(
+        out,
+        |e| Error::file(out, e),
+        |file| {
+            let mut npz = NpzWriter::new_compressed(file);
+            let mut done = 0;
+            for (dataset, names) in datasets.iter().zip(&names) {
+                for (&frame, name) in dataset.selected().iter().zip(names) {
+                    if let Some(truth) = dataset.scan_truth(frame, kind)? {
+                        let mut add = |name: &str, values: &[f32]| -> Result<()> {
+                            let size = (truth.depth.height, truth.depth.width);
+                            let array = ArrayView2::from_shape(size, values)
+                                .map_err(|e| failed(out, e.to_string()))?;
+                            npz.add_array(name, &array).map_err(|e| write_error(out, e))
+                        };
+                        add(name, &truth.depth.data)?;
+                        if let Some(velocity) = &truth.velocity_mps {
+                            add(&format!("{VELOCITY}{name}"), velocity)?;
+                        }
+                        written += 1;
                     }
-                    written += 1;
+                    done += 1;
+                    progress(done, total);
                 }
-                done += 1;
-                progress(done, total);
             }
-        }
-        if written == 0 {
-            return Err(Error::NoScans {
-                path: datasets
-                    .first()
-                    .map_or_else(|| out.to_owned(), |d| d.folder().to_owned()),
-                frames: total,
-            });
-        }
-        npz.finish().map_err(|e| write_error(out, e))?;
-        Ok(())
-    })?;
+            if written == 0 {
+                return Err(Error::NoScans {
+                    path: datasets
+                        .first()
+                        .map_or_else(|| out.to_owned(), |d| d.folder().to_owned()),
+                    frames: total,
+                });
+            }
+            npz.finish().map_err(|e| write_error(out, e))?;
+            Ok(())
+        },
+    )?;
     Ok(written)
 }
 

@@ -1,7 +1,7 @@
 //! What is in a recording.
 
 use crate::layout::Layout;
-use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions, Result, bag, comma, doctor};
+use crate::{Cameras, Dataset, DatasetKind, Error, OpenOptions, Result, bag, comma, doctor};
 use deepfusion_geometry::Intrinsics;
 use serde::Serialize;
 use std::path::Path;
@@ -147,8 +147,8 @@ pub fn inspect_with(path: &Path, options: &OpenOptions) -> Result<Inspection> {
         };
         layout.open(path, &options)
     };
-    let datasets = match open(CameraChoice::Left) {
-        Err(Error::NoImages { .. }) => open(CameraChoice::Right),
+    let datasets = match open(Cameras::Left) {
+        Err(Error::NoImages { .. }) => open(Cameras::Right),
         other => other,
     }?;
     let mut streams = Vec::new();

@@ -48,12 +48,11 @@ mod split;
 mod table;
 mod vehicle_log;
 mod video;
-mod write;
 
 pub use agreement::DynamicAgreement;
 pub use bag::{DopplerEgo, ego_velocity, ground_radial};
 pub use calibration::{CameraCalibration, GIVEN_INTRINSICS};
-pub use camera::{Camera, CameraChoice};
+pub use camera::{Camera, Cameras};
 pub use convert::{Converted, convert_to_bag, convert_to_kitti};
 pub use dataset::{Dataset, DatasetParts, OpenOptions};
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
@@ -80,4 +79,3 @@ pub use snippet::{EgoMotion, Snippet, Source, hold_out};
 pub use speed_check::{SpeedWarning, grey_image, speed_unit_warning};
 pub use split::{Split, SplitCoverage, SplitEntry};
 pub use video::{Shown, can_write_video, shown_for, write_video};
-pub use write::{write_atomically, write_unsynced};

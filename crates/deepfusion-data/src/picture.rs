@@ -1,6 +1,6 @@
 //! Images from files and to them.
 
-use crate::{Error, Result, jpeg, write_unsynced};
+use crate::{Error, Result, jpeg};
 use image::{DynamicImage, ImageError, ImageReader, RgbImage};
 use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;
@@ -113,11 +113,15 @@ fn truncated(path: &Path) -> Error {
 /// # Errors
 /// [`Error::File`] where writing fails.
 pub fn save_png(image: &RgbImage, path: &Path) -> Result<()> {
-    write_unsynced(path, |out| {
-        image
-            .write_to(out, image::ImageFormat::Png)
-            .map_err(|e| write_failed(path, e))
-    })
+    deepfusion_fs::write_unsynced(
+        path,
+        |e| Error::file(path, e),
+        |out| {
+            image
+                .write_to(out, image::ImageFormat::Png)
+                .map_err(|e| write_failed(path, e))
+        },
+    )
 }
 
 /// The system's error inside an encoder's, named by file.

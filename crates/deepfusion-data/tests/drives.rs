@@ -10,7 +10,7 @@ mod common;
 
 use common::TinyDrive;
 use deepfusion_data::kitti::{Calibration, find_drives};
-use deepfusion_data::{Camera, CameraChoice, Dataset, Error, OpenOptions, inspect};
+use deepfusion_data::{Camera, Cameras, Dataset, Error, OpenOptions, inspect};
 use deepfusion_hint::Hint;
 use proptest::prelude::*;
 use std::fs;
@@ -67,14 +67,10 @@ fn either_camera_or_both() {
         .unwrap();
         all.iter().map(Dataset::camera).collect()
     };
-    assert_eq!(cameras(CameraChoice::Right), [Camera::Right]);
-    assert_eq!(cameras(CameraChoice::Both), [Camera::Left, Camera::Right]);
-    assert_eq!("both".parse(), Ok(CameraChoice::Both));
-    assert!(
-        "4".parse::<CameraChoice>()
-            .unwrap_err()
-            .contains("2, 3 or both")
-    );
+    assert_eq!(cameras(Cameras::Right), [Camera::Right]);
+    assert_eq!(cameras(Cameras::Both), [Camera::Left, Camera::Right]);
+    assert_eq!("both".parse(), Ok(Cameras::Both));
+    assert!("4".parse::<Cameras>().unwrap_err().contains("2, 3 or both"));
     fs::remove_dir_all(drive.join("image_02")).unwrap();
     let text = refusal(&drive);
     assert!(

@@ -12,7 +12,7 @@ mod folder;
 
 use common::TinyDrive;
 use deepfusion_data::{
-    CameraChoice, Dataset, DatasetKind, Error, GtKind, OpenOptions, Snippet, VehicleMotion, inspect,
+    Cameras, Dataset, DatasetKind, Error, GtKind, OpenOptions, Snippet, VehicleMotion, inspect,
 };
 use deepfusion_geometry::Se3;
 use deepfusion_hint::Hint;
@@ -300,7 +300,7 @@ fn a_camera_is_never_made_up() {
         "{text}"
     );
     let other = OpenOptions {
-        camera: CameraChoice::Right,
+        camera: Cameras::Right,
         ..options
     };
     let error = Dataset::open(root.path(), &other).unwrap_err();

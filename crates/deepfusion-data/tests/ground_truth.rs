@@ -11,7 +11,7 @@ mod common;
 use common::TinyDrive;
 use deepfusion_data::kitti::{Calibration, depth_map};
 use deepfusion_data::{
-    Camera, CameraChoice, Dataset, Error, GtKind, OpenOptions, export_gt, overlay, read_depth_png,
+    Camera, Cameras, Dataset, Error, GtKind, OpenOptions, export_gt, overlay, read_depth_png,
 };
 use deepfusion_geometry::DepthMap;
 use deepfusion_geometry::cloud::PointCloud;
@@ -98,7 +98,7 @@ fn the_two_conventions_differ_by_a_pixel_and_the_sensors_offset() {
     assert!(forward == 12.0 && (z - 11.7).abs() < 0.05, "{z} {forward}");
 }
 
-fn open(path: &Path, camera: CameraChoice) -> Vec<Dataset> {
+fn open(path: &Path, camera: Cameras) -> Vec<Dataset> {
     Dataset::open(
         path,
         &OpenOptions {
@@ -119,7 +119,7 @@ fn a_drives_scans_are_exported_by_frame() {
     }
     .write(root.path());
     let out = root.path().join("gt.npz");
-    let datasets = open(&drive, CameraChoice::Left);
+    let datasets = open(&drive, Cameras::Left);
     let mut steps = Vec::new();
     let mut progress = |done, all| steps.push((done, all));
     let written = export_gt(&datasets, GtKind::Z, &out, &mut progress).unwrap();
@@ -169,9 +169,9 @@ fn several_drives_or_cameras_show_in_the_names() {
         names(&mut NpzReader::new(File::open(&out).unwrap()).unwrap())
     };
     let date = root.path().join("2030_01_02");
-    let left = open(&date, CameraChoice::Left);
+    let left = open(&date, Cameras::Left);
     assert_eq!(export(&left), ["a_sync/0000000001", "b_sync/0000000001"]);
-    let both = open(&date.join("a_sync"), CameraChoice::Both);
+    let both = open(&date.join("a_sync"), Cameras::Both);
     assert_eq!(
         export(&both),
         ["image_02/0000000001", "image_03/0000000001"]
@@ -192,7 +192,7 @@ fn bad_scans_are_errors_and_leave_no_file() {
     let out = root.path().join("gt.npz");
     let export = || {
         export_gt(
-            &open(&drive, CameraChoice::Left),
+            &open(&drive, Cameras::Left),
             GtKind::Z,
             &out,
             &mut |_, _| {},
@@ -227,7 +227,7 @@ fn real_ground_truth_agrees_with_kittis_annotation() {
     let (Some(drive), Some(png)) = (common::real_data(inner), common::real_data(annotated)) else {
         return;
     };
-    let dataset = &open(&drive, CameraChoice::Left)[0];
+    let dataset = &open(&drive, Cameras::Left)[0];
     let ours = dataset.ground_truth(0, GtKind::Z).unwrap().unwrap();
     let theirs = read_depth_png(&png).unwrap();
     assert_eq!((ours.width, ours.height), (theirs.width, theirs.height));

@@ -9,7 +9,7 @@
 mod common;
 
 use common::{TinyDrive, packet};
-use deepfusion_data::{CameraChoice, Dataset, Error, OpenOptions, Snippet, Split, hold_out};
+use deepfusion_data::{Cameras, Dataset, Error, OpenOptions, Snippet, Split, hold_out};
 use deepfusion_hint::Hint;
 use nalgebra::Vector3;
 use std::fs;
@@ -281,14 +281,14 @@ fn a_split_selects_targets_but_not_their_neighbours() {
         )
         .unwrap()
     };
-    let left = open(CameraChoice::Left);
+    let left = open(Cameras::Left);
     // Of five frames, once each; the right camera's and two that are nowhere are not among what was opened.
     let coverage = split.coverage(&left);
     assert_eq!((coverage.expected, coverage.found), (5, 2));
     let first = coverage.first_missing.clone().unwrap();
     assert_eq!(first, format!("{name} 99 l"));
     assert!(!coverage.is_complete());
-    assert_eq!(split.coverage(&open(CameraChoice::Both)).found, 3);
+    assert_eq!(split.coverage(&open(Cameras::Both)).found, 3);
     assert_eq!(left[0].frames().len(), 8);
     assert_eq!(left[0].selected(), [2, 5]);
     let pairs = left[0].snippets(&[-1, 1], 0.5).unwrap();
@@ -299,14 +299,14 @@ fn a_split_selects_targets_but_not_their_neighbours() {
         "in the split's order"
     );
 
-    let both = open(CameraChoice::Both);
+    let both = open(Cameras::Both);
     assert_eq!(both.len(), 2);
     assert_eq!(both[1].selected(), [3]);
     assert_eq!(split.locate(&both), [(0, 5), (0, 2), (1, 3)]);
 
     fs::write(&file, "2011_09_26/2011_09_26_drive_0001_sync 3 l\n").unwrap();
     let split = Some(Split::read(&file).unwrap());
-    let camera = CameraChoice::Left;
+    let camera = Cameras::Left;
     let error = Dataset::open(
         &folder,
         &OpenOptions {

@@ -4,7 +4,7 @@
 //! [`Evaluator::add`]; [`Evaluator::report`] gives the [`Report`], whose JSON is the one scripts rely on and whose
 //! `Display` is the table for people. [`TrivialBaseline`] makes the row that any useful network must beat: the mean
 //! depth of each pixel over the training scans. Where truth is dense, [`Sharpness`] says how sharp boundaries are. Paths of
-//! the camera are compared in [`odometry`].
+//! the camera are compared in [`odometry`]; [`compare`] puts evaluations side by side, and beside the field's published tables.
 //!
 //! # Conventions
 //! Depth is camera z in metres; ground truth 0 (or NaN, or negative) means none, infinity what is
@@ -12,6 +12,7 @@
 //! H×W, row by row. All arithmetic is in `f64`, whatever the files hold.
 
 mod array_set;
+pub mod compare;
 mod error;
 mod evaluator;
 mod grid;

@@ -14,6 +14,15 @@ pub enum Crop {
 }
 
 impl Crop {
+    /// Its name, on the command line and in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Garg => "garg",
+        }
+    }
+
     /// Rows and columns that are compared in an image of `width` × `height`: half-open ranges of whole pixels, the
     /// fractions truncated as the field's scripts do.
     #[must_use]

@@ -93,6 +93,14 @@ pub fn write_atomically<E>(
     write_aside(path, &failed, write)?.publish().map_err(failed)
 }
 
+/// [`write_atomically`] of bytes that are there already.
+///
+/// # Errors
+/// What the system says; the partial file is then gone.
+pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
+    write_atomically(path, |e| e, |out| out.write_all(bytes.as_ref()))
+}
+
 /// As [`write_atomically`] without waiting for the disk: a reader never sees half a file, and after a power cut there may be
 /// one. For many files that another, written after [`crate::sync_files`], says to be done.
 ///

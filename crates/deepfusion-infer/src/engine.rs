@@ -14,12 +14,24 @@ use crate::{Border, Error, Graph};
 use crate::{masks, means};
 
 /// In which numbers the network computes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Precision {
     /// 32-bit floats throughout.
+    #[default]
     F32,
     /// Weights and the values between operations in bf16 (8 bits of mantissa), sums in f32.
     Bf16,
+}
+
+impl Precision {
+    /// Its name, on the command line and in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::Bf16 => "bf16",
+        }
+    }
 }
 
 /// A network that runs: a plan with packed weights, which [`Engine::another`] shares, and buffers of its own.

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::weights::{Weights, read_safetensors_under};
-use crate::{Error, TrainConfig};
+use crate::{Error, TrainConfig, TrainFindings};
 
 /// The version of the checkpoint's layout; files of another version are refused.
 pub const CHECKPOINT_VERSION: u32 = 1;
@@ -134,25 +134,54 @@ impl RunFolder {
         }
     }
 
-    /// Writes the configuration.
+    /// Writes the configuration, and what the run found out from its data.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn write_config(&self, config: &TrainConfig) -> Result<(), Error> {
-        let text = config.to_toml()?;
+    pub fn write_config(
+        &self,
+        config: &TrainConfig,
+        findings: &TrainFindings,
+    ) -> Result<(), Error> {
+        let found = findings.to_toml().map_err(|e| Error::Config {
+            field: "findings",
+            expected: "values that TOML can hold".into(),
+            found: e.to_string(),
+        })?;
+        let text = config.to_toml()? + &found;
         let path = self.config_path();
-        let failed = |e| Error::io(&path, "write", e);
-        deepfusion_fs::write_atomically(&path, failed, |file| {
-            std::io::Write::write_all(file, text.as_bytes()).map_err(failed)
-        })
+        deepfusion_fs::write(&path, text).map_err(|e| Error::io(&path, "write", e))
     }
 
-    /// Reads the configuration.
+    /// The configuration as the networks need it: what it leaves open is as the run found it.
     ///
     /// # Errors
     /// As [`TrainConfig::read`].
     pub fn read_config(&self) -> Result<TrainConfig, Error> {
+        Ok(self.read_findings()?.complete(self.read_settings()?))
+    }
+
+    /// The configuration as it was set.
+    ///
+    /// # Errors
+    /// As [`TrainConfig::read`].
+    pub fn read_settings(&self) -> Result<TrainConfig, Error> {
         TrainConfig::read(&self.config_path())
+    }
+
+    /// What the run found out from its data.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::ConfigFile`].
+    pub fn read_findings(&self) -> Result<TrainFindings, Error> {
+        let path = self.config_path();
+        let text = std::fs::read_to_string(&path).map_err(|e| Error::io(&path, "read", e))?;
+        let read = TrainConfig::from_run_text(&text);
+        let (_, findings) = read.map_err(|e| Error::ConfigFile {
+            path,
+            reason: e.to_string(),
+        })?;
+        Ok(findings)
     }
 
     /// Where training stood at a checkpoint; its tensors are not read.

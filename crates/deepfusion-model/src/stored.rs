@@ -1,5 +1,7 @@
 use std::path::Path;
 
+use deepfusion_geometry::Intrinsics;
+
 use crate::weights::{Weights, read_bytes};
 use crate::{CheckpointKind, Error, RunFolder, TrainConfig};
 
@@ -8,6 +10,8 @@ use crate::{CheckpointKind, Error, RunFolder, TrainConfig};
 pub struct StoredNetwork {
     /// The configuration of its run, as one of its data sets sees it.
     pub config: TrainConfig,
+    /// The camera it learned with, at the size of its images; `None` for imported weights.
+    pub camera: Option<Intrinsics>,
     /// The depth network's weights.
     pub weights: Weights,
     /// Steps it was trained for.
@@ -34,16 +38,19 @@ impl StoredNetwork {
         kind: CheckpointKind,
         set: Option<&str>,
     ) -> Result<Self, Error> {
-        let config = folder.read_config()?.for_set(set)?;
+        let config = folder.read_config()?;
+        let camera = folder.read_findings()?.camera_of(&config, set);
+        let config = config.for_set(set)?;
         let (weights, state) = folder.load_depth_weights(kind)?;
         Ok(Self {
             config,
+            camera,
             weights,
             step: state.step,
         })
     }
 
-    /// One without a run: its configuration as a table of the configuration file's keys, and its tensors as the bytes of a safetensors
+    /// One without a run: its configuration as the table of a run's `config.toml`, and its tensors as the bytes of a safetensors
     /// file. `origin` is what error messages call it; `set` as in [`Self::of_run`].
     ///
     /// # Errors
@@ -56,12 +63,14 @@ impl StoredNetwork {
         set: Option<&str>,
     ) -> Result<Self, Error> {
         // Not validated: it has no recordings, and trains nothing.
-        let config: TrainConfig = config.try_into().map_err(|e| Error::ConfigFile {
+        let read = TrainConfig::from_run_table(config);
+        let (config, findings) = read.map_err(|e| Error::ConfigFile {
             path: origin.into(),
             reason: e.to_string(),
         })?;
         Ok(Self {
-            config: config.for_set(set)?,
+            camera: findings.camera_of(&config, set),
+            config: findings.complete(config).for_set(set)?,
             weights: read_bytes(origin, bytes)?,
             step,
         })

@@ -40,7 +40,10 @@ fn targets(criterion: &mut Criterion) {
         (
             "rows of cars in a garage, 640x192",
             &garage,
-            PerceptionConfig::default(),
+            PerceptionConfig {
+                parking_rows: true,
+                ..PerceptionConfig::default()
+            },
         ),
     ] {
         let mut perception = Perception::new(config);

@@ -38,6 +38,9 @@ pub struct PerceptionConfig {
     pub camera_height_m: [f32; 2],
     /// Largest angle between the camera's up and the ground's normal, in degrees.
     pub max_tilt_deg: f32,
+    /// Whether rows of parked cars are completed, as in a car park: those that are seen well tell where the others stand, of which
+    /// only a corner or a strip is seen. It needs the camera's poses, and remembers the cars that were passed.
+    pub parking_rows: bool,
 }
 
 impl PerceptionConfig {
@@ -149,6 +152,7 @@ impl Default for PerceptionConfig {
             max_slope: 0.2,
             camera_height_m: [0.3, 4.0],
             max_tilt_deg: 20.0,
+            parking_rows: false,
         }
     }
 }

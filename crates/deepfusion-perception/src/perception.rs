@@ -37,6 +37,7 @@ pub struct Perception {
     ground: Option<Ground>,
     rays: Option<(Intrinsics, Rays)>,
     obstacles: Obstacles,
+    /// The rows of parked cars, where [`PerceptionConfig::parking_rows`] asks for them.
     parking: Parking,
 }
 
@@ -152,8 +153,10 @@ impl Perception {
         self.obstacles
             .find(&depth.data, rays, &ground, &self.config);
         let pose = stamp.as_ref().map(|stamp| &stamp.world_from_cam);
-        self.parking.recall(&ground, pose);
-        let detections = detect_turned(
+        if self.config.parking_rows {
+            self.parking.recall(&ground, pose);
+        }
+        let mut detections = detect_turned(
             &depth.data,
             &self.obstacles,
             instances,
@@ -162,15 +165,17 @@ impl Perception {
             &|at| self.parking.usual_turn(at),
             &self.config,
         );
-        let moving: Vec<_> = self.tracker.moving().collect();
-        let view = View {
-            depth: &depth.data,
-            obstacles: &self.obstacles,
-            rays,
-            ground: &ground,
-            config: &self.config,
-        };
-        let mut detections = self.parking.complete(detections, &moving, view, pose);
+        if self.config.parking_rows {
+            let moving: Vec<_> = self.tracker.moving().collect();
+            let view = View {
+                depth: &depth.data,
+                obstacles: &self.obstacles,
+                rays,
+                ground: &ground,
+                config: &self.config,
+            };
+            detections = self.parking.complete(detections, &moving, view, pose);
+        }
         if let Some(sigma) = sigma {
             for detection in &mut detections {
                 detection.weigh(&depth.data, &sigma.data, size.0);

@@ -39,7 +39,11 @@ fn road(k: &Intrinsics, wall: f64) -> DepthMap {
 }
 
 fn both(depth: &DepthMap, k: &Intrinsics) {
-    for config in [PerceptionConfig::default(), PerceptionConfig::predicted()] {
+    let with_rows = PerceptionConfig {
+        parking_rows: true,
+        ..PerceptionConfig::predicted()
+    };
+    for config in [PerceptionConfig::default(), with_rows] {
         let mut perception = Perception::new(config);
         perception.look(depth, k, None).unwrap();
         for time in 0..3 {

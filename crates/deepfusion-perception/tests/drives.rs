@@ -2,7 +2,8 @@
 
 mod common;
 
-use deepfusion_sim::{Scene, SimConfig};
+use deepfusion_perception::{Perception, PerceptionConfig, Rays, Stamp, detect};
+use deepfusion_sim::{Scene, SimConfig, Simulation};
 
 fn drive(scene: Scene, seed: u64) -> SimConfig {
     SimConfig {
@@ -59,4 +60,34 @@ fn a_longer_drive_knows_its_rows() {
     assert!(score.precision.unwrap() >= 0.92, "{score:?}");
     assert!(score.center_error_m.unwrap() <= 0.4, "{score:?}");
     assert!(score.yaw_error_deg.unwrap() <= 5.0, "{score:?}");
+}
+
+/// Rows are completed where somebody asks for it; else the boxes are those of each image alone.
+#[test]
+fn rows_are_completed_where_they_are_asked_for() {
+    let simulation = Simulation::new(&drive(Scene::Garage, 201)).unwrap();
+    let k = simulation.intrinsics();
+    let rays = Rays::of(&k);
+    let frames: Vec<_> = (0..15).map(|number| simulation.frame(number)).collect();
+    let completed = |parking_rows: bool| {
+        let config = PerceptionConfig {
+            parking_rows,
+            ..PerceptionConfig::default()
+        };
+        let mut perception = Perception::new(config);
+        let others = frames.iter().filter(|frame| {
+            let stamp = Stamp {
+                time_s: frame.time_s,
+                world_from_cam: frame.world_from_cam,
+            };
+            let seen = perception.look(&frame.depth, &k, Some(stamp)).unwrap();
+            let ground = seen.ground.unwrap();
+            let (obstacles, config) = (perception.obstacles(), perception.config());
+            let alone = detect(&frame.depth.data, obstacles, &[], &rays, &ground, config);
+            seen.detections.iter().any(|found| !alone.contains(found))
+        });
+        others.count()
+    };
+    assert_eq!(completed(false), 0);
+    assert!(completed(true) > 0);
 }

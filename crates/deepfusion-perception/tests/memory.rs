@@ -43,7 +43,10 @@ fn ten_thousand_frames_hold_no_more_than_a_thousand() {
     .unwrap();
     let k = simulation.intrinsics();
     let frames: Vec<_> = (0..24).map(|i| simulation.frame(i)).collect();
-    let mut perception = Perception::new(PerceptionConfig::default());
+    let mut perception = Perception::new(PerceptionConfig {
+        parking_rows: true,
+        ..PerceptionConfig::default()
+    });
     let mut look = |number: usize| {
         let frame = &frames[number % frames.len()];
         let stamp = Stamp {

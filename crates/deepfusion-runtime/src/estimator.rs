@@ -17,6 +17,8 @@ use crate::{
 #[derive(Debug)]
 pub struct DepthEstimator {
     config: Arc<TrainConfig>,
+    /// The camera it learned with.
+    camera: Option<Intrinsics>,
     runner: Box<dyn DepthRunner>,
     /// For input sizes beside the one trained with; none of a network that has no use for them.
     others: Option<OtherSizes>,
@@ -88,6 +90,7 @@ impl DepthEstimator {
     ) -> Result<Self, E> {
         let StoredNetwork {
             config,
+            camera,
             weights,
             step,
         } = network;
@@ -112,6 +115,7 @@ impl DepthEstimator {
             runner: own,
             others,
             config,
+            camera,
             step,
         })
     }
@@ -127,6 +131,7 @@ impl DepthEstimator {
         });
         let mut another = Self {
             config: Arc::clone(&self.config),
+            camera: self.camera,
             runner: self.runner.another()?,
             others,
             step: self.step,
@@ -171,7 +176,7 @@ impl DepthEstimator {
     /// The camera the network learned with, at the size of its images; `None` for imported weights.
     #[must_use]
     pub fn training_camera(&self) -> Option<Intrinsics> {
-        self.config.camera
+        self.camera
     }
 
     /// What makes images this network's input.
@@ -179,7 +184,7 @@ impl DepthEstimator {
     pub fn preparer(&self) -> Preparer {
         Preparer {
             size: self.config.size,
-            training_camera: self.config.camera,
+            training_camera: self.camera,
             canonical_focal_px: self.config.canonical_focal_px,
         }
     }

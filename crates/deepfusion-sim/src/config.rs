@@ -96,6 +96,17 @@ pub enum Sensors {
     Umad,
 }
 
+impl Sensors {
+    /// Its name, as `--sensors` takes it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Kitti => "kitti",
+            Self::Umad => "umad",
+        }
+    }
+}
+
 /// A street of half an hour's drive still fits into memory, and its coordinates into f32.
 const LONGEST_DRIVE_S: f64 = 1800.0;
 

@@ -44,7 +44,8 @@ pub use deepfusion_model::{
     Augmentation, CHECKPOINT_VERSION, Checkpoint, CheckpointKind, CompareAt, Compute, ConfigKey,
     DataConfig, DataSetConfig, DepthLossConfig, FlowLossConfig, Learn, LearningRateSchedule,
     LossConfig, MovingConfig, Preset, Reprojection, ReversedPose, RunFolder, SampleFactors,
-    SimulatedConfig, StoredNetwork, TrainConfig, ViewMotion, config_keys,
+    SetFindings, SimulatedConfig, StoredNetwork, TrainConfig, TrainFindings, ViewMotion,
+    config_keys,
 };
 pub use deepfusion_nn::BilinearResize;
 pub use depth_batch::{DepthBatch, DepthLoader};

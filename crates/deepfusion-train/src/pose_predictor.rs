@@ -1,7 +1,7 @@
 use crate::{CheckpointKind, Checkpoints, Error, RunFolder, TrainConfig};
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_data::{RgbImage, to_network_input};
-use deepfusion_geometry::Se3;
+use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_nn::PoseNet;
 use nalgebra::Vector3;
 use std::path::Path;
@@ -13,6 +13,7 @@ use std::path::Path;
 #[derive(Debug)]
 pub struct PosePredictor {
     config: TrainConfig,
+    camera: Option<Intrinsics>,
     pose_net: PoseNet,
     device: Device,
     /// Which checkpoint it was loaded from.
@@ -29,11 +30,14 @@ impl PosePredictor {
     /// As [`RunFolder::open`], [`Checkpoints::load`] and [`TrainConfig::for_set`].
     pub fn load(path: &Path, set: Option<&str>, device: &Device) -> Result<Self, Error> {
         let (folder, kind) = RunFolder::open(path)?;
-        let config = folder.read_config()?.for_set(set)?;
+        let config = folder.read_config()?;
+        let camera = folder.read_findings()?.camera_of(&config, set);
+        let config = config.for_set(set)?;
         let checkpoint = kind.unwrap_or_else(|| folder.preferred());
         let (model, _, state) = folder.load(checkpoint, &config, device)?;
         Ok(Self {
             config,
+            camera,
             pose_net: model.pose_net,
             device: device.clone(),
             checkpoint,
@@ -45,6 +49,12 @@ impl PosePredictor {
     #[must_use]
     pub fn config(&self) -> &TrainConfig {
         &self.config
+    }
+
+    /// The camera the network learned with, at the size of its images; `None` for imported weights.
+    #[must_use]
+    pub fn training_camera(&self) -> Option<Intrinsics> {
+        self.camera
     }
 
     /// An image as the network takes it, as in training: all of it, resized.

@@ -8,7 +8,7 @@ use crate::{
     TrainEvent,
 };
 use burn::tensor::{Device, Tensor};
-use deepfusion_model::Error as ModelError;
+use deepfusion_model::{Error as ModelError, SetFindings, TrainFindings};
 use deepfusion_nn::ops::{Precision, autocast, supports};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -63,8 +63,8 @@ impl std::fmt::Debug for Trainer {
 }
 
 impl Trainer {
-    /// A new run in `folder`. The configuration's open values (camera, metres per unit of pose) are
-    /// taken from the data and stored with it. `init` changes the networks before the first step.
+    /// A new run in `folder`. What the data alone can say (its camera, metres per unit of pose) is found out and stored beside the
+    /// configuration. `init` changes the networks before the first step.
     ///
     /// # Errors
     /// [`Error::Model`], [`Error::NoSamples`], [`Error::NoValidation`].
@@ -79,22 +79,12 @@ impl Trainer {
         check_precision(&config, device)?;
         config.make_absolute();
         check_samples(&config, &train, &validation)?;
-        if config.pose_net.metres_per_unit == 0.0 {
-            config.pose_net.metres_per_unit = first_unit(&config, &train);
-        }
-        config.camera = train.camera();
-        for i in 0..config.data.sets.len() {
-            let own = train.of_set(i);
-            let unit = first_unit(&config, &own);
-            let set = &mut config.data.sets[i];
-            if set.metres_per_unit == 0.0 {
-                set.metres_per_unit = unit;
-            }
-            set.trained_with = own.camera();
-        }
+        let settings = config;
+        let findings = findings(&settings, &train);
+        let config = findings.complete(settings.clone());
         let device = device.clone().autodiff();
         let model = init(Model::new(&config, &device)?)?;
-        folder.write_config(&config)?;
+        folder.write_config(&settings, &findings)?;
         Ok(Self {
             config,
             folder,
@@ -122,6 +112,7 @@ impl Trainer {
         (train, validation): (SampleSet, SampleSet),
         device: &Device,
     ) -> Result<Self, Error> {
+        let config = folder.read_findings()?.complete(config);
         check_precision(&config, device)?;
         check_samples(&config, &train, &validation)?;
         let device = device.clone().autodiff();
@@ -177,7 +168,7 @@ impl Trainer {
         &self.model
     }
 
-    /// The configuration, with what was taken from the data.
+    /// The configuration, with the units that the run found where it leaves them open.
     #[must_use]
     pub fn config(&self) -> &TrainConfig {
         &self.config
@@ -512,6 +503,24 @@ fn first_unit(config: &TrainConfig, set: &SampleSet) -> f64 {
         1.0
     } else {
         config.first_unit(set.mean_displacement_m())
+    }
+}
+
+/// What the training samples say: their cameras, and the units that the configuration leaves open.
+fn findings(config: &TrainConfig, train: &SampleSet) -> TrainFindings {
+    let unit = |set: f64, samples: &SampleSet| (set == 0.0).then(|| first_unit(config, samples));
+    let sets = config.data.sets.iter().enumerate().map(|(i, set)| {
+        let own = train.of_set(i);
+        SetFindings {
+            name: set.name.clone(),
+            metres_per_unit: unit(set.metres_per_unit, &own),
+            camera: own.camera(),
+        }
+    });
+    TrainFindings {
+        metres_per_unit: unit(config.pose_net.metres_per_unit, train),
+        camera: train.camera(),
+        sets: sets.collect(),
     }
 }
 

@@ -15,7 +15,7 @@ use deepfusion_nn::weights::{self, Weights};
 use deepfusion_nn::{DepthNetConfig, PoseNetConfig, ResNetDepth};
 use deepfusion_train::{
     Checkpoint, CheckpointKind, Checkpoints, Control, Error, Model, Preset, RunFolder, TrainConfig,
-    Trainer,
+    TrainFindings, Trainer,
 };
 use std::path::Path;
 use support::{drive, small};
@@ -134,7 +134,8 @@ fn imported_encoders_start_a_network_with_other_parts() {
     let imported = narrow(imported);
     let theirs = Model::new(&imported, &device).unwrap();
     let run = RunFolder::create(folder.path()).unwrap();
-    run.write_config(&imported).unwrap();
+    run.write_config(&imported, &TrainFindings::default())
+        .unwrap();
     let mut state = Checkpoint {
         step: 0,
         best_validation: None,

@@ -131,7 +131,13 @@ fn simulated_views_teach_depth_and_resume_exactly() {
         panic!("{lesson:?}");
     };
     assert!(truth.iter().any(|d| *d > 0.0) && error.iter().any(|e| *e != 0.0));
-    let camera = whole.config().camera.unwrap();
+    let camera = RunFolder::open(whole.folder())
+        .unwrap()
+        .0
+        .read_findings()
+        .unwrap()
+        .camera
+        .unwrap();
     assert_eq!((camera.width, camera.height), (96, 64));
 
     let parts = folder.path().join("parts");

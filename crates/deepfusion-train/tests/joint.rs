@@ -164,7 +164,13 @@ fn every_sample_brings_its_own_camera_range_and_unit() {
     }
     let ratio = road.metres_per_unit / garage.metres_per_unit;
     assert!(ratio > 1.5, "{ratio}");
-    let [k_road, k_garage] = [road, garage].map(|set| set.trained_with.unwrap().resized(96, 64));
+    let (folder, _) = RunFolder::open(trainer.folder()).unwrap();
+    let found = folder.read_findings().unwrap().sets;
+    let [k_road, k_garage] = [0, 1].map(|set: usize| found[set].camera.unwrap().resized(96, 64));
+    // The file has what was set, and what was found apart from it.
+    let set = folder.read_settings().unwrap();
+    assert!(set.data.sets.iter().all(|set| set.metres_per_unit == 0.0));
+    assert_eq!(folder.read_config().unwrap(), *config);
     assert!((k_garage.fx / k_road.fx - 2.0).abs() < 1e-6);
     assert!(validation.samples.iter().any(|s| s.dataset == 0));
 

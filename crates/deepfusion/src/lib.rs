@@ -85,7 +85,7 @@
 //! | [`data`] | recordings as datasets, frames and ground truth; what is wrong with them |
 //! | [`motion`] | how a vehicle moved, from inertial unit, CAN, GPS |
 //! | [`bags`] | ROS bags, read and written |
-//! | [`eval`] | the field's metrics and protocols; odometry; intervals and their coverage |
+//! | [`eval`] | the field's metrics and protocols; odometry; intervals and their coverage; `compare`: evaluations side by side |
 //! | [`perception`] | a depth image to 3D targets, tracks, free space |
 //! | [`geometry`] | cameras, motions, depth images; `cloud`: point clouds and their files |
 //! | [`sim`] | streets with exact depth, to learn from and to test on |

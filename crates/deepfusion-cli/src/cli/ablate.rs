@@ -1,9 +1,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use deepfusion_data::CameraChoice;
+use deepfusion_data::Cameras;
+use deepfusion_model::{Preset, ViewMotion};
 
-use super::{DeviceChoice, PresetChoice, Size, ViewMotionChoice};
+use super::{ComputeDevice, Size, names};
 
 /// The parts and terms that no row decides.
 const SHARED_TERMS: [&str; 6] = [
@@ -47,8 +48,8 @@ pub struct AblateArgs {
     #[arg(long, value_name = "K")]
     pub seeds: Option<usize>,
     /// Settings of everything that the rows do not change [default: light].
-    #[arg(long, value_enum, conflicts_with = "resume")]
-    pub preset: Option<PresetChoice>,
+    #[arg(long, value_parser = names::preset(), conflicts_with = "resume")]
+    pub preset: Option<Preset>,
     /// Settings from a file, as written into every run as config.toml.
     #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["preset", "resume"])]
     pub config: Option<PathBuf>,
@@ -73,8 +74,11 @@ pub struct AblateArgs {
     #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = SHARED_TERMS, conflicts_with = "resume")]
     pub without: Vec<String>,
     /// Whose motion the views are synthesised with [default: posenet; with --config the file's].
-    #[arg(long, value_enum, value_name = "MOTION", conflicts_with = "resume")]
-    pub view_motion: Option<ViewMotionChoice>,
+    #[arg(long, value_parser = names::view_motion(), value_name = "MOTION", conflicts_with = "resume")]
+    pub view_motion: Option<ViewMotion>,
+    /// Any key of the configuration, as loss.smoothness=0.01 (`deepfusion config show` prints them all); may be repeated.
+    #[arg(long, value_name = "KEY=VALUE", conflicts_with = "resume")]
+    pub set: Vec<String>,
     /// Which cameras.
     #[arg(
         long,
@@ -82,7 +86,7 @@ pub struct AblateArgs {
         default_value = "2",
         conflicts_with = "resume"
     )]
-    pub camera: CameraChoice,
+    pub camera: Cameras,
     /// Folder of the table and its runs [default: runs/ablate-TIME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -91,7 +95,7 @@ pub struct AblateArgs {
     pub resume: bool,
     /// Where to compute.
     #[arg(long, value_enum, default_value_t)]
-    pub device: DeviceChoice,
+    pub device: ComputeDevice,
     /// Print the table as JSON on stdout.
     #[arg(long)]
     pub json: bool,

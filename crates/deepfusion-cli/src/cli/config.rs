@@ -1,6 +1,7 @@
 use clap::{Args, Subcommand};
+use deepfusion_model::Preset;
 
-use super::{DeviceChoice, PresetChoice};
+use super::{ComputeDevice, names};
 
 /// `deepfusion config …`.
 #[derive(Debug, Subcommand)]
@@ -17,12 +18,12 @@ pub enum ConfigCommand {
 )]
 pub struct ShowArgs {
     /// The preset.
-    #[arg(value_enum, default_value = "tiny")]
-    pub preset: PresetChoice,
+    #[arg(value_parser = names::preset(), default_value = "tiny")]
+    pub preset: Preset,
     /// A key and its value, as for `train`; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// What is to be trained on: a preset's sizes follow it.
     #[arg(long, value_enum, default_value_t)]
-    pub device: DeviceChoice,
+    pub device: ComputeDevice,
 }

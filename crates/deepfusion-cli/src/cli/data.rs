@@ -1,11 +1,11 @@
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand, ValueEnum};
-use deepfusion_data::{CameraChoice, GtKind};
-use deepfusion_eval::GroundTruth;
+use clap::{Args, Subcommand};
+use deepfusion_data::{Cameras, GtKind};
+use deepfusion_rosbag::Compression;
 
 use super::values::milliseconds;
-use super::{CameraIntrinsics, CompressionChoice};
+use super::{CameraIntrinsics, names};
 
 /// `deepfusion data …`.
 #[derive(Debug, Subcommand)]
@@ -64,13 +64,13 @@ pub struct ConvertArgs {
     pub intrinsics: Option<CameraIntrinsics>,
     /// Which camera.
     #[arg(long, value_name = "2|3", default_value = "2")]
-    pub camera: CameraChoice,
+    pub camera: Cameras,
     /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
     #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
     pub camera_ahead_s: Option<f64>,
     /// Compression of a bag.
-    #[arg(long, value_enum, default_value_t)]
-    pub compression: CompressionChoice,
+    #[arg(long, value_parser = names::compression(), default_value = "lz4")]
+    pub compression: Compression,
     /// Print what was written as JSON.
     #[arg(long)]
     pub json: bool,
@@ -95,11 +95,11 @@ pub struct ExportGtArgs {
     #[arg(long, requires = "split")]
     pub strict: bool,
     /// Which depth, at which pixel.
-    #[arg(long, value_enum, default_value_t)]
-    pub gt_depth: GtDepth,
+    #[arg(long, value_parser = names::gt_kind(), default_value = "z")]
+    pub gt_depth: GtKind,
     /// Which camera.
     #[arg(long, value_name = "2|3|both", default_value = "2")]
-    pub camera: CameraChoice,
+    pub camera: Cameras,
     /// File to write.
     #[arg(long, value_name = "FILE.npz")]
     pub out: PathBuf,
@@ -112,32 +112,4 @@ pub struct ExportGtArgs {
     /// Print what was written as JSON.
     #[arg(long)]
     pub json: bool,
-}
-
-/// Conventions of ground-truth depth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub enum GtDepth {
-    /// Camera z at pixel round(u), round(v), as KITTI's annotated depth.
-    #[default]
-    Z,
-    /// The velodyne's forward distance at pixel round(u) - 1, round(v) - 1: the field's eigen files.
-    Velodyne,
-}
-
-impl GtDepth {
-    /// The same in the data crate's terms.
-    pub fn kind(self) -> GtKind {
-        match self {
-            Self::Z => GtKind::Z,
-            Self::Velodyne => GtKind::Velodyne,
-        }
-    }
-
-    /// The same in the report's terms.
-    pub fn reported(self) -> GroundTruth {
-        match self {
-            Self::Z => GroundTruth::Z,
-            Self::Velodyne => GroundTruth::Velodyne,
-        }
-    }
 }

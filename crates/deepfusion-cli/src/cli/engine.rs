@@ -1,24 +1,25 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use deepfusion_infer::Precision;
 
-use super::DeviceChoice;
+use super::{ComputeDevice, names};
 
 /// What runs a trained network, and where.
 #[derive(Debug, Clone, Args)]
 pub struct EngineArgs {
     /// What runs the network.
     #[arg(long, value_enum, default_value_t)]
-    pub engine: EngineChoice,
+    pub engine: Engine,
     /// In which numbers the fused engine computes.
-    #[arg(long, value_enum, default_value_t)]
-    pub precision: PrecisionChoice,
+    #[arg(long, value_parser = names::precision(), default_value = "f32")]
+    pub precision: Precision,
     /// The ONNX Runtime library of `--engine ort` [default: found].
     #[arg(long, value_name = "FILE")]
     pub ort_lib: Option<PathBuf>,
     /// Where to compute.
     #[arg(long, value_enum, default_value_t)]
-    pub device: DeviceChoice,
+    pub device: ComputeDevice,
     /// Which of the data sets that the run learned from its metres are of, where it learned several.
     #[arg(long = "data-set", alias = "set", value_name = "NAME")]
     pub set: Option<String>,
@@ -26,10 +27,10 @@ pub struct EngineArgs {
 
 impl EngineArgs {
     /// What is chosen without a word, on a device.
-    pub fn on(device: DeviceChoice) -> Self {
+    pub fn on(device: ComputeDevice) -> Self {
         Self {
-            engine: EngineChoice::default(),
-            precision: PrecisionChoice::default(),
+            engine: Engine::default(),
+            precision: Precision::default(),
             ort_lib: None,
             device,
             set: None,
@@ -39,7 +40,7 @@ impl EngineArgs {
 
 /// What runs the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub enum EngineChoice {
+pub enum Engine {
     /// `fused` on the processor, `burn` on any other device.
     #[default]
     Auto,
@@ -49,14 +50,4 @@ pub enum EngineChoice {
     Fused,
     /// ONNX Runtime, a library of your own.
     Ort,
-}
-
-/// In which numbers a network computes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub enum PrecisionChoice {
-    /// 32-bit floats.
-    #[default]
-    F32,
-    /// Eight bits of mantissa: faster on processors with AMX or AVX512-BF16, a little less exact.
-    Bf16,
 }

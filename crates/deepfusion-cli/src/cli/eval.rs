@@ -1,11 +1,11 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
-use deepfusion_data::CameraChoice;
-use deepfusion_eval::{Crop, Holes, Protocol, Scaling};
+use deepfusion_data::{Cameras, GtKind};
+use deepfusion_eval::{Crop, GroundTruth, Holes, Protocol, Scaling};
 
 use super::values::{milliseconds, positive, scaling};
-use super::{CameraIntrinsics, EngineArgs, GtDepth};
+use super::{CameraIntrinsics, EngineArgs, names};
 
 /// `deepfusion eval`.
 #[derive(Debug, Args)]
@@ -36,7 +36,7 @@ pub struct EvalArgs {
         default_value = "2",
         conflicts_with = "pred"
     )]
-    pub camera: CameraChoice,
+    pub camera: Cameras,
     /// The camera of recordings without a calibration, in pixels of their images.
     #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "pred")]
     pub intrinsics: Option<CameraIntrinsics>,
@@ -56,11 +56,11 @@ pub struct EvalArgs {
     #[arg(long, value_name = "FILE")]
     pub gt: Option<PathBuf>,
     /// Which depth the ground truth is.
-    #[arg(long, value_enum, default_value_t)]
-    pub gt_depth: GtDepth,
+    #[arg(long, value_parser = names::gt_kind(), default_value = "z")]
+    pub gt_depth: GtKind,
     /// Part of the image to compare [default: garg for KITTI raw, else none].
-    #[arg(long, value_enum)]
-    pub crop: Option<CropChoice>,
+    #[arg(long, value_parser = names::crop())]
+    pub crop: Option<Crop>,
     /// Farthest ground truth that counts, in metres; predictions are clamped to it.
     #[arg(long, value_name = "M", default_value_t = 80.0, value_parser = positive)]
     pub cap: f64,
@@ -108,10 +108,13 @@ impl EvalArgs {
     /// The protocol asked for; `default_crop` where none was.
     pub fn protocol(&self, default_crop: Crop) -> Protocol {
         Protocol {
-            crop: self.crop.map_or(default_crop, CropChoice::crop),
+            crop: self.crop.unwrap_or(default_crop),
             cap_m: self.cap,
             min_m: self.min,
-            gt: self.gt_depth.reported(),
+            gt: match self.gt_depth {
+                GtKind::Z => GroundTruth::Z,
+                GtKind::Velodyne => GroundTruth::Velodyne,
+            },
             scaling: self.scale,
             holes: if self.allow_holes {
                 Holes::Skip
@@ -132,22 +135,4 @@ pub enum PredKind {
     Depth,
     /// 1 / depth.
     Disparity,
-}
-
-/// Part of the image to compare.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum CropChoice {
-    /// The whole image.
-    None,
-    /// Garg et al.'s window, the field's default for KITTI.
-    Garg,
-}
-
-impl CropChoice {
-    fn crop(self) -> Crop {
-        match self {
-            Self::None => Crop::None,
-            Self::Garg => Crop::Garg,
-        }
-    }
 }

@@ -1,9 +1,9 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
-use deepfusion_data::CameraChoice;
+use deepfusion_data::Cameras;
 
-use super::DeviceChoice;
+use super::ComputeDevice;
 use super::values::milliseconds;
 
 /// `deepfusion eval-odometry`.
@@ -38,7 +38,7 @@ pub struct EvalOdometryArgs {
         default_value = "2",
         conflicts_with = "pred"
     )]
-    pub camera: CameraChoice,
+    pub camera: Cameras,
     /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
     #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true, conflicts_with = "pred")]
     pub camera_ahead_s: Option<f64>,
@@ -53,7 +53,7 @@ pub struct EvalOdometryArgs {
     pub out: Option<PathBuf>,
     /// Where to compute.
     #[arg(long, value_enum, default_value_t)]
-    pub device: DeviceChoice,
+    pub device: ComputeDevice,
     /// Print as JSON.
     #[arg(long)]
     pub json: bool,

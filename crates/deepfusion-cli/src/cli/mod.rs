@@ -13,6 +13,7 @@ mod eval_targets;
 mod export;
 mod instances;
 mod live;
+mod names;
 mod perceive;
 mod predict;
 mod prediction;
@@ -24,14 +25,16 @@ mod weights;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use deepfusion_rosbag::Compression;
+use deepfusion_sim::{Scene, Sensors};
 
 pub use ablate::AblateArgs;
 pub use compare::{CompareArgs, TableFormat};
 pub use completions::{CompletionsArgs, CompletionsKind};
 pub use config::{ConfigCommand, ShowArgs};
-pub use data::{ConvertArgs, DataCommand, ExportGtArgs, GtDepth, InspectArgs};
+pub use data::{ConvertArgs, DataCommand, ExportGtArgs, InspectArgs};
 pub use doctor::DoctorArgs;
-pub use engine::{EngineArgs, EngineChoice, PrecisionChoice};
+pub use engine::{Engine, EngineArgs};
 pub use eval::{EvalArgs, PredKind};
 pub use eval_odometry::EvalOdometryArgs;
 pub use eval_targets::{EvalTargetsArgs, TargetDepth};
@@ -41,7 +44,7 @@ pub use live::LiveArgs;
 pub use perceive::{PerceiveArgs, PerceiveSave};
 pub use predict::{BenchArgs, PredictArgs, Save};
 pub use prediction::{Outputs, PredictionArgs};
-pub use train::{DeviceChoice, PresetChoice, TrainArgs, ViewMotionChoice};
+pub use train::{ComputeDevice, TrainArgs};
 pub use values::{CameraIntrinsics, Shard, Size};
 pub use view::ViewArgs;
 pub use weights::{PackArgs, WeightsCommand};
@@ -133,7 +136,7 @@ pub struct DemoArgs {
     pub seed: u64,
     /// Where to compute.
     #[arg(long, value_enum, default_value_t)]
-    pub device: DeviceChoice,
+    pub device: ComputeDevice,
 }
 
 /// `deepfusion simulate`.
@@ -156,8 +159,8 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
     /// Kind of place.
-    #[arg(long, value_enum, default_value_t)]
-    pub scene: SceneChoice,
+    #[arg(long, value_parser = names::scene(), default_value = "urban")]
+    pub scene: Scene,
     /// Number of cars that move.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub moving_cars: usize,
@@ -168,8 +171,8 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "HZ")]
     pub fps: Option<f64>,
     /// Sensors of the car [default: those of the layout's data set].
-    #[arg(long, value_enum)]
-    pub sensors: Option<SensorsChoice>,
+    #[arg(long, value_parser = names::sensors())]
+    pub sensors: Option<Sensors>,
     /// Set the clock of camera and LiDAR so many milliseconds ahead of the vehicle's (bag).
     #[arg(
         long,
@@ -179,8 +182,8 @@ pub struct SimulateArgs {
     )]
     pub clock_offset: f64,
     /// Compression of the bag.
-    #[arg(long, value_enum, default_value_t)]
-    pub compression: CompressionChoice,
+    #[arg(long, value_parser = names::compression(), default_value = "lz4")]
+    pub compression: Compression,
     /// A velodyne scan for every N-th frame (KITTI); 0 writes none.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub scan_every: usize,
@@ -197,51 +200,4 @@ pub enum SimulateFormat {
     Kitti,
     /// A ROS 1 bag as UMAD's: camera, FMCW LiDAR, inertial unit, CAN speed and steering, and the truth.
     Bag,
-}
-
-/// What the simulated car carries.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum SensorsChoice {
-    /// KITTI's, camera and velodyne on the roof.
-    Kitti,
-    /// UMAD's, camera, FMCW LiDAR and inertial unit in one head.
-    Umad,
-}
-
-/// How a bag's chunks are compressed.
-#[derive(Debug, Clone, Copy, Default, ValueEnum)]
-pub enum CompressionChoice {
-    /// Not at all.
-    None,
-    /// Fast.
-    #[default]
-    Lz4,
-    /// Small and slow.
-    Bz2,
-}
-
-impl From<CompressionChoice> for deepfusion_rosbag::Compression {
-    fn from(choice: CompressionChoice) -> Self {
-        match choice {
-            CompressionChoice::None => Self::None,
-            CompressionChoice::Lz4 => Self::Lz4,
-            CompressionChoice::Bz2 => Self::Bz2,
-        }
-    }
-}
-
-/// Places the simulator knows.
-#[derive(Debug, Clone, Copy, Default, ValueEnum)]
-pub enum SceneChoice {
-    /// A street with houses, parked cars, trees.
-    #[default]
-    Urban,
-    /// A narrow road between lawns and trees.
-    Park,
-    /// Under ground: dark, near walls, pillars, a low ceiling.
-    Garage,
-    /// Large houses, wide pavements, many parked cars.
-    Commercial,
-    /// The urban street by night, under its lamps.
-    Night,
 }

@@ -1,9 +1,10 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
+use deepfusion_model::Preset;
 
 use super::values::positive;
-use super::{EngineArgs, Outputs, PredictionArgs, PresetChoice, Shard, Size};
+use super::{EngineArgs, Outputs, PredictionArgs, Shard, Size, names};
 
 /// `deepfusion predict`.
 #[derive(Debug, Args)]
@@ -116,8 +117,8 @@ pub struct BenchArgs {
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
     /// A preset's network with random weights [default with --size, and where no network is embedded: tiny].
-    #[arg(long, value_enum)]
-    pub preset: Option<PresetChoice>,
+    #[arg(long, value_parser = names::preset())]
+    pub preset: Option<Preset>,
     /// Size of a preset's input [default: the preset's own].
     #[arg(long, value_name = "WxH", conflicts_with = "model")]
     pub size: Option<Size>,

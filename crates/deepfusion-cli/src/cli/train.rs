@@ -1,11 +1,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use deepfusion_data::CameraChoice;
+use deepfusion_data::Cameras;
 use deepfusion_model::{Compute, Learn, Preset, TrainConfig, ViewMotion};
 
-use super::Size;
 use super::values::milliseconds;
+use super::{Size, names};
 
 /// `deepfusion train`.
 #[derive(Debug, Args)]
@@ -25,8 +25,8 @@ pub struct TrainArgs {
     #[arg(long, value_name = "PATH", num_args = 1.., required_unless_present_any = ["resume", "config"])]
     pub data: Vec<PathBuf>,
     /// Settings to start from [default: tiny].
-    #[arg(long, value_enum)]
-    pub preset: Option<PresetChoice>,
+    #[arg(long, value_parser = names::preset())]
+    pub preset: Option<Preset>,
     /// Settings from a file: a preset and the keys in which it differs, or all of them, as written into every run as config.toml.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "preset")]
     pub config: Option<PathBuf>,
@@ -38,7 +38,7 @@ pub struct TrainArgs {
     pub resume: bool,
     /// Where to compute.
     #[arg(long, value_enum, default_value_t)]
-    pub device: DeviceChoice,
+    pub device: ComputeDevice,
     /// Passes over the data [default: the preset's 20, and at least 1200 steps].
     #[arg(long, value_name = "N", conflicts_with = "steps")]
     pub epochs: Option<usize>,
@@ -55,11 +55,11 @@ pub struct TrainArgs {
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
     /// What is learned from: the drive's own motion, the depth recorded with it (RGB-D, scans), or both [default: self].
-    #[arg(long, value_enum, value_name = "LESSON")]
-    pub learn: Option<LearnChoice>,
+    #[arg(long, value_parser = names::learn(), value_name = "LESSON")]
+    pub learn: Option<Learn>,
     /// Which cameras [default: 2].
     #[arg(long, value_name = "2|3|both")]
-    pub camera: Option<CameraChoice>,
+    pub camera: Option<Cameras>,
     /// Train on the frames of this split file only (lines "folder index side").
     #[arg(long, value_name = "FILE")]
     pub split: Option<PathBuf>,
@@ -77,8 +77,8 @@ pub struct TrainArgs {
     #[arg(long, value_name = "WEIGHTS")]
     pub init: Option<PathBuf>,
     /// Whose motion the views are synthesised with [default: the preset's].
-    #[arg(long, value_enum, value_name = "MOTION")]
-    pub view_motion: Option<ViewMotionChoice>,
+    #[arg(long, value_parser = names::view_motion(), value_name = "MOTION")]
+    pub view_motion: Option<ViewMotion>,
     /// Parts of the network and terms of the loss to switch on.
     #[arg(long, value_name = "TERM,…", value_delimiter = ',', value_parser = TrainConfig::TERMS)]
     pub with: Vec<String>,
@@ -90,79 +90,9 @@ pub struct TrainArgs {
     pub set: Vec<String>,
 }
 
-/// Settings to start from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum PresetChoice {
-    /// ResNet-18 at half width, 320×96: useful on two cores in minutes.
-    Tiny,
-    /// ResNet-18, 640×192; trained on a processor 320×96.
-    Light,
-    /// ResNet-50, 640×192, batch 12; trained on a processor 320×96, batch 4.
-    Resnet50,
-    /// The paper's network: ResNet-50 with context and attention; sizes as resnet50.
-    Paper,
-    /// Monodepth2's network and losses, with the speed term.
-    Monodepth2,
-}
-
-impl From<PresetChoice> for Preset {
-    fn from(choice: PresetChoice) -> Self {
-        match choice {
-            PresetChoice::Tiny => Self::Tiny,
-            PresetChoice::Light => Self::Light,
-            PresetChoice::Resnet50 => Self::Resnet50,
-            PresetChoice::Paper => Self::Paper,
-            PresetChoice::Monodepth2 => Self::Monodepth2,
-        }
-    }
-}
-
-/// What a recording is learned from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum LearnChoice {
-    /// Its own motion: views of one frame from another; needs a speed.
-    #[value(name = "self")]
-    OwnMotion,
-    /// Its depth: RGB-D images or a LiDAR's scans; needs no speed.
-    Depth,
-    /// Both.
-    Both,
-}
-
-/// Whose motion the views are synthesised with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ViewMotionChoice {
-    /// PoseNet's; the speed loss pulls its length to the vehicle's.
-    Posenet,
-    /// PoseNet's direction and rotation, the vehicle's distance.
-    Distance,
-    /// The vehicle's, from speed and yaw rate.
-    Vehicle,
-}
-
-impl From<LearnChoice> for Learn {
-    fn from(choice: LearnChoice) -> Self {
-        match choice {
-            LearnChoice::OwnMotion => Self::OwnMotion,
-            LearnChoice::Depth => Self::Depth,
-            LearnChoice::Both => Self::Both,
-        }
-    }
-}
-
-impl From<ViewMotionChoice> for ViewMotion {
-    fn from(choice: ViewMotionChoice) -> Self {
-        match choice {
-            ViewMotionChoice::Posenet => Self::PoseNet,
-            ViewMotionChoice::Distance => Self::Distance,
-            ViewMotionChoice::Vehicle => Self::Vehicle,
-        }
-    }
-}
-
 /// Where to compute. Help lists what this build has; the others are known, so that they are answered with how to build them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub enum DeviceChoice {
+pub enum ComputeDevice {
     /// This machine's processor.
     #[default]
     Cpu,
@@ -180,7 +110,7 @@ pub enum DeviceChoice {
     Metal,
 }
 
-impl DeviceChoice {
+impl ComputeDevice {
     /// What a preset's sizes follow.
     pub fn compute(self) -> Compute {
         match self {

@@ -1,7 +1,9 @@
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use deepfusion_model::CheckpointKind;
+
+use super::names;
 
 /// `deepfusion weights …`.
 #[derive(Debug, Subcommand)]
@@ -44,8 +46,8 @@ pub struct PackArgs {
     #[arg(long, value_name = "RUN")]
     pub model: PathBuf,
     /// Which checkpoint [default: best, where there is one].
-    #[arg(long, value_enum)]
-    pub checkpoint: Option<CheckpointChoice>,
+    #[arg(long, value_parser = names::checkpoint())]
+    pub checkpoint: Option<CheckpointKind>,
     /// What `--model` is to call it: letters a to z, digits and dashes.
     #[arg(long, value_name = "NAME")]
     pub name: String,
@@ -70,22 +72,4 @@ pub struct PackArgs {
     /// Print the card as JSON on stdout.
     #[arg(long)]
     pub json: bool,
-}
-
-/// A checkpoint of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum CheckpointChoice {
-    /// At the lowest held-out loss.
-    Best,
-    /// Where training ended.
-    Last,
-}
-
-impl From<CheckpointChoice> for CheckpointKind {
-    fn from(choice: CheckpointChoice) -> Self {
-        match choice {
-            CheckpointChoice::Best => Self::Best,
-            CheckpointChoice::Last => Self::Last,
-        }
-    }
 }

@@ -1,10 +1,9 @@
 //! `deepfusion compare`: evaluations side by side.
 
-use std::io::Write as _;
 use std::path::Path;
 
-use deepfusion_compare::{Evaluation, Tables, published_tables, run_tables};
-use deepfusion_data::{CameraChoice, Dataset, GtKind, RgbImage, save_png};
+use deepfusion_data::{Cameras, Dataset, GtKind, RgbImage, save_png};
+use deepfusion_eval::compare::{Evaluation, Tables, published_tables, run_tables};
 use deepfusion_render::{
     DepthScale, HtmlReport, PictureFormat, Tile, depth_legend, depth_picture, model_sheet,
     shrink_depth, shrink_picture, sparse_depth_picture,
@@ -50,13 +49,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         TableFormat::Html => html(args, &tables, &rows)?,
     };
     match &args.out {
-        Some(path) => Ok(deepfusion_data::write_atomically::<deepfusion_data::Error>(
-            path,
-            |file| {
-                file.write_all(text.as_bytes())
-                    .map_err(|e| deepfusion_data::Error::file(path, e))
-            },
-        )?),
+        Some(path) => output::write(path, text),
         None => output::print(&text),
     }
 }
@@ -64,7 +57,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 fn html(args: &CompareArgs, tables: &Tables, rows: &[Vec<Tile>]) -> Result<String> {
     let names: Vec<_> = args.runs.iter().map(|p| output::name_of(p)).collect();
     let mut page = HtmlReport::new("Depth, side by side", names.join(", ")).wide();
-    page = tables.add_to(page);
+    page = page.comparison(tables);
     if let (false, Some(recording)) = (rows.is_empty(), &args.pictures) {
         page = page
             .section(&format!("Pictures of {}", output::name_of(recording)))
@@ -86,7 +79,7 @@ fn pictures(args: &CompareArgs, recording: &Path) -> Result<Vec<Vec<Tile>>> {
     if let Some(file) = args.runs.iter().find(|p| !p.is_dir()) {
         return Err(CliError::NoModel { path: file.clone() }.into());
     }
-    let datasets = open_datasets(&[recording.to_owned()], None, CameraChoice::default())?;
+    let datasets = open_datasets(&[recording.to_owned()], None, Cameras::default())?;
     let frames = spread(&datasets, usize::from(args.picture_count));
     if frames.is_empty() {
         return Err(CliError::NoImages {

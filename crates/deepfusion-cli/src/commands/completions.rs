@@ -6,7 +6,6 @@ use clap::CommandFactory;
 use clap::error::ErrorKind;
 use clap_complete::{Shell, generate};
 use clap_mangen::Man;
-use deepfusion_data::write_atomically;
 
 use crate::cli::{Cli, CompletionsArgs, CompletionsKind};
 use crate::failure::Result;
@@ -48,10 +47,9 @@ fn manual(out: &Path) -> Result<()> {
         }
         let path = out.join(format!("{name}.1"));
         let page = Man::new(command).title(name);
-        write_atomically::<deepfusion_data::Error>(&path, |file| {
-            page.render(file)
-                .map_err(|e| deepfusion_data::Error::file(&path, e))
-        })?;
+        let mut text = Vec::new();
+        page.render(&mut text)?;
+        output::write(&path, text)?;
     }
     Ok(())
 }

@@ -1,9 +1,8 @@
 //! What a run's depth is worth, pixel by pixel: learned from frames with ground truth, kept beside the run.
 
-use std::io::Write;
 use std::path::Path;
 
-use deepfusion_data::{Dataset, write_atomically};
+use deepfusion_data::Dataset;
 use deepfusion_perception::{ConfidenceModel, Evidence, Reliability};
 use deepfusion_runtime::DepthEstimator;
 use image::imageops::flip_horizontal;
@@ -13,6 +12,7 @@ use super::division::divide;
 use super::evaluate::{Evaluated, Place, Truth};
 use super::known_pixels::known_pixels;
 use crate::failure::{Failure, Result};
+use crate::output;
 
 /// The file in a run's folder.
 const FILE: &str = "confidence.toml";
@@ -60,10 +60,7 @@ impl Confidence {
              # with the mirrored image); confidence = exp(-error). Written by `eval --calibrate-confidence`.\n{}",
             toml::to_string(self)?
         );
-        write_atomically::<deepfusion_data::Error>(&path, |out| {
-            out.write_all(text.as_bytes())
-                .map_err(|e| deepfusion_data::Error::file(&path, e))
-        })?;
+        output::write(&path, text)?;
         Ok(path)
     }
 }

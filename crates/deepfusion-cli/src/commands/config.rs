@@ -1,14 +1,12 @@
 //! `deepfusion config`: what can be configured.
 
-use deepfusion_model::Preset;
-
 use crate::cli::ShowArgs;
 use crate::failure::Result;
 use crate::output;
 
 /// `deepfusion config show`.
 pub fn show(args: &ShowArgs) -> Result<()> {
-    let mut config = Preset::from(args.preset).config_on(args.device.compute());
+    let mut config = args.preset.config_on(args.device.compute());
     for assignment in &args.set {
         config.set(assignment)?;
     }

@@ -34,7 +34,7 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
             let input = args.input.clone();
             return Err(CliError::SeveralDrives { input, drives }.into());
         };
-        convert_to_bag(dataset, &args.out, args.compression.into(), &mut report)?
+        convert_to_bag(dataset, &args.out, args.compression, &mut report)?
     } else {
         convert_to_kitti(&datasets, &args.out, &mut report)?
     };

@@ -2,26 +2,26 @@
 #[cfg(feature = "train")]
 use burn::tensor::Device;
 
-use crate::cli::DeviceChoice;
+use crate::cli::ComputeDevice;
 #[cfg(feature = "train")]
 use crate::error::CliError;
 use crate::failure::Result;
 
 /// The device asked for, where this build has its backend.
 #[cfg(feature = "train")]
-pub fn open(choice: DeviceChoice) -> Result<Device> {
+pub fn open(device: ComputeDevice) -> Result<Device> {
     #[allow(unused_imports)]
     use burn::tensor::DeviceKind;
-    match choice {
-        DeviceChoice::Cpu => Ok(Device::flex()),
+    match device {
+        ComputeDevice::Cpu => Ok(Device::flex()),
         #[cfg(feature = "vulkan")]
-        DeviceChoice::Vulkan => Ok(Device::vulkan(DeviceKind::DefaultDevice)),
+        ComputeDevice::Vulkan => Ok(Device::vulkan(DeviceKind::DefaultDevice)),
         #[cfg(feature = "wgpu")]
-        DeviceChoice::Wgpu => Ok(Device::wgpu(DeviceKind::DefaultDevice)),
+        ComputeDevice::Wgpu => Ok(Device::wgpu(DeviceKind::DefaultDevice)),
         #[cfg(feature = "cuda")]
-        DeviceChoice::Cuda => Ok(Device::cuda(0)),
+        ComputeDevice::Cuda => Ok(Device::cuda(0)),
         #[cfg(feature = "metal")]
-        DeviceChoice::Metal => Ok(Device::metal(DeviceKind::DefaultDevice)),
+        ComputeDevice::Metal => Ok(Device::metal(DeviceKind::DefaultDevice)),
         #[allow(unreachable_patterns)]
         other => Err(CliError::NoBackend {
             device: name(other),
@@ -31,12 +31,12 @@ pub fn open(choice: DeviceChoice) -> Result<Device> {
 }
 
 /// The device's name as on the command line.
-pub fn name(choice: DeviceChoice) -> &'static str {
-    match choice {
-        DeviceChoice::Cpu => "cpu",
-        DeviceChoice::Vulkan => "vulkan",
-        DeviceChoice::Wgpu => "wgpu",
-        DeviceChoice::Cuda => "cuda",
-        DeviceChoice::Metal => "metal",
+pub fn name(device: ComputeDevice) -> &'static str {
+    match device {
+        ComputeDevice::Cpu => "cpu",
+        ComputeDevice::Vulkan => "vulkan",
+        ComputeDevice::Wgpu => "wgpu",
+        ComputeDevice::Cuda => "cuda",
+        ComputeDevice::Metal => "metal",
     }
 }

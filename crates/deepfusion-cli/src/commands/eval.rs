@@ -1,7 +1,7 @@
 use std::path::Path;
 
-use deepfusion_compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
-use deepfusion_data::{CameraChoice, Dataset, GtKind, OpenOptions, RgbImage};
+use deepfusion_data::{Cameras, Dataset, GtKind, OpenOptions, RgbImage};
+use deepfusion_eval::compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
 use deepfusion_eval::{
     ArraySet, Crop, Grid, Prediction, Protocol, Report, Sample, TrivialBaseline, match_names,
 };
@@ -21,7 +21,7 @@ use super::held_out::{held_out, unseen};
 use super::run_report::{self, Choice};
 use super::uncertainty;
 use super::used_checkpoint::UsedCheckpoint;
-use crate::cli::{CameraIntrinsics, EvalArgs, PrecisionChoice, PredKind};
+use crate::cli::{CameraIntrinsics, EvalArgs, PredKind};
 use crate::engine;
 use crate::error::CliError;
 use crate::failure::Result;
@@ -83,7 +83,7 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
     let datasets = open_recordings(&args.data, &options)?;
     let expected = expected_frames(&options, &datasets, args.strict)?;
     let crop = default_crop(&datasets);
-    let kind = args.gt_depth.kind();
+    let kind = args.gt_depth;
     let mut truth = match &args.gt {
         Some(path) => Truth::Arrays(Box::new(ArraySet::open(path)?)),
         None => Truth::Scans(kind),
@@ -335,10 +335,7 @@ fn saved(
     evaluated: &Evaluated,
 ) -> Result<SavedEvaluation> {
     let absolute = |p: &std::path::PathBuf| std::path::absolute(p).unwrap_or_else(|_| p.clone());
-    let precision = match args.engine.precision {
-        PrecisionChoice::F32 => "f32",
-        PrecisionChoice::Bf16 => "bf16",
-    };
+    let precision = args.engine.precision.name();
     Ok(SavedEvaluation {
         format_version: SAVED_VERSION,
         measured: Measured {
@@ -346,9 +343,9 @@ fn saved(
             split: args.split.as_ref().map(absolute),
             gt: args.gt.as_ref().map(absolute),
             camera: match args.camera {
-                CameraChoice::Left => "2",
-                CameraChoice::Right => "3",
-                CameraChoice::Both => "both",
+                Cameras::Left => "2",
+                Cameras::Right => "3",
+                Cameras::Both => "both",
             }
             .into(),
             engine: format!("{} {precision}", estimator.engine()),

@@ -1,9 +1,6 @@
-use std::io::Write as _;
 use std::path::Path;
 
-use deepfusion_data::{
-    Camera, CameraPath, Dataset, DatasetKind, Error, OpenOptions, write_atomically,
-};
+use deepfusion_data::{Camera, CameraPath, Dataset, DatasetKind, OpenOptions};
 use deepfusion_eval::odometry::{
     OdometryReport, PoseFile, TrackError, TrackPair, chain, from_first, kitti_text, tum_text,
 };
@@ -173,7 +170,7 @@ fn track_name(dataset: &Dataset, path: &CameraPath, several: bool, cameras: bool
 
 /// A pose network sees pixels: another focal length shows it another motion.
 fn warn_of_focal_length(predictor: &PosePredictor, dataset: &Dataset) {
-    let (Some(train), Some(&frame)) = (predictor.config().camera, dataset.selected().first())
+    let (Some(train), Some(&frame)) = (predictor.training_camera(), dataset.selected().first())
     else {
         return;
     };
@@ -194,9 +191,9 @@ fn write_track(out: &Path, track: &TrackPair) -> Result<()> {
     let (truth, predicted) = (from_first(&track.truth), from_first(&track.predicted));
     for (what, poses) in [("truth", &truth), ("predicted", &predicted)] {
         let file = |kind: &str| out.join(format!("{}_{what}.{kind}", track.name));
-        write(&file("txt"), &kitti_text(poses))?;
+        output::write(&file("txt"), kitti_text(poses))?;
         if track.times_s.len() == poses.len() {
-            write(&file("tum"), &tum_text(poses, &track.times_s))?;
+            output::write(&file("tum"), tum_text(poses, &track.times_s))?;
         }
     }
     // From above: the first camera's x to the right, its z ahead.
@@ -209,13 +206,5 @@ fn write_track(out: &Path, track: &TrackPair) -> Result<()> {
         .path("truth", seen(&truth))
         .path("predicted, unscaled", seen(&predicted))
         .to_svg();
-    write(&out.join(format!("{}.svg", track.name)), &svg)
-}
-
-fn write(path: &Path, text: &str) -> Result<()> {
-    write_atomically::<Error>(path, |file| {
-        file.write_all(text.as_bytes())
-            .map_err(|e| Error::file(path, e))
-    })?;
-    Ok(())
+    output::write(&out.join(format!("{}.svg", track.name)), svg)
 }

@@ -4,8 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::{
-    CameraChoice, Dataset, DatasetKind, GtKind, OpenOptions, Split, SplitCoverage,
-    ground_truth_names,
+    Cameras, Dataset, DatasetKind, GtKind, OpenOptions, Split, SplitCoverage, ground_truth_names,
 };
 use deepfusion_eval::{
     ArraySet, Crop, DrawnPoint, Evaluator, Grid, GroundTruth, ImageScore, Prediction, Protocol,
@@ -21,7 +20,7 @@ use crate::failure::Result;
 pub fn open_datasets(
     paths: &[PathBuf],
     split: Option<&Path>,
-    camera: CameraChoice,
+    camera: Cameras,
 ) -> Result<Vec<Dataset>> {
     let options = OpenOptions {
         camera,

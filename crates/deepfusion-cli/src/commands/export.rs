@@ -4,7 +4,7 @@ use std::path::Path;
 
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_fs::Partial;
-use deepfusion_model::{InputSize, TrainConfig, depth_graph};
+use deepfusion_model::{InputSize, StoredNetwork, depth_graph};
 use deepfusion_nn::{DepthNet, weights};
 use deepfusion_onnx::check::{PICTURES, deviation, pictures};
 use deepfusion_onnx::runtime::{OrtEngine, find};
@@ -53,7 +53,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let device = Device::flex();
     let network = model::chosen(args.model.as_deref())?.load(args.set.as_deref())?;
     let net = depth_net(&network.config, &network.weights, &device)?;
-    let model = model_of(&network.config, &net, args)?;
+    let model = model_of(&network, &net, args)?;
     let bytes = write(&model)?;
     let partial = partial_file(out, &bytes)?;
     let checks = check(args, &model, &net, partial.path(), &device)?;
@@ -64,13 +64,14 @@ pub fn run(args: &ExportArgs) -> Result<()> {
 }
 
 /// The network of a run, for pictures of the size asked for.
-fn model_of(config: &TrainConfig, net: &DepthNet, args: &ExportArgs) -> Result<DepthModel> {
+fn model_of(network: &StoredNetwork, net: &DepthNet, args: &ExportArgs) -> Result<DepthModel> {
+    let config = &network.config;
     let size = match args.size {
         Some(size) => InputSize::new(size.width as usize, size.height as usize)?,
         None => config.size,
     };
     // Of the pictures trained on, whatever the size now: a network sees metres through those.
-    let camera = config
+    let camera = network
         .camera
         .map(|k| k.resized(config.size.width as u32, config.size.height as u32));
     Ok(DepthModel {

@@ -24,7 +24,7 @@ pub fn run(args: &ExportGtArgs) -> Result<()> {
     };
     let datasets = open_recordings(&args.paths, &options)?;
     let expected = expected_frames(&options, &datasets, args.strict)?;
-    let kind = args.gt_depth.kind();
+    let kind = args.gt_depth;
     if args.strict {
         // Known before the file is written: a part of what was asked for would be taken for all of it.
         let with_truth = |d: &Dataset| {

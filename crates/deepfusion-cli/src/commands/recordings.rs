@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Camera, CameraChoice, Dataset, OpenOptions};
+use deepfusion_data::{Camera, Cameras, Dataset, OpenOptions};
 use deepfusion_model::{DataSetConfig, Error as ModelError, TrainConfig};
 
 use super::evaluate::{open_quietly, open_recordings, read_split};
 use crate::failure::Result;
 
 /// Cameras as configurations name them.
-pub fn camera_word(camera: CameraChoice) -> &'static str {
+pub fn camera_word(camera: Cameras) -> &'static str {
     match camera.cameras() {
         [Camera::Left] => "2",
         [Camera::Right] => "3",
@@ -91,8 +91,8 @@ fn recordings(
     camera_ahead_s: Option<f64>,
     tell: bool,
 ) -> Result<Vec<Dataset>> {
-    let camera: CameraChoice = match camera {
-        "" => CameraChoice::default(),
+    let camera: Cameras = match camera {
+        "" => Cameras::default(),
         text => text.parse().map_err(|_| ModelError::Config {
             field: "data.camera",
             expected: "2, 3 or both".into(),

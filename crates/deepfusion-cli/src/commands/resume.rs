@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use clap::ValueEnum;
-use deepfusion_model::{Learn, TrainConfig, ViewMotion};
+use deepfusion_model::TrainConfig;
 
 use super::recordings::camera_word;
 use super::start;
@@ -46,9 +45,7 @@ pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> 
         take_file(&mut config, path, args)?;
     }
     if let Some(preset) = preset {
-        let word = preset.to_possible_value();
-        let asked = word.map_or(String::new(), |v| v.get_name().to_owned());
-        same("--preset", asked, run.preset.to_string())?;
+        same("--preset", preset.to_string(), run.preset.to_string())?;
     }
     if let Some(size) = size {
         let asked = format!("{}x{}", size.width, size.height);
@@ -62,22 +59,16 @@ pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> 
         same("--seed", seed.to_string(), run.seed.to_string())?;
     }
     if let Some(learn) = learn {
-        let word = |learn| match learn {
-            Learn::OwnMotion => "self".to_owned(),
-            Learn::Depth => "depth".to_owned(),
-            Learn::Both => "both".to_owned(),
-        };
-        let asked = word(Learn::from(*learn));
-        same("--learn", asked, word(run.data.learn))?;
+        let found = run.data.learn.name();
+        same("--learn", learn.name().into(), found.into())?;
     }
     if let Some(camera) = camera {
         let found = camera_of(&config);
         same("--camera", camera_word(*camera).into(), found)?;
     }
     if let Some(motion) = view_motion {
-        let asked = format!("{:?}", ViewMotion::from(*motion)).to_lowercase();
-        let found = format!("{:?}", run.view_motion).to_lowercase();
-        same("--view-motion", asked, found)?;
+        let found = run.view_motion.name();
+        same("--view-motion", motion.name().into(), found.into())?;
     }
     for term in with {
         let mut other = run.clone();
@@ -183,14 +174,12 @@ fn take_file(config: &mut TrainConfig, path: &Path, args: &TrainArgs) -> Result<
     // What a run fills in from its data, or the options say, is not the file's to say.
     let mut asked = file;
     asked.data.make_absolute();
-    asked.camera = config.camera;
     asked.init.clone_from(&config.init);
     asked.init_sha256.clone_from(&config.init_sha256);
     if asked.pose_net.metres_per_unit == 0.0 {
         asked.pose_net.metres_per_unit = config.pose_net.metres_per_unit;
     }
     for (asked, has) in asked.data.sets.iter_mut().zip(&config.data.sets) {
-        asked.trained_with = has.trained_with;
         if asked.metres_per_unit == 0.0 {
             asked.metres_per_unit = has.metres_per_unit;
         }

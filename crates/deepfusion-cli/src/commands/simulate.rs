@@ -1,9 +1,8 @@
-use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti};
-
-use crate::cli::{SceneChoice, SensorsChoice, SimulateArgs, SimulateFormat, Size};
+use crate::cli::{SimulateArgs, SimulateFormat, Size};
 use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
+use deepfusion_sim::{BagSettings, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 
 /// `deepfusion simulate`.
 pub fn run(args: &SimulateArgs) -> Result<()> {
@@ -15,7 +14,7 @@ pub fn run(args: &SimulateArgs) -> Result<()> {
         SimulateFormat::Kitti => write_kitti(&simulation, &args.out, &mut report)?,
         SimulateFormat::Bag => {
             let settings = BagSettings {
-                compression: args.compression.into(),
+                compression: args.compression,
                 clock_offset_s: 1e-3 * args.clock_offset,
                 ..BagSettings::default()
             };
@@ -54,18 +53,8 @@ fn config(args: &SimulateArgs) -> SimConfig {
         height,
         moving_cars: args.moving_cars,
         fps: args.fps.unwrap_or(fps),
-        scene: match args.scene {
-            SceneChoice::Urban => Scene::Urban,
-            SceneChoice::Park => Scene::Park,
-            SceneChoice::Garage => Scene::Garage,
-            SceneChoice::Commercial => Scene::Commercial,
-            SceneChoice::Night => Scene::Night,
-        },
-        sensors: match args.sensors {
-            None => sensors,
-            Some(SensorsChoice::Kitti) => Sensors::Kitti,
-            Some(SensorsChoice::Umad) => Sensors::Umad,
-        },
+        scene: args.scene,
+        sensors: args.sensors.unwrap_or(sensors),
         scan_every: args.scan_every,
         ..SimConfig::default()
     }

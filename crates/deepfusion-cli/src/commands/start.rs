@@ -221,15 +221,12 @@ impl Start {
 /// The configuration of a packed network's run; its metres are no matter here, of whichever data set.
 fn unpacked_config(network: &Shipped) -> Result<TrainConfig, ModelError> {
     let origin = || network.card.name.clone().into();
-    network
-        .card
-        .config
-        .clone()
-        .try_into()
-        .map_err(|e: toml::de::Error| ModelError::ConfigFile {
-            path: origin(),
-            reason: e.to_string(),
-        })
+    let read = TrainConfig::from_run_table(network.card.config.clone());
+    let (config, _) = read.map_err(|e| ModelError::ConfigFile {
+        path: origin(),
+        reason: e.to_string(),
+    })?;
+    Ok(config)
 }
 
 /// Its tensors.
@@ -309,8 +306,8 @@ mod tests {
     #[test]
     fn layers_and_range_decide() {
         let net = |preset: Preset| preset.config().depth_net;
-        for (a, _) in Preset::ALL {
-            for (b, _) in Preset::ALL {
+        for a in Preset::ALL {
+            for b in Preset::ALL {
                 assert_eq!(same_layers(&net(a), &net(b)), a == b, "{a}, {b}");
             }
         }

@@ -1,6 +1,6 @@
 use std::collections::HashSet;
 
-use deepfusion_data::{CameraChoice, Dataset, speed_unit_warning};
+use deepfusion_data::{Cameras, Dataset, speed_unit_warning};
 use deepfusion_model::{
     DataConfig, Error as ModelError, InputSize, Learn, Preset, RunFolder, TrainConfig,
 };
@@ -12,7 +12,7 @@ use super::recordings::{Part, camera_word, open_part, validates};
 use super::start::Start;
 use super::{device, remarks, resume};
 use crate::allocator;
-use crate::cli::{PresetChoice, TrainArgs};
+use crate::cli::TrainArgs;
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::say;
@@ -26,7 +26,7 @@ pub fn run(args: &TrainArgs) -> Result<()> {
         _ => None,
     };
     let mut config = match &resumed {
-        Some(folder) => resume::with_options(&folder.read_config()?, args)?,
+        Some(folder) => resume::with_options(&folder.read_settings()?, args)?,
         None => start_config(args)?,
     };
     config.validate()?;
@@ -36,7 +36,7 @@ pub fn run(args: &TrainArgs) -> Result<()> {
     })?;
     let mut trainer = match resumed {
         Some(folder) => {
-            folder.write_config(&config)?;
+            folder.write_config(&config, &folder.read_findings()?)?;
             Trainer::resume(config, folder, sets, &device)?
         }
         None => {
@@ -134,7 +134,7 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     let mut config = match &args.config {
         Some(path) => TrainConfig::read_over_preset(path, args.device.compute())?,
         None => {
-            let preset = Preset::from(args.preset.unwrap_or(PresetChoice::Tiny));
+            let preset = args.preset.unwrap_or(Preset::Tiny);
             preset.config_on(args.device.compute())
         }
     };
@@ -155,9 +155,7 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
         config.without(term)?;
     }
     // Said last: a motion that contradicts a term left out is an error, and not silently another one.
-    if let Some(choice) = args.view_motion {
-        config.view_motion = choice.into();
-    }
+    config.view_motion = args.view_motion.unwrap_or(config.view_motion);
     for assignment in &args.set {
         config.set(assignment)?;
     }
@@ -207,11 +205,11 @@ fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), Mode
         data.validation_split.clone_from(&args.val_split);
     }
     data.camera_ahead_s = args.camera_ahead_s.or(data.camera_ahead_s);
-    data.learn = args.learn.map_or(data.learn, Into::into);
+    data.learn = args.learn.unwrap_or(data.learn);
     if let Some(camera) = args.camera {
         data.camera = camera_word(camera).into();
     } else if data.camera.is_empty() && data.sets.is_empty() {
-        data.camera = camera_word(CameraChoice::default()).into();
+        data.camera = camera_word(Cameras::default()).into();
     }
     if data.paths.is_empty() && data.sets.is_empty() {
         return Err(ModelError::Config {

@@ -1,9 +1,8 @@
 //! How sure a network is: whether its intervals hold, and by how much they must be stretched so that they do.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Dataset, write_atomically};
+use deepfusion_data::Dataset;
 use deepfusion_eval::{IntervalFactors, IntervalSample, Protocol};
 use deepfusion_geometry::DepthMap;
 use deepfusion_runtime::ModelSource;
@@ -14,6 +13,7 @@ use super::known_pixels::known_pixels;
 use crate::error::CliError;
 use crate::failure::{Context, Result};
 use crate::model::ModelFacts;
+use crate::output;
 use crate::progress::say;
 
 /// The file in a run's folder.
@@ -41,10 +41,7 @@ fn write(factors: &IntervalFactors, run: &Path) -> Result<PathBuf> {
          # each level and range of predicted depth. Written by `eval --calibrate-uncertainty`.\n{}",
         toml::to_string(factors)?
     );
-    write_atomically::<deepfusion_data::Error>(&path, |out| {
-        out.write_all(text.as_bytes())
-            .map_err(|e| deepfusion_data::Error::file(&path, e))
-    })?;
+    output::write(&path, text)?;
     Ok(path)
 }
 

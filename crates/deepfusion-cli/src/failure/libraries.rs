@@ -91,7 +91,7 @@ impl Reportable for deepfusion_eval::Error {
     }
 }
 
-impl Reportable for deepfusion_compare::Error {
+impl Reportable for deepfusion_eval::compare::Error {
     fn message(&self) -> String {
         match self {
             Self::Data(error) => error.message(),

@@ -1,6 +1,7 @@
 //! The file beside a bag, `<bag>.toml` or `bag.toml` for all bags of a folder: what the bag does not say.
 
 use super::can::CanConfig;
+use super::profile;
 use crate::{Error, Result};
 use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_motion::{FusionConfig, SPEED_SCALES};
@@ -41,6 +42,9 @@ pub(super) struct BagConfig {
     pub(super) can: Option<CanConfig>,
     /// Weights of the sensors in the motion.
     pub(super) fusion: FusionConfig,
+    /// The profile's camera, where nothing else says one.
+    #[serde(skip)]
+    pub(super) profile_camera: Option<CameraConfig>,
     /// Where it was read from; the path it would have where there is none.
     #[serde(skip)]
     pub(super) path: PathBuf,
@@ -184,7 +188,17 @@ impl BagConfig {
         let there = candidates.iter().find(|path| path.is_file());
         // Where there is none, the first is where one would be looked for.
         let path = there.or(candidates.first()).cloned().unwrap_or_default();
+        // Read alone first: what is wrong with it is then told with its line.
         let mut config: Self = crate::config::read_or_default(&path)?;
+        if let Some(name) = &config.profile {
+            let own = crate::config::read_or_default(&path)?;
+            if let Some(filled) = Self::over_profile(own, name) {
+                config = filled.map_err(|e| Error::Config {
+                    path: path.clone(),
+                    problem: e.to_string().trim_end().to_owned(),
+                })?;
+            }
+        }
         config.path = path;
         config.validate()?;
         Ok(config)
@@ -233,11 +247,14 @@ impl BagConfig {
                 "[camera] and calibration both say what the camera is: keep one of them".into(),
             ));
         }
-        let known = self.profile.as_deref().is_none_or(|p| p == "umad");
-        if known {
-            Ok(())
-        } else {
-            Err(self.wrong("profile: the only one there is is \"umad\"".into()))
+        let mut known = profile::names();
+        match &self.profile {
+            Some(asked) if !known.any(|name| name == asked) => {
+                let names: Vec<String> = profile::names().map(|n| format!("\"{n}\"")).collect();
+                let names = names.join(", ");
+                Err(self.wrong(format!("profile: the only one there is is {names}")))
+            }
+            _ => Ok(()),
         }
     }
 

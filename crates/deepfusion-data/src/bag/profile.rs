@@ -1,27 +1,49 @@
-//! Numbers that a data set's paper prints, for bags that hold none.
+//! What a data set's paper says of its vehicle, for bags that hold none of it. A profile is a file as the one beside a bag; it
+//! comes with the program.
 
-use super::config::{CameraConfig, Transform};
-use std::f64::consts::FRAC_PI_2;
+use super::config::BagConfig;
+use toml::{Table, Value};
 
-/// UMAD's camera as printed. Its centre's row is implausible for 480 rows; it is not corrected here, `doctor` and the
-/// inspection say so.
-pub(super) const UMAD_CAMERA: CameraConfig = CameraConfig {
-    fx: 703.64,
-    fy: 724.82,
-    cx: 322.55,
-    cy: 117.60,
-    width: 640,
-    height: 480,
-};
+/// The profiles by their names. They name no files: there is no folder to look for those in.
+const PROFILES: [(&str, &str); 1] = [(
+    "umad",
+    include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/profiles/umad.toml")),
+)];
 
-/// UMAD's LiDAR sits 80 mm below the camera, its axes (forward, left, up) turned to the camera's (right, down,
-/// forward): 120° about (1, −1, 1)/√3 reversed. The paper prints no rotation beyond that.
-pub(super) fn umad_cam_from_lidar() -> Transform {
-    // Rotation vector of the axes' permutation: 2π/3 about (1, −1, 1)/√3.
-    let angle = 4.0 / 3.0 * FRAC_PI_2 / 3.0_f64.sqrt();
-    Transform {
-        translation: [0.0, 0.08, 0.0],
-        rotation: [angle, -angle, angle],
+/// The names that `profile` may be.
+pub(super) fn names() -> impl Iterator<Item = &'static str> {
+    PROFILES.iter().map(|(name, _)| *name)
+}
+
+impl BagConfig {
+    /// The table of a bag's file, with what it leaves out as the profile of this name has it. Its camera goes behind
+    /// CameraInfo, and therefore stays apart. `None` where there is no such profile.
+    ///
+    /// # Errors
+    /// What of either is no such file.
+    pub(super) fn over_profile(own: Table, name: &str) -> Option<Result<Self, toml::de::Error>> {
+        let (_, text) = PROFILES.iter().find(|(known, _)| *known == name)?;
+        let taken_together = || {
+            let mut all: Table = toml::from_str(text)?;
+            let camera = all.remove("camera").map(Value::try_into).transpose()?;
+            merge(&mut all, own);
+            let mut config: Self = all.try_into()?;
+            config.profile_camera = camera;
+            Ok(config)
+        };
+        Some(taken_together())
+    }
+}
+
+/// Puts `own` over `base`, table by table.
+fn merge(base: &mut Table, own: Table) {
+    for (key, value) in own {
+        match (base.get_mut(&key), value) {
+            (Some(Value::Table(base)), Value::Table(own)) => merge(base, own),
+            (_, value) => {
+                base.insert(key, value);
+            }
+        }
     }
 }
 
@@ -30,11 +52,40 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
+    fn umad(own: &str) -> BagConfig {
+        let own = toml::from_str(own).unwrap();
+        BagConfig::over_profile(own, "umad").unwrap().unwrap()
+    }
+
+    /// Each is read as the file beside a bag is, and names no file.
+    #[test]
+    fn profiles_are_files_as_those_beside_bags() {
+        for (name, text) in PROFILES {
+            let config: BagConfig = toml::from_str(text).unwrap();
+            assert!(
+                config.calibration.is_none() && config.can.is_none(),
+                "{name}"
+            );
+            assert!(config.profile.is_none(), "{name}");
+        }
+    }
+
     #[test]
     fn ahead_of_the_lidar_is_ahead_of_the_camera() {
-        let cam_from_lidar = umad_cam_from_lidar().se3();
+        let cam_from_lidar = umad("").cam_from_lidar.unwrap().se3();
         let ahead = cam_from_lidar.transform(&Vector3::new(10.0, 1.0, 2.0));
         let expected = Vector3::new(-1.0, -2.0 + 0.08, 10.0);
         assert!((ahead - expected).norm() < 1e-9, "{ahead}");
+    }
+
+    #[test]
+    fn what_the_bags_file_says_goes_before_it() {
+        let config =
+            umad("[cam_from_lidar]\ntranslation = [0.0, 0.1, 0.0]\nrotation = [0.0, 0.0, 0.0]\n");
+        assert_eq!(config.cam_from_lidar.unwrap().translation, [0.0, 0.1, 0.0]);
+        // CameraInfo goes before the profile's camera, the file's own before CameraInfo.
+        assert!(config.camera.is_none());
+        assert_eq!(config.profile_camera.unwrap().cy, 117.60);
+        assert!(BagConfig::over_profile(Table::new(), "kitti").is_none());
     }
 }

@@ -4,7 +4,6 @@ use super::config::{BagConfig, LidarConfig};
 use super::doppler::ego_velocity;
 use super::dynamic::{DynamicPoints, Listed};
 use super::index::{Index, Place};
-use super::profile;
 use super::scan::{Scan, SeenScan};
 use super::topics::{Role, Topics};
 use super::{image, sensors, source};
@@ -172,11 +171,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         camera_ahead_s,
         scenario: config.scenario.clone(),
     };
-    let cam_from_lidar = match (&config.cam_from_lidar, config.profile.as_deref()) {
-        (Some(transform), _) => Some(transform.se3()),
-        (None, Some("umad")) => Some(profile::umad_cam_from_lidar().se3()),
-        _ => None,
-    };
+    let cam_from_lidar = config.cam_from_lidar.map(|transform| transform.se3());
     let timed = |places: &[Place]| {
         let timed = places.iter().map(|p| (*p, seconds(p.stamp_ns)));
         timed.collect::<Vec<_>>()
@@ -277,9 +272,8 @@ fn camera(
         (Ok(lens), place)
     } else if let Some(info) = index.camera_info.as_ref().filter(|info| info.k[0] > 0.0) {
         (of_camera_info(info, rectified), place(bag, "CameraInfo"))
-    } else if config.profile.as_deref() == Some("umad") {
-        let printed = profile::UMAD_CAMERA.intrinsics();
-        (pinhole(printed), place(&config.path, "profile"))
+    } else if let Some(camera) = config.profile_camera {
+        (pinhole(camera.intrinsics()), place(&config.path, "profile"))
     } else {
         return Err(Error::NoBagCamera {
             path: bag.to_owned(),

@@ -1,6 +1,6 @@
 use super::calendar::{date, stamp};
 use super::{Converted, Moving, at_ns, cam_from_scanner, moving_at, points, seconds_to_move};
-use crate::{Dataset, Error, Result, save_png, write_unsynced};
+use crate::{Dataset, Error, Result, save_png};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{Intrinsics, Se3};
 use rayon::prelude::*;
@@ -92,9 +92,12 @@ fn write_drive(
                     xyz,
                     ..PointCloud::default()
                 };
-                write_unsynced(&path, |out| -> Result<()> {
-                    Ok(cloud.write_kitti_bin(out)?)
-                })?;
+                let failed = |e| Error::file(&path, e);
+                deepfusion_fs::write_unsynced(
+                    &path,
+                    failed,
+                    |out| Ok(cloud.write_kitti_bin(out)?),
+                )?;
             }
             let known = frame.time_s.and_then(|t| moving_at(dataset, t));
             if let (Some(folder), Some(moving)) = (&oxts, known) {

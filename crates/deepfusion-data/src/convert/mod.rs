@@ -11,7 +11,7 @@ mod kitti;
 pub use bag::convert_to_bag;
 pub use kitti::convert_to_kitti;
 
-use crate::{Dataset, Error, GtKind, MotionModel, Result, write_unsynced};
+use crate::{Dataset, Error, GtKind, MotionModel, Result};
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix3, Vector3};
 use std::io::Write as _;
@@ -91,9 +91,9 @@ fn prepare(out: &Path) -> Result<()> {
 }
 
 fn write_text(path: &Path, text: &str) -> Result<()> {
-    write_unsynced(path, |out| {
-        let written = out.write_all(text.as_bytes());
-        written.map_err(|e| Error::file(path, e))
+    let failed = |e| Error::file(path, e);
+    deepfusion_fs::write_unsynced(path, failed, |out| {
+        out.write_all(text.as_bytes()).map_err(failed)
     })
 }
 

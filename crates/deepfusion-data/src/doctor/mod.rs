@@ -32,7 +32,7 @@ mod turn;
 pub use finding::{Figure, Finding, Limit, Outcome, Severity, Status};
 pub use plots::{DrivePlots, Line};
 
-use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions};
+use crate::{Cameras, Dataset, DatasetKind, Error, OpenOptions};
 use deepfusion_hint::Hint;
 use deepfusion_motion::TimeOffset;
 use serde::Serialize;
@@ -152,8 +152,8 @@ pub fn doctor_with(path: &Path, options: &OpenOptions) -> Result<Diagnosis, Erro
         };
         Dataset::open(path, &options)
     };
-    let datasets = match open(CameraChoice::Left) {
-        Err(Error::NoImages { .. }) => open(CameraChoice::Right),
+    let datasets = match open(Cameras::Left) {
+        Err(Error::NoImages { .. }) => open(Cameras::Right),
         other => other,
     }?;
     let trains = datasets.iter().any(|d| opening::pairs(d).is_ok());

@@ -3,7 +3,7 @@
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::flow::flow;
 use super::median;
-use crate::{Camera, CameraChoice, Dataset, OpenOptions, Result, grey_image};
+use crate::{Camera, Cameras, Dataset, OpenOptions, Result, grey_image};
 use deepfusion_motion::GreyImage;
 use std::path::Path;
 
@@ -17,7 +17,7 @@ const LEAST_POINTS: usize = 20;
 pub(super) fn check(path: &Path, options: &OpenOptions) -> Outcome {
     const CHECK: &str = "stereo";
     let options = OpenOptions {
-        camera: CameraChoice::Both,
+        camera: Cameras::Both,
         split: None,
         ..options.clone()
     };

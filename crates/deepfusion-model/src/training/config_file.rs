@@ -1,6 +1,6 @@
 //! Configurations as people write them: a whole file, some keys over a preset, or one key on the command line.
 
-use crate::{Compute, Error, Preset, TrainConfig};
+use crate::{Compute, Error, Preset, TrainConfig, TrainFindings};
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -21,10 +21,11 @@ impl TrainConfig {
             path: path.to_owned(),
             reason: e.to_string().trim_end().to_owned(),
         };
-        let config = match toml::from_str::<Self>(&text) {
-            Ok(whole) => whole,
+        let config = match Self::from_run_text(&text) {
+            Ok((whole, _)) => whole,
             Err(whole) => {
-                let keys: Table = toml::from_str(&text).map_err(wrong)?;
+                let mut keys: Table = toml::from_str(&text).map_err(wrong)?;
+                TrainFindings::take_from(&mut keys).map_err(wrong)?;
                 match keys.get("preset") {
                     None => return Err(wrong(whole)),
                     Some(preset) => {

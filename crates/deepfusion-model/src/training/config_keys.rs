@@ -244,7 +244,7 @@ mod tests {
                 }
             }
         }
-        for (preset, _) in Preset::ALL {
+        for preset in Preset::ALL {
             let mut written = Vec::new();
             let table = toml::Table::try_from(preset.config()).unwrap();
             leaves(&table, "", &mut written);
@@ -259,7 +259,7 @@ mod tests {
     /// What is shown is a file that can be trained with, and says all that there is.
     #[test]
     fn a_commented_file_is_the_configuration() {
-        for (preset, _) in Preset::ALL {
+        for preset in Preset::ALL {
             let config = preset.config();
             let text = config.to_commented_toml().unwrap();
             assert_eq!(toml::from_str::<TrainConfig>(&text).unwrap(), config);

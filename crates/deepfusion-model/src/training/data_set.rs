@@ -1,7 +1,7 @@
 //! Several data sets in one run, each with its own cameras, range of depths and unit of displacement.
 
 use crate::{Error, TrainConfig};
-use deepfusion_geometry::{DepthRange, Intrinsics};
+use deepfusion_geometry::DepthRange;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -21,6 +21,16 @@ pub enum Learn {
 }
 
 impl Learn {
+    /// Its name, on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OwnMotion => "self",
+            Self::Depth => "depth",
+            Self::Both => "both",
+        }
+    }
+
     /// Whether pairs of frames are learned from.
     #[must_use]
     pub fn from_motion(self) -> bool {
@@ -101,13 +111,8 @@ pub struct DataSetConfig {
     /// The depths that the sigmoid spans; absent: the depth network's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range: Option<DepthRange>,
-    /// Metres of translation per unit of PoseNet's output; 0 means the set's mean displacement per pair, which is
-    /// then filled in.
+    /// Metres of translation per unit of PoseNet's output; 0 means the set's mean displacement per pair.
     pub metres_per_unit: f64,
-    /// The camera of its first sample, at the size of its images; filled in from the data.
-    #[schemars(skip)]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub trained_with: Option<Intrinsics>,
 }
 
 impl DataSetConfig {
@@ -130,8 +135,9 @@ impl TrainConfig {
             .map_or(own, |set| (set.range.unwrap_or(own.0), set.metres_per_unit))
     }
 
-    /// The configuration of a run as one of its data sets sees it: depths, displacements and focal lengths mean
-    /// metres of that set's cameras. A run without sets is its own; of one with a single set, that is meant.
+    /// The configuration of a run as one of its data sets sees it: depths and displacements mean metres of that set. A run
+    /// without sets is its own; of one with a single set, that is meant. The set's camera is
+    /// [`crate::TrainFindings::camera_of`].
     ///
     /// # Errors
     /// [`Error::DataSet`] where the run has several sets and none is named, or none of that name.
@@ -158,7 +164,6 @@ impl TrainConfig {
         };
         self.depth_net.range = set.range.unwrap_or(self.depth_net.range);
         self.pose_net.metres_per_unit = set.metres_per_unit;
-        self.camera = set.trained_with.or(self.camera);
         Ok(self)
     }
 

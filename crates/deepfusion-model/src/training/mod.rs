@@ -1,8 +1,10 @@
 //! Everything that decides a training run, as one struct: the command line, `--config` and a run's `config.toml` say the same.
+//! What a run finds out from its data is another: [`TrainFindings`].
 
 mod config_file;
 mod config_keys;
 mod data_set;
+mod findings;
 mod loss_config;
 mod preset;
 mod sample_factors;
@@ -10,6 +12,7 @@ mod train_config;
 
 pub use config_keys::{ConfigKey, config_keys};
 pub use data_set::{DataSetConfig, Learn, SimulatedConfig};
+pub use findings::{SetFindings, TrainFindings};
 pub use loss_config::{CompareAt, DepthLossConfig, FlowLossConfig, LossConfig, MovingConfig};
 pub use preset::{Compute, Preset};
 pub use sample_factors::SampleFactors;

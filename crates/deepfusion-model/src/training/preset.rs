@@ -42,14 +42,26 @@ pub enum Compute {
 const MIN_STEPS: usize = 1200;
 
 impl Preset {
-    /// All presets with the names the command line takes.
-    pub const ALL: [(Self, &'static str); 5] = [
-        (Self::Tiny, "tiny"),
-        (Self::Light, "light"),
-        (Self::Resnet50, "resnet50"),
-        (Self::Paper, "paper"),
-        (Self::Monodepth2, "monodepth2"),
+    /// All presets.
+    pub const ALL: [Self; 5] = [
+        Self::Tiny,
+        Self::Light,
+        Self::Resnet50,
+        Self::Paper,
+        Self::Monodepth2,
     ];
+
+    /// Its name, on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tiny => "tiny",
+            Self::Light => "light",
+            Self::Resnet50 => "resnet50",
+            Self::Paper => "paper",
+            Self::Monodepth2 => "monodepth2",
+        }
+    }
 
     /// The configuration to train with on such a device. On a processor every preset takes images of 320×96, four a step,
     /// which it learns from in minutes: twelve of 640×192 are twelve times as many pixels.
@@ -101,7 +113,6 @@ impl Preset {
             checkpoint_minutes: 10.0,
             start_moving: false,
             view_motion: ViewMotion::PoseNet,
-            camera: None,
             canonical_focal_px: None,
             data: DataConfig::default(),
             loss: LossConfig {
@@ -189,8 +200,7 @@ impl Preset {
 
 impl std::fmt::Display for Preset {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let name = Self::ALL.iter().find(|(preset, _)| preset == self);
-        f.write_str(name.map_or("", |(_, name)| name))
+        f.write_str(self.name())
     }
 }
 
@@ -201,7 +211,7 @@ mod tests {
     /// A processor's images are small; on a graphics card, and where nothing is trained, the sizes are the published ones.
     #[test]
     fn sizes_follow_the_device() {
-        for (preset, _) in Preset::ALL {
+        for preset in Preset::ALL {
             let on = |compute| {
                 let config = preset.config_on(compute);
                 config.validate().unwrap();
@@ -219,11 +229,11 @@ mod tests {
 
     #[test]
     fn every_preset_is_valid_and_survives_its_file() {
-        for (preset, name) in Preset::ALL {
+        for preset in Preset::ALL {
             let config = preset.config();
             config.validate().unwrap();
-            assert_eq!(preset.to_string(), name);
             let text = config.to_toml().unwrap();
+            assert!(text.contains(&format!("preset = \"{preset}\"\n")), "{text}");
             assert_eq!(
                 toml::from_str::<TrainConfig>(&text).unwrap(),
                 config,

@@ -3,7 +3,6 @@ use crate::{
     PoseNetConfig,
 };
 use crate::{DataSetConfig, Error, Learn, LossConfig, Preset};
-use deepfusion_geometry::Intrinsics;
 use deepfusion_kernels::Precision;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -42,6 +41,18 @@ pub enum ViewMotion {
     /// The vehicle's own, from speed and yaw rate, and the body's lean where it is known. PoseNet learns
     /// that motion beside it.
     Vehicle,
+}
+
+impl ViewMotion {
+    /// Its name, on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PoseNet => "posenet",
+            Self::Distance => "distance",
+            Self::Vehicle => "vehicle",
+        }
+    }
 }
 
 /// What is done to the images before the networks see them.
@@ -104,7 +115,7 @@ pub struct DataConfig {
 }
 
 /// Everything that decides a training run. One struct serves the command line, the `--config` file
-/// and the checkpoint; it is stored beside the run as `config.toml`.
+/// and the checkpoint; it is stored beside the run as `config.toml`, with what the run found out ([`crate::TrainFindings`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrainConfig {
@@ -179,10 +190,6 @@ pub struct TrainConfig {
     /// Whose motion the views are synthesised with.
     #[serde(default)]
     pub view_motion: ViewMotion,
-    /// The camera trained with, at network size; filled in from the data. Several cameras: the first.
-    #[schemars(skip)]
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub camera: Option<Intrinsics>,
     /// f_c, the focal length in pixels of the network's input to which all cameras are brought (Metric3D): the network
     /// says depth × f_c/f_y, so that what looks the same in pixels is the same to it whatever the lens. Absent: it says
     /// the depth of the camera it is trained with.
@@ -282,13 +289,13 @@ impl TrainConfig {
         }
     }
 
-    /// Reads a TOML file.
+    /// Reads a TOML file. Of a run's, what it was told, not what it found out ([`crate::RunFolder::read_findings`]).
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::ConfigFile`] naming the line, or what [`Self::validate`] says.
     pub fn read(path: &std::path::Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))?;
-        let config: Self = toml::from_str(&text).map_err(|e| Error::ConfigFile {
+        let (config, _) = Self::from_run_text(&text).map_err(|e| Error::ConfigFile {
             path: path.to_owned(),
             reason: e.to_string(),
         })?;

@@ -68,7 +68,10 @@ pub fn score(drives: &[SimConfig]) -> TargetScore {
     let mut scorer = Scorer::new(ScoringRules::default());
     for config in drives {
         let simulation = Simulation::new(config).unwrap();
-        let mut perception = Perception::new(PerceptionConfig::default());
+        let mut perception = Perception::new(PerceptionConfig {
+            parking_rows: true,
+            ..PerceptionConfig::default()
+        });
         let first_from_world = simulation.world_from_cam(0).inverse();
         scorer.begin_drive();
         for number in 0..simulation.frames() {

@@ -1,5 +1,6 @@
 //! A report as one HTML file that works offline: styles, pictures and charts are inside.
 
+mod comparison;
 mod frames;
 mod page;
 mod sections;

@@ -1,5 +1,5 @@
 use std::fmt::Write as _;
-use std::io::{Cursor, Write as _};
+use std::io::Cursor;
 use std::path::Path;
 
 use base64::Engine as _;
@@ -282,10 +282,8 @@ impl HtmlReport {
     /// # Errors
     /// [`crate::Error::Data`] naming the file.
     pub fn write(&self, path: &Path) -> Result<()> {
-        deepfusion_data::write_atomically(path, |file| {
-            file.write_all(self.to_html().as_bytes())
-                .map_err(|e| deepfusion_data::Error::file(path, e).into())
-        })
+        let written = deepfusion_fs::write(path, self.to_html());
+        Ok(written.map_err(|e| deepfusion_data::Error::file(path, e))?)
     }
 }
 

@@ -70,9 +70,7 @@ impl CsvLog {
                 }
             }
         }
-        deepfusion_data::write_atomically::<Error>(path, |out| {
-            writeln!(out, "{}", kept.join("\n")).map_err(io("write"))
-        })?;
+        deepfusion_fs::write(path, kept.join("\n") + "\n").map_err(io("write"))?;
         let file = OpenOptions::new().append(true).open(path);
         Ok(Self {
             file: file.map_err(io("write"))?,

@@ -60,7 +60,8 @@ pub fn write_rerun(
     }
     let frames = folder.entries(0, usize::MAX);
     let mut report = RerunReport::default();
-    deepfusion_data::write_atomically(path, |out| {
+    let failed = |e| Error::from(deepfusion_data::Error::file(path, e));
+    deepfusion_fs::write_atomically(path, failed, |out| {
         let recording = Recording::begin(out, &folder.name());
         let mut recording = recording.map_err(|e| e.of(path))?;
         let mut logger = FrameLogger::default();

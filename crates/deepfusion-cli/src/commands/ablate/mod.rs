@@ -3,17 +3,16 @@
 mod rows;
 mod table;
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use burn::tensor::Device;
-use deepfusion_data::{CameraChoice, GtKind};
+use deepfusion_data::{Cameras, GtKind};
 use deepfusion_eval::{GroundTruth, Protocol, Report};
 use deepfusion_model::{CheckpointKind, Preset, RunFolder, TrainConfig, ViewMotion};
 use deepfusion_runtime::ModelSource;
 use deepfusion_train::Trainer;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use self::rows::Row;
 use self::table::RunResult;
@@ -23,7 +22,7 @@ use super::evaluate::{
 };
 use super::recordings::{camera_word, training_recordings};
 use super::{device, resume, train};
-use crate::cli::{AblateArgs, DeviceChoice, EngineArgs, PresetChoice};
+use crate::cli::{AblateArgs, ComputeDevice, EngineArgs};
 use crate::error::CliError;
 use crate::failure::{Context, Result};
 use crate::progress::{Progress, say};
@@ -41,7 +40,14 @@ struct Plan {
     /// Recordings to measure on; empty: those trained on.
     eval_data: Vec<PathBuf>,
     /// What all rows share.
+    #[serde(deserialize_with = "settings")]
     config: TrainConfig,
+}
+
+/// A configuration; one that came from a run of before may say what that run found out.
+fn settings<'de, D: Deserializer<'de>>(from: D) -> Result<TrainConfig, D::Error> {
+    let read = TrainConfig::from_run_table(toml::Table::deserialize(from)?);
+    Ok(read.map_err(serde::de::Error::custom)?.0)
 }
 
 const PLAN: &str = "ablate.toml";
@@ -115,7 +121,7 @@ fn new_plan(args: &AblateArgs) -> Result<Plan> {
     let mut config = match &args.config {
         Some(path) => TrainConfig::read_over_preset(path, args.device.compute())?,
         None => {
-            let preset = Preset::from(args.preset.unwrap_or(PresetChoice::Light));
+            let preset = args.preset.unwrap_or(Preset::Light);
             let mut config = preset.config_on(args.device.compute());
             // A measured motion in the warp would teach the rows without the speed loss, too; and masks of what moves
             // are no part of the flow loss.
@@ -130,14 +136,19 @@ fn new_plan(args: &AblateArgs) -> Result<Plan> {
     for term in &args.without {
         config.without(term)?;
     }
-    if let Some(choice) = args.view_motion {
-        config.view_motion = choice.into();
-    }
+    config.view_motion = args.view_motion.unwrap_or(config.view_motion);
     if let Some(size) = args.size {
         config.size.width = size.width as usize;
         config.size.height = size.height as usize;
     }
     config.batch = args.batch.unwrap_or(config.batch);
+    for assignment in &args.set {
+        if let Some(reason) = decided_by_the_table(assignment) {
+            let (assignment, reason) = (assignment.clone(), reason.into());
+            return Err(deepfusion_model::Error::Setting { assignment, reason }.into());
+        }
+        config.set(assignment)?;
+    }
     config.data.paths.clone_from(&args.data);
     config.data.camera = camera_word(args.camera).into();
     // Every row begins anew.
@@ -152,6 +163,19 @@ fn new_plan(args: &AblateArgs) -> Result<Plan> {
         eval_data: args.eval_data.iter().map(absolute).collect(),
         config,
     })
+}
+
+/// Why a key cannot be set for all rows, where it cannot.
+fn decided_by_the_table(assignment: &str) -> Option<&'static str> {
+    let key = assignment.split('=').next().unwrap_or_default().trim();
+    match key {
+        "steps" | "epochs" | "min_steps" => Some("--budget says how long every run learns"),
+        "seed" => Some("--seeds says how often a row is run, and with which seeds"),
+        "init" | "init_sha256" => Some("every run begins from nothing"),
+        "data.paths" => Some("the recordings are those of --data"),
+        "data.camera" => Some("the cameras are those of --camera"),
+        _ => None,
+    }
 }
 
 /// The rows of these names; those of the paper's table where none is named.
@@ -201,7 +225,7 @@ fn one_run(
     row: Row,
     config: TrainConfig,
     plan: &Plan,
-    device: DeviceChoice,
+    device: ComputeDevice,
 ) -> Result<Outcome> {
     let done = folder.join("result.json");
     if done.exists() {
@@ -270,7 +294,7 @@ fn spent(folder: &Path, seconds: f64) -> Result<f64> {
 }
 
 /// The run's last checkpoint, measured like `eval` does: equal budgets are compared, and not choices of a checkpoint.
-fn measure(run: &Path, plan: &Plan, device: DeviceChoice) -> Result<Report> {
+fn measure(run: &Path, plan: &Plan, device: ComputeDevice) -> Result<Report> {
     let checkpoint = ModelSource::named(&run.join("last.safetensors"))?;
     let mut estimator = engine::load(&checkpoint, &EngineArgs::on(device))?;
     let (train_sets, eval_sets) = open_eval_data(plan)?;
@@ -304,7 +328,7 @@ fn open_eval_data(plan: &Plan) -> Result<(Datasets, Datasets)> {
     };
     let eval = match plan.eval_data.as_slice() {
         [] => trained_on()?,
-        paths => open_datasets(paths, None, CameraChoice::default())?,
+        paths => open_datasets(paths, None, Cameras::default())?,
     };
     let train = trained_on()?;
     Ok((train, eval))
@@ -340,9 +364,5 @@ fn write(path: &Path, text: &str) -> Result<()> {
     if let Some(parent) = path.parent() {
         std::fs::create_dir_all(parent).map_err(|e| deepfusion_data::Error::file(parent, e))?;
     }
-    deepfusion_data::write_atomically::<deepfusion_data::Error>(path, |file| {
-        file.write_all(text.as_bytes())
-            .map_err(|e| deepfusion_data::Error::file(path, e))
-    })?;
-    Ok(())
+    output::write(path, text)
 }

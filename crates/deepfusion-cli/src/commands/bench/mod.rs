@@ -21,7 +21,7 @@ use serde::Serialize;
 
 use self::modules::{Module, Modules};
 use super::device;
-use crate::cli::{BenchArgs, PresetChoice};
+use crate::cli::BenchArgs;
 use crate::failure::Result;
 use crate::model;
 use crate::pipeline::{self, Threads};
@@ -163,7 +163,7 @@ fn network(args: &BenchArgs) -> Result<(String, TrainConfig, Box<dyn DepthRunner
         let name = model.given().display().to_string();
         return Ok((name, config, estimator.into_runner()));
     }
-    let preset = Preset::from(args.preset.unwrap_or(PresetChoice::Tiny));
+    let preset = args.preset.unwrap_or(Preset::Tiny);
     let mut config = preset.config();
     if let Some(size) = args.size {
         config.size.width = size.width as usize;
@@ -271,7 +271,10 @@ impl Bench {
 
     /// Ground, boxes and tracks of a picture that is seen again and again.
     fn targets(&self, repeats: usize) -> Result<f64> {
-        let mut perception = Perception::new(PerceptionConfig::default());
+        let mut perception = Perception::new(PerceptionConfig {
+            parking_rows: true,
+            ..PerceptionConfig::default()
+        });
         let mut time_s = 0.0;
         median(repeats, || {
             time_s += 0.1;

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::{Parser, ValueEnum};
-use deepfusion_data::{Dataset, OpenOptions, Split, write_atomically};
+use clap::Parser;
+use deepfusion_data::{Dataset, OpenOptions, Split};
 use deepfusion_model::{TrainConfig, ViewMotion};
 use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_render::{HtmlReport, PictureFormat};
@@ -18,8 +18,9 @@ use crate::cli::PerceiveArgs;
 use crate::commands::evaluate::Evaluated;
 use crate::commands::recorder::clock;
 use crate::commands::start::Start;
-use crate::commands::{perceive, run_report};
+use crate::commands::{device, perceive, run_report};
 use crate::failure::Result;
+use crate::output;
 use crate::progress::say;
 
 /// Frames of the drive along the new street, ten a second, and how many of them have a scan.
@@ -153,10 +154,7 @@ impl Parts {
                 format!("{} {:010} l\n", all.split_name(), frame.number)
             };
             let text: String = part.iter().map(line).collect();
-            write_atomically::<deepfusion_data::Error>(&path, |file| {
-                std::io::Write::write_all(file, text.as_bytes())
-                    .map_err(|e| deepfusion_data::Error::file(&path, e))
-            })?;
+            output::write(&path, text)?;
             Ok(path)
         };
         let learn = list("learned.txt", &frames[..LEARNED])?;
@@ -173,8 +171,7 @@ impl Parts {
 /// 3D targets of the whole drive, followed over time, with pictures: the program's own command, which takes the embedded
 /// network where none is named.
 fn perceive(demo: &Demo, drive: &Path, out: &Path) -> Result<()> {
-    let device = demo.args.device.to_possible_value();
-    let device = device.map_or_else(String::new, |value| value.get_name().to_owned());
+    let device = device::name(demo.args.device);
     let words = [
         "perceive".as_ref(),
         drive.as_os_str(),

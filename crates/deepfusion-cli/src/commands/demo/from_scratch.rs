@@ -1,6 +1,6 @@
 //! From scratch: six simulated streets, a small network that knows nothing, and a seventh street to be measured on.
 
-use deepfusion_data::{CameraChoice, Dataset, OpenOptions};
+use deepfusion_data::{Cameras, Dataset, OpenOptions};
 use deepfusion_model::{CompareAt, InputSize, Preset, Reprojection, TrainConfig, ViewMotion};
 use deepfusion_render::HtmlReport;
 use deepfusion_sim::SimConfig;
@@ -76,7 +76,7 @@ pub fn run(demo: &Demo) -> Result<()> {
 
     say("3/4 measuring on the street never seen");
     let mut estimator = demo.estimator(&model)?;
-    let train_sets = open_datasets(&train_drives, None, CameraChoice::default())?;
+    let train_sets = open_datasets(&train_drives, None, Cameras::default())?;
     let test_sets = Dataset::open(&test_drive, &OpenOptions::default())?;
     let evaluated = measure(&mut estimator, &train_sets, &test_sets)?;
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Dataset, RgbImage, save_png, write_atomically, write_depth_png};
+use deepfusion_data::{Dataset, RgbImage, save_png, write_depth_png};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_render::{
@@ -14,6 +14,7 @@ use deepfusion_runtime::DepthEstimator;
 use super::{DEMO, Demo};
 use crate::failure::Result;
 use crate::interrupt;
+use crate::output;
 
 /// How both ways measure.
 pub const PROTOCOL: &str = "Scans of the simulated LiDAR, Garg's crop, 80 m. Unscaled: the prediction as it is, in metres. \
@@ -101,10 +102,7 @@ impl Shown {
         let cloud = PointCloud::from_depth(&self.depth, &self.camera, colours, CLOUD_REACH_M)?;
         let mut bytes = Vec::new();
         cloud.write_ply(&mut bytes)?;
-        write_atomically::<deepfusion_data::Error>(path, |file| {
-            std::io::Write::write_all(file, &bytes)
-                .map_err(|e| deepfusion_data::Error::file(path, e))
-        })?;
+        output::write(path, bytes)?;
         for (view, caption) in [
             (
                 CloudView::oblique(),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use deepfusion_data::doctor::{Diagnosis, DriveDiagnosis, Line};
-use deepfusion_data::{Camera, CameraChoice, Dataset, GtKind, OpenOptions, overlay};
+use deepfusion_data::{Camera, Cameras, Dataset, GtKind, OpenOptions, overlay};
 use deepfusion_render::{HtmlReport, LineChart, PictureFormat};
 
 use super::lines;
@@ -79,9 +79,9 @@ fn pictures(
     }
     let options = OpenOptions {
         camera: if drive.camera == Camera::Left.number() {
-            CameraChoice::Left
+            Cameras::Left
         } else {
-            CameraChoice::Right
+            Cameras::Right
         },
         ..options.clone()
     };

@@ -69,8 +69,12 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
     }
 }
 
-/// Settings from a file over `base`.
+/// Settings from a file over `base`, with rows of parked cars unless the file says otherwise.
 pub fn read_config(path: Option<&Path>, base: PerceptionConfig) -> Result<PerceptionConfig> {
+    let base = PerceptionConfig {
+        parking_rows: true,
+        ..base
+    };
     let Some(path) = path else { return Ok(base) };
     // What the file says over what it does not.
     let text = std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{RgbImage, save_png, write_unsynced};
+use deepfusion_data::{RgbImage, save_png};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::{
@@ -13,6 +13,7 @@ use deepfusion_runtime::Prediction;
 
 use crate::cli::PerceiveSave;
 use crate::failure::{Failure, Result};
+use crate::output;
 
 /// Cells of the free space and how far it reaches, metres.
 const GRID: (f32, f32) = (0.25, 50.0);
@@ -140,7 +141,8 @@ impl Picture {
             Self::Image(picture) => save_png(picture, path)?,
             Self::Cloud(cloud) => {
                 let pcd = path.extension().is_some_and(|ending| ending == "pcd");
-                write_unsynced::<Failure>(path, |out| {
+                let failed = |e| deepfusion_data::Error::file(path, e).into();
+                deepfusion_fs::write_unsynced::<Failure>(path, failed, |out| {
                     if pcd {
                         Ok(cloud.write_pcd(out)?)
                     } else {
@@ -157,8 +159,5 @@ impl Picture {
 pub fn save_jpeg(image: &RgbImage, path: &Path) -> Result<()> {
     let mut bytes = Vec::new();
     image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 90).encode_image(image)?;
-    write_unsynced::<deepfusion_data::Error>(path, |out| {
-        std::io::Write::write_all(out, &bytes).map_err(|e| deepfusion_data::Error::file(path, e))
-    })?;
-    Ok(())
+    output::write_unsynced(path, bytes)
 }

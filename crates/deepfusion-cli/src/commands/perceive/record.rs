@@ -3,9 +3,10 @@
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::write_unsynced;
 use deepfusion_perception::{Collision, Surroundings, Target};
 use serde::Serialize;
+
+use crate::output;
 
 use super::super::scene::{Motion, Scale};
 use crate::failure::Result;
@@ -89,11 +90,7 @@ impl FrameRecord {
     /// As a file of its own.
     pub fn write(&self, path: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self)? + "\n";
-        write_unsynced::<deepfusion_data::Error>(path, |out| {
-            out.write_all(text.as_bytes())
-                .map_err(|e| deepfusion_data::Error::file(path, e))
-        })?;
-        Ok(())
+        output::write_unsynced(path, text)
     }
 }
 

@@ -5,12 +5,12 @@ mod imp {
     use crate::failure::Result;
     use deepfusion_model::StoredNetwork;
 
-    use crate::cli::DeviceChoice;
+    use crate::cli::ComputeDevice;
     use crate::commands::device;
 
     pub use deepfusion_train::Inspector;
 
-    pub fn open(network: &StoredNetwork, device: DeviceChoice) -> Result<Inspector> {
+    pub fn open(network: &StoredNetwork, device: ComputeDevice) -> Result<Inspector> {
         Ok(Inspector::new(network, &device::open(device)?)?)
     }
 }
@@ -21,7 +21,7 @@ mod imp {
     use deepfusion_model::{InputSize, StoredNetwork};
     use deepfusion_runtime::LayerMaps;
 
-    use crate::cli::DeviceChoice;
+    use crate::cli::ComputeDevice;
     use crate::error::CliError;
 
     /// There is none.
@@ -33,7 +33,7 @@ mod imp {
         }
     }
 
-    pub fn open(_: &StoredNetwork, _: DeviceChoice) -> Result<Inspector> {
+    pub fn open(_: &StoredNetwork, _: ComputeDevice) -> Result<Inspector> {
         Err(CliError::BuiltWithoutTraining {
             what: "--save features",
         }

@@ -16,9 +16,9 @@ mod watcher;
 
 use std::sync::Once;
 
-use deepfusion_compare::MetricScale;
 use deepfusion_data::{LiveFrame, RgbImage, load_photo};
 use deepfusion_eval::IntervalFactors;
+use deepfusion_eval::compare::MetricScale;
 use deepfusion_geometry::Intrinsics;
 use deepfusion_runtime::LayerMaps;
 use deepfusion_runtime::ModelSource;

@@ -1,9 +1,8 @@
 //! The files of one prediction.
 
-use std::io::Write;
 use std::path::Path;
 
-use deepfusion_data::{RgbImage, save_png, write_depth_png, write_unsynced};
+use deepfusion_data::{RgbImage, save_png, write_depth_png};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_render::{DepthScale, depth_picture, side_by_side, with_depth_legend};
@@ -14,6 +13,7 @@ use crate::cli::Save;
 use crate::commands::uncertainty;
 use crate::error::CliError;
 use crate::failure::{Failure, Result};
+use crate::output;
 
 /// The name of an output.
 pub fn file_name(name: &str, save: Save) -> String {
@@ -89,11 +89,11 @@ pub fn write(
             };
             let mut cloud = PointCloud::from_depth(depth, k, rgb, far)?;
             cloud.sigma = sigma.map(|sigma| PointCloud::column(&sigma.data, depth, far));
-            write_unsynced::<CloudError>(path, |out| match save {
+            let failed = |e| deepfusion_data::Error::file(path, e).into();
+            deepfusion_fs::write_unsynced::<Failure>(path, failed, |out| match save {
                 Save::Pcd => Ok(cloud.write_pcd(out)?),
                 _ => Ok(cloud.write_ply(out)?),
-            })
-            .map_err(CloudError::into_inner)?;
+            })?;
         }
     }
     Ok(())
@@ -103,27 +103,5 @@ fn write_npy(depth: &DepthMap, path: &Path) -> Result<()> {
     let view = ndarray::ArrayView2::from_shape((depth.height, depth.width), &depth.data)?;
     let mut bytes = Vec::new();
     ndarray_npy::WriteNpyExt::write_npy(&view, &mut bytes)?;
-    write_unsynced::<deepfusion_data::Error>(path, |out| {
-        out.write_all(&bytes)
-            .map_err(|e| deepfusion_data::Error::file(path, e))
-    })?;
-    Ok(())
-}
-
-/// Either crate's error, out of a file being written.
-#[derive(Debug, thiserror::Error)]
-enum CloudError {
-    #[error(transparent)]
-    File(#[from] deepfusion_data::Error),
-    #[error(transparent)]
-    Cloud(#[from] deepfusion_geometry::cloud::Error),
-}
-
-impl CloudError {
-    fn into_inner(self) -> Failure {
-        match self {
-            Self::File(error) => error.into(),
-            Self::Cloud(error) => error.into(),
-        }
-    }
+    output::write_unsynced(path, bytes)
 }

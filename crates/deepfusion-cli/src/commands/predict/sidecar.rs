@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use clap::ValueEnum;
-use deepfusion_compare::MetricScale;
-use deepfusion_data::{LiveFrame, write_atomically};
+use deepfusion_data::LiveFrame;
+use deepfusion_eval::compare::MetricScale;
 use deepfusion_fs::Content;
 use deepfusion_runtime::DepthEstimator;
 use deepfusion_runtime::ModelSource;
@@ -19,6 +19,7 @@ use super::camera::CameraSource;
 use crate::cli::{Outputs, PredictionArgs, Save};
 use crate::failure::Result;
 use crate::model::ModelFacts;
+use crate::output;
 
 /// A prediction's description.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -266,10 +267,7 @@ impl Sidecar {
     /// Writes it into the folder, whole or not at all, without waiting for the disk: where nothing goes on from it.
     pub fn write_unsynced(&self, folder: &Path, name: &str) -> Result<()> {
         let path = Self::path(folder, name);
-        let text = as_json(self)?;
-        Ok(deepfusion_data::write_unsynced(&path, |out| {
-            put(out, &text, &path)
-        })?)
+        output::write_unsynced(&path, as_json(self)?)
     }
 
     /// Whether every output is there with the content that was written.
@@ -293,8 +291,7 @@ impl Sidecar {
 
 /// Writes a value as indented JSON, atomically.
 pub fn write_json<T: Serialize>(value: &T, path: &Path) -> Result<()> {
-    let text = as_json(value)?;
-    Ok(write_atomically(path, |out| put(out, &text, path))?)
+    output::write(path, as_json(value)?)
 }
 
 fn as_json<T: Serialize>(value: &T) -> Result<Vec<u8>> {

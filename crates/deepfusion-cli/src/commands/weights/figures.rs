@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_compare::SavedEvaluation;
+use deepfusion_eval::compare::SavedEvaluation;
 use deepfusion_weights::Figure;
 
 /// The evaluations of the checkpoint with this SHA-256, in the order of their files' names. A file that cannot be read, or is of another

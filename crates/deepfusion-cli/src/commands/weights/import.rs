@@ -6,7 +6,7 @@ use deepfusion_nn::{
     DepthNet, DepthNetConfig, PoseNet, PoseNetConfig, weights::load_torchvision_resnet,
 };
 use deepfusion_train::{
-    Checkpoint, CheckpointKind, Checkpoints, Model, Preset, RunFolder, TrainConfig,
+    Checkpoint, CheckpointKind, Checkpoints, Model, Preset, RunFolder, TrainConfig, TrainFindings,
 };
 
 use crate::failure::Result;
@@ -23,7 +23,7 @@ pub fn run(files: &[PathBuf], out: &Path) -> Result<()> {
         files => from_monodepth2(&named(files), &device)?,
     };
     let folder = RunFolder::create(&output::run_folder(Some(out), "weights")?)?;
-    folder.write_config(&config)?;
+    folder.write_config(&config, &TrainFindings::default())?;
     let state = Checkpoint {
         step: 0,
         best_validation: None,

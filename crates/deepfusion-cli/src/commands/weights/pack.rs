@@ -1,5 +1,5 @@
-use deepfusion_compare::sha256_of_file;
 use deepfusion_data::to_network_input;
+use deepfusion_eval::compare::sha256_of_file;
 use deepfusion_infer::Precision;
 use deepfusion_model::depth_graph_with_uncertainty;
 use deepfusion_model::{RunFolder, StoredNetwork, TrainConfig};
@@ -23,16 +23,17 @@ pub fn run(args: &PackArgs) -> Result<()> {
         return Err(CliError::PackedAlready { path }.into());
     }
     let (folder, given) = RunFolder::open(&args.model)?;
-    let asked = args.checkpoint.map(Into::into).or(given);
+    let asked = args.checkpoint.or(given);
     let kind = asked.unwrap_or_else(|| folder.preferred());
     let file = folder.checkpoint_path(kind);
     if folder.read_state(kind)?.encoders_only {
         return Err(CliError::NothingToPack { path: file }.into());
     }
-    let config = folder.read_config()?;
+    let (config, findings) = (folder.read_config()?, folder.read_findings()?);
     let (weights, state) = folder.load_depth_weights(kind)?;
     let network = StoredNetwork {
         config: config.clone(),
+        camera: findings.camera,
         weights,
         step: state.step,
     };
@@ -72,7 +73,9 @@ pub fn run(args: &PackArgs) -> Result<()> {
             .map(toml::Table::try_from)
             .transpose()
             .context("the factors of its intervals have no TOML form")?,
-        config: toml::Table::try_from(config.without_places())
+        config: config
+            .without_places()
+            .to_run_table(&findings)
             .context("the run's configuration has no TOML form")?,
     };
     let shipped = Shipped::new(card, bytes)?;

@@ -2,9 +2,9 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use crate::plausibility::{Flag, Seven, THREE_DECIMALS, check, identical};
-use crate::table::{Column, Row, Table, Tables, Value};
-use crate::{Error, Result};
+use super::plausibility::{Flag, Seven, THREE_DECIMALS, check, identical};
+use super::table::{Column, Row, Table, Tables, Value};
+use super::{Error, Result};
 
 /// Farthest depth of KITTI's protocols, in metres.
 const CAP_M: f64 = 80.0;
@@ -203,7 +203,7 @@ fn commonest<'a>(rows: &[&'a PublishedRow]) -> Option<(&'a str, &'a str)> {
 /// [`Error::Published`], which a test excludes.
 pub fn published_tables() -> Result<Tables> {
     static PUBLISHED: LazyLock<std::result::Result<Published, String>> = LazyLock::new(|| {
-        Published::parse(include_str!("../data/published.toml")).map_err(|e| e.to_string())
+        Published::parse(include_str!("../../data/published.toml")).map_err(|e| e.to_string())
     });
     match &*PUBLISHED {
         Ok(published) => Ok(published.tables()),
@@ -214,7 +214,7 @@ pub fn published_tables() -> Result<Tables> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plausibility::Severity;
+    use crate::compare::plausibility::Severity;
 
     fn flagged(severity: Severity) -> Vec<String> {
         let tables = published_tables().unwrap().tables;
@@ -265,7 +265,7 @@ mod tests {
             error.contains("published.toml") && error.contains("id"),
             "{error}"
         );
-        let text = include_str!("../data/published.toml")
+        let text = include_str!("../../data/published.toml")
             .replace("source = \"monovit\"", "source = \"no\"");
         let error = Published::parse(&text).unwrap_err().to_string();
         assert!(error.contains("`MonoViT` has no such source"), "{error}");

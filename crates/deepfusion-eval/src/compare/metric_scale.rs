@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::saved::SavedEvaluation;
+use super::saved::SavedEvaluation;
 
 /// How far a prediction may be off as a whole, and its metres still be trusted: exp(|bias|) ≤ 1 ± this.
 pub const TRUSTED_WITHIN: f64 = 0.1;

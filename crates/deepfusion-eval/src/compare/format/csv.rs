@@ -1,12 +1,12 @@
-use crate::Result;
-use crate::table::{Tables, Value};
+use crate::compare::Result;
+use crate::compare::table::{Tables, Value};
 
 impl Tables {
     /// One table of all: `table`, the union of all columns (empty where a table has none), `flags`, `source`. Numbers in full
     /// precision.
     ///
     /// # Errors
-    /// [`crate::Error::Csv`].
+    /// [`crate::compare::Error::Csv`].
     pub fn to_csv(&self) -> Result<String> {
         let mut keys: Vec<&str> = Vec::new();
         for column in self.tables.iter().flat_map(|t| &t.columns) {

@@ -1,11 +1,11 @@
-use std::io::{Read, Write};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use deepfusion_eval::{ImageScore, Report};
+use crate::{ImageScore, Report};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::Result;
+use super::{Error, Result};
 
 /// Version of the file's layout.
 pub const SAVED_VERSION: u32 = 1;
@@ -138,16 +138,14 @@ impl SavedEvaluation {
     /// Writes it into the run's folder, whole or not at all; the file's path.
     ///
     /// # Errors
-    /// [`crate::Error::Data`] naming the file.
+    /// [`Error::File`] naming the file.
     pub fn write(&self, run: &Path) -> Result<PathBuf> {
         let folder = run.join(FOLDER);
-        std::fs::create_dir_all(&folder).map_err(|e| deepfusion_data::Error::file(&folder, e))?;
+        std::fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, e))?;
         let path = folder.join(self.file_name());
-        let failed = |e| deepfusion_data::Error::file(&path, e);
+        let failed = |e| Error::file(&path, e);
         let text = serde_json::to_string_pretty(self).map_err(|e| failed(e.into()))?;
-        deepfusion_data::write_atomically::<deepfusion_data::Error>(&path, |file| {
-            writeln!(file, "{text}").map_err(failed)
-        })?;
+        deepfusion_fs::write(&path, text + "\n").map_err(failed)?;
         Ok(path)
     }
 
@@ -168,9 +166,9 @@ impl SavedEvaluation {
 /// SHA-256 of a file's bytes, in hexadecimal.
 ///
 /// # Errors
-/// [`crate::Error::Data`] naming the file.
+/// [`Error::NoSuchPath`] or [`Error::File`] naming the file.
 pub fn sha256_of_file(path: &Path) -> Result<String> {
-    let failed = |e| deepfusion_data::Error::file(path, e);
+    let failed = |e| Error::file(path, e);
     let mut file = std::fs::File::open(path).map_err(failed)?;
     let mut digest = Sha256::new();
     let mut buffer = vec![0; 1 << 16];

@@ -1,13 +1,25 @@
 use deepfusion_hint::Hint;
-use std::path::PathBuf;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 
 /// What can go wrong while evaluations are read and put side by side.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A file that cannot be read or written.
-    #[error(transparent)]
-    Data(#[from] deepfusion_data::Error),
+    /// There is nothing at the path.
+    #[error("{}: no such file or folder", path.display())]
+    NoSuchPath {
+        /// The path given.
+        path: PathBuf,
+    },
+    /// A file could not be opened, read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// A file that is no evaluation.
     #[error("{}: no evaluation: {what}", path.display())]
     NotAnEvaluation {
@@ -17,7 +29,7 @@ pub enum Error {
         what: String,
     },
     /// A file of a newer program.
-    #[error("{}: format version {found}, this program reads up to {}", path.display(), crate::SAVED_VERSION)]
+    #[error("{}: format version {found}, this program reads up to {}", path.display(), super::SAVED_VERSION)]
     Version {
         /// The file.
         path: PathBuf,
@@ -38,13 +50,35 @@ pub enum Error {
     Published(String),
 }
 
-/// A result of this crate.
+/// A result of this module.
 pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// An error of the system's at `path`; a missing file is [`Error::NoSuchPath`].
+    pub(super) fn file(path: &Path, source: std::io::Error) -> Self {
+        let path = path.to_owned();
+        match source.kind() {
+            ErrorKind::NotFound => Self::NoSuchPath { path },
+            _ => Self::File { path, source },
+        }
+    }
+}
 
 impl Hint for Error {
     fn hint(&self) -> Option<String> {
         match self {
-            Self::Data(inner) => inner.hint(),
+            Self::NoSuchPath { .. } => {
+                Some("check the spelling, and that the disk is mounted".into())
+            }
+            Self::File { source, .. } => match source.kind() {
+                ErrorKind::StorageFull => {
+                    Some("the disk is full: free some space and run again".into())
+                }
+                ErrorKind::PermissionDenied => {
+                    Some("check the permissions of the file and its folder".into())
+                }
+                _ => None,
+            },
             Self::NotAnEvaluation { .. } => Some(
                 "give a run's folder, a file of its eval/ folder, or an evaluation as JSON".into(),
             ),

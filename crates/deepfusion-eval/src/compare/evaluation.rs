@@ -1,11 +1,11 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use deepfusion_eval::Report;
+use crate::Report;
 use serde_json::Value;
 
-use crate::saved::{Measured, ModelFile, SavedEvaluation, sha256_of_file};
-use crate::{Error, Result, SAVED_VERSION};
+use super::saved::{Measured, ModelFile, SavedEvaluation, sha256_of_file};
+use super::{Error, Result, SAVED_VERSION};
 
 /// An evaluation to be compared.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,7 +41,8 @@ impl Evaluation {
     /// Rows of the same name are told apart by their paths and checkpoints.
     ///
     /// # Errors
-    /// [`Error::NotEvaluated`], [`Error::NotAnEvaluation`], [`Error::Version`], [`Error::Data`].
+    /// [`Error::NotEvaluated`], [`Error::NotAnEvaluation`], [`Error::Version`], [`Error::NoSuchPath`],
+    /// [`Error::File`].
     pub fn collect(paths: &[PathBuf]) -> Result<Vec<Self>> {
         let mut all = Vec::new();
         let mut digests = HashMap::new();
@@ -67,8 +68,7 @@ impl Evaluation {
         run: Option<&Path>,
         digests: &mut HashMap<PathBuf, Option<String>>,
     ) -> Result<Self> {
-        let text =
-            std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
+        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
         let not = |what: String| Error::NotAnEvaluation {
             path: path.to_owned(),
             what,

@@ -3,8 +3,8 @@
 //! A [`SavedEvaluation`] is what `eval` leaves in a run's folder; [`Evaluation::collect`] reads such files, whole run folders
 //! and the plain output of `eval --json`. [`run_tables`] sorts them by what they were measured on, so that no table mixes
 //! protocols or images; [`published_tables`] are the field's, quoted with their places. Every row goes through
-//! [`plausibility::check`]. The tables come as [text](Tables::to_text), [CSV](Tables::to_csv), [LaTeX](Tables::to_latex) and
-//! [HTML](Tables::add_to).
+//! [`plausibility::check`]. The tables come as [text](Tables::to_text), [CSV](Tables::to_csv), [LaTeX](Tables::to_latex), and as
+//! a section of an HTML page through `deepfusion-render`.
 
 mod error;
 mod evaluation;
@@ -22,4 +22,4 @@ pub use metric_scale::{LEAST_IMAGES, LEAST_STEPS, MetricScale, TRUSTED_WITHIN, V
 pub use published::{Published, published_tables};
 pub use runs::run_tables;
 pub use saved::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation, sha256_of_file};
-pub use table::{Better, Column, Row, Table, Tables, Value};
+pub use table::{Better, Column, Rank, Row, Table, Tables, Value};

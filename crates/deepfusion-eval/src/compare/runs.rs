@@ -1,11 +1,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use deepfusion_eval::{Crop, GroundTruth, Metrics, PointErrors, RangeBin, Report};
+use crate::{Crop, GroundTruth, Metrics, PointErrors, RangeBin, Report};
 
-use crate::evaluation::{Evaluation, Origin};
-use crate::plausibility::{Flag, Severity, check, identical};
-use crate::table::{Better, Column, Row, Table, Tables, Value};
+use super::evaluation::{Evaluation, Origin};
+use super::plausibility::{Flag, Severity, check, identical};
+use super::table::{Better, Column, Row, Table, Tables, Value};
 
 /// Tables of evaluations: unscaled, median-scaled, by range and of drawn points, for each ground on which was measured.
 #[must_use]

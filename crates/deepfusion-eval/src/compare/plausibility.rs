@@ -16,7 +16,7 @@
 //! adds k²t², and 1 + 3 + … = k²). The root is concave, so means over images may fall below it when a few images hold
 //! the wrong pixels; a row that does is flagged as implausible, not impossible.
 
-use deepfusion_eval::Metrics;
+use crate::Metrics;
 
 /// The seven metrics as far as they are known, in the order of [`Metrics::NAMES`].
 pub type Seven = [Option<f64>; 7];

@@ -1,6 +1,6 @@
 use std::fmt::Write as _;
 
-use crate::table::{Rank, Table, Tables};
+use crate::compare::table::{Rank, Table, Tables};
 
 /// Footnotes are broken into lines of about this many letters.
 const LINE: usize = 116;
@@ -51,7 +51,7 @@ fn table_text(out: &mut String, table: &Table) {
         });
         lines.push(line.collect());
         let numbers: String = numbers.iter().map(|n| format!("[{n}]")).collect();
-        let sign = if Table::doubtful(row) { "! " } else { "" };
+        let sign = if row.is_doubtful() { "! " } else { "" };
         tails.push(format!("{sign}{numbers}"));
     }
     let width = |c: usize| {

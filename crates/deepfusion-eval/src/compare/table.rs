@@ -1,4 +1,4 @@
-use crate::plausibility::{Flag, Severity};
+use super::plausibility::{Flag, Severity};
 
 /// Which end of a column is better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,7 +58,7 @@ impl Column {
             "δ<1.25²",
             "δ<1.25³",
         ];
-        let names = deepfusion_eval::Metrics::NAMES.iter().zip(TITLES);
+        let names = crate::Metrics::NAMES.iter().zip(TITLES);
         names
             .enumerate()
             .map(|(i, (key, title))| {
@@ -129,6 +129,12 @@ pub struct Row {
 }
 
 impl Row {
+    /// Whether a reader must be warned of it.
+    #[must_use]
+    pub fn is_doubtful(&self) -> bool {
+        self.flags.iter().any(|f| f.severity != Severity::Remark)
+    }
+
     /// Whether it takes part in the ranking: rows that cannot be right do not.
     fn competes(&self) -> bool {
         self.ranked
@@ -204,7 +210,8 @@ impl Table {
 
     /// The different flags of its rows and where the figures are from, numbered from 1 in the order in which they come; and
     /// for each row the numbers of its flags.
-    pub(crate) fn footnotes(&self) -> (Vec<String>, Vec<Vec<usize>>) {
+    #[must_use]
+    pub fn footnotes(&self) -> (Vec<String>, Vec<Vec<usize>>) {
         let mut notes: Vec<String> = Vec::new();
         let mut number = |text: String| match notes.iter().position(|n| *n == text) {
             Some(place) => place + 1,
@@ -221,11 +228,6 @@ impl Table {
         };
         let numbers = self.rows.iter().map(of_row).collect();
         (notes, numbers)
-    }
-
-    /// Whether a reader must be warned of a row.
-    pub(crate) fn doubtful(row: &Row) -> bool {
-        row.flags.iter().any(|f| f.severity != Severity::Remark)
     }
 }
 

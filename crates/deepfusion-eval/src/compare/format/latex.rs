@@ -1,6 +1,6 @@
 use std::fmt::Write as _;
 
-use crate::table::{Rank, Table, Tables, Value};
+use crate::compare::table::{Rank, Table, Tables, Value};
 
 impl Tables {
     /// For a paper: a `table` each in booktabs' style (`\usepackage{booktabs}`), the best bold, the second underlined, footnotes

@@ -1,0 +1,228 @@
+//! The libraries' own enums on the command line: each value by its name, with a line for the help.
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use deepfusion_data::GtKind;
+use deepfusion_eval::Crop;
+use deepfusion_infer::Precision;
+use deepfusion_model::{CheckpointKind, Learn, Preset, ViewMotion};
+use deepfusion_rosbag::Compression;
+use deepfusion_sim::{Scene, Sensors};
+
+/// A parser of these values by their names. Help lists each with its meaning, an error names them all.
+fn one_of<T: Copy + Send + Sync + 'static>(
+    name: fn(T) -> &'static str,
+    values: &'static [(T, &'static str)],
+) -> impl TypedValueParser<Value = T> {
+    let listed = values
+        .iter()
+        .map(move |(value, meaning)| PossibleValue::new(name(*value)).help(*meaning));
+    PossibleValuesParser::new(listed).try_map(move |given| {
+        let found = values.iter().find(|(value, _)| name(*value) == given);
+        found.map(|(value, _)| *value).ok_or("it is not listed")
+    })
+}
+
+/// Settings to start from.
+pub fn preset() -> impl TypedValueParser<Value = Preset> {
+    one_of(
+        Preset::name,
+        &[
+            (
+                Preset::Tiny,
+                "ResNet-18 at half width, 320×96: useful on two cores in minutes",
+            ),
+            (
+                Preset::Light,
+                "ResNet-18, 640×192; trained on a processor 320×96",
+            ),
+            (
+                Preset::Resnet50,
+                "ResNet-50, 640×192, batch 12; trained on a processor 320×96, batch 4",
+            ),
+            (
+                Preset::Paper,
+                "The paper's network: ResNet-50 with context and attention; sizes as resnet50",
+            ),
+            (
+                Preset::Monodepth2,
+                "Monodepth2's network and losses, with the speed term",
+            ),
+        ],
+    )
+}
+
+/// What a recording is learned from.
+pub fn learn() -> impl TypedValueParser<Value = Learn> {
+    one_of(
+        Learn::name,
+        &[
+            (
+                Learn::OwnMotion,
+                "Its own motion: views of one frame from another; needs a speed",
+            ),
+            (
+                Learn::Depth,
+                "Its depth: RGB-D images or a LiDAR's scans; needs no speed",
+            ),
+            (Learn::Both, "Both"),
+        ],
+    )
+}
+
+/// Whose motion the views are synthesised with.
+pub fn view_motion() -> impl TypedValueParser<Value = ViewMotion> {
+    one_of(
+        ViewMotion::name,
+        &[
+            (
+                ViewMotion::PoseNet,
+                "PoseNet's; the speed loss pulls its length to the vehicle's",
+            ),
+            (
+                ViewMotion::Distance,
+                "PoseNet's direction and rotation, the vehicle's distance",
+            ),
+            (
+                ViewMotion::Vehicle,
+                "The vehicle's, from speed and yaw rate",
+            ),
+        ],
+    )
+}
+
+/// A checkpoint of a run.
+pub fn checkpoint() -> impl TypedValueParser<Value = CheckpointKind> {
+    one_of(
+        CheckpointKind::name,
+        &[
+            (CheckpointKind::Best, "At the lowest held-out loss"),
+            (CheckpointKind::Last, "Where training ended"),
+        ],
+    )
+}
+
+/// In which numbers a network computes.
+pub fn precision() -> impl TypedValueParser<Value = Precision> {
+    one_of(
+        Precision::name,
+        &[
+            (Precision::F32, "32-bit floats"),
+            (
+                Precision::Bf16,
+                "Eight bits of mantissa: faster on processors with AMX or AVX512-BF16, a little less exact",
+            ),
+        ],
+    )
+}
+
+/// Conventions of ground-truth depth.
+pub fn gt_kind() -> impl TypedValueParser<Value = GtKind> {
+    one_of(
+        GtKind::name,
+        &[
+            (
+                GtKind::Z,
+                "Camera z at pixel round(u), round(v), as KITTI's annotated depth",
+            ),
+            (
+                GtKind::Velodyne,
+                "The velodyne's forward distance at pixel round(u) - 1, round(v) - 1: the field's eigen files",
+            ),
+        ],
+    )
+}
+
+/// Part of the image to compare.
+pub fn crop() -> impl TypedValueParser<Value = Crop> {
+    one_of(
+        Crop::name,
+        &[
+            (Crop::None, "The whole image"),
+            (
+                Crop::Garg,
+                "Garg et al.'s window, the field's default for KITTI",
+            ),
+        ],
+    )
+}
+
+/// How a bag's chunks are compressed.
+pub fn compression() -> impl TypedValueParser<Value = Compression> {
+    one_of(
+        Compression::name,
+        &[
+            (Compression::None, "Not at all"),
+            (Compression::Lz4, "Fast"),
+            (Compression::Bz2, "Small and slow"),
+        ],
+    )
+}
+
+/// What the simulated car carries.
+pub fn sensors() -> impl TypedValueParser<Value = Sensors> {
+    one_of(
+        Sensors::name,
+        &[
+            (Sensors::Kitti, "KITTI's, camera and velodyne on the roof"),
+            (
+                Sensors::Umad,
+                "UMAD's, camera, FMCW LiDAR and inertial unit in one head",
+            ),
+        ],
+    )
+}
+
+/// Places that a simulated drive leads through.
+pub fn scene() -> impl TypedValueParser<Value = Scene> {
+    one_of(
+        Scene::name,
+        &[
+            (Scene::Urban, "A street with houses, parked cars, trees"),
+            (Scene::Park, "A narrow road between lawns and trees"),
+            (
+                Scene::Garage,
+                "Under ground: dark, near walls, pillars, a low ceiling",
+            ),
+            (
+                Scene::Commercial,
+                "Large houses, wide pavements, many parked cars",
+            ),
+            (Scene::Night, "The urban street by night, under its lamps"),
+        ],
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The names that a parser lists.
+    fn names(parser: &impl TypedValueParser) -> Vec<String> {
+        let values = parser.possible_values().into_iter().flatten();
+        values.map(|value| value.get_name().to_owned()).collect()
+    }
+
+    /// A preset or a scene that is added to the library is offered here, too.
+    #[test]
+    fn whatever_the_library_lists_is_offered() {
+        assert_eq!(names(&preset()), Preset::ALL.map(Preset::name));
+        assert_eq!(names(&scene()), Scene::ALL.map(Scene::name));
+    }
+
+    /// The names are those of the files, so that what is printed can be typed.
+    #[test]
+    fn names_are_those_of_configurations() {
+        for name in names(&preset()) {
+            let value = toml::Value::String(name.clone());
+            assert_eq!(value.try_into::<Preset>().unwrap().name(), name);
+        }
+        for name in names(&learn()) {
+            let value = toml::Value::String(name.clone());
+            assert_eq!(value.try_into::<Learn>().unwrap().name(), name);
+        }
+        for name in names(&view_motion()) {
+            let value = toml::Value::String(name.clone());
+            assert_eq!(value.try_into::<ViewMotion>().unwrap().name(), name);
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! What a run found out from its data, apart from what its configuration says.
+
+use deepfusion_geometry::Intrinsics;
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+use super::TrainConfig;
+
+/// The table of a run's `config.toml` that holds it.
+const TABLE: &str = "findings";
+
+/// What a run found out from its data when it began. Nobody sets it, and without it the networks' outputs mean no metres.
+///
+/// It is the table `[findings]` of the run's `config.toml`; as a configuration (`train --config`) that file means its
+/// settings alone.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TrainFindings {
+    /// Metres of translation per unit of PoseNet's output, where `pose_net.metres_per_unit` is 0: the mean displacement of a
+    /// pair.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub metres_per_unit: Option<f64>,
+    /// The camera trained with, at the size of its images; `None` for imported weights. Several cameras: the first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Intrinsics>,
+    /// The same for each of `data.sets`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sets: Vec<SetFindings>,
+}
+
+/// What a run found out from one of its data sets.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SetFindings {
+    /// The set's name in `data.sets`.
+    pub name: String,
+    /// Metres of translation per unit of PoseNet's output, where the set's own `metres_per_unit` is 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub metres_per_unit: Option<f64>,
+    /// The camera of its first sample, at the size of its images.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Intrinsics>,
+}
+
+impl TrainFindings {
+    /// The configuration with the metres per unit that it leaves open.
+    #[must_use]
+    pub fn complete(&self, mut config: TrainConfig) -> TrainConfig {
+        let fill = |open: &mut f64, found: Option<f64>| {
+            if *open == 0.0 {
+                *open = found.unwrap_or(0.0);
+            }
+        };
+        fill(&mut config.pose_net.metres_per_unit, self.metres_per_unit);
+        for set in &mut config.data.sets {
+            fill(
+                &mut set.metres_per_unit,
+                self.set(&set.name).and_then(|found| found.metres_per_unit),
+            );
+        }
+        config
+    }
+
+    /// The camera that a data set was learned with; `set` as for [`TrainConfig::for_set`].
+    #[must_use]
+    pub fn camera_of(&self, config: &TrainConfig, set: Option<&str>) -> Option<Intrinsics> {
+        let only = match config.data.sets.as_slice() {
+            [only] => Some(only.name.as_str()),
+            _ => None,
+        };
+        let own = set.or(only).and_then(|name| self.set(name));
+        own.and_then(|own| own.camera).or(self.camera)
+    }
+
+    fn set(&self, name: &str) -> Option<&SetFindings> {
+        self.sets.iter().find(|set| set.name == name)
+    }
+
+    /// Its lines at the end of a configuration's; none where nothing was found.
+    pub(crate) fn to_toml(&self) -> Result<String, toml::ser::Error> {
+        let mut table = Table::new();
+        self.put_into(&mut table)?;
+        match table.is_empty() {
+            true => Ok(String::new()),
+            false => Ok(format!("\n{}", toml::to_string_pretty(&table)?)),
+        }
+    }
+
+    fn put_into(&self, config: &mut Table) -> Result<(), toml::ser::Error> {
+        if *self != Self::default() {
+            config.insert(TABLE.into(), Value::try_from(self)?);
+        }
+        Ok(())
+    }
+
+    /// Takes them out of a configuration's table: `[findings]`, or the keys that runs had before there was that table
+    /// (`camera`, and `trained_with` of each set). `None` where there are neither.
+    pub(super) fn take_from(config: &mut Table) -> Result<Option<Self>, toml::de::Error> {
+        if let Some(findings) = config.remove(TABLE) {
+            return findings.try_into().map(Some);
+        }
+        let camera = config.remove("camera").map(Value::try_into).transpose()?;
+        let data = config.get_mut("data").and_then(|data| data.get_mut("sets"));
+        let mut sets = Vec::new();
+        for set in data.and_then(Value::as_array_mut).into_iter().flatten() {
+            let Some(set) = set.as_table_mut() else {
+                continue;
+            };
+            let name = set.get("name").and_then(Value::as_str).map(str::to_owned);
+            if let Some(camera) = set.remove("trained_with") {
+                sets.push(SetFindings {
+                    name: name.unwrap_or_default(),
+                    metres_per_unit: None,
+                    camera: Some(camera.try_into()?),
+                });
+            }
+        }
+        let found = Self {
+            metres_per_unit: None,
+            camera,
+            sets,
+        };
+        Ok((found != Self::default()).then_some(found))
+    }
+}
+
+impl TrainConfig {
+    /// A configuration and what its run found out, of a table as a run's `config.toml` or an embedded network's card holds it.
+    ///
+    /// # Errors
+    /// The first key that is unknown, missing, or of another type.
+    pub fn from_run_table(mut table: Table) -> Result<(Self, TrainFindings), toml::de::Error> {
+        let findings = TrainFindings::take_from(&mut table)?;
+        Ok((table.try_into()?, findings.unwrap_or_default()))
+    }
+
+    /// That table: [`Self::from_run_table`] reads it.
+    ///
+    /// # Errors
+    /// Values that TOML cannot hold.
+    pub fn to_run_table(&self, findings: &TrainFindings) -> Result<Table, toml::ser::Error> {
+        let mut table = Table::try_from(self)?;
+        findings.put_into(&mut table)?;
+        Ok(table)
+    }
+
+    /// What [`Self::from_run_table`] reads, of a file's text.
+    pub(crate) fn from_run_text(text: &str) -> Result<(Self, TrainFindings), toml::de::Error> {
+        // Of a configuration alone, the error names the line.
+        toml::from_str(text).map_or_else(
+            |error| {
+                let mut table: Table = toml::from_str(text)?;
+                match TrainFindings::take_from(&mut table)? {
+                    Some(findings) => Ok((table.try_into()?, findings)),
+                    None => Err(error),
+                }
+            },
+            |config| Ok((config, TrainFindings::default())),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Preset;
+
+    fn camera(fx: f64) -> Intrinsics {
+        Intrinsics {
+            fx,
+            fy: fx,
+            cx: 159.5,
+            cy: 47.5,
+            width: 320,
+            height: 96,
+        }
+    }
+
+    /// A run with two data sets, of which one has its unit set.
+    fn config() -> TrainConfig {
+        let mut config = Preset::Tiny.config();
+        config.data = toml::from_str(
+            "sets = [{ name = 'road', paths = ['/road'] }, { name = 'hall', paths = ['/hall'], metres_per_unit = 0.25 }]",
+        )
+        .unwrap();
+        config
+    }
+
+    fn findings() -> TrainFindings {
+        let set = |name: &str, metres_per_unit, fx| SetFindings {
+            name: name.into(),
+            metres_per_unit,
+            camera: Some(camera(fx)),
+        };
+        TrainFindings {
+            metres_per_unit: Some(0.8),
+            camera: Some(camera(230.4)),
+            sets: vec![set("road", Some(1.1), 230.4), set("hall", None, 150.0)],
+        }
+    }
+
+    #[test]
+    fn a_runs_file_holds_both_and_keeps_them_apart() {
+        let (config, findings) = (config(), findings());
+        let text = config.to_toml().unwrap() + &findings.to_toml().unwrap();
+        assert!(text.contains("\n[findings]\n"), "{text}");
+        let read = TrainConfig::from_run_text(&text).unwrap();
+        assert_eq!(read, (config.clone(), findings));
+        assert_eq!(read.0.pose_net.metres_per_unit, 0.0, "what was set stays");
+        // Nothing found leaves no trace.
+        let text = config.to_toml().unwrap() + &TrainFindings::default().to_toml().unwrap();
+        assert!(!text.contains(TABLE));
+        let wrong = text.replace("batch = 4", "batsch = 4");
+        let error = TrainConfig::from_run_text(&wrong).unwrap_err().to_string();
+        assert!(
+            error.contains("line") && error.contains("batsch"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn what_is_open_is_filled_in_and_what_is_set_stays() {
+        let complete = findings().complete(config());
+        assert_eq!(complete.pose_net.metres_per_unit, 0.8);
+        let units = complete.data.sets.iter().map(|set| set.metres_per_unit);
+        assert_eq!(units.collect::<Vec<_>>(), [1.1, 0.25]);
+        let fx = |set| findings().camera_of(&complete, set).map(|k| k.fx);
+        assert_eq!(fx(Some("hall")), Some(150.0));
+        assert_eq!(fx(None), Some(230.4));
+        assert_eq!(TrainFindings::default().complete(config()), config());
+    }
+
+    /// Runs, and the cards of embedded networks, from before there was the table.
+    #[test]
+    fn older_runs_are_read() {
+        let mut expected = config();
+        expected.pose_net.metres_per_unit = 0.8;
+        expected.data.sets[0].metres_per_unit = 1.1;
+        let mut table = Table::try_from(&expected).unwrap();
+        let value = |fx| Value::try_from(camera(fx)).unwrap();
+        table.insert("camera".into(), value(230.4));
+        let sets = table["data"].get_mut("sets").unwrap();
+        for (set, fx) in sets.as_array_mut().unwrap().iter_mut().zip([230.4, 150.0]) {
+            let set = set.as_table_mut().unwrap();
+            set.insert("trained_with".into(), value(fx));
+        }
+        let text = toml::to_string_pretty(&table).unwrap();
+        let again = expected.to_run_table(&findings()).unwrap();
+        let again = TrainConfig::from_run_table(again).unwrap();
+        assert_eq!(again, (expected.clone(), findings()));
+        for (config, older) in [
+            TrainConfig::from_run_table(table).unwrap(),
+            TrainConfig::from_run_text(&text).unwrap(),
+        ] {
+            assert_eq!(config, expected);
+            assert_eq!(older.camera, findings().camera);
+            assert_eq!(
+                older.camera_of(&config, Some("hall")).map(|k| k.fx),
+                Some(150.0)
+            );
+            assert_eq!(older.complete(config), expected, "its units are set");
+        }
+    }
+}
