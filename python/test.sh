@@ -4,7 +4,10 @@
 #   python/test.sh [FOLDER]     default: a temporary one
 set -euo pipefail
 # From where the caller stands.
-if [ -n "${DEEPFUSION:-}" ]; then export DEEPFUSION=$(realpath "$DEEPFUSION"); fi
+if [ -n "${DEEPFUSION:-}" ]; then
+    DEEPFUSION=$(realpath "$DEEPFUSION")
+    export DEEPFUSION
+fi
 venv=$(realpath -m "${1:-$(mktemp -d)}")
 cd "$(dirname "$0")"
 python3 -m venv "$venv"
