@@ -268,3 +268,34 @@ impl Checkpoint {
             })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Preset;
+
+    /// A run from before there was the table `[findings]`: read as it is, and written anew without a loss.
+    #[test]
+    fn a_run_of_before_keeps_its_camera() {
+        let at = tempfile::tempdir().unwrap();
+        let folder = RunFolder::create(&at.path().join("run")).unwrap();
+        let mut config = Preset::Tiny.config();
+        config.pose_net.metres_per_unit = 0.8;
+        let camera =
+            "[camera]\nfx = 230.4\nfy = 230.4\ncx = 159.5\ncy = 47.5\nwidth = 320\nheight = 96\n";
+        let text = format!("{}\n{camera}", config.to_toml().unwrap());
+        std::fs::write(folder.config_path(), text).unwrap();
+        let found = folder.read_findings().unwrap();
+        assert_eq!(found.camera.map(|k| k.fx), Some(230.4));
+        assert_eq!(folder.read_config().unwrap(), config);
+
+        // As `--resume` does.
+        folder
+            .write_config(&folder.read_settings().unwrap(), &found)
+            .unwrap();
+        let text = std::fs::read_to_string(folder.config_path()).unwrap();
+        assert!(text.contains("[findings.camera]"), "{text}");
+        assert_eq!(folder.read_findings().unwrap(), found);
+        assert_eq!(folder.read_config().unwrap(), config);
+    }
+}
