@@ -92,16 +92,8 @@ impl Reportable for deepfusion_eval::Error {
 }
 
 impl Reportable for deepfusion_eval::compare::Error {
-    fn message(&self) -> String {
-        match self {
-            Self::Data(error) => error.message(),
-            _ => self.to_string(),
-        }
-    }
-
     fn remedy(&self) -> Option<String> {
         match self {
-            Self::Data(error) => error.remedy(),
             Self::NotAnEvaluation { .. } => Some(
                 "give a run's folder, a file of its eval/ folder, or what `eval --json` printed"
                     .into(),
