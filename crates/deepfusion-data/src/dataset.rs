@@ -408,8 +408,11 @@ impl Dataset {
         motion.source_from_target
     }
 
-    /// What ego-motion is made from, or what is missing for it.
-    pub(crate) fn ego(&self) -> Result<Ego<'_>> {
+    /// What the camera's motion is made from.
+    ///
+    /// # Errors
+    /// What is missing for it: [`Error::Missing`] or [`Error::NoTrack`].
+    pub fn ego(&self) -> Result<Ego<'_>> {
         let timed = self.frames().iter().any(|f| f.time_s.is_some());
         match (&self.parts.track, self.parts.cam_from_vehicle) {
             (Some(track), Some(cam_from_vehicle)) if timed => Ok(Ego {

@@ -1,7 +1,7 @@
 //! What is in a recording.
 
 use crate::layout::Layout;
-use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions, Result, bag, comma, doctor};
+use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions, Result, bag, comma};
 use deepfusion_geometry::Intrinsics;
 use serde::Serialize;
 use std::path::Path;
@@ -57,8 +57,8 @@ pub struct DriveInspection {
     /// What was taken off the images' times, in seconds: how far the camera's clock is ahead of the vehicle's, as the
     /// recording's file or the caller says.
     pub camera_ahead_s: f64,
-    /// How far the vehicle's clock is then still ahead of the camera's, by how the pictures moved. Estimated where one drive is
-    /// looked at and shows it; `None` otherwise.
+    /// How far the vehicle's clock is then still ahead of the camera's, by how the pictures moved. `None` where nobody
+    /// measured it ([`inspect_with`]), the drive does not show it, or there are several drives.
     pub time_offset: Option<ClockOffset>,
     /// What was taken for granted or looks odd.
     pub remarks: Vec<String>,
@@ -119,14 +119,20 @@ pub struct SpeedRange {
 /// # Errors
 /// As [`Dataset::open`]; times and speeds may be missing and are then told as unknown.
 pub fn inspect(path: &Path) -> Result<Inspection> {
-    inspect_with(path, &OpenOptions::default())
+    inspect_with(path, &OpenOptions::default(), |_| None)
 }
 
-/// [`inspect`] with a camera or a clock offset given; camera and split of the options are not looked at.
+/// [`inspect`] with a camera or a clock offset given; camera and split of the options are not looked at. `time_offset` measures
+/// [`DriveInspection::time_offset`]: it is asked where there is one drive, and may take long (`deepfusion_doctor::inspect`
+/// has one that reads a few hundred pictures).
 ///
 /// # Errors
 /// As [`inspect`].
-pub fn inspect_with(path: &Path, options: &OpenOptions) -> Result<Inspection> {
+pub fn inspect_with(
+    path: &Path,
+    options: &OpenOptions,
+    time_offset: impl FnOnce(&Dataset) -> Option<ClockOffset>,
+) -> Result<Inspection> {
     let layout = Layout::of(path)?;
     if let Layout::Comma(segment) = &layout
         && !comma::has_video(segment)
@@ -162,12 +168,9 @@ pub fn inspect_with(path: &Path, options: &OpenOptions) -> Result<Inspection> {
         }
         drives.push(look_at(dataset)?);
     }
-    // It reads a few hundred pictures: of many drives `doctor` tells it one by one.
+    // Measuring reads many pictures: of many drives the doctor tells it one by one.
     if let ([dataset], [drive]) = (datasets.as_slice(), drives.as_mut_slice()) {
-        drive.time_offset = doctor::time_offset(dataset).map(|offset| ClockOffset {
-            vehicle_minus_camera_s: offset.vehicle_minus_camera_s,
-            std_error_s: offset.std_error_s,
-        });
+        drive.time_offset = time_offset(dataset);
     }
     let k = datasets[0].intrinsics(0);
     Ok(Inspection {

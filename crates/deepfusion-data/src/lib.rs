@@ -16,7 +16,6 @@ mod convert;
 mod dataset;
 mod depth_images;
 mod depth_png;
-pub mod doctor;
 mod ego;
 mod error;
 mod export;
@@ -58,6 +57,7 @@ pub use convert::{Converted, convert_to_bag, convert_to_kitti};
 pub use dataset::{Dataset, DatasetParts, OpenOptions};
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
 pub use depth_png::{read_depth_png, write_depth_png};
+pub use ego::{Ego, EgoMotion, NoMotion};
 pub use error::{Error, Result};
 pub use export::{VELOCITY, export_gt, ground_truth_names};
 pub use frame::{Frame, FrameImage};
@@ -76,8 +76,10 @@ pub use photo::{Photo, load_photo};
 pub use picture::{decode_rgb, image_size, load_rgb, save_png};
 pub use recording::{CalibrationPlace, DatasetKind, LidarMotion, Recording, ScanTruth};
 pub use resize::{resize_rgb, to_chw, to_network_input};
-pub use snippet::{EgoMotion, Snippet, Source, hold_out};
-pub use speed_check::{SpeedWarning, grey_image, speed_unit_warning};
+pub use snippet::{Snippet, Source, hold_out};
+pub use speed_check::{
+    PLAUSIBLE_HEIGHT_M, SpeedWarning, grey_image, road_camera_height, speed_unit_warning,
+};
 pub use split::{Split, SplitCoverage, SplitEntry};
 pub use video::{Shown, can_write_video, shown_for, write_video};
 pub use write::{write_atomically, write_unsynced};

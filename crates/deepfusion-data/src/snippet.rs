@@ -1,23 +1,8 @@
 //! Training samples: a frame, its neighbours, and how the camera moved between them.
 
-use crate::{Dataset, Error, Result};
-use deepfusion_geometry::Se3;
+use crate::ego::NoMotion;
+use crate::{Dataset, EgoMotion, Error, Result};
 use std::collections::{HashMap, HashSet};
-
-/// How the camera moved between a target frame and one of its sources.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EgoMotion {
-    /// Time between the two, in seconds, positive.
-    pub dt_s: f64,
-    /// Length of the camera's translation, in metres.
-    pub distance_m: f64,
-    /// The car's mean speed over that time, in m/s, positive also when reversing.
-    pub speed_mps: f64,
-    /// A point of the target's camera frame in the source's. Driving ahead, its z is negative for the
-    /// frame after the target and positive for the one before. `None` where the recording has no yaw
-    /// rate: then nobody knows how the car turned, and only lengths may be used.
-    pub source_from_target: Option<Se3>,
-}
 
 /// A neighbour of a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -148,14 +133,6 @@ impl Dataset {
             }
         })
     }
-}
-
-/// Why the motion between two frames is unknown.
-pub(crate) enum NoMotion {
-    /// Their time stamps do not increase with their numbers.
-    Time,
-    /// No speed was measured about their time.
-    Speed,
 }
 
 /// Splits one drive's snippets, in order, into those to train on and the last `fraction` to validate

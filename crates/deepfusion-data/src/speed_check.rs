@@ -19,7 +19,7 @@ use std::fmt;
 use std::sync::Arc;
 
 /// Heights that a camera on a road vehicle can have, in metres.
-pub(crate) const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.9..=2.6;
+pub const PLAUSIBLE_HEIGHT_M: std::ops::RangeInclusive<f64> = 0.9..=2.6;
 /// Width of the images compared, in pixels, and how many pairs.
 const WIDTH: u32 = 240;
 const MAX_PAIRS: usize = 24;
@@ -39,7 +39,7 @@ impl SpeedWarning {
     /// A warning if a camera that high cannot be on a car.
     #[must_use]
     pub fn of_height(implied_height_m: f64, pairs: usize) -> Option<Self> {
-        (!PLAUSIBLE_M.contains(&implied_height_m)).then_some(Self {
+        (!PLAUSIBLE_HEIGHT_M.contains(&implied_height_m)).then_some(Self {
             implied_height_m,
             pairs,
         })
@@ -68,7 +68,7 @@ impl fmt::Display for SpeedWarning {
                 self.pairs
             );
         }
-        let (low, high) = (PLAUSIBLE_M.start(), PLAUSIBLE_M.end());
+        let (low, high) = (PLAUSIBLE_HEIGHT_M.start(), PLAUSIBLE_HEIGHT_M.end());
         write!(
             f,
             "the speeds do not fit the images: the road's motion would put the camera {h:.1} m above it \
@@ -103,7 +103,7 @@ pub fn speed_unit_warning(dataset: &Dataset) -> Result<Option<SpeedWarning>> {
 ///
 /// # Errors
 /// As [`speed_unit_warning`].
-pub(crate) fn road_camera_height(dataset: &Dataset) -> Result<Option<(f64, usize)>> {
+pub fn road_camera_height(dataset: &Dataset) -> Result<Option<(f64, usize)>> {
     let snippets = sample(dataset.snippets(&[-1], 0.5)?);
     let Some(cam_from_vehicle) = dataset.cam_from_vehicle() else {
         return Ok(None);

@@ -82,7 +82,8 @@
 //! | [`runtime`] | trained networks that run: [`DepthEstimator`] over the fused engine or ONNX Runtime; no training framework |
 //! | [`model`] | configurations, weights as safetensors, runs on disk |
 //! | [`weights`] | the networks inside the library |
-//! | [`data`] | recordings as datasets, frames and ground truth; what is wrong with them |
+//! | [`data`] | recordings as datasets, frames and ground truth |
+//! | [`doctor`] | what is wrong with a recording |
 //! | [`motion`] | how a vehicle moved, from inertial unit, CAN, GPS |
 //! | [`bags`] | ROS bags, read and written |
 //! | [`eval`] | the field's metrics and protocols; odometry; intervals and their coverage |
@@ -98,6 +99,7 @@
 //! Coordinates are a camera's: x right, y down, z ahead, in metres. A transform is named `target_from_source`.
 
 pub use deepfusion_data as data;
+pub use deepfusion_doctor as doctor;
 pub use deepfusion_eval as eval;
 pub use deepfusion_geometry as geometry;
 pub use deepfusion_model as model;

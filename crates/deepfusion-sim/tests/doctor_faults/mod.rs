@@ -1,6 +1,6 @@
 //! A clean simulated drive in KITTI's layout, and faults planted into copies of it.
 
-use deepfusion_data::doctor::{Diagnosis, doctor};
+use deepfusion_doctor::{Diagnosis, doctor};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use image::RgbImage;
 use std::path::{Path, PathBuf};

@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_data::doctor::{Diagnosis, Outcome, Severity, doctor_with};
 use deepfusion_data::{DatasetKind, OpenOptions};
+use deepfusion_doctor::{Diagnosis, Outcome, Severity, doctor_with};
 
 use crate::cli::{CameraIntrinsics, DoctorArgs};
 use crate::error::CliError;

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::Result;
-use deepfusion_data::doctor::{Diagnosis, DriveDiagnosis, Line};
 use deepfusion_data::{Camera, CameraChoice, Dataset, GtKind, OpenOptions, overlay};
+use deepfusion_doctor::{Diagnosis, DriveDiagnosis, Line};
 use deepfusion_render::{HtmlReport, LineChart, PictureFormat};
 
 use super::lines;

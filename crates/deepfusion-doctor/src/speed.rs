@@ -1,8 +1,9 @@
 //! The speeds against the road in the images, and against the recording's own poses.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
-use crate::speed_check::{PLAUSIBLE_M, SpeedWarning, road_camera_height};
-use crate::{CameraPath, Dataset, DatasetKind};
+use deepfusion_data::{
+    CameraPath, Dataset, DatasetKind, PLAUSIBLE_HEIGHT_M, SpeedWarning, road_camera_height,
+};
 
 /// Way by the poses over way by the speeds.
 const RATIO: Limit = Limit::Within(0.95, 1.05);
@@ -29,7 +30,7 @@ fn by_road(dataset: &Dataset, outcome: &mut Outcome) {
             return;
         }
     };
-    let limit = Limit::Within(*PLAUSIBLE_M.start(), *PLAUSIBLE_M.end());
+    let limit = Limit::Within(*PLAUSIBLE_HEIGHT_M.start(), *PLAUSIBLE_HEIGHT_M.end());
     let figure = Figure::new("camera height by the road's motion", height_m, "m", limit);
     let warning = SpeedWarning::of_height(height_m, pairs);
     outcome.judge(Severity::Error, figure, || {

@@ -1,7 +1,7 @@
 //! How far the steering turns the vehicle, against what its gyro feels: wheelbase and steering ratio.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
-use crate::{Dataset, MotionModel};
+use deepfusion_data::{Dataset, MotionModel};
 
 const CHECK: &str = "steering";
 /// Tyres slip in fast bends, and then the vehicle turns less than its wheels point.

@@ -3,7 +3,7 @@
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::flow::flow;
 use super::median;
-use crate::{Camera, CameraChoice, Dataset, OpenOptions, Result, grey_image};
+use deepfusion_data::{Camera, CameraChoice, Dataset, OpenOptions, Result, grey_image};
 use deepfusion_motion::GreyImage;
 use std::path::Path;
 

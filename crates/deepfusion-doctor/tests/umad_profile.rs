@@ -1,7 +1,7 @@
 //! UMAD's camera as its paper prints it: used where a bag says nothing else, and flagged.
 
-use deepfusion_data::doctor::{Severity, doctor};
 use deepfusion_data::{Dataset, OpenOptions};
+use deepfusion_doctor::{Severity, doctor};
 use deepfusion_rosbag::msg::{Header, Image, TwistStamped};
 use deepfusion_rosbag::{BagWriter, Time, WriterOptions};
 use std::borrow::Cow;

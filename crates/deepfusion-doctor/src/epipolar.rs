@@ -14,7 +14,7 @@ mod pitching;
 
 use super::flow::Flow;
 use super::survey::Survey;
-use crate::ego::Ego;
+use deepfusion_data::Ego;
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix2x3, Matrix3, Vector2, Vector3};
 use rayon::prelude::*;

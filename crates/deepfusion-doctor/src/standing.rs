@@ -1,7 +1,7 @@
 //! How much of the drive stands still.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
-use crate::Dataset;
+use deepfusion_data::Dataset;
 
 /// Slower pairs do not train (SPEC 3.5), m/s.
 const STANDING_MPS: f64 = 0.5;

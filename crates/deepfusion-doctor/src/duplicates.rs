@@ -3,7 +3,7 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::survey::Survey;
-use crate::Frame;
+use deepfusion_data::Frame;
 
 /// The vehicle certainly moves above this, m/s.
 const MOVING_MPS: f64 = 1.0;

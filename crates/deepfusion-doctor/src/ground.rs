@@ -2,8 +2,7 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::median;
-use crate::speed_check::PLAUSIBLE_M;
-use crate::{Dataset, GtKind};
+use deepfusion_data::{Dataset, GtKind, PLAUSIBLE_HEIGHT_M};
 use deepfusion_geometry::DepthMap;
 use nalgebra::{Matrix3, Vector3};
 
@@ -109,7 +108,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
             )
         });
     }
-    let limit = Limit::Within(*PLAUSIBLE_M.start(), *PLAUSIBLE_M.end());
+    let limit = Limit::Within(*PLAUSIBLE_HEIGHT_M.start(), *PLAUSIBLE_HEIGHT_M.end());
     let figure = Figure::new("camera above the measured road", height, "m", limit);
     outcome.judge(Severity::Warning, figure, || {
         (

@@ -2,7 +2,7 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::median;
-use crate::{Dataset, LidarMotion};
+use deepfusion_data::{Dataset, LidarMotion};
 use nalgebra::Vector3;
 
 /// Scans looked at.

@@ -32,7 +32,9 @@ mod turn;
 pub use finding::{Figure, Finding, Limit, Outcome, Severity, Status};
 pub use plots::{DrivePlots, Line};
 
-use crate::{CameraChoice, Dataset, DatasetKind, Error, OpenOptions};
+use deepfusion_data::{
+    CameraChoice, ClockOffset, Dataset, DatasetKind, Error, Inspection, OpenOptions, Result,
+};
 use deepfusion_motion::TimeOffset;
 use serde::Serialize;
 use std::path::Path;
@@ -213,6 +215,20 @@ pub fn time_offset(dataset: &Dataset) -> Option<TimeOffset> {
     let pairs = epipolar::pairs(&survey);
     let estimate = clock::estimate(&survey, &pairs).ok()?;
     Some(estimate.offset)
+}
+
+/// [`deepfusion_data::inspect_with`] with the offset of the clocks measured by [`time_offset`], where one drive is looked at: a
+/// few hundred pictures are read for it.
+///
+/// # Errors
+/// As [`deepfusion_data::inspect`].
+pub fn inspect(path: &Path, options: &OpenOptions) -> Result<Inspection> {
+    deepfusion_data::inspect_with(path, options, |dataset| {
+        time_offset(dataset).map(|offset| ClockOffset {
+            vehicle_minus_camera_s: offset.vehicle_minus_camera_s,
+            std_error_s: offset.std_error_s,
+        })
+    })
 }
 
 /// The middle of the values; NaN where there is none.

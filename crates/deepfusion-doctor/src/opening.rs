@@ -2,7 +2,7 @@
 
 use super::finding::{Outcome, Severity};
 use super::survey::Survey;
-use crate::{Dataset, Error, Result};
+use deepfusion_data::{Dataset, Error, Result};
 
 pub(super) const CHECK: &str = "opening";
 /// Pairs slower than this do not train (SPEC 3.5).

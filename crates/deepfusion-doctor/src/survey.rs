@@ -2,8 +2,7 @@
 
 use super::flow::{Flow, flow};
 use super::look::Look;
-use crate::ego::Ego;
-use crate::{Dataset, EgoMotion, grey_image};
+use deepfusion_data::{Dataset, Ego, EgoMotion, grey_image};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_motion::GreyImage;
 use deepfusion_motion::{GreyFrame, ImageMotion};

@@ -3,7 +3,7 @@
 
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::median;
-use crate::Dataset;
+use deepfusion_data::Dataset;
 
 /// Share of frames that may be missing, percent: KITTI's and the simulator's drives miss none.
 const MOST_LOST: f64 = 1.0;

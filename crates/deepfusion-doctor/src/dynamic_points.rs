@@ -1,7 +1,7 @@
 //! A topic of dynamic points against the radial velocities of its LiDAR.
 
 use super::finding::{Figure, Limit, Outcome, Severity};
-use crate::Dataset;
+use deepfusion_data::Dataset;
 
 const CHECK: &str = "dynamic-points";
 /// Scans looked at.
