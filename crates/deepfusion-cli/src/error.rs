@@ -513,6 +513,7 @@ pub fn hint_of(problem: &anyhow::Error) -> Option<String> {
             deepfusion_perception::Error,
             deepfusion_render::Error,
             deepfusion_sim::Error,
+            deepfusion_video::Error,
             deepfusion_view::Error,
             deepfusion_weights::Error,
         );

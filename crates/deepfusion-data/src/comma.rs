@@ -9,7 +9,7 @@ use crate::inspect::{DriveInspection, Inspection, SpeedRange, Stream};
 use crate::plain::PlainParts;
 use crate::speed_log::{Samples, SpeedLog};
 use crate::vehicle_log::VehicleLog;
-use crate::video::VideoFrames;
+use crate::video::frames_of;
 use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
 use deepfusion_motion::{ImuMount, comma};
 use ndarray::{ArrayViewD, IxDyn};
@@ -52,20 +52,20 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         });
     }
     let config = FolderConfig::read(folder)?;
-    let video = VideoFrames::probe(&folder.join(VIDEO), &config)?;
+    let video = frames_of(&folder.join(VIDEO), &config)?;
     let calibration = find_camera(folder, &config, options, video.size(), CAMERA_REMEDY)?;
     let times = frame_times(folder)?;
     let mut remarks = Vec::new();
-    if times.len() != video.len() {
+    if times.len() != video.count() {
         remarks.push(format!(
             "{FRAME_TIMES} has {} times, {VIDEO} {} frames: the first {} are taken",
             times.len(),
-            video.len(),
-            times.len().min(video.len())
+            video.count(),
+            times.len().min(video.count())
         ));
     }
     let numbers = numbers_by_time(&times);
-    let images = numbers.into_iter().zip(&times).take(video.len());
+    let images = numbers.into_iter().zip(&times).take(video.count());
     let image = |(number, ns): (u64, &i64)| TimedImage {
         number,
         path: video.file().to_owned(),

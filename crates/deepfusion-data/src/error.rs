@@ -239,6 +239,9 @@ pub enum Error {
         /// What to do.
         remedy: &'static str,
     },
+    /// Another failure of a video's.
+    #[error(transparent)]
+    Video(deepfusion_video::Error),
     /// A calibration file lacks a field or has a bad one.
     #[error("{}: {field}: {problem}", path.display())]
     Calibration {
@@ -410,6 +413,27 @@ const LOOKED_FOR: &str = "  KITTI raw          image_02/ or image_03/ with data/
   video              a file .mp4, .mkv, .mov, .avi or .hevc, given or the only one here
   image folder       .png or .jpg files here, in images/, or where dataset.toml says";
 
+impl From<deepfusion_video::Error> for Error {
+    fn from(error: deepfusion_video::Error) -> Self {
+        use deepfusion_video::Error as Video;
+        match error {
+            Video::File { path, source } => Self::file(&path, source),
+            Video::Program {
+                path,
+                program,
+                problem,
+                remedy,
+            } => Self::Program {
+                path,
+                program,
+                problem,
+                remedy,
+            },
+            other => Self::Video(other),
+        }
+    }
+}
+
 impl Error {
     /// An error of the system's at `path`; a missing file is [`Error::NoSuchPath`].
     #[must_use]
@@ -444,6 +468,7 @@ impl Error {
             Self::Cameras { .. } => "convert them one by one, each into a folder of its own",
             Self::NoTimes { .. } => "give the frames times: timestamps.txt, or fps in dataset.toml",
             Self::Bag(error) => return error.hint(),
+            Self::Video(error) => return error.hint(),
             Self::Motion { source, .. } => return source.hint(),
             Self::OneCamera { .. } => "leave --camera out, or give 2",
             Self::CameraFile { remedy, .. }

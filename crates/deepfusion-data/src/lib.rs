@@ -29,7 +29,6 @@ mod jpeg;
 pub mod kitti;
 mod layout;
 mod lens;
-mod live;
 mod moving;
 mod overlay;
 mod path;
@@ -68,7 +67,6 @@ pub use inspect::{
 };
 pub use kitti::GtKind;
 pub use lens::Lens;
-pub use live::{Address, LiveFrame, LiveSource, Taken};
 pub use moving::{MovingLabels, MovingSource};
 pub use overlay::overlay;
 pub use path::CameraPath;
@@ -81,5 +79,4 @@ pub use speed_check::{
     PLAUSIBLE_HEIGHT_M, SpeedWarning, grey_image, road_camera_height, speed_unit_warning,
 };
 pub use split::{Split, SplitCoverage, SplitEntry};
-pub use video::{Shown, can_write_video, shown_for, write_video};
 pub use write::{write_atomically, write_unsynced};

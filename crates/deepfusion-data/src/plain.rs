@@ -7,12 +7,12 @@ use crate::frame_times::TimedImage;
 use crate::kitti::GtKind;
 use crate::recording::{CalibrationPlace, Recording};
 use crate::speed_log::SpeedLog;
-use crate::video::VideoFrames;
 use crate::{
     Camera, CameraCalibration, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame,
     FrameImage, Lens, Result, Stream, load_rgb,
 };
 use deepfusion_geometry::{DepthMap, Se3};
+use deepfusion_video::VideoFrames;
 use image::RgbImage;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -229,7 +229,7 @@ impl Recording for PlainRecording {
 
     fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
         let image = match (&self.video, &frame.image) {
-            (Some(video), FrameImage::Within { index, .. }) => video.load(*index)?,
+            (Some(video), FrameImage::Within { index, .. }) => load_rgb(&video.frame(*index)?)?,
             _ => load_rgb(frame.image.path())?,
         };
         let k = self.lens.intrinsics();

@@ -84,6 +84,7 @@
 //! | [`weights`] | the networks inside the library |
 //! | [`data`] | recordings as datasets, frames and ground truth |
 //! | [`doctor`] | what is wrong with a recording |
+//! | [`video`] | frames of videos, cameras and streams, through the user's ffmpeg |
 //! | [`motion`] | how a vehicle moved, from inertial unit, CAN, GPS |
 //! | [`bags`] | ROS bags, read and written |
 //! | [`eval`] | the field's metrics and protocols; odometry; intervals and their coverage |
@@ -114,6 +115,7 @@ pub use deepfusion_runtime as runtime;
 pub use deepfusion_sim as sim;
 #[cfg(feature = "train")]
 pub use deepfusion_train as train;
+pub use deepfusion_video as video;
 pub use deepfusion_weights as weights;
 
 pub use deepfusion_runtime::{DepthEstimator, Prediction};

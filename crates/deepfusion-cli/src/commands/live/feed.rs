@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use crossbeam_channel::bounded;
-use deepfusion_data::{Address, LiveFrame, LiveSource, Taken};
+use deepfusion_video::{Address, LiveFrame, LiveSource, Taken};
 
 use super::figures::Figures;
 use crate::cli::LiveArgs;

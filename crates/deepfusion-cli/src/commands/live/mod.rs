@@ -11,7 +11,7 @@ use std::io::IsTerminal;
 use std::time::UNIX_EPOCH;
 
 use anyhow::Result;
-use deepfusion_data::{Address, LiveFrame};
+use deepfusion_video::{Address, LiveFrame};
 use serde::{Deserialize, Serialize};
 
 use super::predict::inputs::Input;

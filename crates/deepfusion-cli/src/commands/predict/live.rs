@@ -3,8 +3,8 @@
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::Result;
-use deepfusion_data::{Address, LiveFrame, shown_for};
 use deepfusion_runtime::ModelSource;
+use deepfusion_video::{Address, LiveFrame, shown_for};
 
 use super::camera::CameraSource;
 use super::manifest::Lock;

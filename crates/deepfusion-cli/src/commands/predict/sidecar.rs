@@ -7,10 +7,11 @@ use std::time::UNIX_EPOCH;
 use anyhow::Result;
 use clap::ValueEnum;
 use deepfusion_compare::MetricScale;
-use deepfusion_data::{LiveFrame, write_atomically};
+use deepfusion_data::write_atomically;
 use deepfusion_fs::Content;
 use deepfusion_runtime::DepthEstimator;
 use deepfusion_runtime::ModelSource;
+use deepfusion_video::LiveFrame;
 use serde::{Deserialize, Serialize};
 
 use super::super::device;

@@ -10,28 +10,13 @@ mod ppm;
 mod slot;
 
 pub use address::Address;
+pub use slot::LiveFrame;
 
 use self::ffmpeg::{End, Ffmpeg, quoted};
 use self::slot::Got;
 use crate::{Error, Result};
-use image::RgbImage;
 use std::path::PathBuf;
-use std::time::{Duration, Instant, SystemTime};
-
-/// A frame of a live source.
-#[derive(Debug, Clone)]
-pub struct LiveFrame {
-    /// Its place in the stream, counted from 0: skipped frames leave gaps.
-    pub number: u64,
-    /// What the camera saw.
-    pub image: RgbImage,
-    /// When its last pixel was here.
-    pub arrived: Instant,
-    /// The same on the wall's clock.
-    pub arrived_at: SystemTime,
-    /// Frames before it that nobody took.
-    pub dropped: u64,
-}
+use std::time::Duration;
 
 /// What [`LiveSource::take`] found.
 #[derive(Debug)]

@@ -6,26 +6,26 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// What most want of it.
-pub(super) const READ: &str = "read videos";
+pub(crate) const READ: &str = "read videos";
 /// And what some.
-pub(super) const WRITE: &str = "write videos";
+pub(crate) const WRITE: &str = "write videos";
 
 /// Longest complaint that is passed on, in characters.
 const LONGEST: usize = 400;
 
 /// What a program that succeeded printed.
-pub(super) struct Printed {
+pub(crate) struct Printed {
     /// On its standard output.
-    pub(super) text: Vec<u8>,
+    pub(crate) text: Vec<u8>,
     /// On its standard error, shortened.
-    pub(super) complaint: String,
+    pub(crate) complaint: String,
 }
 
 /// Runs a program on `file` in a folder, to do `what`, and gives what it printed on its standard output.
 ///
 /// # Errors
 /// [`Error::Program`] where it is not installed, or fails.
-pub(super) fn run<S: AsRef<OsStr>>(
+pub(crate) fn run<S: AsRef<OsStr>>(
     program: &'static str,
     arguments: &[S],
     (file, what): (&Path, &str),
@@ -38,7 +38,7 @@ pub(super) fn run<S: AsRef<OsStr>>(
 ///
 /// # Errors
 /// As [`run`].
-pub(super) fn output<S: AsRef<OsStr>>(
+pub(crate) fn output<S: AsRef<OsStr>>(
     program: &'static str,
     arguments: &[S],
     (file, what): (&Path, &str),
@@ -84,7 +84,7 @@ pub(super) fn output<S: AsRef<OsStr>>(
 ///
 /// # Errors
 /// Those of `run`.
-pub(super) fn in_either_words<T>(run: impl Fn(&str) -> Result<T>) -> Result<T> {
+pub(crate) fn in_either_words<T>(run: impl Fn(&str) -> Result<T>) -> Result<T> {
     match run("-fps_mode") {
         Err(Error::Program { problem, .. }) if problem.contains("fps_mode") => run("-vsync"),
         other => other,

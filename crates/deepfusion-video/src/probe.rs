@@ -1,23 +1,27 @@
 //! What ffprobe says of a video, without decoding it.
 
-use super::program::{READ, run};
-use crate::clock::TimeUnit;
+use crate::program::{READ, run};
 use crate::{Error, Result};
+use jiff::{SignedDuration, Timestamp};
 use serde::Deserialize;
+use std::ops::RangeInclusive;
 use std::path::Path;
+
+/// Seconds since 1970 from 2000 to 2100: a recorder that writes another date has no clock.
+const RECORDED_S: RangeInclusive<i64> = 946_684_800..=4_102_444_800;
 
 /// A video's frames before they are decoded.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Probed {
+pub(crate) struct Probed {
     /// Width and height as shown, the recorder's rotation applied.
-    pub(super) size: (u32, u32),
+    pub(crate) size: (u32, u32),
     /// How many.
-    pub(super) frames: usize,
+    pub(crate) frames: usize,
     /// Their times in order, in nanoseconds; `None` where the file has none.
-    pub(super) times_ns: Option<Vec<i64>>,
+    pub(crate) times_ns: Option<Vec<i64>>,
     /// When the recorder says that the video was made, in nanoseconds since 1970: its first frame of some recorders, its last of
     /// others.
-    pub(super) created_ns: Option<i64>,
+    pub(crate) created_ns: Option<i64>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -63,7 +67,7 @@ struct SideData {
 
 /// Looks at the first video stream. Its packets are listed rather than its frames: that needs no decoding,
 /// and each packet is a frame.
-pub(super) fn probe(file: &Path) -> Result<Probed> {
+pub(crate) fn probe(file: &Path) -> Result<Probed> {
     let entries = "packet=pts_time,flags:stream=width,height:stream_side_data=rotation:format_tags=creation_time";
     let arguments = [
         "-v",
@@ -107,9 +111,7 @@ fn parse(json: &[u8]) -> std::result::Result<Probed, String> {
     if shown.is_empty() {
         return Err("finds no frame in it".into());
     }
-    let times = shown
-        .iter()
-        .map(|p| TimeUnit::Seconds.nanoseconds(p.pts_time.as_ref()?));
+    let times = shown.iter().map(|p| nanoseconds(p.pts_time.as_ref()?));
     let mut times_ns: Option<Vec<i64>> = times.collect();
     if let Some(times) = &mut times_ns {
         // Packets come in the order of decoding.
@@ -128,11 +130,17 @@ fn parse(json: &[u8]) -> std::result::Result<Probed, String> {
     })
 }
 
+/// Decimal seconds, kept to the last digit.
+fn nanoseconds(seconds: &str) -> Option<i64> {
+    let time: SignedDuration = format!("{seconds}s").parse().ok()?;
+    i64::try_from(time.as_nanos()).ok()
+}
+
 /// A date with its zone; recorders without a clock write 1904 or 1970, which is none.
 fn created(word: Option<&str>) -> Option<i64> {
-    let stamp: jiff::Timestamp = word?.parse().ok()?;
-    let ns = i64::try_from(stamp.as_nanosecond()).ok()?;
-    TimeUnit::of_date(ns as f64).map(|_| ns)
+    let stamp: Timestamp = word?.parse().ok()?;
+    let known = RECORDED_S.contains(&stamp.as_second());
+    known.then(|| i64::try_from(stamp.as_nanosecond()).ok())?
 }
 
 #[cfg(test)]

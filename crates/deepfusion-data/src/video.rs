@@ -1,11 +1,4 @@
-//! A video file with tables and a calibration beside it, decoded by the user's ffmpeg.
-
-mod decode;
-mod encode;
-mod probe;
-pub(crate) mod program;
-
-pub use encode::{Shown, can_write_video, shown_for, write_video};
+//! A video file with tables and a calibration beside it.
 
 use crate::calibration::find_camera;
 use crate::clock::{TimeUnit, seconds};
@@ -14,11 +7,10 @@ use crate::folder::{CAMERA_REMEDY, NO_MOUNT};
 use crate::frame_times::{TimedImage, from_start, numbers_by_time};
 use crate::plain::PlainParts;
 use crate::speed_log::SpeedLog;
-use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, load_rgb};
-use image::RgbImage;
+use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
+use deepfusion_video::VideoFrames;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
 /// Endings of the files that are taken for videos.
 const ENDINGS: [&str; 7] = ["mp4", "mkv", "mov", "avi", "hevc", "m4v", "webm"];
@@ -77,23 +69,23 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     };
     let folder = file.parent().unwrap_or(Path::new(".")).to_owned();
     let config = FolderConfig::read(&folder)?;
-    let video = VideoFrames::probe(&file, &config)?;
+    let video = frames_of(&file, &config)?;
     let calibration = find_camera(&folder, &config, options, video.size(), CAMERA_REMEDY)?;
     let mut remarks = Vec::new();
-    let times = match (&video.probed.times_ns, config.fps) {
+    let times = match (video.times_ns(), config.fps) {
         (_, Some(fps)) => {
             let ns = |i: usize| Some((i as f64 / fps * 1e9).round() as i64);
-            (0..video.len()).map(ns).collect()
+            (0..video.count()).map(ns).collect()
         }
         (Some(times), None) => times.iter().copied().map(Some).collect(),
         (None, None) => {
             remarks.push("the video has no time stamps: set fps in dataset.toml".into());
-            vec![None; video.len()]
+            vec![None; video.count()]
         }
     };
     let speeds = SpeedLog::read(&folder, &config)?;
     let start_s = config.start_s.or_else(|| {
-        let (created, log) = (video.probed.created_ns?, speeds.as_ref()?);
+        let (created, log) = (video.created_ns()?, speeds.as_ref()?);
         let ns = &log.speeds_mps.ns;
         let start = begun(created, &times, (*ns.first()?, *ns.last()?))?;
         remarks.push(format!(
@@ -107,7 +99,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     let known: Option<Vec<i64>> = times.iter().copied().collect();
     let numbers = match known {
         Some(known) => numbers_by_time(&known),
-        None => (0..video.len() as u64).collect(),
+        None => (0..video.count() as u64).collect(),
     };
     if start_s.is_none() {
         remarks.push(
@@ -165,65 +157,15 @@ fn begun(created_ns: i64, times: &[Option<i64>], log: (i64, i64)) -> Option<i64>
     })
 }
 
-/// A video's frames: counted when it is opened, decoded when the first of them is read.
-#[derive(Debug)]
-pub(crate) struct VideoFrames {
-    file: PathBuf,
-    cache: PathBuf,
-    probed: probe::Probed,
-    /// Whether the cache is complete; held while it is made.
-    decoded: Mutex<bool>,
-}
-
-impl VideoFrames {
-    /// Counts the frames of a video with ffprobe.
-    ///
-    /// # Errors
-    /// [`Error::Program`].
-    pub(crate) fn probe(file: &Path, config: &FolderConfig) -> Result<Self> {
-        let name = file.file_name().unwrap_or_default().to_string_lossy();
-        let folder = file.parent().unwrap_or(Path::new("."));
-        let cache = config
-            .cache
-            .as_ref()
-            .map_or(folder.to_owned(), |c| folder.join(c));
-        Ok(Self {
-            probed: probe::probe(file)?,
-            cache: cache.join(format!("{name}.frames")),
-            file: file.to_owned(),
-            decoded: Mutex::new(false),
-        })
-    }
-
-    pub(crate) fn file(&self) -> &Path {
-        &self.file
-    }
-
-    /// How many frames there are.
-    pub(crate) fn len(&self) -> usize {
-        self.probed.frames
-    }
-
-    /// Width and height of the frames.
-    pub(crate) fn size(&self) -> (u32, u32) {
-        self.probed.size
-    }
-
-    /// A frame, counted from 0.
-    ///
-    /// # Errors
-    /// [`Error::Program`] where the video cannot be decoded, and as [`load_rgb`].
-    pub(crate) fn load(&self, index: u64) -> Result<RgbImage> {
-        {
-            // A thread that failed while decoding left nothing behind.
-            let mut decoded = self.decoded.lock().unwrap_or_else(|e| e.into_inner());
-            if !*decoded {
-                decode::ensure(&self.file, &self.cache, self.probed.frames)?;
-                *decoded = true;
-            }
-        }
-        load_rgb(&decode::frame_path(&self.cache, index))
-    }
+/// The frames of a video, kept beside it or where `dataset.toml` says.
+///
+/// # Errors
+/// [`Error::Program`].
+pub(crate) fn frames_of(file: &Path, config: &FolderConfig) -> Result<VideoFrames> {
+    let folder = file.parent().unwrap_or(Path::new("."));
+    let cache = config.cache.as_ref();
+    let cache = cache.map_or(folder.to_owned(), |c| folder.join(c));
+    Ok(VideoFrames::open(file, &cache)?)
 }
 
 #[cfg(test)]

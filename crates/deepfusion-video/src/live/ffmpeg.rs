@@ -4,7 +4,7 @@ use super::address::Address;
 use super::ppm;
 use super::slot::Slot;
 use crate::Result;
-use crate::video::program::not_started;
+use crate::program::not_started;
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;

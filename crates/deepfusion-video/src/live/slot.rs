@@ -1,9 +1,23 @@
 //! Room for one frame, between who reads the source and who looks at its frames.
 
-use super::LiveFrame;
 use image::RgbImage;
 use std::sync::{Condvar, Mutex, MutexGuard};
 use std::time::{Duration, Instant, SystemTime};
+
+/// A frame of a live source.
+#[derive(Debug, Clone)]
+pub struct LiveFrame {
+    /// Its place in the stream, counted from 0: skipped frames leave gaps.
+    pub number: u64,
+    /// What the camera saw.
+    pub image: RgbImage,
+    /// When its last pixel was here.
+    pub arrived: Instant,
+    /// The same on the wall's clock.
+    pub arrived_at: SystemTime,
+    /// Frames before it that nobody took.
+    pub dropped: u64,
+}
 
 /// Holds the newest frame that nobody took, and nothing else.
 #[derive(Debug)]

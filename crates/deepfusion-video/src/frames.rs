@@ -1,16 +1,88 @@
 //! A video's frames as files.
 //!
 //! Training reads frames in random order, which a video cannot give: every jump decodes from the last
-//! key frame. So all frames are decoded once, into `<video>.frames` beside it (or in the folder that
-//! `cache` in `dataset.toml` names), as JPEGs of ffmpeg's best quality but one; the folder can be deleted at
+//! key frame. So all frames are decoded once, into `<video>.frames` in a folder that the caller names, as JPEGs of ffmpeg's best quality but one; the folder can be deleted at
 //! any time. It takes part under another name and is renamed when it is whole.
 
-use super::program::{READ, in_either_words, run};
+use crate::probe::{Probed, probe};
+use crate::program::{READ, in_either_words, run};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::time::UNIX_EPOCH;
+
+/// A video's frames: counted when it is opened, decoded when the first of them is asked for.
+#[derive(Debug)]
+pub struct VideoFrames {
+    file: PathBuf,
+    cache: PathBuf,
+    probed: Probed,
+    /// Whether the cache is complete; held while it is made.
+    decoded: Mutex<bool>,
+}
+
+impl VideoFrames {
+    /// Counts the frames of a video with ffprobe. Its frames will be kept in `<video>.frames` in `folder`.
+    ///
+    /// # Errors
+    /// [`Error::Program`].
+    pub fn open(file: &Path, folder: &Path) -> Result<Self> {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        Ok(Self {
+            probed: probe(file)?,
+            cache: folder.join(format!("{name}.frames")),
+            file: file.to_owned(),
+            decoded: Mutex::new(false),
+        })
+    }
+
+    /// The video.
+    #[must_use]
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// How many frames there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.probed.frames
+    }
+
+    /// Width and height of the frames as shown, the recorder's rotation applied.
+    #[must_use]
+    pub fn size(&self) -> (u32, u32) {
+        self.probed.size
+    }
+
+    /// The frames' times in order, in nanoseconds; `None` where the file has none.
+    #[must_use]
+    pub fn times_ns(&self) -> Option<&[i64]> {
+        self.probed.times_ns.as_deref()
+    }
+
+    /// When the recorder says that the video was made, in nanoseconds since 1970: its first frame of some recorders, its last
+    /// of others.
+    #[must_use]
+    pub fn created_ns(&self) -> Option<i64> {
+        self.probed.created_ns
+    }
+
+    /// The JPEG of a frame, counted from 0; the first call decodes the whole video, unless that was done before.
+    ///
+    /// # Errors
+    /// [`Error::Program`] where the video cannot be decoded, [`Error::File`] where its frames cannot be kept.
+    pub fn frame(&self, index: u64) -> Result<PathBuf> {
+        // A thread that failed while decoding left nothing behind.
+        let mut decoded = self.decoded.lock().unwrap_or_else(|e| e.into_inner());
+        if !*decoded {
+            ensure(&self.file, &self.cache, self.probed.frames)?;
+            *decoded = true;
+        }
+        Ok(frame_path(&self.cache, index))
+    }
+}
 
 /// Which video a folder of frames was made from.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,7 +95,7 @@ struct Origin {
 const ORIGIN: &str = "origin.json";
 
 /// The file of a frame, counted from 0.
-pub(super) fn frame_path(cache: &Path, index: u64) -> PathBuf {
+fn frame_path(cache: &Path, index: u64) -> PathBuf {
     cache.join(format!("{index:010}.jpg"))
 }
 
@@ -31,7 +103,7 @@ pub(super) fn frame_path(cache: &Path, index: u64) -> PathBuf {
 ///
 /// # Errors
 /// [`Error::Program`], [`Error::File`].
-pub(super) fn ensure(video: &Path, cache: &Path, frames: usize) -> Result<()> {
+fn ensure(video: &Path, cache: &Path, frames: usize) -> Result<()> {
     let origin = Origin::of(video, frames)?;
     if Origin::read(cache).as_ref() == Some(&origin) {
         return Ok(());

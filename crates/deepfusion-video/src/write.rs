@@ -1,7 +1,8 @@
 //! Pictures to a video file.
 
-use super::program::{WRITE, in_either_words, output, run};
-use crate::{Error, Result, load_rgb};
+use crate::program::{WRITE, in_either_words, output, run};
+use crate::{Error, Result};
+use image::ImageReader;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
@@ -23,12 +24,12 @@ const FINER: f64 = 1000.0;
 ///
 /// # Errors
 /// [`Error::Program`] where ffmpeg is not installed, or fails at any of the pictures; [`Error::File`] where the folder
-/// cannot be written; [`Error::Image`] where the first picture is none.
+/// cannot be written; [`Error::Picture`] where the first picture is none.
 pub fn write_video(folder: &Path, pictures: &[Shown], name: &str) -> Result<()> {
     let Some(first) = pictures.first() else {
         return Ok(());
     };
-    let size = load_rgb(&folder.join(&first.file))?.dimensions();
+    let size = picture_size(&folder.join(&first.file))?;
     // Whatever a run left here that was killed is replaced.
     let aside = Aside::new(folder.join(format!(".{name}.partial")))?;
     let list = concat_list(pictures, |i, picture| {
@@ -38,6 +39,17 @@ pub fn write_video(folder: &Path, pictures: &[Shown], name: &str) -> Result<()> 
     let path = folder.join(name);
     encode(&aside.0, size, &path)?;
     deepfusion_fs::publish(&aside.0.join(PART), &path).map_err(|e| Error::file(&path, e))
+}
+
+/// Width and height of a picture, whatever its name ends in.
+fn picture_size(path: &Path) -> Result<(u32, u32)> {
+    let failed = |e| Error::file(path, e);
+    let reader = ImageReader::open(path).map_err(failed)?;
+    let reader = reader.with_guessed_format().map_err(failed)?;
+    reader.into_dimensions().map_err(|e| Error::Picture {
+        path: path.to_owned(),
+        problem: format!("cannot be decoded: {e}"),
+    })
 }
 
 /// Whether ffmpeg can be run at all, to know before hours of work.
