@@ -1,4 +1,3 @@
-use crate::layout::WITHOUT_ROS2;
 use std::path::{Path, PathBuf};
 
 /// What can go wrong with a recording.
@@ -404,6 +403,12 @@ pub enum Error {
 
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// Why a ROS 2 bag is no recording here.
+pub(crate) const WITHOUT_ROS2: &str = match cfg!(feature = "ros2") {
+    true => "",
+    false => ", and this program was built without the feature `ros2`",
+};
 
 /// The layouts that are told apart, in the order in which they are looked for.
 const LOOKED_FOR: &str = "  KITTI raw          image_02/ or image_03/ with data/0000000000.png, here or up to two folders below

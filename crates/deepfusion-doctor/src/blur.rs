@@ -1,7 +1,6 @@
 //! Blurred frames: single ones against the drive's usual sharpness, and a whole drive out of focus.
 
-use super::finding::{Figure, Limit, Outcome, Severity};
-use super::median;
+use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::survey::Survey;
 
 /// A frame with less than this share of the drive's usual sharpness is blurred.

@@ -4,7 +4,7 @@
 //! the rows (or columns) inward are followed while they hardly change over time; the part is the vehicle's where a
 //! standing edge ends it. A plain sky hardly changes either, but nothing that stays put ends it.
 
-use super::finding::{Figure, Limit, Outcome, Severity};
+use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::survey::Survey;
 
 /// The vehicle certainly moves above this, m/s.
@@ -143,7 +143,7 @@ impl Still {
             }
         }
         let deviation = |s: &[f64; 5]| (s[1] - s[0] * s[0]).max(0.0).sqrt();
-        let usual = super::median(sums.iter().map(deviation).collect());
+        let usual = median(sums.iter().map(deviation).collect());
         let stands = |s: &[f64; 5]| {
             let mean = s[2].hypot(s[3]);
             mean > EDGE && mean > STANDS * s[4]

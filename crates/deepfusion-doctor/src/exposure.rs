@@ -1,7 +1,6 @@
 //! Brightness: jumps from frame to frame, darkness, whiteness. View synthesis compares colours.
 
-use super::finding::{Figure, Limit, Outcome, Severity};
-use super::median;
+use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::survey::Survey;
 
 /// A change of the mean grey level by more than this share is a jump of the exposure, not of the scene.

@@ -1,7 +1,6 @@
 //! The road in the measured depth against the camera's mount: the way up, and the height.
 
-use super::finding::{Figure, Limit, Outcome, Severity};
-use super::median;
+use super::finding::{Figure, Limit, Outcome, Severity, median};
 use deepfusion_data::{Dataset, GtKind, PLAUSIBLE_HEIGHT_M};
 use deepfusion_geometry::DepthMap;
 use nalgebra::{Matrix3, Vector3};

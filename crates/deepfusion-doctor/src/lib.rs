@@ -230,9 +230,3 @@ pub fn inspect(path: &Path, options: &OpenOptions) -> Result<Inspection> {
         })
     })
 }
-
-/// The middle of the values; NaN where there is none.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}

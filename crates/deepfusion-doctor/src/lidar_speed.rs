@@ -1,7 +1,6 @@
 //! The vehicle's speed against the radial velocities of an FMCW LiDAR.
 
-use super::finding::{Figure, Limit, Outcome, Severity};
-use super::median;
+use super::finding::{Figure, Limit, Outcome, Severity, median};
 use deepfusion_data::{Dataset, LidarMotion};
 use nalgebra::Vector3;
 

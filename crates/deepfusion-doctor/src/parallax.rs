@@ -1,8 +1,7 @@
 //! Whether the picture moves enough for depth to be seen.
 
 use super::epipolar::{EpipolarPair, YawTrust};
-use super::finding::{Figure, Limit, Outcome, Severity};
-use super::median;
+use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::survey::Survey;
 
 /// Width at which networks train, pixels.

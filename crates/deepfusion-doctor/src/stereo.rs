@@ -1,8 +1,7 @@
 //! Whether a drive's two cameras are the right way round: what the left one sees lies further left in the right one.
 
-use super::finding::{Figure, Limit, Outcome, Severity};
+use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::flow::flow;
-use super::median;
 use deepfusion_data::{Camera, CameraChoice, Dataset, OpenOptions, Result, grey_image};
 use deepfusion_motion::GreyImage;
 use std::path::Path;

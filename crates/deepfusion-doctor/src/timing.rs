@@ -1,8 +1,7 @@
 //! Rates, gaps and lost frames, by the frames' numbers and time stamps; and times at which the vehicle's motion is not
 //! known, by its own.
 
-use super::finding::{Figure, Limit, Outcome, Severity};
-use super::median;
+use super::finding::{Figure, Limit, Outcome, Severity, median};
 use deepfusion_data::Dataset;
 
 /// Share of frames that may be missing, percent: KITTI's and the simulator's drives miss none.

@@ -1,15 +1,11 @@
 //! A camera from the file that a calibration tool wrote.
 
-mod find;
-mod numbers;
-mod yaml;
-
-use crate::recording::CalibrationPlace;
-use crate::{Error, Lens, Result};
+use super::lens::Lens;
+use super::numbers::{self, Numbers};
+use super::yaml;
+use crate::{CalibrationPlace, Error, Result};
 use deepfusion_geometry::{Distortion, Intrinsics};
 use std::path::{Path, PathBuf};
-
-pub(crate) use find::find_camera;
 
 /// What a calibration file says of a camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,15 +18,6 @@ pub struct CameraCalibration {
     pub size_in_file: bool,
     /// The file, or what else said it.
     pub path: PathBuf,
-}
-
-/// The numbers in a file, which may lack the image's size.
-#[derive(Debug, Clone, PartialEq)]
-struct Numbers {
-    /// fx, fy, cx, cy.
-    pinhole: [f64; 4],
-    distortion: Distortion,
-    size: Option<(u32, u32)>,
 }
 
 impl CameraCalibration {
@@ -112,23 +99,5 @@ impl CameraCalibration {
             remedy: "take matrix and coefficients from one calibration, for images of this size"
                 .into(),
         })
-    }
-}
-
-/// Why a file's text is no camera.
-#[derive(Debug, PartialEq)]
-struct Refusal {
-    problem: String,
-    remedy: String,
-}
-
-impl Refusal {
-    fn new(problem: impl Into<String>) -> Self {
-        Self {
-            problem: problem.into(),
-            remedy: "OpenCV's and ROS's calibration YAML, Kalibr's camchain and four numbers \
-                     fx, fy, cx, cy are read: docs/guides/train-on-your-own-video.md"
-                .into(),
-        }
     }
 }

@@ -1,7 +1,8 @@
 //! Where a recording's camera is looked for.
 
-use crate::config::FolderConfig;
-use crate::{CameraCalibration, Error, OpenOptions, Result};
+use super::calibration::CameraCalibration;
+use crate::dataset_toml::FolderConfig;
+use crate::{Error, OpenOptions, Result};
 use std::path::Path;
 
 /// Names under which a calibration is looked for beside the images, in this order.

@@ -1,7 +1,33 @@
 //! Plain numbers: fx, fy, cx, cy, or a camera matrix row by row.
 
-use super::{Numbers, Refusal};
 use deepfusion_geometry::Distortion;
+
+/// The numbers in a file, which may lack the image's size.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Numbers {
+    /// fx, fy, cx, cy.
+    pub(super) pinhole: [f64; 4],
+    pub(super) distortion: Distortion,
+    pub(super) size: Option<(u32, u32)>,
+}
+
+/// Why a file's text is no camera.
+#[derive(Debug, PartialEq)]
+pub(super) struct Refusal {
+    pub(super) problem: String,
+    pub(super) remedy: String,
+}
+
+impl Refusal {
+    pub(super) fn new(problem: impl Into<String>) -> Self {
+        Self {
+            problem: problem.into(),
+            remedy: "OpenCV's and ROS's calibration YAML, Kalibr's camchain and four numbers \
+                     fx, fy, cx, cy are read: docs/guides/train-on-your-own-video.md"
+                .into(),
+        }
+    }
+}
 
 /// Reads four or nine numbers, apart by commas, spaces or lines; `#` begins a comment.
 pub(super) fn parse(text: &str) -> Result<Numbers, Refusal> {

@@ -1,6 +1,6 @@
 //! The YAML of OpenCV, ROS and Kalibr.
 
-use super::{Numbers, Refusal};
+use super::numbers::{Numbers, Refusal};
 use deepfusion_geometry::Distortion;
 use serde::Deserialize;
 use std::collections::BTreeMap;

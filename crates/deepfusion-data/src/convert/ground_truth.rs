@@ -1,7 +1,6 @@
 //! Ground truth of many frames in one `.npz`.
 
-use crate::kitti::GtKind;
-use crate::{Dataset, Error, Result, write_atomically};
+use crate::{Dataset, Error, GtKind, Result, write_atomically};
 use ndarray::ArrayView2;
 use ndarray_npy::{NpzWriter, WriteNpyError, WriteNpzError};
 use std::collections::HashSet;

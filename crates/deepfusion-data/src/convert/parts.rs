@@ -1,15 +1,4 @@
-//! A recording of any layout written as another: KITTI raw, or a ROS 1 bag.
-//!
-//! What is written is what a [`Dataset`](crate::Dataset) gives: images freed of their lens' distortion, their times, the
-//! camera, its place on the vehicle, speeds, turns and leans, and the measured depth as points in the camera's place. The
-//! other layout then gives the same snippets and the same ground truth.
-
-mod bag;
-mod calendar;
-mod kitti;
-
-pub use bag::convert_to_bag;
-pub use kitti::convert_to_kitti;
+//! What both layouts are written from: points, times, how the vehicle moves.
 
 use crate::{Dataset, Error, GtKind, MotionModel, Result, write_unsynced};
 use deepfusion_geometry::Se3;
@@ -18,14 +7,14 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// The axes of a scanner (x forward, y left, z up) at the camera's place, seen from the camera.
-fn cam_from_scanner() -> Se3 {
+pub(super) fn cam_from_scanner() -> Se3 {
     let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
     Se3::from_parts(&axes, Vector3::zeros())
 }
 
 /// A frame's measured depth as points of a scanner at the camera's place, x forward, y left, z up, in metres: each
 /// projects back to the pixel it came from. `None` where the frame has no depth.
-fn points(dataset: &Dataset, frame: usize) -> Result<Option<Vec<[f32; 3]>>> {
+pub(super) fn points(dataset: &Dataset, frame: usize) -> Result<Option<Vec<[f32; 3]>>> {
     let Some(depth) = dataset.ground_truth(frame, GtKind::Z)? else {
         return Ok(None);
     };
@@ -44,7 +33,7 @@ fn points(dataset: &Dataset, frame: usize) -> Result<Option<Vec<[f32; 3]>>> {
 /// Whole seconds by which all times of the recordings have to be moved, so that all are after the beginning of 1970: 0 where
 /// they are. Neither layout can write an earlier one, in a bag 0 means that no time is set, and a clock that counts from its own
 /// start has such times where one sensor started first.
-fn seconds_to_move(datasets: &[Dataset]) -> i64 {
+pub(super) fn seconds_to_move(datasets: &[Dataset]) -> i64 {
     let earliest = |dataset: &Dataset| {
         let frames = dataset.frames().iter().filter_map(|f| f.time_s);
         let track = dataset
@@ -60,7 +49,7 @@ fn seconds_to_move(datasets: &[Dataset]) -> i64 {
 }
 
 /// A time of a recording as nanoseconds since 1970, moved by whole seconds.
-fn at_ns(dataset: &Dataset, time_s: f64, moved_s: i64) -> i64 {
+pub(super) fn at_ns(dataset: &Dataset, time_s: f64, moved_s: i64) -> i64 {
     let origin_ns = dataset.origin_ns().unwrap_or_default();
     let ns = origin_ns.saturating_add((time_s * 1e9).round() as i64);
     ns.saturating_add(moved_s.saturating_mul(NANOS))
@@ -79,7 +68,7 @@ pub struct Converted {
 }
 
 /// Makes the output folder, which must be new or empty.
-fn prepare(out: &Path) -> Result<()> {
+pub(super) fn prepare(out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).map_err(|e| Error::file(out, e))?;
     let mut entries = std::fs::read_dir(out).map_err(|e| Error::file(out, e))?;
     match entries.next() {
@@ -90,7 +79,7 @@ fn prepare(out: &Path) -> Result<()> {
     }
 }
 
-fn write_text(path: &Path, text: &str) -> Result<()> {
+pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
     write_unsynced(path, |out| {
         let written = out.write_all(text.as_bytes());
         written.map_err(|e| Error::file(path, e))
@@ -101,17 +90,17 @@ fn write_text(path: &Path, text: &str) -> Result<()> {
 const RATE_REACH_S: f64 = 0.05;
 
 /// How a vehicle moves at a time.
-struct Moving {
+pub(super) struct Moving {
     /// Forward, in m/s.
-    speed_mps: f64,
+    pub(super) speed_mps: f64,
     /// About x, y and z, in rad/s.
-    rates_radps: [f64; 3],
+    pub(super) rates_radps: [f64; 3],
     /// Roll and pitch, in radians; 0 where nothing measured them.
-    tilt_rad: [f64; 2],
+    pub(super) tilt_rad: [f64; 2],
 }
 
 /// What the recording says about a time; `None` where it does not.
-fn moving_at(dataset: &Dataset, time_s: f64) -> Option<Moving> {
+pub(super) fn moving_at(dataset: &Dataset, time_s: f64) -> Option<Moving> {
     let track = dataset.track()?;
     let speed = track.speed_at(time_s)?;
     let reaches = [

@@ -1,37 +1,20 @@
-//! A recording as frames, whatever its layout.
+//! One camera's recording of one drive as frames, whatever its layout.
 
-use crate::ego::Ego;
-use crate::kitti::GtKind;
-use crate::layout::Layout;
-use crate::recording::Recording;
-use crate::selection::Selection;
-use crate::split::Split;
-use crate::{
-    Camera, CameraChoice, CameraPath, DatasetKind, DynamicAgreement, Error, Frame, LidarMotion,
-    MotionModel, MovingLabels, Result, ScanTruth, Stream, bag, image_size,
-};
+use super::camera::Camera;
+use super::ego::Ego;
+use super::frame::Frame;
+use super::inspection::Stream;
+use super::kind::DatasetKind;
+use super::options::OpenOptions;
+use super::recording::{CameraPath, Recording};
+use super::selection::Selection;
+use crate::truth::{DynamicAgreement, GtKind, LidarMotion, MovingLabels, ScanTruth};
+use crate::{Error, MotionModel, Result, image_size};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
-use deepfusion_rosbag::MessageSource;
 use image::RgbImage;
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
-
-/// How to open a recording.
-#[derive(Debug, Clone, Default)]
-pub struct OpenOptions {
-    /// Which cameras.
-    pub camera: CameraChoice,
-    /// Only these frames are selected; their neighbours still serve as sources.
-    pub split: Option<Split>,
-    /// fx, fy, cx, cy in pixels of an undistorted image, instead of the recording's own. Not for KITTI
-    /// raw, which brings its calibration and refuses it.
-    pub intrinsics: Option<[f64; 4]>,
-    /// How far the clock of camera and LiDAR is ahead of the vehicle's, in seconds, instead of what the recording's own
-    /// file says (`clock.camera_ahead_s`). It is taken off the images' times, once, when a recording is opened: every time of
-    /// a [`Dataset`] is one of the vehicle's clock.
-    pub camera_ahead_s: Option<f64>,
-}
 
 /// What every layout has: the parts of a [`Dataset`] that are plain values.
 #[derive(Debug, Clone)]
@@ -72,42 +55,6 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// Opens a recording of any known layout, told by what is there: a KITTI raw drive, date or root (one
-    /// data set for each drive and camera, in order of names), a folder of images, a video file, a
-    /// comma2k19 segment, a folder of RGB-D frames. Drives without images of the camera, or without a
-    /// selected frame, are left out.
-    ///
-    /// The sizes of all images are checked against the calibration. Times and speeds may be absent
-    /// (evaluation needs neither); where they are there, they must be readable.
-    ///
-    /// # Errors
-    /// [`Error::UnknownLayout`] where no layout fits, [`Error::NoSuchPath`], [`Error::Missing`]
-    /// (calibration), [`Error::NoImages`], [`Error::OneCamera`], [`Error::FrameSize`], [`Error::Image`],
-    /// [`Error::SplitSelectsNothing`], and what the layout's files can have wrong:
-    /// [`Error::Calibration`], [`Error::TimeStamp`], [`Error::NoTimeStamp`], [`Error::Oxts`],
-    /// [`Error::Table`], [`Error::Config`], [`Error::Clocks`], [`Error::Program`].
-    pub fn open(path: &Path, options: &OpenOptions) -> Result<Vec<Self>> {
-        Layout::of(path)?.open(path, options)
-    }
-
-    /// The layout in which [`Self::open`] reads what is at a path, told without opening it.
-    ///
-    /// # Errors
-    /// [`Error::UnknownLayout`], [`Error::NoSuchPath`], [`Error::Config`].
-    pub fn kind_at(path: &Path) -> Result<DatasetKind> {
-        Ok(Layout::of(path)?.kind())
-    }
-
-    /// A recording of messages, such as an open bag of another format, as [`Self::open`] opens a bag: topics are found
-    /// by type, and the file beside [`MessageSource::path`] says what they do not.
-    ///
-    /// # Errors
-    /// As [`Self::open`].
-    pub fn from_messages(source: Arc<dyn MessageSource>, options: &OpenOptions) -> Result<Self> {
-        let path = source.path().to_owned();
-        bag::open_bag(source, options)?.select(&path, options)
-    }
-
     /// A data set of all its frames.
     #[must_use]
     pub fn new(parts: DatasetParts, recording: Arc<dyn Recording>) -> Self {
@@ -395,6 +342,18 @@ impl Dataset {
     /// Adds what was noticed beside it.
     pub(crate) fn remark(&mut self, remark: String) {
         self.remarks.push(remark);
+    }
+
+    /// Stretches of at least two frames whose numbers follow each other, by index.
+    #[must_use]
+    pub fn stretches(&self) -> Vec<Vec<usize>> {
+        let frames = self.frames();
+        let indices: Vec<usize> = (0..frames.len()).collect();
+        indices
+            .chunk_by(|a, b| frames[*a].number + 1 == frames[*b].number)
+            .filter(|stretch| stretch.len() > 1)
+            .map(<[usize]>::to_vec)
+            .collect()
     }
 
     /// The camera of frame `to` in the camera of frame `from` (`from_from_to`, metres), from the vehicle's speed and yaw

@@ -1,6 +1,7 @@
 //! The camera's motion between two frames, from the car's.
 
-use crate::{Frame, MotionModel, VehicleMotion};
+use super::frame::Frame;
+use crate::{MotionModel, VehicleMotion};
 use deepfusion_geometry::Se3;
 
 /// How the camera moved between a target frame and one of its sources.

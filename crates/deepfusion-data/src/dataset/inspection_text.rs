@@ -1,6 +1,7 @@
 //! An inspection in words.
 
-use crate::{DatasetKind, Inspection, SpeedRange};
+use super::inspection::{Inspection, SpeedRange};
+use super::kind::DatasetKind;
 use std::fmt;
 
 impl fmt::Display for Inspection {

@@ -1,49 +1,15 @@
 //! What a layout has to offer for its recordings to be a [`Dataset`].
 
-use crate::kitti::GtKind;
-use crate::{CameraPath, Dataset, DynamicAgreement, Error, Frame, MovingLabels, Result, Stream};
-use deepfusion_geometry::DepthMap;
+use super::drive::Dataset;
+use super::frame::Frame;
+use super::inspection::Stream;
+use super::kind::DatasetKind;
+use crate::truth::{DynamicAgreement, GtKind, LidarMotion, MovingLabels, ScanTruth};
+use crate::{Error, Result};
+use deepfusion_geometry::{DepthMap, Se3};
 use image::RgbImage;
-use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::{Path, PathBuf};
-
-/// The layout a recording came in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum DatasetKind {
-    /// KITTI raw.
-    KittiRaw,
-    /// A folder of images with tables beside it.
-    Folder,
-    /// A video file with tables beside it.
-    Video,
-    /// A comma2k19 segment.
-    Comma2k19,
-    /// A folder of colour, depth and pose files, as 7-Scenes has.
-    RgbD,
-    /// A ROS bag.
-    Bag,
-    /// A layout of somebody else's: a [`Recording`] from outside this crate.
-    Other,
-}
-
-impl DatasetKind {
-    /// Its name in text.
-    #[must_use]
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::KittiRaw => "KITTI raw",
-            Self::Folder => "image folder",
-            Self::Video => "video",
-            Self::Comma2k19 => "comma2k19 segment",
-            Self::RgbD => "RGB-D folder",
-            Self::Bag => "ROS bag",
-            Self::Other => "recording",
-        }
-    }
-}
 
 /// Where a data set's images and labels come from; one implementation a layout.
 ///
@@ -155,28 +121,6 @@ pub trait Recording: fmt::Debug + Send + Sync {
     }
 }
 
-/// Depth of a frame by its scan, and how fast what is seen there moves.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ScanTruth {
-    /// H×W camera z in metres, 0 = none; as [`Dataset::ground_truth`].
-    pub depth: DepthMap,
-    /// Velocity over ground along the LiDAR's ray, m/s, receding is positive, row by row, of the point that the depth is
-    /// of: about 0 for what stands still, NaN where there is no depth or no velocity. `None` where the scan has no
-    /// radial velocities.
-    pub velocity_mps: Option<Vec<f32>>,
-}
-
-/// The velocity of a LiDAR over ground, by its scan and by the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LidarMotion {
-    /// When, in seconds on the frames' clock.
-    pub time_s: f64,
-    /// By the scan's static points, in the vehicle's axes (x forward, y left, z up), m/s.
-    pub by_scan_mps: Vector3<f64>,
-    /// By speed and yaw rate, same axes, m/s.
-    pub by_vehicle_mps: Vector3<f64>,
-}
-
 /// The place in a file that says what the camera is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CalibrationPlace {
@@ -184,4 +128,16 @@ pub struct CalibrationPlace {
     pub file: PathBuf,
     /// The field that holds the image's size.
     pub field: &'static str,
+}
+
+/// A camera's path over consecutively numbered frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraPath {
+    /// Indices in [`Dataset::frames`].
+    pub frames: Vec<usize>,
+    /// Their times, in seconds from the drive's first time stamp; empty where there are none.
+    pub times_s: Vec<f64>,
+    /// The camera in a world that does not move. KITTI's has x east, y north, z up, and its origin at the
+    /// unit's first place; an RGB-D folder's is the recording's own.
+    pub world_from_cam: Vec<Se3>,
 }

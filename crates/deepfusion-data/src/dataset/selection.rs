@@ -1,7 +1,9 @@
 //! Which frames of a recording a split wants.
 
-use crate::split::SplitEntry;
-use crate::{Camera, Error, OpenOptions, Split};
+use super::camera::Camera;
+use super::options::OpenOptions;
+use super::split::{Split, SplitEntry};
+use crate::Error;
 use std::collections::HashSet;
 use std::path::Path;
 

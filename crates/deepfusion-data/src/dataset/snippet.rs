@@ -1,6 +1,6 @@
 //! Training samples: a frame, its neighbours, and how the camera moved between them.
 
-use crate::ego::NoMotion;
+use super::ego::NoMotion;
 use crate::{Dataset, EgoMotion, Error, Result};
 use std::collections::{HashMap, HashSet};
 

@@ -6,7 +6,7 @@
 //! sweep over h finds the plane that best carries the earlier image onto the later one. A car's camera
 //! is 0.9 to 2.6 m above the road; a height outside says that t, and so the speed, is wrong by as much.
 
-use crate::snippet::Snippet;
+use super::snippet::Snippet;
 use crate::{Dataset, Result, resize_rgb};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::{

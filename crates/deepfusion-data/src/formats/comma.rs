@@ -1,19 +1,20 @@
 //! A comma2k19 segment: `processed_log` and `global_pose` as NumPy arrays without an ending, `video.hevc`.
 
-use crate::calibration::find_camera;
-use crate::clock::{on_the_vehicles_clock, seconds};
-use crate::config::FolderConfig;
-use crate::folder::{NO_MOUNT, name_of};
-use crate::frame_times::{TimedImage, numbers_by_time};
-use crate::inspect::{DriveInspection, Inspection, SpeedRange, Stream};
-use crate::plain::PlainParts;
-use crate::speed_log::{Samples, SpeedLog};
-use crate::vehicle_log::VehicleLog;
-use crate::video::frames_of;
-use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
+use super::files::name_of;
+use super::plain::{NO_MOUNT, PlainParts};
+use super::video::frames_of;
+use crate::camera::find_camera;
+use crate::dataset_toml::FolderConfig;
+use crate::logs::clock::{on_the_vehicles_clock, seconds};
+use crate::logs::frame_times::{TimedImage, numbers_by_time};
+use crate::logs::samples::Samples;
+use crate::logs::speed_log::SpeedLog;
+use crate::logs::vehicle_log::VehicleLog;
+use crate::{
+    Dataset, DatasetKind, DriveInspection, Error, Inspection, OpenOptions, Result, SpeedRange,
+    Stream,
+};
 use deepfusion_motion::{ImuMount, comma};
-use ndarray::{ArrayViewD, IxDyn};
-use ndarray_npy::ViewNpyExt;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -263,29 +264,20 @@ fn nanoseconds(path: &Path) -> Result<Vec<i64>> {
 
 /// An array of N or N×1 numbers.
 fn column(path: &Path) -> Result<Vec<f64>> {
-    let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
-    // A view's size is checked against the file's; nothing is made as large as a header says.
-    let array =
-        ArrayViewD::<f64>::view_npy(&bytes).map_err(|e| array_error(path, e.to_string()))?;
-    let shape: Vec<usize> = array.shape().to_vec();
-    let len = match shape.as_slice() {
-        [n] | [n, 1] => *n,
-        _ => {
-            return Err(array_error(
-                path,
-                format!("shape {shape:?}, expected N or N x 1"),
-            ));
-        }
-    };
-    let array = array.into_shape_with_order(IxDyn(&[len]));
-    let array = array.map_err(|e| array_error(path, e.to_string()))?;
-    Ok(array.iter().copied().collect())
+    comma::numbers(path).map_err(|error| match error {
+        deepfusion_motion::Error::File { path, source } => Error::file(&path, source),
+        deepfusion_motion::Error::Array { path, problem } => array_error(&path, problem),
+        source => Error::Motion {
+            path: path.to_owned(),
+            source,
+        },
+    })
 }
 
 fn array_error(path: &Path, problem: String) -> Error {
     Error::Columns {
         path: PathBuf::from(path),
         problem,
-        remedy: "fetch the segment again: it should be a NumPy array of f64".into(),
+        remedy: "fetch the segment again: it should be a NumPy array of numbers".into(),
     }
 }

@@ -1,20 +1,19 @@
 //! A folder of images with tables and a calibration beside them.
 
-use crate::calibration::find_camera;
-use crate::config::FolderConfig;
-use crate::depth_images::DepthImages;
-use crate::frame_times::timed_images;
-use crate::plain::PlainParts;
-use crate::speed_log::SpeedLog;
+use super::files::{images_in, name_of};
+use super::plain::{CAMERA_REMEDY, NO_MOUNT, PlainParts};
+use crate::camera::find_camera;
+use crate::dataset_toml::FolderConfig;
+use crate::logs::frame_times::timed_images;
+use crate::logs::speed_log::SpeedLog;
+use crate::truth::depth_images::DepthImages;
 use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, image_size};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Folders in which the images are looked for; then the recording's folder itself.
 const FOLDERS: [&str; 2] = ["images", "frames"];
-pub(crate) const CAMERA_REMEDY: &str = "put calibration.yaml (OpenCV, ROS or Kalibr) or intrinsics.txt (fx, fy, cx, cy) \
-     there, or set intrinsics = [fx, fy, cx, cy] in dataset.toml";
-pub(crate) const SPEED_REMEDY: &str = "training needs speed.csv (time_s,speed_mps) beside the images; evaluation and prediction do not";
+const SPEED_REMEDY: &str = "training needs speed.csv (time_s,speed_mps) beside the images; evaluation and prediction do not";
 
 /// Whether a folder is one of images.
 pub(crate) fn has_images(folder: &Path) -> Result<bool> {
@@ -65,37 +64,11 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     .into_dataset()
 }
 
-/// What is said where nothing tells where the camera is.
-pub(crate) const NO_MOUNT: &str = "the camera's place on the vehicle is not given ([mount] in dataset.toml): it is taken to look straight \
-     ahead and to move as the vehicle does";
-
-/// A folder's name.
-pub(crate) fn name_of(folder: &Path) -> String {
-    let name = folder.file_name().unwrap_or(folder.as_os_str());
-    name.to_string_lossy().into_owned()
-}
-
 fn images_folder(folder: &Path, config: &FolderConfig) -> Result<PathBuf> {
     let found = config.find(folder, "images", config.images.as_ref(), &FOLDERS)?;
     Ok(found
         .filter(|p| p.is_dir())
         .unwrap_or_else(|| folder.to_owned()))
-}
-
-/// The PNG and JPEG files of a folder, hidden ones left out; none where there is no such folder.
-pub(crate) fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut images = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
-        let path = entry.map_err(|e| Error::file(folder, e))?.path();
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-        let known = ["png", "jpg", "jpeg"].contains(&extension.to_ascii_lowercase().as_str());
-        let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("");
-        if known && !name.starts_with('.') && path.is_file() {
-            images.push(path);
-        }
-    }
-    images.sort();
-    Ok(images)
 }
 
 /// The depth images whose names are those of frames.

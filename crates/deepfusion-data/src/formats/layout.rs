@@ -1,10 +1,53 @@
 //! Telling layouts apart, and saying what was looked for where none fits.
 
-use crate::config::FolderConfig;
-use crate::kitti::{self, Drive, find_drives, layout};
-use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, bag, comma, folder, rgbd, video};
+use super::files::folders;
+use super::kitti::{self, Drive, drive_around, find_drives};
+use super::{bag, comma, folder, rgbd, video};
+use crate::dataset_toml::FolderConfig;
+use crate::error::WITHOUT_ROS2;
+use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
+use deepfusion_rosbag::MessageSource;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+impl Dataset {
+    /// Opens a recording of any known layout, told by what is there: a KITTI raw drive, date or root (one
+    /// data set for each drive and camera, in order of names), a folder of images, a video file, a
+    /// comma2k19 segment, a folder of RGB-D frames. Drives without images of the camera, or without a
+    /// selected frame, are left out.
+    ///
+    /// The sizes of all images are checked against the calibration. Times and speeds may be absent
+    /// (evaluation needs neither); where they are there, they must be readable.
+    ///
+    /// # Errors
+    /// [`Error::UnknownLayout`] where no layout fits, [`Error::NoSuchPath`], [`Error::Missing`]
+    /// (calibration), [`Error::NoImages`], [`Error::OneCamera`], [`Error::FrameSize`], [`Error::Image`],
+    /// [`Error::SplitSelectsNothing`], and what the layout's files can have wrong:
+    /// [`Error::Calibration`], [`Error::TimeStamp`], [`Error::NoTimeStamp`], [`Error::Oxts`],
+    /// [`Error::Table`], [`Error::Config`], [`Error::Clocks`], [`Error::Program`].
+    pub fn open(path: &Path, options: &OpenOptions) -> Result<Vec<Self>> {
+        Layout::of(path)?.open(path, options)
+    }
+
+    /// The layout in which [`Self::open`] reads what is at a path, told without opening it.
+    ///
+    /// # Errors
+    /// [`Error::UnknownLayout`], [`Error::NoSuchPath`], [`Error::Config`].
+    pub fn kind_at(path: &Path) -> Result<DatasetKind> {
+        Ok(Layout::of(path)?.kind())
+    }
+
+    /// A recording of messages, such as an open bag of another format, as [`Self::open`] opens a bag: topics are found
+    /// by type, and the file beside [`MessageSource::path`] says what they do not.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn from_messages(source: Arc<dyn MessageSource>, options: &OpenOptions) -> Result<Self> {
+        let path = source.path().to_owned();
+        bag::open_bag(source, options)?.select(&path, options)
+    }
+}
 
 /// What lies at a path.
 #[derive(Debug)]
@@ -44,7 +87,7 @@ impl Layout {
                 false => Err(unknown(describe_file(&real))),
             };
         }
-        if let Some(drive) = layout::drive_around(&real) {
+        if let Some(drive) = drive_around(&real) {
             let drive = drive.display();
             return Err(unknown(format!("it lies within the drive {drive}")));
         }
@@ -109,12 +152,6 @@ fn named(path: &Path, real: &Path) -> PathBuf {
         .unwrap_or_else(|| real.to_owned())
 }
 
-/// Why a ROS 2 bag is no recording here.
-pub(crate) const WITHOUT_ROS2: &str = match cfg!(feature = "ros2") {
-    true => "",
-    false => ", and this program was built without the feature `ros2`",
-};
-
 fn describe_file(path: &Path) -> String {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     match extension.to_ascii_lowercase().as_str() {
@@ -130,7 +167,7 @@ fn describe_file(path: &Path) -> String {
 fn describe_folder(folder: &Path) -> Result<String> {
     let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
     let (mut files, mut first) = (0_usize, None);
-    let inner = layout::folders(folder)?;
+    let inner = folders(folder)?;
     for place in std::iter::once(folder.to_owned()).chain(inner.iter().cloned()) {
         for entry in std::fs::read_dir(&place).map_err(|e| Error::file(&place, e))? {
             let path = entry.map_err(|e| Error::file(&place, e))?.path();

@@ -1,15 +1,13 @@
 //! What folders, videos, comma2k19 segments and RGB-D folders have in common: frames, tables beside
 //! them, depth images.
 
-use crate::clock::{on_the_vehicles_clock, seconds};
-use crate::depth_images::DepthImages;
-use crate::frame_times::TimedImage;
-use crate::kitti::GtKind;
-use crate::recording::{CalibrationPlace, Recording};
-use crate::speed_log::SpeedLog;
+use crate::logs::clock::{on_the_vehicles_clock, seconds};
+use crate::logs::frame_times::TimedImage;
+use crate::logs::speed_log::SpeedLog;
+use crate::truth::depth_images::DepthImages;
 use crate::{
-    Camera, CameraCalibration, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame,
-    FrameImage, Lens, Result, Stream, load_rgb,
+    CalibrationPlace, Camera, CameraCalibration, CameraPath, Dataset, DatasetKind, DatasetParts,
+    Error, Frame, FrameImage, GtKind, Lens, Recording, Result, Stream, load_rgb,
 };
 use deepfusion_geometry::{DepthMap, Se3};
 use deepfusion_video::VideoFrames;
@@ -17,6 +15,13 @@ use image::RgbImage;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// What is said where nothing tells what the camera is.
+pub(crate) const CAMERA_REMEDY: &str = "put calibration.yaml (OpenCV, ROS or Kalibr) or intrinsics.txt (fx, fy, cx, cy) \
+     there, or set intrinsics = [fx, fy, cx, cy] in dataset.toml";
+/// What is said where nothing tells where the camera is.
+pub(crate) const NO_MOUNT: &str = "the camera's place on the vehicle is not given ([mount] in dataset.toml): it is taken to look straight \
+     ahead and to move as the vehicle does";
 
 /// A recording of one camera, put together from what a layout found.
 #[derive(Debug)]

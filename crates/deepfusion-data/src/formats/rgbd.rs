@@ -1,12 +1,11 @@
 //! Folders of colour, depth and pose files, one of each a frame, as the 7-Scenes data set has them.
 
-use crate::calibration::find_camera;
-use crate::config::FolderConfig;
-use crate::depth_images::DepthImages;
-use crate::folder::{images_in, name_of};
-use crate::frame_times::TimedImage;
-use crate::kitti::layout::folders;
-use crate::plain::PlainParts;
+use super::files::{folders, images_in, name_of};
+use super::plain::PlainParts;
+use crate::camera::find_camera;
+use crate::dataset_toml::FolderConfig;
+use crate::logs::frame_times::TimedImage;
+use crate::truth::depth_images::DepthImages;
 use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, image_size};
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix3, Vector3};

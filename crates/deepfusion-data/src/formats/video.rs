@@ -1,12 +1,11 @@
 //! A video file with tables and a calibration beside it.
 
-use crate::calibration::find_camera;
-use crate::clock::{TimeUnit, seconds};
-use crate::config::FolderConfig;
-use crate::folder::{CAMERA_REMEDY, NO_MOUNT};
-use crate::frame_times::{TimedImage, from_start, numbers_by_time};
-use crate::plain::PlainParts;
-use crate::speed_log::SpeedLog;
+use super::plain::{CAMERA_REMEDY, NO_MOUNT, PlainParts};
+use crate::camera::find_camera;
+use crate::dataset_toml::FolderConfig;
+use crate::logs::clock::{TimeUnit, seconds};
+use crate::logs::frame_times::{TimedImage, from_start, numbers_by_time};
+use crate::logs::speed_log::SpeedLog;
 use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
 use deepfusion_video::VideoFrames;
 use std::collections::BTreeMap;

@@ -1,10 +1,10 @@
 //! When the images of a folder were taken, and which of them are neighbours.
 
-use crate::clock::{TimeUnit, seconds};
-use crate::config::FolderConfig;
-use crate::kitti::parse_date_time;
-use crate::speed_log::times;
-use crate::table::{Table, describe};
+use super::clock::{TimeUnit, seconds};
+use super::date_time;
+use super::table::{Table, describe};
+use super::times::times;
+use crate::dataset_toml::FolderConfig;
 use crate::{Error, Result};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -230,7 +230,7 @@ fn from_list(path: &Path, images: usize, config: &FolderConfig) -> Result<Vec<i6
     let mut times = Vec::with_capacity(lines.len());
     for (line, text) in &lines {
         let ns = match dates {
-            true => parse_date_time(text),
+            true => date_time::parse(text).ok(),
             // A line that is no number has kept the unit from being known: it is the one to be named.
             false => number(text).and_then(|_| unit.unwrap_or(TimeUnit::Seconds).nanoseconds(text)),
         };

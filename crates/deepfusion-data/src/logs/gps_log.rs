@@ -1,7 +1,7 @@
 //! Tracks of satellite receivers: GPX of phones, watches and cameras; NMEA sentences as receivers speak them.
 
-use crate::clock::seconds;
-use crate::config::FolderConfig;
+use super::clock::seconds;
+use crate::dataset_toml::FolderConfig;
 use crate::{Error, Result};
 use deepfusion_motion::{Fix, FixSpeed, speeds_of_fixes};
 use nmea::sentences::rmc::{RmcStatusOfFix, parse_rmc};

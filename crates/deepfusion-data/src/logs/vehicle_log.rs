@@ -1,8 +1,8 @@
 //! An inertial unit's and a steering wheel's recording beside the speeds, and the motion that follows from all of them.
 
-use crate::clock::seconds;
-use crate::speed_log::Samples;
-use crate::table::{Column, Table};
+use super::clock::seconds;
+use super::samples::Samples;
+use super::table::{Column, Table};
 use crate::{MotionModel, Result};
 use deepfusion_motion::{FusedTrack, ImuSample, MotionConfig, Signal, VehicleSensors};
 use nalgebra::Vector3;

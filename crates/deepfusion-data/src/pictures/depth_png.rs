@@ -1,6 +1,7 @@
 //! KITTI's annotated depth: 16-bit grey PNG, depth = value / 256 metres, 0 = none.
 
-use crate::{Error, Result, picture, write_unsynced};
+use super::files;
+use crate::{Error, Result, write_unsynced};
 use deepfusion_geometry::DepthMap;
 use image::{DynamicImage, ImageBuffer, Luma};
 use std::path::Path;
@@ -13,7 +14,7 @@ const STEPS_PER_M: f32 = 256.0;
 /// As [`crate::load_rgb`], and [`Error::Image`] for an image that is not 16-bit grey: 8-bit pictures
 /// of depth have lost their metres.
 pub fn read_depth_png(path: &Path) -> Result<DepthMap> {
-    let DynamicImage::ImageLuma16(image) = picture::decode(path)? else {
+    let DynamicImage::ImageLuma16(image) = files::decode(path)? else {
         return Err(Error::Image {
             path: path.to_owned(),
             problem: "not a 16-bit grey PNG, which depth in steps of 1/256 m needs".into(),
@@ -53,7 +54,7 @@ pub fn write_depth_png(depth: &DepthMap, path: &Path) -> Result<()> {
     write_unsynced(path, |out| {
         image
             .write_to(out, image::ImageFormat::Png)
-            .map_err(|e| picture::write_failed(path, e))
+            .map_err(|e| files::write_failed(path, e))
     })
 }
 

@@ -1,6 +1,7 @@
 //! Images from files and to them.
 
-use crate::{Error, Result, jpeg, write_unsynced};
+use super::jpeg;
+use crate::{Error, Result, write_unsynced};
 use image::{DynamicImage, ImageError, ImageReader, RgbImage};
 use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;

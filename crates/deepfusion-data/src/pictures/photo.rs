@@ -1,6 +1,6 @@
 //! A single picture as a camera or a telephone wrote it.
 
-use crate::picture::decode_bytes;
+use super::files::decode_bytes;
 use crate::{Error, Result};
 use deepfusion_geometry::Intrinsics;
 use exif::{Exif, In, Tag};

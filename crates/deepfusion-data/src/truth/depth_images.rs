@@ -1,6 +1,7 @@
 //! Folders of depth images.
 
-use crate::{Error, Result, picture};
+use crate::pictures::decode;
+use crate::{Error, Result};
 use deepfusion_geometry::DepthMap;
 use image::DynamicImage;
 use std::collections::BTreeMap;
@@ -19,7 +20,7 @@ pub(crate) struct DepthImages {
 impl DepthImages {
     /// A 16-bit grey PNG as metres.
     pub(crate) fn read(&self, path: &Path) -> Result<DepthMap> {
-        let DynamicImage::ImageLuma16(image) = picture::decode(path)? else {
+        let DynamicImage::ImageLuma16(image) = decode(path)? else {
             return Err(Error::Image {
                 path: path.to_owned(),
                 problem: "not a 16-bit grey PNG, which depth images are".into(),

@@ -1,38 +1,14 @@
 //! Speed and steering out of CAN frames: which signals the file beside a bag names, and what a frame says of them.
 
-use super::config::{BagConfig, SpeedUnit};
+use super::can_config::SignalConfig;
+use super::config::BagConfig;
 use crate::Result;
 use deepfusion_motion::can::{CanFrame, CanId, CanSignal, Dbc};
 use deepfusion_rosbag::msg::Frame;
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{Error as _, MapAccess, Visitor};
-use serde::{Deserialize, Deserializer};
-use std::fmt;
-use std::path::PathBuf;
 
 /// The highest identifiers of 11 and of 29 bits.
 const HIGHEST_STANDARD: u16 = 0x7ff;
 const HIGHEST_EXTENDED: u32 = 0x1fff_ffff;
-
-/// `[can]`: signals of CAN frames.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct CanConfig {
-    /// The DBC file, beside this one; needed for signals that are named.
-    dbc: Option<PathBuf>,
-    pub(super) speed: Option<SignalConfig>,
-    speed_unit: Option<SpeedUnit>,
-    pub(super) steering: Option<SignalConfig>,
-    /// Radians for one unit of the steering signal: 0.0174533 where it is in degrees.
-    steering_rad: Option<f64>,
-}
-
-/// A signal: `Message.Signal` of the DBC file, or written out.
-#[derive(Debug, Clone)]
-pub(super) enum SignalConfig {
-    Named(String),
-    Inline(CanSignal),
-}
 
 /// The signals that are read, each with its factor to m/s or rad.
 #[derive(Debug, Default)]
@@ -178,59 +154,4 @@ fn check(signal: &CanSignal, key: &str) -> std::result::Result<(), String> {
         layout.validate(key).map_err(|e| e.to_string())?;
     }
     Ok(())
-}
-
-impl SignalConfig {
-    /// The unit that the DBC file gives a signal it names.
-    fn unit(&self, dbc: &Dbc) -> Option<SpeedUnit> {
-        match self {
-            Self::Named(name) => unit_of(dbc.unit(name)?),
-            Self::Inline(_) => None,
-        }
-    }
-}
-
-fn unit_of(text: &str) -> Option<SpeedUnit> {
-    match text.trim().to_lowercase().as_str() {
-        "m/s" => Some(SpeedUnit::MetresPerSecond),
-        "km/h" | "kph" | "kmh" => Some(SpeedUnit::KilometresPerHour),
-        "mph" => Some(SpeedUnit::MilesPerHour),
-        _ => None,
-    }
-}
-
-/// By hand, as an untagged enum says nothing of the field that is wrong.
-impl<'de> Deserialize<'de> for SignalConfig {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
-        struct Either;
-
-        impl<'de> Visitor<'de> for Either {
-            type Value = SignalConfig;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("\"Message.Signal\" of the DBC file, or { id = …, layout = { … } }")
-            }
-
-            fn visit_str<E: serde::de::Error>(
-                self,
-                name: &str,
-            ) -> std::result::Result<Self::Value, E> {
-                match name.is_empty() {
-                    true => Err(E::invalid_length(0, &self)),
-                    false => Ok(SignalConfig::Named(name.to_owned())),
-                }
-            }
-
-            fn visit_map<A: MapAccess<'de>>(
-                self,
-                map: A,
-            ) -> std::result::Result<Self::Value, A::Error> {
-                CanSignal::deserialize(MapAccessDeserializer::new(map))
-                    .map(SignalConfig::Inline)
-                    .map_err(A::Error::custom)
-            }
-        }
-
-        deserializer.deserialize_any(Either)
-    }
 }

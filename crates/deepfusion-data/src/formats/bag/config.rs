@@ -1,6 +1,6 @@
 //! The file beside a bag, `<bag>.toml` or `bag.toml` for all bags of a folder: what the bag does not say.
 
-use super::can::CanConfig;
+use super::can_config::{CanConfig, SpeedUnit};
 use crate::{Error, Result};
 use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_motion::{FusionConfig, SPEED_SCALES};
@@ -96,27 +96,6 @@ pub(super) struct VehicleConfig {
     pub(super) speed_unit: Option<SpeedUnit>,
 }
 
-/// Unit of a speed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-pub(super) enum SpeedUnit {
-    #[serde(rename = "m/s")]
-    MetresPerSecond,
-    #[serde(rename = "km/h")]
-    KilometresPerHour,
-    #[serde(rename = "mph")]
-    MilesPerHour,
-}
-
-impl SpeedUnit {
-    pub(super) fn metres_per_second(self) -> f64 {
-        match self {
-            Self::MetresPerSecond => 1.0,
-            Self::KilometresPerHour => 1.0 / 3.6,
-            Self::MilesPerHour => 0.44704,
-        }
-    }
-}
-
 /// The LiDAR's ways.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -184,7 +163,7 @@ impl BagConfig {
         let there = candidates.iter().find(|path| path.is_file());
         // Where there is none, the first is where one would be looked for.
         let path = there.or(candidates.first()).cloned().unwrap_or_default();
-        let mut config: Self = crate::config::read_or_default(&path)?;
+        let mut config: Self = crate::dataset_toml::read_or_default(&path)?;
         config.path = path;
         config.validate()?;
         Ok(config)
@@ -210,7 +189,7 @@ impl BagConfig {
         ];
         let scale = self.vehicle.speed_scale.unwrap_or(1.0);
         if !SPEED_SCALES.contains(&scale) {
-            return Err(self.wrong(crate::config::bad_speed_scale(scale)));
+            return Err(self.wrong(crate::dataset_toml::bad_speed_scale(scale)));
         }
         for (key, value, positive) in numbers {
             if !value.is_finite() || (positive && value <= 0.0) {

@@ -1,8 +1,7 @@
 //! The topic of dynamic points beside a LiDAR: those points of a scan that its driver calls moving.
 
-use super::recording::nearest;
-use super::scan;
-use super::{image, index::Place};
+use super::index::{Place, nearest};
+use super::{image, scan};
 use crate::Result;
 use deepfusion_rosbag::MessageSource;
 use nalgebra::Vector3;

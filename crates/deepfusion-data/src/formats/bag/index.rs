@@ -22,6 +22,19 @@ pub(super) struct Place {
     pub(super) stamp_ns: i64,
 }
 
+/// The message nearest to a time, no farther than `within_s`; `places` by time.
+pub(super) fn nearest(
+    places: &[(Place, f64)],
+    time_s: f64,
+    within_s: f64,
+) -> Option<&(Place, f64)> {
+    let after = places.partition_point(|p| p.1 < time_s);
+    let around = places[after.saturating_sub(1)..].iter().take(2);
+    let apart = |p: &&(Place, f64)| (p.1 - time_s).abs();
+    let nearest = around.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    nearest.filter(|p| apart(p) <= within_s)
+}
+
 /// What one pass finds. Times of the vehicle's streams are nanoseconds.
 #[derive(Debug, Default)]
 pub(super) struct Index {

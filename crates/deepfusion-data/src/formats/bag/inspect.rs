@@ -2,11 +2,10 @@
 
 use super::config::BagConfig;
 use super::index::Index;
-use super::recording::{remarks_on, streams};
+use super::streams::{remarks_on, streams};
 use super::topics::{Role, Topics};
 use super::{sensors, source};
-use crate::inspect::{DriveInspection, Inspection, SpeedRange};
-use crate::{DatasetKind, Result};
+use crate::{DatasetKind, DriveInspection, Inspection, Result, SpeedRange};
 use deepfusion_motion::Signal;
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! `dataset.toml` of a KITTI drive: what of its clock and its speeds is known better than its files say.
 
-use crate::config::{Clock, check_clock_and_scale, read_or_default};
-use crate::kitti::Drive;
+use super::layout::Drive;
+use crate::dataset_toml::{Clock, check_clock_and_scale, read_or_default};
 use crate::{Error, OpenOptions, Result};
 use serde::Deserialize;
 

@@ -1,5 +1,7 @@
 //! Finding drives below a path, and saying what is there where there are none.
 
+use super::calibration::Calibration;
+use crate::formats::files::folders;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,7 +22,7 @@ impl Drive {
         let name = |p: &Path| p.file_name().map(|n| n.to_string_lossy().into_owned());
         let above = folder.parent().unwrap_or(folder);
         // A drive that carries its own calibration is as good as one under its date.
-        let own = folder.join(crate::kitti::Calibration::CAM_TO_CAM).is_file();
+        let own = folder.join(Calibration::CAM_TO_CAM).is_file();
         Self {
             name: name(folder).unwrap_or_else(|| "drive".into()),
             folder: folder.to_owned(),
@@ -120,20 +122,6 @@ pub(crate) fn numbered_files(folder: &Path, extensions: &[&str]) -> Result<Vec<(
         }
     }
     Ok(files.into_iter().map(|(n, (_, path))| (n, path)).collect())
-}
-
-/// The folders in a folder, in order of their names, without hidden ones.
-pub(crate) fn folders(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
-        let entry = entry.map_err(|e| Error::file(folder, e))?;
-        let hidden = entry.file_name().as_encoded_bytes().starts_with(b".");
-        if !hidden && entry.path().is_dir() {
-            found.push(entry.path());
-        }
-    }
-    found.sort();
-    Ok(found)
 }
 
 /// The drive that a folder lies in, if it does: giving a folder within a drive is the likeliest slip.

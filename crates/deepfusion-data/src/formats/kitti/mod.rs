@@ -3,7 +3,8 @@
 
 mod calibration;
 mod config;
-pub(crate) mod layout;
+mod layout;
+mod moving;
 mod oxts;
 mod oxts_path;
 mod recording;
@@ -11,13 +12,12 @@ mod timestamps;
 mod tracklets;
 mod velodyne;
 
+pub use crate::truth::GtKind;
 pub use calibration::Calibration;
+pub(crate) use layout::drive_around;
 pub use layout::{Drive, find_drives};
-pub(crate) use oxts::read_packets;
 pub use oxts::{OxtsPacket, read_oxts};
-pub(crate) use oxts_path::oxts_paths;
-pub(crate) use recording::{KittiRecording, open};
+pub(crate) use recording::open;
 pub use timestamps::TimeStamps;
-pub(crate) use timestamps::parse_date_time;
 pub use tracklets::{Tracklet, TrackletPose};
-pub use velodyne::{GtKind, depth_map, velo_point};
+pub use velodyne::{depth_map, velo_point};

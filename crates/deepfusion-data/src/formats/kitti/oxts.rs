@@ -1,6 +1,6 @@
 //! OXTS: one file a packet of the car's GPS / IMU, thirty numbers.
 
-use crate::kitti::TimeStamps;
+use super::timestamps::TimeStamps;
 use crate::{Error, Result, VehicleTrack};
 use std::path::Path;
 

@@ -1,6 +1,7 @@
 //! The camera's path as the car's GPS / IMU unit knows it.
 
-use crate::kitti::{KittiRecording, OxtsPacket, read_packets};
+use super::calibration::Calibration;
+use super::oxts::{OxtsPacket, read_packets};
 use crate::{CameraPath, Dataset, Result};
 use deepfusion_geometry::Se3;
 use nalgebra::{Rotation3, Vector3};
@@ -15,14 +16,18 @@ use nalgebra::{Rotation3, Vector3};
 /// # Errors
 /// [`crate::Error::Missing`] without time stamps, oxts or the IMU's calibration;
 /// [`crate::Error::Oxts`] for a packet that cannot be read.
-pub(crate) fn oxts_paths(recording: &KittiRecording, dataset: &Dataset) -> Result<Vec<CameraPath>> {
+pub(super) fn oxts_paths(
+    dataset: &Dataset,
+    calibration: &Calibration,
+    speed_scale: f64,
+) -> Result<Vec<CameraPath>> {
     // Names what is missing, if something is.
     dataset.ego()?;
-    let imu_from_cam = recording.calibration.require_cam_from_imu()?.inverse();
+    let imu_from_cam = calibration.require_cam_from_imu()?.inverse();
     let origin_ns = dataset.origin_ns().unwrap_or_default();
-    let mut packets = read_packets(&recording.drive.folder.join("oxts"), origin_ns)?;
+    let mut packets = read_packets(&dataset.folder().join("oxts"), origin_ns)?;
     for (_, packet) in &mut packets {
-        packet.velocity_mps = packet.velocity_mps.map(|v| v * recording.speed_scale);
+        packet.velocity_mps = packet.velocity_mps.map(|v| v * speed_scale);
     }
     let unit = UnitPath::new(&packets);
     let mut paths = Vec::new();

@@ -1,15 +1,19 @@
 //! KITTI raw as a [`Recording`].
 
-use crate::clock::on_the_vehicles_clock;
-use crate::kitti::config::DriveConfig;
-use crate::kitti::layout::numbered_files;
-use crate::kitti::{self, Calibration, Drive, GtKind, TimeStamps, read_oxts};
-use crate::moving::MASKS;
-use crate::recording::{CalibrationPlace, Recording};
-use crate::selection::Selection;
+use super::calibration::Calibration;
+use super::config::DriveConfig;
+use super::layout::{Drive, numbered_files};
+use super::moving::{self, MASKS};
+use super::oxts::read_oxts;
+use super::oxts_path::oxts_paths;
+use super::timestamps::TimeStamps;
+use super::velodyne::depth_map;
+use crate::dataset::selection::Selection;
+use crate::logs::clock::on_the_vehicles_clock;
 use crate::{
-    Camera, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame, FrameImage, MovingLabels,
-    OpenOptions, Result, Stream, load_rgb, read_depth_png,
+    CalibrationPlace, Camera, CameraPath, Dataset, DatasetKind, DatasetParts, Error, Frame,
+    FrameImage, GtKind, MovingLabels, OpenOptions, Recording, Result, Stream, load_rgb,
+    read_depth_png,
 };
 use deepfusion_geometry::DepthMap;
 use deepfusion_geometry::cloud::PointCloud;
@@ -22,12 +26,12 @@ const DEPTHS: &str = "proj_depth/groundtruth/image_02";
 
 /// One camera of one drive.
 #[derive(Debug)]
-pub(crate) struct KittiRecording {
-    pub(crate) drive: Drive,
-    pub(crate) calibration: Calibration,
+struct KittiRecording {
+    drive: Drive,
+    calibration: Calibration,
     camera: Camera,
     /// True speed over the oxts', which the track holds already.
-    pub(crate) speed_scale: f64,
+    speed_scale: f64,
     /// Seconds by frame number, also of frames without an image.
     times_s: Vec<Option<f64>>,
 }
@@ -210,7 +214,7 @@ impl Recording for KittiRecording {
         };
         let scan = PointCloud::read_kitti_bin(&path)?;
         let k = self.calibration.intrinsics;
-        Ok(Some(kitti::depth_map(
+        Ok(Some(depth_map(
             &scan,
             &self.calibration.require_pixels_from_velo()?,
             (k.width as usize, k.height as usize),
@@ -245,7 +249,7 @@ impl Recording for KittiRecording {
     }
 
     fn moving_labels(&self, dataset: &Dataset) -> Result<Option<MovingLabels>> {
-        MovingLabels::of_kitti(self, dataset)
+        moving::labels(&self.calibration, dataset)
     }
 
     fn time_of(&self, number: u64) -> Option<f64> {
@@ -253,7 +257,7 @@ impl Recording for KittiRecording {
     }
 
     fn camera_paths(&self, dataset: &Dataset) -> Result<Vec<CameraPath>> {
-        kitti::oxts_paths(self, dataset)
+        oxts_paths(dataset, &self.calibration, self.speed_scale)
     }
 }
 

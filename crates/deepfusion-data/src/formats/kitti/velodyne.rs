@@ -1,42 +1,9 @@
 //! Sparse ground-truth depth from a velodyne scan (SPEC 5).
 
+use crate::truth::GtKind;
 use deepfusion_geometry::DepthMap;
 use deepfusion_geometry::cloud::PointCloud;
 use nalgebra::{Matrix3, Matrix3x4, Vector3, Vector4};
-
-/// What a ground-truth depth means and at which pixel it lies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum GtKind {
-    /// Camera z at pixel round(u), round(v), as in KITTI's annotated depth.
-    #[default]
-    Z,
-    /// The sensor's forward distance at pixel round(u) − 1, round(v) − 1: the field's `eigen` files,
-    /// whose convention dates from a MATLAB devkit that counts pixels from 1. For published numbers.
-    Velodyne,
-}
-
-impl GtKind {
-    /// The name on the command line and in reports.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Z => "z",
-            Self::Velodyne => "velodyne",
-        }
-    }
-}
-
-impl std::str::FromStr for GtKind {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "z" => Ok(Self::Z),
-            "velodyne" => Ok(Self::Velodyne),
-            _ => Err(format!("'{text}' is no ground-truth depth: z or velodyne")),
-        }
-    }
-}
 
 /// The scan as a sparse depth map of `width` × `height` pixels, metres, 0 = none.
 ///

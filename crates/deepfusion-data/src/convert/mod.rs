@@ -1,0 +1,16 @@
+//! A recording of any layout written as another: KITTI raw, or a ROS 1 bag.
+//!
+//! What is written is what a [`Dataset`](crate::Dataset) gives: images freed of their lens' distortion, their times, the
+//! camera, its place on the vehicle, speeds, turns and leans, and the measured depth as points in the camera's place. The
+//! other layout then gives the same snippets and the same ground truth.
+
+mod bag;
+mod calendar;
+mod ground_truth;
+mod kitti;
+mod parts;
+
+pub use bag::convert_to_bag;
+pub use ground_truth::{VELOCITY, export_gt, ground_truth_names};
+pub use kitti::convert_to_kitti;
+pub use parts::Converted;
