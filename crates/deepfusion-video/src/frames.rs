@@ -1,8 +1,9 @@
 //! A video's frames as files.
 //!
 //! Training reads frames in random order, which a video cannot give: every jump decodes from the last
-//! key frame. So all frames are decoded once, into `<video>.frames` in a folder that the caller names, as JPEGs of ffmpeg's best quality but one; the folder can be deleted at
-//! any time. It takes part under another name and is renamed when it is whole.
+//! key frame. So all frames are decoded once, into `<video>.frames` in a folder that the caller names, as
+//! JPEGs of ffmpeg's best quality but one; the folder can be deleted at any time. It is filled under another name and
+//! renamed when it is whole.
 
 use crate::probe::{Probed, probe};
 use crate::program::{READ, in_either_words, run};
