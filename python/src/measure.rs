@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use deepfusion::data::doctor as checks;
+use deepfusion::doctor as checks;
 use deepfusion::eval::{Crop, Evaluator, Grid, Prediction, Protocol};
 use deepfusion::sim::{Scene, SimConfig, Simulation, write_kitti};
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};

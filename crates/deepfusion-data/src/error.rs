@@ -1,5 +1,4 @@
 use crate::DatasetKind;
-use crate::layout::WITHOUT_ROS2;
 use deepfusion_hint::Hint;
 use std::path::{Path, PathBuf};
 
@@ -263,14 +262,9 @@ pub enum Error {
         /// What to do.
         remedy: &'static str,
     },
-    /// A live source gives no frame for longer than is waited for.
-    #[error("{address}: ffmpeg {problem}")]
-    Silent {
-        /// The source, without its password.
-        address: String,
-        /// For how long, after how many frames, and what ffmpeg said.
-        problem: String,
-    },
+    /// Another failure of a video's.
+    #[error(transparent)]
+    Video(deepfusion_video::Error),
     /// A calibration file lacks a field or has a bad one.
     #[error("{}: {field}: {problem}", path.display())]
     Calibration {
@@ -434,6 +428,12 @@ pub enum Error {
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// Why a ROS 2 bag is no recording here.
+pub(crate) const WITHOUT_ROS2: &str = match cfg!(feature = "ros2") {
+    true => "",
+    false => ", and this program was built without the feature `ros2`",
+};
+
 /// The layouts that are told apart, in the order in which they are looked for.
 const LOOKED_FOR: &str = "  KITTI raw          image_02/ or image_03/ with data/0000000000.png, here or up to two folders below
   comma2k19 segment  processed_log/CAN/speed/t or global_pose/frame_times
@@ -441,6 +441,27 @@ const LOOKED_FOR: &str = "  KITTI raw          image_02/ or image_03/ with data/
   RGB-D folder       frame-000000.color.png or .jpg with .depth.png, here or in folders seq-01, …
   video              a file .mp4, .mkv, .mov, .avi or .hevc, given or the only one here
   image folder       .png or .jpg files here, in images/, or where dataset.toml says";
+
+impl From<deepfusion_video::Error> for Error {
+    fn from(error: deepfusion_video::Error) -> Self {
+        use deepfusion_video::Error as Video;
+        match error {
+            Video::File { path, source } => Self::file(&path, source),
+            Video::Program {
+                path,
+                program,
+                problem,
+                remedy,
+            } => Self::Program {
+                path,
+                program,
+                problem,
+                remedy,
+            },
+            other => Self::Video(other),
+        }
+    }
+}
 
 impl Error {
     /// An error of the system's at `path`; a missing file is [`Error::NoSuchPath`].
@@ -485,6 +506,7 @@ impl Hint for Error {
             Self::Cameras { .. } => "convert them one by one, each into a folder of its own",
             Self::NoTimes { .. } => "give the frames times: timestamps.txt, or fps in dataset.toml",
             Self::Bag(error) => return error.hint(),
+            Self::Video(error) => return error.hint(),
             Self::Motion { source, .. } => return source.hint(),
             Self::OneCamera { .. } => "ask for camera 2",
             Self::NoCameraFile {
@@ -525,7 +547,6 @@ impl Hint for Error {
             }
             Self::NoPath { .. } => "KITTI raw with oxts and RGB-D folders with poses have one",
             Self::DepthKind { .. } => "take camera z from them",
-            Self::Silent { .. } => "is the source sending? A longer timeout waits for it",
             Self::Program { remedy, .. } => remedy,
             Self::Missing { remedy, .. } => remedy,
             Self::NoImages { .. } => {

@@ -4,78 +4,40 @@
 //! beside it, a comma2k19 segment, an RGB-D folder, a ROS 1 bag, with the feature `ros2` a ROS 2 bag. [`Dataset::snippets`] gives the training samples with
 //! the camera's ego-motion, [`Dataset::ground_truth`] the measured depth. Another layout is another
 //! [`Recording`]. Nothing here knows of tensors.
+//!
+//! Inside, `formats` reads each layout with the help of `camera` (calibrations, lenses), `logs` (tables of times and speeds),
+//! `pictures` and `truth` (measured depth), and makes a `dataset` of it; `convert` writes data sets in other layouts.
 
-mod agreement;
-mod bag;
-mod calibration;
 mod camera;
-mod clock;
-mod comma;
-mod config;
 mod convert;
 mod dataset;
-mod depth_images;
-mod depth_png;
-pub mod doctor;
-mod ego;
+mod dataset_toml;
 mod error;
-mod export;
-mod folder;
-mod frame;
-mod frame_times;
-mod gps_log;
-mod inspect;
-mod inspect_text;
-mod jpeg;
-pub mod kitti;
-mod layout;
-mod lens;
-mod live;
-mod moving;
-mod overlay;
-mod path;
-mod photo;
-mod picture;
-mod plain;
-mod recording;
-mod resize;
-mod rgbd;
-mod selection;
-mod snippet;
-mod speed_check;
-mod speed_log;
-mod split;
-mod table;
-mod vehicle_log;
-mod video;
+mod formats;
+mod logs;
+mod pictures;
+mod truth;
 
-pub use agreement::DynamicAgreement;
-pub use bag::{DopplerEgo, ego_velocity, ground_radial};
-pub use calibration::{CameraCalibration, GIVEN_INTRINSICS};
-pub use camera::{Camera, Cameras};
-pub use convert::{Converted, convert_to_bag, convert_to_kitti};
-pub use dataset::{Dataset, DatasetParts, OpenOptions};
-pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
-pub use depth_png::{read_depth_png, write_depth_png};
-pub use error::{Error, Result};
-pub use export::{VELOCITY, export_gt, ground_truth_names};
-pub use frame::{Frame, FrameImage};
-pub use image::RgbImage;
-pub use inspect::{
-    ClockOffset, DriveInspection, Inspection, IntrinsicsSummary, SpeedRange, Stream, inspect,
-    inspect_with,
+pub use camera::{CameraCalibration, GIVEN_INTRINSICS, Lens};
+pub use convert::{
+    Converted, VELOCITY, convert_to_bag, convert_to_kitti, export_gt, ground_truth_names,
 };
-pub use kitti::GtKind;
-pub use lens::Lens;
-pub use live::{Address, LiveFrame, LiveSource, Taken};
-pub use moving::{MovingLabels, MovingSource};
-pub use overlay::overlay;
-pub use path::CameraPath;
-pub use photo::{Photo, load_photo};
-pub use picture::{decode_rgb, image_size, load_rgb, save_png};
-pub use recording::{CalibrationPlace, DatasetKind, LidarMotion, Recording, ScanTruth};
-pub use resize::{resize_rgb, to_chw, to_network_input};
-pub use snippet::{EgoMotion, Snippet, Source, hold_out};
-pub use speed_check::{SpeedWarning, grey_image, speed_unit_warning};
-pub use split::{Split, SplitCoverage, SplitEntry};
-pub use video::{Shown, can_write_video, shown_for, write_video};
+pub use dataset::{
+    CalibrationPlace, Camera, CameraPath, Cameras, ClockOffset, Dataset, DatasetKind, DatasetParts,
+    DriveInspection, Ego, EgoMotion, Frame, FrameImage, Inspection, IntrinsicsSummary, NoMotion,
+    OpenOptions, PLAUSIBLE_HEIGHT_M, Recording, Snippet, Source, SpeedRange, SpeedWarning, Split,
+    SplitCoverage, SplitEntry, Stream, grey_image, hold_out, road_camera_height,
+    speed_unit_warning,
+};
+pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
+pub use error::{Error, Result};
+pub use formats::kitti;
+pub use formats::{DopplerEgo, ego_velocity, ground_radial, inspect, inspect_with};
+pub use image::RgbImage;
+pub use pictures::{
+    Photo, decode_rgb, image_size, load_photo, load_rgb, overlay, read_depth_png, resize_rgb,
+    save_png, to_chw, to_network_input, write_depth_png,
+};
+pub use truth::{
+    DynamicAgreement, GtKind, LidarMotion, MovingLabels, MovingPixels, MovingSource, ScanTruth,
+};

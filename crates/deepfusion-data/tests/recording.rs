@@ -1,10 +1,11 @@
 //! A layout of somebody else's: what it takes to be a [`Dataset`].
 
 use deepfusion_data::{
-    CalibrationPlace, Camera, Dataset, DatasetKind, DatasetParts, Error, Frame, FrameImage,
-    Recording, Result, RgbImage, Stream, VehicleTrack, speed_unit_warning,
+    CalibrationPlace, Camera, Dataset, DatasetKind, DatasetParts, Error, Frame, FrameImage, GtKind,
+    MovingLabels, MovingPixels, MovingSource, Recording, Result, RgbImage, Stream, VehicleTrack,
+    speed_unit_warning,
 };
-use deepfusion_geometry::{Intrinsics, Se3};
+use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -48,6 +49,21 @@ impl Recording for Messages {
             why: "no topic of speeds".into(),
             remedy: "record one".into(),
         }
+    }
+
+    fn moving_labels(&self, _: &Dataset) -> Result<Option<MovingLabels>> {
+        Ok(Some(MovingLabels::new(MovingSource::Masks, Near)))
+    }
+}
+
+/// What is nearer than 10 m moves; of the last frame nobody knows.
+#[derive(Debug)]
+struct Near;
+
+impl MovingPixels for Near {
+    fn pixels(&self, frame: u64, truth: &DepthMap, _: GtKind) -> Result<Option<Vec<bool>>> {
+        let moves = || truth.data.iter().map(|z| *z < 10.0).collect();
+        Ok((frame < 4).then(moves))
     }
 }
 
@@ -121,4 +137,18 @@ fn an_image_of_another_size_and_missing_speeds_are_told_by_place() {
         dataset.camera_paths().unwrap_err(),
         Error::NoPath { .. }
     ));
+}
+
+#[test]
+fn a_layout_says_what_moves() {
+    let labels = dataset(Messages::default(), None).moving_labels();
+    let labels = labels.unwrap().unwrap();
+    let truth = DepthMap {
+        width: 2,
+        height: 1,
+        data: vec![5.0, 20.0],
+    };
+    let moving = |frame| labels.pixels(frame, &truth, GtKind::Z).unwrap();
+    assert_eq!(labels.source(), MovingSource::Masks);
+    assert_eq!((moving(2), moving(4)), (Some(vec![true, false]), None));
 }

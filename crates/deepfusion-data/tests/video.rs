@@ -10,10 +10,9 @@ mod common;
 #[path = "common/folder.rs"]
 mod folder;
 
-use deepfusion_data::{
-    Dataset, DatasetKind, FrameImage, OpenOptions, RgbImage, Shown, inspect, shown_for,
-};
+use deepfusion_data::{Dataset, DatasetKind, FrameImage, OpenOptions, RgbImage, inspect};
 use deepfusion_hint::Hint;
+use deepfusion_video::{Shown, shown_for};
 use image::Rgb;
 use ndarray::Array1;
 use ndarray_npy::WriteNpyExt;
@@ -220,7 +219,7 @@ fn pictures_become_a_video_at_their_own_times() {
             Shown { file, seconds }
         })
         .collect();
-    let made = |name: &str| deepfusion_data::write_video(&folder, &shown, name);
+    let made = |name: &str| deepfusion_video::write_video(&folder, &shown, name);
     made("drive.mp4").unwrap();
     fs::write(folder.join("intrinsics.txt"), "50,50,32,24").unwrap();
     let opened = Dataset::open(&folder.join("drive.mp4"), &OpenOptions::default()).unwrap();

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::aligned::Aligned;
+use crate::conv_form::ConvForm;
 use crate::element::{Bf16, Element};
-use crate::forms::{Bf16Conv, ConvForm, F32Conv};
+use crate::forms::{Bf16Conv, F32Conv};
 use crate::movement::{self, Normalisation};
 use crate::plan::{Plan, Step};
 use crate::view::Shared;

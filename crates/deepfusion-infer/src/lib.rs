@@ -5,6 +5,7 @@ mod aligned;
 #[cfg(target_arch = "x86_64")]
 mod bf16;
 mod conv;
+mod conv_form;
 mod direct;
 mod dispatch;
 mod element;

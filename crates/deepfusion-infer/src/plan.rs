@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use crate::aligned::Aligned;
 use crate::conv::Geometry;
+use crate::conv_form::ConvForm;
 use crate::element::Element;
-use crate::forms::ConvForm;
 use crate::layout::{Layout, parts};
 use crate::masks::Gate;
 use crate::stale::stale;

@@ -7,8 +7,8 @@
 use std::ops::Range;
 
 use crate::conv::{Geometry, Runs};
+use crate::conv_form::ConvForm;
 use crate::element::Element;
-use crate::forms::ConvForm;
 use crate::movement::for_border;
 use crate::plan::Step;
 use crate::view::View;

@@ -8,7 +8,8 @@
 
 mod doctor_faults;
 
-use deepfusion_data::doctor::{Diagnosis, Finding, Outcome, Severity, doctor};
+use deepfusion_data::OpenOptions;
+use deepfusion_doctor::{Diagnosis, Finding, Outcome, Severity, doctor};
 use deepfusion_sim::{BagSettings, Scene, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 use doctor_faults::{Drive, oxts};
 use nalgebra::{Rotation3, Vector3};
@@ -486,7 +487,7 @@ fn a_bag_whose_camera_clock_is_off_is_told() {
         let diagnosis = doctor(&path, None);
         let finding = found(&diagnosis, "clock", "offset");
         // `data inspect` tells the same, as a figure.
-        let seen = deepfusion_data::inspect(&path).unwrap();
+        let seen = deepfusion_doctor::inspect(&path, &OpenOptions::default()).unwrap();
         let offset = seen.drives[0].time_offset.unwrap();
         assert_eq!(offset.vehicle_minus_camera_s, value(finding));
         assert!(offset.std_error_s < 0.05, "{offset:?}");

@@ -82,7 +82,9 @@
 //! | [`runtime`] | trained networks that run: [`DepthEstimator`] over the fused engine or ONNX Runtime; no training framework |
 //! | [`model`] | configurations, weights as safetensors, runs on disk |
 //! | [`weights`] | the networks inside the library |
-//! | [`data`] | recordings as datasets, frames and ground truth; what is wrong with them |
+//! | [`data`] | recordings as datasets, frames and ground truth |
+//! | [`doctor`] | what is wrong with a recording |
+//! | [`video`] | frames of videos, cameras and streams, through the user's ffmpeg |
 //! | [`motion`] | how a vehicle moved, from inertial unit, CAN, GPS |
 //! | [`bags`] | ROS bags, read and written |
 //! | [`eval`] | the field's metrics and protocols; odometry; intervals and their coverage; `compare`: evaluations side by side |
@@ -98,6 +100,7 @@
 //! Coordinates are a camera's: x right, y down, z ahead, in metres. A transform is named `target_from_source`.
 
 pub use deepfusion_data as data;
+pub use deepfusion_doctor as doctor;
 pub use deepfusion_eval as eval;
 pub use deepfusion_geometry as geometry;
 pub use deepfusion_model as model;
@@ -112,6 +115,7 @@ pub use deepfusion_runtime as runtime;
 pub use deepfusion_sim as sim;
 #[cfg(feature = "train")]
 pub use deepfusion_train as train;
+pub use deepfusion_video as video;
 pub use deepfusion_weights as weights;
 
 pub use deepfusion_hint::Hint;

@@ -1,8 +1,7 @@
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{
-    Dataset, GtKind, OpenOptions, ground_truth_names, inspect_with, overlay, save_png,
-};
+use deepfusion_data::{Dataset, GtKind, OpenOptions, ground_truth_names, overlay, save_png};
+use deepfusion_doctor::inspect;
 
 use crate::cli::{CameraIntrinsics, InspectArgs};
 use crate::failure::Result;
@@ -16,7 +15,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         camera_ahead_s: args.camera_ahead_s,
         ..OpenOptions::default()
     };
-    let inspection = inspect_with(&args.path, &options)?;
+    let inspection = inspect(&args.path, &options)?;
     if args.json {
         output::print_json(&inspection)?;
     } else {

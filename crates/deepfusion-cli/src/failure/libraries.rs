@@ -32,6 +32,15 @@ as_the_library_says!(
     deepfusion_sim::Error,
 );
 
+impl Reportable for deepfusion_video::Error {
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::Silent { .. } => Some("is the source sending? --timeout S waits longer".into()),
+            _ => self.hint(),
+        }
+    }
+}
+
 impl Reportable for deepfusion_data::Error {
     fn message(&self) -> String {
         match self {
@@ -59,7 +68,7 @@ impl Reportable for deepfusion_data::Error {
             Self::OwnCalibration { .. } => Some("leave --intrinsics out".into()),
             Self::OneCamera { .. } => Some("leave --camera out, or give 2".into()),
             Self::DepthKind { .. } => Some("leave --gt-depth out, or give z".into()),
-            Self::Silent { .. } => Some("is the source sending? --timeout S waits longer".into()),
+            Self::Video(error) => error.remedy(),
             _ => hint,
         }
     }

@@ -1,4 +1,4 @@
-use super::{Converted, at_ns, cam_from_scanner, moving_at, points, seconds_to_move};
+use super::parts::{Converted, at_ns, cam_from_scanner, moving_at, points, seconds_to_move};
 use crate::{Dataset, Error, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_rosbag::msg::{
@@ -121,7 +121,7 @@ pub fn convert_to_bag(
         done += batch.len();
         progress(done, times.len());
     }
-    super::write_text(&sidecar, &describe(dataset))?;
+    super::parts::write_text(&sidecar, &describe(dataset))?;
     bag.finish()?;
     Ok(Converted {
         paths: vec![out.to_owned()],

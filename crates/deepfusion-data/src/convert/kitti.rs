@@ -1,5 +1,7 @@
 use super::calendar::{date, stamp};
-use super::{Converted, Moving, at_ns, cam_from_scanner, moving_at, points, seconds_to_move};
+use super::parts::{
+    Converted, Moving, at_ns, cam_from_scanner, moving_at, points, seconds_to_move,
+};
 use crate::{Dataset, Error, Result, save_png};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{Intrinsics, Se3};
@@ -35,7 +37,7 @@ pub fn convert_to_kitti(
             other: other.name().to_owned(),
         });
     }
-    super::prepare(out)?;
+    super::parts::prepare(out)?;
     let moved_s = seconds_to_move(datasets);
     let start_ns = at_ns(first, 0.0, moved_s);
     let (year, month, day) = date(start_ns.div_euclid(86_400_000_000_000));
@@ -102,7 +104,7 @@ fn write_drive(
             let known = frame.time_s.and_then(|t| moving_at(dataset, t));
             if let (Some(folder), Some(moving)) = (&oxts, known) {
                 let path = folder.join(format!("{name}.txt"));
-                super::write_text(&path, &packet(&moving))?;
+                super::parts::write_text(&path, &packet(&moving))?;
             }
             Ok::<(), Error>(())
         })?;
@@ -119,7 +121,7 @@ fn write_drive(
     if dataset.frames().iter().any(|f| f.time_s.is_some()) {
         for name in ["image_02", "velodyne_points", "oxts"] {
             if name != "oxts" || has_motion {
-                super::write_text(&folder.join(name).join("timestamps.txt"), &text)?;
+                super::parts::write_text(&folder.join(name).join("timestamps.txt"), &text)?;
             }
         }
     }
@@ -168,13 +170,13 @@ fn write_calibration(folder: &Path, k: &Intrinsics, cam_from_vehicle: Option<Se3
         numbers(identity),
         numbers(projection)
     );
-    super::write_text(&folder.join("calib_cam_to_cam.txt"), &text)?;
+    super::parts::write_text(&folder.join("calib_cam_to_cam.txt"), &text)?;
     let scanner = cam_from_scanner();
-    super::write_text(&folder.join("calib_velo_to_cam.txt"), &rigid(&scanner))?;
+    super::parts::write_text(&folder.join("calib_velo_to_cam.txt"), &rigid(&scanner))?;
     if let Some(cam_from_vehicle) = cam_from_vehicle {
         let scanner_from_vehicle = scanner.inverse() * cam_from_vehicle;
         let path = folder.join("calib_imu_to_velo.txt");
-        super::write_text(&path, &rigid(&scanner_from_vehicle))?;
+        super::parts::write_text(&path, &rigid(&scanner_from_vehicle))?;
     }
     Ok(())
 }

@@ -8,10 +8,10 @@ mod remains;
 
 use proptest::prelude::*;
 
+use crate::conv_form::ConvForm;
 use crate::dispatch::tests::{Level, with_level};
 use crate::element::Element;
 use crate::engine::Typed;
-use crate::forms::ConvForm;
 use crate::{Activation, Border, Conv, Engine, Graph, Op, Precision, ValueId};
 use build::{Builder, deviation, noise, noise_image};
 use oracle::run;

@@ -4,8 +4,8 @@
 use rayon::prelude::*;
 
 use crate::conv::{Geometry, Runs, padded_bias, weight};
+use crate::conv_form::ConvForm;
 use crate::element::{Bf16, Element};
-use crate::forms::ConvForm;
 use crate::tile::LANES;
 use crate::view::Shared;
 use crate::{Activation, Conv};

@@ -4,9 +4,10 @@ use super::build::{Builder, deviation, noise, noise_image};
 use super::oracle::run;
 use super::plain::Plain;
 use super::{attention, network, odd_network};
+use crate::conv_form::ConvForm;
 use crate::element::{Bf16, Element};
 use crate::engine::Typed;
-use crate::forms::{ConvForm, F32Conv};
+use crate::forms::F32Conv;
 use crate::{Activation, Engine, Graph, Op, Precision, ValueId};
 
 /// Inputs of a count that no run divides, and a concatenation of a value and its own convolution; the second output is

@@ -63,6 +63,14 @@ pub fn sensors(folder: &Path) -> Result<VehicleSensors> {
     recorded(folder).map(|(sensors, _)| sensors)
 }
 
+/// The numbers of an array of N or N×1, such as `processed_log/CAN/speed/t`.
+///
+/// # Errors
+/// [`Error::File`]; [`Error::Array`] for what is no such array.
+pub fn numbers(path: &Path) -> Result<Vec<f64>> {
+    Ok(Table::read(path, 1)?.values)
+}
+
 /// The sensors, and each wheel's speed.
 fn recorded(folder: &Path) -> Result<(VehicleSensors, Vec<Signal>)> {
     let log = folder.join("processed_log");

@@ -6,7 +6,7 @@
     reason = "a test's panic is its message"
 )]
 
-use deepfusion_data::doctor::{Diagnosis, doctor};
+use deepfusion_doctor::{Diagnosis, doctor};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use image::RgbImage;
 use std::path::{Path, PathBuf};

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use deepfusion_data::doctor::{Outcome, Severity, Status};
+use deepfusion_doctor::{Outcome, Severity, Status};
 
 /// A check and the drive it looked at; no drive where it looked at the whole recording.
 type Checked<'a> = (Option<&'a str>, &'a Outcome);

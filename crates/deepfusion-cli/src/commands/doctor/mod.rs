@@ -7,8 +7,8 @@ mod report;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use deepfusion_data::doctor::{Diagnosis, Outcome, Severity, doctor_with};
 use deepfusion_data::{DatasetKind, OpenOptions};
+use deepfusion_doctor::{Diagnosis, Outcome, Severity, doctor_with};
 
 use crate::cli::{CameraIntrinsics, DoctorArgs};
 use crate::error::CliError;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use deepfusion_data::doctor::{Diagnosis, DriveDiagnosis, Line};
 use deepfusion_data::{Camera, Cameras, Dataset, GtKind, OpenOptions, overlay};
+use deepfusion_doctor::{Diagnosis, DriveDiagnosis, Line};
 use deepfusion_render::{HtmlReport, LineChart, PictureFormat};
 
 use super::lines;

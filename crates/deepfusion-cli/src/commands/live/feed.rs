@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::bounded;
-use deepfusion_data::{Address, LiveFrame, LiveSource, Taken};
+use deepfusion_video::{Address, LiveFrame, LiveSource, Taken};
 
 use super::figures::Figures;
 use crate::cli::LiveArgs;

@@ -10,7 +10,7 @@ pub use self::folder::{VIDEO, make_room};
 use std::io::IsTerminal;
 use std::time::UNIX_EPOCH;
 
-use deepfusion_data::{Address, LiveFrame};
+use deepfusion_video::{Address, LiveFrame};
 use serde::{Deserialize, Serialize};
 
 use super::predict::inputs::Input;

@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use deepfusion_data::{Address, LiveFrame};
 use deepfusion_geometry::Se3;
 use deepfusion_perception::Stamp;
+use deepfusion_video::{Address, LiveFrame};
 use nalgebra::Vector3;
 
 use super::Work;

@@ -2,8 +2,8 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use deepfusion_data::{Address, LiveFrame, shown_for};
 use deepfusion_runtime::ModelSource;
+use deepfusion_video::{Address, LiveFrame, shown_for};
 
 use super::camera::CameraSource;
 use super::manifest::Lock;

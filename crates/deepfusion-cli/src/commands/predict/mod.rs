@@ -16,13 +16,14 @@ mod watcher;
 
 use std::sync::Once;
 
-use deepfusion_data::{LiveFrame, RgbImage, load_photo};
+use deepfusion_data::{RgbImage, load_photo};
 use deepfusion_eval::IntervalFactors;
 use deepfusion_eval::compare::MetricScale;
 use deepfusion_geometry::Intrinsics;
 use deepfusion_runtime::LayerMaps;
 use deepfusion_runtime::ModelSource;
 use deepfusion_runtime::{DepthEstimator, Prediction, PreparedImage, Preparer};
+use deepfusion_video::LiveFrame;
 use rayon::prelude::*;
 
 use self::camera::{CameraSource, Taken};

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use clap::ValueEnum;
-use deepfusion_data::LiveFrame;
 use deepfusion_eval::compare::MetricScale;
 use deepfusion_fs::Content;
 use deepfusion_runtime::DepthEstimator;
 use deepfusion_runtime::ModelSource;
+use deepfusion_video::LiveFrame;
 use serde::{Deserialize, Serialize};
 
 use super::super::device;

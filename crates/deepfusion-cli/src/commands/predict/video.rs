@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use deepfusion_data::{Shown, can_write_video, shown_for, write_video};
+use deepfusion_video::{Shown, can_write_video, shown_for, write_video};
 
 use super::inputs::Input;
 use super::manifest::Manifest;

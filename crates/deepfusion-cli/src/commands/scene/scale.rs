@@ -3,13 +3,14 @@
 use std::fmt::Display;
 use std::sync::Arc;
 
-use deepfusion_data::{Address, RgbImage, grey_image};
+use deepfusion_data::{RgbImage, grey_image};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_motion::{
     GroundPair, RoadTexture, ScaleCorrection, ScaleMonitor, ScaleMonitorConfig, ScaleReading,
     ScaleState,
 };
 use deepfusion_perception::Ground;
+use deepfusion_video::Address;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 

@@ -1,0 +1,12 @@
+//! A camera by its calibration, and images freed of its lens' distortion.
+
+mod calibration;
+mod find;
+mod lens;
+mod numbers;
+mod yaml;
+
+pub use calibration::CameraCalibration;
+pub use find::GIVEN_INTRINSICS;
+pub(crate) use find::find_camera;
+pub use lens::Lens;

@@ -1,0 +1,108 @@
+//! Plain numbers: fx, fy, cx, cy, or a camera matrix row by row.
+
+use deepfusion_geometry::Distortion;
+
+/// The numbers in a file, which may lack the image's size.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Numbers {
+    /// fx, fy, cx, cy.
+    pub(super) pinhole: [f64; 4],
+    pub(super) distortion: Distortion,
+    pub(super) size: Option<(u32, u32)>,
+}
+
+/// Why a file's text is no camera.
+#[derive(Debug, PartialEq)]
+pub(super) struct Refusal {
+    pub(super) problem: String,
+    pub(super) remedy: String,
+}
+
+impl Refusal {
+    pub(super) fn new(problem: impl Into<String>) -> Self {
+        Self {
+            problem: problem.into(),
+            remedy: "OpenCV's and ROS's calibration YAML, Kalibr's camchain and four numbers \
+                     fx, fy, cx, cy are read: docs/guides/train-on-your-own-video.md"
+                .into(),
+        }
+    }
+}
+
+/// Reads four or nine numbers, apart by commas, spaces or lines; `#` begins a comment.
+pub(super) fn parse(text: &str) -> Result<Numbers, Refusal> {
+    let lines = text.lines().map(|l| l.split('#').next().unwrap_or(""));
+    let mut numbers = Vec::new();
+    for word in lines
+        .flat_map(|l| l.split([',', ' ', '\t', ';', '[', ']']))
+        .filter(|w| !w.is_empty())
+    {
+        let value = word.parse::<f64>().ok().filter(|v| v.is_finite());
+        let Some(value) = value else {
+            let word: String = word.chars().take(40).collect();
+            return Err(Refusal::new(format!("'{word}' is not a number")));
+        };
+        if numbers.len() == 9 {
+            return Err(Refusal::new("more than nine numbers"));
+        }
+        numbers.push(value);
+    }
+    let pinhole = match numbers.as_slice() {
+        [fx, fy, cx, cy] => [*fx, *fy, *cx, *cy],
+        [fx, skew, cx, _, fy, cy, _, _, _] => {
+            if skew.abs() > 1e-6 * fx.abs() || numbers[3] != 0.0 || numbers[6..] != [0.0, 0.0, 1.0]
+            {
+                return Err(Refusal::new(
+                    "nine numbers, but no camera matrix fx 0 cx 0 fy cy 0 0 1",
+                ));
+            }
+            [*fx, *fy, *cx, *cy]
+        }
+        other => {
+            return Err(Refusal::new(format!(
+                "{} numbers, expected four (fx, fy, cx, cy) or a matrix of nine",
+                other.len()
+            )));
+        }
+    };
+    Ok(Numbers {
+        pinhole,
+        distortion: Distortion::default(),
+        size: None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn four_numbers_or_a_matrix() {
+        let four = parse("585, 586, 320, 240\n").unwrap().pinhole;
+        assert_eq!(four, [585.0, 586.0, 320.0, 240.0]);
+        assert_eq!(
+            parse("585 0 320 # first row\n0 586 240\n0 0 1")
+                .unwrap()
+                .pinhole,
+            four
+        );
+        for (bad, why) in [
+            ("1 2 3", "3 numbers"),
+            ("1 2 x 4", "'x'"),
+            ("1 2 3 4 5 6 7 8 9", "no camera matrix"),
+            ("1 2 nan 4", "'nan'"),
+            ("1 2 3 4 5 6 7 8 9 10", "more than nine"),
+        ] {
+            let problem = parse(bad).unwrap_err().problem;
+            assert!(problem.contains(why), "{problem}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_never_panics(text in ".{0,80}") {
+            let _ = parse(&text);
+        }
+    }
+}

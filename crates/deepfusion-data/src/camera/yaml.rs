@@ -1,0 +1,200 @@
+//! The YAML of OpenCV, ROS and Kalibr.
+
+use super::numbers::{Numbers, Refusal};
+use deepfusion_geometry::Distortion;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// Longest file that is looked at, in bytes: calibrations have some hundred.
+const LONGEST: usize = 1 << 20;
+
+/// Keys of OpenCV's and ROS's files, in the spellings that their tools use.
+#[derive(Debug, Default, Deserialize)]
+struct Flat {
+    #[serde(alias = "width", alias = "Image_width")]
+    image_width: Option<u32>,
+    #[serde(alias = "height", alias = "Image_height")]
+    image_height: Option<u32>,
+    #[serde(
+        alias = "Camera_Matrix",
+        alias = "cameraMatrix",
+        alias = "K",
+        alias = "k"
+    )]
+    camera_matrix: Option<Matrix>,
+    #[serde(
+        alias = "Distortion_Coefficients",
+        alias = "distCoeffs",
+        alias = "dist_coeffs",
+        alias = "D",
+        alias = "d"
+    )]
+    distortion_coefficients: Option<Matrix>,
+    #[serde(alias = "distortionModel")]
+    distortion_model: Option<String>,
+    camera_model: Option<String>,
+    fisheye_model: Option<u32>,
+}
+
+/// A matrix as a list, or with rows, columns and data.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum Matrix {
+    Sized {
+        rows: Option<u32>,
+        cols: Option<u32>,
+        data: Vec<f64>,
+    },
+    Nested(Vec<Vec<f64>>),
+    List(Vec<f64>),
+}
+
+/// One camera of Kalibr's camchain.
+#[derive(Debug, Deserialize)]
+struct Kalibr {
+    camera_model: String,
+    intrinsics: Vec<f64>,
+    distortion_model: String,
+    distortion_coeffs: Vec<f64>,
+    resolution: Option<[u32; 2]>,
+}
+
+/// Reads whichever of the three it is.
+pub(super) fn parse(text: &str) -> Result<Numbers, Refusal> {
+    if text.len() > LONGEST {
+        return Err(Refusal::new("too long for a calibration"));
+    }
+    let text = plain(text);
+    let bad = |e: serde_saphyr::Error| {
+        let line = e.to_string();
+        let line = line.lines().next().unwrap_or_default().to_owned();
+        Refusal::new(format!("not the YAML of a calibration: {line}"))
+    };
+    if text.lines().any(|l| l.trim_end() == "cam0:") {
+        let chain: BTreeMap<String, Kalibr> = serde_saphyr::from_str(&text).map_err(bad)?;
+        let first = chain.into_iter().next();
+        return kalibr(
+            first
+                .ok_or_else(|| Refusal::new("the camchain is empty"))?
+                .1,
+        );
+    }
+    flat(serde_saphyr::from_str(&text).map_err(bad)?)
+}
+
+/// OpenCV begins with `%YAML:1.0`, which is no YAML, and tags matrices with a type of its own.
+fn plain(text: &str) -> String {
+    let lines = text
+        .lines()
+        .filter(|l| !l.starts_with("%YAML") && l.trim() != "---");
+    let lines = lines.map(|l| l.replace("!!opencv-matrix", ""));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+fn flat(file: Flat) -> Result<Numbers, Refusal> {
+    let model = file.distortion_model.as_deref().unwrap_or("plumb_bob");
+    let known = [
+        "plumb_bob",
+        "rational_polynomial",
+        "radtan",
+        "radial-tangential",
+        "none",
+        "",
+    ];
+    if !known.contains(&model) {
+        return Err(model_refused(model));
+    }
+    if file.fisheye_model == Some(1) {
+        return Err(model_refused("fisheye"));
+    }
+    if let Some(other) = file.camera_model.as_deref().filter(|m| *m != "pinhole") {
+        return Err(model_refused(other));
+    }
+    let matrix = file
+        .camera_matrix
+        .ok_or_else(|| Refusal::new("it has no camera_matrix (nor K)"))?;
+    let k = matrix.values("camera_matrix")?;
+    let [fx, skew, cx, zero, fy, cy, 0.0, 0.0, 1.0] = k[..] else {
+        return Err(Refusal::new(
+            "camera_matrix: expected the nine numbers fx, 0, cx, 0, fy, cy, 0, 0, 1",
+        ));
+    };
+    if skew != 0.0 || zero != 0.0 {
+        return Err(Refusal::new("camera_matrix: a skew is not supported"));
+    }
+    let coefficients = match file.distortion_coefficients {
+        Some(matrix) => matrix.values("distortion_coefficients")?,
+        None => Vec::new(),
+    };
+    let size = file.image_width.zip(file.image_height);
+    // A message of a camera that does not know its size says 0.
+    numbers(
+        [fx, fy, cx, cy],
+        &coefficients,
+        size.filter(|s| s.0 > 0 && s.1 > 0),
+    )
+}
+
+fn kalibr(camera: Kalibr) -> Result<Numbers, Refusal> {
+    if camera.camera_model != "pinhole" {
+        return Err(model_refused(&camera.camera_model));
+    }
+    if !["radtan", "none"].contains(&camera.distortion_model.as_str()) {
+        return Err(model_refused(&camera.distortion_model));
+    }
+    let [fx, fy, cx, cy] = camera.intrinsics[..] else {
+        return Err(Refusal::new(format!(
+            "intrinsics: {} numbers, expected fx, fy, cx, cy",
+            camera.intrinsics.len()
+        )));
+    };
+    let size = camera.resolution.map(|[w, h]| (w, h));
+    numbers([fx, fy, cx, cy], &camera.distortion_coeffs, size)
+}
+
+fn numbers(
+    pinhole: [f64; 4],
+    coefficients: &[f64],
+    size: Option<(u32, u32)>,
+) -> Result<Numbers, Refusal> {
+    let distortion = Distortion::from_opencv(coefficients)
+        .map_err(|why| Refusal::new(format!("distortion coefficients: {why}")))?;
+    Ok(Numbers {
+        pinhole,
+        distortion,
+        size,
+    })
+}
+
+fn model_refused(model: &str) -> Refusal {
+    let model: String = model.chars().take(40).collect();
+    Refusal {
+        problem: format!("the lens model '{model}' is not supported"),
+        remedy: "calibrate with Brown and Conrady's model (OpenCV's default, ROS plumb_bob or \
+                 rational_polynomial, Kalibr pinhole-radtan), or undistort the images first"
+            .into(),
+    }
+}
+
+impl Matrix {
+    fn values(self, name: &str) -> Result<Vec<f64>, Refusal> {
+        match self {
+            Self::List(data) => Ok(data),
+            Self::Nested(rows) => Ok(rows.concat()),
+            Self::Sized { rows, cols, data } => {
+                let said = rows.zip(cols).map(|(r, c)| u64::from(r) * u64::from(c));
+                match said {
+                    Some(n) if n != data.len() as u64 => Err(Refusal::new(format!(
+                        "{name}: {} numbers, but its rows and cols make {n}",
+                        data.len()
+                    ))),
+                    _ => Ok(data),
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "yaml_tests.rs"]
+mod tests;

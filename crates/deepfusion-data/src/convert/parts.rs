@@ -1,0 +1,132 @@
+//! What both layouts are written from: points, times, how the vehicle moves.
+
+use crate::{Dataset, Error, GtKind, MotionModel, Result};
+use deepfusion_geometry::Se3;
+use nalgebra::{Matrix3, Vector3};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// The axes of a scanner (x forward, y left, z up) at the camera's place, seen from the camera.
+pub(super) fn cam_from_scanner() -> Se3 {
+    let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+    Se3::from_parts(&axes, Vector3::zeros())
+}
+
+/// A frame's measured depth as points of a scanner at the camera's place, x forward, y left, z up, in metres: each
+/// projects back to the pixel it came from. `None` where the frame has no depth.
+pub(super) fn points(dataset: &Dataset, frame: usize) -> Result<Option<Vec<[f32; 3]>>> {
+    let Some(depth) = dataset.ground_truth(frame, GtKind::Z)? else {
+        return Ok(None);
+    };
+    let k = dataset.intrinsics(frame);
+    let scanner_from_cam = cam_from_scanner().inverse();
+    let mut points = Vec::new();
+    for (index, z) in depth.data.iter().enumerate().filter(|(_, z)| **z > 0.0) {
+        let (u, v) = (index % depth.width, index / depth.width);
+        let in_cam = k.back_project(u as f64, v as f64, f64::from(*z));
+        let point = scanner_from_cam.transform(&in_cam);
+        points.push([point.x as f32, point.y as f32, point.z as f32]);
+    }
+    Ok(Some(points))
+}
+
+/// Whole seconds by which all times of the recordings have to be moved, so that all are after the beginning of 1970: 0 where
+/// they are. Neither layout can write an earlier one, in a bag 0 means that no time is set, and a clock that counts from its own
+/// start has such times where one sensor started first.
+pub(super) fn seconds_to_move(datasets: &[Dataset]) -> i64 {
+    let earliest = |dataset: &Dataset| {
+        let frames = dataset.frames().iter().filter_map(|f| f.time_s);
+        let track = dataset
+            .track()
+            .map(MotionModel::times_s)
+            .unwrap_or_default();
+        let first_s = frames.chain(track.first().copied()).reduce(f64::min)?;
+        Some(at_ns(dataset, first_s, 0))
+    };
+    let earliest = datasets.iter().filter_map(earliest).min().unwrap_or(1);
+    // Down to whole seconds: 0 for 1 ns and later, −1 for 0 and for a second before it.
+    (earliest - 1).min(0).div_euclid(NANOS).abs()
+}
+
+/// A time of a recording as nanoseconds since 1970, moved by whole seconds.
+pub(super) fn at_ns(dataset: &Dataset, time_s: f64, moved_s: i64) -> i64 {
+    let origin_ns = dataset.origin_ns().unwrap_or_default();
+    let ns = origin_ns.saturating_add((time_s * 1e9).round() as i64);
+    ns.saturating_add(moved_s.saturating_mul(NANOS))
+}
+
+const NANOS: i64 = 1_000_000_000;
+
+/// What came of a conversion.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Converted {
+    /// What was written: drives' folders, or a bag.
+    pub paths: Vec<PathBuf>,
+    /// Seconds by which every time was moved, as some were not after the beginning of 1970, and neither layout can write
+    /// those; 0 in general.
+    pub moved_s: i64,
+}
+
+/// Makes the output folder, which must be new or empty.
+pub(super) fn prepare(out: &Path) -> Result<()> {
+    std::fs::create_dir_all(out).map_err(|e| Error::file(out, e))?;
+    let mut entries = std::fs::read_dir(out).map_err(|e| Error::file(out, e))?;
+    match entries.next() {
+        None => Ok(()),
+        Some(_) => Err(Error::Exists {
+            path: out.to_owned(),
+        }),
+    }
+}
+
+pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
+    let failed = |e| Error::file(path, e);
+    deepfusion_fs::write_unsynced(path, failed, |out| {
+        out.write_all(text.as_bytes()).map_err(failed)
+    })
+}
+
+/// Half the time over which a rate is taken, in seconds.
+const RATE_REACH_S: f64 = 0.05;
+
+/// How a vehicle moves at a time.
+pub(super) struct Moving {
+    /// Forward, in m/s.
+    pub(super) speed_mps: f64,
+    /// About x, y and z, in rad/s.
+    pub(super) rates_radps: [f64; 3],
+    /// Roll and pitch, in radians; 0 where nothing measured them.
+    pub(super) tilt_rad: [f64; 2],
+}
+
+/// What the recording says about a time; `None` where it does not.
+pub(super) fn moving_at(dataset: &Dataset, time_s: f64) -> Option<Moving> {
+    let track = dataset.track()?;
+    let speed = track.speed_at(time_s)?;
+    let reaches = [
+        (RATE_REACH_S, RATE_REACH_S),
+        (0.0, RATE_REACH_S),
+        (RATE_REACH_S, 0.0),
+    ];
+    let rates = reaches.iter().find_map(|(before, after)| {
+        let motion = track.motion(time_s - before, time_s + after)?;
+        let [roll, pitch] = motion.tilt_rad;
+        Some([roll, pitch, motion.yaw_rad].map(|angle| angle / (before + after)))
+    });
+    Some(Moving {
+        speed_mps: speed,
+        rates_radps: rates.unwrap_or_default(),
+        tilt_rad: track.tilt(time_s).unwrap_or_default(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ahead_of_the_scanner_is_ahead_of_the_camera() {
+        let seen = cam_from_scanner().transform(&Vector3::new(5.0, 2.0, 1.0));
+        assert!((seen - Vector3::new(-2.0, -1.0, 5.0)).norm() < 1e-12);
+    }
+}

@@ -1,0 +1,384 @@
+use super::camera::Camera;
+use super::ego::Ego;
+use super::frame::Frame;
+use super::inspection::Stream;
+use super::kind::DatasetKind;
+use super::options::OpenOptions;
+use super::recording::{CameraPath, Recording};
+use super::selection::Selection;
+use crate::truth::{DynamicAgreement, GtKind, LidarMotion, MovingLabels, ScanTruth};
+use crate::{Error, MotionModel, Result, image_size};
+use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use image::RgbImage;
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What every layout has: the parts of a [`Dataset`] that are plain values.
+#[derive(Debug, Clone)]
+pub struct DatasetParts {
+    /// The drive's name.
+    pub name: String,
+    /// Its name in split files; KITTI's is `<date>/<drive>`.
+    pub split_name: String,
+    /// The camera whose images these are.
+    pub camera: Camera,
+    /// All frames, by number.
+    pub frames: Vec<Frame>,
+    /// Of the images as [`Recording::load_image`] gives them.
+    pub intrinsics: Intrinsics,
+    /// A point of the vehicle (x forward, y left, z up, where speed and yaw rate are measured) in the
+    /// camera; `None` where the layout has to know it and does not.
+    pub cam_from_vehicle: Option<Se3>,
+    /// The car's speed and yaw rate, where the drive has them.
+    pub track: Option<MotionModel>,
+    /// Whether the track's yaw rates were measured. Where not, they are 0 and mean nothing.
+    pub yaw_known: bool,
+    /// Nanoseconds from which seconds are counted, on the vehicle's clock: since 1970 or whatever it starts at.
+    pub origin_ns: Option<i64>,
+    /// What was taken off the images' times, in seconds: how far the camera's clock is ahead of the vehicle's.
+    pub camera_ahead_s: f64,
+    /// The kind of drive, such as `garage`, for a row each in an evaluation.
+    pub scenario: Option<String>,
+}
+
+/// Everything a trainer or an evaluator needs from one camera's recording of one drive.
+#[derive(Debug, Clone)]
+pub struct Dataset {
+    parts: DatasetParts,
+    selected: Vec<usize>,
+    recording: Arc<dyn Recording>,
+    /// The recording's, and what was noticed about its neighbours.
+    remarks: Vec<String>,
+}
+
+impl Dataset {
+    /// A data set of all its frames.
+    #[must_use]
+    pub fn new(parts: DatasetParts, recording: Arc<dyn Recording>) -> Self {
+        Self {
+            selected: (0..parts.frames.len()).collect(),
+            parts,
+            remarks: recording.remarks().to_vec(),
+            recording,
+        }
+    }
+
+    /// With only these frames selected, by index.
+    pub(crate) fn with_selected(mut self, selected: Vec<usize>) -> Self {
+        self.selected = selected;
+        self
+    }
+
+    /// With what the options select; for layouts of one drive and one camera.
+    ///
+    /// # Errors
+    /// [`Error::SplitSelectsNothing`]; [`Error::OneCamera`] where only the right camera is asked for.
+    pub(crate) fn select(self, path: &Path, options: &OpenOptions) -> Result<Self> {
+        if !options.camera.cameras().contains(&self.camera()) {
+            return Err(Error::OneCamera {
+                path: path.to_owned(),
+            });
+        }
+        let selection = Selection::new(options);
+        let numbers = self.frames().iter().map(|f| f.number);
+        let selected = selection.of(self.split_name(), self.scenario(), self.camera(), numbers);
+        match selection.nothing(path) {
+            Some(error) if selected.is_empty() => Err(error),
+            _ => Ok(self.with_selected(selected)),
+        }
+    }
+
+    /// The drive's name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.parts.name
+    }
+
+    /// Its name in split files: KITTI's is `<date>/<drive>`, others' the folder's name.
+    #[must_use]
+    pub fn split_name(&self) -> &str {
+        &self.parts.split_name
+    }
+
+    /// The layout it came in.
+    #[must_use]
+    pub fn kind(&self) -> DatasetKind {
+        self.recording.kind()
+    }
+
+    /// The camera whose images these are.
+    #[must_use]
+    pub fn camera(&self) -> Camera {
+        self.parts.camera
+    }
+
+    /// The folder its files are in.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        self.recording.folder()
+    }
+
+    /// The kind of drive, such as `garage`, where the recording says it.
+    #[must_use]
+    pub fn scenario(&self) -> Option<&str> {
+        self.parts.scenario.as_deref()
+    }
+
+    /// All frames, by number. Not all need be selected.
+    #[must_use]
+    pub fn frames(&self) -> &[Frame] {
+        &self.parts.frames
+    }
+
+    /// Indices of the frames that the split selects, all without one. Never empty.
+    #[must_use]
+    pub fn selected(&self) -> &[usize] {
+        &self.selected
+    }
+
+    /// A point of the vehicle (x forward, y left, z up) in the camera, in metres; `None` where unknown.
+    #[must_use]
+    pub fn cam_from_vehicle(&self) -> Option<Se3> {
+        self.parts.cam_from_vehicle
+    }
+
+    /// The car's speed and yaw rate, where the drive has them. See [`Self::yaw_known`].
+    #[must_use]
+    pub fn track(&self) -> Option<&MotionModel> {
+        self.parts.track.as_ref()
+    }
+
+    /// Whether the track's yaw rates were measured. Where not, only its speeds and distances mean anything.
+    #[must_use]
+    pub fn yaw_known(&self) -> bool {
+        self.parts.yaw_known
+    }
+
+    /// Nanoseconds from which its seconds are counted (since 1970 where the recording's clock says so), on the
+    /// vehicle's clock, where it has time stamps.
+    #[must_use]
+    pub fn origin_ns(&self) -> Option<i64> {
+        self.parts.origin_ns
+    }
+
+    /// How far the camera's clock was said to be ahead of the vehicle's, in seconds: by the recording's file or by
+    /// [`OpenOptions::camera_ahead_s`]. It is off the frames' times already.
+    #[must_use]
+    pub fn camera_ahead_s(&self) -> f64 {
+        self.parts.camera_ahead_s
+    }
+
+    /// The time of a frame number, whether or not there is an image of it, in seconds from the drive's
+    /// first time stamp.
+    #[must_use]
+    pub fn time_of(&self, number: u64) -> Option<f64> {
+        let frames = self.frames();
+        match frames.binary_search_by_key(&number, |f| f.number) {
+            Ok(index) => frames[index].time_s,
+            Err(_) => self.recording.time_of(number),
+        }
+    }
+
+    /// The camera of a frame's image as [`Self::load_image`] gives it.
+    #[must_use]
+    pub fn intrinsics(&self, _frame: usize) -> Intrinsics {
+        self.parts.intrinsics
+    }
+
+    /// A frame's image at full size, freed of its lens' distortion.
+    ///
+    /// # Errors
+    /// As [`crate::load_rgb`], [`Error::FrameSize`], and [`Error::Program`] where a video cannot be
+    /// decoded.
+    ///
+    /// # Panics
+    /// If there is no frame of that index.
+    pub fn load_image(&self, frame: usize) -> Result<RgbImage> {
+        let frame = &self.frames()[frame];
+        let image = self.recording.load_image(frame)?;
+        self.check_size(frame, image.dimensions())?;
+        Ok(image)
+    }
+
+    /// Reads the header of every image that is a file: that takes some microseconds each, and a wrong
+    /// size found now is not found at night.
+    ///
+    /// # Errors
+    /// [`Error::FrameSize`], [`Error::Image`].
+    pub(crate) fn check_sizes(&self) -> Result<()> {
+        self.frames().par_iter().try_for_each(|frame| {
+            let Some(file) = frame.image.file() else {
+                return Ok(());
+            };
+            self.check_size(frame, image_size(file)?)
+        })
+    }
+
+    fn check_size(&self, frame: &Frame, found: (u32, u32)) -> Result<()> {
+        let k = &self.parts.intrinsics;
+        if found == (k.width, k.height) {
+            return Ok(());
+        }
+        let place = self.recording.calibration();
+        Err(Error::FrameSize {
+            image: frame.image.to_string(),
+            drive: frame.drive.clone(),
+            frame: frame.number,
+            found,
+            expected: (k.width, k.height),
+            field: place.field,
+            calibration: place.file,
+        })
+    }
+
+    /// Whether [`Self::ground_truth`] has something for a frame.
+    ///
+    /// # Panics
+    /// If there is no frame of that index.
+    #[must_use]
+    pub fn has_ground_truth(&self, frame: usize) -> bool {
+        self.recording.has_ground_truth(&self.frames()[frame])
+    }
+
+    /// Depth of a frame from its scan or its depth image, at the image's full size, in metres, 0 = none;
+    /// `None` where there is neither.
+    ///
+    /// # Errors
+    /// [`Error::Cloud`] where a scan cannot be read, [`Error::Missing`] without the scanner's calibration,
+    /// [`Error::Image`] for a depth image that cannot be read, [`Error::DepthKind`] where the velodyne's
+    /// convention is asked of one.
+    ///
+    /// # Panics
+    /// If there is no frame of that index.
+    pub fn ground_truth(&self, frame: usize, kind: GtKind) -> Result<Option<DepthMap>> {
+        self.recording.ground_truth(&self.frames()[frame], kind)
+    }
+
+    /// Exact depth of every pixel of a frame, where the recording has it beside its scans, as the simulator's drives do:
+    /// H×W at the image's size, camera z in metres, infinite where nothing is within 255 m (the sky). `None` where there is
+    /// no such depth; that of an RGB-D folder is its [`Self::ground_truth`].
+    ///
+    /// # Errors
+    /// [`Error::Image`] for a depth image that cannot be read, [`Error::Size`] for one of another size than the images.
+    ///
+    /// # Panics
+    /// If there is no frame of that index.
+    pub fn dense_depth(&self, frame: usize) -> Result<Option<DepthMap>> {
+        self.recording.dense_depth(&self.frames()[frame])
+    }
+
+    /// [`Self::ground_truth`] and, where a LiDAR measured them, the velocities of what is seen at each pixel with depth
+    /// (H×W, m/s over ground along the LiDAR's ray, NaN where unknown).
+    ///
+    /// # Errors
+    /// As [`Self::ground_truth`].
+    ///
+    /// # Panics
+    /// If there is no frame of that index.
+    pub fn scan_truth(&self, frame: usize, kind: GtKind) -> Result<Option<ScanTruth>> {
+        self.recording.scan_truth(&self.frames()[frame], kind)
+    }
+
+    /// What tells this recording's moving pixels from its static ones: the simulator's masks, KITTI's
+    /// tracklets together with the car's own motion, or a bag's LiDAR: its radial velocities, else its topic of dynamic
+    /// points. `None` where none of these is there, or nothing says how
+    /// the car itself moves.
+    ///
+    /// A tracklet is moving in a frame where its box's centre, seen from the ground, moves at 0.75 m/s
+    /// or more from five frames before to five frames after (fewer at its ends). Traffic without a
+    /// tracklet counts as static: KITTI labels what its annotators could follow in the scans.
+    ///
+    /// # Errors
+    /// [`Error::Tracklets`] for a tracklet file that cannot be read.
+    pub fn moving_labels(&self) -> Result<Option<MovingLabels>> {
+        self.recording.moving_labels(self)
+    }
+
+    /// The camera's path as the recording measured it, in stretches without gaps: KITTI's from OXTS
+    /// attitude and integrated velocity, an RGB-D folder's from its poses.
+    ///
+    /// # Errors
+    /// [`Error::NoPath`] where the layout has none; [`Error::Missing`] or [`Error::Oxts`] where it should
+    /// and cannot be read.
+    pub fn camera_paths(&self) -> Result<Vec<CameraPath>> {
+        self.recording.camera_paths(self)
+    }
+
+    /// The vehicle's velocity as a LiDAR that measures radial velocities saw it, in at most `most` scans spread over
+    /// the drive, beside what speed and yaw rate say; none where there is no such LiDAR.
+    ///
+    /// # Errors
+    /// Where a scan cannot be read.
+    pub fn lidar_motion(&self, most: usize) -> Result<Vec<LidarMotion>> {
+        self.recording.lidar_motion(most)
+    }
+
+    /// How far a topic of dynamic points agrees with the radial velocities of the LiDAR beside it, in at most `most` scans
+    /// spread over the drive; `None` where the recording has not both.
+    ///
+    /// # Errors
+    /// Where a scan cannot be read.
+    pub fn dynamic_agreement(&self, most: usize) -> Result<Option<DynamicAgreement>> {
+        self.recording.dynamic_agreement(most)
+    }
+
+    /// What was recorded, stream by stream.
+    ///
+    /// # Errors
+    /// Where a stream is there and cannot be read.
+    pub fn streams(&self) -> Result<Vec<Stream>> {
+        self.recording.streams()
+    }
+
+    /// What was taken for granted or looks odd, in sentences.
+    #[must_use]
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+
+    /// Adds what was noticed beside it.
+    pub(crate) fn remark(&mut self, remark: String) {
+        self.remarks.push(remark);
+    }
+
+    /// Stretches of at least two frames whose numbers follow each other, by index.
+    #[must_use]
+    pub fn stretches(&self) -> Vec<Vec<usize>> {
+        let frames = self.frames();
+        let indices: Vec<usize> = (0..frames.len()).collect();
+        indices
+            .chunk_by(|a, b| frames[*a].number + 1 == frames[*b].number)
+            .filter(|stretch| stretch.len() > 1)
+            .map(<[usize]>::to_vec)
+            .collect()
+    }
+
+    /// The camera of frame `to` in the camera of frame `from` (`from_from_to`, metres), from the vehicle's speed and yaw
+    /// rate; `None` where either was not recorded, or the frames have no times.
+    ///
+    /// # Panics
+    /// If there is no frame of such an index.
+    #[must_use]
+    pub fn camera_motion(&self, from: usize, to: usize) -> Option<Se3> {
+        let motion = self.ego().ok()?.between(self.frames(), to, from).ok()?;
+        motion.source_from_target
+    }
+
+    /// What the camera's motion is made from.
+    ///
+    /// # Errors
+    /// What is missing for it: [`Error::Missing`] or [`Error::NoTrack`].
+    pub fn ego(&self) -> Result<Ego<'_>> {
+        let timed = self.frames().iter().any(|f| f.time_s.is_some());
+        match (&self.parts.track, self.parts.cam_from_vehicle) {
+            (Some(track), Some(cam_from_vehicle)) if timed => Ok(Ego {
+                track,
+                yaw_known: self.parts.yaw_known,
+                cam_from_vehicle,
+                leans: true,
+            }),
+            _ => Err(self.recording.no_motion()),
+        }
+    }
+}

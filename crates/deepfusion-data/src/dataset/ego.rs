@@ -1,0 +1,98 @@
+//! The camera's motion between two frames, from the car's.
+
+use super::frame::Frame;
+use crate::{MotionModel, VehicleMotion};
+use deepfusion_geometry::Se3;
+
+/// How the camera moved between a target frame and one of its sources.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EgoMotion {
+    /// Time between the two, in seconds, positive.
+    pub dt_s: f64,
+    /// Length of the camera's translation, in metres.
+    pub distance_m: f64,
+    /// The car's mean speed over that time, in m/s, positive also when reversing.
+    pub speed_mps: f64,
+    /// A point of the target's camera frame in the source's. Driving ahead, its z is negative for the
+    /// frame after the target and positive for the one before. `None` where the recording has no yaw
+    /// rate: then nobody knows how the car turned, and only lengths may be used.
+    pub source_from_target: Option<Se3>,
+}
+
+/// The car's track and the camera's place on the car: [`Dataset::ego`](crate::Dataset::ego).
+#[derive(Debug, Clone, Copy)]
+pub struct Ego<'a> {
+    /// How the vehicle moved, on the frames' clock.
+    pub(crate) track: &'a MotionModel,
+    /// Whether its turns were measured.
+    pub(crate) yaw_known: bool,
+    /// A point of the vehicle (x forward, y left, z up, metres) in the camera.
+    pub cam_from_vehicle: Se3,
+    /// Whether the body's lean, where an inertial unit felt it, turns the camera.
+    pub(crate) leans: bool,
+}
+
+/// Why the motion between two frames is unknown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoMotion {
+    /// Their time stamps do not increase with their numbers.
+    Time,
+    /// No speed was measured about their time.
+    Speed,
+}
+
+impl Ego<'_> {
+    /// The same on a body that never leans: for what looks in the pictures for how it does.
+    #[must_use]
+    pub fn level(self) -> Self {
+        Self {
+            leans: false,
+            ..self
+        }
+    }
+
+    /// What the vehicle did between two times, in seconds; `None` where no speed was measured.
+    #[must_use]
+    pub fn vehicle_motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {
+        let motion = self.track.motion(from_s, to_s)?;
+        Some(if self.leans { motion } else { motion.level() })
+    }
+
+    /// The camera's motion between two frames given by index, in either order of time.
+    ///
+    /// # Errors
+    /// Why it is unknown.
+    ///
+    /// # Panics
+    /// If there is no frame of such an index.
+    pub fn between(
+        &self,
+        frames: &[Frame],
+        target: usize,
+        source: usize,
+    ) -> std::result::Result<EgoMotion, NoMotion> {
+        let (earlier, later) = (target.min(source), target.max(source));
+        let (Some(from_s), Some(to_s)) = (frames[earlier].time_s, frames[later].time_s) else {
+            return Err(NoMotion::Time);
+        };
+        if to_s <= from_s {
+            return Err(NoMotion::Time);
+        }
+        let vehicle = self.vehicle_motion(from_s, to_s).ok_or(NoMotion::Speed)?;
+        let earlier_from_later = vehicle.camera0_from_camera1(&self.cam_from_vehicle);
+        let dt_s = to_s - from_s;
+        Ok(EgoMotion {
+            dt_s,
+            // Without a yaw rate the track's is 0: this is then the way the vehicle itself went.
+            distance_m: earlier_from_later.translation().norm(),
+            speed_mps: vehicle.distance_m.abs() / dt_s,
+            source_from_target: self.yaw_known.then(|| {
+                if source == earlier {
+                    earlier_from_later
+                } else {
+                    earlier_from_later.inverse()
+                }
+            }),
+        })
+    }
+}

@@ -1,0 +1,122 @@
+//! An inspection in words.
+
+use super::inspection::{Inspection, SpeedRange};
+use super::kind::DatasetKind;
+use std::fmt;
+
+impl fmt::Display for Inspection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let layout = self.kind.label();
+        match self.size {
+            Some([w, h]) => writeln!(f, "{layout}, {} frames of {w}x{h}", self.frames)?,
+            None => writeln!(f, "{layout} without images")?,
+        }
+        if let Some(k) = &self.intrinsics {
+            writeln!(
+                f,
+                "camera: fx {:.2}, fy {:.2}, cx {:.2}, cy {:.2} px",
+                k.fx, k.fy, k.cx, k.cy
+            )?;
+        }
+        let known = |value: Option<f64>, unit: &str| match value {
+            Some(value) => format!("{:.1} {unit}", unsigned_zero(value)),
+            None => "unknown".into(),
+        };
+        let speed = |range: Option<SpeedRange>| match range {
+            Some(r) => {
+                let [min, max, mean] = [r.min, r.max, r.mean].map(unsigned_zero);
+                format!("{min:.1} to {max:.1} m/s, mean {mean:.1}")
+            }
+            None => "unknown".into(),
+        };
+        for drive in &self.drives {
+            // Only KITTI numbers its cameras.
+            match self.kind {
+                DatasetKind::KittiRaw => writeln!(f, "\n{} (camera {})", drive.name, drive.camera)?,
+                _ => writeln!(f, "\n{}", drive.name)?,
+            }
+            writeln!(
+                f,
+                "  frames    {}{}",
+                drive.frames,
+                missing(&drive.missing_frames)
+            )?;
+            writeln!(
+                f,
+                "  driven    {} in {}, turned {}",
+                known(drive.distance_m, "m"),
+                known(drive.duration_s, "s"),
+                known(drive.turn_rad.map(f64::to_degrees), "degrees")
+            )?;
+            writeln!(f, "  speed     {}", speed(drive.speed_mps))?;
+            let ms = |seconds: f64| 1e3 * seconds;
+            if drive.camera_ahead_s != 0.0 {
+                writeln!(
+                    f,
+                    "  clocks    camera ahead by {:.0} ms as was said, taken off its times",
+                    ms(drive.camera_ahead_s)
+                )?;
+            }
+            if let Some(offset) = drive.time_offset {
+                writeln!(
+                    f,
+                    "  clocks    vehicle less camera {:.0} ms, standard error {:.0} ms",
+                    ms(offset.vehicle_minus_camera_s),
+                    ms(offset.std_error_s)
+                )?;
+            }
+            writeln!(f, "  pairs     {} usable for training", drive.usable_pairs)?;
+            if let Some(why) = &drive.why_no_pairs {
+                writeln!(f, "            {why}")?;
+            }
+            writeln!(f, "  scans     {} frames with ground truth", drive.scans)?;
+            for remark in &drive.remarks {
+                writeln!(f, "  note      {remark}")?;
+            }
+        }
+        let width = self.streams.iter().map(|s| s.name.len()).max().unwrap_or(0);
+        let width = width.max("stream".len());
+        writeln!(
+            f,
+            "\n{:width$}  {:11}  {:>6}  {:>7}  {:>4}",
+            "stream", "type", "count", "rate", "gaps"
+        )?;
+        for s in &self.streams {
+            let rate = s
+                .rate_hz
+                .map_or_else(|| "-".into(), |r| format!("{r:.1} Hz"));
+            writeln!(
+                f,
+                "{:width$}  {:11}  {:>6}  {rate:>7}  {:>4}",
+                s.name, s.kind, s.count, s.gaps
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// A value that one decimal shows as 0 or −0 as 0.
+fn unsigned_zero(value: f64) -> f64 {
+    if value.abs() < 0.05 { 0.0 } else { value }
+}
+
+/// `, missing 3, 7-9` with the first few ranges.
+fn missing(ranges: &[[u64; 2]]) -> String {
+    if ranges.is_empty() {
+        return String::new();
+    }
+    let show = |[from, to]: &[u64; 2]| {
+        if from == to {
+            from.to_string()
+        } else {
+            format!("{from}-{to}")
+        }
+    };
+    let shown: Vec<String> = ranges.iter().take(6).map(show).collect();
+    let more = if ranges.len() > shown.len() {
+        ", …"
+    } else {
+        ""
+    };
+    format!(", missing {}{more}", shown.join(", "))
+}

@@ -1,0 +1,36 @@
+//! What every layout becomes: a [`Dataset`] of [`Frame`]s, with [`Snippet`]s to train on.
+//!
+//! `recording` is what a layout has to offer, `drive` what is made of it; `ego` says how the camera moved, `split` and `selection` which
+//! frames are meant, `inspection` what is there.
+
+mod camera;
+mod coverage;
+mod drive;
+mod ego;
+mod frame;
+mod inspection;
+mod inspection_text;
+mod kind;
+mod options;
+mod recording;
+pub(crate) mod selection;
+mod snippet;
+mod speed_check;
+mod split;
+
+pub use camera::{Camera, Cameras};
+pub use coverage::SplitCoverage;
+pub use drive::{Dataset, DatasetParts};
+pub use ego::{Ego, EgoMotion, NoMotion};
+pub use frame::{Frame, FrameImage};
+pub use inspection::{
+    ClockOffset, DriveInspection, Inspection, IntrinsicsSummary, SpeedRange, Stream,
+};
+pub use kind::DatasetKind;
+pub use options::OpenOptions;
+pub use recording::{CalibrationPlace, CameraPath, Recording};
+pub use snippet::{Snippet, Source, hold_out};
+pub use speed_check::{
+    PLAUSIBLE_HEIGHT_M, SpeedWarning, grey_image, road_camera_height, speed_unit_warning,
+};
+pub use split::{Split, SplitEntry};

@@ -1,0 +1,178 @@
+//! The field's split files: lists of frames, one a line; or of kinds of drives.
+
+use super::camera::Camera;
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// A list of frames, in the file's order.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Split {
+    /// The file it came from.
+    pub path: PathBuf,
+    /// Its lines that name a frame.
+    pub entries: Vec<SplitEntry>,
+    /// Its lines that name a kind of drive, such as `garage`: every frame of such drives.
+    pub scenarios: Vec<String>,
+}
+
+/// One line of a split file, `folder index side`.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct SplitEntry {
+    /// `<date>/<drive>`, as written.
+    pub folder: String,
+    /// The frame's number.
+    pub frame: u64,
+    /// `l` is camera 2, `r` is camera 3; without a side, camera 2.
+    pub camera: Camera,
+}
+
+impl Split {
+    /// Reads lines like `2011_09_26/2011_09_26_drive_0009_sync 0000000016 l`; the index may be padded
+    /// with zeros or not, empty lines are skipped. A line `scenario = garage` stands for every frame of the drives whose
+    /// [`crate::Dataset::scenario`] that is.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchPath`] / [`Error::File`], or [`Error::Split`] with the number of a bad line.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+        let (mut entries, mut scenarios) = (Vec::new(), Vec::new());
+        for (i, line) in String::from_utf8_lossy(&bytes).lines().enumerate() {
+            if line.trim().is_empty() {
+                continue;
+            }
+            if let Some(name) = scenario(line) {
+                scenarios.push(name.to_owned());
+                continue;
+            }
+            entries.push(parse(line).map_err(|problem| Error::Split {
+                path: path.to_owned(),
+                line: i + 1,
+                problem,
+            })?);
+        }
+        if entries.is_empty() && scenarios.is_empty() {
+            return Err(Error::Split {
+                path: path.to_owned(),
+                line: 1,
+                problem: "the file names no frame".into(),
+            });
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            entries,
+            scenarios,
+        })
+    }
+
+    /// How many lines it has.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.entries.len() + self.scenarios.len()
+    }
+
+    /// Whether it names nothing; one that was read names something.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl std::fmt::Display for SplitEntry {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let side = match self.camera {
+            Camera::Left => 'l',
+            Camera::Right => 'r',
+        };
+        write!(f, "{} {} {side}", self.folder, self.frame)
+    }
+}
+
+/// The name in `scenario = garage`.
+fn scenario(line: &str) -> Option<&str> {
+    let (key, name) = line.split_once('=')?;
+    let name = name.trim().trim_matches('"');
+    (key.trim() == "scenario" && !name.is_empty()).then_some(name)
+}
+
+fn parse(line: &str) -> std::result::Result<SplitEntry, String> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let (folder, index, side) = match words.as_slice() {
+        [folder, index] => (folder, index, "l"),
+        [folder, index, side] => (folder, index, *side),
+        _ => {
+            return Err(format!(
+                "{} words, expected folder, index and side",
+                words.len()
+            ));
+        }
+    };
+    let frame = index
+        .parse()
+        .map_err(|_| format!("index '{index}' is not a frame number"))?;
+    let camera = match side {
+        "l" => Camera::Left,
+        "r" => Camera::Right,
+        _ => return Err(format!("side '{side}', expected l or r")),
+    };
+    Ok(SplitEntry {
+        folder: folder.trim_end_matches('/').to_owned(),
+        frame,
+        camera,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn both_ways_of_writing_an_index_are_one_frame() {
+        let padded = parse("2011_09_26/2011_09_26_drive_0009_sync 0000000016 l").unwrap();
+        let plain = parse("2011_09_26/2011_09_26_drive_0009_sync 16").unwrap();
+        assert_eq!(padded, plain);
+        assert_eq!(parse("a/b 3 r").unwrap().camera, Camera::Right);
+    }
+
+    #[test]
+    fn a_bad_line_is_named_with_its_number() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        for bad in ["a/b", "a/b x l", "a/b 3 m", "a b c d"] {
+            std::fs::write(file.path(), format!("a/b 1 l\n\n{bad}\n")).unwrap();
+            let error = Split::read(file.path()).unwrap_err();
+            assert!(matches!(error, Error::Split { line: 3, .. }), "{error}");
+        }
+        std::fs::write(file.path(), "\n\n").unwrap();
+        assert!(Split::read(file.path()).is_err(), "no frames at all");
+    }
+
+    #[test]
+    fn a_scenario_is_a_line_of_its_own() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(
+            file.path(),
+            "scenario = garage\na/b 1 l\nscenario=\"night\"\n",
+        )
+        .unwrap();
+        let split = Split::read(file.path()).unwrap();
+        assert_eq!(split.scenarios, ["garage", "night"]);
+        assert_eq!((split.entries.len(), split.len()), (1, 3));
+        std::fs::write(file.path(), "scenario =\n").unwrap();
+        let error = Split::read(file.path()).unwrap_err();
+        assert!(matches!(error, Error::Split { line: 1, .. }), "{error}");
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_never_panics(line in ".{0,60}") {
+            let _ = parse(&line);
+        }
+
+        #[test]
+        fn an_entry_is_read_as_it_is_shown(frame in any::<u64>(), right in any::<bool>()) {
+            let camera = if right { Camera::Right } else { Camera::Left };
+            let entry = SplitEntry { folder: "d/e_sync".into(), frame, camera };
+            prop_assert_eq!(parse(&entry.to_string()).unwrap(), entry);
+        }
+    }
+}

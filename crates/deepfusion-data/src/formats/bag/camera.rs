@@ -1,0 +1,140 @@
+//! The camera of a bag: its lens, and where it is on the vehicle.
+
+use super::config::BagConfig;
+use super::index::{Index, Place};
+use super::topics::{Role, Topics};
+use super::{image, source};
+use crate::camera::GIVEN_INTRINSICS;
+use crate::{CalibrationPlace, CameraCalibration, Error, Lens, OpenOptions, Result};
+use deepfusion_geometry::{Distortion, Intrinsics, Se3};
+use deepfusion_rosbag::MessageSource;
+use deepfusion_rosbag::msg::CameraInfo;
+use nalgebra::{Matrix3, Vector3};
+use std::path::Path;
+
+/// The camera by what is given, by the file beside the bag, by CameraInfo, or as the profile prints it.
+///
+/// # Errors
+/// [`Error::CameraFile`] where nothing says it or it cannot be; [`Error::FrameSize`] where it is of another size than `first`,
+/// the first image, which is read for it.
+pub(super) fn find(
+    messages: &dyn MessageSource,
+    topics: &Topics,
+    index: &Index,
+    first: &Place,
+    config: &BagConfig,
+    options: &OpenOptions,
+) -> Result<(Lens, CalibrationPlace)> {
+    let bag = messages.path();
+    let topic = topics.of(Role::Image).unwrap_or_default();
+    let picture = image::decode(messages, &image::message(messages, topic, first)?)?;
+    let (width, height) = picture.dimensions();
+    let rectified = topic.contains("rect");
+    let place = |file: &Path, field| CalibrationPlace {
+        file: file.to_owned(),
+        field,
+    };
+    let pinhole = |intrinsics: Intrinsics| Lens::new(intrinsics, &Distortion::default());
+    let (lens, place) = if let Some(numbers) = options.intrinsics {
+        let given = Intrinsics::from_numbers(numbers, (width, height));
+        (pinhole(given), place(bag, GIVEN_INTRINSICS))
+    } else if let Some(camera) = config.camera {
+        (pinhole(camera.intrinsics()), place(&config.path, "camera"))
+    } else if let Some(file) = &config.calibration {
+        let (lens, place) = calibrated(config, file, (width, height), rectified)?;
+        (Ok(lens), place)
+    } else if let Some(info) = index.camera_info.as_ref().filter(|info| info.k[0] > 0.0) {
+        (of_camera_info(info, rectified), place(bag, "CameraInfo"))
+    } else if let Some(camera) = config.profile_camera {
+        (pinhole(camera.intrinsics()), place(&config.path, "profile"))
+    } else {
+        return Err(Error::NoBagCamera {
+            path: bag.to_owned(),
+            config: config.path.clone(),
+        });
+    };
+    let lens = lens.map_err(|problem| Error::CameraFile {
+        path: place.file.clone(),
+        problem,
+        remedy: "calibrate the camera at the size of these images".into(),
+    })?;
+    let found = lens.intrinsics();
+    if (found.width, found.height) != (width, height) {
+        return Err(Error::FrameSize {
+            image: format!("{}, image 0", bag.display()),
+            drive: source::name(bag),
+            frame: 0,
+            found: (width, height),
+            expected: (found.width, found.height),
+            field: place.field,
+            calibration: place.file,
+        });
+    }
+    Ok((lens, place))
+}
+
+/// The camera of the calibration file that the file beside the bag names.
+fn calibrated(
+    config: &BagConfig,
+    file: &Path,
+    size: (u32, u32),
+    rectified: bool,
+) -> Result<(Lens, CalibrationPlace)> {
+    let path = config.folder().join(file);
+    if !path.is_file() {
+        return Err(config.wrong(format!("calibration: there is no {}", path.display())));
+    }
+    let calibration = CameraCalibration::read(&path, size)?;
+    // Such a file is of the raw images: rectified ones have another matrix, and no distortion left to take out.
+    if rectified && !calibration.distortion.is_none() {
+        return Err(Error::CameraFile {
+            path,
+            problem: "it has a distortion, and the images are of a topic with `rect` in its name, rectified already".into(),
+            remedy: format!(
+                "name the raw images' topic (topics.image), or give the rectified camera as [camera], both in {}",
+                config.path.display()
+            ),
+        });
+    }
+    Ok((calibration.lens()?, calibration.place()))
+}
+
+/// Of rectified images P without distortion, of raw ones K with it.
+fn of_camera_info(info: &CameraInfo, rectified: bool) -> std::result::Result<Lens, String> {
+    let size = (info.width, info.height);
+    let of = |fx, fy, cx, cy| Intrinsics::from_numbers([fx, fy, cx, cy], size);
+    if rectified && info.p[0] > 0.0 {
+        let p = &info.p;
+        return Lens::new(of(p[0], p[5], p[2], p[6]), &Distortion::default());
+    }
+    let known = ["plumb_bob", "rational_polynomial", ""];
+    if !known.contains(&info.distortion_model.as_str()) && info.d.iter().any(|d| *d != 0.0) {
+        let model = &info.distortion_model;
+        return Err(format!(
+            "distortion_model {model} is not known: plumb_bob and rational_polynomial are"
+        ));
+    }
+    let distortion = match info.d.as_slice() {
+        [] => Distortion::default(),
+        d => Distortion::from_opencv(d)?,
+    };
+    let k = &info.k;
+    Lens::new(of(k[0], k[4], k[2], k[5]), &distortion)
+}
+
+/// Where the camera is on the vehicle; what is taken for granted goes to the remarks.
+pub(super) fn mount(config: &BagConfig, remarks: &mut Vec<String>) -> Se3 {
+    if let Some(transform) = config.cam_from_vehicle {
+        return transform.se3();
+    }
+    remarks.push(
+        "nothing says where the camera is on the vehicle: it is taken to look ahead and to move as the rear axle does".into(),
+    );
+    looking_ahead()
+}
+
+/// A camera at the rear axle that looks ahead.
+fn looking_ahead() -> Se3 {
+    let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+    Se3::from_parts(&axes, Vector3::zeros())
+}

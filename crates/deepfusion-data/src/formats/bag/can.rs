@@ -1,0 +1,158 @@
+//! Speed and steering out of CAN frames: which signals the file beside a bag names, and what a frame says of them.
+
+use super::can_config::SignalConfig;
+use super::config::BagConfig;
+use crate::Result;
+use deepfusion_motion::can::{CanFrame, CanId, CanSignal, Dbc};
+use deepfusion_rosbag::msg::Frame;
+
+/// The highest identifiers of 11 and of 29 bits.
+const HIGHEST_STANDARD: u16 = 0x7ff;
+const HIGHEST_EXTENDED: u32 = 0x1fff_ffff;
+
+/// The signals that are read, each with its factor to m/s or rad.
+#[derive(Debug, Default)]
+pub(super) struct Can {
+    speed: Option<(CanSignal, f64)>,
+    steering: Option<(CanSignal, f64)>,
+}
+
+/// What a frame says, with its time in nanoseconds.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct CanReading {
+    pub(super) speed_mps: Option<(i64, f64)>,
+    pub(super) steering_rad: Option<(i64, f64)>,
+}
+
+impl Can {
+    /// The signals of the file beside a bag.
+    ///
+    /// # Errors
+    /// [`crate::Error::Config`] for a DBC file, a signal or a unit that is missing or cannot be.
+    pub(super) fn of(config: &BagConfig) -> Result<Self> {
+        let Some(can) = &config.can else {
+            return Ok(Self::default());
+        };
+        let wrong = |e: deepfusion_motion::Error| config.wrong(format!("can: {e}"));
+        let dbc = can.dbc.as_ref();
+        let dbc = dbc.map(|dbc| Dbc::open(&config.folder().join(dbc)));
+        let dbc = dbc.transpose().map_err(wrong)?;
+        let signal = |key: &str, signal: &SignalConfig| {
+            match (signal, &dbc) {
+            (SignalConfig::Named(name), Some(dbc)) => dbc.signal(name).map_err(wrong),
+            (SignalConfig::Named(name), None) => Err(config.wrong(format!(
+                "can.{key} names {name} of a DBC file, and can.dbc names none; without one, write the signal out: \
+                 {key} = {{ id = …, layout = {{ start_bit = …, length = …, byte_order = … }} }}"
+            ))),
+            (SignalConfig::Inline(signal), _) => {
+                let key = format!("can.{key}");
+                check(signal, &key).map_err(|problem| config.wrong(problem))?;
+                Ok(signal.clone())
+            }
+        }
+        };
+        let speed = match &can.speed {
+            None => None,
+            Some(source) => {
+                let found = signal("speed", source)?;
+                let unit = can.speed_unit.or_else(|| source.unit(dbc.as_ref()?));
+                let unit = unit.ok_or_else(|| {
+                    config.wrong(format!(
+                        "can.speed_unit is missing, and {}: \"m/s\", \"km/h\" or \"mph\"",
+                        match source {
+                            SignalConfig::Named(name) =>
+                                format!("the DBC file gives {name} none that is known"),
+                            SignalConfig::Inline(_) => "can.speed has no unit of its own".into(),
+                        }
+                    ))
+                })?;
+                Some((found, unit.metres_per_second()))
+            }
+        };
+        let steering = match &can.steering {
+            None => None,
+            Some(source) => {
+                let factor = can.steering_rad.ok_or_else(|| {
+                    config.wrong(
+                        "can.steering_rad is missing: radians for one unit of the signal, 0.0174533 for degrees, 1.0 for radians".into(),
+                    )
+                })?;
+                if !factor.is_finite() || factor == 0.0 {
+                    return Err(config.wrong(format!("can.steering_rad is {factor}")));
+                }
+                Some((signal("steering", source)?, factor))
+            }
+        };
+        Ok(Self { speed, steering })
+    }
+
+    /// What a frame of this time says. Remote requests and error frames carry no values, whatever their bytes.
+    pub(super) fn read(&self, frame: &Frame, time_ns: i64) -> CanReading {
+        let id = if frame.is_extended {
+            Some(CanId::Extended { extended: frame.id })
+        } else {
+            u16::try_from(frame.id).ok().map(CanId::Standard)
+        };
+        let Some(id) = id.filter(|_| !frame.is_rtr && !frame.is_error) else {
+            return CanReading::default();
+        };
+        let length = usize::from(frame.dlc).min(frame.data.len());
+        let seen = CanFrame {
+            time_s: 0.0,
+            id,
+            data: &frame.data[..length],
+        };
+        let value = |signal: &Option<(CanSignal, f64)>| {
+            let (signal, factor) = signal.as_ref()?;
+            let value = (signal.id == seen.id).then(|| signal.decode(seen.data))??;
+            Some((time_ns, value * factor))
+        };
+        CanReading {
+            speed_mps: value(&self.speed),
+            steering_rad: value(&self.steering),
+        }
+    }
+
+    /// Signals without a value, as a sentence each: they are configured, so no other source was looked for.
+    pub(super) fn silent(&self, speeds: usize, angles: usize) -> Vec<String> {
+        let signals = [
+            ("can.speed", &self.speed, speeds),
+            ("can.steering", &self.steering, angles),
+        ];
+        let silent = signals.into_iter().filter(|(_, _, values)| *values == 0);
+        silent
+            .filter_map(|(key, signal, _)| {
+                let id = match signal.as_ref()?.0.id {
+                    CanId::Standard(id) => format!("0x{id:x}"),
+                    CanId::Extended { extended } => format!("0x{extended:x} (29 bits)"),
+                };
+                Some(format!("{key}: no CAN frame {id} holds a value of it"))
+            })
+            .collect()
+    }
+}
+
+/// What no frame can hold, by field.
+fn check(signal: &CanSignal, key: &str) -> std::result::Result<(), String> {
+    match signal.id {
+        CanId::Standard(id) if id > HIGHEST_STANDARD => {
+            return Err(format!(
+                "{key}: id is 0x{id:x}, expected at most 0x{HIGHEST_STANDARD:x}; one of 29 bits is written id = {{ extended = 0x{id:x} }}"
+            ));
+        }
+        CanId::Extended { extended } if extended > HIGHEST_EXTENDED => {
+            return Err(format!(
+                "{key}: id.extended is 0x{extended:x}, expected at most 0x{HIGHEST_EXTENDED:x}"
+            ));
+        }
+        CanId::Standard(_) | CanId::Extended { .. } => {}
+    }
+    if signal.layout.scale == 0.0 {
+        return Err(format!("{key}: scale is 0, every value would be the same"));
+    }
+    let switches = signal.multiplexed.iter().map(|m| &m.switch);
+    for layout in std::iter::once(&signal.layout).chain(switches) {
+        layout.validate(key).map_err(|e| e.to_string())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,267 @@
+//! The file beside a bag, `<bag>.toml` or `bag.toml` for all bags of a folder: what the bag does not say.
+
+use super::can_config::{CanConfig, SpeedUnit};
+use super::profile;
+use crate::{Error, Result};
+use deepfusion_geometry::{Intrinsics, Se3};
+use deepfusion_motion::{FusionConfig, SPEED_SCALES};
+use nalgebra::Vector3;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// The file for every bag of a folder that has none of its own.
+const OF_FOLDER: &str = "bag.toml";
+
+/// Everything that can be said. All of it is optional; docs/reference/bag-toml.md explains each key.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct BagConfig {
+    /// A data set's published numbers, where the bag has none: `umad`.
+    pub(super) profile: Option<String>,
+    /// The kind of drive, for one row each in the evaluation.
+    pub(super) scenario: Option<String>,
+    /// Topics by name, where the type does not tell.
+    pub(super) topics: TopicNames,
+    /// A camera without distortion, where there is no CameraInfo.
+    pub(super) camera: Option<CameraConfig>,
+    /// A calibration tool's file, from this one's folder.
+    pub(super) calibration: Option<PathBuf>,
+    /// A point of the LiDAR in the camera.
+    pub(super) cam_from_lidar: Option<Transform>,
+    /// A point of the vehicle (middle of the rear axle; x forward, y left, z up) in the camera.
+    pub(super) cam_from_vehicle: Option<Transform>,
+    /// A point of the inertial unit in the vehicle.
+    pub(super) vehicle_from_imu: Option<Transform>,
+    /// The vehicle's geometry.
+    pub(super) vehicle: VehicleConfig,
+    /// The LiDAR's ways.
+    pub(super) lidar: LidarConfig,
+    /// Clocks and how near in time two sensors must be.
+    pub(super) clock: ClockConfig,
+    /// Signals of CAN frames.
+    pub(super) can: Option<CanConfig>,
+    /// Weights of the sensors in the motion.
+    pub(super) fusion: FusionConfig,
+    /// The profile's camera, where nothing else says one.
+    #[serde(skip)]
+    pub(super) profile_camera: Option<CameraConfig>,
+    /// Where it was read from; the path it would have where there is none.
+    #[serde(skip)]
+    pub(super) path: PathBuf,
+}
+
+/// Topics by name.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct TopicNames {
+    pub(super) image: Option<String>,
+    pub(super) camera_info: Option<String>,
+    pub(super) lidar: Option<String>,
+    pub(super) dynamic: Option<String>,
+    pub(super) imu: Option<String>,
+    pub(super) speed: Option<String>,
+    pub(super) steering: Option<String>,
+    pub(super) can: Option<String>,
+    pub(super) truth: Option<String>,
+}
+
+/// A camera by four numbers and its image's size.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CameraConfig {
+    pub(super) fx: f64,
+    pub(super) fy: f64,
+    pub(super) cx: f64,
+    pub(super) cy: f64,
+    pub(super) width: u32,
+    pub(super) height: u32,
+}
+
+/// A rigid motion: metres, and an axis-angle vector in radians.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Transform {
+    pub(super) translation: [f64; 3],
+    #[serde(default)]
+    pub(super) rotation: [f64; 3],
+}
+
+/// The vehicle's geometry, and the unit of a bare number as its speed.
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct VehicleConfig {
+    pub(super) wheelbase_m: Option<f64>,
+    /// True speed over the vehicle's: worn tyres read too fast.
+    pub(super) speed_scale: Option<f64>,
+    /// Steering wheel's angle over road wheels'; without it the signal is the road wheels' angle.
+    pub(super) steering_ratio: Option<f64>,
+    pub(super) steering_offset_rad: f64,
+    /// Needed where the speed is a Float32 or Float64.
+    pub(super) speed_unit: Option<SpeedUnit>,
+}
+
+/// The LiDAR's ways.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct LidarConfig {
+    /// The field of the radial velocity; without it the usual names are tried.
+    pub(super) velocity_field: Option<String>,
+    /// The sign of a point that recedes.
+    pub(super) receding: Sign,
+    /// Whether the sensor already took its own velocity out.
+    pub(super) over_ground: bool,
+    /// Speed over ground along the ray from which a point moves, m/s.
+    pub(super) moving_mps: f64,
+}
+
+impl Default for LidarConfig {
+    fn default() -> Self {
+        Self {
+            velocity_field: None,
+            receding: Sign::Positive,
+            over_ground: false,
+            moving_mps: 0.5,
+        }
+    }
+}
+
+/// A sign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Sign {
+    Positive,
+    Negative,
+}
+
+/// Clocks.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct ClockConfig {
+    /// How far the clock of camera and LiDAR is ahead of the vehicle's, in seconds; taken off their stamps.
+    /// [`crate::OpenOptions::camera_ahead_s`] goes before it.
+    pub(super) camera_ahead_s: f64,
+    /// A scan belongs to a frame if they are no farther apart, in seconds.
+    pub(super) scan_within_s: f64,
+}
+
+impl Default for ClockConfig {
+    fn default() -> Self {
+        Self {
+            camera_ahead_s: 0.0,
+            scan_within_s: 0.025,
+        }
+    }
+}
+
+impl BagConfig {
+    /// Reads the file beside a bag; where there is none, nothing is said.
+    ///
+    /// # Errors
+    /// [`Error::Config`], [`Error::File`].
+    pub(super) fn beside(bag: &Path) -> Result<Self> {
+        let mut candidates = Self::candidates(bag);
+        // Of a link, the file beside what it leads to, where the link has none beside itself.
+        if let Ok(real) = bag.canonicalize() {
+            candidates.extend(Self::candidates(&real));
+        }
+        let there = candidates.iter().find(|path| path.is_file());
+        // Where there is none, the first is where one would be looked for.
+        let path = there.or(candidates.first()).cloned().unwrap_or_default();
+        // Read alone first: what is wrong with it is then told with its line.
+        let mut config: Self = crate::dataset_toml::read_or_default(&path)?;
+        if let Some(name) = &config.profile {
+            let own = crate::dataset_toml::read_or_default(&path)?;
+            if let Some(filled) = Self::over_profile(own, name) {
+                config = filled.map_err(|e| Error::Config {
+                    path: path.clone(),
+                    problem: e.to_string().trim_end().to_owned(),
+                })?;
+            }
+        }
+        config.path = path;
+        config.validate()?;
+        Ok(config)
+    }
+
+    /// Where a bag's file is looked for, in this order.
+    fn candidates(bag: &Path) -> Vec<PathBuf> {
+        let shared = bag.with_file_name(OF_FOLDER);
+        if !bag.is_dir() {
+            return vec![bag.with_extension("toml"), shared];
+        }
+        // A bag of ROS 2 is a folder: within it, beside it under its whole name, or for all of the folder above.
+        let mut own = bag.as_os_str().to_owned();
+        own.push(".toml");
+        vec![bag.join(OF_FOLDER), PathBuf::from(own), shared]
+    }
+
+    fn validate(&self) -> Result<()> {
+        let numbers = [
+            ("lidar.moving_mps", self.lidar.moving_mps, true),
+            ("clock.scan_within_s", self.clock.scan_within_s, true),
+            ("clock.camera_ahead_s", self.clock.camera_ahead_s, false),
+        ];
+        let scale = self.vehicle.speed_scale.unwrap_or(1.0);
+        if !SPEED_SCALES.contains(&scale) {
+            return Err(self.wrong(crate::dataset_toml::bad_speed_scale(scale)));
+        }
+        for (key, value, positive) in numbers {
+            if !value.is_finite() || (positive && value <= 0.0) {
+                return Err(self.wrong(format!("{key} is {value}")));
+            }
+        }
+        for (key, transform) in [
+            ("cam_from_lidar", self.cam_from_lidar),
+            ("cam_from_vehicle", self.cam_from_vehicle),
+            ("vehicle_from_imu", self.vehicle_from_imu),
+        ] {
+            let Some(t) = transform else { continue };
+            let all = t.translation.iter().chain(&t.rotation);
+            if !all.clone().all(|x| x.is_finite()) {
+                return Err(self.wrong(format!("{key} holds a number that is not finite")));
+            }
+        }
+        if self.camera.is_some() && self.calibration.is_some() {
+            return Err(self.wrong(
+                "[camera] and calibration both say what the camera is: keep one of them".into(),
+            ));
+        }
+        let mut known = profile::names();
+        match &self.profile {
+            Some(asked) if !known.any(|name| name == asked) => {
+                let names: Vec<String> = profile::names().map(|n| format!("\"{n}\"")).collect();
+                let names = names.join(", ");
+                Err(self.wrong(format!("profile: the only one there is is {names}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Where files that it names are looked for.
+    pub(super) fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(&self.path)
+    }
+
+    pub(super) fn wrong(&self, problem: String) -> Error {
+        Error::Config {
+            path: self.path.clone(),
+            problem,
+        }
+    }
+}
+
+impl Transform {
+    pub(super) fn se3(&self) -> Se3 {
+        Se3::from_axis_angle(
+            Vector3::from(self.rotation),
+            Vector3::from(self.translation),
+        )
+    }
+}
+
+impl CameraConfig {
+    pub(super) fn intrinsics(&self) -> Intrinsics {
+        let pinhole = [self.fx, self.fy, self.cx, self.cy];
+        Intrinsics::from_numbers(pinhole, (self.width, self.height))
+    }
+}

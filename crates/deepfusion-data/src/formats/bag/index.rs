@@ -1,0 +1,250 @@
+//! One pass over a bag: when images and scans were taken, and what the vehicle said meanwhile.
+
+use super::can::Can;
+use super::config::BagConfig;
+use super::topics::{Role, Topics};
+use crate::{Error, Result};
+use deepfusion_geometry::Se3;
+use deepfusion_motion::ImuSample;
+use deepfusion_rosbag::msg::{
+    AckermannDriveStamped, CameraInfo, Float32, Float64, Frame, Imu, Odometry, Twist, TwistStamped,
+};
+use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+
+/// A message that is read again when it is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    /// When it was recorded, by which it is found again.
+    pub(super) recorded: Time,
+    /// When it was measured, by the sensor's clock, nanoseconds since 1970.
+    pub(super) stamp_ns: i64,
+}
+
+/// The message nearest to a time, no farther than `within_s`; `places` by time.
+pub(super) fn nearest(
+    places: &[(Place, f64)],
+    time_s: f64,
+    within_s: f64,
+) -> Option<&(Place, f64)> {
+    let after = places.partition_point(|p| p.1 < time_s);
+    let around = places[after.saturating_sub(1)..].iter().take(2);
+    let apart = |p: &&(Place, f64)| (p.1 - time_s).abs();
+    let nearest = around.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    nearest.filter(|p| apart(p) <= within_s)
+}
+
+/// What one pass finds. Times of the vehicle's streams are nanoseconds.
+#[derive(Debug, Default)]
+pub(super) struct Index {
+    pub(super) images: Vec<Place>,
+    pub(super) scans: Vec<Place>,
+    /// Messages of the points that move.
+    pub(super) dynamic: Vec<Place>,
+    pub(super) camera_info: Option<CameraInfo>,
+    pub(super) speed_mps: Vec<(i64, f64)>,
+    /// Of the message that holds the speed, rad/s; not every publisher fills it.
+    pub(super) yaw_rate: Vec<(i64, f64)>,
+    /// Roll and pitch rate, in rad/s, where a twist gives all three.
+    pub(super) tilt_rates: Vec<(i64, [f64; 2])>,
+    pub(super) steering_rad: Vec<(i64, f64)>,
+    pub(super) imu: Vec<(i64, ImuSample)>,
+    /// `world_from_vehicle`, exact.
+    pub(super) truth: Vec<(i64, Se3)>,
+    /// Chunks or messages that could not be read, in sentences.
+    pub(super) lost: Vec<String>,
+    /// CAN signals that no frame holds, in sentences.
+    pub(super) silent: Vec<String>,
+    /// Messages whose header has no time, by topic: the time of recording stands for it.
+    pub(super) unstamped: BTreeMap<String, usize>,
+}
+
+impl Index {
+    /// Reads the topics' stamps and the vehicle's values. Images and clouds are not decoded. What cannot be read is
+    /// counted and left out: a bag with a broken chunk has whole ones too.
+    ///
+    /// # Errors
+    /// [`Error::Bag`] where reading cannot begin; [`Error::Config`] for units or signals that are missing.
+    pub(super) fn read(
+        bag: &dyn MessageSource,
+        topics: &Topics,
+        config: &BagConfig,
+    ) -> Result<Self> {
+        let can = Can::of(config)?;
+        let mut index = Self::default();
+        let mut names: Vec<&str> = topics.found.iter().map(|(_, name)| name.as_str()).collect();
+        names.dedup();
+        for message in bag.messages(Selection::topics(names))? {
+            let read = message
+                .map_err(Error::from)
+                .and_then(|message| index.add(&message, topics, config, &can));
+            match read {
+                Ok(()) => {}
+                Err(error @ Error::Config { .. }) => return Err(error),
+                Err(error) => index.lost.push(error.to_string()),
+            }
+        }
+        // The one place where the vehicle's speeds are scaled, whichever message held them.
+        let scale = config.vehicle.speed_scale.unwrap_or(1.0);
+        index.speed_mps.iter_mut().for_each(|(_, v)| *v *= scale);
+        index.silent = can.silent(index.speed_mps.len(), index.steering_rad.len());
+        index.images.sort_by_key(|p| p.stamp_ns);
+        index.scans.sort_by_key(|p| p.stamp_ns);
+        index.dynamic.sort_by_key(|p| p.stamp_ns);
+        index.truth.sort_by_key(|p| p.0);
+        Ok(index)
+    }
+
+    fn add(
+        &mut self,
+        message: &Message<'_>,
+        topics: &Topics,
+        config: &BagConfig,
+        can: &Can,
+    ) -> Result<()> {
+        let at_ns = stamp(message);
+        let mut timed = false;
+        for role in topics.roles(message.topic()) {
+            timed |= role != Role::CameraInfo;
+            match role {
+                Role::Image | Role::Lidar | Role::Dynamic => {
+                    let place = Place {
+                        recorded: message.time(),
+                        stamp_ns: at_ns,
+                    };
+                    match role {
+                        Role::Image => self.images.push(place),
+                        Role::Dynamic => self.dynamic.push(place),
+                        _ => self.scans.push(place),
+                    }
+                }
+                Role::CameraInfo if self.camera_info.is_none() => {
+                    self.camera_info = Some(message.decode::<CameraInfo>()?);
+                }
+                Role::CameraInfo => {}
+                Role::Imu => {
+                    let imu: Imu = message.decode()?;
+                    let (a, w) = (imu.linear_acceleration, imu.angular_velocity);
+                    let sample = ImuSample {
+                        time_s: 0.0,
+                        acceleration_mps2: Vector3::new(a.x, a.y, a.z),
+                        angular_rate_radps: Vector3::new(w.x, w.y, w.z),
+                    };
+                    self.imu.push((at_ns, sample));
+                }
+                Role::Speed => {
+                    let Reading { speed_mps, rates } = reading(message, config)?;
+                    self.speed_mps.push((at_ns, speed_mps));
+                    if let Some([roll, pitch, yaw]) = rates {
+                        self.yaw_rate.push((at_ns, yaw));
+                        self.tilt_rates.push((at_ns, [roll, pitch]));
+                    }
+                }
+                Role::Steering => {
+                    self.steering_rad.push((at_ns, steering(message)?));
+                }
+                Role::Can => {
+                    let frame: Frame = message.decode()?;
+                    let said = can.read(&frame, at_ns);
+                    self.speed_mps.extend(said.speed_mps);
+                    self.steering_rad.extend(said.steering_rad);
+                }
+                Role::Truth => {
+                    let odometry: Odometry = message.decode()?;
+                    let (p, q) = (odometry.pose.pose.position, odometry.pose.pose.orientation);
+                    let place = Vector3::new(p.x, p.y, p.z);
+                    let pose = Se3::from_quaternion([q.w, q.x, q.y, q.z], place);
+                    self.truth.push((at_ns, pose));
+                }
+            }
+        }
+        if timed && has_header(message) && message.header_stamp().is_none() {
+            let topic = message.topic().to_owned();
+            *self.unstamped.entry(topic).or_default() += 1;
+        }
+        Ok(())
+    }
+}
+
+/// What a message about the speed says.
+struct Reading {
+    speed_mps: f64,
+    /// Roll, pitch and yaw rate, in rad/s.
+    rates: Option<[f64; 3]>,
+}
+
+/// The vehicle's forward speed by whatever message holds it.
+fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
+    if message.is::<TwistStamped>() {
+        let twist: TwistStamped = message.decode()?;
+        return Ok(Reading {
+            speed_mps: twist.twist.linear.x,
+            rates: Some(rates(&twist.twist)),
+        });
+    }
+    if message.is::<AckermannDriveStamped>() {
+        let drive: AckermannDriveStamped = message.decode()?;
+        return Ok(Reading {
+            speed_mps: f64::from(drive.drive.speed),
+            rates: None,
+        });
+    }
+    if message.is::<Odometry>() {
+        let odometry: Odometry = message.decode()?;
+        let twist = odometry.twist.twist;
+        return Ok(Reading {
+            speed_mps: twist.linear.x,
+            rates: Some(rates(&twist)),
+        });
+    }
+    let value = number(message)?;
+    let unit = config.vehicle.speed_unit.ok_or_else(|| {
+        config.wrong(format!(
+            "vehicle.speed_unit is missing: {} is a bare number, \"m/s\", \"km/h\" or \"mph\"",
+            message.topic()
+        ))
+    })?;
+    Ok(Reading {
+        speed_mps: value * unit.metres_per_second(),
+        rates: None,
+    })
+}
+
+fn rates(twist: &Twist) -> [f64; 3] {
+    [twist.angular.x, twist.angular.y, twist.angular.z]
+}
+
+/// The steering angle in radians, by whatever message holds it.
+fn steering(message: &Message<'_>) -> Result<f64> {
+    if message.is::<AckermannDriveStamped>() {
+        let drive: AckermannDriveStamped = message.decode()?;
+        return Ok(f64::from(drive.drive.steering_angle));
+    }
+    number(message)
+}
+
+/// A bare number.
+fn number(message: &Message<'_>) -> Result<f64> {
+    Ok(if message.is::<Float32>() {
+        f64::from(message.decode::<Float32>()?.data)
+    } else {
+        message.decode::<Float64>()?.data
+    })
+}
+
+/// When a message was measured, in nanoseconds: the stamp of its header; the time of recording where it has no header, or
+/// one that is not set. Taken as they are, unset stamps would put all messages of a topic at one instant.
+pub(super) fn stamp(message: &Message<'_>) -> i64 {
+    let stamp = has_header(message).then(|| message.header_stamp());
+    nanos(stamp.flatten().unwrap_or(message.time()))
+}
+
+/// Whether a message of a type that is read here begins with a header: all but bare numbers do.
+fn has_header(message: &Message<'_>) -> bool {
+    !message.is::<Float32>() && !message.is::<Float64>()
+}
+
+pub(super) fn nanos(time: Time) -> i64 {
+    i64::try_from(time.nanos()).unwrap_or(i64::MAX)
+}

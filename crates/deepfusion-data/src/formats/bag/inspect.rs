@@ -1,0 +1,107 @@
+//! What is in a bag that no camera wrote into.
+
+use super::config::BagConfig;
+use super::index::Index;
+use super::streams::{remarks_on, streams};
+use super::topics::{Role, Topics};
+use super::{sensors, source};
+use crate::{DatasetKind, DriveInspection, Inspection, Result, SpeedRange};
+use deepfusion_motion::Signal;
+use std::path::Path;
+
+/// Speeds farther apart than this are not joined, in seconds.
+const MAX_GAP_S: f64 = 0.5;
+
+/// The streams of a bag without images; `None` where it has some.
+///
+/// # Errors
+/// As [`crate::Dataset::open`].
+pub(crate) fn without_images(path: &Path) -> Result<Option<Inspection>> {
+    let config = BagConfig::beside(path)?;
+    let bag = source::open(path)?;
+    let topics = Topics::find(bag.as_ref(), &config)?;
+    if topics.of(Role::Image).is_some() {
+        return Ok(None);
+    }
+    let index = Index::read(bag.as_ref(), &topics, &config)?;
+    let mut speeds = index.speed_mps.clone();
+    speeds.sort_by_key(|s| s.0);
+    let seconds = |from: i64, to: i64| (to - from) as f64 * 1e-9;
+    let steps = speeds
+        .windows(2)
+        .map(|w| (seconds(w[0].0, w[1].0), 0.5 * (w[0].1 + w[1].1)));
+    let driven = steps
+        .filter(|(dt, _)| *dt <= MAX_GAP_S)
+        .map(|(dt, v)| (dt * v).abs());
+    let distance_m = (speeds.len() > 1).then(|| driven.sum());
+    let range = bag.time_range();
+    let duration_s = range.map(|(first, last)| last.seconds_since(first));
+    let speed_mps = SpeedRange::of(speeds.iter().map(|s| s.1));
+    let drive = DriveInspection {
+        name: source::name(path),
+        camera: 2,
+        frames: 0,
+        missing_frames: Vec::new(),
+        usable_pairs: 0,
+        why_no_pairs: Some("none of the bag's topics holds images".into()),
+        scans: 0,
+        speed_mps,
+        distance_m,
+        turn_rad: turn(path, &index, &config),
+        duration_s,
+        camera_ahead_s: 0.0,
+        time_offset: None,
+        remarks: remarks_on(bag.as_ref(), &index),
+    };
+    Ok(Some(Inspection {
+        kind: DatasetKind::Bag,
+        frames: 0,
+        size: None,
+        intrinsics: None,
+        streams: streams(bag.as_ref(), &topics, &index)?,
+        speed_mps,
+        distance_m,
+        duration_s,
+        drives: vec![drive],
+    }))
+}
+
+/// How far the vehicle turned, in radians, positive to the left: by all its sensors where it has a speed, else by the
+/// yaw rates as they were measured, bias included. `None` where there are none.
+fn turn(path: &Path, index: &Index, config: &BagConfig) -> Option<f64> {
+    let origin_ns = index.speed_mps.iter().map(|s| s.0).min();
+    // Sensors that contradict each other end an opening; here they still say what they measured.
+    let motion = origin_ns.and_then(|ns| sensors::motion(path, index, config, ns).ok().flatten());
+    if let Some(motion) = motion.filter(|m| m.yaw_known) {
+        let track = &motion.track;
+        let pairs = track.times_s().windows(2);
+        return total(pairs.filter_map(|t| Some(track.motion(t[0], t[1])?.yaw_rad)));
+    }
+    let mut rates = yaw_rates(index, config);
+    rates.sort_by_key(|r| r.0);
+    let first_ns = rates.first()?.0;
+    let seconds = |ns: i64| (ns - first_ns) as f64 * 1e-9;
+    let signal = Signal::new(rates.into_iter().map(|(ns, rate)| (seconds(ns), rate)));
+    let pairs = signal.times_s().windows(2);
+    total(pairs.filter_map(|t| signal.integral(t[0], t[1])))
+}
+
+/// Yaw rates in rad/s by whoever measures them: the speed's messages if they ever say a turn (not every publisher
+/// fills it), else the inertial unit, whose z is up unless the file beside the bag turns it.
+fn yaw_rates(index: &Index, config: &BagConfig) -> Vec<(i64, f64)> {
+    if index.yaw_rate.iter().any(|(_, rate)| *rate != 0.0) {
+        return index.yaw_rate.clone();
+    }
+    let vehicle_from_imu = config.vehicle_from_imu.map(|t| t.se3());
+    let rates = index.imu.iter().map(|(ns, sample)| {
+        let rate = sample.angular_rate_radps;
+        let turned = vehicle_from_imu.map_or(rate, |t| t.rotate(&rate));
+        (*ns, turned.z)
+    });
+    rates.collect()
+}
+
+/// The sum; `None` of nothing.
+fn total(parts: impl Iterator<Item = f64>) -> Option<f64> {
+    parts.reduce(|sum, part| sum + part)
+}

@@ -1,0 +1,200 @@
+//! From bags to data sets: topics, then one pass over them, then the camera, the vehicle's motion and the scans.
+
+use super::config::BagConfig;
+use super::dynamic::DynamicPoints;
+use super::index::{Index, Place};
+use super::recording::BagRecording;
+use super::scans::BagScans;
+use super::streams::{remarks_on, streams};
+use super::topics::{Role, Topics};
+use super::{camera, sensors, source};
+use crate::logs::clock::{on_the_vehicles_clock, seconds};
+use crate::{
+    Camera, Dataset, DatasetParts, Error, Frame, FrameImage, MotionModel, OpenOptions, Result,
+};
+use deepfusion_geometry::{StampedPose, Trajectory};
+use deepfusion_rosbag::MessageSource;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Opens bags, a data set each.
+///
+/// # Errors
+/// As [`Dataset::open`].
+pub(crate) fn open(path: &Path, bags: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
+    let (mut datasets, mut without_camera) = (Vec::<Dataset>::new(), Vec::new());
+    let mut refused = None;
+    for bag in bags {
+        let opened = open_bag(source::open(bag)?, options);
+        match opened.and_then(|dataset| dataset.select(path, options)) {
+            Ok(dataset) => datasets.push(dataset),
+            Err(error @ Error::SplitSelectsNothing { .. }) => refused = Some(error),
+            // A recorder may give each computer of the vehicle its bag; the others can still be used.
+            Err(error @ Error::NoFrames { .. }) => {
+                without_camera.push(source::name(bag));
+                refused = refused.or(Some(error));
+            }
+            Err(other) => return Err(other),
+        }
+    }
+    match (datasets.first_mut(), refused) {
+        (None, Some(error)) => Err(error),
+        (Some(first), _) if !without_camera.is_empty() => {
+            let names = without_camera.join(", ");
+            first.remark(format!(
+                "left out, as none of their topics holds images: {names}"
+            ));
+            Ok(datasets)
+        }
+        _ => Ok(datasets),
+    }
+}
+
+/// A recording of messages as a data set, with what the file beside it says.
+///
+/// # Errors
+/// As [`Dataset::open`].
+pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Result<Dataset> {
+    let path = bag.path();
+    let config = BagConfig::beside(path)?;
+    let topics = Topics::find(bag.as_ref(), &config)?;
+    let index = Index::read(bag.as_ref(), &topics, &config)?;
+    let first = first_image(bag.as_ref(), &index)?;
+    let clock = Clock::from_image(&first, &config, options);
+    let mut remarks = remarks_on(bag.as_ref(), &index);
+
+    let (lens, calibration) =
+        camera::find(bag.as_ref(), &topics, &index, &first, &config, options)?;
+    remarks.extend(lens.intrinsics().implausible());
+    let cam_from_vehicle = camera::mount(&config, &mut remarks);
+    let motion = sensors::motion(path, &index, &config, clock.origin_ns)?;
+    let yaw_known = motion.as_ref().is_some_and(|m| m.yaw_known);
+    let track = motion.map(|m| m.track);
+
+    let name = source::name(path);
+    let parts = DatasetParts {
+        name: name.clone(),
+        split_name: name.clone(),
+        camera: Camera::Left,
+        frames: frames(path, &name, &clock.timed(&index.images), track.as_ref()),
+        intrinsics: lens.intrinsics(),
+        cam_from_vehicle: Some(cam_from_vehicle),
+        track: track.clone(),
+        yaw_known,
+        origin_ns: Some(clock.origin_ns),
+        camera_ahead_s: clock.camera_ahead_s,
+        scenario: config.scenario.clone(),
+    };
+    let scans = match (
+        topics.of(Role::Lidar),
+        config.cam_from_lidar.map(|transform| transform.se3()),
+    ) {
+        (Some(topic), Some(cam_from_lidar)) => Some(Arc::new(BagScans {
+            bag: Arc::clone(&bag),
+            topic: topic.to_owned(),
+            places: clock.timed(&index.scans),
+            dynamic: topics.of(Role::Dynamic).map(|topic| DynamicPoints {
+                topic: topic.to_owned(),
+                places: clock.timed(&index.dynamic),
+            }),
+            lidar: config.lidar.clone(),
+            within_s: config.clock.scan_within_s,
+            cam_from_lidar,
+            cam_from_vehicle,
+            intrinsics: lens.intrinsics(),
+            track,
+        })),
+        (Some(_), None) => {
+            remarks.push(
+                "nothing says where the LiDAR is (cam_from_lidar): its scans give no ground truth"
+                    .into(),
+            );
+            None
+        }
+        _ => None,
+    };
+    let recording = BagRecording {
+        streams: streams(bag.as_ref(), &topics, &index)?,
+        folder: match path.is_dir() {
+            true => path.to_owned(),
+            false => path.parent().unwrap_or(path).to_owned(),
+        },
+        bag: Arc::clone(&bag),
+        topics,
+        truth: truth(&index, clock.origin_ns),
+        images: index.images,
+        lens,
+        remarks,
+        cam_from_vehicle,
+        scans,
+        calibration,
+    };
+    Ok(Dataset::new(parts, Arc::new(recording)))
+}
+
+/// The first image, with which the data set's time begins.
+fn first_image(bag: &dyn MessageSource, index: &Index) -> Result<Place> {
+    if let Some(first) = index.images.first() {
+        return Ok(*first);
+    }
+    let list: Vec<String> = bag.topics()?.into_iter().map(|t| t.name).collect();
+    Err(Error::NoFrames {
+        path: bag.path().to_owned(),
+        why: format!("none of its topics holds images: {}", list.join(", ")),
+        remedy: "topics.image in the file beside the bag names the camera's topic".into(),
+    })
+}
+
+/// The data set's clock: the vehicle's, from the first image on. Camera and LiDAR have one of their own, ahead of it.
+struct Clock {
+    origin_ns: i64,
+    camera_ahead_s: f64,
+}
+
+impl Clock {
+    fn from_image(first: &Place, config: &BagConfig, options: &OpenOptions) -> Self {
+        let said = options.camera_ahead_s;
+        let camera_ahead_s = said.unwrap_or(config.clock.camera_ahead_s);
+        Self {
+            origin_ns: on_the_vehicles_clock(first.stamp_ns, camera_ahead_s),
+            camera_ahead_s,
+        }
+    }
+
+    /// Messages of camera or LiDAR, each with its time in seconds.
+    fn timed(&self, places: &[Place]) -> Vec<(Place, f64)> {
+        let time_s = |place: &Place| {
+            let ns = on_the_vehicles_clock(place.stamp_ns, self.camera_ahead_s);
+            seconds(ns, self.origin_ns)
+        };
+        places.iter().map(|place| (*place, time_s(place))).collect()
+    }
+}
+
+fn frames(
+    path: &Path,
+    drive: &str,
+    images: &[(Place, f64)],
+    track: Option<&MotionModel>,
+) -> Vec<Frame> {
+    let frame = |(number, (_, time_s)): (u64, &(Place, f64))| Frame {
+        drive: drive.to_owned(),
+        number,
+        time_s: Some(*time_s),
+        image: FrameImage::Within {
+            file: path.to_owned(),
+            index: number,
+        },
+        speed_mps: track.and_then(|t| t.speed_at(*time_s)),
+    };
+    (0..).zip(images).map(frame).collect()
+}
+
+/// Where the vehicle was, exactly: a simulated drive knows it, on the vehicle's clock.
+fn truth(index: &Index, origin_ns: i64) -> Trajectory {
+    let poses = index.truth.iter().map(|(ns, pose)| StampedPose {
+        time_s: (ns - origin_ns) as f64 * 1e-9,
+        world_from_body: *pose,
+    });
+    Trajectory::new(poses.collect())
+}

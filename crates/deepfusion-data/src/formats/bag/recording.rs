@@ -1,0 +1,168 @@
+//! A bag as a [`Recording`].
+
+use super::image;
+use super::index::Place;
+use super::scans::{BagScans, MovingPoints};
+use super::topics::{Role, Topics};
+use crate::{
+    CalibrationPlace, CameraPath, Dataset, DatasetKind, DynamicAgreement, Error, Frame, GtKind,
+    Lens, LidarMotion, MovingLabels, MovingSource, Recording, Result, ScanTruth, Stream,
+};
+use ::image::RgbImage;
+use deepfusion_geometry::{DepthMap, Se3, Trajectory};
+use deepfusion_rosbag::MessageSource;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A bag with a camera.
+#[derive(Debug)]
+pub(super) struct BagRecording {
+    pub(super) folder: PathBuf,
+    pub(super) bag: Arc<dyn MessageSource>,
+    pub(super) topics: Topics,
+    pub(super) images: Vec<Place>,
+    pub(super) lens: Lens,
+    pub(super) streams: Vec<Stream>,
+    pub(super) remarks: Vec<String>,
+    /// Where the vehicle was, exactly, on the vehicle's clock.
+    pub(super) truth: Trajectory,
+    pub(super) cam_from_vehicle: Se3,
+    pub(super) scans: Option<Arc<BagScans>>,
+    pub(super) calibration: CalibrationPlace,
+}
+
+impl Recording for BagRecording {
+    fn kind(&self) -> DatasetKind {
+        DatasetKind::Bag
+    }
+
+    fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
+        let topic = self.topics.of(Role::Image).unwrap_or_default();
+        let place = usize::try_from(frame.number)
+            .ok()
+            .and_then(|n| self.images.get(n));
+        let Some(place) = place else {
+            return Err(Error::Image {
+                path: self.bag.path().to_owned(),
+                problem: format!("there is no image {}", frame.number),
+                truncated: false,
+            });
+        };
+        let message = image::message(self.bag.as_ref(), topic, place)?;
+        self.lens
+            .correct(image::decode(self.bag.as_ref(), &message)?)
+    }
+
+    fn calibration(&self) -> CalibrationPlace {
+        self.calibration.clone()
+    }
+
+    fn streams(&self) -> Result<Vec<Stream>> {
+        Ok(self.streams.clone())
+    }
+
+    fn no_motion(&self) -> Error {
+        Error::NoTrack {
+            drive: self.bag.path().display().to_string(),
+            why: "the bag has no speed of the vehicle (TwistStamped, Odometry, a CAN signal)".into(),
+            remedy: "topics.speed in the file beside the bag names its topic; [can] reads it from CAN frames".into(),
+        }
+    }
+
+    fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+
+    fn has_ground_truth(&self, frame: &Frame) -> bool {
+        let scans = self.scans.as_ref();
+        scans.is_some_and(|scans| frame.time_s.is_some_and(|t| scans.has(t)))
+    }
+
+    fn ground_truth(&self, frame: &Frame, kind: GtKind) -> Result<Option<DepthMap>> {
+        if kind != GtKind::Z {
+            return Err(Error::DepthKind {
+                drive: frame.drive.clone(),
+            });
+        }
+        let (Some(scans), Some(time_s)) = (&self.scans, frame.time_s) else {
+            return Ok(None);
+        };
+        scans.depth(time_s)
+    }
+
+    fn scan_truth(&self, frame: &Frame, kind: GtKind) -> Result<Option<ScanTruth>> {
+        if kind != GtKind::Z {
+            return Err(Error::DepthKind {
+                drive: frame.drive.clone(),
+            });
+        }
+        match (&self.scans, frame.time_s) {
+            (Some(scans), Some(time_s)) => scans.truth(time_s),
+            _ => Ok(None),
+        }
+    }
+
+    fn lidar_motion(&self, most: usize) -> Result<Vec<LidarMotion>> {
+        self.scans
+            .as_ref()
+            .map_or(Ok(Vec::new()), |scans| scans.motion(most))
+    }
+
+    fn dynamic_agreement(&self, most: usize) -> Result<Option<DynamicAgreement>> {
+        let scans = self.scans.as_ref();
+        let scans = scans.filter(|scans| scans.dynamic.is_some());
+        scans.map_or(Ok(None), |scans| scans.agreement(most))
+    }
+
+    fn moving_labels(&self, dataset: &Dataset) -> Result<Option<MovingLabels>> {
+        let Some(scans) = &self.scans else {
+            return Ok(None);
+        };
+        let source = match (scans.has_velocities()?, &scans.dynamic) {
+            (true, _) => MovingSource::RadialVelocity,
+            (false, Some(_)) => MovingSource::DynamicPoints,
+            (false, None) => return Ok(None),
+        };
+        let times = dataset
+            .frames()
+            .iter()
+            .filter_map(|f| Some((f.number, f.time_s?)));
+        let moving = MovingPoints {
+            scans: Arc::clone(scans),
+            times_s: times.collect(),
+        };
+        Ok(Some(MovingLabels::new(source, moving)))
+    }
+
+    fn camera_paths(&self, dataset: &Dataset) -> Result<Vec<CameraPath>> {
+        let vehicle_from_cam = self.cam_from_vehicle.inverse();
+        let mut paths = Vec::new();
+        for stretch in dataset.stretches() {
+            let known: Vec<(usize, f64, Se3)> = stretch
+                .into_iter()
+                .filter_map(|frame| {
+                    let time_s = dataset.frames()[frame].time_s?;
+                    Some((frame, time_s, self.truth.at(time_s)? * vehicle_from_cam))
+                })
+                .collect();
+            if known.len() > 1 {
+                paths.push(CameraPath {
+                    frames: known.iter().map(|k| k.0).collect(),
+                    times_s: known.iter().map(|k| k.1).collect(),
+                    world_from_cam: known.iter().map(|k| k.2).collect(),
+                });
+            }
+        }
+        match paths.is_empty() {
+            true => Err(Error::NoPath {
+                drive: dataset.name().to_owned(),
+                layout: self.kind().label(),
+            }),
+            false => Ok(paths),
+        }
+    }
+}

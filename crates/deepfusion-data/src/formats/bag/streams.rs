@@ -1,0 +1,63 @@
+//! What a bag holds, topic by topic, and what of it cannot be read.
+
+use super::index::Index;
+use super::topics::{Role, Topics};
+use crate::{Result, Stream};
+use deepfusion_rosbag::MessageSource;
+
+pub(super) fn streams(
+    bag: &dyn MessageSource,
+    topics: &Topics,
+    index: &Index,
+) -> Result<Vec<Stream>> {
+    let all = bag.topics()?;
+    let streams = all.iter().map(|topic| {
+        let role = topics.roles(&topic.name).next();
+        let (kind, times): (_, Vec<i64>) = match role {
+            Some(Role::Image) => ("image", index.images.iter().map(|p| p.stamp_ns).collect()),
+            Some(Role::Lidar) => (
+                "point_cloud",
+                index.scans.iter().map(|p| p.stamp_ns).collect(),
+            ),
+            Some(Role::Dynamic) => (
+                "point_cloud",
+                index.dynamic.iter().map(|p| p.stamp_ns).collect(),
+            ),
+            Some(Role::Imu) => ("imu", index.imu.iter().map(|s| s.0).collect()),
+            Some(Role::Speed) => ("speed", index.speed_mps.iter().map(|s| s.0).collect()),
+            Some(Role::Steering) => ("steering", index.steering_rad.iter().map(|s| s.0).collect()),
+            Some(Role::Truth) => ("pose", index.truth.iter().map(|s| s.0).collect()),
+            Some(Role::CameraInfo) => ("camera_info", Vec::new()),
+            Some(Role::Can) => ("can", Vec::new()),
+            None => ("other", Vec::new()),
+        };
+        let origin = times.first().copied().unwrap_or_default();
+        let seconds: Vec<f64> = times.iter().map(|t| (t - origin) as f64 * 1e-9).collect();
+        let mut stream = Stream::new(&topic.name, kind, topic.count as usize, &seconds);
+        stream.rate_hz = stream.rate_hz.or(topic.rate_hz());
+        stream
+    });
+    Ok(streams.collect())
+}
+
+/// What of a bag cannot be read, in sentences.
+pub(super) fn remarks_on(bag: &dyn MessageSource, index: &Index) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let damage = bag.damage();
+    remarks.extend(damage.map(|damage| format!("the bag is damaged: {damage}")));
+    if let Some(lost) = index.lost.first() {
+        remarks.push(format!(
+            "{} messages or chunks cannot be read; the first: {lost}",
+            index.lost.len()
+        ));
+    }
+    remarks.extend(index.silent.iter().cloned());
+    let unstamped = index.unstamped.iter();
+    remarks.extend(unstamped.map(|(topic, messages)| {
+        format!(
+            "{topic}: {messages} messages have no time in their header; that of their recording is taken, which is as late as the \
+             message was on its way"
+        )
+    }));
+    remarks
+}

@@ -1,0 +1,287 @@
+//! A comma2k19 segment: `processed_log` and `global_pose` as NumPy arrays without an ending, `video.hevc`.
+
+use super::files::name_of;
+use super::plain::{NO_MOUNT, PlainParts};
+use super::video::frames_of;
+use crate::camera::find_camera;
+use crate::dataset_toml::FolderConfig;
+use crate::logs::clock::{on_the_vehicles_clock, seconds};
+use crate::logs::frame_times::{TimedImage, numbers_by_time};
+use crate::logs::samples::Samples;
+use crate::logs::speed_log::SpeedLog;
+use crate::logs::vehicle_log::VehicleLog;
+use crate::{
+    Dataset, DatasetKind, DriveInspection, Error, Inspection, OpenOptions, Result, SpeedRange,
+    Stream,
+};
+use deepfusion_motion::{ImuMount, comma};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+const VIDEO: &str = "video.hevc";
+const SPEED: &str = "processed_log/CAN/speed";
+const FRAME_TIMES: &str = "global_pose/frame_times";
+
+/// Streams beside the images: folder with `t`, kind.
+const STREAMS: [(&str, &str); 5] = [
+    (SPEED, "speed"),
+    ("processed_log/CAN/wheel_speed", "speed"),
+    ("processed_log/CAN/steering_angle", "steering"),
+    ("processed_log/IMU/accelerometer", "imu"),
+    ("processed_log/IMU/gyro", "imu"),
+];
+
+/// Whether a folder is a segment.
+pub(crate) fn is_segment(folder: &Path) -> bool {
+    folder.join(SPEED).join("t").is_file() || folder.join(FRAME_TIMES).is_file()
+}
+
+/// Whether its images are there.
+pub(crate) fn has_video(folder: &Path) -> bool {
+    folder.join(VIDEO).is_file()
+}
+
+/// Opens a segment.
+pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
+    if !has_video(folder) {
+        return Err(Error::NoFrames {
+            path: folder.join(VIDEO),
+            why: "the segment's images are absent".into(),
+            remedy: "fetch video.hevc of the segment; `deepfusion data inspect` tells of its other streams".into(),
+        });
+    }
+    let config = FolderConfig::read(folder)?;
+    let video = frames_of(&folder.join(VIDEO), &config)?;
+    let calibration = find_camera(
+        folder,
+        &config,
+        options,
+        video.size(),
+        DatasetKind::Comma2k19,
+    )?;
+    let times = frame_times(folder)?;
+    let mut remarks = Vec::new();
+    if times.len() != video.count() {
+        remarks.push(format!(
+            "{FRAME_TIMES} has {} times, {VIDEO} {} frames: the first {} are taken",
+            times.len(),
+            video.count(),
+            times.len().min(video.count())
+        ));
+    }
+    let numbers = numbers_by_time(&times);
+    let images = numbers.into_iter().zip(&times).take(video.count());
+    let image = |(number, ns): (u64, &i64)| TimedImage {
+        number,
+        path: video.file().to_owned(),
+        ns: Some(*ns),
+    };
+    if config.mount.is_none() {
+        remarks.push(NO_MOUNT.into());
+    }
+    let mut streams = streams(folder)?;
+    // That of the speeds comes with the speeds.
+    streams.retain(|s| s.name != SPEED);
+    PlainParts {
+        kind: DatasetKind::Comma2k19,
+        folder: folder.to_owned(),
+        name: name_of(folder),
+        images: images.map(image).collect(),
+        image_size: video.size(),
+        video: Some(video),
+        calibration,
+        camera_ahead_s: config.camera_ahead_s(options),
+        speeds: speeds(folder, &config)?,
+        cam_from_vehicle: config.cam_from_vehicle(),
+        depth: None,
+        world_from_cam: BTreeMap::new(),
+        streams,
+        remarks,
+        speed_remedy: "fetch processed_log/CAN/speed of the segment",
+    }
+    .into_dataset()
+}
+
+/// A segment without its video.
+pub(crate) fn inspect(folder: &Path, options: &OpenOptions) -> Result<Inspection> {
+    let config = FolderConfig::read(folder)?;
+    let camera_ahead_s = config.camera_ahead_s(options);
+    let times: Vec<i64> = frame_times(folder)?
+        .into_iter()
+        .map(|ns| on_the_vehicles_clock(ns, camera_ahead_s))
+        .collect();
+    let speeds = speeds(folder, &config)?;
+    let origin = times.first().copied().unwrap_or_default();
+    let motion = speeds.as_ref().map(|log| log.motion(origin));
+    let (track, yaw_known) = match motion.transpose()? {
+        Some((track, yaw_known)) => (Some(track), yaw_known),
+        None => (None, false),
+    };
+    let at: Vec<f64> = times.iter().map(|t| seconds(*t, origin)).collect();
+    let at_frames = at.iter().filter_map(|t| track.as_ref()?.speed_at(*t));
+    let speed_mps = SpeedRange::of(at_frames);
+    let ends = at.first().zip(at.last());
+    let (mut distance_m, mut turn_rad) = (None, None);
+    for pair in at.windows(2) {
+        if let Some(motion) = track.as_ref().and_then(|t| t.motion(pair[0], pair[1])) {
+            *distance_m.get_or_insert(0.0) += motion.distance_m.abs();
+            if yaw_known {
+                *turn_rad.get_or_insert(0.0) += motion.yaw_rad;
+            }
+        }
+    }
+    let duration_s = ends.map(|(first, last)| last - first);
+    let mut streams = streams(folder)?;
+    streams.push(Stream::new(FRAME_TIMES, "pose", at.len(), &at));
+    Ok(Inspection {
+        kind: DatasetKind::Comma2k19,
+        frames: 0,
+        size: None,
+        intrinsics: None,
+        streams,
+        speed_mps,
+        distance_m,
+        duration_s,
+        drives: vec![DriveInspection {
+            name: name_of(folder),
+            camera: crate::Camera::Left.number(),
+            frames: 0,
+            missing_frames: Vec::new(),
+            usable_pairs: 0,
+            why_no_pairs: Some(format!(
+                "{VIDEO} is absent: the segment's images are not here"
+            )),
+            scans: 0,
+            speed_mps,
+            distance_m,
+            turn_rad,
+            duration_s,
+            camera_ahead_s,
+            time_offset: None,
+            remarks: Vec::new(),
+        }],
+    })
+}
+
+/// When the frames were taken, on the clock of the logs.
+fn frame_times(folder: &Path) -> Result<Vec<i64>> {
+    match folder.join(FRAME_TIMES) {
+        path if path.is_file() => nanoseconds(&path),
+        path => Err(Error::Missing {
+            path,
+            what: "the times of the frames",
+            remedy: "fetch global_pose of the segment",
+        }),
+    }
+}
+
+fn speeds(folder: &Path, config: &FolderConfig) -> Result<Option<SpeedLog>> {
+    let place = folder.join(SPEED);
+    if !place.join("t").is_file() {
+        return Ok(None);
+    }
+    let ns = nanoseconds(&place.join("t"))?;
+    let path = place.join("value");
+    let values = column(&path)?;
+    if values.len() != ns.len() {
+        return Err(array_error(
+            &path,
+            format!("{} values, but t has {}", values.len(), ns.len()),
+        ));
+    }
+    if let Some(row) = values.iter().position(|v| !v.is_finite()) {
+        return Err(array_error(
+            &path,
+            format!("row {row}: {} is no speed", values[row]),
+        ));
+    }
+    let origin = ns.first().copied().unwrap_or_default();
+    let at: Vec<f64> = ns.iter().map(|t| seconds(*t, origin)).collect();
+    let values = values.iter().map(|v| v * config.speed_scale()).collect();
+    let vehicle = vehicle(folder, config)?;
+    let remarks = match &vehicle {
+        Some(_) => Vec::new(),
+        None => vec![
+            "the segment has neither gyroscope and accelerometer nor a steering angle of a known vehicle: how the car \
+             turned is unknown"
+                .into(),
+        ],
+    };
+    Ok(Some(SpeedLog {
+        vehicle,
+        path,
+        streams: vec![Stream::new(SPEED, "speed", at.len(), &at)],
+        speeds_mps: Samples { ns, values },
+        yaw_rates_radps: None,
+        remarks,
+    }))
+}
+
+/// The segment's inertial unit, and its steering angle where `dataset.toml` says the vehicle's wheelbase.
+fn vehicle(folder: &Path, config: &FolderConfig) -> Result<Option<VehicleLog>> {
+    let sensors = comma::sensors(folder).map_err(|source| Error::Motion {
+        path: folder.to_owned(),
+        source,
+    })?;
+    let config = config.motion(ImuMount::forward_right_down());
+    let ns = |time_s: f64| (time_s * 1e9).round() as i64;
+    let imu = sensors.imu.unwrap_or_default().into_iter();
+    let imu: Vec<_> = imu.map(|sample| (ns(sample.time_s), sample)).collect();
+    let steering = sensors.steering_rad.filter(|_| config.bicycle.is_some());
+    let steering_rad = steering.map(|signal| Samples {
+        ns: signal.times_s().iter().map(|t| ns(*t)).collect(),
+        values: signal.values().to_vec(),
+    });
+    let known = !imu.is_empty() || steering_rad.is_some();
+    Ok(known.then_some(VehicleLog {
+        imu,
+        steering_rad,
+        config,
+    }))
+}
+
+fn streams(folder: &Path) -> Result<Vec<Stream>> {
+    let mut streams = Vec::new();
+    for (name, kind) in STREAMS {
+        let path = folder.join(name).join("t");
+        if path.is_file() {
+            let times = column(&path)?;
+            streams.push(Stream::new(name, kind, times.len(), &times));
+        }
+    }
+    Ok(streams)
+}
+
+/// Times of an array of seconds, which must not go back.
+fn nanoseconds(path: &Path) -> Result<Vec<i64>> {
+    let times = column(path)?;
+    let mut last = f64::NEG_INFINITY;
+    for (row, time) in times.iter().enumerate() {
+        if !time.is_finite() || time.abs() > 9e9 || *time < last {
+            let problem = format!("row {row}: {time} s after {last} s is no time");
+            return Err(array_error(path, problem));
+        }
+        last = *time;
+    }
+    Ok(times.iter().map(|t| (t * 1e9).round() as i64).collect())
+}
+
+/// An array of N or N×1 numbers.
+fn column(path: &Path) -> Result<Vec<f64>> {
+    comma::numbers(path).map_err(|error| match error {
+        deepfusion_motion::Error::File { path, source } => Error::file(&path, source),
+        deepfusion_motion::Error::Array { path, problem } => array_error(&path, problem),
+        source => Error::Motion {
+            path: path.to_owned(),
+            source,
+        },
+    })
+}
+
+fn array_error(path: &Path, problem: String) -> Error {
+    Error::Columns {
+        path: PathBuf::from(path),
+        problem,
+        remedy: "fetch the segment again: it should be a NumPy array of numbers".into(),
+    }
+}

@@ -1,0 +1,40 @@
+//! What is in a folder.
+
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// A folder's name.
+pub(crate) fn name_of(folder: &Path) -> String {
+    let name = folder.file_name().unwrap_or(folder.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// The PNG and JPEG files of a folder, hidden ones left out; none where there is no such folder.
+pub(crate) fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut images = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
+        let path = entry.map_err(|e| Error::file(folder, e))?.path();
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+        let known = ["png", "jpg", "jpeg"].contains(&extension.to_ascii_lowercase().as_str());
+        let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("");
+        if known && !name.starts_with('.') && path.is_file() {
+            images.push(path);
+        }
+    }
+    images.sort();
+    Ok(images)
+}
+
+/// The folders in a folder, in order of their names, without hidden ones.
+pub(crate) fn folders(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
+        let entry = entry.map_err(|e| Error::file(folder, e))?;
+        let hidden = entry.file_name().as_encoded_bytes().starts_with(b".");
+        if !hidden && entry.path().is_dir() {
+            found.push(entry.path());
+        }
+    }
+    found.sort();
+    Ok(found)
+}

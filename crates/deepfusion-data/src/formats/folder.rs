@@ -1,0 +1,104 @@
+//! A folder of images with tables and a calibration beside them.
+
+use super::files::{images_in, name_of};
+use super::plain::{NO_MOUNT, PlainParts};
+use crate::camera::find_camera;
+use crate::dataset_toml::FolderConfig;
+use crate::logs::frame_times::timed_images;
+use crate::logs::speed_log::SpeedLog;
+use crate::truth::depth_images::DepthImages;
+use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, image_size};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Folders in which the images are looked for; then the recording's folder itself.
+const FOLDERS: [&str; 2] = ["images", "frames"];
+const SPEED_REMEDY: &str = "training needs speed.csv (time_s,speed_mps) beside the images; evaluation and prediction do not";
+
+/// Whether a folder is one of images.
+pub(crate) fn has_images(folder: &Path) -> Result<bool> {
+    let config = FolderConfig::read(folder)?;
+    Ok(config.images.is_some() || !images_in(&images_folder(folder, &config)?)?.is_empty())
+}
+
+/// Opens a folder of images.
+pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
+    let config = FolderConfig::read(folder)?;
+    let mut remarks = Vec::new();
+    let place = images_folder(folder, &config)?;
+    let images = images_in(&place)?;
+    let Some(first) = images.first() else {
+        return Err(Error::NoFrames {
+            path: place,
+            why: "no image (.png, .jpg, .jpeg)".into(),
+            remedy: "name the folder of the images in dataset.toml: images = \"…\"".into(),
+        });
+    };
+    let size = image_size(first)?;
+    let calibration = find_camera(folder, &config, options, size, DatasetKind::Folder)?;
+    let images = timed_images(folder, images, &config, &mut remarks)?;
+    let stems = images
+        .iter()
+        .filter_map(|i| Some((i.path.file_stem()?, i.number)));
+    let depth = depth_images(folder, &config, stems.collect())?;
+    if config.mount.is_none() {
+        remarks.push(NO_MOUNT.into());
+    }
+    PlainParts {
+        kind: DatasetKind::Folder,
+        folder: folder.to_owned(),
+        name: name_of(folder),
+        images,
+        video: None,
+        calibration,
+        camera_ahead_s: config.camera_ahead_s(options),
+        image_size: size,
+        speeds: SpeedLog::read(folder, &config)?,
+        cam_from_vehicle: config.cam_from_vehicle(),
+        depth,
+        world_from_cam: BTreeMap::new(),
+        streams: Vec::new(),
+        remarks,
+        speed_remedy: SPEED_REMEDY,
+    }
+    .into_dataset()
+}
+
+fn images_folder(folder: &Path, config: &FolderConfig) -> Result<PathBuf> {
+    let found = config.find(folder, "images", config.images.as_ref(), &FOLDERS)?;
+    Ok(found
+        .filter(|p| p.is_dir())
+        .unwrap_or_else(|| folder.to_owned()))
+}
+
+/// The depth images whose names are those of frames.
+fn depth_images(
+    folder: &Path,
+    config: &FolderConfig,
+    numbers: BTreeMap<&std::ffi::OsStr, u64>,
+) -> Result<Option<DepthImages>> {
+    let Some(place) = config.find(folder, "depth", config.depth.as_ref(), &["depth"])? else {
+        return Ok(None);
+    };
+    if !place.is_dir() {
+        return Ok(None);
+    }
+    let images = images_in(&place)?.into_iter();
+    let files: BTreeMap<u64, PathBuf> = images
+        .filter_map(|path| Some((*numbers.get(path.file_stem()?)?, path)))
+        .collect();
+    if files.is_empty() {
+        return Ok(None);
+    }
+    let unit_m = config.depth_unit_m.ok_or_else(|| Error::Columns {
+        path: place.clone(),
+        problem: "nothing says the unit of the depth images".into(),
+        remedy: "set depth_unit_m in dataset.toml: 0.001 for millimetres, 0.00390625 for KITTI's 1/256 m"
+            .into(),
+    })?;
+    Ok(Some(DepthImages {
+        files,
+        unit_m,
+        invalid: config.depth_invalid,
+    }))
+}

@@ -1,0 +1,23 @@
+//! KITTI raw as it lies on disk: `<date>/<date>_drive_<n>_sync/{image_02,image_03,velodyne_points,oxts}`
+//! with the calibration files in `<date>`.
+
+mod calibration;
+mod config;
+mod layout;
+mod moving;
+mod oxts;
+mod oxts_path;
+mod recording;
+mod timestamps;
+mod tracklets;
+mod velodyne;
+
+pub use crate::truth::GtKind;
+pub use calibration::Calibration;
+pub(crate) use layout::drive_around;
+pub use layout::{Drive, find_drives};
+pub use oxts::{OxtsPacket, read_oxts};
+pub(crate) use recording::open;
+pub use timestamps::TimeStamps;
+pub use tracklets::{Tracklet, TrackletPose};
+pub use velodyne::{depth_map, velo_point};

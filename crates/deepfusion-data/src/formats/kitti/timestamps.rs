@@ -1,0 +1,144 @@
+//! `timestamps.txt`: one line a frame of the whole drive, whether or not the frame is there.
+
+use crate::logs::date_time::parse;
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// Time stamps of a sensor, by frame number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimeStamps {
+    /// Nanoseconds since 1970-01-01 00:00; a frame's number is its index. Integers, because an f64 of
+    /// seconds since 1970 resolves only a quarter of a microsecond. `None` where the line is empty:
+    /// KITTI writes that for frames the sensor missed (drive 0009's scans 177 to 180).
+    pub ns: Vec<Option<i64>>,
+    path: PathBuf,
+}
+
+impl TimeStamps {
+    /// Reads a file of lines like `2011-09-26 13:04:32.345808896`, or empty for a frame without a time.
+    /// Empty lines at its end are no frames.
+    ///
+    /// # Errors
+    /// [`Error::Missing`] if there is no such file, [`Error::TimeStamp`] with the number of a bad line.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|e| match e.kind() {
+            std::io::ErrorKind::NotFound => Error::Missing {
+                path: path.to_owned(),
+                what: "the time of every frame",
+                remedy: "fetch the drive's time stamps: ego-motion uses real time, not a nominal frame rate",
+            },
+            _ => Error::file(path, e),
+        })?;
+        let text = String::from_utf8_lossy(&bytes);
+        let mut ns = Vec::new();
+        for (i, line) in text.trim_end().lines().enumerate() {
+            if line.trim().is_empty() {
+                ns.push(None);
+                continue;
+            }
+            let time = parse(line).map_err(|problem| Error::TimeStamp {
+                path: path.to_owned(),
+                line: i + 1,
+                problem,
+            })?;
+            ns.push(Some(time));
+        }
+        Ok(Self {
+            ns,
+            path: path.to_owned(),
+        })
+    }
+
+    /// The first time there is, from which seconds are counted.
+    #[must_use]
+    pub fn origin_ns(&self) -> Option<i64> {
+        self.ns.iter().copied().flatten().next()
+    }
+
+    /// Seconds from `origin_ns` to the time of `frame`; `None` where its line is empty.
+    ///
+    /// # Errors
+    /// [`Error::NoTimeStamp`] if the file ends before that frame.
+    pub fn seconds(&self, frame: u64, origin_ns: i64) -> Result<Option<f64>> {
+        let found = usize::try_from(frame).ok().and_then(|i| self.ns.get(i));
+        let ns = found.ok_or_else(|| Error::NoTimeStamp {
+            path: self.path.clone(),
+            lines: self.ns.len(),
+            frame,
+        })?;
+        Ok(ns.map(|ns| (ns - origin_ns) as f64 * 1e-9))
+    }
+
+    /// Seconds from `origin_ns` to the time of every frame.
+    #[must_use]
+    pub fn all_seconds(&self, origin_ns: i64) -> Vec<Option<f64>> {
+        let seconds = |ns: &Option<i64>| ns.map(|ns| (ns - origin_ns) as f64 * 1e-9);
+        self.ns.iter().map(seconds).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<TimeStamps> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        TimeStamps::read(file.path())
+    }
+
+    #[test]
+    fn nanoseconds_are_kept() {
+        // `date -u -d '2011-09-26 13:04:32' +%s` gives 1317042272.
+        let times =
+            read("2011-09-26 13:04:32.345808896\n2011-09-26 13:04:32.449188864\r\n\n").unwrap();
+        assert_eq!(
+            times.ns,
+            [
+                Some(1_317_042_272_345_808_896),
+                Some(1_317_042_272_449_188_864)
+            ]
+        );
+        let dt = times
+            .seconds(1, times.origin_ns().unwrap())
+            .unwrap()
+            .unwrap();
+        assert!((dt - 0.103_379_968).abs() < 1e-15, "{dt}");
+    }
+
+    #[test]
+    fn a_bad_line_is_named_with_its_number() {
+        for bad in [
+            "soon",
+            "2011-09-26",
+            "2011-13-26 13:04:32.1",
+            "2011-09-26 13:04:32.x",
+            "2011-09-26 13:04:32.1234567890",
+            "2011-09-26 13:04",
+            "-1-2-3 1:2:3",
+        ] {
+            let text = format!("2011-09-26 13:04:32.3\n{bad}\n2011-09-26 13:04:33.3\n");
+            let error = read(&text).unwrap_err();
+            assert!(
+                matches!(error, Error::TimeStamp { line: 2, .. }),
+                "{bad}: {error}"
+            );
+            assert!(error.to_string().contains(":2:"), "{error}");
+        }
+    }
+
+    #[test]
+    fn an_empty_line_is_a_frame_without_a_time() {
+        let times = read("\n2011-09-26 13:04:32.3\n \n2011-09-26 13:04:33.3\n").unwrap();
+        let origin = times.origin_ns().unwrap();
+        let seconds: Vec<_> = (0..4).map(|n| times.seconds(n, origin).unwrap()).collect();
+        assert_eq!(seconds, [None, Some(0.0), None, Some(1.0)]);
+    }
+
+    #[test]
+    fn a_frame_beyond_the_file_is_named() {
+        let times = read("2011-09-26 13:04:32.3\n").unwrap();
+        let message = times.seconds(7, 0).unwrap_err().to_string();
+        assert!(message.contains("frame 7"), "{message}");
+    }
+}

@@ -1,0 +1,215 @@
+//! Telling layouts apart, and saying what was looked for where none fits.
+
+use super::files::folders;
+use super::kitti::{self, Drive, drive_around, find_drives};
+use super::{bag, comma, folder, rgbd, video};
+use crate::dataset_toml::FolderConfig;
+use crate::error::WITHOUT_ROS2;
+use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
+use deepfusion_rosbag::MessageSource;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+impl Dataset {
+    /// Opens a recording of any known layout, told by what is there: a KITTI raw drive, date or root (one
+    /// data set for each drive and camera, in order of names), a folder of images, a video file, a
+    /// comma2k19 segment, a folder of RGB-D frames. Drives without images of the camera, or without a
+    /// selected frame, are left out.
+    ///
+    /// The sizes of all images are checked against the calibration. Times and speeds may be absent
+    /// (evaluation needs neither); where they are there, they must be readable.
+    ///
+    /// # Errors
+    /// [`Error::UnknownLayout`] where no layout fits, [`Error::NoSuchPath`], [`Error::Missing`]
+    /// (calibration), [`Error::NoImages`], [`Error::OneCamera`], [`Error::FrameSize`], [`Error::Image`],
+    /// [`Error::SplitSelectsNothing`], and what the layout's files can have wrong:
+    /// [`Error::Calibration`], [`Error::TimeStamp`], [`Error::NoTimeStamp`], [`Error::Oxts`],
+    /// [`Error::Table`], [`Error::Config`], [`Error::Clocks`], [`Error::Program`].
+    pub fn open(path: &Path, options: &OpenOptions) -> Result<Vec<Self>> {
+        Layout::of(path)?.open(path, options)
+    }
+
+    /// The layout in which [`Self::open`] reads what is at a path, told without opening it.
+    ///
+    /// # Errors
+    /// [`Error::UnknownLayout`], [`Error::NoSuchPath`], [`Error::Config`].
+    pub fn kind_at(path: &Path) -> Result<DatasetKind> {
+        Ok(Layout::of(path)?.kind())
+    }
+
+    /// A recording of messages, such as an open bag of another format, as [`Self::open`] opens a bag: topics are found
+    /// by type, and the file beside [`MessageSource::path`] says what they do not.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn from_messages(source: Arc<dyn MessageSource>, options: &OpenOptions) -> Result<Self> {
+        let path = source.path().to_owned();
+        bag::open_bag(source, options)?.select(&path, options)
+    }
+}
+
+/// What lies at a path.
+#[derive(Debug)]
+pub(crate) enum Layout {
+    Kitti(Vec<Drive>),
+    Comma(PathBuf),
+    RgbD(Vec<PathBuf>),
+    Bags(Vec<PathBuf>),
+    Folder(PathBuf),
+    Video(PathBuf),
+}
+
+impl Layout {
+    /// The first layout that fits.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchPath`], [`Error::UnknownLayout`].
+    pub(crate) fn of(path: &Path) -> Result<Self> {
+        let drives = find_drives(path)?;
+        if !drives.is_empty() {
+            return Ok(Self::Kitti(drives));
+        }
+        // `.` and links have names too once they are resolved.
+        let real = path.canonicalize().map_err(|e| Error::file(path, e))?;
+        let unknown = |found| Error::UnknownLayout {
+            path: path.to_owned(),
+            found,
+        };
+        let given = named(path, &real);
+        // By either name: a link may have no ending, or lead to a store whose files have none.
+        if bag::is_bag(&given) || bag::is_bag(&real) {
+            return Ok(Self::Bags(vec![given]));
+        }
+        if !real.is_dir() {
+            return if video::is_video(&real) {
+                Ok(Self::Video(real))
+            } else {
+                Err(unknown(describe_file(&real)))
+            };
+        }
+        if let Some(drive) = drive_around(&real) {
+            let drive = drive.display();
+            return Err(unknown(format!("it lies within the drive {drive}")));
+        }
+        if comma::is_segment(&real) {
+            return Ok(Self::Comma(real));
+        }
+        let bags = bag::bags_in(&real)?;
+        if !bags.is_empty() {
+            return Ok(Self::Bags(bags));
+        }
+        let rgbd = rgbd::find(&real)?;
+        if !rgbd.is_empty() {
+            return Ok(Self::RgbD(rgbd));
+        }
+        let (images, video) = (folder::has_images(&real)?, video::in_folder(&real)?);
+        match (images, video) {
+            (true, Some(video)) if !video.named => Err(Error::Config {
+                path: real.join(FolderConfig::NAME),
+                problem: format!(
+                    "there are images and a video ({}): name one, images = \"…\" or video = \"…\"",
+                    video.file.display()
+                ),
+            }),
+            (_, Some(_)) => Ok(Self::Video(real)),
+            (true, None) => Ok(Self::Folder(real)),
+            (false, None) => Err(unknown(describe_folder(&real)?)),
+        }
+    }
+
+    /// Its name.
+    pub(crate) fn kind(&self) -> DatasetKind {
+        match self {
+            Self::Kitti(_) => DatasetKind::KittiRaw,
+            Self::Comma(_) => DatasetKind::Comma2k19,
+            Self::RgbD(_) => DatasetKind::RgbD,
+            Self::Bags(_) => DatasetKind::Bag,
+            Self::Folder(_) => DatasetKind::Folder,
+            Self::Video(_) => DatasetKind::Video,
+        }
+    }
+
+    /// Opens what was found.
+    pub(crate) fn open(&self, path: &Path, options: &OpenOptions) -> Result<Vec<Dataset>> {
+        let one = |dataset: Result<Dataset>| Ok(vec![dataset?.select(path, options)?]);
+        match self {
+            Self::Kitti(drives) => kitti::open(path, drives, options),
+            Self::Comma(folder) => one(comma::open(folder, options)),
+            Self::RgbD(folders) => rgbd::open(path, folders, options),
+            Self::Bags(bags) => bag::open(path, bags, options),
+            Self::Folder(folder) => one(folder::open(folder, options)),
+            Self::Video(place) => one(video::open(place, options)),
+        }
+    }
+}
+
+/// The path as it was given, links and all, since a bag's file lies beside the link; what it resolves to where the given
+/// path ends without a name (`..`).
+fn named(path: &Path, real: &Path) -> PathBuf {
+    let given = std::path::absolute(path).ok();
+    given
+        .filter(|given| given.file_name().is_some())
+        .unwrap_or_else(|| real.to_owned())
+}
+
+fn describe_file(path: &Path) -> String {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    match extension.to_ascii_lowercase().as_str() {
+        "mcap" | "db3" => format!("it is a ROS 2 bag{WITHOUT_ROS2}"),
+        "png" | "jpg" | "jpeg" => "it is a single image".into(),
+        "mp4" | "mkv" | "avi" | "mov" | "hevc" => "it is a video".into(),
+        "zip" | "tar" | "gz" | "tgz" => "it is an archive that is still packed".into(),
+        _ => "it is a file".into(),
+    }
+}
+
+/// What a folder without drives looks like.
+fn describe_folder(folder: &Path) -> Result<String> {
+    let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
+    let (mut files, mut first) = (0_usize, None);
+    let inner = folders(folder)?;
+    for place in std::iter::once(folder.to_owned()).chain(inner.iter().cloned()) {
+        for entry in std::fs::read_dir(&place).map_err(|e| Error::file(&place, e))? {
+            let path = entry.map_err(|e| Error::file(&place, e))?.path();
+            if path.is_dir() {
+                continue;
+            }
+            files += 1;
+            first.get_or_insert(path.clone());
+            let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+            let kind = match extension.to_ascii_lowercase().as_str() {
+                "png" | "jpg" | "jpeg" => "images",
+                "mcap" | "db3" => "ROS 2 bags",
+                "bag" => "ROS bags",
+                "mp4" | "mkv" | "avi" | "mov" | "hevc" => "videos",
+                "zip" | "tar" | "gz" | "tgz" => "packed archives",
+                "bin" => ".bin files",
+                _ => continue,
+            };
+            *kinds.entry(kind).or_default() += 1;
+        }
+    }
+    if files == 0 && inner.is_empty() {
+        return Ok("it is empty".into());
+    }
+    if !kinds.is_empty() {
+        let list: Vec<String> = kinds.iter().map(|(k, n)| format!("{n} {k}")).collect();
+        let without = if kinds.contains_key("ROS 2 bags") {
+            WITHOUT_ROS2
+        } else {
+            ""
+        };
+        return Ok(format!(
+            "it holds {} and nothing that says how to read them{without}",
+            list.join(", ")
+        ));
+    }
+    let shown = first.or_else(|| inner.first().cloned()).unwrap_or_default();
+    let shown = shown.strip_prefix(folder).unwrap_or(&shown).to_owned();
+    Ok(format!(
+        "it holds {files} files and {} folders (such as {})",
+        inner.len(),
+        shown.display()
+    ))
+}

@@ -1,0 +1,312 @@
+//! What folders, videos, comma2k19 segments and RGB-D folders have in common: frames, tables beside
+//! them, depth images.
+
+use crate::logs::clock::{on_the_vehicles_clock, seconds};
+use crate::logs::frame_times::TimedImage;
+use crate::logs::speed_log::SpeedLog;
+use crate::truth::depth_images::DepthImages;
+use crate::{
+    CalibrationPlace, Camera, CameraCalibration, CameraPath, Dataset, DatasetKind, DatasetParts,
+    Error, Frame, FrameImage, GtKind, Lens, Recording, Result, Stream, load_rgb,
+};
+use deepfusion_geometry::{DepthMap, Se3};
+use deepfusion_video::VideoFrames;
+use image::RgbImage;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What is said where nothing tells where the camera is.
+pub(crate) const NO_MOUNT: &str = "the camera's place on the vehicle is not given ([mount] in dataset.toml): it is taken to look straight \
+     ahead and to move as the vehicle does";
+
+/// A recording of one camera, put together from what a layout found.
+#[derive(Debug)]
+pub(crate) struct PlainRecording {
+    kind: DatasetKind,
+    name: String,
+    folder: PathBuf,
+    calibration: CameraCalibration,
+    lens: Lens,
+    video: Option<VideoFrames>,
+    depth: Option<DepthImages>,
+    world_from_cam: BTreeMap<u64, Se3>,
+    streams: Vec<Stream>,
+    remarks: Vec<String>,
+    /// Why there is no ego-motion, where there is none.
+    no_motion: (String, String),
+}
+
+/// What a layout found, before it is a [`Dataset`].
+pub(crate) struct PlainParts {
+    pub(crate) kind: DatasetKind,
+    pub(crate) folder: PathBuf,
+    pub(crate) name: String,
+    pub(crate) images: Vec<TimedImage>,
+    pub(crate) video: Option<VideoFrames>,
+    pub(crate) calibration: CameraCalibration,
+    /// How far the camera's clock is ahead of that of the speeds, in seconds.
+    pub(crate) camera_ahead_s: f64,
+    /// Of the first image.
+    pub(crate) image_size: (u32, u32),
+    pub(crate) speeds: Option<SpeedLog>,
+    pub(crate) cam_from_vehicle: Se3,
+    pub(crate) depth: Option<DepthImages>,
+    pub(crate) world_from_cam: BTreeMap<u64, Se3>,
+    /// Beside those of the images, the speeds and the depth images.
+    pub(crate) streams: Vec<Stream>,
+    pub(crate) remarks: Vec<String>,
+    /// What to do about missing speeds.
+    pub(crate) speed_remedy: &'static str,
+}
+
+impl PlainParts {
+    /// The recording as a data set of all its frames.
+    ///
+    /// # Errors
+    /// [`Error::Clocks`] where frames and speeds have no time in common, [`Error::CameraFile`],
+    /// [`Error::FrameSize`], [`Error::Image`], [`Error::Motion`].
+    pub(crate) fn into_dataset(mut self) -> Result<Dataset> {
+        for ns in self.images.iter_mut().filter_map(|i| i.ns.as_mut()) {
+            *ns = on_the_vehicles_clock(*ns, self.camera_ahead_s);
+        }
+        let origin_ns = self.images.iter().find_map(|i| i.ns);
+        let motion = match (&self.speeds, origin_ns) {
+            (Some(log), Some(origin)) => Some(log.motion(origin)?),
+            _ => None,
+        };
+        let yaw_known = motion.as_ref().is_some_and(|(_, known)| *known);
+        let track = motion.map(|(track, _)| track);
+        let no_motion = match (&self.speeds, origin_ns) {
+            (None, _) => ("it has no speeds".to_owned(), self.speed_remedy.to_owned()),
+            _ => (
+                "nothing says when its frames were taken".to_owned(),
+                "add frames.csv, timestamps.txt or fps in dataset.toml".to_owned(),
+            ),
+        };
+        self.check_size()?;
+        let lens = self.calibration.lens()?;
+        let mut frames = Vec::with_capacity(self.images.len());
+        for (i, image) in self.images.iter().enumerate() {
+            let time_s = image.ns.zip(origin_ns).map(|(ns, o)| seconds(ns, o));
+            frames.push(Frame {
+                drive: self.name.clone(),
+                number: image.number,
+                time_s,
+                image: match &self.video {
+                    Some(video) => FrameImage::Within {
+                        file: video.file().to_owned(),
+                        index: i as u64,
+                    },
+                    None => FrameImage::File(image.path.clone()),
+                },
+                speed_mps: time_s.and_then(|t| track.as_ref()?.speed_at(t)),
+            });
+        }
+        self.check_clocks(&frames)?;
+        self.describe_camera(&lens);
+        let times: Vec<f64> = frames.iter().filter_map(|f| f.time_s).collect();
+        let mut streams = vec![Stream::new("frames", "image", frames.len(), &times)];
+        if let Some(log) = &self.speeds {
+            streams.extend(log.streams.iter().cloned());
+            self.remarks.extend(log.remarks.iter().cloned());
+        }
+        if let Some(depth) = &self.depth {
+            streams.push(Stream::new("depth", "depth", depth.files.len(), &[]));
+        }
+        if !self.world_from_cam.is_empty() {
+            streams.push(Stream::new("pose", "pose", self.world_from_cam.len(), &[]));
+        }
+        streams.append(&mut self.streams);
+        let parts = DatasetParts {
+            name: self.name.clone(),
+            split_name: self.name.clone(),
+            camera: Camera::Left,
+            frames,
+            intrinsics: lens.intrinsics(),
+            cam_from_vehicle: Some(self.cam_from_vehicle),
+            track,
+            yaw_known,
+            origin_ns,
+            camera_ahead_s: self.camera_ahead_s,
+            scenario: None,
+        };
+        let dataset = Dataset::new(
+            parts,
+            Arc::new(PlainRecording {
+                kind: self.kind,
+                name: self.name,
+                folder: self.folder,
+                calibration: self.calibration,
+                lens,
+                video: self.video,
+                depth: self.depth,
+                world_from_cam: self.world_from_cam,
+                streams,
+                remarks: self.remarks,
+                no_motion,
+            }),
+        );
+        dataset.check_sizes()?;
+        Ok(dataset)
+    }
+
+    /// The correction is as large as the calibration says: the images must say so too.
+    fn check_size(&self) -> Result<()> {
+        let k = &self.calibration.intrinsics;
+        if self.image_size == (k.width, k.height) {
+            return Ok(());
+        }
+        let first = self.images.first();
+        let place = self.calibration.place();
+        Err(Error::FrameSize {
+            image: first.map_or_else(String::new, |i| i.path.display().to_string()),
+            drive: self.name.clone(),
+            frame: first.map_or(0, |i| i.number),
+            found: self.image_size,
+            expected: (k.width, k.height),
+            field: place.field,
+            calibration: place.file,
+        })
+    }
+
+    /// Frames without a speed are told; if none has one, the clocks differ.
+    fn check_clocks(&mut self, frames: &[Frame]) -> Result<()> {
+        let Some(log) = &self.speeds else {
+            return Ok(());
+        };
+        let timed = frames.iter().filter(|f| f.time_s.is_some()).count();
+        let known = frames.iter().filter(|f| f.speed_mps.is_some()).count();
+        let ns: Vec<i64> = self.images.iter().filter_map(|i| i.ns).collect();
+        if let (Some(f0), Some(f1), Some(s0), Some(s1)) = (
+            ns.iter().min(),
+            ns.iter().max(),
+            log.speeds_mps.ns.first(),
+            log.speeds_mps.ns.last(),
+        ) && (s1 < f0 || f1 < s0)
+        {
+            let s = |ns: &i64| seconds(*ns, 0);
+            return Err(Error::Clocks {
+                path: log.path.clone(),
+                times_s: (s(s0), s(s1)),
+                frames_s: (s(f0), s(f1)),
+            });
+        }
+        if known < timed {
+            self.remarks.push(format!(
+                "{} of {timed} frames have no speed measured about their time",
+                timed - known
+            ));
+        }
+        Ok(())
+    }
+
+    fn describe_camera(&mut self, lens: &Lens) {
+        let file = self.calibration.path.display().to_string();
+        let name = self.calibration.path.file_name();
+        let file = name.map_or(file, |n| n.to_string_lossy().into_owned());
+        if !self.calibration.size_in_file {
+            let k = &self.calibration.intrinsics;
+            self.remarks.push(format!(
+                "{file} does not say for which size its camera is: taken for the images' {}x{}",
+                k.width, k.height
+            ));
+        }
+        if lens.distorts() {
+            self.remarks.push(
+                "the lens' distortion is taken out of the images; fx, fy, cx, cy are those of the result".into(),
+            );
+        }
+    }
+}
+
+impl Recording for PlainRecording {
+    fn kind(&self) -> DatasetKind {
+        self.kind
+    }
+
+    fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
+        let image = match (&self.video, &frame.image) {
+            (Some(video), FrameImage::Within { index, .. }) => load_rgb(&video.frame(*index)?)?,
+            _ => load_rgb(frame.image.path())?,
+        };
+        let k = self.lens.intrinsics();
+        // One of another size is told by the data set, which knows the frame.
+        if image.dimensions() == (k.width, k.height) {
+            self.lens.correct(image)
+        } else {
+            Ok(image)
+        }
+    }
+
+    fn calibration(&self) -> CalibrationPlace {
+        self.calibration.place()
+    }
+
+    fn streams(&self) -> Result<Vec<Stream>> {
+        Ok(self.streams.clone())
+    }
+
+    fn no_motion(&self) -> Error {
+        let (why, remedy) = self.no_motion.clone();
+        Error::NoTrack {
+            drive: self.name.clone(),
+            why,
+            remedy,
+        }
+    }
+
+    fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+
+    fn has_ground_truth(&self, frame: &Frame) -> bool {
+        let depth = self.depth.as_ref();
+        depth.is_some_and(|d| d.files.contains_key(&frame.number))
+    }
+
+    fn ground_truth(&self, frame: &Frame, kind: GtKind) -> Result<Option<DepthMap>> {
+        let Some(depth) = &self.depth else {
+            return Ok(None);
+        };
+        let Some(path) = depth.files.get(&frame.number) else {
+            return Ok(None);
+        };
+        if kind != GtKind::Z {
+            return Err(Error::DepthKind {
+                drive: self.name.clone(),
+            });
+        }
+        Ok(Some(self.lens.correct_depth(depth.read(path)?)?))
+    }
+
+    fn camera_paths(&self, dataset: &Dataset) -> Result<Vec<CameraPath>> {
+        if self.world_from_cam.is_empty() {
+            return Err(Error::NoPath {
+                drive: self.name.clone(),
+                layout: self.kind.label(),
+            });
+        }
+        let pose = |frame: &usize| {
+            let frame = dataset.frames().get(*frame)?;
+            self.world_from_cam.get(&frame.number).copied()
+        };
+        let mut paths = Vec::new();
+        for stretch in dataset.stretches() {
+            let has_pose = |a: &usize, b: &usize| pose(a).is_some() && pose(b).is_some();
+            for piece in stretch.chunk_by(has_pose).filter(|p| p.len() > 1) {
+                let times = piece.iter().map(|f| dataset.frames()[*f].time_s);
+                paths.push(CameraPath {
+                    frames: piece.to_vec(),
+                    times_s: times.collect::<Option<Vec<_>>>().unwrap_or_default(),
+                    world_from_cam: piece.iter().filter_map(pose).collect(),
+                });
+            }
+        }
+        Ok(paths)
+    }
+}

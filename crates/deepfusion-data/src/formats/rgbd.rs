@@ -1,0 +1,152 @@
+//! Folders of colour, depth and pose files, one of each a frame, as the 7-Scenes data set has them.
+
+use super::files::{folders, images_in, name_of};
+use super::plain::PlainParts;
+use crate::camera::find_camera;
+use crate::dataset_toml::FolderConfig;
+use crate::logs::frame_times::TimedImage;
+use crate::truth::depth_images::DepthImages;
+use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, image_size};
+use deepfusion_geometry::Se3;
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Millimetres, and the value of pixels without depth.
+const UNIT_M: f64 = 0.001;
+const INVALID: u16 = 65_535;
+
+/// The sequences at a path: the folder itself, or the folders in it.
+pub(crate) fn find(folder: &Path) -> Result<Vec<PathBuf>> {
+    if !colour_images(folder)?.is_empty() {
+        return Ok(vec![folder.to_owned()]);
+    }
+    let mut found = Vec::new();
+    for inner in folders(folder)? {
+        if !colour_images(&inner)?.is_empty() {
+            found.push(inner);
+        }
+    }
+    Ok(found)
+}
+
+/// Opens sequences found at `path`, a data set each; those without a selected frame are left out.
+pub(crate) fn open(
+    path: &Path,
+    sequences: &[PathBuf],
+    options: &OpenOptions,
+) -> Result<Vec<Dataset>> {
+    let mut datasets = Vec::new();
+    let mut refused = None;
+    for folder in sequences {
+        match open_sequence(folder, options)?.select(path, options) {
+            Ok(dataset) => datasets.push(dataset),
+            Err(error @ Error::SplitSelectsNothing { .. }) => refused = Some(error),
+            Err(other) => return Err(other),
+        }
+    }
+    match refused {
+        Some(error) if datasets.is_empty() => Err(error),
+        _ => Ok(datasets),
+    }
+}
+
+fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
+    let config = FolderConfig::read(folder)?;
+    let colour = colour_images(folder)?;
+    let Some((_, first)) = colour.first_key_value() else {
+        return Err(Error::NoFrames {
+            path: folder.to_owned(),
+            why: "no frame-<number>.color.png or .jpg".into(),
+            remedy: "fetch the sequence's images".into(),
+        });
+    };
+    let size = image_size(first)?;
+    let calibration = find_camera(folder, &config, options, size, DatasetKind::RgbD)?;
+    let (mut depth, mut world_from_cam) = (BTreeMap::new(), BTreeMap::new());
+    for &number in colour.keys() {
+        let part = |ending: &str| folder.join(format!("frame-{number:06}.{ending}"));
+        let image = part("depth.png");
+        if image.is_file() {
+            depth.insert(number, image);
+        }
+        let pose = part("pose.txt");
+        if pose.is_file()
+            && let Some(pose) = read_pose(&pose)?
+        {
+            world_from_cam.insert(number, pose);
+        }
+    }
+    let interval = config.fps.map(|fps| 1e9 / fps);
+    let image = |(number, path): (u64, PathBuf)| TimedImage {
+        number,
+        path,
+        ns: interval.map(|ns| (number as f64 * ns).round() as i64),
+    };
+    PlainParts {
+        kind: DatasetKind::RgbD,
+        folder: folder.to_owned(),
+        name: name_of(folder),
+        images: colour.into_iter().map(image).collect(),
+        video: None,
+        calibration,
+        camera_ahead_s: config.camera_ahead_s(options),
+        image_size: size,
+        speeds: None,
+        cam_from_vehicle: config.cam_from_vehicle(),
+        depth: Some(DepthImages {
+            files: depth,
+            unit_m: config.depth_unit_m.unwrap_or(UNIT_M),
+            invalid: Some(config.depth_invalid.unwrap_or(INVALID)),
+        }),
+        world_from_cam,
+        streams: Vec::new(),
+        remarks: Vec::new(),
+        speed_remedy: "an RGB-D camera is carried by hand: evaluate and predict on it, train on a vehicle's recording",
+    }
+    .into_dataset()
+}
+
+/// `frame-<number>.color.png` and `.jpg`, by number.
+fn colour_images(folder: &Path) -> Result<BTreeMap<u64, PathBuf>> {
+    let number = |path: &Path| -> Option<u64> {
+        let name = path.file_name()?.to_str()?.strip_prefix("frame-")?;
+        let (number, ending) = name.split_once('.')?;
+        let digits = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
+        (digits && ending.starts_with("color.")).then(|| number.parse().ok())?
+    };
+    let images = images_in(folder)?.into_iter();
+    Ok(images
+        .filter_map(|path| Some((number(&path)?, path)))
+        .collect())
+}
+
+/// A pose file: `world_from_cam` as four rows of four numbers, in metres; `None` where the tracker had lost
+/// the camera, which 7-Scenes writes as numbers that are not finite.
+fn read_pose(path: &Path) -> Result<Option<Se3>> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
+    let bad = |problem: &str| Error::Columns {
+        path: path.to_owned(),
+        problem: problem.to_owned(),
+        remedy:
+            "a pose is world_from_cam in four rows of four numbers: repair it, or delete the file"
+                .into(),
+    };
+    let numbers: Option<Vec<f64>> = text.split_whitespace().map(|w| w.parse().ok()).collect();
+    let numbers = numbers.ok_or_else(|| bad("a word is no number"))?;
+    if numbers.len() != 16 {
+        return Err(bad(&format!("{} numbers, expected 16", numbers.len())));
+    }
+    if numbers.iter().any(|n| !n.is_finite()) {
+        return Ok(None);
+    }
+    let at = |row: usize, column: usize| numbers[4 * row + column];
+    let rotation = Matrix3::from_fn(at);
+    if (rotation.transpose() * rotation - Matrix3::identity()).norm() > 1e-2
+        || rotation.determinant() < 0.0
+    {
+        return Err(bad("its rotation is none"));
+    }
+    let place = Vector3::new(at(0, 3), at(1, 3), at(2, 3));
+    Ok(Some(Se3::from_parts(&rotation, place)))
+}

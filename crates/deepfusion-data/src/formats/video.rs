@@ -1,0 +1,208 @@
+//! A video file with tables and a calibration beside it.
+
+use super::plain::{NO_MOUNT, PlainParts};
+use crate::camera::find_camera;
+use crate::dataset_toml::FolderConfig;
+use crate::logs::clock::{TimeUnit, seconds};
+use crate::logs::frame_times::{TimedImage, from_start, numbers_by_time};
+use crate::logs::speed_log::SpeedLog;
+use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
+use deepfusion_video::VideoFrames;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Endings of the files that are taken for videos.
+const ENDINGS: [&str; 7] = ["mp4", "mkv", "mov", "avi", "hevc", "m4v", "webm"];
+const SPEED_REMEDY: &str = "training needs speed.csv (time_s,speed_mps) or a GPS track (.gpx, .nmea) beside the video; evaluation and prediction do not";
+
+/// Whether a file is named like a video.
+pub(crate) fn is_video(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    ENDINGS.contains(&extension.to_ascii_lowercase().as_str())
+}
+
+/// The video of a folder.
+#[derive(Debug)]
+pub(crate) struct InFolder {
+    pub(crate) file: PathBuf,
+    /// Whether `dataset.toml` names it.
+    pub(crate) named: bool,
+}
+
+/// The video of a folder: that which `dataset.toml` names, or the only one.
+///
+/// # Errors
+/// [`Error::Config`] where a named one is not there or there are several.
+pub(crate) fn in_folder(folder: &Path) -> Result<Option<InFolder>> {
+    let config = FolderConfig::read(folder)?;
+    if config.images.is_some() {
+        return Ok(None);
+    }
+    if let Some(named) = config.find(folder, "video", config.video.as_ref(), &[])? {
+        return Ok(Some(InFolder {
+            file: named,
+            named: true,
+        }));
+    }
+    let mut videos = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
+        let path = entry.map_err(|e| Error::file(folder, e))?.path();
+        if path.is_file() && is_video(&path) {
+            videos.push(path);
+        }
+    }
+    match videos.len() {
+        0 => Ok(None),
+        1 => Ok(videos.pop().map(|file| InFolder { file, named: false })),
+        n => Err(config.error(format!(
+            "{n} videos are there: name one, video = \"…\", or give its path"
+        ))),
+    }
+}
+
+/// Opens a video file, or the video of a folder.
+pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
+    let file = if place.is_dir() {
+        in_folder(place)?.map_or_else(|| place.to_owned(), |found| found.file)
+    } else {
+        place.to_owned()
+    };
+    let folder = file.parent().unwrap_or(Path::new(".")).to_owned();
+    let config = FolderConfig::read(&folder)?;
+    let video = frames_of(&file, &config)?;
+    let calibration = find_camera(&folder, &config, options, video.size(), DatasetKind::Video)?;
+    let mut remarks = Vec::new();
+    let times = match (video.times_ns(), config.fps) {
+        (_, Some(fps)) => {
+            let ns = |i: usize| Some((i as f64 / fps * 1e9).round() as i64);
+            (0..video.count()).map(ns).collect()
+        }
+        (Some(times), None) => times.iter().copied().map(Some).collect(),
+        (None, None) => {
+            remarks.push("the video has no time stamps: set fps in dataset.toml".into());
+            vec![None; video.count()]
+        }
+    };
+    let speeds = SpeedLog::read(&folder, &config)?;
+    let start_s = config.start_s.or_else(|| {
+        let (created, log) = (video.created_ns()?, speeds.as_ref()?);
+        let ns = &log.speeds_mps.ns;
+        let start = begun(created, &times, (*ns.first()?, *ns.last()?))?;
+        remarks.push(format!(
+            "the video is taken to begin at {}, as its recorder says (start_s = {:.3} in dataset.toml; another moves it)",
+            jiff::Timestamp::from_nanosecond(start.into()).map_or_else(|_| "?".into(), |t| t.to_string()),
+            seconds(start, 0)
+        ));
+        Some(seconds(start, 0))
+    });
+    let times = from_start(times, start_s);
+    let known: Option<Vec<i64>> = times.iter().copied().collect();
+    let numbers = match known {
+        Some(known) => numbers_by_time(&known),
+        None => (0..video.count() as u64).collect(),
+    };
+    if start_s.is_none() {
+        remarks.push(
+            "the video's time stamps are taken to be on the tables' clock (start_s in dataset.toml moves them)"
+                .into(),
+        );
+    }
+    if config.mount.is_none() {
+        remarks.push(NO_MOUNT.into());
+    }
+    let image = |(number, ns): (u64, Option<i64>)| TimedImage {
+        number,
+        path: file.clone(),
+        ns,
+    };
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    PlainParts {
+        kind: DatasetKind::Video,
+        name: stem.into_owned(),
+        images: numbers.into_iter().zip(times).map(image).collect(),
+        calibration,
+        camera_ahead_s: config.camera_ahead_s(options),
+        image_size: video.size(),
+        speeds,
+        cam_from_vehicle: config.cam_from_vehicle(),
+        depth: None,
+        world_from_cam: BTreeMap::new(),
+        streams: Vec::new(),
+        remarks,
+        speed_remedy: SPEED_REMEDY,
+        video: Some(video),
+        folder,
+    }
+    .into_dataset()
+}
+
+/// When a video of dates' speeds began, whose own times count from 0: recorders say when it was made, and mean its first frame or
+/// its last; that is taken of which more lies within the log. `None` where the video's times are dates themselves, or the log's are
+/// none.
+fn begun(created_ns: i64, times: &[Option<i64>], log: (i64, i64)) -> Option<i64> {
+    let (first, last) = ((*times.first()?)?, (*times.last()?)?);
+    let is_date = |ns: i64| TimeUnit::of_date(ns as f64).is_some();
+    if is_date(first) || !is_date(log.0) {
+        return None;
+    }
+    let length = last.saturating_sub(first);
+    let within = |start: i64| {
+        let end = start.saturating_add(length).min(log.1);
+        end.saturating_sub(start.max(log.0)).max(0)
+    };
+    let from_end = created_ns.saturating_sub(length);
+    Some(if within(from_end) > within(created_ns) {
+        from_end
+    } else {
+        created_ns
+    })
+}
+
+/// The frames of a video, kept beside it or where `dataset.toml` says.
+///
+/// # Errors
+/// [`Error::Program`].
+pub(crate) fn frames_of(file: &Path, config: &FolderConfig) -> Result<VideoFrames> {
+    let folder = file.parent().unwrap_or(Path::new("."));
+    let cache = config.cache.as_ref();
+    let cache = cache.map_or(folder.to_owned(), |c| folder.join(c));
+    Ok(VideoFrames::open(file, &cache)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A minute of video, made at the moment that both kinds of recorders write.
+    #[test]
+    fn a_video_begins_where_its_log_has_speeds() {
+        const S: i64 = 1_000_000_000;
+        let day = 1_700_000_000 * S;
+        let times = [Some(0), Some(30 * S), Some(60 * S)];
+        let log = (day, day + 60 * S);
+        assert_eq!(
+            begun(day, &times, log),
+            Some(day),
+            "it was made when it began"
+        );
+        assert_eq!(
+            begun(day + 60 * S, &times, log),
+            Some(day),
+            "or when it ended"
+        );
+        let longer = (day - 600 * S, day + 600 * S);
+        assert_eq!(
+            begun(day, &times, longer),
+            Some(day),
+            "either fits: the first frame"
+        );
+        assert_eq!(
+            begun(day, &times, (0, 60 * S)),
+            None,
+            "the log counts from 0, too"
+        );
+        let dates = times.map(|t| t.map(|t| t + day));
+        assert_eq!(begun(day, &dates, log), None, "the video's times are dates");
+        assert_eq!(begun(day, &[None], log), None);
+    }
+}

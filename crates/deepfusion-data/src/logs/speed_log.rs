@@ -1,0 +1,235 @@
+//! `speed.csv`, and the turns from it or from `imu.csv`: a yaw rate, or a whole inertial unit.
+
+use super::clock::seconds;
+use super::gps_log::{self, GpsLog};
+use super::samples::Samples;
+use super::table::{Column, Table};
+use super::times::times;
+use super::vehicle_log::{VehicleLog, imu_readings};
+use crate::dataset_toml::FolderConfig;
+use crate::{Error, MotionModel, Result, Stream, VehicleTrack};
+use deepfusion_motion::ImuMount;
+use std::path::{Path, PathBuf};
+
+const SPEEDS: [&str; 4] = ["speed", "velocity", "vehicle_speed", "v"];
+const YAW_RATES: [&str; 6] = [
+    "yaw_rate",
+    "yawrate",
+    "gyro_z",
+    "wz",
+    "omega_z",
+    "angular_velocity_z",
+];
+
+/// A recording's speeds.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SpeedLog {
+    pub(crate) path: PathBuf,
+    pub(crate) speeds_mps: Samples,
+    pub(crate) yaw_rates_radps: Option<Samples>,
+    /// An inertial unit, where all six of its columns are there: then the motion comes from its fusion with the speed.
+    pub(crate) vehicle: Option<VehicleLog>,
+    /// What was found, for the inspection.
+    pub(crate) streams: Vec<Stream>,
+    pub(crate) remarks: Vec<String>,
+}
+
+impl SpeedLog {
+    /// Reads the tables that `dataset.toml` names, or `speed.csv` and `imu.csv`, or a receiver's track in place of the first;
+    /// `None` without speeds.
+    ///
+    /// # Errors
+    /// [`crate::Error::Config`] where a named table is absent, [`crate::Error::Log`] for a track that cannot be read, [`crate::Error::Columns`] where a column is
+    /// missing or its unit is not said, [`crate::Error::Table`] for a bad value or a time that goes back.
+    pub(crate) fn read(folder: &Path, config: &FolderConfig) -> Result<Option<Self>> {
+        let speed = config.find(folder, "speed", config.speed.as_ref(), &["speed.csv"])?;
+        let imu = config.find(folder, "imu", config.imu.as_ref(), &["imu.csv"])?;
+        let speed = match speed {
+            None => gps_log::in_folder(folder, config)?,
+            named => named,
+        };
+        let Some(path) = speed else {
+            return Ok(None);
+        };
+        let mut remarks = Vec::new();
+        let (measured, table) = if gps_log::is_gps(&path) {
+            (of_track(&path, config, &mut remarks)?, None)
+        } else {
+            let table = Table::read(&path)?;
+            let ns = times(&table, config, &mut remarks, &name(&path))?;
+            let column = table.require(&SPEEDS, "time_s,speed_mps")?;
+            let factor = speed_factor(&table, column, config)? * config.speed_scale();
+            let values = scaled(table.numbers(column)?, factor);
+            (Samples { ns, values }, Some(table))
+        };
+        let mut streams = vec![stream(&path, "speed", &measured.ns)];
+        let (mut yaw_rates_radps, mut vehicle) = (None, None);
+        let mut yaw_table = None;
+        if let Some(table) = &table
+            && let Some(column) = table.column(&YAW_RATES)
+        {
+            yaw_table = Some((table.numbers(column)?, yaw_factor(table, column, config)?));
+        }
+        if let Some((values, factor)) = yaw_table {
+            let yaw_rates = Samples {
+                ns: measured.ns.clone(),
+                values: scaled(values, factor),
+            };
+            yaw_rates_radps = Some(yaw_rates.bridged(config.max_gap_s, None));
+        } else if let Some(imu) = imu {
+            let table = Table::read(&imu)?;
+            let ns = times(&table, config, &mut remarks, &name(&imu))?;
+            streams.push(stream(&imu, "imu", &ns));
+            let readings = imu_readings(&table, &ns, |column| yaw_factor(&table, column, config))?;
+            if let Some(imu) = readings {
+                vehicle = Some(VehicleLog {
+                    imu,
+                    steering_rad: None,
+                    config: config.motion(ImuMount::default()),
+                });
+            } else {
+                let column = table.require(&YAW_RATES, "time_s,gyro_z_radps")?;
+                let factor = yaw_factor(&table, column, config)?;
+                let values = scaled(table.numbers(column)?, factor);
+                yaw_rates_radps = Some(Samples { ns, values });
+            }
+        } else {
+            remarks.push(format!(
+                "{}: no yaw rate, here or in imu.csv: how the car turned is unknown, which \
+                 view_motion = \"vehicle\" and a rotation loss need",
+                name(&path)
+            ));
+        }
+        let speeds_mps = measured.bridged(config.max_gap_s, Some((&mut remarks, &name(&path))));
+        Ok(Some(Self {
+            path,
+            speeds_mps,
+            yaw_rates_radps,
+            vehicle,
+            streams,
+            remarks,
+        }))
+    }
+
+    /// The car's motion on the frames' clock, and whether its turns are known.
+    ///
+    /// # Errors
+    /// [`Error::Motion`] for an inertial unit or a steering angle that cannot be read as configured.
+    pub(crate) fn motion(&self, origin_ns: i64) -> Result<(MotionModel, bool)> {
+        match &self.vehicle {
+            Some(vehicle) => {
+                let motion = vehicle.motion(&self.speeds_mps, origin_ns);
+                motion.map_err(|source| Error::Motion {
+                    path: self.path.clone(),
+                    source,
+                })
+            }
+            None => Ok((self.track(origin_ns).into(), self.yaw_rates_radps.is_some())),
+        }
+    }
+
+    /// The motion by speed and yaw rate alone. Where the yaw rate has other times than the speed, the track
+    /// has both: between samples either is straight, so that its integrals stay exact.
+    fn track(&self, origin_ns: i64) -> VehicleTrack {
+        let Some(yaw) = &self.yaw_rates_radps else {
+            let samples = self.speeds_mps.ns.iter().zip(&self.speeds_mps.values);
+            let samples: Vec<_> = samples
+                .map(|(ns, v)| (seconds(*ns, origin_ns), *v, 0.0))
+                .collect();
+            return VehicleTrack::new(&samples);
+        };
+        let mut times: Vec<i64> = self.speeds_mps.ns.iter().chain(&yaw.ns).copied().collect();
+        times.sort_unstable();
+        times.dedup();
+        let known = times.iter().filter_map(|ns| {
+            let (v, w) = (self.speeds_mps.at(*ns)?, yaw.at(*ns)?);
+            Some((seconds(*ns, origin_ns), v, w))
+        });
+        VehicleTrack::new(&known.collect::<Vec<_>>())
+    }
+}
+
+/// The speeds of a receiver's track.
+fn of_track(path: &Path, config: &FolderConfig, remarks: &mut Vec<String>) -> Result<Samples> {
+    let log = GpsLog::read(path)?;
+    let (name, scale) = (name(path), config.speed_scale());
+    if log.speeds.len() < log.fixes {
+        let lost = log.fixes - log.speeds.len();
+        remarks.push(format!(
+            "{name}: {lost} of {} fixes stand alone or go back in time and are left out",
+            log.fixes
+        ));
+    }
+    let mut sigmas: Vec<f64> = log.speeds.iter().map(|s| s.sigma_mps).collect();
+    sigmas.sort_by(f64::total_cmp);
+    let from = if log.measured {
+        "as the receiver measured them"
+    } else {
+        "from its positions, smoothed"
+    };
+    remarks.push(format!(
+        "{name}: speeds {from}, sure to {:.2} m/s in the middle",
+        sigmas[sigmas.len() / 2]
+    ));
+    Ok(Samples {
+        ns: log.ns,
+        values: scaled(log.speeds.iter().map(|s| s.speed_mps).collect(), scale),
+    })
+}
+
+/// m/s of one unit of the column.
+fn speed_factor(table: &Table, column: &Column, config: &FolderConfig) -> Result<f64> {
+    let unit = column.unit.as_deref().or(config.speed_unit.as_deref());
+    match unit {
+        Some("mps" | "m/s") => Ok(1.0),
+        Some("kmh" | "km/h" | "kph") => Ok(1.0 / 3.6),
+        Some("mph" | "mi/h") => Ok(0.447_04),
+        Some(other) => Err(table.lacks(
+            format!("the unit of speed '{other}' is not known"),
+            "units are mps (m/s), kmh (km/h) and mph".into(),
+        )),
+        None => Err(table.lacks(
+            format!("nothing says the unit of column {}", column.header),
+            "name the column speed_mps, speed_kmh or speed_mph, or set speed_unit in dataset.toml: \
+             a wrong unit would scale every depth"
+                .into(),
+        )),
+    }
+}
+
+/// rad/s of one unit of the column.
+fn yaw_factor(table: &Table, column: &Column, config: &FolderConfig) -> Result<f64> {
+    let unit = column.unit.as_deref().or(config.yaw_rate_unit.as_deref());
+    match unit {
+        Some("radps" | "rad/s" | "rad s^-1") => Ok(1.0),
+        Some("dps" | "degps" | "deg/s" | "°/s") => Ok(1_f64.to_radians()),
+        other => Err(table.lacks(
+            match other {
+                Some(other) => format!("the unit of yaw rate '{other}' is not known"),
+                None => format!("nothing says the unit of column {}", column.header),
+            },
+            "name the column yaw_rate_radps or yaw_rate_dps (positive to the left), or set yaw_rate_unit \
+             in dataset.toml"
+                .into(),
+        )),
+    }
+}
+
+fn scaled(values: Vec<f64>, factor: f64) -> Vec<f64> {
+    values.into_iter().map(|v| v * factor).collect()
+}
+
+fn name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+fn stream(path: &Path, kind: &'static str, ns: &[i64]) -> Stream {
+    let first = ns.first().copied().unwrap_or_default();
+    let times: Vec<f64> = ns.iter().map(|t| seconds(*t, first)).collect();
+    Stream::new(&name(path), kind, ns.len(), &times)
+}
+
+#[cfg(test)]
+#[path = "speed_log_tests.rs"]
+mod tests;

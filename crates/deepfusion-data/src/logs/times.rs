@@ -1,0 +1,65 @@
+//! The column of times of a table.
+
+use super::clock::{TimeUnit, seconds};
+use super::table::{Table, describe};
+use crate::Result;
+use crate::dataset_toml::FolderConfig;
+
+const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timestamps"];
+
+/// The table's times in nanoseconds, which must rise; equal ones are told once.
+pub(crate) fn times(
+    table: &Table,
+    config: &FolderConfig,
+    remarks: &mut Vec<String>,
+    name: &str,
+) -> Result<Vec<i64>> {
+    let column = table.require(&TIMES, "time_s,speed_mps")?;
+    if table.len() == 0 {
+        return Err(table.lacks("no row below the header".into(), "record some".into()));
+    }
+    let unit = match (&column.unit, &config.time_unit) {
+        (Some(unit), _) | (None, Some(unit)) => TimeUnit::named(unit),
+        (None, None) => {
+            let unit = TimeUnit::of_numbers(&table.numbers(column)?);
+            if let Some(unit) = unit {
+                remarks.push(format!(
+                    "{name}: column {} has no unit, taken as {} by its numbers",
+                    column.header,
+                    unit.symbol()
+                ));
+            }
+            unit
+        }
+    };
+    let Some(unit) = unit else {
+        return Err(table.lacks(
+            format!("nothing says the unit of time of column {}", column.header),
+            "name the column time_s, time_ms, time_us or time_ns, or set time_unit in dataset.toml"
+                .into(),
+        ));
+    };
+    let mut all: Vec<i64> = Vec::with_capacity(table.len());
+    let mut repeated = Vec::new();
+    for (row, word) in table.words(column).enumerate() {
+        let ns = unit.nanoseconds(word);
+        let ns = ns.ok_or_else(|| table.bad(row, column, &describe(word, "a time")))?;
+        match all.last() {
+            Some(last) if ns < *last => {
+                let back = seconds(*last, ns);
+                let problem = format!("'{word}' is {back} s before the row above");
+                return Err(table.bad(row, column, &problem));
+            }
+            Some(last) if ns == *last => repeated.push(table.line(row)),
+            _ => {}
+        }
+        all.push(ns);
+    }
+    if let Some(first) = repeated.first() {
+        remarks.push(format!(
+            "{name}: {} rows repeat the time of the row above (first in line {first}) and are left out",
+            repeated.len()
+        ));
+    }
+    Ok(all)
+}

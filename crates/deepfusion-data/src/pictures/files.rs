@@ -1,0 +1,134 @@
+//! Images from files and to them.
+
+use super::jpeg;
+use crate::{Error, Result};
+use image::{DynamicImage, ImageError, ImageReader, RgbImage};
+use std::io::{BufRead, Cursor, Seek};
+use std::path::Path;
+
+/// Reads a PNG or JPEG, told apart by content, as 8-bit RGB. Grey becomes RGB, 16 bits become 8, an
+/// alpha channel is left out.
+///
+/// # Errors
+/// [`Error::NoSuchPath`], [`Error::File`], or [`Error::Image`] where the content is no such image or
+/// ends early.
+pub fn load_rgb(path: &Path) -> Result<RgbImage> {
+    Ok(decode(path)?.into_rgb8())
+}
+
+/// [`load_rgb`] of a file's bytes that were read already; `path` is for errors alone.
+///
+/// # Errors
+/// As [`load_rgb`].
+pub fn decode_rgb(bytes: &[u8], path: &Path) -> Result<RgbImage> {
+    Ok(decode_bytes(bytes, path)?.into_rgb8())
+}
+
+/// A PNG or JPEG in the pixel type it has.
+pub(crate) fn decode(path: &Path) -> Result<DynamicImage> {
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+    decode_bytes(&bytes, path)
+}
+
+/// The same of a file's bytes.
+pub(crate) fn decode_bytes(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
+    if jpeg::is_jpeg(bytes) && !jpeg::has_end(bytes) {
+        return Err(truncated(path));
+    }
+    reader(Cursor::new(bytes), path)?
+        .decode()
+        .map_err(|e| broken(path, &e))
+}
+
+/// Width and height of a PNG or JPEG, from its header alone.
+///
+/// # Errors
+/// As [`load_rgb`]; a file cut off after its header is not noticed here.
+pub fn image_size(path: &Path) -> Result<(u32, u32)> {
+    let file = std::fs::File::open(path).map_err(|e| Error::file(path, e))?;
+    let mut input = std::io::BufReader::new(file);
+    let begin = input.fill_buf().map_err(|e| Error::file(path, e))?;
+    if !jpeg::is_jpeg(begin) {
+        return reader(input, path)?
+            .into_dimensions()
+            .map_err(|e| broken(path, &e));
+    }
+    match jpeg::size(&mut input) {
+        Ok(Some(size)) => Ok(size),
+        Ok(None) => Err(Error::Image {
+            path: path.to_owned(),
+            problem: "the JPEG has no frame header".into(),
+            truncated: false,
+        }),
+        Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Err(truncated(path)),
+        Err(e) => Err(Error::file(path, e)),
+    }
+}
+
+fn reader<R: BufRead + Seek>(input: R, path: &Path) -> Result<ImageReader<R>> {
+    let reader = ImageReader::new(input)
+        .with_guessed_format()
+        .map_err(|e| Error::file(path, e))?;
+    if reader.format().is_none() {
+        return Err(Error::Image {
+            path: path.to_owned(),
+            problem: "neither a PNG nor a JPEG".into(),
+            truncated: false,
+        });
+    }
+    Ok(reader)
+}
+
+fn broken(path: &Path, error: &ImageError) -> Error {
+    // The PNG decoder reports a cut file as an unexpected end, at some depth of its causes.
+    let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(error);
+    while let Some(e) = cause {
+        let io = e.downcast_ref::<std::io::Error>();
+        let text = e.to_string().to_lowercase();
+        if io.is_some_and(|io| io.kind() == std::io::ErrorKind::UnexpectedEof)
+            || text.contains("unexpected end")
+            || text.contains("unexpected eof")
+            || text.contains("exhausted")
+        {
+            return truncated(path);
+        }
+        cause = e.source();
+    }
+    Error::Image {
+        path: path.to_owned(),
+        problem: format!("cannot be decoded: {error}"),
+        truncated: false,
+    }
+}
+
+fn truncated(path: &Path) -> Error {
+    Error::Image {
+        path: path.to_owned(),
+        problem: "the image is truncated: the file ends within it".into(),
+        truncated: true,
+    }
+}
+
+/// Writes the image as a PNG, whole or not at all; who says that it is done syncs it first.
+///
+/// # Errors
+/// [`Error::File`] where writing fails.
+pub fn save_png(image: &RgbImage, path: &Path) -> Result<()> {
+    deepfusion_fs::write_unsynced(
+        path,
+        |e| Error::file(path, e),
+        |out| {
+            image
+                .write_to(out, image::ImageFormat::Png)
+                .map_err(|e| write_failed(path, e))
+        },
+    )
+}
+
+/// The system's error inside an encoder's, named by file.
+pub(crate) fn write_failed(path: &Path, error: ImageError) -> Error {
+    match error {
+        ImageError::IoError(source) => Error::file(path, source),
+        other => Error::file(path, std::io::Error::other(other)),
+    }
+}

@@ -1,0 +1,154 @@
+//! A single picture as a camera or a telephone wrote it.
+
+use super::files::decode_bytes;
+use crate::{Error, Result};
+use deepfusion_geometry::Intrinsics;
+use exif::{Exif, In, Tag};
+use image::RgbImage;
+use image::metadata::Orientation;
+use std::io::Cursor;
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+/// Diagonal of a frame of 35 mm film, 36 mm by 24 mm, which EXIF's equivalent focal lengths refer to (CIPA DC-008).
+const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
+
+/// Equivalent focal lengths of lenses there are, mm.
+const FOCAL_LENGTHS_MM: RangeInclusive<u32> = 5..=2000;
+
+/// A picture, and what its EXIF block says of how it was taken.
+#[derive(Debug, Clone)]
+pub struct Photo {
+    /// Upright: turned as EXIF's orientation says.
+    pub image: RgbImage,
+    /// The camera by EXIF's focal length in 35 mm film, with square pixels and the principal point in the middle; `None` where
+    /// nothing is said. It is the lens's nominal focal length: of a picture that was cut since it is wrong.
+    pub intrinsics: Option<Intrinsics>,
+}
+
+/// Reads a PNG or JPEG as [`crate::load_rgb`] does, turns it upright, and takes its camera from EXIF. A block that is damaged
+/// says nothing.
+///
+/// # Errors
+/// As [`crate::load_rgb`].
+pub fn load_photo(path: &Path) -> Result<Photo> {
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+    let mut image = decode_bytes(&bytes, path)?;
+    let exif = exif::Reader::new()
+        .read_from_container(&mut Cursor::new(&bytes))
+        .ok();
+    let exif = exif.as_ref();
+    let turn = exif.and_then(|exif| number(exif, Tag::Orientation));
+    if let Some(turn) = turn.and_then(|n| Orientation::from_exif(u8::try_from(n).ok()?)) {
+        image.apply_orientation(turn);
+    }
+    let image = image.into_rgb8();
+    let focal_mm = exif.and_then(|exif| number(exif, Tag::FocalLengthIn35mmFilm));
+    let intrinsics = focal_mm
+        .filter(|mm| FOCAL_LENGTHS_MM.contains(mm))
+        .map(|mm| of_film(f64::from(mm), image.dimensions()));
+    Ok(Photo { image, intrinsics })
+}
+
+fn number(exif: &Exif, tag: Tag) -> Option<u32> {
+    exif.get_field(tag, In::PRIMARY)?.value.get_uint(0)
+}
+
+/// The pinhole camera of a lens that is `focal_mm` long for film.
+fn of_film(focal_mm: f64, (width, height): (u32, u32)) -> Intrinsics {
+    let diagonal = f64::from(width).hypot(f64::from(height));
+    Intrinsics::centred(focal_mm / FILM_DIAGONAL_MM * diagonal, (width, height))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exif::experimental::Writer;
+    use exif::{Field, Value};
+    use image::Rgb;
+
+    /// A JPEG of 64×48, left half red and right half blue, with these fields.
+    fn jpeg(fields: &[(Tag, u16)]) -> Vec<u8> {
+        let half = |x: u32, _| {
+            if x < 32 {
+                Rgb([220, 20, 20])
+            } else {
+                Rgb([20, 20, 220])
+            }
+        };
+        let mut plain = Vec::new();
+        RgbImage::from_fn(64, 48, half)
+            .write_to(&mut Cursor::new(&mut plain), image::ImageFormat::Jpeg)
+            .unwrap();
+        if fields.is_empty() {
+            return plain;
+        }
+        let fields: Vec<Field> = fields
+            .iter()
+            .map(|(tag, value)| Field {
+                tag: *tag,
+                ifd_num: In::PRIMARY,
+                value: Value::Short(vec![*value]),
+            })
+            .collect();
+        let mut writer = Writer::new();
+        fields.iter().for_each(|field| writer.push_field(field));
+        let mut block = Cursor::new(Vec::new());
+        writer.write(&mut block, true).unwrap();
+        let block = block.into_inner();
+        // After the start of the image: APP1, its length, its name, the block.
+        let length = u16::try_from(block.len() + 8).unwrap().to_be_bytes();
+        let app1 = [&[0xFF, 0xE1], &length[..], b"Exif\0\0", &block[..]].concat();
+        [&plain[..2], &app1[..], &plain[2..]].concat()
+    }
+
+    fn load(bytes: &[u8]) -> Photo {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("street.jpg");
+        std::fs::write(&path, bytes).unwrap();
+        load_photo(&path).unwrap()
+    }
+
+    fn is_red(image: &RgbImage, x: u32, y: u32) -> bool {
+        let Rgb([r, _, b]) = *image.get_pixel(x, y);
+        r > b
+    }
+
+    #[test]
+    fn a_telephone_s_picture_is_upright_and_knows_its_lens() {
+        // 6: the right-hand side of what is stored is the bottom of the picture: turned by 90 degrees clockwise.
+        let photo = load(&jpeg(&[
+            (Tag::Orientation, 6),
+            (Tag::FocalLengthIn35mmFilm, 26),
+        ]));
+        assert_eq!(photo.image.dimensions(), (48, 64));
+        assert!(is_red(&photo.image, 24, 5) && !is_red(&photo.image, 24, 60));
+        let camera = photo.intrinsics.unwrap();
+        // 26 mm of a diagonal of 43.27 mm; the picture's diagonal is 80 pixels.
+        assert!((camera.fx - 26.0 / 43.2666 * 80.0).abs() < 1e-3);
+        assert_eq!(camera.fx, camera.fy);
+        assert_eq!((camera.width, camera.height), (48, 64));
+        assert_eq!((camera.cx, camera.cy), (23.5, 31.5));
+        assert_eq!(camera.implausible(), None);
+    }
+
+    #[test]
+    fn what_is_not_said_or_cannot_be_is_not_known() {
+        for fields in [
+            &[][..],
+            &[(Tag::FocalLengthIn35mmFilm, 0)],
+            &[(Tag::FocalLengthIn35mmFilm, 60_000), (Tag::Orientation, 99)],
+        ] {
+            let photo = load(&jpeg(fields));
+            assert_eq!(photo.intrinsics, None, "{fields:?}");
+            assert_eq!(photo.image.dimensions(), (64, 48));
+            assert!(is_red(&photo.image, 5, 24));
+        }
+        // A damaged block is no reason to refuse a picture.
+        let mut damaged = jpeg(&[(Tag::FocalLengthIn35mmFilm, 26)]);
+        for byte in &mut damaged[12..30] {
+            *byte = 0xAB;
+        }
+        assert_eq!(load(&damaged).intrinsics, None);
+    }
+}

@@ -1,0 +1,43 @@
+//! Folders of depth images.
+
+use crate::pictures::decode;
+use crate::{Error, Result};
+use deepfusion_geometry::DepthMap;
+use image::DynamicImage;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Depth images by frame number, and what their values mean.
+#[derive(Debug, Clone)]
+pub(crate) struct DepthImages {
+    pub(crate) files: BTreeMap<u64, PathBuf>,
+    /// Metres of one step.
+    pub(crate) unit_m: f64,
+    /// A value besides 0 that means none.
+    pub(crate) invalid: Option<u16>,
+}
+
+impl DepthImages {
+    /// A 16-bit grey PNG as metres.
+    pub(crate) fn read(&self, path: &Path) -> Result<DepthMap> {
+        let DynamicImage::ImageLuma16(image) = decode(path)? else {
+            return Err(Error::Image {
+                path: path.to_owned(),
+                problem: "not a 16-bit grey PNG, which depth images are".into(),
+                truncated: false,
+            });
+        };
+        let metres = |value: &u16| {
+            if Some(*value) == self.invalid {
+                0.0
+            } else {
+                (f64::from(*value) * self.unit_m) as f32
+            }
+        };
+        Ok(DepthMap {
+            width: image.width() as usize,
+            height: image.height() as usize,
+            data: image.as_raw().iter().map(metres).collect(),
+        })
+    }
+}

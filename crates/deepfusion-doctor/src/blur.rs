@@ -1,0 +1,50 @@
+//! Blurred frames: single ones against the drive's usual sharpness, and a whole drive out of focus.
+
+use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::survey::Survey;
+
+/// A frame with less than this share of the drive's usual sharpness is blurred.
+const BLURRED: f64 = 0.5;
+/// Share of blurred frames, percent.
+const MOST: f64 = 5.0;
+/// Sharpness of a drive in focus: variance of the Laplacian over that at half the size.
+const LEAST: f64 = 0.06;
+
+pub(super) fn check(survey: &Survey<'_>) -> Outcome {
+    let seen = survey.frames.iter();
+    let seen: Vec<(u64, f64)> = seen
+        .filter_map(|f| Some((f.number, f.look.sharpness?)))
+        .collect();
+    if seen.is_empty() {
+        return Outcome::skipped("blur", "no image has any detail");
+    }
+    let mut outcome = Outcome::new("blur");
+    let usual = median(seen.iter().map(|s| s.1).collect());
+    let whole = Figure::new("sharpness", usual, "", Limit::AtLeast(LEAST));
+    outcome.judge(Severity::Warning, whole, || {
+        (
+            "the pictures lack the finest detail, as out of focus, shaken or enlarged ones do".into(),
+            "focus the lens, clean the windscreen, expose shorter; enlarged pictures train as well at half their size".into(),
+        )
+    });
+    let blurred: Vec<u64> = seen
+        .iter()
+        .filter(|(_, sharpness)| *sharpness < BLURRED * usual)
+        .map(|(number, _)| *number)
+        .collect();
+    let share = 100.0 * blurred.len() as f64 / seen.len() as f64;
+    let figure = Figure::new("blurred frames", share, "%", Limit::AtMost(MOST));
+    let first = blurred.first().copied();
+    outcome.judge_at(Severity::Warning, first, figure, || {
+        (
+            format!(
+                "{} of {} frames have less than half the drive's usual sharpness, the first of them frame {}",
+                blurred.len(),
+                seen.len(),
+                blurred[0]
+            ),
+            "expose shorter, fix the mount, or leave these frames out".into(),
+        )
+    });
+    outcome
+}

@@ -1,0 +1,189 @@
+//! Parts of the picture that belong to the vehicle: a bonnet, a black frame, a dashboard's reflection.
+//!
+//! While the vehicle moves, such a part hardly changes, and its rim stays where it is. From each side of the picture
+//! the rows (or columns) inward are followed while they hardly change over time; the part is the vehicle's where a
+//! standing edge ends it. A plain sky hardly changes either, but nothing that stays put ends it.
+
+use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::survey::Survey;
+
+/// The vehicle certainly moves above this, m/s.
+const MOVING_MPS: f64 = 1.0;
+const LEAST_FRAMES: usize = 12;
+/// A pixel hardly changes where its standard deviation over time is below this share of the picture's median one.
+const STILL: f64 = 0.35;
+/// An edge is a mean slope of so many grey levels a pixel; it stands where the slope's mean over time is this share of
+/// its mean length.
+const EDGE: f64 = 4.0;
+const STANDS: f64 = 0.85;
+/// A part that is this thin is the lens' shade or an encoder's rim, pixels of the small picture.
+const LEAST_DEPTH: usize = 3;
+/// Share of a side that the part may take, percent: of the bottom, where bonnets are, and of the others, where a black
+/// frame takes all, and a plain sky over houses that lie ahead a sixth, in four seconds of drive up to a half.
+const MOST_BOTTOM: f64 = 15.0;
+const MOST_ELSEWHERE: f64 = 75.0;
+
+pub(super) fn check(survey: &Survey<'_>) -> Outcome {
+    let Some(still) = Still::of(survey) else {
+        let why = format!("fewer than {LEAST_FRAMES} frames while the vehicle moves");
+        return Outcome::skipped("bonnet", why);
+    };
+    let k = survey.dataset.intrinsics(0);
+    let (width, height) = (still.width, still.height);
+    let down = f64::from(k.height) / height as f64;
+    let across = f64::from(k.width) / width as f64;
+    let sides = [
+        (
+            "bottom",
+            "still rim at the bottom",
+            down,
+            still.rim(width, height, |along, deep| (along, height - 1 - deep)),
+        ),
+        (
+            "top",
+            "still rim at the top",
+            down,
+            still.rim(width, height, |along, deep| (along, deep)),
+        ),
+        (
+            "left",
+            "still rim at the left",
+            across,
+            still.rim(height, width, |along, deep| (deep, along)),
+        ),
+        (
+            "right",
+            "still rim at the right",
+            across,
+            still.rim(height, width, |along, deep| (width - 1 - deep, along)),
+        ),
+    ];
+    let mut outcome = Outcome::new("bonnet");
+    for (side, quantity, scale, rim) in sides {
+        let most = match side {
+            "bottom" => MOST_BOTTOM,
+            _ => MOST_ELSEWHERE,
+        };
+        let figure = Figure::new(
+            quantity,
+            100.0 * rim.share,
+            "% of the side",
+            Limit::AtMost(most),
+        );
+        outcome.judge(Severity::Warning, figure, || {
+            let pixels = (rim.depth as f64 * scale).ceil();
+            let kept = match side {
+                "bottom" => format!("keep rows 0 to {:.0}", f64::from(k.height) - pixels - 1.0),
+                "top" => format!("keep rows from {pixels:.0}, and subtract {pixels:.0} from cy"),
+                "left" => format!("keep columns from {pixels:.0}, and subtract {pixels:.0} from cx"),
+                _ => format!("keep columns 0 to {:.0}", f64::from(k.width) - pixels - 1.0),
+            };
+            (
+                format!(
+                    "{pixels:.0} pixels at the {side} do not change while the vehicle moves (over {:.0} % of that side): \
+                     they teach that what stands still on the vehicle is infinitely far",
+                    100.0 * rim.share
+                ),
+                format!("cut them off: {kept}"),
+            )
+        });
+    }
+    outcome
+}
+
+/// What hardly changes over a drive.
+struct Still {
+    width: usize,
+    height: usize,
+    still: Vec<bool>,
+    edge: Vec<bool>,
+}
+
+/// A side's still part.
+struct Rim {
+    /// Share of the side along which there is one.
+    share: f64,
+    /// How deep it is there (but for the deepest fiftieth), pixels of the small picture.
+    depth: usize,
+}
+
+impl Still {
+    /// `None` where there are too few frames in motion.
+    fn of(survey: &Survey<'_>) -> Option<Self> {
+        let moving: Vec<_> = survey
+            .neighbours()
+            .filter(|(a, b)| {
+                survey
+                    .speed_mps(a.index, b.index)
+                    .is_none_or(|v| v > MOVING_MPS)
+            })
+            .map(|(a, _)| a)
+            .collect();
+        if moving.len() < LEAST_FRAMES {
+            return None;
+        }
+        let (width, height) = (moving[0].small.width, moving[0].small.height);
+        let n = moving.len() as f64;
+        let mut sums = vec![[0.0_f64; 5]; width * height];
+        for frame in &moving {
+            let data = &frame.small.data;
+            for (i, sum) in sums.iter_mut().enumerate() {
+                let v = f64::from(data[i]);
+                let (x, y) = (i % width, i / width);
+                let (mut dx, mut dy) = (0.0, 0.0);
+                if x > 0 && x + 1 < width {
+                    dx = 0.5 * f64::from(data[i + 1] - data[i - 1]);
+                }
+                if y > 0 && y + 1 < height {
+                    dy = 0.5 * f64::from(data[i + width] - data[i - width]);
+                }
+                for (sum, term) in sum.iter_mut().zip([v, v * v, dx, dy, dx.hypot(dy)]) {
+                    *sum += term / n;
+                }
+            }
+        }
+        let deviation = |s: &[f64; 5]| (s[1] - s[0] * s[0]).max(0.0).sqrt();
+        let usual = median(sums.iter().map(deviation).collect());
+        let stands = |s: &[f64; 5]| {
+            let mean = s[2].hypot(s[3]);
+            mean > EDGE && mean > STANDS * s[4]
+        };
+        Some(Self {
+            width,
+            height,
+            still: sums.iter().map(|s| deviation(s) < STILL * usual).collect(),
+            edge: sums.iter().map(stands).collect(),
+        })
+    }
+
+    /// The rim along a side of `length` places, up to a third of `depth` deep; `at` gives a place's x and y.
+    fn rim(&self, length: usize, depth: usize, at: impl Fn(usize, usize) -> (usize, usize)) -> Rim {
+        let index = |along: usize, deep: usize| {
+            let (x, y) = at(along, deep);
+            y * self.width + x
+        };
+        let mut depths = Vec::new();
+        for along in 0..length {
+            let mut ended = None;
+            for deep in 0..depth / 3 {
+                let i = index(along, deep);
+                // Across the rim itself pixels may change: what lies beyond shines in.
+                if self.edge[i] {
+                    ended = Some(deep);
+                } else if !self.still[i] {
+                    break;
+                }
+            }
+            depths.extend(
+                ended
+                    .filter(|deep| *deep >= LEAST_DEPTH)
+                    .map(|deep| deep + 1),
+            );
+        }
+        depths.sort_unstable();
+        Rim {
+            share: depths.len() as f64 / length.max(1) as f64,
+            depth: depths.get(depths.len() * 98 / 100).copied().unwrap_or(0),
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Frames that are the frame before once more: their pair shows no motion where the vehicle has one, and teaches that
+//! everything is far away.
+
+use super::finding::{Figure, Limit, Outcome, Severity};
+use super::survey::Survey;
+use deepfusion_data::Frame;
+
+/// The vehicle certainly moves above this, m/s.
+const MOVING_MPS: f64 = 1.0;
+/// Share of frames that may repeat the one before while the vehicle moves: none does in a whole recording.
+const MOST: f64 = 0.0;
+
+pub(super) fn check(survey: &Survey<'_>) -> Outcome {
+    let mut outcome = Outcome::new("duplicates");
+    let frames = survey.dataset.frames();
+    let moving = |a: usize, b: usize| survey.speed_mps(a, b).is_some_and(|v| v > MOVING_MPS);
+    let (mut compared, mut repeated) = (0, Vec::new());
+    if frames.iter().all(|f| f.image.file().is_some()) {
+        for (i, pair) in frames.windows(2).enumerate() {
+            if moving(i, i + 1) {
+                compared += 1;
+                repeated.extend(same_file(&pair[0], &pair[1]).then_some(pair[1].number));
+            }
+        }
+    } else {
+        for (a, b) in survey.neighbours() {
+            if moving(a.index, b.index) {
+                compared += 1;
+                repeated.extend((a.small == b.small).then_some(b.number));
+            }
+        }
+    }
+    if compared == 0 {
+        return Outcome::skipped(
+            "duplicates",
+            "no neighbouring frames while the vehicle moves",
+        );
+    }
+    let share = 100.0 * repeated.len() as f64 / f64::from(compared);
+    let figure = Figure::new("repeated frames", share, "%", Limit::AtMost(MOST));
+    let first = repeated.first().copied();
+    outcome.judge_at(Severity::Error, first, figure, || {
+        (
+            format!(
+                "{} of {compared} frames are the frame before once more while the vehicle moves, the first of them \
+                 frame {}: each of them teaches that everything is infinitely far",
+                repeated.len(),
+                repeated[0]
+            ),
+            "record at the camera's own rate, and remove the repeated frames (time stamps and all)".into(),
+        )
+    });
+    outcome
+}
+
+/// Whether two files hold the same bytes. What cannot be read is found elsewhere.
+fn same_file(a: &Frame, b: &Frame) -> bool {
+    let (a, b) = (a.image.path(), b.image.path());
+    let length = |path: &std::path::Path| std::fs::metadata(path).map(|m| m.len()).ok();
+    length(a).is_some()
+        && length(a) == length(b)
+        && matches!((std::fs::read(a), std::fs::read(b)), (Ok(a), Ok(b)) if a == b)
+}

@@ -1,0 +1,79 @@
+//! Brightness: jumps from frame to frame, darkness, whiteness. View synthesis compares colours.
+
+use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::survey::Survey;
+
+/// A change of the mean grey level by more than this share is a jump of the exposure, not of the scene.
+const JUMP: f64 = 0.12;
+/// Share of neighbours that may jump, percent.
+const MOST_JUMPS: f64 = 2.0;
+/// Median share of a picture that may be all but black or all but white, percent.
+const MOST_DARK: f64 = 60.0;
+const MOST_WHITE: f64 = 40.0;
+/// Added to grey levels before ratios: a lamp passing in the dark is no jump.
+const FLOOR: f64 = 10.0;
+
+pub(super) fn check(survey: &Survey<'_>) -> Outcome {
+    if survey.frames.is_empty() {
+        return Outcome::skipped("exposure", "no image can be read");
+    }
+    let mut outcome = Outcome::new("exposure");
+    let (mut neighbours, mut jumps) = (0, Vec::new());
+    for (a, b) in survey.neighbours() {
+        neighbours += 1;
+        let ratio = (b.look.mean + FLOOR) / (a.look.mean + FLOOR);
+        if ratio.ln().abs() > JUMP.ln_1p() {
+            jumps.push((b.number, ratio));
+        }
+    }
+    if neighbours > 0 {
+        let share = 100.0 * jumps.len() as f64 / f64::from(neighbours);
+        let figure = Figure::new(
+            "neighbours that jump in brightness",
+            share,
+            "%",
+            Limit::AtMost(MOST_JUMPS),
+        );
+        let first = jumps.first().map(|jump| jump.0);
+        outcome.judge_at(Severity::Warning, first, figure, || {
+            let (number, ratio) = jumps[0];
+            (
+                format!(
+                    "{} of {neighbours} neighbours differ by more than {:.0} % in brightness, the first at frame {number} ({:+.0} %): the photometric error then measures the exposure",
+                    jumps.len(),
+                    100.0 * JUMP,
+                    100.0 * (ratio - 1.0)
+                ),
+                "fix the camera's exposure and gain, or let them change slowly; record anew".into(),
+            )
+        });
+    }
+    let typical = |of: fn(&super::look::Look) -> f64| {
+        100.0 * median(survey.frames.iter().map(|f| of(&f.look)).collect())
+    };
+    let dark = Figure::new(
+        "black pixels",
+        typical(|l| l.dark),
+        "%",
+        Limit::AtMost(MOST_DARK),
+    );
+    outcome.judge(Severity::Warning, dark, || {
+        (
+            "most of the picture is black: nothing can be compared there".into(),
+            "expose longer, or leave the darkest drives out".into(),
+        )
+    });
+    let white = Figure::new(
+        "white pixels",
+        typical(|l| l.white),
+        "%",
+        Limit::AtMost(MOST_WHITE),
+    );
+    outcome.judge(Severity::Warning, white, || {
+        (
+            "much of the picture is white: nothing can be compared there".into(),
+            "expose shorter".into(),
+        )
+    });
+    outcome
+}

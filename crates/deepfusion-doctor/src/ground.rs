@@ -1,0 +1,234 @@
+//! The road in the measured depth against the camera's mount: the way up, and the height.
+
+use super::finding::{Figure, Limit, Outcome, Severity, median};
+use deepfusion_data::{Dataset, GtKind, PLAUSIBLE_HEIGHT_M};
+use deepfusion_geometry::DepthMap;
+use deepfusion_hint::Hint;
+use nalgebra::{Matrix3, Vector3};
+
+/// Frames looked at.
+const MOST_FRAMES: usize = 8;
+/// Where the road is looked for: metres ahead, metres aside, metres below the camera.
+const AHEAD_M: std::ops::Range<f64> = 3.0..18.0;
+const ASIDE_M: f64 = 4.0;
+const BELOW_M: std::ops::Range<f64> = 0.5..3.5;
+const LEAST_POINTS: usize = 60;
+/// How far the road has to be seen, metres along and across: what is shorter is a car's roof or bonnet as well as a road.
+const LEAST_LENGTH_M: f64 = 5.0;
+const LEAST_WIDTH_M: f64 = 2.5;
+/// Frames that have to show it, and by how much their angles may scatter about the median, as a share of the limit.
+const LEAST_PLANES: usize = 4;
+const MOST_SCATTER: f64 = 0.5;
+/// Roughness of a road and noise of a scan, metres.
+const NOISE_M: f64 = 0.04;
+const ROUNDS: usize = 10;
+/// How far up may differ, degrees: cars nod, and roads are crowned (KITTI 0009's by 1.9 degrees of roll).
+const MOST_PITCH_DEG: f64 = 2.0;
+const MOST_TILT_DEG: f64 = 12.0;
+const MOST_ROLL_DEG: f64 = 3.5;
+
+pub(super) fn check(dataset: &Dataset) -> Outcome {
+    let Some(mount) = dataset.cam_from_vehicle() else {
+        return Outcome::skipped("ground", "nothing says where the camera is on the vehicle");
+    };
+    let up = mount.rotate(&Vector3::z());
+    let with_depth: Vec<usize> = (0..dataset.frames().len())
+        .filter(|i| dataset.has_ground_truth(*i))
+        .collect();
+    let step = with_depth.len().div_ceil(MOST_FRAMES).max(1);
+    let mut planes = Vec::new();
+    for frame in with_depth.into_iter().step_by(step) {
+        match dataset.ground_truth(frame, GtKind::Z) {
+            Ok(Some(depth)) => {
+                let points = points(dataset, frame, &depth);
+                planes.extend(plane(&points, &up));
+            }
+            Ok(None) => {}
+            Err(error) => {
+                let mut outcome = Outcome::new("ground");
+                let remedy = error
+                    .hint()
+                    .unwrap_or_else(|| "copy the recording again".into());
+                let number = dataset.frames()[frame].number;
+                outcome.find(Severity::Warning, Some(number), error.to_string(), remedy);
+                return outcome;
+            }
+        }
+    }
+    // What is turned by more is a wall or a car, not the road: a LiDAR that looks ahead sees little of that.
+    planes.retain(|(n, _)| n.angle(&up).to_degrees() <= MOST_TILT_DEG);
+    if planes.len() < LEAST_PLANES {
+        let why = format!(
+            "the measured depth of {} frames shows the road before the camera, {LEAST_PLANES} are needed",
+            planes.len()
+        );
+        return Outcome::skipped("ground", why);
+    }
+    // Up by the road, turned into the mount's: about the camera's x and z.
+    let pitch = |(n, _): &(Vector3<f64>, f64)| up.cross(n).x.asin().to_degrees();
+    let roll = |(n, _): &(Vector3<f64>, f64)| up.cross(n).z.asin().to_degrees();
+    // Road, kerb and what stands on it do not lie alike from frame to frame; a mount that is off always is by as much.
+    let pitches = Angle::of(planes.iter().map(pitch).collect());
+    let rolls = Angle::of(planes.iter().map(roll).collect());
+    if pitches.scatter > MOST_SCATTER * MOST_PITCH_DEG
+        || rolls.scatter > MOST_SCATTER * MOST_ROLL_DEG
+    {
+        let why = format!(
+            "the planes before the camera differ between frames (pitch by {:.1} degrees, roll by {:.1}): not the road alone",
+            pitches.scatter, rolls.scatter
+        );
+        return Outcome::skipped("ground", why);
+    }
+    let height = median(planes.iter().map(|p| p.1).collect());
+    let mut outcome = Outcome::new("ground");
+    let angles = [
+        (
+            "pitch of the road against the mount",
+            pitches.median,
+            "pitch",
+            MOST_PITCH_DEG,
+        ),
+        (
+            "roll of the road against the mount",
+            rolls.median,
+            "roll",
+            MOST_ROLL_DEG,
+        ),
+    ];
+    for (quantity, value, name, most) in angles {
+        let limit = Limit::Within(-most, most);
+        outcome.judge(Severity::Warning, Figure::new(quantity, value, "degrees", limit), || {
+            (
+                format!(
+                    "the road in the measured depth of {} frames is turned by {:.1} degrees ({name}) against what the mounts say",
+                    planes.len(),
+                    value.abs()
+                ),
+                format!("correct the {name} of the camera on the vehicle (cam_from_vehicle) or of the LiDAR on the camera by that angle"),
+            )
+        });
+    }
+    let limit = Limit::Within(*PLAUSIBLE_HEIGHT_M.start(), *PLAUSIBLE_HEIGHT_M.end());
+    let figure = Figure::new("camera above the measured road", height, "m", limit);
+    outcome.judge(Severity::Warning, figure, || {
+        (
+            format!("the measured depth puts the camera {height:.2} m above the road, where no car has it"),
+            "see the unit of the depth (metres, millimetres, 1/256 m) and the LiDAR's place on the camera".into(),
+        )
+    });
+    outcome
+}
+
+/// An angle over the frames, degrees.
+struct Angle {
+    median: f64,
+    /// Median distance from it.
+    scatter: f64,
+}
+
+impl Angle {
+    fn of(angles: Vec<f64>) -> Self {
+        let middle = median(angles.clone());
+        let scatter = median(angles.iter().map(|a| (a - middle).abs()).collect());
+        Self {
+            median: middle,
+            scatter,
+        }
+    }
+}
+
+/// The measured points, in the camera's axes, metres.
+fn points(dataset: &Dataset, frame: usize, depth: &DepthMap) -> Vec<Vector3<f64>> {
+    let k = dataset.intrinsics(frame);
+    let known = depth.data.iter().enumerate().filter(|(_, d)| **d > 0.0);
+    let point = |(i, d): (usize, &f32)| {
+        let (u, v) = (i % depth.width, i / depth.width);
+        k.back_project(u as f64, v as f64, f64::from(*d))
+    };
+    known.map(point).collect()
+}
+
+/// The road's plane: its way up, and the camera's height above it; robust least squares of n·X = −h, from the mount's
+/// way up and the most usual height.
+fn plane(points: &[Vector3<f64>], up: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
+    let near: Vec<&Vector3<f64>> = points
+        .iter()
+        .filter(|p| AHEAD_M.contains(&p.z) && p.x.abs() < ASIDE_M && BELOW_M.contains(&-up.dot(p)))
+        .collect();
+    if near.len() < LEAST_POINTS {
+        return None;
+    }
+    // The road is the lowest that many points share: kerbs and cars lie above it.
+    let mut heights: Vec<f64> = near.iter().map(|p| -up.dot(p)).collect();
+    heights.sort_by(f64::total_cmp);
+    let start = heights[heights.len() * 7 / 10];
+    let mut plane = up / start;
+    for round in 0..ROUNDS {
+        let scale = NOISE_M * 2.0_f64.powi((4 - round as i32).max(0));
+        let height = 1.0 / plane.norm();
+        let (mut m, mut y) = (Matrix3::zeros(), Vector3::zeros());
+        for p in &near {
+            let residual = (plane.dot(p) + 1.0) * height / scale;
+            let weight = 1.0 / (1.0 + residual * residual).powi(2);
+            m += weight * *p * p.transpose();
+            y -= weight * *p;
+        }
+        plane = m.try_inverse()? * y;
+    }
+    let height = 1.0 / plane.norm();
+    let inside: Vec<_> = near
+        .iter()
+        .filter(|p| ((plane.dot(p) + 1.0) * height).abs() < 3.0 * NOISE_M)
+        .collect();
+    let long = inner_range(inside.iter().map(|p| p.z).collect()) >= LEAST_LENGTH_M;
+    let wide = inner_range(inside.iter().map(|p| p.x).collect()) >= LEAST_WIDTH_M;
+    (inside.len() > LEAST_POINTS / 2 && long && wide).then(|| (plane * height, height))
+}
+
+/// Where the middle nine tenths lie.
+fn inner_range(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let at = |share: f64| values[((values.len() - 1) as f64 * share) as usize];
+    if values.is_empty() {
+        0.0
+    } else {
+        at(0.95) - at(0.05)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tilted_road_is_measured() {
+        let tilt = 3.0_f64.to_radians();
+        let normal = Vector3::new(0.0, -tilt.cos(), tilt.sin());
+        let mut points = Vec::new();
+        for i in 0..600 {
+            let noise = |k: f64| ((f64::from(i) * k).sin() * 43758.5453).fract();
+            let (x, z) = (3.5 * noise(1.3), 9.0 + 6.0 * noise(2.1));
+            // n·X = −h with h = 1.65.
+            let y = (-1.65 - normal.x * x - normal.z * z) / normal.y;
+            let car = if i % 5 == 0 { 0.6 } else { 0.0 };
+            points.push(Vector3::new(x, y - car + 0.01 * noise(3.7), z));
+        }
+        let (n, height) = plane(&points, &-Vector3::y()).unwrap();
+        assert!((n - normal).norm() < 0.004, "{n}");
+        assert!((height - 1.65).abs() < 0.02, "{height}");
+    }
+
+    #[test]
+    fn no_road_no_plane() {
+        assert!(plane(&[], &-Vector3::y()).is_none());
+        let wall: Vec<_> = (0..500)
+            .map(|i| Vector3::new(0.0, -f64::from(i) * 0.01, 8.0))
+            .collect();
+        assert!(plane(&wall, &-Vector3::y()).is_none());
+        // A roof is as flat as a road, and short.
+        let roof: Vec<_> = (0..500)
+            .map(|i| Vector3::new(f64::from(i % 20) * 0.08, 1.0, 9.0 + f64::from(i / 20) * 0.1))
+            .collect();
+        assert!(plane(&roof, &-Vector3::y()).is_none());
+    }
+}

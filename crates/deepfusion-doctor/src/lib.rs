@@ -1,0 +1,233 @@
+//! Every reason why training on a recording would fail, or give depths of a wrong scale, before it starts.
+//!
+//! [`doctor`] opens a recording and lets one check after the other look at it. A check measures a figure and compares
+//! it with a limit; what does not keep to it is a [`Finding`] with a remedy. The limits are such that the clean drives
+//! at hand (KITTI 0005 and 0009, the simulator's five places) keep to all of them.
+
+mod blur;
+mod bonnet;
+mod clock;
+mod duplicates;
+mod dynamic_points;
+mod epipolar;
+mod exposure;
+mod finding;
+mod flow;
+mod ground;
+mod heading;
+mod intrinsics;
+mod lidar_speed;
+mod look;
+mod opening;
+mod parallax;
+mod plots;
+mod speed;
+mod standing;
+mod steering;
+mod stereo;
+mod survey;
+mod timing;
+mod turn;
+
+pub use finding::{Figure, Finding, Limit, Outcome, Severity, Status};
+pub use plots::{DrivePlots, Line};
+
+use deepfusion_data::{
+    Cameras, ClockOffset, Dataset, DatasetKind, Error, Inspection, OpenOptions, Result,
+};
+use deepfusion_hint::Hint;
+use deepfusion_motion::TimeOffset;
+use serde::Serialize;
+use std::path::Path;
+use survey::Survey;
+
+/// What the checks say about a recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// What is wrong with the recording as a whole: it cannot be opened, its cameras are swapped.
+    pub recording: Vec<Outcome>,
+    /// Each drive by itself.
+    pub drives: Vec<DriveDiagnosis>,
+}
+
+/// What the checks say about one drive.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DriveDiagnosis {
+    /// The drive's name.
+    pub name: String,
+    /// The camera looked at: 2 or 3.
+    pub camera: u8,
+    /// The layout.
+    pub kind: DatasetKind,
+    /// Its images.
+    pub frames: usize,
+    /// How many of them were looked at.
+    pub looked_at: usize,
+    /// Check by check.
+    pub outcomes: Vec<Outcome>,
+    /// What was measured over time, to be drawn.
+    #[serde(skip)]
+    pub plots: DrivePlots,
+}
+
+impl Diagnosis {
+    /// Of a recording that cannot be opened: why, and what to do about it.
+    #[must_use]
+    pub fn unopened(why: String, remedy: Option<String>) -> Self {
+        let others = CHECKS.iter().filter(|check| **check != opening::CHECK);
+        let skipped =
+            |check: &&'static str| Outcome::skipped(check, "the recording cannot be opened");
+        let failed = std::iter::once(opening::failed(why, remedy));
+        Self {
+            recording: failed.chain(others.map(skipped)).collect(),
+            drives: Vec::new(),
+        }
+    }
+
+    /// All findings with the drive they are about, the worst first.
+    #[must_use]
+    pub fn findings(&self) -> Vec<(Option<&str>, &Finding)> {
+        let whole = self.recording.iter().map(|outcome| (None, outcome));
+        let drives = self.drives.iter().flat_map(|drive| {
+            let named = |outcome| (Some(drive.name.as_str()), outcome);
+            drive.outcomes.iter().map(named)
+        });
+        let mut found: Vec<(Option<&str>, &Finding)> = whole
+            .chain(drives)
+            .flat_map(|(name, outcome)| outcome.findings.iter().map(move |f| (name, f)))
+            .collect();
+        found.sort_by_key(|(_, finding)| std::cmp::Reverse(finding.severity));
+        found
+    }
+
+    /// The worst of the findings.
+    #[must_use]
+    pub fn worst(&self) -> Option<Severity> {
+        self.findings().first().map(|(_, finding)| finding.severity)
+    }
+}
+
+/// Every check by its name, in the order in which they are told: those of a drive, and that of both cameras.
+const CHECKS: [&str; 18] = [
+    "opening",
+    "timing",
+    "duplicates",
+    "intrinsics",
+    "standing",
+    "speed",
+    "lidar-speed",
+    "dynamic-points",
+    "steering",
+    "clock",
+    "turn",
+    "heading",
+    "ground",
+    "parallax",
+    "exposure",
+    "blur",
+    "bonnet",
+    "stereo",
+];
+
+/// Examines a recording of any layout; `intrinsics` as [`OpenOptions::intrinsics`]. A recording that cannot be opened
+/// is a finding, not an error.
+#[must_use]
+pub fn doctor(path: &Path, intrinsics: Option<[f64; 4]>) -> Diagnosis {
+    let options = OpenOptions {
+        intrinsics,
+        ..OpenOptions::default()
+    };
+    doctor_with(path, &options).unwrap_or_else(|e| Diagnosis::unopened(e.to_string(), e.hint()))
+}
+
+/// [`doctor`] with a camera or a clock offset given; camera and split of the options are not looked at.
+///
+/// # Errors
+/// Those of [`Dataset::open`]: a recording that cannot be opened is a finding in the words of whoever asks
+/// ([`Diagnosis::unopened`]).
+pub fn doctor_with(path: &Path, options: &OpenOptions) -> Result<Diagnosis> {
+    let open = |camera| {
+        let options = OpenOptions {
+            camera,
+            split: None,
+            ..options.clone()
+        };
+        Dataset::open(path, &options)
+    };
+    let datasets = match open(Cameras::Left) {
+        Err(Error::NoImages { .. }) => open(Cameras::Right),
+        other => other,
+    }?;
+    let trains = datasets.iter().any(|d| opening::pairs(d).is_ok());
+    let drives = datasets.iter().map(|d| examine_among(d, trains));
+    Ok(Diagnosis {
+        drives: drives.collect(),
+        recording: vec![stereo::check(path, options)],
+    })
+}
+
+/// Examines one drive.
+#[must_use]
+pub fn examine(dataset: &Dataset) -> DriveDiagnosis {
+    examine_among(dataset, false)
+}
+
+/// Examines a drive of several, of which another one trains or not.
+fn examine_among(dataset: &Dataset, others_train: bool) -> DriveDiagnosis {
+    let survey = Survey::of(dataset);
+    let pairs = epipolar::pairs(&survey);
+    let outcomes = vec![
+        opening::check(&survey, others_train),
+        timing::check(dataset),
+        duplicates::check(&survey),
+        intrinsics::check(&dataset.intrinsics(0)),
+        standing::check(dataset),
+        speed::check(dataset),
+        lidar_speed::check(dataset),
+        dynamic_points::check(dataset),
+        steering::check(dataset),
+        clock::check(&survey, &pairs),
+        turn::check(&pairs),
+        heading::check(&survey, &pairs),
+        ground::check(dataset),
+        parallax::check(&survey, &pairs),
+        exposure::check(&survey),
+        blur::check(&survey),
+        bonnet::check(&survey),
+    ];
+    DriveDiagnosis {
+        name: dataset.name().to_owned(),
+        camera: dataset.camera().number(),
+        kind: dataset.kind(),
+        frames: dataset.frames().len(),
+        looked_at: survey.frames.len(),
+        outcomes,
+        plots: DrivePlots::of(&survey, &pairs),
+    }
+}
+
+/// The offset of the camera's clock to the vehicle's, as the check `clock` measures it: by how a sample of the pictures
+/// moved. `None` without speeds and turns, or where the drive does not show it to 0.05 s.
+#[must_use]
+pub fn time_offset(dataset: &Dataset) -> Option<TimeOffset> {
+    // Without them no picture need be read.
+    dataset.track().filter(|_| dataset.yaw_known())?;
+    let survey = Survey::of(dataset);
+    let pairs = epipolar::pairs(&survey);
+    let estimate = clock::estimate(&survey, &pairs).ok()?;
+    Some(estimate.offset)
+}
+
+/// [`deepfusion_data::inspect_with`] with the offset of the clocks measured by [`time_offset`], where one drive is looked at: a
+/// few hundred pictures are read for it.
+///
+/// # Errors
+/// As [`deepfusion_data::inspect`].
+pub fn inspect(path: &Path, options: &OpenOptions) -> Result<Inspection> {
+    deepfusion_data::inspect_with(path, options, |dataset| {
+        time_offset(dataset).map(|offset| ClockOffset {
+            vehicle_minus_camera_s: offset.vehicle_minus_camera_s,
+            std_error_s: offset.std_error_s,
+        })
+    })
+}

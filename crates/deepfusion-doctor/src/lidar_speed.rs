@@ -1,0 +1,88 @@
+//! The vehicle's speed against the radial velocities of an FMCW LiDAR.
+
+use super::finding::{Figure, Limit, Outcome, Severity, median};
+use deepfusion_data::{Dataset, LidarMotion};
+use nalgebra::Vector3;
+
+/// Scans looked at.
+const MOST_SCANS: usize = 40;
+/// Slower scans tell no ratio, m/s.
+const MOVING_MPS: f64 = 1.0;
+const LEAST_SCANS: usize = 4;
+/// Speed by the vehicle over speed by the LiDAR.
+const RATIO: Limit = Limit::Within(0.95, 1.05);
+/// Sideways speed over speed, as an angle in degrees: the LiDAR's yaw on the vehicle.
+const MOST_SIDEWAYS_DEG: f64 = 1.5;
+/// Upward speed over speed, as an angle in degrees: its pitch. A loaded boot lifts the nose by some tenths, and few rays look up
+/// or down.
+const MOST_UPWARD_DEG: f64 = 2.0;
+
+pub(super) fn check(dataset: &Dataset) -> Outcome {
+    let motions = match dataset.lidar_motion(MOST_SCANS) {
+        Ok(motions) => motions,
+        Err(error) => return Outcome::skipped("lidar-speed", error.to_string()),
+    };
+    let moving: Vec<_> = motions
+        .iter()
+        .filter(|m| m.by_scan_mps.norm().max(m.by_vehicle_mps.norm()) > MOVING_MPS)
+        .collect();
+    if moving.len() < LEAST_SCANS {
+        let why = "no LiDAR with radial velocities, or no scans of it while the vehicle moves";
+        return Outcome::skipped("lidar-speed", why);
+    }
+    let ratio = median(
+        moving
+            .iter()
+            .map(|m| m.by_vehicle_mps.x / m.by_scan_mps.x)
+            .collect(),
+    );
+    let off = |axis: usize| {
+        let angle = |v: &Vector3<f64>| v[axis].atan2(v.x.abs());
+        let apart = |m: &&LidarMotion| angle(&m.by_scan_mps) - angle(&m.by_vehicle_mps);
+        median(moving.iter().map(apart).collect()).to_degrees()
+    };
+    let (sideways, upward) = (off(1), off(2));
+    let mut outcome = Outcome::new("lidar-speed");
+    let figure = Figure::new(
+        "speed by the vehicle over speed by the LiDAR",
+        ratio,
+        "",
+        RATIO,
+    );
+    outcome.judge(Severity::Error, figure, || {
+        (
+            format!("the vehicle's speed is {ratio:.2} times what the LiDAR's {} scans say: depths would come out {ratio:.2} times as large", moving.len()),
+            "see the speed signal's unit and factor (km/h is 3.6), and lidar.receding for the sign of the radial velocities".into(),
+        )
+    });
+    let limit = Limit::Within(-MOST_SIDEWAYS_DEG, MOST_SIDEWAYS_DEG);
+    let figure = Figure::new(
+        "the LiDAR drifts to the left by",
+        sideways,
+        "degrees",
+        limit,
+    );
+    outcome.judge(Severity::Warning, figure, || {
+        (
+            format!(
+                "by its radial velocities the LiDAR drives {:.1} degrees to the {} of where its mount says",
+                sideways.abs(),
+                if sideways > 0.0 { "left" } else { "right" }
+            ),
+            "correct the yaw of cam_from_lidar or of cam_from_vehicle by that angle".into(),
+        )
+    });
+    let limit = Limit::Within(-MOST_UPWARD_DEG, MOST_UPWARD_DEG);
+    let figure = Figure::new("the LiDAR climbs by", upward, "degrees", limit);
+    outcome.judge(Severity::Warning, figure, || {
+        (
+            format!(
+                "by its radial velocities the LiDAR drives {:.1} degrees {} where its mount says",
+                upward.abs(),
+                if upward > 0.0 { "above" } else { "below" }
+            ),
+            "correct the pitch of cam_from_lidar or of cam_from_vehicle by that angle".into(),
+        )
+    });
+    outcome
+}

@@ -1,0 +1,44 @@
+//! Whether the picture moves enough for depth to be seen.
+
+use super::epipolar::{EpipolarPair, YawTrust};
+use super::finding::{Figure, Limit, Outcome, Severity, median};
+use super::survey::Survey;
+
+/// Width at which networks train, pixels.
+const TRAINING_WIDTH: f64 = 640.0;
+/// Median movement of the followed points that is left once the turn is taken out, pixels a frame at that width.
+const LEAST_PX: f64 = 0.1;
+/// Standing pairs are another check's.
+const MOVING_MPS: f64 = 0.5;
+
+pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
+    let k = &survey.intrinsics;
+    let scale = k.fx * TRAINING_WIDTH / f64::from(k.width) / survey.stride as f64;
+    let moved: Vec<f64> = pairs
+        .iter()
+        .filter(|p| p.speed_mps > MOVING_MPS)
+        .filter_map(|p| Some(scale * p.turn(&p.direction()?, YawTrust(0.001))?.parallax))
+        .collect();
+    if moved.is_empty() {
+        return Outcome::skipped(
+            "parallax",
+            "no moving pair with points to follow and a yaw rate",
+        );
+    }
+    let mut outcome = Outcome::new("parallax");
+    let moved = median(moved);
+    let figure = Figure::new(
+        "median parallax at 640 pixels' width",
+        moved,
+        "px a frame",
+        Limit::AtLeast(LEAST_PX),
+    );
+    outcome.judge(Severity::Warning, figure, || {
+        (
+            "from frame to frame the picture hardly moves: what is taught lies below the images' noise".into(),
+            "take frames further apart (frames = [3], or frame_distance_m = 0.2, in the training's configuration), or drives at \
+             more speed".into(),
+        )
+    });
+    outcome
+}

@@ -1,0 +1,86 @@
+//! The speeds against the road in the images, and against the recording's own poses.
+
+use super::finding::{Figure, Limit, Outcome, Severity};
+use deepfusion_data::{
+    CameraPath, Dataset, DatasetKind, PLAUSIBLE_HEIGHT_M, SpeedWarning, road_camera_height,
+};
+
+/// Way by the poses over way by the speeds.
+const RATIO: Limit = Limit::Within(0.95, 1.05);
+/// Shorter ways prove nothing, metres.
+const LEAST_WAY_M: f64 = 5.0;
+
+pub(super) fn check(dataset: &Dataset) -> Outcome {
+    let mut outcome = Outcome::new("speed");
+    by_road(dataset, &mut outcome);
+    by_poses(dataset, &mut outcome);
+    if outcome.measured.is_empty() && outcome.skipped.is_none() {
+        outcome.skipped =
+            Some("no road to see (too dark, too plain, or no yaw rate), and no poses".into());
+    }
+    outcome
+}
+
+fn by_road(dataset: &Dataset, outcome: &mut Outcome) {
+    let (height_m, pairs) = match road_camera_height(dataset) {
+        Ok(Some(seen)) => seen,
+        Ok(None) => return,
+        Err(error) => {
+            outcome.skipped = Some(error.to_string());
+            return;
+        }
+    };
+    let limit = Limit::Within(*PLAUSIBLE_HEIGHT_M.start(), *PLAUSIBLE_HEIGHT_M.end());
+    let figure = Figure::new("camera height by the road's motion", height_m, "m", limit);
+    let warning = SpeedWarning::of_height(height_m, pairs);
+    outcome.judge(Severity::Error, figure, || {
+        let unit = warning.and_then(|w| w.likely_unit());
+        (
+            warning.map_or_else(String::new, |w| w.to_string()),
+            match unit {
+                Some(unit) => format!("divide the speeds: they seem to be in {unit} (speed_unit says so for tables and bare numbers)"),
+                None => "see the speed signal's unit and factor, and the camera's focal length".into(),
+            },
+        )
+    });
+}
+
+/// A bag's poses come from another unit than its speeds; elsewhere both are one unit's.
+fn by_poses(dataset: &Dataset, outcome: &mut Outcome) {
+    if dataset.kind() != DatasetKind::Bag {
+        return;
+    }
+    let (Ok(paths), Some(track)) = (dataset.camera_paths(), dataset.track()) else {
+        return;
+    };
+    let (mut by_poses, mut by_speeds) = (0.0, 0.0);
+    for CameraPath {
+        times_s,
+        world_from_cam,
+        ..
+    } in &paths
+    {
+        for (times, poses) in times_s.windows(2).zip(world_from_cam.windows(2)) {
+            if let Some(motion) = track.motion(times[0], times[1])
+                && let Some(mount) = dataset.cam_from_vehicle()
+            {
+                by_speeds += motion.camera0_from_camera1(&mount).translation().norm();
+                by_poses += (poses[1].translation() - poses[0].translation()).norm();
+            }
+        }
+    }
+    if by_speeds.max(by_poses) < LEAST_WAY_M {
+        return;
+    }
+    let ratio = by_poses / by_speeds;
+    let figure = Figure::new("way by the poses over way by the speeds", ratio, "", RATIO);
+    outcome.judge(Severity::Error, figure, || {
+        (
+            format!(
+                "the poses go {by_poses:.0} m, the speeds {by_speeds:.0} m: depths would come out {:.2} times as large",
+                1.0 / ratio
+            ),
+            "see the speed signal's unit and factor (km/h is 3.6, a worn tyre 1.02)".into(),
+        )
+    });
+}

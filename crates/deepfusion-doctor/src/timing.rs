@@ -1,0 +1,112 @@
+//! Rates, gaps and lost frames, by the frames' numbers and time stamps; and times at which the vehicle's motion is not
+//! known, by its own.
+
+use super::finding::{Figure, Limit, Outcome, Severity, median};
+use deepfusion_data::Dataset;
+
+/// Share of frames that may be missing, percent: KITTI's and the simulator's drives miss none.
+const MOST_LOST: f64 = 1.0;
+/// Share of the time between frames at which the motion may be unknown, percent. Sensors start and end some frames apart.
+const MOST_UNKNOWN: f64 = 2.0;
+/// Intervals longer than so many usual ones are gaps.
+const GAP: f64 = 1.5;
+
+pub(super) fn check(dataset: &Dataset) -> Outcome {
+    let mut outcome = Outcome::new("timing");
+    let frames = dataset.frames();
+    let steps: Vec<(u64, f64, u64)> = frames
+        .windows(2)
+        .filter_map(|w| {
+            let apart = w[1].time_s? - w[0].time_s?;
+            Some((w[1].number, apart, w[1].number - w[0].number))
+        })
+        .collect();
+    if steps.is_empty() {
+        return Outcome::skipped("timing", "the frames have no time stamps");
+    }
+    for (number, apart, _) in steps.iter().filter(|(_, apart, _)| *apart <= 0.0) {
+        outcome.find(
+            Severity::Error,
+            Some(*number),
+            format!("its time stamp is {:.3} s before the frame before", -apart),
+            "sort the frames by time, or correct the time stamps",
+        );
+    }
+    let usual = median(
+        steps
+            .iter()
+            .map(|(_, apart, n)| apart / *n as f64)
+            .collect(),
+    );
+    // A number that is missing is a frame that is missing; where numbers go on, the time tells.
+    let lost_in = |apart: f64, numbers: u64| {
+        let by_time = if apart > GAP * usual * numbers as f64 {
+            (apart / usual).round() - numbers as f64
+        } else {
+            0.0
+        };
+        numbers as f64 - 1.0 + by_time.max(0.0)
+    };
+    let lost: f64 = steps.iter().map(|(_, apart, n)| lost_in(*apart, *n)).sum();
+    let first = steps.iter().find(|(_, apart, n)| lost_in(*apart, *n) > 0.0);
+    let share = 100.0 * lost / (lost + frames.len() as f64);
+    let figure = Figure::new("lost frames", share, "%", Limit::AtMost(MOST_LOST));
+    let first = first.map(|(number, _, _)| *number);
+    outcome.judge_at(Severity::Warning, first, figure, || {
+        let at = first.unwrap_or(0);
+        (
+            format!(
+                "{lost:.0} frames are missing at {:.1} frames a second, the first before frame {at}: pairs across \
+                 a gap are left out or move further than others",
+                1.0 / usual
+            ),
+            "find out where the recorder drops frames (disk, network, queue length), or cut the recording there"
+                .into(),
+        )
+    });
+    unknown_motion(dataset, &mut outcome);
+    outcome
+}
+
+/// Where the speed has gaps, no pair can train: nothing is made up across them.
+fn unknown_motion(dataset: &Dataset, outcome: &mut Outcome) {
+    let Some(track) = dataset.track() else { return };
+    let (mut unknown, mut all, mut stretches, mut first) = (0.0, 0.0, 0, None);
+    let mut known = true;
+    for pair in dataset.frames().windows(2) {
+        let (Some(from_s), Some(to_s)) = (pair[0].time_s, pair[1].time_s) else {
+            continue;
+        };
+        if to_s <= from_s {
+            continue;
+        }
+        all += to_s - from_s;
+        let is_known = track.motion(from_s, to_s).is_some();
+        if !is_known {
+            unknown += to_s - from_s;
+            stretches += usize::from(known);
+            first = first.or(Some(pair[0].number));
+        }
+        known = is_known;
+    }
+    if all <= 0.0 {
+        return;
+    }
+    let share = 100.0 * unknown / all;
+    let figure = Figure::new(
+        "time without a motion",
+        share,
+        "%",
+        Limit::AtMost(MOST_UNKNOWN),
+    );
+    outcome.judge_at(Severity::Warning, first, figure, || {
+        let at = first.unwrap_or(0);
+        (
+            format!(
+                "the vehicle's motion is unknown for {unknown:.1} s in {stretches} stretches, the first from frame {at}: \
+                 its speed has gaps there, and no pair of these frames can train"
+            ),
+            "find out where the recorder drops messages of the speed, or cut the recording there".into(),
+        )
+    });
+}

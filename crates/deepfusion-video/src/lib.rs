@@ -1,0 +1,16 @@
+//! Videos, cameras and streams, all through the ffmpeg that the user has installed.
+//!
+//! [`VideoFrames`] gives a file's frames in any order, [`write_video`] makes a file of pictures, and [`LiveSource`] takes the
+//! newest frame of a camera or stream. Without ffmpeg each says so, and what to do; nothing is linked.
+
+mod error;
+mod frames;
+mod live;
+mod probe;
+mod program;
+mod write;
+
+pub use error::{Error, Result};
+pub use frames::VideoFrames;
+pub use live::{Address, LiveFrame, LiveSource, Taken};
+pub use write::{Shown, can_write_video, shown_for, write_video};

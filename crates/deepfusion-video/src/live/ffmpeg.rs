@@ -1,0 +1,256 @@
+//! The ffmpeg that decodes a source.
+
+use super::address::Address;
+use super::ppm;
+use super::slot::Slot;
+use crate::Result;
+use crate::program::not_started;
+use std::collections::VecDeque;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Lines of ffmpeg's complaints that are kept: the last ones tell why it ended.
+const LINES: usize = 6;
+/// How long an ffmpeg that has closed its pipe may take to end.
+const GRACE: Duration = Duration::from_secs(2);
+
+/// A running ffmpeg, with the threads that read what it gives and says. Dropping it kills and buries it; the threads
+/// end with its pipes.
+#[derive(Debug)]
+pub(super) struct Ffmpeg {
+    child: Child,
+    slot: Arc<Slot>,
+    said: Arc<Mutex<VecDeque<String>>>,
+    listener: Option<JoinHandle<()>>,
+}
+
+/// How an ffmpeg ended.
+#[derive(Debug)]
+pub(super) struct End {
+    code: Option<i32>,
+    said: Vec<String>,
+}
+
+impl Ffmpeg {
+    /// Starts it. `old_names`: as before ffmpeg 5.1.
+    ///
+    /// # Errors
+    /// [`crate::Error::Program`].
+    pub(super) fn start(address: &Address, old_names: bool) -> Result<Self> {
+        let mut command = Command::new("ffmpeg");
+        command
+            .args(["-nostdin", "-hide_banner", "-v", "error"])
+            // No frame waits for others to be decoded with it.
+            .args(["-flags", "low_delay"])
+            // Nor does the first for twenty others to tell the rate, or for five seconds in which a sound might be found.
+            .args(["-fpsprobesize", "0", "-analyzeduration", "500000"])
+            .args(address.input(std::env::consts::OS)?)
+            .args(["-map", "0:v:0"])
+            // None doubled or dropped to keep a rate.
+            .args([
+                if old_names { "-vsync" } else { "-fps_mode" },
+                "passthrough",
+            ])
+            .args(["-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24"])
+            .args(["-flush_packets", "1", "pipe:1"])
+            .stdin(if address.is_stdin() {
+                Stdio::inherit()
+            } else {
+                Stdio::null()
+            })
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        out_of_reach_of_ctrl_c(&mut command);
+        let mut child = command.spawn().map_err(|e| {
+            let name = address.to_string();
+            let remedy = "install ffmpeg so that it is on the PATH; it opens cameras and streams";
+            not_started(Path::new(&name), "ffmpeg", &e, "read live sources", remedy)
+        })?;
+        let slot = Arc::new(Slot::new());
+        let said = Arc::new(Mutex::new(VecDeque::new()));
+        if let Some(pipe) = child.stdout.take() {
+            let slot = slot.clone();
+            std::thread::spawn(move || read_frames(pipe, &slot));
+        }
+        let listener = child.stderr.take().map(|pipe| {
+            let said = said.clone();
+            std::thread::spawn(move || listen(pipe, &said))
+        });
+        Ok(Self {
+            child,
+            slot,
+            said,
+            listener,
+        })
+    }
+
+    /// Where its newest frame is.
+    pub(super) fn slot(&self) -> &Slot {
+        &self.slot
+    }
+
+    /// Waits for its end after its pipe was closed, and sees to it where it takes too long.
+    pub(super) fn end(&mut self) -> End {
+        let begun = Instant::now();
+        let mut code = None;
+        while begun.elapsed() < GRACE {
+            let status = self.child.try_wait().ok().flatten();
+            let heard = self.listener.as_ref().is_none_or(JoinHandle::is_finished);
+            if let Some(status) = status {
+                code = status.code();
+                if heard {
+                    break;
+                }
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let said = self.said();
+        End { code, said }
+    }
+
+    /// Its last words so far.
+    pub(super) fn said(&self) -> Vec<String> {
+        let said = self.said.lock().unwrap_or_else(PoisonError::into_inner);
+        said.iter().cloned().collect()
+    }
+}
+
+impl Drop for Ffmpeg {
+    fn drop(&mut self) {
+        // It may have ended by itself: then there is nothing to kill.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Ctrl-C in a terminal goes to all its programs; this one's end is this program's to choose, after the frames at work.
+fn out_of_reach_of_ctrl_c(command: &mut Command) {
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(command, 0);
+    #[cfg(windows)]
+    {
+        const CREATE_NEW_PROCESS_GROUP: u32 = 0x200;
+        std::os::windows::process::CommandExt::creation_flags(command, CREATE_NEW_PROCESS_GROUP);
+    }
+}
+
+/// Reads frames as fast as they come, so that none waits in a pipe.
+fn read_frames(pipe: impl Read, slot: &Slot) {
+    let mut pipe = BufReader::with_capacity(1 << 16, pipe);
+    let mut spare = Vec::new();
+    let problem = loop {
+        match ppm::read(&mut pipe, spare) {
+            Ok(Some(image)) => spare = slot.put(image),
+            Ok(None) => break None,
+            Err(error) => break Some(format!("cannot be read: {error}")),
+        }
+    };
+    slot.close(problem);
+}
+
+/// Keeps the last lines that it says.
+fn listen(pipe: impl Read, said: &Mutex<VecDeque<String>>) {
+    for line in BufReader::new(pipe)
+        .split(b'\n')
+        .map_while(std::io::Result::ok)
+    {
+        let line = String::from_utf8_lossy(&line).trim().to_owned();
+        if line.is_empty() {
+            continue;
+        }
+        let mut said = said.lock().unwrap_or_else(PoisonError::into_inner);
+        if said.len() == LINES {
+            said.pop_front();
+        }
+        said.push_back(line);
+    }
+}
+
+/// What ffmpeg says when a source is lost, though it may end with code 0 then; damaged frames are complained about too,
+/// and are no loss.
+const LOSSES: [&str; 7] = [
+    "Input/output error",
+    "ends prematurely",
+    "Connection reset",
+    "timed out",
+    "Network is unreachable",
+    "No route to host",
+    "Error during demuxing",
+];
+
+impl End {
+    /// Whether it ended because its source did.
+    pub(super) fn is_clean(&self) -> bool {
+        self.code == Some(0) && !self.said_one_of(&LOSSES)
+    }
+
+    /// Whether it is too old for `-fps_mode`.
+    pub(super) fn knows_no_option(&self) -> bool {
+        self.said_one_of(&["'fps_mode'"])
+    }
+
+    /// Whether one of the texts is in what it said.
+    pub(super) fn said_one_of(&self, texts: &[&str]) -> bool {
+        let mut said = self.said.iter();
+        said.any(|line| texts.iter().any(|text| line.contains(text)))
+    }
+
+    /// Its exit code and last words.
+    pub(super) fn told(&self) -> String {
+        let code = match self.code {
+            Some(code) => format!("ended with code {code}"),
+            None => "was ended".into(),
+        };
+        code + &quoted(&self.said)
+    }
+}
+
+/// What it said, to be put behind what happened.
+pub(super) fn quoted(said: &[String]) -> String {
+    if said.is_empty() {
+        String::new()
+    } else {
+        format!(", saying\n  {}", said.join("\n  "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn end(code: i32, said: &[&str]) -> End {
+        End {
+            code: Some(code),
+            said: said.iter().map(|s| (*s).to_owned()).collect(),
+        }
+    }
+
+    #[test]
+    fn a_loss_is_told_from_an_end() {
+        assert!(end(0, &[]).is_clean());
+        assert!(end(0, &["[h264 @ 0x1] error while decoding MB 12 3"]).is_clean());
+        assert!(!end(1, &[]).is_clean());
+        assert!(
+            !end(
+                0,
+                &["[http @ 0x1] Stream ends prematurely at 3, should be 9"]
+            )
+            .is_clean()
+        );
+        assert!(end(1, &["Unrecognized option 'fps_mode'."]).knows_no_option());
+    }
+
+    #[test]
+    fn only_the_last_words_are_kept() {
+        let said = Mutex::new(VecDeque::new());
+        let text: String = (0..50).map(|i| format!("line {i}\n\n")).collect();
+        listen(text.as_bytes(), &said);
+        let said = said.into_inner().unwrap();
+        assert_eq!(said.len(), LINES);
+        assert_eq!(said.back().unwrap(), "line 49");
+    }
+}

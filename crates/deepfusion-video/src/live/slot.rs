@@ -1,0 +1,174 @@
+//! Room for one frame, between who reads the source and who looks at its frames.
+
+use image::RgbImage;
+use std::sync::{Condvar, Mutex, MutexGuard};
+use std::time::{Duration, Instant, SystemTime};
+
+/// A frame of a live source.
+#[derive(Debug, Clone)]
+pub struct LiveFrame {
+    /// Its place in the stream, counted from 0: skipped frames leave gaps.
+    pub number: u64,
+    /// What the camera saw.
+    pub image: RgbImage,
+    /// When its last pixel was here.
+    pub arrived: Instant,
+    /// The same on the wall's clock.
+    pub arrived_at: SystemTime,
+    /// Frames before it that nobody took.
+    pub dropped: u64,
+}
+
+/// Holds the newest frame that nobody took, and nothing else.
+#[derive(Debug)]
+pub(super) struct Slot {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Debug)]
+struct State {
+    newest: Option<LiveFrame>,
+    arrived: u64,
+    dropped: u64,
+    /// When the last frame came, or the wait for the first began.
+    last: Instant,
+    closed: Option<Option<String>>,
+}
+
+/// What a slot had.
+#[derive(Debug)]
+pub(super) enum Got {
+    Frame(LiveFrame),
+    Nothing {
+        /// How long there has been none, taken or not.
+        silence: Duration,
+    },
+    /// There will be no more; with what went wrong while reading.
+    Closed(Option<String>),
+}
+
+impl Slot {
+    /// Empty.
+    pub(super) fn new() -> Self {
+        let state = State {
+            newest: None,
+            arrived: 0,
+            dropped: 0,
+            last: Instant::now(),
+            closed: None,
+        };
+        Self {
+            state: Mutex::new(state),
+            changed: Condvar::new(),
+        }
+    }
+
+    /// Puts the next frame in. One that is still there is dropped: its buffer is given back for the next.
+    pub(super) fn put(&self, image: RgbImage) -> Vec<u8> {
+        let (arrived, arrived_at) = (Instant::now(), SystemTime::now());
+        let mut state = self.lock();
+        let old = state.newest.take();
+        state.dropped += u64::from(old.is_some());
+        state.newest = Some(LiveFrame {
+            number: state.arrived,
+            image,
+            arrived,
+            arrived_at,
+            dropped: state.dropped,
+        });
+        state.arrived += 1;
+        state.last = arrived;
+        drop(state);
+        self.changed.notify_all();
+        old.map_or_else(Vec::new, |frame| frame.image.into_raw())
+    }
+
+    /// Says that no more will come; `problem` where that is a failure.
+    pub(super) fn close(&self, problem: Option<String>) {
+        self.lock().closed.get_or_insert(problem);
+        self.changed.notify_all();
+    }
+
+    /// Takes the frame out, waiting no longer than `wait` for one. What is left is given before the end is told.
+    pub(super) fn take(&self, wait: Duration) -> Got {
+        let empty = |state: &mut State| state.newest.is_none() && state.closed.is_none();
+        let waited = self.changed.wait_timeout_while(self.lock(), wait, empty);
+        let (mut state, _) = waited.unwrap_or_else(|e| e.into_inner());
+        match (state.newest.take(), &state.closed) {
+            (Some(frame), _) => Got::Frame(frame),
+            (None, Some(problem)) => Got::Closed(problem.clone()),
+            (None, None) => Got::Nothing {
+                silence: state.last.elapsed(),
+            },
+        }
+    }
+
+    /// How many frames have come.
+    pub(super) fn arrived(&self) -> u64 {
+        self.lock().arrived
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // Nothing in here panics half-way.
+        self.state.lock().unwrap_or_else(|e| e.into_inner())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(value: u8) -> RgbImage {
+        RgbImage::from_pixel(2, 1, image::Rgb([value; 3]))
+    }
+
+    fn frame(slot: &Slot) -> LiveFrame {
+        match slot.take(Duration::ZERO) {
+            Got::Frame(frame) => frame,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn only_the_newest_is_kept_and_the_others_are_counted() {
+        let slot = Slot::new();
+        assert!(slot.put(picture(0)).is_empty());
+        for value in 1..=200 {
+            // One comes in, one goes out: there is never more than one.
+            assert_eq!(slot.put(picture(value)), [value - 1; 6]);
+        }
+        let newest = frame(&slot);
+        assert_eq!((newest.number, newest.dropped), (200, 200));
+        assert_eq!(newest.image, picture(200));
+        assert!(matches!(slot.take(Duration::ZERO), Got::Nothing { .. }));
+        slot.put(picture(201));
+        let next = frame(&slot);
+        assert_eq!((next.number, next.dropped), (201, 200));
+        assert_eq!(slot.arrived(), 202);
+    }
+
+    #[test]
+    fn the_last_frame_comes_before_the_end() {
+        let slot = Slot::new();
+        slot.put(picture(7));
+        slot.close(None);
+        slot.close(Some("later".into()));
+        assert_eq!(frame(&slot).number, 0);
+        assert!(matches!(slot.take(Duration::MAX), Got::Closed(None)));
+        assert!(matches!(slot.take(Duration::MAX), Got::Closed(None)));
+    }
+
+    #[test]
+    fn who_waits_is_woken() {
+        let slot = Slot::new();
+        std::thread::scope(|scope| {
+            let waiting = scope.spawn(|| slot.take(Duration::from_secs(60)));
+            slot.put(picture(1));
+            assert!(matches!(waiting.join().unwrap(), Got::Frame(_)));
+            let waiting = scope.spawn(|| slot.take(Duration::from_secs(60)));
+            slot.close(Some("broken".into()));
+            assert!(matches!(waiting.join().unwrap(), Got::Closed(Some(_))));
+        });
+    }
+}

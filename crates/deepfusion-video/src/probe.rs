@@ -1,0 +1,191 @@
+//! What ffprobe says of a video, without decoding it.
+
+use crate::program::{READ, run};
+use crate::{Error, Result};
+use jiff::{SignedDuration, Timestamp};
+use serde::Deserialize;
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+/// Seconds since 1970 from 2000 to 2100: a recorder that writes another date has no clock.
+const RECORDED_S: RangeInclusive<i64> = 946_684_800..=4_102_444_800;
+
+/// A video's frames before they are decoded.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Probed {
+    /// Width and height as shown, the recorder's rotation applied.
+    pub(crate) size: (u32, u32),
+    /// How many.
+    pub(crate) frames: usize,
+    /// Their times in order, in nanoseconds; `None` where the file has none.
+    pub(crate) times_ns: Option<Vec<i64>>,
+    /// When the recorder says that the video was made, in nanoseconds since 1970: its first frame of some recorders, its last of
+    /// others.
+    pub(crate) created_ns: Option<i64>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Answer {
+    #[serde(default)]
+    packets: Vec<Packet>,
+    #[serde(default)]
+    streams: Vec<StreamAnswer>,
+    #[serde(default)]
+    format: FormatAnswer,
+}
+
+#[derive(Debug, Default, Deserialize)]
+struct FormatAnswer {
+    #[serde(default)]
+    tags: Tags,
+}
+
+#[derive(Debug, Default, Deserialize)]
+struct Tags {
+    creation_time: Option<String>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Packet {
+    pts_time: Option<String>,
+    #[serde(default)]
+    flags: String,
+}
+
+#[derive(Debug, Deserialize)]
+struct StreamAnswer {
+    width: Option<u32>,
+    height: Option<u32>,
+    #[serde(default)]
+    side_data_list: Vec<SideData>,
+}
+
+#[derive(Debug, Deserialize)]
+struct SideData {
+    rotation: Option<f64>,
+}
+
+/// Looks at the first video stream. Its packets are listed rather than its frames: that needs no decoding,
+/// and each packet is a frame.
+pub(crate) fn probe(file: &Path) -> Result<Probed> {
+    let entries = "packet=pts_time,flags:stream=width,height:stream_side_data=rotation:format_tags=creation_time";
+    let arguments = [
+        "-v",
+        "error",
+        "-select_streams",
+        "v:0",
+        "-show_entries",
+        entries,
+        "-of",
+        "json",
+    ];
+    let mut arguments: Vec<&std::ffi::OsStr> = arguments.iter().map(|a| a.as_ref()).collect();
+    arguments.push(file.as_os_str());
+    let folder = file.parent().unwrap_or(Path::new("."));
+    parse(&run("ffprobe", &arguments, (file, READ), folder)?).map_err(|problem| Error::Program {
+        path: file.to_owned(),
+        program: "ffprobe",
+        problem,
+        remedy: "is it a video, and whole?",
+    })
+}
+
+fn parse(json: &[u8]) -> std::result::Result<Probed, String> {
+    let answer: Answer =
+        serde_json::from_slice(json).map_err(|e| format!("answered what cannot be read: {e}"))?;
+    let stream = answer.streams.first();
+    let stream = stream.ok_or("finds no video stream in it")?;
+    let (Some(width), Some(height)) = (stream.width, stream.height) else {
+        return Err("does not know the images' size".into());
+    };
+    let mut rotations = stream.side_data_list.iter().filter_map(|s| s.rotation);
+    let upright = rotations
+        .next_back()
+        .is_none_or(|r| (r / 90.0).round() % 2.0 == 0.0);
+    // `D`: cut off by the file's edit list, not shown and not decoded into a frame.
+    let shown: Vec<&Packet> = answer
+        .packets
+        .iter()
+        .filter(|p| !p.flags.contains('D'))
+        .collect();
+    if shown.is_empty() {
+        return Err("finds no frame in it".into());
+    }
+    let times = shown.iter().map(|p| nanoseconds(p.pts_time.as_ref()?));
+    let mut times_ns: Option<Vec<i64>> = times.collect();
+    if let Some(times) = &mut times_ns {
+        // Packets come in the order of decoding.
+        times.sort_unstable();
+    }
+    let distinct = times_ns.filter(|t| t.windows(2).all(|w| w[0] < w[1]));
+    Ok(Probed {
+        size: if upright {
+            (width, height)
+        } else {
+            (height, width)
+        },
+        frames: shown.len(),
+        times_ns: distinct,
+        created_ns: created(answer.format.tags.creation_time.as_deref()),
+    })
+}
+
+/// Decimal seconds, kept to the last digit.
+fn nanoseconds(seconds: &str) -> Option<i64> {
+    let time: SignedDuration = format!("{seconds}s").parse().ok()?;
+    i64::try_from(time.as_nanos()).ok()
+}
+
+/// A date with its zone; recorders without a clock write 1904 or 1970, which is none.
+fn created(word: Option<&str>) -> Option<i64> {
+    let stamp: Timestamp = word?.parse().ok()?;
+    let known = RECORDED_S.contains(&stamp.as_second());
+    known.then(|| i64::try_from(stamp.as_nanosecond()).ok())?
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn packets_become_frames_in_order_of_time() {
+        let json = br#"{"packets": [
+            {"pts_time": "0.080000", "flags": "K__"}, {"pts_time": "0.200000", "flags": "___"},
+            {"pts_time": "0.120000", "flags": "___"}, {"pts_time": "-0.040000", "flags": "_D_"}],
+            "streams": [{"width": 64, "height": 48}]}"#;
+        let probed = parse(json).unwrap();
+        assert_eq!((probed.size, probed.frames), ((64, 48), 3));
+        assert_eq!(
+            probed.times_ns.unwrap(),
+            [80_000_000, 120_000_000, 200_000_000]
+        );
+    }
+
+    #[test]
+    fn rotated_videos_are_as_wide_as_they_look() {
+        let json = br#"{"packets": [{"flags": "K__"}],
+            "streams": [{"width": 64, "height": 48, "side_data_list": [{"rotation": -90}]}]}"#;
+        let probed = parse(json).unwrap();
+        assert_eq!((probed.size, probed.times_ns), ((48, 64), None));
+    }
+
+    #[test]
+    fn no_video_is_told() {
+        for (json, problem) in [
+            ("{}", "no video stream"),
+            (r#"{"streams": [{}]}"#, "images' size"),
+            (r#"{"streams": [{"width": 1, "height": 1}]}"#, "no frame"),
+            ("x", "cannot be read"),
+        ] {
+            assert!(parse(json.as_bytes()).unwrap_err().contains(problem));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_never_panics(text in ".{0,80}") {
+            let _ = parse(text.as_bytes());
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! Pictures to a video file.
+
+use crate::program::{WRITE, in_either_words, output, run};
+use crate::{Error, Result};
+use image::ImageReader;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+/// A picture of a video, and for how long it is shown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shown {
+    /// Its name in the folder of all.
+    pub file: String,
+    /// Seconds, above 0.
+    pub seconds: f64,
+}
+
+/// ffmpeg takes a list's times in 25ths of a second, whatever they are: it is given a thousandfold, and sets them back.
+const FINER: f64 = 1000.0;
+
+/// Makes a video of pictures (PNG) that lie in a folder, with the user's ffmpeg: `name` (`*.mp4`) in the same folder, made
+/// aside and moved there when it is whole. Pictures of other sizes than the first are fitted into its size; each is shown
+/// for its own time. Without a picture there is no video.
+///
+/// # Errors
+/// [`Error::Program`] where ffmpeg is not installed, or fails at any of the pictures; [`Error::File`] where the folder
+/// cannot be written; [`Error::Picture`] where the first picture is none.
+pub fn write_video(folder: &Path, pictures: &[Shown], name: &str) -> Result<()> {
+    let Some(first) = pictures.first() else {
+        return Ok(());
+    };
+    let size = picture_size(&folder.join(&first.file))?;
+    // Whatever a run left here that was killed is replaced.
+    let aside = Aside::new(folder.join(format!(".{name}.partial")))?;
+    let list = concat_list(pictures, |i, picture| {
+        aside.take(&folder.join(&picture.file), i)
+    })?;
+    aside.write(LIST, &list)?;
+    let path = folder.join(name);
+    encode(&aside.0, size, &path)?;
+    deepfusion_fs::publish(&aside.0.join(PART), &path).map_err(|e| Error::file(&path, e))
+}
+
+/// Width and height of a picture, whatever its name ends in.
+fn picture_size(path: &Path) -> Result<(u32, u32)> {
+    let failed = |e| Error::file(path, e);
+    let reader = ImageReader::open(path).map_err(failed)?;
+    let reader = reader.with_guessed_format().map_err(failed)?;
+    reader.into_dimensions().map_err(|e| Error::Picture {
+        path: path.to_owned(),
+        problem: format!("cannot be decoded: {e}"),
+    })
+}
+
+/// Whether ffmpeg can be run at all, to know before hours of work.
+///
+/// # Errors
+/// [`Error::Program`] where it is not installed.
+pub fn can_write_video(path: &Path) -> Result<()> {
+    run("ffmpeg", &["-version"], (path, WRITE), Path::new(".")).map(|_| ())
+}
+
+const LIST: &str = "list";
+const PART: &str = "part";
+
+/// A folder of its own for what ffmpeg reads and writes: it takes colons and percent signs in names for something else. Goes
+/// away with this.
+struct Aside(PathBuf);
+
+impl Aside {
+    fn new(path: PathBuf) -> Result<Self> {
+        if path.exists() {
+            std::fs::remove_dir_all(&path).map_err(|e| Error::file(&path, e))?;
+        }
+        std::fs::create_dir(&path).map_err(|e| Error::file(&path, e))?;
+        Ok(Self(path))
+    }
+
+    /// Takes a picture in, and gives the name that it has here.
+    fn take(&self, picture: &Path, number: usize) -> Result<String> {
+        let name = format!("{number:08}.png");
+        let path = self.0.join(&name);
+        // Not every file system has links.
+        std::fs::hard_link(picture, &path)
+            .or_else(|_| std::fs::copy(picture, &path).map(|_| ()))
+            .map_err(|e| Error::file(picture, e))?;
+        Ok(name)
+    }
+
+    fn write(&self, name: &str, text: &str) -> Result<()> {
+        let path = self.0.join(name);
+        std::fs::write(&path, text).map_err(|e| Error::file(&path, e))
+    }
+}
+
+impl Drop for Aside {
+    fn drop(&mut self) {
+        // Best effort: what counts is whether the video was made.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
+    // Encoders of 4:2:0 want even sizes.
+    let [w, h] = [size.0, size.1].map(|s| s.next_multiple_of(2));
+    let filter = format!(
+        "settb=1/90000,setpts=PTS/{FINER},\
+         scale={w}:{h}:force_original_aspect_ratio=decrease,pad={w}:{h}:(ow-iw)/2:(oh-ih)/2,setsar=1"
+    );
+    let with = |mode: &str| {
+        let arguments: [&OsStr; 23] = [
+            "-v".as_ref(),
+            "error".as_ref(),
+            "-y".as_ref(),
+            "-f".as_ref(),
+            "concat".as_ref(),
+            "-safe".as_ref(),
+            "0".as_ref(),
+            "-i".as_ref(),
+            LIST.as_ref(),
+            "-vf".as_ref(),
+            filter.as_ref(),
+            "-pix_fmt".as_ref(),
+            "yuv420p".as_ref(),
+            mode.as_ref(),
+            "vfr".as_ref(),
+            "-enc_time_base".as_ref(),
+            "1:90000".as_ref(),
+            "-movflags".as_ref(),
+            "+faststart".as_ref(),
+            "-an".as_ref(),
+            "-f".as_ref(),
+            "mp4".as_ref(),
+            PART.as_ref(),
+        ];
+        let done = output("ffmpeg", &arguments, (video, WRITE), aside)?;
+        // It goes on after a picture that it cannot read, or ends there, and calls both a success.
+        if done.complaint.is_empty() {
+            Ok(())
+        } else {
+            Err(Error::Program {
+                path: video.to_owned(),
+                program: "ffmpeg",
+                problem: format!("made only a part of it: {}", done.complaint),
+                remedy: "see whether the disk is full and the pictures can be opened",
+            })
+        }
+    };
+    in_either_words(with)
+}
+
+/// ffmpeg's list of files, each under the name that `file` gives it; of the last one it would forget the time, were it not
+/// named again.
+fn concat_list(
+    pictures: &[Shown],
+    mut file: impl FnMut(usize, &Shown) -> Result<String>,
+) -> Result<String> {
+    let mut text = String::from("ffconcat version 1.0\n");
+    let mut last = String::new();
+    for (i, picture) in pictures.iter().enumerate() {
+        last = format!("file {}\n", file(i, picture)?);
+        text += &format!("{last}duration {:.6}\n", FINER * picture.seconds);
+    }
+    Ok(text + &last)
+}
+
+/// How long each frame of a recording is shown, from when they were taken: until the next one, 0.1 s where that is not
+/// known or not later, and no longer than a second.
+#[must_use]
+pub fn shown_for(times_s: &[Option<f64>]) -> Vec<f64> {
+    const UNKNOWN_S: f64 = 0.1;
+    const LONGEST_S: f64 = 1.0;
+    let until = |pair: &[Option<f64>]| match pair {
+        [Some(now), Some(next)] if next > now => (next - now).min(LONGEST_S),
+        _ => UNKNOWN_S,
+    };
+    let mut seconds: Vec<f64> = times_s.windows(2).map(until).collect();
+    if !times_s.is_empty() {
+        seconds.push(seconds.last().copied().unwrap_or(UNKNOWN_S));
+    }
+    seconds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_shown_until_the_next() {
+        let times = [
+            Some(1.0),
+            Some(1.25),
+            Some(1.25),
+            None,
+            Some(2.0),
+            Some(9.0),
+        ];
+        assert_eq!(shown_for(&times), [0.25, 0.1, 0.1, 0.1, 1.0, 1.0]);
+        assert_eq!(shown_for(&[]), [] as [f64; 0]);
+        assert_eq!(shown_for(&[None]), [0.1]);
+    }
+
+    #[test]
+    fn the_last_of_a_list_is_named_twice() {
+        let shown = |file: &str| Shown {
+            file: file.into(),
+            seconds: 0.04,
+        };
+        let pictures = [shown("a"), shown("b")];
+        let list = concat_list(&pictures, |i, picture| Ok(format!("{i}{}", picture.file)));
+        let expected = "ffconcat version 1.0\nfile 0a\nduration 40.000000\nfile 1b\nduration 40.000000\nfile 1b\n";
+        assert_eq!(list.unwrap(), expected);
+    }
+}
