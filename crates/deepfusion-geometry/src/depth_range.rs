@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 /// The range of depths a network can express, in metres, and its map to the sigmoid output
-/// (SPEC 1.1): d = 1/D_max + (1/D_min − 1/D_max)·σ, depth = 1/d.
+/// (docs/concepts/network.md): d = 1/D_max + (1/D_min − 1/D_max)·σ, depth = 1/d.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DepthRange {

@@ -184,7 +184,7 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
     }
 
     pub(crate) fn run(&mut self, image: &[f32], mut after: impl FnMut(&str, &str)) {
-        // An image may overflow and leave what is no number: of that nothing is read for the next one.
+        // An image may overflow and leave NaN in the arena; nothing of that may reach the next one.
         for places in &self.plan.stale {
             self.arena[places.clone()].fill(E::default());
         }
@@ -256,7 +256,7 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
         values
     }
 
-    /// Leaves the arena full of what is no number, as the worst of images might.
+    /// Fills the arena with NaN, as the worst of images might.
     pub(crate) fn poison(&mut self) {
         self.arena.fill(E::of(f32::NAN));
     }

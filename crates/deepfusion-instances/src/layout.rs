@@ -38,7 +38,7 @@ impl Layout {
     /// # Errors
     /// A sentence saying what is there instead.
     pub fn of(input: [usize; 2], outputs: &[Vec<usize>]) -> Result<Self, String> {
-        let told = || {
+        let found = || {
             let shape = |s: &Vec<usize>| {
                 let sizes: Vec<String> = s.iter().map(ToString::to_string).collect();
                 sizes.join("x")
@@ -62,7 +62,7 @@ impl Layout {
         let most = 1 + usize::from(prototypes.is_some());
         let [a, b] = candidates
             .filter(|_| outputs.len() == most)
-            .ok_or_else(told)?;
+            .ok_or_else(found)?;
         let coefficients = prototypes.map_or(0, |[count, ..]| count);
         let cells: usize = STRIDES
             .iter()
@@ -77,11 +77,11 @@ impl Layout {
         } else if b == 6 + coefficients && a <= MOST_FINAL_ROWS {
             (Kind::Final, a, b, 6)
         } else {
-            return Err(told());
+            return Err(found());
         };
-        let classes = fields.checked_sub(fixed + coefficients).ok_or_else(told)?;
+        let classes = fields.checked_sub(fixed + coefficients).ok_or_else(found)?;
         if kind != Kind::Final && classes == 0 {
-            return Err(told());
+            return Err(found());
         }
         Ok(Self {
             kind,
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn kinds_are_told_by_their_shapes() {
+    fn kinds_follow_from_shapes() {
         let of = |outputs: &[&[usize]]| {
             let outputs: Vec<Vec<usize>> = outputs.iter().map(|s| s.to_vec()).collect();
             Layout::of([640, 640], &outputs)
@@ -137,8 +137,8 @@ mod tests {
             &[],
         ];
         for outputs in strangers {
-            let told = of(outputs).unwrap_err();
-            assert!(told.contains("640x640"), "{told}");
+            let found = of(outputs).unwrap_err();
+            assert!(found.contains("640x640"), "{found}");
         }
     }
 }

@@ -197,7 +197,7 @@ fn input_size(inputs: &[TensorInfo]) -> std::result::Result<[usize; 2], String> 
     let [input] = inputs else {
         return Err(format!("{} inputs, expected one picture", inputs.len()));
     };
-    let told = || {
+    let found = || {
         let sizes = input
             .shape
             .iter()
@@ -214,6 +214,6 @@ fn input_size(inputs: &[TensorInfo]) -> std::result::Result<[usize; 2], String> 
         [None | Some(1), None | Some(3), height, width] if input.f32 => {
             Ok([height.unwrap_or(OPEN_SIZE), width.unwrap_or(OPEN_SIZE)])
         }
-        _ => Err(told()),
+        _ => Err(found()),
     }
 }

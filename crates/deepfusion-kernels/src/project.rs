@@ -1,4 +1,4 @@
-//! Where the pixels of one view lie in another (SPEC 2, Eq. 3–5), from inverse depth.
+//! Where the pixels of one view lie in another, from inverse depth (the paper's Eq. 3–5).
 //!
 //! p' ~ H·p̃ + d·s with d = 1/D, H = K·R·K⁻¹ and s = K·t: the camera's matrices are multiplied once an image,
 //! and inverse depth, which is what the network predicts, is never inverted.

@@ -171,7 +171,7 @@ pub fn identify(
         needed: config.least_turning_s,
         product_m: None,
     };
-    // A limit that is no number is met by nothing.
+    // No value satisfies a NaN limit.
     let turns = turning_s >= config.least_turning_s;
     if observations.len() < 20 || !turns {
         return Err(straight(turning_s));

@@ -103,12 +103,12 @@ impl GroundPair {
     /// where the road is not in view or has no texture.
     #[must_use]
     pub fn costs(&self, heights: &[f64]) -> Option<Vec<f64>> {
-        self.look(heights, 0.0).0
+        self.costs_and_pitch(heights, 0.0).0
     }
 
     /// As [`Self::costs`], for a camera that was pitched by `tilt` (radians, nose up) from its mount in the earlier frame,
     /// and how much more it is in the later one.
-    pub(crate) fn look(&self, heights: &[f64], tilt: f64) -> (Option<Vec<f64>>, f64) {
+    pub(crate) fn costs_and_pitch(&self, heights: &[f64], tilt: f64) -> (Option<Vec<f64>>, f64) {
         let (earlier, later) = (&self.earlier.0, &self.later.0);
         let pitch = self.pitch(earlier, later);
         let pitched = self.pitched(tilt, pitch);

@@ -140,8 +140,8 @@ impl ScaleMonitor {
         let way = pair.earlier_from_later.translation().norm();
         if way >= self.config.min_distance_m && way.is_finite() {
             match self.guess_m {
-                None => self.look_around(pair),
-                Some(guess) => self.look(pair, guess),
+                None => self.coarse_search(pair),
+                Some(guess) => self.refine(pair, guess),
             }
         }
         self.reading()
@@ -159,7 +159,7 @@ impl ScaleMonitor {
     /// before it drifts away; what is slow goes with the acceleration.
     fn costs(&mut self, pair: &GroundPair, heights: &[f64]) -> Option<Vec<f64>> {
         let tilt = self.tilt + self.config.pitch_per_acceleration * self.acceleration(pair);
-        let (costs, pitch) = pair.look(heights, tilt);
+        let (costs, pitch) = pair.costs_and_pitch(heights, tilt);
         self.tilt = TILT_KEPT * (self.tilt + pitch);
         costs
     }
@@ -182,7 +182,7 @@ impl ScaleMonitor {
     }
 
     /// Before anything is known: a coarse sweep over all heights that can be.
-    fn look_around(&mut self, pair: &GroundPair) {
+    fn coarse_search(&mut self, pair: &GroundPair) {
         let count = ((FIRST_M.1 / FIRST_M.0).ln() / 0.06).ceil() as usize;
         let heights: Vec<f64> = (0..=count)
             .map(|i| FIRST_M.0 * (0.06 * i as f64).exp())
@@ -196,7 +196,7 @@ impl ScaleMonitor {
         }
     }
 
-    fn look(&mut self, pair: &GroundPair, guess: f64) {
+    fn refine(&mut self, pair: &GroundPair, guess: f64) {
         let count = (2.0 * REACH / STEP).round() as usize;
         let heights: Vec<f64> = (0..=count)
             .map(|i| guess * (STEP * i as f64 - REACH).exp())

@@ -1,4 +1,4 @@
-//! A piece of a drive: an arc, and how a camera on the vehicle moved thereby (SPEC 3.4).
+//! One stretch of a drive as an arc, and the camera motion that follows from it (docs/concepts/ego-motion.md).
 
 use deepfusion_geometry::Se3;
 use nalgebra::{Rotation3, Vector3};
@@ -17,7 +17,7 @@ pub struct VehicleMotion {
 
 impl VehicleMotion {
     /// `vehicle0_from_vehicle1`: the car's frame at the end seen from its frame at the start, along
-    /// the arc Δ = d·sinc(θ/2)·(cos θ/2, sin θ/2, 0) with heading θ (SPEC 3.4).
+    /// the arc Δ = d·sinc(θ/2)·(cos θ/2, sin θ/2, 0) with heading θ.
     #[must_use]
     pub fn vehicle0_from_vehicle1(&self) -> Se3 {
         let half = 0.5 * self.yaw_rad;
@@ -50,8 +50,8 @@ impl VehicleMotion {
     pub fn camera0_from_camera1(&self, cam_from_vehicle: &Se3) -> Se3 {
         let level = *cam_from_vehicle * self.vehicle0_from_vehicle1() * cam_from_vehicle.inverse();
         let [roll, pitch] = self.tilt_rad;
-        let lean = Rotation3::from_euler_angles(roll, pitch, 0.0).scaled_axis();
-        level * Se3::from_axis_angle(cam_from_vehicle.rotate(&lean), Vector3::zeros())
+        let tilt = Rotation3::from_euler_angles(roll, pitch, 0.0).scaled_axis();
+        level * Se3::from_axis_angle(cam_from_vehicle.rotate(&tilt), Vector3::zeros())
     }
 }
 
@@ -119,16 +119,16 @@ mod tests {
             tilt_rad: [0.02, 0.03],
         };
         let mount = cam_from_vehicle(1.5, 1.2);
-        let (leaning, level) = [motion, motion.level()]
+        let (tilted, level) = [motion, motion.level()]
             .map(|m| m.camera0_from_camera1(&mount))
             .into();
-        assert!((leaning.translation() - level.translation()).norm() < 1e-12);
+        assert!((tilted.translation() - level.translation()).norm() < 1e-12);
         // The camera's y points down: looking down moves its axis to +y; Rz(yaw)·Ry(pitch) takes x to
         // z = −sin(pitch).
-        let axis = leaning.rotate(&Vector3::z());
+        let axis = tilted.rotate(&Vector3::z());
         assert!((axis.y - 0.03_f64.sin()).abs() < 1e-12, "{axis}");
         // The left side up: the camera's x (right) dips, by cos(pitch)·sin(roll).
-        let right = leaning.rotate(&Vector3::x());
+        let right = tilted.rotate(&Vector3::x());
         assert!(
             (right.y - 0.03_f64.cos() * 0.02_f64.sin()).abs() < 1e-12,
             "{right}"

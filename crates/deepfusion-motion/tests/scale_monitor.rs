@@ -148,12 +148,12 @@ fn a_height_that_was_measured_needs_no_learning() {
         ..ScaleMonitorConfig::default()
     };
     let first = readings(&drive, 1.0, 1.0, config.clone());
-    let told = first.iter().position(|r| r.ratio.is_some()).unwrap();
-    assert!(told < 60, "{told}");
+    let ready = first.iter().position(|r| r.ratio.is_some()).unwrap();
+    assert!(ready < 60, "{ready}");
     assert!(
-        (first[told].ratio.unwrap() - 1.0).abs() < 0.06,
+        (first[ready].ratio.unwrap() - 1.0).abs() < 0.06,
         "{:?}",
-        first[told]
+        first[ready]
     );
     // Half the true height: an alarm from the first reading on.
     let wrong = ScaleMonitorConfig {

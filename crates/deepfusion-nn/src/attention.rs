@@ -1,4 +1,4 @@
-//! Channel and spatial attention (SPEC 1.1, Eq. 13–15), and the aggregation of a global feature.
+//! Channel and spatial attention (the paper's Eq. 13–15), and the aggregation of a global feature.
 
 use burn::module::Module;
 use burn::tensor::activation::{relu, sigmoid};

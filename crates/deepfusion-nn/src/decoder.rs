@@ -39,7 +39,7 @@ impl DecoderStage {
     }
 }
 
-/// The decoder and its four disparity heads (SPEC 1.1).
+/// The decoder and its four disparity heads.
 #[derive(Module, Debug)]
 pub struct DisparityDecoder {
     /// Coarse to fine.

@@ -1,4 +1,4 @@
-//! DepthNet: an encoder, context and attention on its skip paths, the disparity decoder (SPEC 1.1).
+//! DepthNet: an encoder, context and attention on its skip paths, the disparity decoder (docs/concepts/network.md).
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};

@@ -1,4 +1,4 @@
-//! The optical-flow decoder on the depth network's encoder (SPEC 1.3). Training only.
+//! The optical-flow decoder on the depth network's encoder. Training only.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};

@@ -1,4 +1,4 @@
-//! Hierarchical context encoding (HCE): one feature seen at several scales at once (SPEC 1.1, Eq. 11–12).
+//! Hierarchical context encoding (HCE): one feature seen at several scales at once (the paper's Eq. 11–12).
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation::relu};

@@ -1,4 +1,4 @@
-//! PoseNet: the motion between two frames (SPEC 1.2).
+//! PoseNet: the motion between two frames.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation::relu};

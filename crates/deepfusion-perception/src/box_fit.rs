@@ -30,7 +30,7 @@ pub fn fit(silhouette: &Silhouette, expected: Turn) -> Option<Vote> {
     let span = axes.map(|axis| extent(&silhouette.points, axis));
     let size = span.map(|[from, to]| to - from);
     let room = [0, 1].map(|i| room(silhouette, axes[i], axes[1 - i], span[i]));
-    let (whole, lean) = completed(size, room, angle, expected, silhouette)?;
+    let (whole, margin) = completed(size, room, angle, expected, silhouette)?;
     let (mut middle, mut fixed) = ([0.0; 2], [0.0; 2]);
     for i in 0..2 {
         let [from, to] = span[i];
@@ -63,7 +63,7 @@ pub fn fit(silhouette: &Silhouette, expected: Turn) -> Option<Vote> {
         anchor: on_ground(fixed),
     };
     let at = on_ground(span.map(|[from, to]| 0.5 * (from + to)));
-    Some(Vote { at, place, lean })
+    Some(Vote { at, place, margin })
 }
 
 /// An angle in [0, π).
@@ -188,7 +188,7 @@ fn completed(
     let against =
         |i: usize| costs[i] + expected.against(angle + i as f32 * std::f32::consts::FRAC_PI_2);
     let length_on = usize::from(against(1) < against(0));
-    let lean = costs[1 - length_on] - costs[length_on];
+    let margin = costs[1 - length_on] - costs[length_on];
     let whole = [0, 1].map(|i| {
         let usual = usual(i, length_on);
         let least = SHORTEST[usize::from(i != length_on)];
@@ -199,7 +199,7 @@ fn completed(
             size[i].max(usual.min(size[i] + room[i]))
         }
     });
-    Some((whole, lean))
+    Some((whole, margin))
 }
 
 #[cfg(test)]
@@ -232,7 +232,7 @@ mod tests {
             "{seen:?}"
         );
         assert!(
-            seen.place.angle.sin().abs() < 0.1 && seen.lean > 0.5,
+            seen.place.angle.sin().abs() < 0.1 && seen.margin > 0.5,
             "{seen:?}"
         );
         // Where the side's foot is hidden it may lie farther in than the car's end.

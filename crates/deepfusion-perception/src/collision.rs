@@ -145,11 +145,14 @@ mod tests {
         let vehicle = VehicleShape::default();
         // The rear is 2 m before the centre, the bumper 1.7 m before the camera: 20 - 2 - 1.7 = 16.3 m.
         let standing = [target(1, 0.0, 20.0, [0.0; 3])];
-        let met = time_to_collision(&standing, 10.0, 0.0, &vehicle).unwrap();
-        assert!((met.time_s - 1.63).abs() < STEP_S, "{met:?}");
+        let collision = time_to_collision(&standing, 10.0, 0.0, &vehicle).unwrap();
+        assert!((collision.time_s - 1.63).abs() < STEP_S, "{collision:?}");
         let fleeing = [target(1, 0.0, 20.0, [0.0, 0.0, 6.0])];
-        let met = time_to_collision(&fleeing, 10.0, 0.0, &vehicle).unwrap();
-        assert!((met.time_s - 16.3 / 4.0).abs() < STEP_S, "{met:?}");
+        let collision = time_to_collision(&fleeing, 10.0, 0.0, &vehicle).unwrap();
+        assert!(
+            (collision.time_s - 16.3 / 4.0).abs() < STEP_S,
+            "{collision:?}"
+        );
         let faster = [target(1, 0.0, 20.0, [0.0, 0.0, 12.0])];
         assert_eq!(time_to_collision(&faster, 10.0, 0.0, &vehicle), None);
     }
@@ -160,13 +163,13 @@ mod tests {
         let left = [target(4, -3.5, 25.0, [0.0; 3])];
         assert_eq!(time_to_collision(&left, 10.0, 0.0, &vehicle), None);
         // Left with a radius of about 89 m: 25² / 178 = 3.5 m to the side at 25 m.
-        let met = time_to_collision(&left, 10.0, 0.112, &vehicle).unwrap();
-        assert_eq!(met.id, 4);
+        let collision = time_to_collision(&left, 10.0, 0.112, &vehicle).unwrap();
+        assert_eq!(collision.id, 4);
         assert_eq!(time_to_collision(&left, 10.0, -0.112, &vehicle), None);
     }
 
     #[test]
-    fn the_nearest_is_told_and_a_standing_car_meets_what_comes() {
+    fn the_nearest_is_reported_and_a_standing_car_is_hit_by_what_comes() {
         let vehicle = VehicleShape::default();
         let two = [
             target(1, 0.0, 30.0, [0.0; 3]),
@@ -174,8 +177,8 @@ mod tests {
         ];
         assert_eq!(time_to_collision(&two, 8.0, 0.0, &vehicle).unwrap().id, 2);
         let coming = [target(3, 0.0, 30.0, [0.0, 0.0, -10.0])];
-        let met = time_to_collision(&coming, 0.0, 0.0, &vehicle).unwrap();
-        assert!((met.time_s - 2.63).abs() < STEP_S);
+        let collision = time_to_collision(&coming, 0.0, 0.0, &vehicle).unwrap();
+        assert!((collision.time_s - 2.63).abs() < STEP_S);
         assert_eq!(time_to_collision(&[], 30.0, 0.0, &vehicle), None);
     }
 }

@@ -129,14 +129,15 @@ impl ConfidenceModel {
     /// error, and number of each.
     #[must_use]
     pub fn reliability(&self, samples: &[(Evidence, f64)], bins: usize) -> Vec<Reliability> {
-        let mut told: Vec<(f64, f64)> = samples
+        let mut pairs: Vec<(f64, f64)> = samples
             .iter()
             .filter(|(_, error)| error.is_finite())
             .map(|(evidence, error)| (self.expected_error(evidence), error.min(MOST_ERROR)))
             .collect();
-        told.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let size = told.len().div_ceil(bins.max(1)).max(1);
-        told.chunks(size)
+        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let size = pairs.len().div_ceil(bins.max(1)).max(1);
+        pairs
+            .chunks(size)
             .map(|part| {
                 let n = part.len();
                 let mean = |value: &dyn Fn(&(f64, f64)) -> f64| {

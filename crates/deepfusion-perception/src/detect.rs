@@ -125,18 +125,18 @@ pub(crate) fn detect_turned(
     let unnamed = (!taken.is_empty()).then(|| obstacles.without(&taken, rays.x.len()));
     let unnamed = unnamed.as_ref().unwrap_or(obstacles);
     let mut left = clusters(depth, unnamed, rays, min_pixels, config);
-    // What is cut in two is looked at again.
+    // What is cut in two is classified again.
     while !left.is_empty() {
-        let looked_at: Vec<Looked> = std::mem::take(&mut left)
+        let outcomes: Vec<Outcome> = std::mem::take(&mut left)
             .into_par_iter()
             .filter(|cluster| cluster.pixels >= min_pixels)
-            .map(|cluster| look(cluster, depth, obstacles, rays, ground, config))
+            .map(|cluster| classify(cluster, depth, obstacles, rays, ground, config))
             .collect();
-        for looked in looked_at {
-            match looked {
-                Looked::Several(halves) => left.extend(halves),
-                Looked::Target(candidate) => candidates.push(*candidate),
-                Looked::Nothing => {}
+        for outcome in outcomes {
+            match outcome {
+                Outcome::Split(halves) => left.extend(halves),
+                Outcome::Target(candidate) => candidates.push(*candidate),
+                Outcome::Nothing => {}
             }
         }
     }
@@ -171,8 +171,9 @@ fn in_rows(
             })
             .collect();
     }
-    let told = candidates.into_iter().zip(votes);
-    told.filter(|(candidate, vote)| is_target(&candidate.silhouette, &vote.place, config))
+    let fitted = candidates.into_iter().zip(votes);
+    fitted
+        .filter(|(candidate, vote)| is_target(&candidate.silhouette, &vote.place, config))
         .map(|(candidate, vote)| Detection {
             place: vote.place,
             pixels: candidate.cluster.pixels,
@@ -204,38 +205,38 @@ fn without_parts(mut detections: Vec<Detection>) -> Vec<Detection> {
 }
 
 /// What a cluster turned out to be.
-enum Looked {
-    Several([Cluster; 2]),
+enum Outcome {
+    Split([Cluster; 2]),
     Target(Box<Candidate>),
     Nothing,
 }
 
-fn look(
+fn classify(
     cluster: Cluster,
     depth: &[f32],
     obstacles: &Obstacles,
     rays: &Rays,
     ground: &Ground,
     config: &PerceptionConfig,
-) -> Looked {
+) -> Outcome {
     let silhouette = Silhouette::of(&cluster, depth, obstacles, rays, ground, config);
     if let Some(parts) = part_at_seam(&cluster, &silhouette, depth, rays, ground, config) {
-        return Looked::Several(parts);
+        return Outcome::Split(parts);
     }
     let Some(vote) = fit(&silhouette, Turn::ahead()) else {
-        return Looked::Nothing;
+        return Outcome::Nothing;
     };
     if let Some(halves) = split(&cluster, &silhouette, &vote.place, depth, rays, ground) {
-        Looked::Several(halves)
+        Outcome::Split(halves)
     } else if is_target(&silhouette, &vote.place, config) {
-        Looked::Target(Box::new(Candidate {
+        Outcome::Target(Box::new(Candidate {
             kind: None,
             cluster,
             silhouette,
             vote,
         }))
     } else {
-        Looked::Nothing
+        Outcome::Nothing
     }
 }
 

@@ -63,9 +63,9 @@ impl Perception {
     }
 
     /// Forgets the past: what comes next does not go on from what was.
-    pub fn forget(&mut self) {
-        self.tracker.forget();
-        self.parking.forget();
+    pub fn reset(&mut self) {
+        self.tracker.reset();
+        self.parking.reset();
         self.ground = None;
     }
 
@@ -76,37 +76,37 @@ impl Perception {
     ///
     /// # Errors
     /// [`Error::Size`] where the depth is not of the camera's size, [`Error::Camera`] where `k` is none.
-    pub fn look(
+    pub fn detect(
         &mut self,
         depth: &DepthMap,
         k: &Intrinsics,
         stamp: Option<Stamp>,
     ) -> Result<Surroundings> {
-        self.look_with(depth, k, stamp, &[])
+        self.detect_with_instances(depth, k, stamp, &[])
     }
 
-    /// As [`Self::look`], with things whose pixels somebody else knows: each becomes a target of its own, of its class,
+    /// As [`Self::detect`], with things whose pixels somebody else knows: each becomes a target of its own, of its class,
     /// where its depth makes it one; all others are found by depth alone.
     ///
     /// # Errors
-    /// As [`Self::look`], and [`Error::Instance`] for pixels outside the depth image.
-    pub fn look_with(
+    /// As [`Self::detect`], and [`Error::Instance`] for pixels outside the depth image.
+    pub fn detect_with_instances(
         &mut self,
         depth: &DepthMap,
         k: &Intrinsics,
         stamp: Option<Stamp>,
         instances: &[Instance],
     ) -> Result<Surroundings> {
-        self.look_with_sigma(depth, None, k, stamp, instances)
+        self.detect_with_sigma(depth, None, k, stamp, instances)
     }
 
-    /// As [`Self::look_with`], where each pixel's depth comes with its standard deviation (metres, of the same size): what a
+    /// As [`Self::detect_with_instances`], where each pixel's depth comes with its standard deviation (metres, of the same size): what a
     /// target's place is worth, and how far off it may be found again, follow from its own pixels, and
     /// [`PerceptionConfig::relative_error`] is for those without.
     ///
     /// # Errors
-    /// As [`Self::look_with`].
-    pub fn look_with_sigma(
+    /// As [`Self::detect_with_instances`].
+    pub fn detect_with_sigma(
         &mut self,
         depth: &DepthMap,
         sigma: Option<&DepthMap>,
@@ -152,7 +152,7 @@ impl Perception {
         self.obstacles
             .find(&depth.data, rays, &ground, &self.config);
         let pose = stamp.as_ref().map(|stamp| &stamp.world_from_cam);
-        self.parking.recall(&ground, pose);
+        self.parking.begin_frame(&ground, pose);
         let detections = detect_turned(
             &depth.data,
             &self.obstacles,

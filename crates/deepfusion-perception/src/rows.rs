@@ -69,7 +69,7 @@ pub struct Vote {
     /// Where it is taken to stand.
     pub place: GroundBox,
     /// How much worse it would be turned otherwise.
-    pub lean: f32,
+    pub margin: f32,
 }
 
 impl Vote {
@@ -83,7 +83,7 @@ impl Vote {
         let farthest = apart[0].max(apart[1]);
         // That something stands as all do says less than that it does not.
         let as_all = Turn::ahead().against(self.place.angle) < COST;
-        let weight = self.lean.min(MOST[usize::from(!as_all)]) * (1.0 - farthest / ROW_M);
+        let weight = self.margin.min(MOST[usize::from(!as_all)]) * (1.0 - farthest / ROW_M);
         ((inside(0) || inside(1)) && weight > 0.0).then(|| Turn::new(self.place.angle, weight))
     }
 }
@@ -103,7 +103,7 @@ mod tests {
     use std::f32::consts::FRAC_PI_2;
 
     /// A car that is seen whole, turned to `angle`.
-    fn vote(middle: [f32; 2], angle: f32, lean: f32) -> Vote {
+    fn vote(middle: [f32; 2], angle: f32, margin: f32) -> Vote {
         Vote {
             at: middle,
             place: GroundBox {
@@ -114,7 +114,7 @@ mod tests {
                 seen: [1.0; 2],
                 anchor: middle,
             },
-            lean,
+            margin,
         }
     }
 

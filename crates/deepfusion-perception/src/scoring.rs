@@ -234,10 +234,10 @@ impl Scorer {
         };
         self.tracks.insert(label.object, (target.id, since));
         if time_s - since >= self.rules.velocity_after_s
-            && let (Some(truth), Some(told)) = (label.velocity_mps, target.velocity_mps)
+            && let (Some(truth), Some(measured)) = (label.velocity_mps, target.velocity_mps)
         {
             self.score.velocities += 1;
-            self.errors.velocity += norm(minus(truth, told));
+            self.errors.velocity += norm(minus(truth, measured));
             let moves = norm(truth) >= MOVES_MPS;
             self.errors.motion += usize::from(target.moving == Some(moves));
         }
@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn found_missed_false_and_neither_are_told_apart() {
+    fn found_missed_false_and_neither_are_distinguished() {
         let mut scorer = Scorer::new(ScoringRules::default());
         let labels = [
             label(1, [0.0, 1.0, 10.0], true),

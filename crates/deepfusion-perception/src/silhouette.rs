@@ -59,7 +59,7 @@ impl Silhouette {
         let mut above = Above::default();
         Columns::of(cluster, depth, width).for_each(|u, pixels| {
             let top = obstacles.height[pixels[0].1 as usize * width + u];
-            let rises = above.look(u, pixels[0], depth, rays, ground, config);
+            let rises = above.follow(u, pixels[0], depth, rays, ground, config);
             let lowest = pixels[pixels.len() - 1].1 as usize;
             // Below the image's last row it goes on.
             let foot = if lowest + 1 == rays.y.len() {
@@ -142,7 +142,7 @@ struct Above {
 impl Above {
     /// Follows a column upwards from its topmost pixel (depth and row) as long as it stays at its distance: whether it
     /// goes on to where no target ends.
-    fn look(
+    fn follow(
         &mut self,
         u: usize,
         (start, v): (f32, u32),

@@ -38,7 +38,7 @@ fn targets_of_true_depth_are_where_the_simulator_put_them() {
 
 /// Cars doors to doors along an aisle, behind pillars: a row tells where those stand of which little is seen.
 #[test]
-fn rows_of_cars_in_a_garage_are_told_apart() {
+fn rows_of_cars_in_a_garage_are_separated() {
     let score = common::score(&[201, 202, 203, 204].map(|seed| drive(Scene::Garage, seed)));
     assert!(score.labels > 1000, "{score:?}");
     assert!(score.recall.unwrap() >= 0.85, "{score:?}");

@@ -14,7 +14,7 @@ pub struct LearningLog {
 struct Row {
     step: f64,
     validation: bool,
-    /// In the order of the columns; NaN where a cell is empty or no number.
+    /// In the order of the columns; NaN where a cell is empty or does not parse.
     values: Vec<f64>,
 }
 

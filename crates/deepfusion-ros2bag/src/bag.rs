@@ -165,7 +165,7 @@ impl MessageSource for Ros2Bag {
             let Some((first, last)) = file.range() else {
                 continue;
             };
-            if wanted.contains(&true) && selection.meets(first, last) {
+            if wanted.contains(&true) && selection.overlaps(first, last) {
                 waiting.push(Waiting {
                     first,
                     file: file.as_ref(),

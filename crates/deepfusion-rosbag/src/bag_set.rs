@@ -130,7 +130,7 @@ impl BagSet {
             .filter_map(|bag| Some((self.bags[bag].time_range()?.0, bag)))
             .collect();
         waiting.sort_unstable();
-        let start = |(first, bag): (Time, usize)| Part {
+        let start = |(first, bag): (Time, usize)| BagMessages {
             first,
             bag,
             messages: Messages::of(
@@ -157,11 +157,11 @@ fn hull(ranges: impl Iterator<Item = (Time, Time)>) -> Option<(Time, Time)> {
 pub struct SetMessages<'set> {
     set: &'set BagSet,
     /// Bags not begun, by their first message.
-    waiting: VecDeque<Part<'set>>,
-    active: Vec<Part<'set>>,
+    waiting: VecDeque<BagMessages<'set>>,
+    active: Vec<BagMessages<'set>>,
 }
 
-struct Part<'set> {
+struct BagMessages<'set> {
     first: Time,
     bag: usize,
     messages: Messages<'set>,
@@ -174,15 +174,24 @@ impl<'set> Iterator for SetMessages<'set> {
         loop {
             // A bag that is through gives back its threads.
             self.active
-                .retain_mut(|part| part.messages.next_time().is_some());
-            let time =
-                |part: &mut Part<'set>| part.messages.next_time().map(|time| (time, part.bag));
+                .retain_mut(|bag_messages| bag_messages.messages.next_time().is_some());
+            let time = |bag_messages: &mut BagMessages<'set>| {
+                bag_messages
+                    .messages
+                    .next_time()
+                    .map(|time| (time, bag_messages.bag))
+            };
             let earliest = self.active.iter_mut().filter_map(time).min();
             match (earliest, self.waiting.front()) {
                 (None, None) => return None,
-                (Some((time, bag)), front) if front.is_none_or(|part| part.first > time) => {
-                    let part = self.active.iter_mut().find(|part| part.bag == bag)?;
-                    let message = part.messages.next()?;
+                (Some((time, bag)), front)
+                    if front.is_none_or(|bag_messages| bag_messages.first > time) =>
+                {
+                    let bag_messages = self
+                        .active
+                        .iter_mut()
+                        .find(|bag_messages| bag_messages.bag == bag)?;
+                    let message = bag_messages.messages.next()?;
                     return Some(message.map(|message| self.merged(message, bag)));
                 }
                 _ => self.active.extend(self.waiting.pop_front()),

@@ -71,7 +71,7 @@ impl<'bag> Messages<'bag> {
         let mut chunks: Vec<_> = bag
             .chunks()
             .iter()
-            .filter(|info| selection.meets(info.first, info.last))
+            .filter(|info| selection.overlaps(info.first, info.last))
             .filter(|info| {
                 info.counts
                     .iter()
@@ -159,7 +159,7 @@ impl<'bag> Messages<'bag> {
                 problem,
             });
         }
-        entries.retain(|e| wanted(e.connection) && self.selection.holds(e.time));
+        entries.retain(|e| wanted(e.connection) && self.selection.contains(e.time));
         entries.sort_by_key(|e| (e.time, e.offset));
         let first = entries.first().map(|e| e.time);
         Ok(first.map(|time| OpenChunk {

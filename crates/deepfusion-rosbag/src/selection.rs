@@ -60,13 +60,13 @@ impl Selection {
 
     /// Whether a message recorded at `time` is wanted.
     #[must_use]
-    pub fn holds(&self, time: Time) -> bool {
+    pub fn contains(&self, time: Time) -> bool {
         self.from <= time && self.is_before_end(time)
     }
 
     /// Whether anything of a stretch from `first` to `last` can be wanted.
     #[must_use]
-    pub fn meets(&self, first: Time, last: Time) -> bool {
+    pub fn overlaps(&self, first: Time, last: Time) -> bool {
         self.from <= last && self.is_before_end(first)
     }
 

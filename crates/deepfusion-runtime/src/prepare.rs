@@ -64,7 +64,7 @@ impl Preparer {
         }
     }
 
-    /// What depth must be multiplied by for an image of this camera, at network size: f_y(test)/f_y(train) (SPEC 5), or
+    /// What depth must be multiplied by for an image of this camera, at network size: f_y(test)/f_y(train) (docs/concepts/scale.md), or
     /// f_y(test)/f_c of a network with a canonical focal length. An unknown camera is taken for the one trained with.
     fn focal_factor(&self, camera: Option<&Intrinsics>, window: [u32; 4], size: InputSize) -> f64 {
         let at =

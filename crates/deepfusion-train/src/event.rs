@@ -25,7 +25,7 @@ pub enum TrainEvent {
         steps: usize,
         /// The loss of the step's samples, the mean over its batches where several are accumulated.
         losses: LossTerms,
-        /// The step size.
+        /// The learning rate.
         learning_rate: f64,
         /// Images a second, targets and sources, over the last steps.
         images_per_second: f64,

@@ -61,7 +61,7 @@ pub(crate) fn levels(
     scales.collect()
 }
 
-/// K and K⁻¹ of images at 1/2ˢ of their size: f' = s·f and c' = s·(c + ½) − ½ (SPEC 0), as matrices.
+/// K and K⁻¹ of images at 1/2ˢ of their size: f' = s·f and c' = s·(c + ½) − ½, as matrices.
 fn cameras(pass: &ForwardPass, scale: usize) -> (Tensor<3>, Tensor<3>) {
     let [count, _, _] = pass.intrinsics.dims();
     let device = pass.intrinsics.device();

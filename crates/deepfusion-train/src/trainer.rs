@@ -19,9 +19,9 @@ const MAX_SKIPPED: usize = 20;
 const COSINE_END: f64 = 0.01;
 /// Steps that the pace and the scale ratio are averaged over.
 const SMOOTHING: f64 = 20.0;
-/// Below this share of pixels in view the geometry has come apart (SPEC 2).
+/// Below this share of pixels in view the geometry has come apart.
 const MIN_VALID_SHARE: f64 = 0.2;
-/// Above this share of moving pixels the masks take away what depth should learn from (SPEC 2).
+/// Above this share of moving pixels the masks take away what depth should learn from.
 const MAX_MOVING_SHARE: f64 = 0.4;
 
 /// A training run.

@@ -13,7 +13,7 @@ pub struct Synthesised {
     pub valid: Tensor<4, Bool>,
 }
 
-/// Sees a source image from the target's place (SPEC 2, Eq. 3–5): Î(p) = source⟨p'⟩,
+/// Sees a source image from the target's place (the paper's Eq. 3–5): Î(p) = source⟨p'⟩,
 /// p' ~ K·(R·D(p)·K⁻¹·p̃ + t).
 ///
 /// # Shapes

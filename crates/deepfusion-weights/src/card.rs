@@ -177,17 +177,17 @@ pub(crate) mod tests {
     /// What cannot be read names the card, and another version says so before anything else is complained of.
     #[test]
     fn what_is_no_card_is_named() {
-        let told = |text: &str| Card::parse("street.toml", text).unwrap_err().to_string();
-        let newer = told("format_version = 7\nnew = 'thing'");
+        let message = |text: &str| Card::parse("street.toml", text).unwrap_err().to_string();
+        let newer = message("format_version = 7\nnew = 'thing'");
         assert!(
             newer.contains("street.toml") && newer.contains("version 7"),
             "{newer}"
         );
         for text in ["", "name = 3", "not toml", "format_version = 1"] {
-            assert!(told(text).contains("street.toml"), "{text}");
+            assert!(message(text).contains("street.toml"), "{text}");
         }
         let text = card("street").to_toml().unwrap();
         let unknown = text.replacen("steps", "stepz", 1);
-        assert!(told(&unknown).contains("stepz"));
+        assert!(message(&unknown).contains("stepz"));
     }
 }

@@ -283,9 +283,9 @@ mod tests {
             assert_eq!(find(&card.name).unwrap(), *network);
         }
         let error = find("no-such-network").unwrap_err();
-        let told = error.to_string();
+        let message = error.to_string();
         for name in names() {
-            assert!(told.contains(name), "{told}");
+            assert!(message.contains(name), "{message}");
         }
         assert!(error.hint().is_some());
     }

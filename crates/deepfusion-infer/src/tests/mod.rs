@@ -220,7 +220,7 @@ fn odd_network() -> Graph {
 }
 
 #[test]
-fn graphs_of_any_shape_are_laid_out_right_and_images_do_not_meet() {
+fn graphs_of_any_shape_are_laid_out_right_and_images_do_not_mix() {
     let graph = odd_network();
     let (width, height) = (64, 40);
     let mut engine = Engine::new(graph.clone(), width, height, Precision::F32).unwrap();

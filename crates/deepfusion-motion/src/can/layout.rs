@@ -101,7 +101,7 @@ impl BitLayout {
     }
 
     /// The physical value in a frame's data; `None` where the data is too short for it, or it is a
-    /// float that is no number.
+    /// NaN float.
     #[must_use]
     pub fn decode(&self, data: &[u8]) -> Option<f64> {
         let raw = self.raw(data)?;

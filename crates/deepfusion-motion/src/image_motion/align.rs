@@ -62,7 +62,7 @@ impl Plane {
         })
     }
 
-    /// Whether its aligned rows are (nearly) all alike, or no numbers.
+    /// Whether its aligned rows are (nearly) all alike, or NaN.
     fn is_plain(&self) -> bool {
         let rows = &self.values[aligned_rows(self.height).start * self.width
             ..aligned_rows(self.height).end * self.width];
@@ -73,7 +73,7 @@ impl Plane {
 
     /// Value and slopes (right, down) at a place, bilinear; `None` outside.
     fn sample(&self, x: f64, y: f64) -> Option<(f64, f64, f64)> {
-        // Also false for what is no number.
+        // Also false for NaN.
         let inside =
             x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64;
         if !inside {

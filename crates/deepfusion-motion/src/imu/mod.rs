@@ -25,7 +25,7 @@ const MOST_TILT_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Time constant of the filter that says how the body leans, in seconds. Long: within the second between two frames the
 /// gyro, freed of its bias, knows a change to a thousandth of a radian, the accelerometer does not.
-const LEAN_TIME_S: f64 = 15.0;
+const TILT_TIME_S: f64 = 15.0;
 
 /// One reading of an inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,10 +113,11 @@ impl ImuTrack {
         for stretch in clean.chunk_by(|a, b| b.time_s - a.time_s <= max_gap_s) {
             let start_s = config.attitude_time_s;
             let mut attitude = Attitude::level(stretch, speed, start_s, start_s);
-            let mut leaning = Attitude::level(stretch, speed, start_s, LEAN_TIME_S.max(start_s));
+            let mut slow_attitude =
+                Attitude::level(stretch, speed, start_s, TILT_TIME_S.max(start_s));
             for sample in stretch {
                 let up = attitude.advance(sample);
-                let lean = leaning.advance(sample);
+                let slow_up = slow_attitude.advance(sample);
                 // Ahead, level: what the specific force has along it is the vehicle's acceleration
                 // alone. Standing or climbing, with the unit's nose up or down.
                 let ahead = Vector3::x() - up * up.x;
@@ -124,8 +125,8 @@ impl ImuTrack {
                 forward.push((sample.time_s, sample.acceleration_mps2.dot(&ahead)));
                 yaw.push((sample.time_s, sample.angular_rate_radps.dot(&up)));
                 // Up is the third row of Rz(yaw)·Ry(pitch)·Rx(roll).
-                tilt[0].push((sample.time_s, lean.y.atan2(lean.z)));
-                tilt[1].push((sample.time_s, (-lean.x).clamp(-1.0, 1.0).asin()));
+                tilt[0].push((sample.time_s, slow_up.y.atan2(slow_up.z)));
+                tilt[1].push((sample.time_s, (-slow_up.x).clamp(-1.0, 1.0).asin()));
             }
         }
         Ok(Self {

@@ -145,7 +145,7 @@ pub fn upsample_concat(x: Tensor<4>, skip: Option<Tensor<4>>) -> Tensor<4> {
     ))
 }
 
-/// The bilinear warp, out(p) = image⟨coords(p)⟩; outside the image its border counts (SPEC 0).
+/// The bilinear warp, out(p) = image⟨coords(p)⟩; outside the image its border counts.
 ///
 /// # Shapes
 /// - `image`: `[N, C, H, W]`
@@ -208,7 +208,7 @@ pub fn local_correlation(first: Tensor<4>, second: Tensor<4>, radius: usize) -> 
     ))
 }
 
-/// Where the pixels of a view lie in another (SPEC 2, Eq. 3–5): p' ~ H·p̃ + d·s, d the inverse depth.
+/// Where the pixels of a view lie in another (the paper's Eq. 3–5): p' ~ H·p̃ + d·s, d the inverse depth.
 /// Points behind the other camera are sent far outside of its image.
 ///
 /// # Shapes
@@ -243,7 +243,7 @@ pub fn in_view(coords: Tensor<4>, [height, width]: [usize; 2]) -> Tensor<4, Bool
     Tensor::<4>::from_dispatch(inside).greater_elem(0.5)
 }
 
-/// Edge-aware smoothness (SPEC 2, Eq. 8): mean(|∂ₓd*|·e^(−|∂ₓI|)) + mean(|∂ᵧd*|·e^(−|∂ᵧI|)), d* = disparity
+/// Edge-aware smoothness (the paper's Eq. 8): mean(|∂ₓd*|·e^(−|∂ₓI|)) + mean(|∂ᵧd*|·e^(−|∂ᵧI|)), d* = disparity
 /// over its mean in the image, |∂I| averaged over channels.
 ///
 /// # Shapes
@@ -262,7 +262,7 @@ pub fn smoothness(disparity: Tensor<4>, image: Tensor<4>) -> Tensor<1> {
     ))
 }
 
-/// The photometric error of SPEC 2, Eq. 6: pe(a, b) = α·clamp((1 − SSIM(a, b))/2, 0, 1) +
+/// The photometric error (the paper's Eq. 6): pe(a, b) = α·clamp((1 − SSIM(a, b))/2, 0, 1) +
 /// (1 − α)·|a − b|, mean over channels. The gradient flows to `a` alone: `b` is what was observed.
 ///
 /// # Shapes

@@ -1,6 +1,6 @@
 //! A car of a row: a box of usual size, square to it.
 
-use super::parts::Seen;
+use super::segments::Seen;
 use super::{Row, View};
 use crate::box_fit::CAR;
 use crate::clusters::Cluster;

@@ -1,5 +1,5 @@
 //! Cars side by side, as in a car park: those that are seen well tell where the others stand, of which only a corner, a
-//! bonnet or a strip of a door is seen.
+//! hood or a strip of a door is seen.
 //!
 //! A row is a line through the middles of cars that stand across the way; the rows on both sides of a lane go the same
 //! way. What stands on such a line is parted by its gaps, and each part is a car of usual size, square to the row. Cars
@@ -8,21 +8,21 @@
 mod alone;
 mod car;
 mod follow;
-mod known;
-mod parts;
+mod remembered;
 mod row;
 #[cfg(test)]
 mod scene;
+mod segments;
 
 use crate::rows::Turn;
 use crate::{Detection, Ground, Obstacles, PerceptionConfig, Rays};
 use alone::stands_alone;
 use deepfusion_geometry::Se3;
 use follow::follow;
-use known::{Known, distance, heading, meet, on_ground, parked};
 use nalgebra::Vector3;
-use parts::Standing;
+use remembered::{RememberedCar, distance, heading, merge, on_ground, parked};
 use row::{Heading, Parked, Row};
+use segments::Standing;
 
 /// From this share of a detection's pixels, or of the smaller footprint, in a car of a row, it is a part of that car; that
 /// it is one is likelier than that something else of a car's size stands there.
@@ -41,7 +41,7 @@ const ACROSS_M: [f32; 2] = [8.6, 15.0];
 /// Completes rows of parked cars, frame by frame.
 #[derive(Debug, Clone, Default)]
 pub struct Parking {
-    known: Vec<Known>,
+    remembered: Vec<RememberedCar>,
     /// Those cars as they are seen from here, and the rows of which two are certain.
     cars: Vec<Parked>,
     rows: Vec<Row>,
@@ -59,16 +59,16 @@ pub struct View<'a> {
 
 impl Parking {
     /// Forgets all cars.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         *self = Self::default();
     }
 
     /// Before a frame is looked at: where the known cars are, seen from there.
-    pub fn recall(&mut self, ground: &Ground, world_from_cam: Option<&Se3>) {
+    pub fn begin_frame(&mut self, ground: &Ground, world_from_cam: Option<&Se3>) {
         self.cars = world_from_cam.map_or(Vec::new(), |pose| {
             let cam_from_world = pose.inverse();
-            let seen = |known: &Known| known.seen(ground, &cam_from_world);
-            self.known.iter().filter_map(seen).collect()
+            let seen = |known: &RememberedCar| known.seen(ground, &cam_from_world);
+            self.remembered.iter().filter_map(seen).collect()
         });
         self.rows = Row::all(&self.cars);
         self.rows.retain(|row| row.sure() > 1);
@@ -109,10 +109,12 @@ impl Parking {
             .partition(|d| d.kind.is_some() || moves(d));
         let mut cars = std::mem::take(&mut self.cars);
         for car in open.iter().filter_map(|d| parked(&d.place)) {
-            meet(&mut cars, car);
+            merge(&mut cars, car);
         }
-        self.known = world_from_cam.map_or(Vec::new(), |pose| {
-            let known = cars.iter().map(|car| Known::new(car, view.ground, pose));
+        self.remembered = world_from_cam.map_or(Vec::new(), |pose| {
+            let known = cars
+                .iter()
+                .map(|car| RememberedCar::new(car, view.ground, pose));
             known.collect()
         });
         let rows = believed(&cars);
@@ -124,9 +126,9 @@ impl Parking {
             open = others;
             let standing = Standing::find(&view, kept.iter().chain(&alone));
             let (rows, found) = follow_all(rows, &lane, &standing, &view);
-            let parts = Parts::of(&found, &view);
+            let explained = Explained::of(&found, &view);
             let in_row = |d: &Detection| rows.iter().any(|row| row.holds(d.place.middle));
-            open.retain(|d| !(in_row(d) && parts.explain(d)));
+            open.retain(|d| !(in_row(d) && explained.covers(d)));
             for car in found {
                 let taken = |other: &Detection| other.place.overlap(&car.place) > SAME;
                 if !kept.iter().chain(&open).any(taken) {
@@ -141,13 +143,13 @@ impl Parking {
 }
 
 /// What the cars of rows explain: where they stand, and what is seen of them.
-struct Parts<'a> {
+struct Explained<'a> {
     cars: &'a [Detection],
     pixels: Vec<bool>,
     width: usize,
 }
 
-impl<'a> Parts<'a> {
+impl<'a> Explained<'a> {
     fn of(cars: &'a [Detection], view: &View) -> Self {
         let width = view.rays.x.len();
         let mut pixels = vec![false; view.depth.len()];
@@ -162,7 +164,7 @@ impl<'a> Parts<'a> {
     }
 
     /// Whether a detection is a part of one of the cars.
-    fn explain(&self, detection: &Detection) -> bool {
+    fn covers(&self, detection: &Detection) -> bool {
         let within = |car: &Detection| car.place.overlap(&detection.place) > PART;
         let own = detection.runs.iter().flat_map(|run| {
             let pixels = &self.pixels[run.pixels(self.width)];
@@ -194,7 +196,7 @@ fn follow_all(
         let mut row = rows[i].clone();
         row.keep_to(lane);
         for other in followed.iter().chain(&rows[i + 1..]) {
-            row.lean_on(other);
+            row.align_with(other);
         }
         found.extend(follow(&mut row, standing, view));
         followed.push(row);
@@ -234,10 +236,10 @@ mod tests {
     }
 
     /// Three cars of a row, looked at so often.
-    fn passed(scene: &Scene, looks: usize, pose: Option<&Se3>) -> Parking {
+    fn passed(scene: &Scene, sightings: usize, pose: Option<&Se3>) -> Parking {
         let mut parking = Parking::default();
-        for _ in 0..looks {
-            parking.recall(scene.view().ground, pose);
+        for _ in 0..sightings {
+            parking.begin_frame(scene.view().ground, pose);
             let seen = [8.0, 11.0, 14.0].map(|forward| detection(car(forward)));
             parking.complete(seen.into(), &[], scene.view(), pose);
         }
@@ -249,7 +251,7 @@ mod tests {
         let scene = Scene::of(&[8.0, 11.0, 14.0, 17.0].map(car));
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
-        parking.recall(scene.view().ground, Some(&pose));
+        parking.begin_frame(scene.view().ground, Some(&pose));
         // Beside its neighbour only a strip of its front is seen: across it.
         let mut wrong = car(17.4);
         wrong.angle = 1.2;
@@ -275,19 +277,19 @@ mod tests {
         strip.angle = 1.2;
         strip.seen = [0.1, 0.2];
         let looked_at = |mut parking: Parking, pose: Option<&Se3>| {
-            parking.recall(scene.view().ground, pose);
+            parking.begin_frame(scene.view().ground, pose);
             let seen = vec![detection(strip)];
             let found = parking.complete(seen, &[], scene.view(), pose);
             assert_eq!(found.len(), 1, "{found:?}");
             found[0].place != strip
         };
         let believed =
-            |looks: usize, pose: Option<&Se3>| looked_at(passed(&scene, looks, pose), pose);
+            |sightings: usize, pose: Option<&Se3>| looked_at(passed(&scene, sightings, pose), pose);
         assert!(believed(2, Some(&pose)));
         assert!(!believed(1, Some(&pose)));
         assert!(!believed(5, None));
         let mut parking = passed(&scene, 5, Some(&pose));
-        parking.forget();
+        parking.reset();
         assert!(!looked_at(parking, Some(&pose)));
     }
 
@@ -296,7 +298,7 @@ mod tests {
         let scene = Scene::of(&[]);
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
-        parking.recall(scene.view().ground, Some(&pose));
+        parking.begin_frame(scene.view().ground, Some(&pose));
         // On the row's line, where nothing tells of a car.
         let seen = vec![detection(car(17.0))];
         let found = parking.complete(seen.clone(), &[], scene.view(), Some(&pose));
@@ -306,13 +308,13 @@ mod tests {
     #[test]
     fn who_stands_in_a_row_or_before_a_car_of_it_stays() {
         let cars = [8.0, 11.0, 14.0].map(car);
-        // Beyond the last car; between two; before the bonnet of one, at whose place the row has a car.
+        // Beyond the last car; between two; before the hood of one, at whose place the row has a car.
         for middle in [[4.0, 19.0], [3.5, 12.5], [3.3, 13.9]] {
             let standing = person(middle);
             let scene = Scene::of(&[cars[0], cars[1], cars[2], standing]);
             let pose = Se3::identity();
             let mut parking = passed(&scene, 2, Some(&pose));
-            parking.recall(scene.view().ground, Some(&pose));
+            parking.begin_frame(scene.view().ground, Some(&pose));
             let mut seen: Vec<_> = cars.map(|car| scene.detection(car)).into();
             let who = scene.detection(standing);
             seen.push(who.clone());
@@ -333,7 +335,7 @@ mod tests {
         let scene = Scene::of(&[car(17.0)]);
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
-        parking.recall(scene.view().ground, Some(&pose));
+        parking.begin_frame(scene.view().ground, Some(&pose));
         let mut named = detection(car(8.0));
         named.kind = Some(Kind {
             class: "truck".into(),
@@ -353,7 +355,7 @@ mod tests {
         let scene = Scene::of(&[]);
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
-        parking.recall(scene.view().ground, Some(&pose));
+        parking.begin_frame(scene.view().ground, Some(&pose));
         let turned = |at: [f32; 2]| parking.usual_turn(at).angle();
         assert!(turned([6.0, 14.0]).sin().abs() < 0.1);
         // Across the lane from it too, but not in the lane.

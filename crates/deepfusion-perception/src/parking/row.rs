@@ -130,7 +130,7 @@ impl Row {
     }
 
     /// Goes as another goes, if that is across the lane.
-    pub fn lean_on(&mut self, other: &Self) {
+    pub fn align_with(&mut self, other: &Self) {
         let [from, to] = self.reach();
         let [other_from, other_to] = other.reach();
         let between = 0.5 * (from.max(other_from) + to.min(other_to));
@@ -344,7 +344,7 @@ mod tests {
         };
         let mut right = Row::through(vec![on(6.0, 2.0), on(6.0, 5.0)]);
         let left = Row::through((1..7).map(|i| on(-6.0, 4.0 * i as f32)).collect());
-        right.lean_on(&left);
+        right.align_with(&left);
         let expected = 6.0 + 24.0 * 24.0 / 80.0;
         assert!((right.at(24.0) - expected).abs() < 0.6, "{right:?}");
         assert!((right.end() - 39.0).abs() < 1e-3);

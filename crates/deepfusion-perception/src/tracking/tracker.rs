@@ -40,7 +40,7 @@ impl Tracker {
     }
 
     /// Gives all tracks up; their ids are not used again.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         self.tracks.clear();
         self.time_s = None;
     }

@@ -123,7 +123,7 @@ impl<'a> Rows<'a> {
                 },
             };
             let time = Time::from_nanos(key.time);
-            if !self.selection.holds(time) {
+            if !self.selection.contains(time) {
                 // In time order: behind the end nothing is wanted.
                 return None;
             }

@@ -147,8 +147,8 @@ impl Shader<'_> {
                 }
                 Surface::Kerb => {
                     let height = height.clamp(0.0, world.road.kerb);
-                    match &layout.look {
-                        Some(look) => look.kerb(&world.noise, &patch, height),
+                    match &layout.style {
+                        Some(style) => style.kerb(&world.noise, &patch, height),
                         None => ground::kerb(&world.noise, &patch, height),
                     }
                 }

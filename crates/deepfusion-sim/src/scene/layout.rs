@@ -167,7 +167,7 @@ fn sections(world: &mut World, rng: &mut ChaCha8Rng) -> Vec<Section> {
             bays: half_width > 5.0 && rng.random_bool(0.5),
             beyond: [beyond(&sides[0], rng), beyond(&sides[1], rng)],
             paving,
-            look: None,
+            style: None,
         });
         sections.push(Section {
             from,

@@ -5,10 +5,10 @@
 //! trees or cars are of one kind.
 
 mod country;
+mod ground_styles;
 mod houses;
 mod indoor;
 mod land;
-mod looks;
 mod models;
 mod motorway;
 mod people;

@@ -2,8 +2,8 @@
 
 pub mod facade;
 pub mod ground;
+pub mod ground_style;
 pub mod leaves;
-pub mod look;
 pub mod noise;
 pub mod objects;
 pub mod pattern;

@@ -1,7 +1,7 @@
 //! Where a view is taken from, and with which lens.
 
+use super::built_world::BuiltWorld;
 use super::draw::{normal, weighted};
-use super::place::Place;
 use crate::config::Scene;
 use crate::motion::rotation;
 use crate::primitive::{Primitive, V3, enter};
@@ -129,7 +129,7 @@ enum Kind {
 
 /// Street coordinates, a heading, and how far the view ahead must be free, metres. `anchor` is where the traffic's own
 /// car drives.
-fn spot(rng: &mut ChaCha8Rng, place: &Place, anchor: f64) -> ((f64, f64, f64), f32) {
+fn spot(rng: &mut ChaCha8Rng, place: &BuiltWorld, anchor: f64) -> ((f64, f64, f64), f32) {
     let kind = weighted(
         rng,
         &[
@@ -179,7 +179,7 @@ fn spot(rng: &mut ChaCha8Rng, place: &Place, anchor: f64) -> ((f64, f64, f64), f
 }
 
 /// A place in the room at `s` or near it, looking anywhere.
-fn in_room(rng: &mut ChaCha8Rng, place: &Place, s: f64) -> (f64, f64, f64) {
+fn in_room(rng: &mut ChaCha8Rng, place: &BuiltWorld, s: f64) -> (f64, f64, f64) {
     let rooms = &place.world.rooms;
     let number = rooms.partition_point(|room| room.high[0] < s);
     let room = &rooms[number.min(rooms.len() - 1)];
@@ -193,7 +193,7 @@ fn in_room(rng: &mut ChaCha8Rng, place: &Place, s: f64) -> (f64, f64, f64) {
 /// close to one, and not with most of its view within arm's length of one.
 pub fn stand(
     rng: &mut ChaCha8Rng,
-    place: &Place,
+    place: &BuiltWorld,
     (moving, anchor): (&[Primitive], f64),
     k: &Intrinsics,
 ) -> Stand {
@@ -220,7 +220,7 @@ pub fn stand(
 }
 
 fn pose(
-    place: &Place,
+    place: &BuiltWorld,
     (s, lateral, turn): (f64, f64, f64),
     (height, pitch, roll): (f64, f64, f64),
 ) -> Stand {
@@ -242,7 +242,7 @@ fn pose(
 }
 
 fn is_free(
-    place: &Place,
+    place: &BuiltWorld,
     moving: &[Primitive],
     world_from_cam: &Se3,
     k: &Intrinsics,

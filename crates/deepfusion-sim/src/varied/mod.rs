@@ -3,12 +3,12 @@
 //! What a view shows hangs on the settings and its index alone, so loaders may ask for any view, from any thread,
 //! in any order. The depth is exact whatever is done to the colours.
 
+mod built_world;
 mod cache;
 mod camera;
 mod config;
 mod draw;
 mod formation;
-mod place;
 mod schedule;
 mod weather;
 mod wet;
@@ -16,13 +16,13 @@ mod wet;
 use crate::Result;
 use crate::config::Scene;
 use crate::render::{self, Air, Cores, Edges, Shot};
+use built_world::BuiltWorld;
 use cache::Cache;
 pub use config::EndlessConfig;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use draw::generator;
 use formation::{Brightness, Formation};
 use image::RgbImage;
-use place::Place;
 use rand::Rng;
 use schedule::Schedule;
 pub use weather::Weather;
@@ -62,7 +62,7 @@ pub struct View {
 pub struct Endless {
     config: EndlessConfig,
     schedule: Schedule,
-    places: Cache<Place>,
+    worlds: Cache<BuiltWorld>,
 }
 
 impl Endless {
@@ -74,7 +74,7 @@ impl Endless {
         config.validate()?;
         Ok(Self {
             schedule: Schedule::new(config.worlds_at_once, config.views_per_world),
-            places: Cache::new(config.worlds_at_once + SPARE_WORLDS),
+            worlds: Cache::new(config.worlds_at_once + SPARE_WORLDS),
             config,
         })
     }
@@ -99,8 +99,8 @@ impl Endless {
         let config = &self.config;
         let world_number = self.schedule.turn(index).world;
         let place = self
-            .places
-            .get(world_number, || Place::build(config, world_number));
+            .worlds
+            .get(world_number, || BuiltWorld::build(config, world_number));
         let world = &place.world;
 
         let mut rng = generator(config.seed, index, 0x00CA_4E4A);
@@ -179,7 +179,7 @@ mod tests {
         })?;
         for index in 0..14 {
             assert_eq!(endless.view(index).world, index);
-            assert!(endless.places.len() <= 2 + SPARE_WORLDS);
+            assert!(endless.worlds.len() <= 2 + SPARE_WORLDS);
         }
         Ok(())
     }

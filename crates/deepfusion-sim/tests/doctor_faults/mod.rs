@@ -6,7 +6,7 @@ use image::RgbImage;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Places of values in an oxts packet.
+/// Indices of values in an OXTS packet.
 pub mod oxts {
     pub const VN: usize = 6;
     pub const VE: usize = 7;
@@ -115,14 +115,14 @@ impl Drive {
             let mut values: Vec<f64> = words.iter().map(|w| w.parse().unwrap()).collect();
             let before = values.clone();
             change(number, &mut values);
-            let told = words
+            let changed = words
                 .iter()
                 .enumerate()
                 .map(|(i, word)| match values[i] == before[i] {
                     true => (*word).to_owned(),
                     false => format!("{:.9}", values[i]),
                 });
-            std::fs::write(&path, told.collect::<Vec<_>>().join(" ")).unwrap();
+            std::fs::write(&path, changed.collect::<Vec<_>>().join(" ")).unwrap();
         }
     }
 

@@ -21,7 +21,7 @@ pub struct CsvRecord<'a> {
     pub step: usize,
     /// The loss.
     pub losses: &'a LossTerms,
-    /// The step size; 0 of a validation.
+    /// The learning rate; 0 of a validation.
     pub learning_rate: f64,
     /// Displacement by speed over displacement by PoseNet.
     pub scale_ratio: f64,

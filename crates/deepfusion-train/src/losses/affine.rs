@@ -27,7 +27,7 @@ pub fn affine_invariant(x: Tensor<4>, y: Tensor<4>, valid: &Tensor<4, Bool>) -> 
     let outside = valid.clone().bool_not();
     let inside = flat(valid.clone().float());
     let count = inside.clone().sum_dim(1).clamp_min(1.0);
-    // What is outside may be anything, also no number.
+    // What is outside may be anything, NaN included.
     let x = flat(x.mask_fill(outside.clone(), 0.0));
     let y = flat(y.detach().mask_fill(outside, 0.0));
     let mean = |t: Tensor<2>| t.sum_dim(1).div(count.clone());

@@ -1,4 +1,4 @@
-//! Learning from known depth (SPEC 7.1): error of log depth, and of its differences between neighbours.
+//! Learning from known depth (docs/concepts/learning-from-depth.md): error of log depth, and of its differences between neighbours.
 
 use crate::DepthLossConfig;
 use burn::tensor::Tensor;

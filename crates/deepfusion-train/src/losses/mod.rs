@@ -1,4 +1,4 @@
-//! The loss terms of SPEC 2, one file each, and their sum.
+//! The loss terms (docs/concepts/losses.md), one file each, and their sum.
 
 mod affine;
 mod agreement;

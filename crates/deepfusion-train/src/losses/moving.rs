@@ -20,9 +20,9 @@ pub struct RigidView<'a> {
     pub inverse_intrinsics: &'a Tensor<3>,
 }
 
-/// The pixels that move by themselves (SPEC 2): the flow explains them and the rigid warp does not, by the
+/// The pixels that move by themselves (docs/concepts/losses.md): the flow explains them and the rigid warp does not, by the
 /// limits of the settings; and the flow leaves the epipolar line, or goes along it much farther or less far
-/// than the depth there lets it. SPEC 2 asks for the first of these two alone, but what drives along the road
+/// than the depth there lets it. The usual test is the first of these two alone, but what drives along the road
 /// like the camera, ahead of it or towards it, never leaves its epipolar lines. No gradient.
 ///
 /// # Shapes

@@ -1,4 +1,4 @@
-//! Learning how sure a depth is (SPEC 7.2): the likelihood of its error under a Laplace distribution.
+//! Learning how sure a depth is (docs/concepts/learning-from-depth.md): the likelihood of its error under a Laplace distribution.
 
 use super::DepthTruth;
 use super::depth::log_depth_error;

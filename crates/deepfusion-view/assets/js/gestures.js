@@ -1,4 +1,4 @@
-// Mouse, pen and fingers on a canvas, told in the same words.
+// Mouse, pen and fingers on a canvas, reported by the same names.
 
 /**
  * Calls `on.hover(x, y)`, `on.leave()`, `on.drag(dx, dy, {secondary, touch, x, y})`, `on.pinch(factor, x, y, dx, dy)`,

@@ -207,7 +207,7 @@ class App {
   }
 
   theme() {
-    this.light = (recall('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark')) === 'light';
+    this.light = (stored('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark')) === 'light';
     document.documentElement.dataset.theme = this.light ? 'light' : 'dark';
     this.panes?.forEach(p => { p.state = null; p.legendState = null; });
     this.touch('scene', 'time');
@@ -227,7 +227,7 @@ class App {
     if (this.runs.length > 1) this.options.list = false;
     for (const key of ['options', `panes-${this.shape()}`]) {
       try {
-        for (const [name, value] of Object.entries(JSON.parse(recall(key) ?? '{}'))) if (typeof value === typeof this.options[name]) this.options[name] = value;
+        for (const [name, value] of Object.entries(JSON.parse(stored(key) ?? '{}'))) if (typeof value === typeof this.options[name]) this.options[name] = value;
       } catch { /* another version's */ }
     }
   }
@@ -418,7 +418,7 @@ class App {
     const wanted = decodeURIComponent(location.hash.slice(1));
     await Promise.all(this.runs.map(run => run.refresh()));
     this.restore();
-    if (narrow() && recall(`panes-${this.shape()}`) === null) {
+    if (narrow() && stored(`panes-${this.shape()}`) === null) {
       // A high picture leaves no room for two and the cloud.
       const { size } = await api.frame(0, this.runs[0].names[0]).then(f => ({ size: f.intrinsics ?? { width: f.picture?.size[0], height: f.picture?.size[1] } })).catch(() => ({}));
       this.options.depth = !(size?.height > 0.55 * size?.width);
@@ -462,7 +462,7 @@ const narrow = () => matchMedia('(max-width: 820px), (max-aspect-ratio: 3/4)').m
 
 // Private windows may refuse to remember.
 function remember(key, value) { try { localStorage.setItem(`deepfusion-${key}`, value); } catch { /* then not */ } }
-function recall(key) { try { return localStorage.getItem(`deepfusion-${key}`); } catch { return null; } }
+function stored(key) { try { return localStorage.getItem(`deepfusion-${key}`); } catch { return null; } }
 
 function message(title, text) {
   const element = document.createElement('div');

@@ -7,7 +7,7 @@ export function metresTold(meta) {
   if (scale?.verdict === 'wrong') return [`wrong${factor(scale)}`, 'bad'];
   if (scale?.verdict === 'trusted') return [`trusted${factor(scale)}`, 'good', 'less'];
   if (scale?.verdict === 'open') return [Number.isFinite(scale.bias) ? `open${factor(scale)}` : 'not measured', '', 'less'];
-  // Of programs that told no more than whether the camera was known.
+  // From versions that recorded no more than whether the camera was known.
   if (meta?.scale_trusted === false) return ['not to be trusted', 'warn'];
   return null;
 }

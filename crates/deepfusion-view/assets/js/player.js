@@ -9,7 +9,7 @@ export class Player {
     this.playing = false;
     this.rate = 1;
     this.loop = false;
-    /** When frames were shown, for the frames a second that are told. */
+    /** When frames were shown, for the frames per second that are shown. */
     this.shownAt = [];
     this.waited = 0;
   }

@@ -53,7 +53,7 @@ export class Run {
     return true;
   }
 
-  /** What tells a frame's present files apart from earlier ones. */
+  /** What distinguishes a frame's present files from earlier ones. */
   key(i) { return i >= 0 && i < this.length ? `${this.names[i]}@${this.revisions[i]}` : ''; }
 
   /** A frame that is at hand; undefined otherwise. */
@@ -61,7 +61,7 @@ export class Run {
 
   has(i) { return this.frames.has(this.key(i)); }
 
-  /** A frame, fetched if need be. It always comes: what cannot be read is told in its `problems`. */
+  /** A frame, fetched if need be. It always comes: what cannot be read is listed in its `problems`. */
   load(i) {
     const key = this.key(i);
     if (!key) return Promise.resolve(undefined);

@@ -19,7 +19,7 @@ export async function showTraining(stage, runs) {
     chart.className = 'chart';
     chart.innerHTML = `<h3>${escape(column.replaceAll('_', ' '))}<span></span></h3><canvas></canvas>`;
     element.querySelector('.charts').append(chart);
-    return { column, canvas: chart.querySelector('canvas'), told: chart.querySelector('span') };
+    return { column, canvas: chart.querySelector('canvas'), readout: chart.querySelector('span') };
   });
   stage.replaceChildren(element);
   const picks = [...element.querySelectorAll('.pick')], pictures = [...element.querySelectorAll('.panel img')];
@@ -40,7 +40,7 @@ export async function showTraining(stage, runs) {
   draw();
 }
 
-function drawChart({ column, canvas, told }, logs) {
+function drawChart({ column, canvas, readout }, logs) {
   fit(canvas);
   const ctx = canvas.getContext('2d'), width = canvas.width / canvas.ratio, height = canvas.height / canvas.ratio;
   ctx.setTransform(canvas.ratio, 0, 0, canvas.ratio, 0, 0);
@@ -87,7 +87,7 @@ function drawChart({ column, canvas, told }, logs) {
     draw(line.points, 0.3, 1);
     draw(smooth(line.points), 1, 1.6);
   }
-  told.textContent = Number(smooth(lines[0].points).at(-1)[1].toPrecision(4)).toString();
+  readout.textContent = Number(smooth(lines[0].points).at(-1)[1].toPrecision(4)).toString();
 }
 
 /** An exponential mean over about a fiftieth of the points. */

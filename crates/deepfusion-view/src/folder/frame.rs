@@ -33,7 +33,7 @@ const PASSED_ON: [&str; 12] = [
 /// `name` may be missing.
 pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
     let mut problems = Vec::new();
-    let mut small = |file: &Option<super::entry::PartFile>| {
+    let mut small = |file: &Option<super::entry::FrameFile>| {
         let outcome = read_json(&folder.join(&file.as_ref()?.file));
         outcome.map_err(|e| problems.push(e.to_string())).ok()
     };
@@ -179,7 +179,7 @@ fn picture(folder: &Path, entry: &Entry, sidecar: Option<&Value>) -> Result<Pict
         .map(|p| (p, true))
         .chain(beside.iter().map(|p| (p, false)))
     {
-        match look(path) {
+        match picture_type(path) {
             Ok(Some((content_type, size))) => {
                 let said = sidecar
                     .filter(|_| is_named)
@@ -206,7 +206,7 @@ fn picture(folder: &Path, entry: &Entry, sidecar: Option<&Value>) -> Result<Pict
 
 /// What a picture is, from its first bytes; `None` where there is no file or none of a picture. Only what this accepts is ever sent, so
 /// that a sidecar cannot name any other file.
-fn look(path: &Path) -> Result<Option<(&'static str, (u32, u32))>> {
+fn picture_type(path: &Path) -> Result<Option<(&'static str, (u32, u32))>> {
     // Not a pipe or a device: those may block.
     if !std::fs::metadata(path).is_ok_and(|m| m.is_file()) {
         return Ok(None);

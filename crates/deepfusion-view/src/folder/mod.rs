@@ -9,7 +9,7 @@ mod summary;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-pub(crate) use entry::{Entry, PartFile};
+pub(crate) use entry::{Entry, FrameFile};
 pub(crate) use frame::{frame_json, picture_of, targets_of};
 #[cfg(feature = "rerun")]
 pub(crate) use summary::{Summary, numbers};

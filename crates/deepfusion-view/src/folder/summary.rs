@@ -36,7 +36,7 @@ impl Summary {
             ..Self::default()
         };
         let mut problems = Vec::new();
-        let mut small = |file: &Option<super::entry::PartFile>| {
+        let mut small = |file: &Option<super::entry::FrameFile>| {
             let outcome = read_json(&folder.join(&file.as_ref()?.file));
             outcome.map_err(|e| problems.push(e.to_string())).ok()
         };

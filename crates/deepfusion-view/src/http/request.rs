@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_answered_is_told_apart() {
+    fn what_is_not_answered_is_distinguished() {
         assert_eq!(parsed("GET / HTTP/1.1\r\nHo"), Ok(None));
         assert_eq!(parsed("POST / HTTP/1.1\r\n\r\n"), Err(Refusal::Method));
         assert_eq!(

@@ -25,7 +25,7 @@ const BESIDE_M: f32 = 3.0;
 /// Within this distance it is the same car, metres.
 const SAME_M: f32 = 1.2;
 /// Most looks that count of one car.
-const MOST_LOOKS: f32 = 4.0;
+const MOST_SIGHTINGS: f32 = 4.0;
 /// How far behind the camera cars are remembered, metres.
 const BEHIND_M: f32 = 15.0;
 /// Nearest to the camera that something drives along the lane ahead, metres, and how far it may be turned out of the way, radians.
@@ -35,14 +35,14 @@ const ASTRAY: f32 = 0.6;
 
 /// A car of a row, remembered.
 #[derive(Debug, Clone)]
-pub struct Known {
+pub struct RememberedCar {
     /// Its middle and the row's direction, in the world's axes.
     middle: Vector3<f64>,
     along: Vector3<f64>,
-    looks: f32,
+    sightings: f32,
 }
 
-impl Known {
+impl RememberedCar {
     /// A car as it stands on this ground, seen by a camera at this pose.
     pub fn new(car: &Parked, ground: &Ground, world_from_cam: &Se3) -> Self {
         let in_world = |at: [f32; 2]| {
@@ -54,7 +54,7 @@ impl Known {
         Self {
             middle,
             along: in_world([right + car.slope, forward + 1.0]) - middle,
-            looks: car.weight,
+            sightings: car.weight,
         }
     }
 
@@ -68,7 +68,7 @@ impl Known {
         (across && middle[1] > -BEHIND_M).then(|| Parked {
             middle,
             slope: along[0] / along[1],
-            weight: self.looks,
+            weight: self.sightings,
         })
     }
 }
@@ -93,7 +93,7 @@ pub fn parked(place: &GroundBox) -> Option<Parked> {
 }
 
 /// Takes a car into those that are known.
-pub fn meet(cars: &mut Vec<Parked>, car: Parked) {
+pub fn merge(cars: &mut Vec<Parked>, car: Parked) {
     let same = |other: &&mut Parked| distance(other.middle, car.middle) < SAME_M;
     let Some(known) = cars.iter_mut().find(same) else {
         cars.push(car);
@@ -103,7 +103,7 @@ pub fn meet(cars: &mut Vec<Parked>, car: Parked) {
     let mean = |a: f32, b: f32| (a * known.weight + b * car.weight) / weight;
     known.middle = [0, 1].map(|i| mean(known.middle[i], car.middle[i]));
     known.slope = mean(known.slope, car.slope);
-    known.weight = weight.min(MOST_LOOKS);
+    known.weight = weight.min(MOST_SIGHTINGS);
 }
 
 /// How the lane goes where something that moves drives along it, if it does: who walks goes anywhere.
@@ -174,16 +174,16 @@ mod tests {
         let mut cars = vec![parked(&place()).unwrap()];
         let mut again = cars[0];
         again.middle[1] += 0.4;
-        meet(&mut cars, again);
+        merge(&mut cars, again);
         assert_eq!((cars.len(), cars[0].weight), (1, 2.0));
         assert!((cars[0].middle[1] - 12.2).abs() < 1e-5, "{cars:?}");
         again.middle[1] += 3.0;
-        meet(&mut cars, again);
+        merge(&mut cars, again);
         assert_eq!(cars.len(), 2);
         for _ in 0..9 {
-            meet(&mut cars, again);
+            merge(&mut cars, again);
         }
-        assert_eq!(cars[1].weight, MOST_LOOKS);
+        assert_eq!(cars[1].weight, MOST_SIGHTINGS);
     }
 
     #[test]

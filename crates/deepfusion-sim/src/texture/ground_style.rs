@@ -50,7 +50,7 @@ pub struct Surface {
 
 /// The ground of a stretch.
 #[derive(Debug, Clone, Copy)]
-pub struct Look {
+pub struct GroundStyle {
     /// The carriageway.
     pub road: Surface,
     /// Pavement and what lies beyond it: right, left.
@@ -136,7 +136,7 @@ impl Surface {
     }
 }
 
-impl Look {
+impl GroundStyle {
     /// The carriageway.
     pub fn carriageway(&self, noise: &Noise, p: &GroundPatch, seed: u32) -> Rgb {
         let mut colour = self.road.albedo(noise, p, seed);

@@ -94,7 +94,7 @@ impl Standing {
     }
 
     /// What of it stands on a row between two places along it, in their order.
-    pub fn parts(&self, row: &Row, [from, to]: [f32; 2], view: &View) -> Vec<Part> {
+    pub fn segments(&self, row: &Row, [from, to]: [f32; 2], view: &View) -> Vec<Segment> {
         let places = ((to - from).max(0.0) / PLACE_M) as usize + 1;
         let mut taken = vec![false; places];
         let mut there = Vec::new();
@@ -117,7 +117,7 @@ impl Standing {
                 ));
             }
         }
-        let mut parts: Vec<Part> = Vec::new();
+        let mut parts: Vec<Segment> = Vec::new();
         let mut part_of = vec![0; places];
         let mut last: Option<usize> = None;
         for place in (0..places).filter(|place| taken[*place]) {
@@ -125,7 +125,7 @@ impl Standing {
             let start = from + place as f32 * PLACE_M;
             match parts.last_mut().filter(|_| near) {
                 Some(part) => part.along[1] = start + PLACE_M,
-                None => parts.push(Part {
+                None => parts.push(Segment {
                     along: [start, start + PLACE_M],
                     points: Vec::new(),
                 }),
@@ -163,13 +163,13 @@ pub struct Seen {
 }
 
 /// What stands together on a row.
-pub struct Part {
+pub struct Segment {
     /// From where to where along it, metres.
     pub along: [f32; 2],
     points: Vec<Seen>,
 }
 
-impl Part {
+impl Segment {
     /// Where the middles of the cars are that it is, along the row, and their points.
     pub fn cars(&self, row: &Row, view: &View) -> Vec<(f32, Vec<&Seen>)> {
         let [from, to] = self.along;
@@ -317,7 +317,7 @@ mod tests {
     fn what_stands_on_a_row_is_parted_by_its_gaps() {
         let scene = Scene::of(&[]);
         let standing = standing(&[[9.0, 10.8, 2.0], [11.4, 13.2, 2.0]]);
-        let parts = standing.parts(&row(), [6.0, 20.0], &scene.view());
+        let parts = standing.segments(&row(), [6.0, 20.0], &scene.view());
         assert_eq!(parts.len(), 2);
         let cars = parts[1].cars(&row(), &scene.view());
         let [(along, points)] = &cars[..] else {
@@ -326,14 +326,17 @@ mod tests {
         assert!((along - 12.3).abs() < 0.15, "{along}");
         assert!(points.len() > 400);
         // Only what lies between the ends asked for.
-        assert_eq!(standing.parts(&row(), [6.0, 11.0], &scene.view()).len(), 1);
+        assert_eq!(
+            standing.segments(&row(), [6.0, 11.0], &scene.view()).len(),
+            1
+        );
     }
 
     #[test]
-    fn cars_doors_to_doors_are_told_apart_by_their_width_and_a_wall_is_none() {
+    fn cars_doors_to_doors_are_separated_by_their_width_and_a_wall_is_none() {
         let scene = Scene::of(&[]);
         let count = |piece: [f32; 3]| {
-            let parts = standing(&[piece]).parts(&row(), [6.0, 40.0], &scene.view());
+            let parts = standing(&[piece]).segments(&row(), [6.0, 40.0], &scene.view());
             parts[0].cars(&row(), &scene.view()).len()
         };
         assert_eq!(count([9.0, 10.9, 2.0]), 1);
@@ -359,7 +362,7 @@ mod tests {
         let standing = Standing {
             points: points.collect(),
         };
-        let parts = standing.parts(&row(), [6.0, 20.0], &scene.view());
+        let parts = standing.segments(&row(), [6.0, 20.0], &scene.view());
         let slope = parts[0].slope(&row()).unwrap();
         assert!((slope + 0.15).abs() < 0.03, "{slope}");
     }

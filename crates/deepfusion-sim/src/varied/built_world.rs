@@ -24,7 +24,7 @@ const DURATION_S: f64 = 9.0;
 const UNVARIED: f64 = 0.12;
 
 /// A built world.
-pub struct Place {
+pub struct BuiltWorld {
     /// The street and what stands on it.
     pub world: World,
     /// Light on its ground.
@@ -37,7 +37,7 @@ pub struct Place {
     pub length: f64,
 }
 
-impl Place {
+impl BuiltWorld {
     /// Builds world `number` of a stream.
     pub fn build(config: &EndlessConfig, number: u64) -> Self {
         // Drawn apart, so that the other worlds are the same whatever the share of the plain ones is.
