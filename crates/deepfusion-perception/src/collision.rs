@@ -1,4 +1,4 @@
-//! When the vehicle would meet a target if both went on as they do.
+//! Time to collision of the vehicle and a target, if both keep their motion.
 
 use crate::Target;
 use serde::{Deserialize, Serialize};
@@ -28,7 +28,7 @@ impl Default for VehicleShape {
     }
 }
 
-/// A meeting that is to come.
+/// A predicted collision.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Collision {
     /// The target's id.
@@ -37,13 +37,13 @@ pub struct Collision {
     pub time_s: f64,
 }
 
-/// How far ahead is looked, and in which steps, seconds.
+/// Prediction horizon and time step, seconds.
 const HORIZON_S: f64 = 10.0;
 /// See [`HORIZON_S`].
 const STEP_S: f64 = 0.05;
 
 /// The first target that the vehicle's front would touch, at its present speed (m/s) and yaw rate (rad/s, positive to the
-/// left), every target going on at its own velocity; one whose velocity is not known yet is taken to stand.
+/// left), if every target keeps its velocity; a target of unknown velocity counts as static.
 #[must_use]
 pub fn time_to_collision(
     targets: &[Target],
@@ -65,7 +65,7 @@ pub fn time_to_collision(
     })
 }
 
-/// Where the camera is after a while: x right, z forward, and how far it has turned to the left.
+/// The camera's future pose: x right, z forward, and its turn to the left.
 struct Pose {
     x: f64,
     z: f64,

@@ -1,4 +1,4 @@
-//! A row from its near end to its far one.
+//! Follows a row from its near to its far end.
 
 use super::View;
 use super::car::car;
@@ -6,10 +6,10 @@ use super::row::{Parked, Row};
 use super::segments::Standing;
 use crate::Detection;
 
-/// What a car that was found by its row says about where the row goes on, in sightings.
+/// Weight of a car found by its row for the row's continuation, in sightings.
 const FOUND: f32 = 2.0;
 
-/// Follows a row from its near end to its far one: each car of which enough is seen says where it goes on.
+/// Follows a row from its near to its far end: each car that is visible enough updates the row's direction.
 pub fn follow(row: &mut Row, standing: &Standing, view: &View) -> Vec<Detection> {
     let mut found = Vec::new();
     let mut done = f32::NEG_INFINITY;

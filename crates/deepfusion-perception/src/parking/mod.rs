@@ -1,9 +1,9 @@
-//! Cars side by side, as in a car park: those that are seen well tell where the others stand, of which only a corner, a
-//! hood or a strip of a door is seen.
+//! Cars side by side, as in a car park: those that are clearly visible show where the others stand, of which only a
+//! corner, a hood or a strip of a door is visible.
 //!
-//! A row is a line through the middles of cars that stand across the way; the rows on both sides of a lane go the same
-//! way. What stands on such a line is parted by its gaps, and each part is a car of usual size, square to the row. Cars
-//! are remembered, so that a row that was passed goes on ahead.
+//! A row is a line through the middles of cars that stand across the lane; the rows on both sides of a lane are
+//! parallel. What stands on such a line is split at its gaps, and each segment is a car of typical size, at a right
+//! angle to the row. Cars are remembered, so that a row continues ahead of those already passed.
 
 mod alone;
 mod car;
@@ -24,25 +24,25 @@ use remembered::{RememberedCar, distance, heading, merge, on_ground, parked};
 use row::{Heading, Parked, Row};
 use segments::Standing;
 
-/// From this share of a detection's pixels, or of the smaller footprint, in a car of a row, it is a part of that car; that
-/// it is one is likelier than that something else of a car's size stands there.
+/// From this share of a detection's pixels, or of the smaller footprint, within a car of a row, it is part of that car:
+/// that is likelier than another object in the car's place.
 const PART: f32 = 0.2;
-/// From this share of the smaller footprint in something else on, a car of a row is that.
+/// From this share of the smaller footprint within another detection, a car of a row is that detection.
 const SAME: f32 = 0.4;
-/// Within this distance of where something moves it is that, metres.
+/// Within this distance of a dynamic track a detection counts as dynamic, metres.
 const MOVING_M: f32 = 1.5;
 /// Half of a row's depth, metres.
 const HALF_M: f32 = 2.8;
-/// Cars that were seen often, of all rows together, before a row is believed: on a street hedges and drives look like one.
+/// Number of cars seen often, over all rows, before rows are used: on a street, hedges and driveways look like a row.
 const LEAST_SURE: usize = 3;
-/// From where to where, across the lane from a row's line, the cars of the other side may be, metres.
+/// Distance range across the lane from a row's line to the cars of the other side, metres.
 const ACROSS_M: [f32; 2] = [8.6, 15.0];
 
 /// Completes rows of parked cars, frame by frame.
 #[derive(Debug, Clone, Default)]
 pub struct Parking {
     remembered: Vec<RememberedCar>,
-    /// Those cars as they are seen from here, and the rows of which two are certain.
+    /// Those cars as seen from the present pose, and the rows with two certain cars.
     cars: Vec<Parked>,
     rows: Vec<Row>,
 }
@@ -63,7 +63,7 @@ impl Parking {
         *self = Self::default();
     }
 
-    /// Before a frame is looked at: where the known cars are, seen from there.
+    /// Starts a frame: transforms the remembered cars to the present camera and finds their rows.
     pub fn begin_frame(&mut self, ground: &Ground, world_from_cam: Option<&Se3>) {
         self.cars = world_from_cam.map_or(Vec::new(), |pose| {
             let cam_from_world = pose.inverse();
@@ -74,7 +74,7 @@ impl Parking {
         self.rows.retain(|row| row.sure() > 1);
     }
 
-    /// How something is usually turned at a place: along the way in the lane, square to it in a row and across from one.
+    /// The usual orientation at a point: along the lane, but at a right angle to it in a row and across the lane from one.
     pub fn usual_turn(&self, at: [f32; 2]) -> Turn {
         let square = |row: &Row| {
             let [along, off] = row.locate(at);
@@ -86,8 +86,9 @@ impl Parking {
         angle.map_or(Turn::ahead(), |angle| Turn::new(angle, 1.0))
     }
 
-    /// Puts the cars of rows in the place of their parts, which were found one by one. All else stays as it is: what moves (in
-    /// the world), what is known by name, what stands in a row by itself, and what none of its cars explains. Without a pose nothing is remembered, and no row believed.
+    /// Replaces detections that are parts of parked cars by the cars of their row. Everything else is kept: what is dynamic
+    /// (`moving`, in the world), what has a class, what stands in a row by itself, and what no car of a row explains. Without a
+    /// pose nothing is remembered and no rows are used.
     pub fn complete(
         &mut self,
         detections: Vec<Detection>,
@@ -142,7 +143,7 @@ impl Parking {
     }
 }
 
-/// What the cars of rows explain: where they stand, and what is seen of them.
+/// What the cars of rows explain: their footprints and their pixels.
 struct Explained<'a> {
     cars: &'a [Detection],
     pixels: Vec<bool>,
@@ -163,7 +164,7 @@ impl<'a> Explained<'a> {
         }
     }
 
-    /// Whether a detection is a part of one of the cars.
+    /// Whether a detection is part of one of the cars.
     fn covers(&self, detection: &Detection) -> bool {
         let within = |car: &Detection| car.place.overlap(&detection.place) > PART;
         let own = detection.runs.iter().flat_map(|run| {
@@ -174,7 +175,7 @@ impl<'a> Explained<'a> {
     }
 }
 
-/// The rows that some cars stand in, if enough of them were seen often.
+/// The rows of some cars, if enough of the cars were seen often.
 fn believed(cars: &[Parked]) -> Vec<Row> {
     let mut rows = Row::all(cars);
     if rows.iter().map(Row::sure).sum::<usize>() < LEAST_SURE {
@@ -183,7 +184,7 @@ fn believed(cars: &[Parked]) -> Vec<Row> {
     rows
 }
 
-/// Follows each of some rows, which bend alike, and as the lane does: they themselves, as they go then, and their cars.
+/// Follows each row; all have the curvature of the lane. Returns the updated rows and their cars.
 fn follow_all(
     rows: Vec<Row>,
     lane: &[Heading],
@@ -235,7 +236,7 @@ mod tests {
         }
     }
 
-    /// Three cars of a row, looked at so often.
+    /// Three cars of a row, seen this often.
     fn passed(scene: &Scene, sightings: usize, pose: Option<&Se3>) -> Parking {
         let mut parking = Parking::default();
         for _ in 0..sightings {
