@@ -13,7 +13,7 @@ use crate::view::Shared;
 use crate::{Border, Error, Graph};
 use crate::{masks, means};
 
-/// In which numbers the network computes.
+/// The precision of the network's arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
     /// 32-bit floats throughout.
@@ -22,7 +22,7 @@ pub enum Precision {
     Bf16,
 }
 
-/// A network that runs: a plan with packed weights, which [`Engine::another`] shares, and buffers of its own.
+/// An executable network: a plan with packed weights, which [`Engine::another`] shares, and its own buffers.
 #[derive(Debug)]
 pub struct Engine {
     runner: Runner,
@@ -39,9 +39,8 @@ impl Engine {
     /// Packs the graph for images of this size.
     ///
     /// # Errors
-    /// [`Error::Size`] where the graph cannot work on such images, [`Error::Graph`] where a residual or a
-    /// mask's operand is a concatenation or the image, [`Error::Memory`] where such images' values have no room in
-    /// memory, [`Error::NoBf16`].
+    /// [`Error::Size`] if the graph cannot run on such images, [`Error::Graph`] if a residual or a mask's operand
+    /// is a concatenation or the image, [`Error::Memory`] if there is not enough memory, [`Error::NoBf16`].
     pub fn new(
         graph: Graph,
         width: usize,
@@ -67,10 +66,10 @@ impl Engine {
         Bf16Conv::available()
     }
 
-    /// Another engine on the same packed weights, with buffers of its own: one for each thread.
+    /// A second engine on the same packed weights, with its own buffers: one for each thread.
     ///
     /// # Errors
-    /// [`Error::Memory`] where there is no room for them.
+    /// [`Error::Memory`] if there is no memory for them.
     pub fn another(&self) -> Result<Self, Error> {
         let (width, height) = self.size;
         let full = || Error::Memory { width, height };
@@ -101,7 +100,7 @@ impl Engine {
         self.run_steps(image, |_, _| {});
     }
 
-    /// The same; gives each step's name (its node's, and what it does) and time.
+    /// As [`Self::run`]; returns each step's name (its node and its kind) and duration.
     ///
     /// # Panics
     /// As [`Self::run`].
@@ -140,7 +139,7 @@ impl Engine {
         values
     }
 
-    /// The same in place of what `values` holds.
+    /// As [`Self::output`], written into `values`.
     ///
     /// # Panics
     /// As [`Self::output`].

@@ -1,4 +1,4 @@
-//! Where every value of a graph lies in the arena.
+//! The layout of a graph's values in the arena.
 
 use crate::tile::LANES;
 use crate::view::View;

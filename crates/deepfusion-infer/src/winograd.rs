@@ -162,7 +162,7 @@ struct Tiles {
     step: usize,
 }
 
-/// Where a tile lies: its first output pixel, and the step to the next.
+/// A tile's first output pixel, and the step to the next.
 #[derive(Debug, Clone, Copy)]
 struct TileOrigin {
     x: usize,

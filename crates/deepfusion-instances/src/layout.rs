@@ -1,42 +1,42 @@
-//! Which kind of model it is, from the shapes of its outputs.
+//! Recognises the kind of a model from the shapes of its outputs.
 
 /// Pixels of the input that a cell of each of the three grids covers.
 pub(crate) const STRIDES: [usize; 3] = [8, 16, 32];
 /// Most rows of a model that has suppressed its candidates itself.
 const MOST_FINAL_ROWS: usize = 1000;
 
-/// How a model writes its candidates.
+/// A model's output format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A column each: x, y, width, height, a score a class, coefficients (YOLOv8 and later).
+    /// One column per candidate: x, y, width, height, a score per class, coefficients (YOLOv8 and later).
     Columns,
-    /// A row each: x, y, width, height, objectness, a score a class, coefficients (YOLOv5, YOLOv7).
+    /// One row per candidate: x, y, width, height, objectness, a score per class, coefficients (YOLOv5, YOLOv7).
     Rows,
-    /// A row each as [`Self::Rows`], but places and sizes relative to their grids' cells (YOLOX).
+    /// As [`Self::Rows`], with positions and sizes relative to the grid's cells (YOLOX).
     GridRows,
-    /// A row each, already suppressed: left, top, right, bottom, score, class, coefficients (YOLOv10, YOLO26, exports with
-    /// NMS).
+    /// One row per candidate after suppression: left, top, right, bottom, score, class, coefficients (YOLOv10, YOLO26,
+    /// exports with NMS).
     Final,
 }
 
-/// What the numbers of a model's outputs are.
+/// The meaning of a model's outputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// How candidates are written.
+    /// The output format.
     pub kind: Kind,
-    /// Candidates.
+    /// Number of candidates.
     pub candidates: usize,
-    /// Classes; 0 where the model does not say.
+    /// Number of classes; 0 if unknown.
     pub classes: usize,
-    /// Prototypes of masks, and their height and width; none where the model gives boxes only.
+    /// Number, height and width of the mask prototypes; `None` if the model outputs boxes only.
     pub prototypes: Option<[usize; 3]>,
 }
 
 impl Layout {
-    /// Of a model with an input of this height and width.
+    /// The layout of a model with an input of this height and width.
     ///
     /// # Errors
-    /// A sentence saying what is there instead.
+    /// A sentence that names the shapes found.
     pub fn of(input: [usize; 2], outputs: &[Vec<usize>]) -> Result<Self, String> {
         let found = || {
             let shape = |s: &Vec<usize>| {

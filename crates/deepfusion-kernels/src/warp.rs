@@ -24,7 +24,7 @@ pub struct WarpShape {
 /// Pixels whose coordinates are worked out together: fixed loops, which the compiler turns into vector code.
 const LANES: usize = 16;
 
-/// What coordinates and pixels are made of.
+/// The number type of coordinates and pixels.
 ///
 /// # Safety
 /// [`Self::whole`] must give the whole part: pixels are then read without a check.

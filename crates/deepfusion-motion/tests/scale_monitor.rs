@@ -60,7 +60,8 @@ fn zoomed(image: &GreyImage, zoom: f64) -> GreyImage {
     GreyImage { data, ..*image }
 }
 
-/// The readings after each frame; from the second stretch on the images are zoomed and the speed is told so much too high.
+/// The readings after each frame; from the second stretch on the images are zoomed and the reported speed is too high by these
+/// factors.
 fn readings(drive: &Drive, zoom: f64, speed: f64, config: ScaleMonitorConfig) -> Vec<ScaleReading> {
     let mut monitor = ScaleMonitor::new(config);
     let images: Vec<Arc<RoadTexture>> = drive
@@ -97,7 +98,7 @@ fn readings(drive: &Drive, zoom: f64, speed: f64, config: ScaleMonitorConfig) ->
         .collect()
 }
 
-/// What a vehicle's speed and yaw rate tell of a motion: neither its pitch nor its heave.
+/// The part of a motion that a vehicle's speed and yaw rate measure: neither its pitch nor its heave.
 fn planar(motion: &Se3) -> Se3 {
     let turn = Vector3::new(0.0, motion.axis_angle().y, 0.0);
     let way = motion.translation();

@@ -1,4 +1,4 @@
-//! Files in ONNX Runtime, where this machine has one; what is said where it has none.
+//! Files in ONNX Runtime, if this machine has one; the messages if it has none.
 #![cfg(feature = "runtime")]
 
 mod support;
@@ -12,7 +12,7 @@ use deepfusion_onnx::runtime::{OrtEngine, find};
 use deepfusion_onnx::{DepthMaps, DepthModel, Error, reference, write};
 use support::model;
 
-/// The library, or what is said without one.
+/// The library, or the message without one.
 fn library_is_here() -> bool {
     match find(None) {
         Ok(library) => {

@@ -110,7 +110,7 @@ mod tests {
     fn two_fronts_are_parted_where_one_ends() {
         let mut row = silhouette(fronts(), vec![false; 20]);
         assert_eq!(seam(&row), Some(9));
-        // Where the lower part is hidden, a windscreen lies behind a bonnet.
+        // Where the lower part is hidden, a windscreen lies behind a hood.
         row.feet = vec![0.9; 20];
         assert_eq!(seam(&row), None);
     }

@@ -1,4 +1,4 @@
-//! Depth images that are none.
+//! Invalid depth images.
 
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use deepfusion_perception::{Error, Perception, PerceptionConfig, Stamp};

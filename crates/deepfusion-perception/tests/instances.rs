@@ -1,4 +1,4 @@
-//! Masks of somebody's model beside depth: what touches is told apart, and keeps its class.
+//! Masks of a segmentation model with depth: touching objects are separated and keep their classes.
 
 #[path = "common/blocks.rs"]
 mod blocks;

@@ -1,4 +1,4 @@
-//! What depth is said to be worth, in targets and in how far off they may be found again.
+//! The standard deviation of depth, in targets and in the tracker's gate.
 
 #[path = "common/blocks.rs"]
 mod blocks;

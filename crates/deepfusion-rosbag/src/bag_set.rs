@@ -13,7 +13,7 @@ use std::path::Path;
 pub struct BagSet {
     bags: Vec<Bag>,
     connections: Vec<Connection>,
-    /// For each bag, from a connection's place in it to the place in `connections`.
+    /// For each bag, from a connection's index in it to the index in `connections`.
     places: Vec<Vec<u32>>,
 }
 
@@ -38,7 +38,7 @@ impl BagSet {
         Self::new(bags.collect::<Result<_>>()?)
     }
 
-    /// A set of bags that are open.
+    /// A set of open bags.
     ///
     /// # Errors
     /// [`Error::EmptySet`].
@@ -77,13 +77,13 @@ impl BagSet {
         &self.bags
     }
 
-    /// The merged connections; `id` is the place in this list.
+    /// The merged connections; `id` is the index in this list.
     #[must_use]
     pub fn connections(&self) -> &[Connection] {
         &self.connections
     }
 
-    /// How many messages all bags hold.
+    /// Number of messages in all bags.
     #[must_use]
     pub fn message_count(&self) -> u64 {
         self.bags.iter().map(Bag::message_count).sum()
@@ -152,8 +152,8 @@ fn hull(ranges: impl Iterator<Item = (Time, Time)>) -> Option<(Time, Time)> {
     ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-/// The messages of a [`BagSet`] in time order; see [`Messages`] for errors. Memory is that of every bag whose times
-/// overlap.
+/// The messages of a [`BagSet`] in time order; see [`Messages`] for errors. It uses the memory of all bags whose
+/// times overlap.
 pub struct SetMessages<'set> {
     set: &'set BagSet,
     /// Bags not begun, by their first message.

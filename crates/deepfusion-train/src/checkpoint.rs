@@ -58,7 +58,7 @@ impl Checkpoints for RunFolder {
     ) -> Result<PathBuf, Error> {
         let mut all = weights::collect(&model.depth_net).with_prefix("depth.");
         all = all.merged(weights::collect(&model.pose_net).with_prefix("pose."));
-        // Training alone needs it, but whoever starts from `best` trains.
+        // Only training needs it, but a run that starts from `best` trains.
         if let Some(decoder) = &model.flow_decoder {
             all = all.merged(weights::collect(decoder).with_prefix("flow."));
         }

@@ -1,4 +1,4 @@
-//! What a run goes on from, and what another one starts from.
+//! Resuming a run, and starting another one from it.
 
 mod support;
 

@@ -1,4 +1,4 @@
-//! What is answered to which path.
+//! The server's routes.
 //!
 //! | Path | Answer |
 //! |---|---|

@@ -181,7 +181,7 @@ fn boxes_are_where_they_belong(browser: &mut Browser) {
             "{corner} is {off} pixels from the nearest of {pixels:?}"
         );
     }
-    // An upright edge's middle has the colour of what moves.
+    // An upright edge's middle has the colour of dynamic targets.
     let colour = browser.value(&format!(
         "(() => {{ const {{ app }} = deepfusion, pane = app.kinds[0].picture, at = pane.layout(), {{ canvas }} = pane; \
          app.point(null); pane.draw(); \

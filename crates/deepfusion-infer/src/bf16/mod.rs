@@ -31,7 +31,7 @@ pub(crate) fn has_amx() -> bool {
     has_dot() && deepfusion_kernels::matrix_unit::available()
 }
 
-/// Where an output pixel is written, and its residual read.
+/// Offsets of an output pixel and of its residual.
 #[derive(Debug, Clone, Copy)]
 struct OutputPixel {
     out: usize,

@@ -227,7 +227,7 @@ fn graphs_of_any_shape_are_laid_out_right_and_images_do_not_mix() {
     for seed in [1, 2, 3] {
         let mut image = noise_image(seed, width, height);
         if seed == 2 {
-            // An image that is none must not be seen in the next.
+            // An invalid image must not affect the next one.
             image.fill(f32::NAN);
             engine.run(&image);
             assert!(engine.output(0).iter().all(|v| v.is_nan()));

@@ -1,4 +1,4 @@
-//! What the operations mean, in f64.
+//! Reference implementations of the operations, in f64.
 
 use crate::{Activation, Border, Conv, Graph, Op};
 

@@ -1,4 +1,4 @@
-//! Nothing of an image is seen in the next, whatever it was.
+//! No image affects the next one, whatever its content.
 
 use super::build::{Builder, deviation, noise, noise_image};
 use super::oracle::run;

@@ -211,7 +211,7 @@ fn pairs_equal_the_definition_across_tiles() {
     }
 }
 
-/// Leaves buffers full of NaN to whoever borrows them next on this thread.
+/// Leaves buffers full of NaN for the next borrower on this thread.
 fn fill_scratch_with_garbage() {
     let fill = |buffer: &mut [f32]| buffer.fill(f32::NAN);
     with_scratch(1 << 20, |outer| {

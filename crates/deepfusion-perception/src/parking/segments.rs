@@ -261,7 +261,7 @@ impl Segment {
         if side.len() < SIDE_STRIPS {
             return None;
         }
-        // The median over pairs: a bonnet or a roof lies behind.
+        // The median over pairs: a hood or a roof lies behind.
         let pairs = side
             .iter()
             .enumerate()

@@ -1,4 +1,4 @@
-//! Where things stand: stretches of road, side streets, and the two sides of the street.
+//! The layout of a street: stretches of road, side streets, and the two sides of the street.
 
 use super::World;
 use super::buildings::{self, Plot, Style};

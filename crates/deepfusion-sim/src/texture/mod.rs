@@ -1,4 +1,4 @@
-//! What surfaces look like: albedo as a function of the place on the surface, never of the viewer.
+//! Textures: albedo as a function of the position on the surface, never of the viewer.
 
 pub mod facade;
 pub mod ground;
@@ -33,7 +33,7 @@ pub struct Patch {
     pub seed: u32,
 }
 
-/// What a solid is made of.
+/// The material of a solid.
 #[derive(Debug, Clone)]
 pub enum Material {
     /// Walls with windows and doors; also the flat top of the house.

@@ -1,4 +1,4 @@
-//! Where a view is taken from, and with which lens.
+//! The camera of a view: its pose and its lens.
 
 use super::built_world::BuiltWorld;
 use super::draw::{normal, weighted};
@@ -26,18 +26,18 @@ const NEARBY: f64 = 14.0;
 /// Tries before a camera goes where cars drive.
 const TRIES: usize = 40;
 
-/// The camera's place in a world.
+/// The camera's pose in a world.
 #[derive(Debug, Clone, Copy)]
 pub struct Stand {
     /// World (z up) from the camera.
     pub world_from_cam: Se3,
     /// Height above the ground below it, metres.
     pub height: f64,
-    /// Whether the traffic had to give way: no free place was found among it.
+    /// Whether the traffic was removed, because no free position was found among it.
     pub alone: bool,
 }
 
-/// Draws a lens, and how its picture came to the size that is asked for.
+/// Draws a lens, and the crop or squeeze of its picture to the requested size.
 ///
 /// Horizontal field of view: 70 % normal around 78° (deviation 8°, 64° to 92°), in rooms around 64°; the rest uniform
 /// from 35° to 60° or from 90° to 110°. Half of the pictures, nine in ten of those of rooms, are ones of another aspect
@@ -210,7 +210,7 @@ pub fn stand(
             return stand;
         }
     }
-    // A lane is free of everything that stands, and from here on of what moves.
+    // A lane is free of everything that stands, and from here on of dynamic objects.
     let lane = place.world.lanes().into_iter().find(|lane| lane.forward);
     let lateral = lane.map_or(-1.65, |lane| lane.lateral);
     Stand {

@@ -1,7 +1,7 @@
-//! The endless mode: views of ever new streets by ever new cameras, for a network that learns depth from them.
+//! The endless mode: views of ever new streets by ever new cameras, as training data for depth networks.
 //!
-//! What a view shows hangs on the settings and its index alone, so loaders may ask for any view, from any thread,
-//! in any order. The depth is exact whatever is done to the colours.
+//! A view depends on the settings and its index alone, so that loaders may request any view, from any thread, in
+//! any order. The depth is exact whatever is done to the colours.
 
 mod built_world;
 mod cache;
@@ -30,7 +30,7 @@ pub use weather::Weather;
 /// Worlds kept beyond those in use: as many threads may be behind or ahead of the others.
 const SPARE_WORLDS: usize = 6;
 
-/// One view, with what is true about it.
+/// One view, with its ground truth.
 #[derive(Debug, Clone)]
 pub struct View {
     /// H×W 8-bit RGB; three equal channels where the camera is grey.
@@ -39,13 +39,13 @@ pub struct View {
     pub depth: DepthMap,
     /// The camera, in pixels of the picture.
     pub intrinsics: Intrinsics,
-    /// H·W flags, row by row: the pixel's centre sees something that moves.
+    /// H·W flags, row by row: the pixel's centre is on a dynamic object.
     pub moving: Vec<bool>,
     /// Camera (x right, y down, z forward) to world (z up), metres.
     pub world_from_cam: Se3,
     /// Number of the world; views with the same number are of the same street.
     pub world: u64,
-    /// The kind of place.
+    /// The kind of scene.
     pub scene: Scene,
     /// The weather.
     pub weather: Weather,
@@ -79,21 +79,21 @@ impl Endless {
         })
     }
 
-    /// What the stream is made from.
+    /// The settings of the stream.
     #[must_use]
     pub fn config(&self) -> &EndlessConfig {
         &self.config
     }
 
     /// View number `index`, the same at every call, from any thread, in any order. Works on the calling thread
-    /// alone; where its world is not built yet, that is done first.
+    /// alone; its world is built first if necessary.
     #[must_use]
     pub fn view(&self, index: u64) -> View {
         self.view_sized(index, (self.config.width, self.config.height))
     }
 
-    /// The same place, seen by a camera of another size (width, height; in pixels). Its lens and where it stands are
-    /// drawn for that size.
+    /// The same place, seen by a camera of another size (width, height; in pixels). Its lens and position are drawn
+    /// for that size.
     #[must_use]
     pub fn view_sized(&self, index: u64, size: (u32, u32)) -> View {
         let config = &self.config;

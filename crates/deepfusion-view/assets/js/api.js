@@ -1,4 +1,4 @@
-// What the server is asked for.
+// Requests to the server.
 
 /** A failure that the server explains. */
 export class Problem extends Error {
@@ -13,7 +13,7 @@ async function get(path) {
   const answer = await fetch(path);
   if (answer.ok) return answer;
   let body = {};
-  try { body = await answer.json(); } catch { /* not this server's words */ }
+  try { body = await answer.json(); } catch { /* not JSON of this server */ }
   throw new Problem(body.error ?? `${answer.status} ${answer.statusText}`, body.hint, answer.status);
 }
 

@@ -10,12 +10,12 @@ import { LINES, POINTS, program } from './shaders.js';
 
 const MOST_POINTS = matchMedia('(pointer: coarse)').matches ? 400_000 : 1_200_000;
 const MOST_PATCHES = MOST_POINTS / 3;
-/** While things move on a machine that cannot keep up. */
+/** While the view moves on a machine that cannot keep up. */
 const COARSE_POINTS = 60_000;
 const MODES = { picture: 0, depth: 1, height: 2 };
 const VIEW_NAMES = { chase: 'Chase', top: 'Top', side: 'Side', eye: 'Camera' };
 
-/** Whether there is no graphics card behind WebGL: edges are then not smoothed, and what moves is drawn coarsely. */
+/** Whether there is no graphics card behind WebGL: edges are then not smoothed, and a moving view is drawn coarsely. */
 export function drawnBySoftware() {
   const gl = document.createElement('canvas').getContext('webgl2');
   const info = gl?.getExtension('WEBGL_debug_renderer_info');

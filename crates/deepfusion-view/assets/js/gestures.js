@@ -55,7 +55,7 @@ export function gestures(element, on) {
   }, { passive: false });
 }
 
-/** Keeps a canvas as fine as the screen; whether its size changed. */
+/** Keeps a canvas at the screen's resolution. Returns whether its size changed. */
 export function fit(canvas, most = 2) {
   const ratio = Math.min(devicePixelRatio || 1, most), box = canvas.getBoundingClientRect();
   const width = Math.max(1, Math.round(box.width * ratio)), height = Math.max(1, Math.round(box.height * ratio));

@@ -1,6 +1,6 @@
 // What the keys do: one table, for the help and for the keyboard.
 
-/** Groups of [keys as they are shown, keys as events say them, what they do, action of the app]. */
+/** Groups of [keys as they are shown, keys as events name them, what they do, action of the app]. */
 export const KEYS = [
   ['Time', [
     [['Space'], [' '], 'play, pause', app => app.player.toggle()],
@@ -57,8 +57,8 @@ export function help() {
   if (dialog.open) return dialog.close();
   const groups = KEYS.map(([name, keys]) => `<section><h3>${name}</h3>${keys.map(([shown, , what]) => `<div><span>${what}</span><span>${shown.map(k => `<kbd>${k.replace('<', '&lt;')}</kbd>`).join('')}</span></div>`).join('')}</section>`);
   dialog.innerHTML = `<button class="close" aria-label="Close">✕</button><h2>Keys</h2><div class="keys">${groups.join('')}</div>`
-    + '<p>Pictures: the pointer tells metres, the wheel zooms, dragging moves, a double click shows all. Cloud: dragging turns, with Shift or the right button moves, the wheel comes nearer, a double click turns about that point. A click on a box chooses its track.</p>'
-    + '<p>Fingers: one tells metres or turns the cloud, two zoom and move, a double tap shows all.</p>';
+    + '<p>Pictures: the pointer shows metres, the wheel zooms, dragging moves, a double click shows all. Cloud: dragging turns, with Shift or the right button moves, the wheel comes nearer, a double click turns about that point. A click on a box chooses its track.</p>'
+    + '<p>Fingers: one shows metres or turns the cloud, two zoom and move, a double tap shows all.</p>';
   dialog.querySelector('.close').onclick = () => dialog.close();
   dialog.onclick = e => { if (e.target === dialog) dialog.close(); };
   dialog.showModal();

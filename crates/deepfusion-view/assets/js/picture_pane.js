@@ -34,7 +34,7 @@ export class PicturePane {
     });
   }
 
-  /** What is painted: a bitmap, or the depth's sheet. */
+  /** The source that is painted: a bitmap, or the painted depth. */
   size(frame) {
     if (this.kind === 'depth' && frame?.depth) return [frame.depth.width, frame.depth.height];
     if (this.kind === 'picture' && frame?.bitmap) return [frame.bitmap.width, frame.bitmap.height];
@@ -42,7 +42,7 @@ export class PicturePane {
     return size ? [size.width, size.height] : frame?.bitmap ? [frame.bitmap.width, frame.bitmap.height] : null;
   }
 
-  /** The picture's place in the canvas, in CSS pixels. */
+  /** The picture's position in the canvas, in CSS pixels. */
   layout() {
     const { width, height } = this.canvas.getBoundingClientRect();
     const [w, h] = this.pixels ?? [16, 9];
@@ -260,7 +260,7 @@ export class PicturePane {
 
 export const escape = text => text.replace(/[&<>"]/g, c => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]);
 
-/** A target in a few signs: its number, metres, and its speed if it moves. */
+/** A target's short label: its number, metres, and its speed if it moves. */
 export function labelOf(target) {
   const distance = target.distance_m ?? Math.hypot(...target.center_m);
   const speed = target.moving && target.velocity_mps ? `  ${Math.hypot(...target.velocity_mps).toFixed(1)} m/s` : '';

@@ -47,7 +47,7 @@ function drawChart({ column, canvas, readout }, logs) {
   ctx.clearRect(0, 0, width, height);
   const lines = logs.flatMap((log, i) => ['train', 'validation'].map(part => ({
     colour: PALETTE[i % 2], dots: part === 'validation',
-    // A validation takes no step: what it says of steps is 0.
+    // A validation makes no step: its step columns are 0.
     points: (part === 'validation' && ['learning_rate', 'images_per_second'].includes(column) ? [] : log[part][column] ?? []).map((v, j) => [log[part][log.step_column][j], v]).filter(p => p[0] !== null && p[1] !== null),
   }))).filter(l => l.points.length);
   const all = lines.flatMap(l => l.points);

@@ -6,7 +6,7 @@ use std::hash::{Hash, Hasher};
 
 use super::summary::Summary;
 
-/// What a file is to its frame, by its name.
+/// The kind of a frame's file, by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum FileKind {
     /// `NAME.json`.
@@ -104,7 +104,7 @@ impl Entry {
         }
     }
 
-    /// A number that is another one when one of the files has changed.
+    /// A number that changes with any of the files.
     pub fn revision(&self) -> u64 {
         let mut hash = DefaultHasher::new();
         let files = [

@@ -11,7 +11,7 @@ use super::entry::{Entry, FrameFile, frame_and_kind};
 use super::order::natural;
 use super::summary::Summary;
 
-/// Files that are written in place change without the folder noticing; so often they are listed at all the same.
+/// Files that are written in place change without the folder noticing; so the folder is listed again after this time in any case.
 const RELIST_AFTER: Duration = Duration::from_secs(5);
 /// How long an answer may be held up by reading small files; the rest is read for the next one.
 const READING_TIME: Duration = Duration::from_millis(150);
@@ -80,7 +80,7 @@ impl Listing {
             let Some((name, kind)) = frame_and_kind(&file_name) else {
                 continue;
             };
-            // A file that went between the two calls is none.
+            // A file that was removed between the two calls is ignored.
             let Ok(meta) = std::fs::metadata(file.path()) else {
                 continue;
             };
@@ -136,7 +136,7 @@ impl Listing {
         }
     }
 
-    /// As the page gets it: columns, a place a frame.
+    /// The list as sent to the page: columns with one entry per frame.
     pub fn json(&self, known: Option<u64>, failure: Option<String>) -> Value {
         let version = self.version;
         if known == Some(version) && failure.is_none() {
