@@ -60,7 +60,7 @@ impl Model {
     #[must_use]
     pub fn loss(&self, pass: &ForwardPass, batch: &SnippetBatch, schedule: Schedule) -> BatchLoss {
         let settings = &self.config.loss;
-        let motions = self.view_motions(pass, batch);
+        let motions = self.warp_poses(pass, batch);
         let targets = pyramid(pass.targets.clone());
         let levels = levels(pass, &targets, settings.compare_at, settings.ssim_weight);
         let mut sum = Sum::default();
@@ -315,8 +315,8 @@ impl Model {
         }
     }
 
-    /// The motions that the views are synthesised with.
-    fn view_motions(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Vec<Motion> {
+    /// The poses used for warping, by view.
+    fn warp_poses(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Vec<Motion> {
         match self.config.view_motion {
             ViewMotion::PoseNet => pass.motions.clone(),
             ViewMotion::Vehicle => pass.measured.clone(),

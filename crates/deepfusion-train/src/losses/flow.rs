@@ -124,7 +124,7 @@ pub fn flow(
 fn sum(terms: impl Iterator<Item = Tensor<1>>) -> Tensor<1> {
     terms
         .reduce(|a, b| a + b)
-        .expect("a flow is looked at from at least one side")
+        .expect("a flow has at least one view")
 }
 
 /// Weight of image edges, e^(−10·|∂I|), as is common for flow networks.

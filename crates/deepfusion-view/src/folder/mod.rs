@@ -114,7 +114,7 @@ impl Folder {
         )
     }
 
-    /// The list of frames as JSON, looked at anew; only that nothing changed where the client's `known` version is the present one.
+    /// The list of frames as JSON, refreshed; only a note that nothing changed if the client's `known` version is current.
     pub(crate) fn index_json(&self, known: Option<u64>) -> serde_json::Value {
         let mut listing = self.listing();
         let failure = listing.refresh().err().map(|e| e.to_string());
