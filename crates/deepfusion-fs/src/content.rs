@@ -2,20 +2,20 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// A file's length and checksum: what is needed to notice that it was cut off, or that a power cut left zeros of it.
+/// A file's length and checksum, to detect truncation and content lost in a power cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Content {
     /// Length in bytes.
     pub bytes: u64,
-    /// CRC-32 as in PNG, zip and Ethernet (IEEE 802.3): for accidents, not for malice.
+    /// CRC-32 as in PNG, zip and Ethernet (IEEE 802.3): against accidents, not tampering.
     pub crc32: u32,
 }
 
 impl Content {
-    /// Of a file as it is now.
+    /// Reads a file's length and checksum.
     ///
     /// # Errors
-    /// What the system says, such as that there is no such file.
+    /// The system's error, for instance if there is no such file.
     pub fn of(path: &Path) -> io::Result<Self> {
         let mut file = File::open(path)?;
         let mut hash = crc32fast::Hasher::new();
@@ -34,7 +34,7 @@ impl Content {
         Ok(Self { bytes, crc32 })
     }
 
-    /// Whether a file still is that; one that is not there is not. Another length is seen without reading.
+    /// Whether a file still has this content; false for a missing file. A different length is noticed without reading.
     #[must_use]
     pub fn is_of(&self, path: &Path) -> bool {
         std::fs::metadata(path).is_ok_and(|meta| meta.len() == self.bytes)

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use crate::sync::{folder_of, publish, sync_files, sync_folder};
 
-/// A file's name beside its target, on the same file system, until the file is whole. What bears the name is removed when
-/// this goes out of scope, unless it was published.
+/// A temporary file beside its target, on the same file system, until the file is complete. It is removed on drop unless
+/// it was published.
 #[derive(Debug)]
 pub struct Partial {
     temporary: PathBuf,
@@ -17,7 +17,7 @@ pub struct Partial {
 }
 
 impl Partial {
-    /// For the file that is to be at `target`. Nothing is made yet.
+    /// A temporary name for the file at `target`. Nothing is created yet.
     #[must_use]
     pub fn beside(target: &Path) -> Self {
         // Threads, processes, and machines that share the folder may write the same target: the last rename wins, whole. A
@@ -32,37 +32,37 @@ impl Partial {
         }
     }
 
-    /// Where to write.
+    /// The path to write to.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.temporary
     }
 
-    /// Makes the file, empty.
+    /// Creates the file, empty.
     ///
     /// # Errors
-    /// What the system says, such as that there is no such folder.
+    /// The system's error, for instance if there is no such folder.
     pub fn create(&self) -> io::Result<File> {
         File::create_new(&self.temporary)
     }
 
-    /// Gives the file its name once its content is on the disk, and returns once the name is, too.
+    /// Syncs the content, renames the file to its target and syncs the folder.
     ///
     /// # Errors
-    /// What the system says. Where syncing or renaming failed the target is as it was.
+    /// The system's error. If syncing the file or renaming failed, the target is unchanged.
     pub fn publish(self) -> io::Result<()> {
         publish(&self.temporary, &self.target)
     }
 
-    /// Gives the file its name without waiting for the disk: after a power cut its content may be missing.
+    /// Renames the file to its target without waiting for the disk: after a power cut its content may be missing.
     ///
     /// # Errors
-    /// What the system says; the target is then as it was.
+    /// The system's error; the target is then unchanged.
     pub fn publish_unsynced(self) -> io::Result<()> {
         std::fs::rename(&self.temporary, &self.target)
     }
 
-    /// The name of the file that a path would have become, where the path is one of these: a killed program leaves it.
+    /// The target's name, if `path` is a temporary file that a killed program left behind.
     #[must_use]
     pub fn target_of(path: &Path) -> Option<&str> {
         let name = path.file_name()?.to_str()?;
@@ -79,12 +79,12 @@ impl Drop for Partial {
     }
 }
 
-/// Writes a file aside, syncs it, renames it to `path` and syncs the folder: `path` never holds half a file, also after a
-/// power cut, and once this returns it is there to stay. `failed` makes the caller's error of the system's.
+/// Writes a temporary file, syncs it, renames it to `path` and syncs the folder: `path` never holds half a file, even
+/// after a power cut, and is durable once this returns. `failed` converts the system's error into the caller's.
 ///
 /// # Errors
-/// What `write` returns, or `failed` of what the system said. The partial file is then gone and `path` is as it was; the last
-/// step, syncing the folder, may fail with the new file in place.
+/// The error of `write`, or `failed` of the system's error. The temporary file is then removed and `path` is unchanged; only
+/// the last step, syncing the folder, may fail with the new file in place.
 pub fn write_atomically<E>(
     path: &Path,
     failed: impl Fn(io::Error) -> E,
@@ -101,8 +101,8 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
     write_atomically(path, |e| e, |out| out.write_all(bytes.as_ref()))
 }
 
-/// As [`write_atomically`] without waiting for the disk: a reader never sees half a file, and after a power cut there may be
-/// one. For many files that another, written after [`crate::sync_files`], says to be done.
+/// As [`write_atomically`], without waiting for the disk: a reader never sees half a file, but after a power cut there may
+/// be one. For many files whose completion another file, written after [`crate::sync_files`], records.
 ///
 /// # Errors
 /// As [`write_atomically`].
@@ -116,10 +116,10 @@ pub fn write_unsynced<E>(
         .map_err(failed)
 }
 
-/// Writes a file aside, for [`publish_all`] or [`Partial::publish`].
+/// Writes a temporary file, for [`publish_all`] or [`Partial::publish`].
 ///
 /// # Errors
-/// What `write` returns, or `failed` of what the system said. The partial file is then gone.
+/// The error of `write`, or `failed` of the system's error. The temporary file is then removed.
 pub fn write_aside<E>(
     path: &Path,
     failed: impl Fn(io::Error) -> E,
@@ -135,7 +135,7 @@ pub fn write_aside<E>(
 /// Publishes many files at once: waiting for the disk takes hardly longer than for one.
 ///
 /// # Errors
-/// What the system says. Where syncing failed no target was touched, where renaming did those before it are in place.
+/// The system's error. If syncing failed, no target was touched; if renaming failed, the targets before it are in place.
 pub fn publish_all(partials: Vec<Partial>) -> io::Result<()> {
     sync_files(partials.iter().map(Partial::path))?;
     let mut folders = BTreeSet::new();
@@ -207,7 +207,7 @@ mod tests {
         assert_eq!(error.kind(), io::ErrorKind::NotFound);
     }
 
-    /// A file in the folder one is in has no folder in its name, which must be synced all the same.
+    /// A file in the current folder has no folder in its path; that folder must be synced all the same.
     #[test]
     fn a_bare_name_is_of_this_folder() {
         let path = PathBuf::from(format!("bare-name-{}.txt", std::process::id()));
@@ -239,7 +239,7 @@ mod tests {
         publish_all(Vec::new()).unwrap();
     }
 
-    /// What a killed program left must not be in the way of the next one, whatever its process's number.
+    /// What a killed program left behind must not be in the way of the next one, whatever its process id.
     #[test]
     fn two_of_one_process_never_share_a_name() {
         let target = Path::new("out/a_depth.png");

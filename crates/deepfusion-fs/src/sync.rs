@@ -3,18 +3,18 @@ use std::io::{self, ErrorKind};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Syncs a finished file, renames it to `target` and syncs the folder: once this returns, the target is there to stay.
+/// Syncs a finished file, renames it to `target` and syncs the folder: once this returns, the target is durable.
 ///
 /// # Errors
-/// What the system says. Where syncing or renaming the file failed, the target is as it was.
+/// The system's error. If syncing or renaming the file failed, the target is unchanged.
 pub fn publish(file: &Path, target: &Path) -> io::Result<()> {
     sync_file(file)?;
     std::fs::rename(file, target)?;
     sync_folder(folder_of(target))
 }
 
-/// Syncs a finished folder with all that is in it, renames it to `target` and syncs the folder of that. A target that is no
-/// empty folder is in the way.
+/// Syncs a finished folder with all its content, renames it to `target` and syncs the parent folder. Fails if `target`
+/// exists and is not an empty folder.
 ///
 /// # Errors
 /// What the system says.
@@ -24,13 +24,13 @@ pub fn publish_folder(folder: &Path, target: &Path) -> io::Result<()> {
     sync_folder(folder_of(target))
 }
 
-/// Threads that wait for the disk at once: it does then what it can together.
+/// Number of threads that sync at once, so that the disk can combine their writes.
 const WAITING: usize = 8;
 
-/// Waits until the content of files is on the disk. Their names are with [`sync_folder`].
+/// Waits until the content of files is on the disk. Their names need [`sync_folder`].
 ///
 /// # Errors
-/// What the system says of one that fails.
+/// The system's error for one that failed.
 pub fn sync_files<P: AsRef<Path>>(files: impl IntoIterator<Item = P>) -> io::Result<()> {
     let files: Vec<P> = files.into_iter().collect();
     let files: Vec<&Path> = files.iter().map(AsRef::as_ref).collect();
@@ -58,7 +58,7 @@ pub fn sync_files<P: AsRef<Path>>(files: impl IntoIterator<Item = P>) -> io::Res
 /// Waits until the names in a folder, though not its files' content, are on the disk.
 ///
 /// # Errors
-/// What the system says. A file system that knows no such thing is no error: there is nothing more that could be done.
+/// The system's error. A file system that cannot sync folders is not an error: nothing more can be done.
 pub fn sync_folder(folder: &Path) -> io::Result<()> {
     // Elsewhere than on Unix a folder cannot be opened as a file, and its names are journalled.
     if !cfg!(unix) {
@@ -80,7 +80,7 @@ pub fn sync_folder(folder: &Path) -> io::Result<()> {
 /// Syncs all files below a folder, and all folders.
 ///
 /// # Errors
-/// What the system says of the first that fails.
+/// The system's error for the first that failed.
 pub fn sync_tree(folder: &Path) -> io::Result<()> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder)? {

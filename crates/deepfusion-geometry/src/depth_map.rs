@@ -42,8 +42,7 @@ impl DepthMap {
         }
     }
 
-    /// The map at another size: of each new pixel the old one at its middle. Nothing is averaged, which would put depths
-    /// between what is near and what is far.
+    /// The map resized by nearest neighbour. Nothing is averaged: that would put depths between near and far surfaces.
     #[must_use]
     pub fn nearest(&self, width: usize, height: usize) -> Self {
         let mut map = Self::empty(width, height);
@@ -61,7 +60,7 @@ impl DepthMap {
         map
     }
 
-    /// How many pixels have a depth.
+    /// Number of pixels with a depth.
     #[must_use]
     pub fn count(&self) -> usize {
         self.data.iter().filter(|d| **d > 0.0).count()

@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 /// The range of depths a network can express, in metres, and its map to the sigmoid output
-/// (SPEC 1.1): d = 1/D_max + (1/D_min − 1/D_max)·σ, depth = 1/d.
+/// (docs/concepts/network.md): d = 1/D_max + (1/D_min − 1/D_max)·σ, depth = 1/d.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct DepthRange {
@@ -35,14 +35,14 @@ impl DepthRange {
         1.0 / self.disparity(sigmoid)
     }
 
-    /// The sigmoid output that means `depth_m`.
+    /// The sigmoid output that stands for `depth_m`.
     #[must_use]
     pub fn sigmoid_of(&self, depth_m: f64) -> f64 {
         let (low, high) = (1.0 / self.max_m, 1.0 / self.min_m);
         (1.0 / depth_m - low) / (high - low)
     }
 
-    /// The bias of a head whose zero input then means `depth_m`: the logit of [`Self::sigmoid_of`].
+    /// The bias that makes a head with zero input predict `depth_m`: the logit of [`Self::sigmoid_of`].
     #[must_use]
     pub fn logit_of(&self, depth_m: f64) -> f64 {
         let s = self.sigmoid_of(depth_m);

@@ -1,15 +1,15 @@
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Steps of Newton's method before giving up; from inside a usual lens' image it takes 4 to 6.
+/// Limit of Newton steps; inside the image of a usual lens 4 to 6 are needed.
 const MAX_STEPS: usize = 30;
-/// Where the distorted point is met to this, in units of the focal length: a millionth of a pixel.
+/// Accuracy of the distorted point, in units of the focal length: about a millionth of a pixel.
 const TOLERANCE: f64 = 1e-10;
 
-/// What a lens does to a pinhole's image: radial and tangential distortion after Brown and Conrady, in
-/// the form of OpenCV's first eight coefficients and ROS's `plumb_bob` and `rational_polynomial`.
+/// Lens distortion, radial and tangential, after Brown and Conrady, in the form of OpenCV's first
+/// eight coefficients and ROS's `plumb_bob` and `rational_polynomial`.
 ///
-/// With x = X/Z, y = Y/Z, r² = x² + y² of a point in the camera frame, it is seen at
+/// A point of the camera frame with x = X/Z, y = Y/Z, r² = x² + y² appears at
 ///
 /// - g = (1 + k₁r² + k₂r⁴ + k₃r⁶) / (1 + k₄r² + k₅r⁴ + k₆r⁶)
 /// - x' = g·x + 2p₁xy + p₂(r² + 2x²)
@@ -31,7 +31,7 @@ impl Distortion {
     /// (thin prism, tilt) only where all further ones are zero.
     ///
     /// # Errors
-    /// A sentence that says what is wrong with them.
+    /// A sentence that says why they are invalid.
     pub fn from_opencv(coefficients: &[f64]) -> Result<Self, String> {
         if let Some(bad) = coefficients.iter().find(|c| !c.is_finite()) {
             return Err(format!("a coefficient is {bad}"));
@@ -54,20 +54,20 @@ impl Distortion {
         })
     }
 
-    /// Whether it leaves every point where it is.
+    /// Whether all coefficients leave points unchanged.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Where the lens shows an ideal point; both at a distance of 1 from the camera (x = X/Z).
+    /// The distorted position of an undistorted point; both in normalised coordinates (x = X/Z).
     #[must_use]
     pub fn distort(&self, ideal: &Vector2<f64>) -> Vector2<f64> {
         self.with_slope(ideal).0
     }
 
-    /// The ideal point that the lens shows at `seen`; `None` where there is none near it: the polynomial
-    /// turns back outside the image that it was fitted to.
+    /// The undistorted point whose distorted position is `seen`; `None` if there is none near it:
+    /// outside the image it was fitted to, the polynomial is not invertible.
     #[must_use]
     pub fn undistort(&self, seen: &Vector2<f64>) -> Option<Vector2<f64>> {
         let mut ideal = *seen;
@@ -86,7 +86,7 @@ impl Distortion {
         None
     }
 
-    /// Where the point is shown, and the derivatives of that: ∂(x', y') / ∂(x, y).
+    /// The distorted position of a point, and its derivatives: ∂(x', y') / ∂(x, y).
     fn with_slope(&self, p: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let (x, y, r2) = (p.x, p.y, p.norm_squared());
         let [p1, p2] = self.tangential;

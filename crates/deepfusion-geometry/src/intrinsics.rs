@@ -22,8 +22,8 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// From fx, fy, cx, cy in pixels of an image of this width and height. They are not checked:
-    /// [`Self::implausible`].
+    /// From fx, fy, cx, cy in pixels of an image of this width and height. They are not checked;
+    /// see [`Self::implausible`].
     #[must_use]
     pub fn from_numbers([fx, fy, cx, cy]: [f64; 4], (width, height): (u32, u32)) -> Self {
         Self {
@@ -124,8 +124,8 @@ impl Intrinsics {
         )
     }
 
-    /// Why these numbers cannot be a camera, if they cannot: focal lengths that are not positive and
-    /// finite, or a principal point outside the image.
+    /// Why these numbers are not a valid camera, or `None` if they are: focal lengths that are not
+    /// positive and finite, or a principal point outside the image.
     #[must_use]
     pub fn implausible(&self) -> Option<String> {
         for (name, f) in [("fx", self.fx), ("fy", self.fy)] {

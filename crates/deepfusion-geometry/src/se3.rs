@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuatern
 pub struct Se3(Isometry3<f64>);
 
 impl Se3 {
-    /// The motion that leaves everything where it is.
+    /// The identity.
     #[must_use]
     pub fn identity() -> Self {
         Self(Isometry3::identity())
@@ -86,13 +86,13 @@ impl Se3 {
         Self(self.0.inverse())
     }
 
-    /// A point of frame b in frame a.
+    /// Transforms a point of frame b to frame a.
     #[must_use]
     pub fn transform(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.0.rotation * point + self.0.translation.vector
     }
 
-    /// A direction of frame b in frame a: rotated, not moved.
+    /// Transforms a direction of frame b to frame a: rotated, not translated.
     #[must_use]
     pub fn rotate(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         self.0.rotation * direction
@@ -128,14 +128,14 @@ impl Se3 {
         self.0.to_homogeneous()
     }
 
-    /// The motion as seen in a mirror that swaps left and right of the camera frame (x → −x).
+    /// The motion mirrored left to right in the camera frame (x → −x).
     #[must_use]
     pub fn mirrored_x(&self) -> Self {
         let m = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
         Self::from_parts(&(m * self.rotation() * m), m * self.translation())
     }
 
-    /// Between two motions: `fraction` 0 is `self`, 1 is `other`; rotation by slerp.
+    /// Interpolates between two motions: `fraction` 0 is `self`, 1 is `other`; rotation by slerp.
     #[must_use]
     pub fn interpolate(&self, other: &Self, fraction: f64) -> Self {
         Self(Isometry3::from_parts(

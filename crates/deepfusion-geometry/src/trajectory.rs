@@ -1,11 +1,11 @@
 use crate::Se3;
 
-/// Where a body is at a time.
+/// A body's pose at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StampedPose {
     /// Time, in seconds.
     pub time_s: f64,
-    /// The body's frame in the world.
+    /// Body frame to world frame.
     pub world_from_body: Se3,
 }
 
@@ -16,7 +16,7 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// A path through `poses`, sorted by time here. Poses with a time that is not finite are dropped.
+    /// A path through `poses`, which are sorted by time. Poses whose time is not finite are dropped.
     #[must_use]
     pub fn new(mut poses: Vec<StampedPose>) -> Self {
         poses.retain(|p| p.time_s.is_finite());

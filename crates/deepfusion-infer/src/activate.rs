@@ -30,7 +30,7 @@ impl Activation {
         let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
         match self {
             Self::Identity => v,
-            // Constants first: x86 then keeps what is no number.
+            // Constants first: x86 then keeps NaN.
             Self::Relu => simd.max_f32s(zero, v),
             Self::Elu => {
                 let negative = exp_negative(simd, simd.min_f32s(zero, v));

@@ -1,4 +1,4 @@
-//! What every form of the convolution shares: its geometry on views, and how work is cut into tasks.
+//! Common parts of all implementations of the convolution: its geometry on views, and the division into tasks.
 
 use std::ops::Range;
 

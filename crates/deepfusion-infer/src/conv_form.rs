@@ -16,8 +16,8 @@ pub(crate) trait ConvForm<E> {
 
     fn geometry(&self) -> &Geometry;
 
-    /// Its runs, if it also reads what none of its inputs stands for: `None` as a source. Each form reads what is told
-    /// here, what its inputs are, and nothing else that its results depend on.
+    /// Its runs, if it also reads elements that belong to none of its inputs (`None` as a source). A form's results
+    /// depend on nothing but its inputs and the elements listed here.
     fn reads_on(&self) -> Option<(&Geometry, &Runs)>;
 
     /// # Safety

@@ -1,4 +1,4 @@
-//! What the arena holds: f32, or bf16 (the upper half of an f32).
+//! The element type of the arena: f32, or bf16 (the upper half of an f32).
 
 /// A number as it is stored between the operations.
 ///

@@ -14,7 +14,7 @@ use crate::view::Shared;
 use crate::{Border, Error, Graph};
 use crate::{masks, means};
 
-/// In which numbers the network computes.
+/// The precision of the network's arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Precision {
     /// 32-bit floats throughout.
@@ -35,7 +35,7 @@ impl Precision {
     }
 }
 
-/// A network that runs: a plan with packed weights, which [`Engine::another`] shares, and buffers of its own.
+/// An executable network: a plan with packed weights, which [`Engine::another`] shares, and its own buffers.
 #[derive(Debug)]
 pub struct Engine {
     runner: Runner,
@@ -52,9 +52,8 @@ impl Engine {
     /// Packs the graph for images of this size.
     ///
     /// # Errors
-    /// [`Error::Size`] where the graph cannot work on such images, [`Error::Graph`] where a residual or a
-    /// mask's operand is a concatenation or the image, [`Error::Memory`] where such images' values have no room in
-    /// memory, [`Error::NoBf16`].
+    /// [`Error::Size`] if the graph cannot run on such images, [`Error::Graph`] if a residual or a mask's operand
+    /// is a concatenation or the image, [`Error::Memory`] if there is not enough memory, [`Error::NoBf16`].
     pub fn new(
         graph: Graph,
         width: usize,
@@ -80,10 +79,10 @@ impl Engine {
         Bf16Conv::available()
     }
 
-    /// Another engine on the same packed weights, with buffers of its own: one for each thread.
+    /// A second engine on the same packed weights, with its own buffers: one for each thread.
     ///
     /// # Errors
-    /// [`Error::Memory`] where there is no room for them.
+    /// [`Error::Memory`] if there is no memory for them.
     pub fn another(&self) -> Result<Self, Error> {
         let (width, height) = self.size;
         let full = || Error::Memory { width, height };
@@ -114,7 +113,7 @@ impl Engine {
         self.run_steps(image, |_, _| {});
     }
 
-    /// The same; gives each step's name (its node's, and what it does) and time.
+    /// As [`Self::run`]; returns each step's name (its node and its kind) and duration.
     ///
     /// # Panics
     /// As [`Self::run`].
@@ -153,7 +152,7 @@ impl Engine {
         values
     }
 
-    /// The same in place of what `values` holds.
+    /// As [`Self::output`], written into `values`.
     ///
     /// # Panics
     /// As [`Self::output`].
@@ -197,7 +196,7 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
     }
 
     pub(crate) fn run(&mut self, image: &[f32], mut after: impl FnMut(&str, &str)) {
-        // An image may overflow and leave what is no number: of that nothing is read for the next one.
+        // An image may overflow and leave NaN in the arena; nothing of that may reach the next one.
         for places in &self.plan.stale {
             self.arena[places.clone()].fill(E::default());
         }
@@ -269,7 +268,7 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
         values
     }
 
-    /// Leaves the arena full of what is no number, as the worst of images might.
+    /// Fills the arena with NaN, as the worst of images might.
     pub(crate) fn poison(&mut self) {
         self.arena.fill(E::of(f32::NAN));
     }

@@ -1,5 +1,3 @@
-//! Which form a convolution takes: for each type of values, the one that fits it best.
-
 use crate::Conv;
 use crate::conv::{Geometry, Runs};
 use crate::conv_form::ConvForm;

@@ -1,9 +1,9 @@
-//! A network as a list of operations with their weights: what the engine runs and what is exported.
+//! A network as a list of operations with their weights, for the engine and for export.
 
 use crate::shape::shape_after;
 use crate::{Border, Error, Node, Op};
 
-/// A value in a [`Graph`]: 0 is the normalised image, `i + 1` is what node `i` gives.
+/// A value in a [`Graph`]: 0 is the normalised image, `i + 1` is the output of node `i`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ValueId(pub usize);
 
@@ -12,7 +12,7 @@ impl ValueId {
     pub const IMAGE: Self = Self(0);
 }
 
-/// Shape of a value, whatever the image's size.
+/// Shape of a value, relative to the image's size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ValueShape {
     /// Channels.
@@ -67,7 +67,7 @@ impl Graph {
     /// Appends an operation.
     ///
     /// # Errors
-    /// [`Error::Graph`] where it does not fit what it is given.
+    /// [`Error::Graph`] if it does not fit its inputs.
     pub fn push(&mut self, name: impl Into<String>, op: Op) -> Result<ValueId, Error> {
         let name = name.into();
         let shape = shape_after(&self.shapes, &op).map_err(|reason| Error::Graph {
@@ -136,7 +136,7 @@ impl Graph {
         self.mean
     }
 
-    /// What they are then divided by.
+    /// The divisors of red, green and blue.
     #[must_use]
     pub fn std(&self) -> [f32; 3] {
         self.std
@@ -192,14 +192,14 @@ impl Graph {
         self.nodes.iter().enumerate().map(of).collect()
     }
 
-    /// The same in all, in 10⁹ operations of two (GFLOP).
+    /// The total in GFLOP, two operations per multiply-add.
     #[must_use]
     pub fn gflop(&self, width: usize, height: usize) -> f64 {
         let all = self.multiply_adds(width, height);
         all.iter().map(|count| *count as f64).sum::<f64>() * 2e-9
     }
 
-    /// That the graph can work on images of this size.
+    /// Checks that the graph can run on images of this size.
     ///
     /// # Errors
     /// [`Error::Size`] unless every halving is exact and every reflected border has pixels to mirror.

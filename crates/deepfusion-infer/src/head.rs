@@ -13,7 +13,7 @@ use crate::view::Shared;
 pub(crate) struct Head {
     pub(crate) geometry: Geometry,
     runs: Runs,
-    /// One for every input of every run.
+    /// One weight for every input of every run.
     weights: Vec<f32>,
     bias: f32,
 }

@@ -1,4 +1,4 @@
-//! Where every value of a graph lies in the arena.
+//! The layout of a graph's values in the arena.
 
 use crate::tile::LANES;
 use crate::view::View;
@@ -91,7 +91,7 @@ impl Layout {
 
     /// Gives every buffer an offset; buffers that are never alive together may share memory. Each has room behind it
     /// for what kernels read on: `overread` elements, by the distance of its pixels. Results lie behind them all: what is
-    /// read on, times zero, must not meet the halves of an f32, which may be no number. Returns the size of the whole;
+    /// read on, times zero, must not meet the halves of an f32, which may be NaN. Returns the size of the whole;
     /// `None` where that is more than can be counted.
     pub(crate) fn place(
         &mut self,

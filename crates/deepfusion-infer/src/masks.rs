@@ -1,4 +1,4 @@
-//! What a single pixel and a mask do to every pixel of a value: attention and aggregation.
+//! Operations of a single pixel or a mask on every pixel of a value: attention and aggregation.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;

@@ -154,7 +154,7 @@ fn extend<E: Element>(sums: &mut [f32; LANES], most: &mut [f32; LANES], values: 
     }
 }
 
-/// The greater of two; what is no number wins.
+/// The greater of two; NaN wins.
 #[inline(always)]
 fn greater(most: f32, value: f32) -> f32 {
     if most >= value || most.is_nan() {

@@ -112,7 +112,7 @@ pub(crate) unsafe fn max_pool<E: Element>(arena: Shared<E>, from: &View, to: &Vi
                         continue;
                     }
                     for (out, v) in out.iter_mut().zip(pixel) {
-                        // What is no number stays so.
+                        // NaN stays NaN.
                         let v = *v;
                         let wins = v > *out || v.partial_cmp(&v).is_none();
                         *out = if wins { v } else { *out };

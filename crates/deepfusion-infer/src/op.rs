@@ -15,7 +15,7 @@ pub enum Activation {
     Sigmoid,
 }
 
-/// What stands beyond the edge of a convolution's input.
+/// The border of a convolution's input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Border {
     /// Zeros.
@@ -32,7 +32,7 @@ pub struct Conv {
     pub input: ValueId,
     /// Out × in × kernel × kernel, row-major; batch normalisation folded in.
     pub weight: Vec<f32>,
-    /// One value an output channel.
+    /// One value per output channel.
     pub bias: Vec<f32>,
     /// Input channels.
     pub channels_in: usize,
@@ -42,9 +42,9 @@ pub struct Conv {
     pub kernel: usize,
     /// 1 or 2.
     pub stride: usize,
-    /// Pixels from a tap of the kernel to the next, at least 1.
+    /// Distance of the kernel's taps in pixels, at least 1.
     pub dilation: usize,
-    /// What the kernel sees beyond the edge.
+    /// The border of the input.
     pub border: Border,
     /// r, of the output's shape; or a single pixel, which is added everywhere.
     pub residual: Option<ValueId>,
@@ -64,7 +64,7 @@ pub enum Op {
     },
     /// Every pixel becomes 2×2, and the channels of `skip` are appended.
     UpsampleConcat {
-        /// What is enlarged.
+        /// The input, which is enlarged.
         input: ValueId,
         /// Appended, twice the size of the input.
         skip: Option<ValueId>,
@@ -105,7 +105,7 @@ pub enum Op {
 }
 
 impl Conv {
-    /// How far the kernel reaches from its centre, in pixels.
+    /// Reach of the kernel from its centre, in pixels.
     #[must_use]
     pub fn reach(&self) -> usize {
         (self.kernel / 2).saturating_mul(self.dilation)
@@ -117,12 +117,12 @@ impl Conv {
 pub struct Node {
     /// Its path in the network, such as `encoder.layer1.0.conv1`.
     pub name: String,
-    /// What it does.
+    /// The operation.
     pub op: Op,
 }
 
 impl Op {
-    /// What the operation reads.
+    /// The operation's inputs.
     pub fn inputs(&self) -> impl Iterator<Item = ValueId> {
         let mut several: &[ValueId] = &[];
         let few = match self {

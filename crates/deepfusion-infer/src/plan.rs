@@ -1,4 +1,4 @@
-//! From a graph to steps over one block of memory: where every value lies, and what happens in which order.
+//! From a graph to steps over one block of memory: the layout of values and the order of steps.
 
 use std::ops::Range;
 

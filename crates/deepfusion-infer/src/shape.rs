@@ -1,4 +1,4 @@
-//! What shape an operation gives, and whether it fits what it reads.
+//! The output shape of an operation, and checks of its inputs.
 
 use crate::{Conv, Op, ValueId, ValueShape};
 

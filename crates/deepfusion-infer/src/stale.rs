@@ -1,8 +1,8 @@
-//! What kernels read before anything was written there for the image at hand.
+//! Elements that kernels read before they are written for the current image.
 //!
-//! Where its inputs do not fill a whole run, a bf16 kernel reads on and multiplies by zero. What stands there may be
-//! left from the image before, and zero times what is no number is none: an image that overflowed would be seen in the
-//! next. So those places, and they alone, are cleared before each image.
+//! Where its inputs do not fill a whole run, a bf16 kernel reads on and multiplies by zero. Those elements may hold
+//! values of the previous image, and zero times NaN is NaN: an image that overflowed would affect the next one. So
+//! these elements, and only these, are cleared before each image.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use crate::movement::for_border;
 use crate::plan::Step;
 use crate::view::View;
 
-/// The places of an arena that the steps read before they write them.
+/// The ranges of an arena that the steps read before they write them.
 pub(crate) fn stale<E: Element, C: ConvForm<E>>(
     steps: &[(String, Step<C>)],
     arena: usize,
@@ -22,27 +22,31 @@ pub(crate) fn stale<E: Element, C: ConvForm<E>>(
     if !steps.iter().any(|(_, step)| reads_on(step)) {
         return Vec::new();
     }
-    let mut places = vec![Place::Untouched; arena];
+    let mut first_uses = vec![FirstUse::Untouched; arena];
     for (_, step) in steps {
         if let Step::Conv(conv) = step
             && let Some((geometry, runs)) = conv.reads_on()
         {
             idle(geometry, runs, |at| {
-                if places[at] == Place::Untouched {
-                    places[at] = Place::Stale;
+                if first_uses[at] == FirstUse::Untouched {
+                    first_uses[at] = FirstUse::Stale;
                 }
             });
         }
         written(step, |at, count| {
-            for place in &mut places[at..at + count] {
-                if *place == Place::Untouched {
-                    *place = Place::Written;
+            for first_use in &mut first_uses[at..at + count] {
+                if *first_use == FirstUse::Untouched {
+                    *first_use = FirstUse::Written;
                 }
             }
         });
     }
     let mut ranges: Vec<Range<usize>> = Vec::new();
-    for (at, _) in places.iter().enumerate().filter(|p| *p.1 == Place::Stale) {
+    for (at, _) in first_uses
+        .iter()
+        .enumerate()
+        .filter(|p| *p.1 == FirstUse::Stale)
+    {
         match ranges.last_mut() {
             Some(range) if range.end == at => range.end += 1,
             _ => ranges.push(at..at + 1),
@@ -51,9 +55,9 @@ pub(crate) fn stale<E: Element, C: ConvForm<E>>(
     ranges
 }
 
-/// What happened to an element first.
+/// What happens to an element first.
 #[derive(Clone, Copy, PartialEq)]
-enum Place {
+enum FirstUse {
     Untouched,
     Written,
     Stale,
@@ -76,7 +80,7 @@ fn idle(g: &Geometry, runs: &Runs, mut read: impl FnMut(usize)) {
     }
 }
 
-/// Calls `write` with the place and count of all that a step writes.
+/// Calls `write` with the offset and count of everything that a step writes.
 fn written<E: Element, C: ConvForm<E>>(step: &Step<C>, mut write: impl FnMut(usize, usize)) {
     let mut all = |view: &View, channels: usize| {
         for y in 0..view.height {

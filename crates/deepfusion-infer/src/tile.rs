@@ -119,7 +119,7 @@ unsafe fn tile<S: Simd, const R: usize, const V: usize>(
         for r in 0..R {
             let out = pixels.get_unchecked(r).out.add(shift.out).cast::<S::f32s>();
             for v in 0..V {
-                // In this order x86 keeps a sum that is no number, as other processors do.
+                // In this order x86 keeps a NaN sum, as other processors do.
                 out.add(v).write_unaligned(simd.max_f32s(least, sums[r][v]));
             }
         }

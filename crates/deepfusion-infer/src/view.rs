@@ -1,4 +1,4 @@
-//! Where values lie: images with their channels together (H×W×C), inside one block of memory.
+//! Views of values: images with interleaved channels (H×W×C), inside one block of memory.
 
 use std::marker::PhantomData;
 

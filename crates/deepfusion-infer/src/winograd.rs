@@ -162,9 +162,9 @@ struct Tiles {
     step: usize,
 }
 
-/// Where a tile lies: its first output pixel, and the step to the next.
+/// A tile's first output pixel, and the step to the next.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct TileOrigin {
     x: usize,
     y: usize,
     step: usize,
@@ -184,13 +184,13 @@ impl Tiles {
         self.across * self.down * self.step * self.step
     }
 
-    fn of(self, tile: usize) -> Place {
+    fn of(self, tile: usize) -> TileOrigin {
         let (phase, tile) = (
             tile / (self.across * self.down),
             tile % (self.across * self.down),
         );
         let along = |tile: usize, phase: usize| tile * OUT * self.step + phase;
-        Place {
+        TileOrigin {
             x: along(tile % self.across, phase % self.step),
             y: along(tile / self.across, phase / self.step),
             step: self.step,
@@ -318,7 +318,7 @@ unsafe fn transform_input<S: Simd>(
     simd: S,
     arena: Shared<f32>,
     view: &View,
-    Place { x, y, step }: Place,
+    TileOrigin { x, y, step }: TileOrigin,
     to: &mut [f32],
 ) {
     assert_eq!(to.len(), AREA * view.channels, "a tile's products");
@@ -369,7 +369,7 @@ impl Winograd {
         simd: S,
         arena: Shared<f32>,
         from: &[f32],
-        Place { x, y, step }: Place,
+        TileOrigin { x, y, step }: TileOrigin,
     ) {
         let g = &self.geometry;
         let columns = self.bias.len();

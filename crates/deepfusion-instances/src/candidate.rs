@@ -3,16 +3,16 @@
 pub struct Candidate {
     /// Left, top, right, bottom.
     pub bounds: [f32; 4],
-    /// 0 to 1.
+    /// Score, 0 to 1.
     pub score: f32,
-    /// Number of the class.
+    /// Index of the class.
     pub class: usize,
-    /// What the prototypes of masks are weighted with; empty where the model gives boxes only.
+    /// Weights of the mask prototypes; empty if the model outputs boxes only.
     pub coefficients: Vec<f32>,
 }
 
 impl Candidate {
-    /// Area in common over area in all, 0 to 1.
+    /// Intersection over union, 0 to 1.
     #[must_use]
     pub fn overlap(&self, other: &Self) -> f32 {
         let [l, t, r, b] = self.bounds;

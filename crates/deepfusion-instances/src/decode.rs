@@ -1,9 +1,9 @@
-//! A model's numbers as candidates.
+//! Decodes a model's output into candidates.
 
 use crate::layout::STRIDES;
 use crate::{Candidate, Kind, Layout};
 
-/// The candidates of at least `least` score, in the order of the model; numbers that are not finite make none.
+/// The candidates of at least `least` score, in the order of the model; numbers that are not finite give none.
 ///
 /// `input` is the height and width of the model's input, `values` the output that [`Layout::of`] took for the candidates.
 #[must_use]

@@ -1,44 +1,44 @@
-//! Which kind of model it is, from the shapes of its outputs.
+//! Recognises the kind of a model from the shapes of its outputs.
 
 /// Pixels of the input that a cell of each of the three grids covers.
 pub(crate) const STRIDES: [usize; 3] = [8, 16, 32];
 /// Most rows of a model that has suppressed its candidates itself.
 const MOST_FINAL_ROWS: usize = 1000;
 
-/// How a model writes its candidates.
+/// A model's output format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A column each: x, y, width, height, a score a class, coefficients (YOLOv8 and later).
+    /// One column per candidate: x, y, width, height, a score per class, coefficients (YOLOv8 and later).
     Columns,
-    /// A row each: x, y, width, height, objectness, a score a class, coefficients (YOLOv5, YOLOv7).
+    /// One row per candidate: x, y, width, height, objectness, a score per class, coefficients (YOLOv5, YOLOv7).
     Rows,
-    /// A row each as [`Self::Rows`], but places and sizes relative to their grids' cells (YOLOX).
+    /// As [`Self::Rows`], with positions and sizes relative to the grid's cells (YOLOX).
     GridRows,
-    /// A row each, already suppressed: left, top, right, bottom, score, class, coefficients (YOLOv10, YOLO26, exports with
-    /// NMS).
+    /// One row per candidate after suppression: left, top, right, bottom, score, class, coefficients (YOLOv10, YOLO26,
+    /// exports with NMS).
     Final,
 }
 
-/// What the numbers of a model's outputs are.
+/// The meaning of a model's outputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// How candidates are written.
+    /// The output format.
     pub kind: Kind,
-    /// Candidates.
+    /// Number of candidates.
     pub candidates: usize,
-    /// Classes; 0 where the model does not say.
+    /// Number of classes; 0 if unknown.
     pub classes: usize,
-    /// Prototypes of masks, and their height and width; none where the model gives boxes only.
+    /// Number, height and width of the mask prototypes; `None` if the model outputs boxes only.
     pub prototypes: Option<[usize; 3]>,
 }
 
 impl Layout {
-    /// Of a model with an input of this height and width.
+    /// The layout of a model with an input of this height and width.
     ///
     /// # Errors
-    /// A sentence saying what is there instead.
+    /// A sentence that names the shapes found.
     pub fn of(input: [usize; 2], outputs: &[Vec<usize>]) -> Result<Self, String> {
-        let told = || {
+        let found = || {
             let shape = |s: &Vec<usize>| {
                 let sizes: Vec<String> = s.iter().map(ToString::to_string).collect();
                 sizes.join("x")
@@ -62,7 +62,7 @@ impl Layout {
         let most = 1 + usize::from(prototypes.is_some());
         let [a, b] = candidates
             .filter(|_| outputs.len() == most)
-            .ok_or_else(told)?;
+            .ok_or_else(found)?;
         let coefficients = prototypes.map_or(0, |[count, ..]| count);
         let cells: usize = STRIDES
             .iter()
@@ -77,11 +77,11 @@ impl Layout {
         } else if b == 6 + coefficients && a <= MOST_FINAL_ROWS {
             (Kind::Final, a, b, 6)
         } else {
-            return Err(told());
+            return Err(found());
         };
-        let classes = fields.checked_sub(fixed + coefficients).ok_or_else(told)?;
+        let classes = fields.checked_sub(fixed + coefficients).ok_or_else(found)?;
         if kind != Kind::Final && classes == 0 {
-            return Err(told());
+            return Err(found());
         }
         Ok(Self {
             kind,
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn kinds_are_told_by_their_shapes() {
+    fn kinds_follow_from_shapes() {
         let of = |outputs: &[&[usize]]| {
             let outputs: Vec<Vec<usize>> = outputs.iter().map(|s| s.to_vec()).collect();
             Layout::of([640, 640], &outputs)
@@ -137,8 +137,8 @@ mod tests {
             &[],
         ];
         for outputs in strangers {
-            let told = of(outputs).unwrap_err();
-            assert!(told.contains("640x640"), "{told}");
+            let found = of(outputs).unwrap_err();
+            assert!(found.contains("640x640"), "{found}");
         }
     }
 }

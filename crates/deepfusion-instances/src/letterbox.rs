@@ -1,4 +1,4 @@
-//! An image fitted into a model's input, its sides kept in proportion.
+//! Fits an image into a model's input, keeping its aspect ratio.
 
 use fast_image_resize::images::{TypedImage, TypedImageRef};
 use fast_image_resize::pixels::U8x3;
@@ -8,7 +8,7 @@ use image::RgbImage;
 /// The grey of what the image does not fill.
 const GREY: u8 = 114;
 
-/// How a model takes colours.
+/// A model's colour format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Colours {
     /// Red, green, blue from 0 to 1; the image in the middle of the input (YOLO).
@@ -17,24 +17,24 @@ pub enum Colours {
     Bgr,
 }
 
-/// Where an image lies in a model's input.
+/// The position of an image in a model's input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Letterbox {
     /// Size of the input, width and height.
     pub input: [usize; 2],
     /// Size of the image.
     pub image: [usize; 2],
-    /// Pixels of the input to a pixel of the image, to the right and down; they differ by the rounding of the image's size
+    /// Pixels of the input per pixel of the image, to the right and down; they differ by the rounding of the image's size
     /// within the input.
     pub scale: [f32; 2],
-    /// Where the image's upper left corner lies in the input.
+    /// The image's upper left corner in the input.
     pub offset: [f32; 2],
     /// Size of the image within the input.
     inner: [usize; 2],
 }
 
 impl Letterbox {
-    /// Of an image of this width and height.
+    /// The letterbox of an image of this width and height.
     #[must_use]
     pub fn new(image: [usize; 2], input: [usize; 2], colours: Colours) -> Self {
         let scale = (0..2)
@@ -58,19 +58,19 @@ impl Letterbox {
         }
     }
 
-    /// A place of the input in the image.
+    /// Maps a point of the input to the image.
     #[must_use]
     pub fn to_image(&self, place: [f32; 2]) -> [f32; 2] {
         [0, 1].map(|i| (place[i] - self.offset[i]) / self.scale[i])
     }
 
-    /// A place of the image in the input.
+    /// Maps a point of the image to the input.
     #[must_use]
     pub fn to_input(&self, place: [f32; 2]) -> [f32; 2] {
         [0, 1].map(|i| place[i] * self.scale[i] + self.offset[i])
     }
 
-    /// The first and the last of the cells (so many pixels of the input wide) that lie on the image, along an axis.
+    /// The first and the last of the cells (of this width in pixels of the input) that lie on the image, along an axis.
     pub(crate) fn cells_of_image(&self, axis: usize, cell: f32) -> [f32; 2] {
         let first = (self.offset[axis] / cell).ceil();
         let after = ((self.offset[axis] + self.inner[axis] as f32) / cell).floor();

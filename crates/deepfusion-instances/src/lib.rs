@@ -1,9 +1,9 @@
-//! Things in an image, each with its pixels: from somebody's segmentation or detection model in ONNX, run in an ONNX
-//! Runtime library.
+//! Instances in an image, each with its pixels, from a third-party segmentation or detection model in ONNX, run in
+//! an ONNX Runtime library.
 //!
-//! The way of an image: [`Letterbox`] fits it into the model's input; the outputs' shapes say which of the known kinds of
-//! model it is ([`Layout`]); [`decode`] makes candidates of them, [`suppress`] keeps the best of those that mean the same;
-//! [`Prototypes`] turn coefficients into masks. [`InstanceModel`] does all of it.
+//! The path of an image: [`Letterbox`] fits it into the model's input; [`Layout`] recognises the kind of model from the
+//! outputs' shapes; [`decode`] turns outputs into candidates, [`suppress`] is non-maximum suppression; [`Prototypes`] turn
+//! coefficients into masks. [`InstanceModel`] does all of it.
 //!
 //! Pixels are of the image that was given: x to the right, y down, pixel centres at whole numbers plus one half, as
 //! detectors count them.

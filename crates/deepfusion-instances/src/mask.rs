@@ -1,4 +1,4 @@
-//! Masks: a weighted sum of the prototypes that a model gives with its candidates (YOLACT's way).
+//! Masks as weighted sums of a model's prototypes (as in YOLACT).
 
 use std::ops::Range;
 
@@ -7,21 +7,21 @@ use crate::{Candidate, Letterbox};
 /// A model's prototypes of masks, which cover its whole input.
 #[derive(Debug, Clone, Copy)]
 pub struct Prototypes<'a> {
-    /// How many, their height and width.
+    /// Number, height and width.
     pub shape: [usize; 3],
-    /// As many numbers as that, row by row.
+    /// The values, row by row.
     pub values: &'a [f32],
 }
 
-/// The pixels of one thing, in an image of `width` columns.
+/// The pixels of one instance.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Mask {
-    /// Row, first column, and the column after the last of each stretch of pixels, from the top row down.
+    /// Row, first column, and the column after the last of each run of pixels, from the top row down.
     pub runs: Vec<[u32; 3]>,
 }
 
 impl Mask {
-    /// How many pixels.
+    /// Number of pixels.
     #[must_use]
     pub fn pixels(&self) -> usize {
         self.runs
@@ -127,7 +127,7 @@ impl Prototypes<'_> {
     }
 }
 
-/// A candidate's box, as far as it lies in an image of `size` that shows the same as the letterbox's image.
+/// A candidate's box, clipped to an image of `size` that shows the same as the letterbox's image.
 #[must_use]
 pub fn in_size(bounds: [f32; 4], letterbox: &Letterbox, size: [usize; 2]) -> [f32; 4] {
     let [left, top] = letterbox.to_image([bounds[0], bounds[1]]);

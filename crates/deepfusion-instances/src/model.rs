@@ -12,27 +12,27 @@ const OPEN_SIZE: usize = 640;
 /// Most things in one image.
 const MOST: usize = 300;
 
-/// Something in an image.
+/// An instance in an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instance {
     /// Name of its class.
     pub class: String,
-    /// How sure the model is, 0 to 1.
+    /// The model's score, 0 to 1.
     pub score: f32,
-    /// Left, top, right, bottom in the size that was asked for.
+    /// Left, top, right, bottom, at the requested size.
     pub bounds: [f32; 4],
-    /// Its pixels; all of the box where the model gives no masks.
+    /// Its pixels; the whole box if the model has no masks.
     pub mask: Mask,
-    /// Whether the model drew the mask.
+    /// Whether the mask is the model's, rather than the box.
     pub drawn: bool,
 }
 
-/// What counts as found.
+/// Limits on the instances found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Limits {
     /// Least score.
     pub score: f32,
-    /// Overlap (area in common over area in all) from which on two boxes of one class are one thing.
+    /// Overlap (intersection over union) above which two boxes of one class are the same instance.
     pub overlap: f32,
     /// Names of the classes that count; empty for all.
     pub classes: Vec<String>,
@@ -61,12 +61,12 @@ pub struct InstanceModel {
 }
 
 impl InstanceModel {
-    /// Loads a file; the ONNX Runtime `library` is found where none is named. `threads` is how many of the
-    /// processor's a run may use; 0 leaves it to the library.
+    /// Loads a file; the ONNX Runtime `library` is searched for if none is given. `threads` is the number
+    /// of CPU threads of a run; 0 leaves it to the library.
     ///
     /// # Errors
-    /// [`Error::File`]; [`Error::Runtime`] where there is no library or it refuses the model; [`Error::Shape`] where
-    /// inputs and outputs are of no known kind; [`Error::Class`] for a class that the model does not have.
+    /// [`Error::File`]; [`Error::Runtime`] if there is no library or it refuses the model; [`Error::Shape`] if
+    /// inputs and outputs match no known kind; [`Error::Class`] for a class that the model does not have.
     pub fn load(
         path: &Path,
         library: Option<&Path>,
@@ -121,17 +121,17 @@ impl InstanceModel {
         })
     }
 
-    /// What the model's outputs are.
+    /// The meaning of the model's outputs.
     #[must_use]
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// The things in an image, the surest first; boxes and masks in an image of `size` (width, height) that shows the
-    /// same.
+    /// The instances in an image, by descending score; boxes and masks are for an image of `size` (width, height)
+    /// that shows the same.
     ///
     /// # Errors
-    /// [`Error::Runtime`]; [`Error::Shape`] where the outputs' shapes depend on what is in the image.
+    /// [`Error::Runtime`]; [`Error::Shape`] if the outputs' shapes depend on the image's content.
     pub fn find(&mut self, image: &RgbImage, size: [usize; 2]) -> Result<Vec<Instance>> {
         let [height, width] = self.input;
         let colours = match self.layout.kind {
@@ -197,7 +197,7 @@ fn input_size(inputs: &[TensorInfo]) -> std::result::Result<[usize; 2], String> 
     let [input] = inputs else {
         return Err(format!("{} inputs, expected one picture", inputs.len()));
     };
-    let told = || {
+    let found = || {
         let sizes = input
             .shape
             .iter()
@@ -214,6 +214,6 @@ fn input_size(inputs: &[TensorInfo]) -> std::result::Result<[usize; 2], String> 
         [None | Some(1), None | Some(3), height, width] if input.f32 => {
             Ok([height.unwrap_or(OPEN_SIZE), width.unwrap_or(OPEN_SIZE)])
         }
-        _ => Err(told()),
+        _ => Err(found()),
     }
 }

@@ -1,9 +1,9 @@
-//! Of candidates that mean the same thing, the surest.
+//! Non-maximum suppression.
 
 use crate::Candidate;
 
-/// Keeps those that no surer one of the same class overlaps by more than `overlap` (area in common over area in all),
-/// the surest first, `most` at most.
+/// Drops candidates that a better one of the same class overlaps by more than `overlap` (intersection over union).
+/// The result is sorted by descending score and has at most `most` entries.
 #[must_use]
 pub fn suppress(mut candidates: Vec<Candidate>, overlap: f32, most: usize) -> Vec<Candidate> {
     candidates.sort_by(|a, b| b.score.total_cmp(&a.score));

@@ -6,7 +6,7 @@ const CHUNK: usize = 1 << 15;
 /// The settings of a step of Adam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdamStep {
-    /// Step size α.
+    /// Learning rate α.
     pub learning_rate: f32,
     /// Decay β₁ of the first moment.
     pub beta1: f32,

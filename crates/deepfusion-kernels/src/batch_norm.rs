@@ -11,7 +11,7 @@ use crate::{
 use rayon::prelude::*;
 use std::mem::MaybeUninit;
 
-/// What the backward pass needs of the forward pass, and what the running statistics are made of.
+/// The batch statistics, for the backward pass and for the running statistics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BatchNormSaved {
     /// Mean of each channel, C.

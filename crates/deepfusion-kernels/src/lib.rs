@@ -1,8 +1,8 @@
-//! The numeric work under the networks, on plain slices, forward and backward: convolution, bilinear
+//! Numeric kernels of the networks on plain slices, forward and backward: convolution, bilinear
 //! warp, local correlation, photometric error, batch normalisation, activations.
 //!
-//! Nothing here knows Burn. Images are N×C×H×W, contiguous; work is shared out over rayon's threads,
-//! and every result is independent of how many there are.
+//! Nothing here knows Burn. Images are N×C×H×W, contiguous; work is distributed over rayon's
+//! threads, and every result is independent of their number.
 
 mod activation;
 mod adam;

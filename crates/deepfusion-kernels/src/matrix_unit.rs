@@ -1,6 +1,6 @@
 //! AMX, the matrix unit of Xeon processors since Sapphire Rapids: eight tile registers of at most 16 rows of 64 bytes, and an
-//! instruction that multiplies two of them, as pairs of bf16, and adds to a third. They have no stable intrinsics, so
-//! those who use them write assembly.
+//! instruction that multiplies two of them, as pairs of bf16, and adds to a third. There are no stable intrinsics, so that
+//! users write assembly.
 
 use std::arch::asm;
 use std::sync::OnceLock;
@@ -50,8 +50,8 @@ fn may_use_tiles() -> bool {
 /// are those of the sums' rows, 6 and 7 those of their columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TileSizes {
-    /// Pairs of bf16 that a product sums, 1 to 16: what a row of the registers 4 and 5 holds, and the rows of the registers
-    /// 6 and 7, of 64 bytes each.
+    /// Number of pairs of bf16 that a product sums, 1 to 16: the length of a row of the registers 4 and 5, and the number
+    /// of rows, of 64 bytes each, of the registers 6 and 7.
     pub pairs: usize,
 }
 
@@ -76,12 +76,12 @@ impl TileSizes {
 #[repr(align(64))]
 struct Palette([u8; 64]);
 
-/// Does `work` with this thread's tile registers configured, and gives them back, so that the system need not keep them
+/// Runs `work` with this thread's tile registers configured, and releases them, so that the system need not save them
 /// any more.
 ///
-/// That is the one thing that lasts from an `asm!` block to the next. It may: the compiler knows of no configuration and
-/// gives out no tile registers, nothing but such work uses the unit, and the system keeps it for each thread. Configuring
-/// for every product would clear all registers every time.
+/// The configuration is the only state that lasts from one `asm!` block to the next. That is sound: the compiler does not
+/// know it and allocates no tile registers, nothing but such work uses the unit, and the system saves it for each thread.
+/// Configuring for every product would clear all registers every time.
 ///
 /// # Safety
 /// The unit must be [`available`]. The work must not configure the registers itself, nor wait for other work of this thread that

@@ -1,4 +1,4 @@
-//! The photometric error of SPEC 2, Eq. 6.
+//! The photometric error (the paper's Eq. 6).
 
 use crate::box_filter::{adjoint3x3, mean3x3};
 use num_traits::Float;

@@ -1,7 +1,7 @@
-//! Where the pixels of one view lie in another (SPEC 2, Eq. 3–5), from inverse depth.
+//! Projects the pixels of one view into another, from inverse depth (the paper's Eq. 3–5).
 //!
-//! p' ~ H·p̃ + d·s with d = 1/D, H = K·R·K⁻¹ and s = K·t: the camera's matrices are multiplied once an image,
-//! and inverse depth, which is what the network predicts, is never inverted.
+//! p' ~ H·p̃ + d·s with d = 1/D, H = K·R·K⁻¹ and s = K·t: the camera's matrices are multiplied once per
+//! image, and inverse depth, the network's prediction, is never inverted.
 
 use crate::{
     lanes::{sum, sum_product},
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 /// Points nearer than this to the camera's plane, in metres, have no pixel.
 pub const MIN_DEPTH_M: f64 = 1e-3;
-/// The coordinate of pixels that have none: outside of every image.
+/// The coordinate of pixels without a projection: outside of every image.
 pub const NOWHERE: f64 = -1e6;
 /// Rows handled by one task.
 const ROWS: usize = 16;

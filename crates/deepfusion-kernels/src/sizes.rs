@@ -1,4 +1,4 @@
-//! Products of sizes, on which unchecked reads rest.
+//! Checked products of sizes, on which unchecked reads rely.
 
 /// All sizes multiplied.
 ///

@@ -1,11 +1,11 @@
-//! Where results go, whether or not something stands there already.
+//! Destinations of results, initialised or not.
 
 use std::mem::MaybeUninit;
 
-/// What a result is written to: floats, or room for floats that holds none yet. Clearing memory that is overwritten
-/// anyway took a fourteenth of a training step.
+/// A destination of results: floats, or uninitialised memory for floats. Clearing memory that is overwritten anyway
+/// took a fourteenth of a training step.
 ///
-/// A kernel that takes it writes every value, and reads none that it has not written.
+/// A kernel writes every value, and reads none that it has not written.
 ///
 /// # Safety
 /// It must be laid out as an `f32`, and any `f32` must be one.

@@ -1,4 +1,4 @@
-//! Edge-aware smoothness of a disparity (SPEC 2, Eq. 8).
+//! Edge-aware smoothness of a disparity (the paper's Eq. 8).
 //!
 //! L = mean|∂ₓd*|·e^(−|∂ₓI|) + mean|∂ᵧd*|·e^(−|∂ᵧI|), d* = d over its mean in the image, |∂I| averaged over
 //! channels. d* is never formed: the mean divides the sum.

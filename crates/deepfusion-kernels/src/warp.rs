@@ -1,4 +1,4 @@
-//! The bilinear warp: reads an image at given pixel coordinates (SPEC 0 and 2).
+//! The bilinear warp: reads an image at given pixel coordinates.
 //!
 //! Coordinates address pixel centres at integers; outside the image the border pixel counts. Where a
 //! coordinate was moved to the border, the output does not depend on it and its gradient is zero.
@@ -24,7 +24,7 @@ pub struct WarpShape {
 /// Pixels whose coordinates are worked out together: fixed loops, which the compiler turns into vector code.
 const LANES: usize = 16;
 
-/// What coordinates and pixels are made of.
+/// The number type of coordinates and pixels.
 ///
 /// # Safety
 /// [`Self::whole`] must give the whole part: pixels are then read without a check.
@@ -311,7 +311,7 @@ pub fn warp_backward_coords<T: WarpFloat>(
                 }
             }
             for l in 0..LANES {
-                // Not multiplied: a gradient that is no number must not spread to where nothing moves.
+                // Not multiplied: a NaN gradient must not spread to where nothing moves.
                 let keep = |free: T, g: T| if free > T::zero() { g } else { T::zero() };
                 gu[l] = keep(samples.free_x[l], gu[l]);
                 gv[l] = keep(samples.free_y[l], gv[l]);

@@ -1,9 +1,9 @@
-//! How a vehicle turns when its front wheels do (Eq. 26–27).
+//! The kinematic bicycle model: yaw rate from speed and steering angle (Eq. 26–27).
 
 use crate::{Error, Result, Signal};
 use serde::{Deserialize, Serialize};
 
-/// The kinematic bicycle model: both wheels of an axle are one, and none slips.
+/// The kinematic bicycle model: one wheel per axle, without slip.
 ///
 /// θ̇ = v / L · tan δ (Eq. 27), where v is the forward speed of the **rear axle's** middle, which is
 /// the vehicle's origin; L the wheelbase; δ the road wheels' angle. A steering wheel's angle s gives
@@ -16,7 +16,7 @@ pub struct Bicycle {
     /// Steering wheel's angle over road wheels' angle; 1 where the signal is the road wheels' angle.
     #[serde(default = "one")]
     pub steering_ratio: f64,
-    /// What the steering signal reads when the car drives straight, in radians.
+    /// Reading of the steering signal when the car drives straight, in radians.
     #[serde(default)]
     pub steering_offset_rad: f64,
     /// Understeer K, in s²/m²: tyres slip in fast bends, θ̇ = v tan δ / (L (1 + K v²)). 0, the
@@ -30,7 +30,7 @@ fn one() -> f64 {
 }
 
 impl Bicycle {
-    /// A vehicle whose steering signal is the road wheels' angle.
+    /// A vehicle whose steering signal is the road wheels' angle, without understeer.
     #[must_use]
     pub fn new(wheelbase_m: f64) -> Self {
         Self {
@@ -41,7 +41,7 @@ impl Bicycle {
         }
     }
 
-    /// The same with the angle of a steering wheel, `steering_ratio` times that of the road wheels.
+    /// The same with a steering wheel's angle as signal: `steering_ratio` times that of the road wheels.
     #[must_use]
     pub fn with_steering_wheel(self, steering_ratio: f64) -> Self {
         Self {
@@ -53,7 +53,7 @@ impl Bicycle {
     /// Checks every field.
     ///
     /// # Errors
-    /// [`Error::Config`] names the first field that no vehicle has.
+    /// [`Error::Config`] naming the first implausible field.
     pub fn validate(&self) -> Result<()> {
         let check = |ok: bool, field, value: f64, expected| {
             ok.then_some(()).ok_or(Error::Config {
@@ -90,8 +90,8 @@ impl Bicycle {
     }
 
     /// Yaw rate in rad/s, positive to the left, at a speed in m/s and a reading of the steering signal
-    /// in radians. A road wheel turns no further than 1.2 rad here: beyond, the reading is wrong, and
-    /// a tangent near its pole would turn the car on the spot.
+    /// in radians. The road wheels' angle is limited to 1.2 rad: larger readings are wrong, and near
+    /// the tangent's pole the car would turn on the spot.
     #[must_use]
     pub fn yaw_rate(&self, speed_mps: f64, steering_rad: f64) -> f64 {
         let delta = (steering_rad - self.steering_offset_rad) / self.steering_ratio;

@@ -1,4 +1,4 @@
-//! One motion from all of a vehicle's sensors (Eq. 28–31).
+//! Fusion of a vehicle's sensors into one motion (Eq. 28–31).
 
 use crate::imu::{DrivingBias, bias_at};
 use crate::vehicle_motion::tilt_between;
@@ -7,22 +7,22 @@ use crate::{Bicycle, Error, ImuConfig, ImuSample, ImuTrack, Result, Signal, Vehi
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
-/// Yaw rates below this say nothing about left and right, in rad/s.
+/// Least yaw rate for the comparison of signs, in rad/s.
 const TURNING_RADPS: f64 = 0.03;
-/// Shorter turning, in seconds, does not prove that two sensors disagree about left and right.
+/// Least duration of turning, in seconds, that proves two sensors disagree about left and right.
 const ENOUGH_TURNING_S: f64 = 3.0;
 
-/// Up to this long the accelerometer's share of a distance is the configured one, in seconds. What is left of its bias grows
-/// with the square of time, the wheels' error with time: beyond, its share falls with the square.
+/// Longest interval, in seconds, with the configured share of the accelerometer. Its remaining bias grows with the square of
+/// time, the wheels' error only with time; so its share falls with the square beyond.
 const DRIFTS_S: f64 = 1.0;
 
-/// True speed over the vehicle's that tyres can explain.
+/// Ratios of true to measured speed that tyres can explain.
 pub const SPEED_SCALES: RangeInclusive<f64> = 0.5..=2.0;
 
-/// What a vehicle's sensors recorded, on one clock.
+/// The recordings of a vehicle's sensors, on one clock.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct VehicleSensors {
-    /// Forward speed, in m/s (negative when reversing, where the vehicle tells).
+    /// Forward speed, in m/s (negative when reversing, if the vehicle reports it).
     pub speed_mps: Signal,
     /// Angle of the steering wheel or of the road wheels, in radians, positive to the left.
     pub steering_rad: Option<Signal>,
@@ -34,8 +34,8 @@ pub struct VehicleSensors {
 /// steering alone.
 ///
 /// Speed from wheels has a small constant error of scale; speed from an integrated accelerometer
-/// drifts. Heading is the reverse: a gyro's error is a slow bias, the steering wheel's angle knows
-/// nothing of slip, bumps and cross slope. So distance leans on the wheels, yaw on the gyro.
+/// drifts. Heading is the reverse: a gyro has a slow bias, while the steering angle does not
+/// reflect slip, bumps and cross slope. So distance relies on the wheels, yaw on the gyro.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FusionConfig {
@@ -54,12 +54,12 @@ impl Default for FusionConfig {
     }
 }
 
-/// How a vehicle's sensors become its motion.
+/// Settings that turn a vehicle's sensors into its motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MotionConfig {
-    /// True speed over the vehicle's. Wheels count turns: worn or larger tyres make the speed wrong by
-    /// a constant percent, and every depth with it. A drive with satellite positions shows it.
+    /// Ratio of true to measured speed. Wheel speed counts turns: worn or larger tyres scale it by a
+    /// constant factor, and every depth with it. A drive with satellite positions reveals the factor.
     pub speed_scale: f64,
     /// The vehicle's geometry. Without it a steering angle cannot be used.
     pub bicycle: Option<Bicycle>,
@@ -80,7 +80,7 @@ impl Default for MotionConfig {
     }
 }
 
-/// What each sensor says about one interval; `None` where there is no such sensor, or it has a gap.
+/// Each sensor's measurement of one interval; `None` if there is no such sensor, or it has a gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionParts {
     /// d_V = ∫v dt, in metres (Eq. 26).
@@ -98,7 +98,7 @@ pub struct MotionParts {
 pub struct FusedTrack {
     speed_mps: Signal,
     steering_yaw_rate: Option<Signal>,
-    /// The gyro's and the steering's, without what they show each other to be wrong by.
+    /// The yaw rates of gyro and steering, corrected for the errors found by comparing them.
     freed_yaw_rates: Option<[Signal; 2]>,
     imu: Option<ImuTrack>,
     weights: FusionConfig,
@@ -109,8 +109,8 @@ impl FusedTrack {
     ///
     /// # Errors
     /// [`Error::TooFewSamples`] without a speed; [`Error::Config`] for settings out of range;
-    /// [`Error::NotGravity`], [`Error::NotUp`] for an inertial unit that cannot be read as configured;
-    /// [`Error::YawSigns`] where gyro and steering turn opposite ways.
+    /// [`Error::NotGravity`], [`Error::NotUp`] for an inertial unit that does not fit its
+    /// configuration; [`Error::YawSigns`] if gyro and steering turn opposite ways.
     pub fn new(sensors: &VehicleSensors, config: &MotionConfig) -> Result<Self> {
         config.fusion.validate()?;
         if !SPEED_SCALES.contains(&config.speed_scale) {
@@ -183,7 +183,7 @@ impl FusedTrack {
         self.steering_yaw_rate.as_ref()
     }
 
-    /// What the inertial unit says, where there is one.
+    /// The inertial unit's track, if there is one.
     #[must_use]
     pub fn imu(&self) -> Option<&ImuTrack> {
         self.imu.as_ref()
@@ -195,16 +195,16 @@ impl FusedTrack {
         self.imu.as_ref()?.tilt(time_s)
     }
 
-    /// Whether anything measures how the vehicle turns. If not, every motion is straight: its distance
-    /// is right, its lever arm is not.
+    /// Whether a sensor measures yaw. If not, every motion is straight: its distance is right, the
+    /// effect of the lever arm is missing.
     #[must_use]
     pub fn knows_yaw(&self) -> bool {
         self.imu.is_some() || self.steering_yaw_rate.is_some()
     }
 
-    /// How far the gyro turns for what the steering says, while the vehicle turns no faster than `most_mps` (tyres slip in
-    /// fast bends): 1 where wheelbase and steering ratio are right. With it, for how many seconds it turned so. `None`
-    /// without either sensor, or where it never did.
+    /// Ratio of the gyro's to the steering's yaw at speeds up to `most_mps` (tyres slip in fast bends), which is 1 if
+    /// wheelbase and steering ratio are right; and the duration of such turning in seconds. `None` without either sensor,
+    /// or without such turning.
     #[must_use]
     pub fn gyro_over_steering(&self, most_mps: f64) -> Option<(f64, f64)> {
         let steering = self.steering_yaw_rate.as_ref()?;
@@ -231,7 +231,7 @@ impl FusedTrack {
         (turning_s > 0.0 && spread > 0.0).then(|| ((sg - s * g / n) / spread, turning_s))
     }
 
-    /// What each sensor says about `from_s` to `to_s`. `None` where the speed does not cover it.
+    /// Each sensor's measurement of `from_s` to `to_s`. `None` if the speed does not cover it.
     #[must_use]
     pub fn parts(&self, from_s: f64, to_s: f64) -> Option<MotionParts> {
         if from_s >= to_s {
@@ -250,9 +250,9 @@ impl FusedTrack {
         })
     }
 
-    /// What the vehicle did from `from_s` to `to_s` (Eq. 30–31): d_F = α_d d_I + (1 − α_d) d_V and θ_F
-    /// likewise, α_d falling with the square of time beyond a second. A sensor that is absent, or has a gap there, leaves all the weight to the other.
-    /// `None` where the speed has a gap, or all that measures yaw has; or where time runs backward.
+    /// The vehicle's motion from `from_s` to `to_s` (Eq. 30–31): d_F = α_d d_I + (1 − α_d) d_V and θ_F likewise, α_d falling with
+    /// the square of time beyond a second. If one sensor is absent or has a gap, the other has all the weight. `None` if the
+    /// speed has a gap, or every yaw sensor has one, or `to_s` is before `from_s`.
     #[must_use]
     pub fn motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {
         let parts = self.parts(from_s, to_s)?;
@@ -285,7 +285,7 @@ impl FusedTrack {
     }
 }
 
-/// The gyro's and the steering's yaw rate without the errors that were found.
+/// The yaw rates of gyro and steering without the errors found.
 fn freed_of(
     found: &[DrivingBias],
     gyro: &Signal,

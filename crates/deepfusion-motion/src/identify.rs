@@ -1,4 +1,4 @@
-//! A vehicle's wheelbase and steering ratio from its own speed, steering and yaw rate.
+//! Identifies a vehicle's wheelbase and steering ratio from its speed, steering and yaw rate.
 //!
 //! The bicycle model (Eq. 27) with a gyro's bias b, s the steering signal and s₀ its zero:
 //!
@@ -25,12 +25,12 @@ use crate::{Bicycle, Signal};
 use deepfusion_hint::Hint;
 use fit::Fit;
 
-/// What is known of the vehicle already, and what counts as enough.
+/// Known parameters of the vehicle, and the required accuracy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IdentifyConfig {
-    /// The wheelbase in metres, where it is known.
+    /// The wheelbase in metres, if known.
     pub wheelbase_m: Option<f64>,
-    /// The steering ratio, where it is known (1 for a road wheel's angle).
+    /// The steering ratio, if known (1 for a road wheel's angle).
     pub steering_ratio: Option<f64>,
     /// Understeer of the vehicle, in s²/m² ([`Bicycle::understeer_s2_per_m2`]); not identified.
     pub understeer_s2_per_m2: f64,
@@ -52,10 +52,10 @@ impl Default for IdentifyConfig {
     }
 }
 
-/// A number with its standard error (0 where it was given).
+/// A value with its standard error (0 if it was given).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// The number.
+    /// The value.
     pub value: f64,
     /// Its standard error.
     pub std_error: f64,
@@ -69,7 +69,7 @@ impl Estimate {
     }
 }
 
-/// A vehicle's steering, as its drive shows it.
+/// Identified steering parameters of a vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Identified {
     /// L, in metres.
@@ -82,14 +82,14 @@ pub struct Identified {
     pub steering_offset_rad: Estimate,
     /// b, in rad/s.
     pub yaw_rate_bias_radps: Estimate,
-    /// Root mean square of what the model leaves of the yaw rate, in rad/s, robust.
+    /// Robust root mean square of the yaw rate's residual, in rad/s.
     pub residual_radps: f64,
-    /// How long the vehicle turned, in seconds.
+    /// Duration of turning, in seconds.
     pub turning_s: f64,
 }
 
 impl Identified {
-    /// The model that the parameters make.
+    /// The bicycle model with these parameters.
     #[must_use]
     pub fn bicycle(&self, understeer_s2_per_m2: f64) -> Bicycle {
         Bicycle {
@@ -101,17 +101,17 @@ impl Identified {
     }
 }
 
-/// Why a drive does not show the parameters.
+/// Why a drive does not determine the parameters.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("not identifiable: {why} ({figure:.3}, needed {needed:.3})")]
 pub struct Unidentifiable {
     /// The reason.
     pub why: Why,
-    /// The figure that is not good enough: seconds of turning, or a relative standard error.
+    /// The insufficient figure: seconds of turning, or a relative standard error.
     pub figure: f64,
-    /// What it would have to be.
+    /// The required figure.
     pub needed: f64,
-    /// L·ρ in metres, where at least that is known well enough.
+    /// L·ρ in metres, if at least that is known well enough.
     pub product_m: Option<Estimate>,
 }
 
@@ -121,8 +121,8 @@ pub struct Unidentifiable {
 pub enum Why {
     /// The drive is too straight: the figure is the seconds of turning.
     Straight,
-    /// Wheelbase and ratio cannot be told apart: no large steering angles. The figure is the larger of
-    /// their relative standard errors.
+    /// Wheelbase and ratio cannot be separated: there are no large steering angles. The figure is the
+    /// larger of their relative standard errors.
     OnlyTheProduct,
     /// The measurements are too noisy, or contradict the model. The figure is a relative standard error.
     TooUncertain,
@@ -156,7 +156,7 @@ impl Hint for Unidentifiable {
 /// `yaw_rate` in rad/s and positive to the left, all on one clock.
 ///
 /// # Errors
-/// [`Unidentifiable`] where the drive is too straight, or a standard error is above the limit.
+/// [`Unidentifiable`] if the drive is too straight, or a standard error is above the limit.
 pub fn identify(
     speed: &Signal,
     steering: &Signal,
@@ -171,7 +171,7 @@ pub fn identify(
         needed: config.least_turning_s,
         product_m: None,
     };
-    // A limit that is no number is met by nothing.
+    // No value satisfies a NaN limit.
     let turns = turning_s >= config.least_turning_s;
     if observations.len() < 20 || !turns {
         return Err(straight(turning_s));

@@ -1,5 +1,5 @@
-//! How the picture moves from one frame to the next: sideways, up and about as the camera turns,
-//! outward as it drives.
+//! Image motion from one frame to the next: shift, drop and roll as the camera turns, growth as it
+//! drives.
 //!
 //! In the upper part of a road picture, turning moves everything by the same amount, and driving
 //! moves everything away from the centre, by more the nearer it is. All at once are fitted to a pair
@@ -71,7 +71,7 @@ impl GreyFrame {
     }
 }
 
-/// How the picture moved between two frames.
+/// Image motion between two frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageMotion {
     /// Time of the frame before, in seconds of the camera's clock.
@@ -85,13 +85,13 @@ pub struct ImageMotion {
     pub drop: f64,
     /// How far the picture turned clockwise about its centre, in radians: minus the camera's roll.
     pub clockwise_rad: f64,
-    /// By which share the picture grew: about the distance driven over the depth of what is seen.
+    /// Relative growth of the picture: about the distance driven over the depth of the scene.
     pub growth: f64,
 }
 
 impl ImageMotion {
-    /// The motion from one frame to the next; `None` where the pictures differ in size, have nothing to
-    /// hold on to (a wall, a tunnel, night), or moved by more than a quarter of their width.
+    /// The motion from one frame to the next; `None` if the pictures differ in size, have no texture (a
+    /// wall, a tunnel, night), or moved by more than a quarter of their width.
     #[must_use]
     pub fn between(before: &GreyFrame, after: &GreyFrame) -> Option<Self> {
         let warp = align::align(&before.pyramid, &after.pyramid)?;
@@ -106,9 +106,9 @@ impl ImageMotion {
     }
 }
 
-/// The motions of a sequence of frames: from each frame to the first one at least `apart_s` later, as
-/// far as they can be aligned. Some 0.1 s serve well: the picture's errors count less over a longer
-/// time, and over a too long one it has moved out of reach.
+/// The motions of a sequence of frames: from each frame to the first one at least `apart_s` later, if
+/// they can be aligned. About 0.1 s is a good value: errors of the alignment matter less over a
+/// longer time, but too long a time moves the picture out of range.
 #[must_use]
 pub fn image_motions(frames: &[GreyFrame], apart_s: f64) -> Vec<ImageMotion> {
     let pair = |(i, before): (usize, &GreyFrame)| {

@@ -1,8 +1,8 @@
-//! How a vehicle moved, from its own sensors: what gives learned depth its metres.
+//! A vehicle's motion from its own sensors, which gives learned depth its metric scale.
 //!
 //! [`VehicleSensors`] (speed, steering, inertial unit) → [`FusedTrack`] → [`VehicleMotion`] between any
 //! two times → the camera's motion ([`VehicleMotion::camera0_from_camera1`]). [`MotionModel`] holds
-//! either that or a [`VehicleTrack`], a unit that gives speed and yaw rate at once.
+//! either that or a [`VehicleTrack`], from a unit that measures both speed and yaw rate.
 //!
 //! | Equation | Here |
 //! |---|---|
@@ -16,8 +16,8 @@
 //!
 //! # Conventions
 //! Vehicle frame: x forward, y left, z up, origin in the middle of the rear axle. Seconds, metres,
-//! radians; yaw is positive to the left. Where a sensor has a gap, nothing is made up: answers are
-//! `None`. Samples that are not finite or not later than the one before are dropped.
+//! radians; yaw is positive to the left. Gaps of a sensor are not filled: the result is `None`.
+//! Samples that are not finite or not later than the one before are dropped.
 //!
 //! ```
 //! use deepfusion_motion::{Bicycle, FusedTrack, MotionConfig, Signal, VehicleSensors};

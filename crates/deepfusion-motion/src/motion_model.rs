@@ -1,9 +1,9 @@
 use crate::{FusedTrack, VehicleMotion, VehicleTrack};
 
-/// Whatever says how a vehicle moved: what a recording holds, whichever sensors it has.
+/// A vehicle's motion over a recording, whichever sensors it has.
 #[derive(Debug, Clone, PartialEq)]
 pub enum MotionModel {
-    /// One unit that gives speed and yaw rate (KITTI's oxts).
+    /// One unit that measures speed and yaw rate (KITTI's oxts).
     Track(Box<VehicleTrack>),
     /// Speed, steering and inertial unit, each with its own clock rate.
     Fused(Box<FusedTrack>),
@@ -19,7 +19,7 @@ impl MotionModel {
         }
     }
 
-    /// Forward speed at a time, in m/s; `None` where it is not known.
+    /// Forward speed at a time, in m/s; `None` if unknown.
     #[must_use]
     pub fn speed_at(&self, time_s: f64) -> Option<f64> {
         match self {
@@ -28,7 +28,7 @@ impl MotionModel {
         }
     }
 
-    /// Roll (the left side up) and pitch (the nose down) at a time, in radians; `None` where nothing measures them.
+    /// Roll (the left side up) and pitch (the nose down) at a time, in radians; `None` if nothing measures them.
     #[must_use]
     pub fn tilt(&self, time_s: f64) -> Option<[f64; 2]> {
         match self {
@@ -37,7 +37,7 @@ impl MotionModel {
         }
     }
 
-    /// What the vehicle did between two times; `None` across gaps, outside the recording, and
+    /// The vehicle's motion between two times; `None` across gaps, outside the recording, and
     /// backwards in time.
     #[must_use]
     pub fn motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {

@@ -1,30 +1,30 @@
 //! Speed along a track of positions, such as a satellite receiver's.
 //!
-//! Differences of neighbouring positions are noise: a metre of jitter at one a second is a metre a second. So the whole track is
-//! smoothed at once: on each axis position and velocity follow a random acceleration, what was measured pulls them towards
-//! it, and what lies far off pulls less the farther it lies (Student's t by reweighting). The answer at every fix is the
-//! velocity given all of them, before and after (Rauch, Tung, Striebel).
+//! Differences of neighbouring positions are noisy: a metre of jitter at 1 Hz is 1 m/s. So the whole track is smoothed at once:
+//! on each axis position and velocity follow a random acceleration, with measurements weighted by Student's t (iterative
+//! reweighting), so that outliers count less. The result at every fix is the velocity given all fixes, before and after (Rauch,
+//! Tung, Striebel).
 
 use nalgebra::{Matrix2, Vector2};
 
-/// Standard deviation of a measured position on an axis, in metres. Receivers claim more, but most of their error stays the
-/// same from second to second, and does not touch the speed.
+/// Standard deviation of a measured position on an axis, in metres. Receivers claim larger errors, but most of that is
+/// constant from second to second and does not affect the speed.
 const POSITION_SIGMA_M: f64 = 1.0;
 /// Standard deviation of a measured speed, in m/s.
 const SPEED_SIGMA_MPS: f64 = 0.15;
-/// Spectral density of the random acceleration, m²/s³: a car's speed wanders by so many (m/s)² in a second.
+/// Spectral density of the random acceleration, m²/s³: the variance that a car's speed gains per second.
 const ACCELERATION_DENSITY: f64 = 1.5;
 /// Degrees of freedom of Student's t: small is robust.
 const FREEDOM: f64 = 4.0;
-/// Rounds of reweighting.
+/// Number of rounds of reweighting.
 const ROUNDS: usize = 5;
-/// Fixes farther apart are of different tracks, in seconds.
+/// Longest gap within a track, in seconds.
 const MAX_GAP_S: f64 = 10.0;
 /// The ellipsoid of WGS 84: its equator's radius in metres, and its eccentricity squared.
 const EQUATOR_M: f64 = 6_378_137.0;
 const ECCENTRICITY_2: f64 = 6.694_379_990_14e-3;
 
-/// Where a receiver was.
+/// A satellite receiver's position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fix {
     /// In seconds.
@@ -33,8 +33,8 @@ pub struct Fix {
     pub latitude_deg: f64,
     /// East of Greenwich, in degrees.
     pub longitude_deg: f64,
-    /// The speed over ground where the receiver tells it (from Doppler shifts, better than any difference of positions),
-    /// in m/s.
+    /// The speed over ground, in m/s, if the receiver reports it (from Doppler shifts, better than differences of
+    /// positions).
     pub speed_mps: Option<f64>,
 }
 
@@ -184,7 +184,7 @@ fn transition(dt: f64) -> Matrix2<f64> {
     Matrix2::new(1.0, dt, 0.0, 1.0)
 }
 
-/// What is expected `dt` seconds later.
+/// The prediction `dt` seconds later.
 fn advanced(from: &Estimate, dt: f64) -> Estimate {
     let step = transition(dt);
     let noise = Matrix2::new(dt.powi(3) / 3.0, dt.powi(2) / 2.0, dt.powi(2) / 2.0, dt);
@@ -198,7 +198,7 @@ fn advanced(from: &Estimate, dt: f64) -> Estimate {
 mod tests {
     use super::*;
 
-    /// A number between -1 and 1 that looks random.
+    /// A pseudo-random number between -1 and 1.
     fn noise(i: usize) -> f64 {
         let x = (i as f64 * 12.9898).sin() * 43_758.545_3;
         2.0 * (x - x.floor()) - 1.0
@@ -236,7 +236,7 @@ mod tests {
         (fixes, speeds)
     }
 
-    /// Root mean square of what is wrong, and the ratio of the distances.
+    /// Root mean square of the errors, and the ratio of the distances.
     fn errors(found: &[FixSpeed], truth: &[f64]) -> (f64, f64) {
         let squares = found
             .iter()
@@ -255,7 +255,7 @@ mod tests {
             let (error, ratio) = errors(&found, &truth);
             assert!(error < rms, "{jitter}: {error}");
             assert!((ratio - 1.0).abs() < bias, "{jitter}: {ratio}");
-            // Two thirds lie within what it says of itself, or more.
+            // At least two thirds lie within its own standard deviation.
             let within = found
                 .iter()
                 .zip(&truth)

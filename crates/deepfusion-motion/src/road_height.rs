@@ -1,4 +1,4 @@
-//! How high above the road the camera stands, from how the road moves in its images.
+//! The camera's height above the road, from the road's motion in its images.
 //!
 //! The road is a plane. Two frames show its motion in units of the camera's height over it: the homography of the plane
 //! n·X = h between them is K (R + t nᵀ / h) K⁻¹, so a known t gives h. A sweep over h finds the plane that best carries
@@ -9,30 +9,31 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Heights tried, in metres, and the ratio of one to the next. Beyond 15 m the road hardly moves.
+/// Range of heights tried, in metres, and the ratio of one to the next. Beyond 15 m the road hardly moves.
 pub const SWEEP_M: (f64, f64) = (0.3, 15.0);
 /// See [`SWEEP_M`].
 pub const SWEEP_RATIO: f64 = 1.06;
-/// The best height's cost over the median's, above which the images say nothing. On KITTI it is 0.71 to
-/// 0.73 with true speeds, 0.57 to 0.82 with speeds 3.6 times too large or too small; 0.99 on unrelated images.
+/// Largest ratio of the best height's cost to the median cost; above it the images are inconclusive. On KITTI
+/// it is 0.71 to 0.73 with true speeds, 0.57 to 0.82 with speeds 3.6 times too large or too small; 0.99 on
+/// unrelated images.
 pub(crate) const CONCLUSIVE: f64 = 0.92;
-/// Fewer pairs than this prove nothing: a car ahead may fill the view.
+/// Fewest pairs for a result: a car ahead may fill the view.
 const MIN_PAIRS: usize = 4;
-/// The road is looked for in the middle columns, and in rows whose rays point at least this share as
+/// The road is searched in the middle columns, and in rows whose rays point at least this share as
 /// steeply down as the bottom row's.
 const COLUMNS: (f64, f64) = (0.2, 0.8);
 const STEEPNESS: f64 = 0.35;
-/// The far scene, which a camera's way hardly moves: columns in the middle, and rows about the horizon, as the share of
+/// The far scene, which translation hardly moves: columns in the middle, and rows about the horizon, as the share of
 /// depth that rays there go down or up.
 const FAR_COLUMNS: (f64, f64) = (0.3, 0.7);
 const FAR_SLOPE: f64 = 0.06;
-/// Pitch between two frames that is looked for, to both sides, and in what steps, radians: a speed and a yaw rate do not
-/// tell it, and a tenth of a degree moves the road as much as a change of its height.
+/// Search range (to both sides) and step of the pitch between two frames, radians: speed and yaw rate do not contain it,
+/// and a tenth of a degree moves the road as much as a change of its height.
 const PITCH: f64 = 0.0105;
 const PITCH_STEP: f64 = 0.0007;
-/// Of so many of the road's pixels one is looked at.
+/// One in this many of the road's pixels is used.
 const THIN: usize = 2;
-/// Half the window whose mean is taken off, so that shade and exposure do not count, in pixels.
+/// Half the window whose mean is subtracted, so that shade and exposure have no effect, in pixels.
 const HIGH_PASS: usize = 4;
 /// Largest difference of one pixel that counts, in grey levels of 255: cars and kerbs are not the plane.
 const CLIP: f64 = 20.0;
@@ -48,8 +49,8 @@ pub struct GreyImage {
     pub data: Vec<f32>,
 }
 
-/// What of a frame tells how the road moves: its texture, without shade and exposure. Made once, it serves the pair
-/// before and the pair after.
+/// A frame's texture, without shade and exposure, from which the road's motion is measured. Made once, it serves
+/// the pair before and the pair after.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoadTexture(GreyImage);
 
@@ -59,16 +60,16 @@ impl From<&GreyImage> for RoadTexture {
     }
 }
 
-/// Two frames of a drive, and how the camera is said to have moved between them.
+/// Two frames of a drive, and the measured motion of the camera between them.
 #[derive(Debug, Clone)]
 pub struct GroundPair {
     /// The frame before.
     pub earlier: Arc<RoadTexture>,
     /// The frame after, of the same size.
     pub later: Arc<RoadTexture>,
-    /// Of these small images.
+    /// Intrinsics of these small images.
     pub intrinsics: Intrinsics,
-    /// Time between them, seconds; NaN where it is not known.
+    /// Time between them, seconds; NaN if unknown.
     pub seconds: f64,
     /// A point of the later camera in the earlier one; its translation is what is tested.
     pub earlier_from_later: Se3,
@@ -77,7 +78,7 @@ pub struct GroundPair {
 }
 
 /// The height above the road, in metres, at which the pairs' motion explains their images best; `None`
-/// where no height does clearly better than others, or there are fewer than four pairs that show road.
+/// if no height is clearly better than the others, or fewer than four pairs show road.
 #[must_use]
 pub fn implied_camera_height(pairs: &[GroundPair]) -> Option<f64> {
     let count = ((SWEEP_M.1 / SWEEP_M.0).ln() / SWEEP_RATIO.ln()).ceil() as i32;
@@ -100,15 +101,15 @@ pub fn implied_camera_height(pairs: &[GroundPair]) -> Option<f64> {
 
 impl GroundPair {
     /// Mean difference of the two images over the road for each height, over the median of them; `None`
-    /// where the road is not in view or has no texture.
+    /// if the road is not in view or has no texture.
     #[must_use]
     pub fn costs(&self, heights: &[f64]) -> Option<Vec<f64>> {
-        self.look(heights, 0.0).0
+        self.costs_and_pitch(heights, 0.0).0
     }
 
-    /// As [`Self::costs`], for a camera that was pitched by `tilt` (radians, nose up) from its mount in the earlier frame,
-    /// and how much more it is in the later one.
-    pub(crate) fn look(&self, heights: &[f64], tilt: f64) -> (Option<Vec<f64>>, f64) {
+    /// As [`Self::costs`], for a camera pitched by `tilt` (radians, nose up) from its mount in the earlier frame; with the
+    /// estimated pitch from the earlier to the later one.
+    pub(crate) fn costs_and_pitch(&self, heights: &[f64], tilt: f64) -> (Option<Vec<f64>>, f64) {
         let (earlier, later) = (&self.earlier.0, &self.later.0);
         let pitch = self.pitch(earlier, later);
         let pitched = self.pitched(tilt, pitch);
@@ -121,7 +122,7 @@ impl GroundPair {
         Se3::from_axis_angle(side * angle, Vector3::zeros())
     }
 
-    /// The motion and the direction to the ground as a pitched camera has them: what the vehicle tells is without.
+    /// The motion and the direction to the ground of a pitched camera: the vehicle's sensors do not include the pitch.
     fn pitched(&self, tilt: f64, pitch: f64) -> Pitched<'_> {
         let motion = &self.earlier_from_later;
         let rotation = self.nose_up(pitch).rotation() * motion.rotation();
@@ -133,7 +134,7 @@ impl GroundPair {
         }
     }
 
-    /// The pitch between the frames that carries the far scene best from one image to the other, radians, nose up.
+    /// The pitch between the frames that best maps the far scene from one image to the other, radians, nose up.
     fn pitch(&self, earlier: &GreyImage, later: &GreyImage) -> f64 {
         let k_inverse = self.intrinsics.inverse_matrix();
         let (width, height) = (later.width, later.height);
@@ -163,7 +164,7 @@ impl GroundPair {
     }
 }
 
-/// A camera on its way, and where the ground is in it.
+/// A camera's motion, and the direction to the ground in it.
 struct Pitched<'a> {
     intrinsics: &'a Intrinsics,
     motion: Se3,
@@ -214,7 +215,7 @@ impl Pitched<'_> {
     }
 }
 
-/// Mean difference of the later image's pixels and the places of the earlier one that a homography takes them to.
+/// Mean difference of the later image's pixels and the earlier image at the positions to which a homography maps them.
 fn difference(
     earlier: &GreyImage,
     later: &GreyImage,
@@ -247,7 +248,7 @@ fn difference(
     pixels.iter().map(one).sum::<f32>() as f64 / pixels.len() as f64
 }
 
-/// Place of the least of some costs, between the steps by a parabola; `None` where it is the first or the last.
+/// Index of the least cost, interpolated by a parabola; `None` if it is the first or the last.
 pub(crate) fn least(costs: &[f64]) -> Option<f64> {
     let least = (0..costs.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
     if least == 0 || least + 1 == costs.len() {
@@ -292,7 +293,7 @@ impl GreyImage {
         Self { data, ..*self }
     }
 
-    /// Bilinear value at a position, which is moved into the image first.
+    /// Bilinear value at a position, clamped to the image.
     #[must_use]
     pub fn sample(&self, x: f32, y: f32) -> f32 {
         let at = |v: f32, size: usize| {

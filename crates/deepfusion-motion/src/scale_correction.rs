@@ -1,30 +1,30 @@
-//! Depth brought back to the metres it was learned in, slowly.
+//! Slow correction of depth to the metric scale it was learned with.
 
 use crate::scale_monitor::{ScaleReading, ScaleState};
 
-/// Largest change from one pair of frames to the next, as ln: 10 % take some thirty frames. A reading that errs for a
-/// moment hardly moves it, and depth never jumps.
+/// Largest change from one pair of frames to the next, as ln: 10 % take about thirty frames. A short error of the
+/// reading hardly moves it, and depth never jumps.
 const STEP: f64 = 0.003;
 
-/// Follows what the [`ScaleMonitor`](crate::ScaleMonitor) says while it says that metres have changed.
+/// Follows the ratio of the [`ScaleMonitor`](crate::ScaleMonitor) while it reports a drift.
 ///
-/// The ratio is the camera's height in the vehicle's metres over what it was. Images zoomed by 10 % show everything 10 %
-/// nearer to a network, which judges distance by size, and a camera that came to stand higher likewise by the road:
-/// depth times the ratio is right again. Where it is the speed that went wrong, depth follows the wrong speed: the
-/// vehicle's metres are what is held on to.
+/// The ratio is the camera's height in the vehicle's metres over its reference. In images zoomed by 10 % everything
+/// looks 10 % nearer to a network, which judges distance by size; a camera that is now higher has a similar effect on
+/// the road. Depth times the ratio is right again. If the speed is wrong, depth follows the wrong speed: the vehicle's
+/// metres are the reference.
 #[derive(Debug, Clone, Default)]
 pub struct ScaleCorrection {
     ln_factor: f64,
 }
 
 impl ScaleCorrection {
-    /// What depth is to be multiplied by: 1 until a change was seen.
+    /// The factor for depth: 1 until a change was detected.
     #[must_use]
     pub fn factor(&self) -> f64 {
         self.ln_factor.exp()
     }
 
-    /// Goes one step towards what the reading says, or back to 1 where nothing is wrong any more.
+    /// Moves one step towards the reading's ratio, or back to 1 if the drift has ended.
     pub fn follow(&mut self, reading: &ScaleReading) {
         let target = match (reading.state, reading.ratio) {
             (ScaleState::Drift, Some(ratio)) if ratio > 0.0 && ratio.is_finite() => ratio.ln(),

@@ -1,29 +1,30 @@
-//! Whether metres still are what they were: the camera's height over the road, as the vehicle's metres measure it from
-//! the road's motion, must not change while driving.
+//! Monitors the metric scale: the camera's height over the road, measured from the road's motion and the vehicle's
+//! speed, must not change while driving.
 //!
-//! It changes where images are zoomed (a lens touched, a resolution switched), where the camera comes loose, and where the
-//! speed goes wrong (other tyres, another unit). The network's depth takes no part, so that a street on which it errs is no
-//! alarm; beside it stands how high the network's own road lies below the camera: their ratio is the depth's scale.
+//! It changes if images are zoomed (a lens touched, a resolution switched), if the camera comes loose, and if the speed
+//! becomes wrong (other tyres, another unit). The network's depth is not involved, so that its errors on a street raise no
+//! alarm. The height of the camera over the network's own road is reported beside it: the ratio of the two is the scale of
+//! depth.
 
 use crate::road_height::{CONCLUSIVE, GroundPair, least};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// How the monitor judges.
+/// Settings of the monitor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ScaleMonitorConfig {
-    /// Pairs of frames that the reference is learned from.
+    /// Number of pairs of frames from which the reference is learned.
     pub learn_pairs: usize,
-    /// Pairs that a reading is made from, the latest.
+    /// Number of latest pairs from which a reading is made.
     pub window_pairs: usize,
-    /// Shortest way of the camera between two frames that is looked at, metres.
+    /// Shortest translation of the camera between two frames of a pair that is used, metres.
     pub min_distance_m: f64,
     /// Smallest change that is an alarm, as a share.
     pub min_change: f64,
-    /// How far the vehicle's nose rises while it speeds up, radians to 1 m/s²: 2 degrees to 1 g, a guess of a car.
+    /// Rise of the vehicle's nose under acceleration, radians per m/s²: 2 degrees per g, a guess for a car.
     pub pitch_per_acceleration: f64,
-    /// The camera's height over the road in metres, where it was measured: nothing has to be learned then.
+    /// The camera's height over the road in metres, if it was measured: then nothing has to be learned.
     pub height_m: Option<f64>,
 }
 
@@ -40,13 +41,13 @@ impl Default for ScaleMonitorConfig {
     }
 }
 
-/// What the monitor makes of it.
+/// The monitor's verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ScaleState {
     /// The reference is being learned.
     Learning,
-    /// As it was.
+    /// Unchanged.
     Steady,
     /// It has changed.
     Drift,
@@ -55,39 +56,39 @@ pub enum ScaleState {
 /// A reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ScaleReading {
-    /// Height now over the reference: 1.1 where images are zoomed by 10 %, or the speed is told 10 % too high. `None` while
-    /// learning.
+    /// Height now over the reference: 1.1 if images are zoomed by 10 %, or the reported speed is 10 % too high. `None`
+    /// while learning.
     pub ratio: Option<f64>,
     /// Its 95 % interval.
     pub ci95: Option<[f64; 2]>,
     /// The camera's height by the road's motion, metres.
     pub height_m: Option<f64>,
-    /// The network's metres over the vehicle's, by the height of its road: what depth would have to be divided by.
+    /// The network's metres over the vehicle's, by the height of its road: the divisor that would correct depth.
     pub depth_ratio: Option<f64>,
-    /// What is made of it.
+    /// The verdict.
     pub state: ScaleState,
 }
 
-/// Heights over the guess that are tried: 35 % to both sides in steps of 2 %.
+/// Heights tried relative to the guess: 35 % to both sides in steps of 2 %.
 const REACH: f64 = 0.35;
 /// See [`REACH`].
 const STEP: f64 = 0.02;
-/// Share of the camera's fast pitch that is kept from one pair to the next.
+/// Share of the camera's fast pitch that carries over from one pair to the next.
 const TILT_KEPT: f64 = 0.9;
-/// Pairs whose costs make one estimate: single pairs say little.
+/// Number of pairs per estimate: single pairs are too noisy.
 const BLOCK: usize = 10;
 /// Heights tried first, metres: those of anything that drives, in steps of 6 %.
 const FIRST_M: (f64, f64) = (0.3, 4.5);
-/// Standard errors from which on a change is no chance.
+/// Number of standard errors of a significant change.
 const SIGMAS: f64 = 3.0;
-/// Standard error that is assumed at least: blocks on one street agree better than streets do.
+/// Least standard error assumed: blocks on one street agree better than different streets do.
 const LEAST_ERROR: f64 = 0.012;
 
-/// Watches the metres of a drive.
+/// Monitors the metric scale of a drive.
 #[derive(Debug, Clone)]
 pub struct ScaleMonitor {
     config: ScaleMonitorConfig,
-    /// Middle of the heights that are tried, metres, once one is known.
+    /// Centre of the heights tried, metres, once one is known.
     guess_m: Option<f64>,
     first: Vec<Vec<f64>>,
     /// Costs of the pairs of the block that is being filled.
@@ -98,14 +99,14 @@ pub struct ScaleMonitor {
     /// ln of the height of the network's road, the latest last.
     depth_heights: VecDeque<f64>,
     drifting: bool,
-    /// How the camera is pitched from its mount, radians, nose up.
+    /// The camera's pitch relative to its mount, radians, nose up.
     tilt: f64,
     /// Speed over each of the latest pairs, m/s, and their seconds.
     speeds: VecDeque<(f64, f64)>,
 }
 
 impl ScaleMonitor {
-    /// Without any pair yet.
+    /// A monitor without pairs.
     #[must_use]
     pub fn new(config: ScaleMonitorConfig) -> Self {
         Self {
@@ -128,8 +129,8 @@ impl ScaleMonitor {
         &self.config
     }
 
-    /// Takes a pair of frames in. `depth_height_m` is the camera's height over the network's road in the later frame,
-    /// metres, where there is a network and it sees one.
+    /// Adds a pair of frames. `depth_height_m` is the camera's height over the network's road in the later frame,
+    /// metres, if there is a network and it sees a road.
     pub fn add(&mut self, pair: &GroundPair, depth_height_m: Option<f64>) -> ScaleReading {
         if let Some(height) = depth_height_m.filter(|h| h.is_finite() && *h > 0.0) {
             self.depth_heights.push_back(height.ln());
@@ -140,26 +141,26 @@ impl ScaleMonitor {
         let way = pair.earlier_from_later.translation().norm();
         if way >= self.config.min_distance_m && way.is_finite() {
             match self.guess_m {
-                None => self.look_around(pair),
-                Some(guess) => self.look(pair, guess),
+                None => self.coarse_search(pair),
+                Some(guess) => self.refine(pair, guess),
             }
         }
         self.reading()
     }
 
-    /// The next pair does not go on from the last one: how the camera was pitched and how fast it was say nothing of it.
-    /// What was learned stays.
+    /// Marks a break: the next pair does not continue the last one, so that pitch and speeds are dropped. What was
+    /// learned stays.
     pub fn pause(&mut self) {
         self.tilt = 0.0;
         self.speeds.clear();
     }
 
-    /// A pair's costs. A camera pitches as the vehicle brakes and the road waves, which neither speed nor yaw rate tell,
-    /// and a tenth of a degree counts: what is fast is seen in the far scene from frame to frame, summed up and forgotten
-    /// before it drifts away; what is slow goes with the acceleration.
+    /// A pair's costs. A camera pitches as the vehicle brakes and the road undulates, which neither speed nor yaw rate
+    /// contain, and a tenth of a degree matters. Fast pitch is measured in the far scene from frame to frame and summed
+    /// with a decay, so that it does not drift; slow pitch follows from the acceleration.
     fn costs(&mut self, pair: &GroundPair, heights: &[f64]) -> Option<Vec<f64>> {
         let tilt = self.tilt + self.config.pitch_per_acceleration * self.acceleration(pair);
-        let (costs, pitch) = pair.look(heights, tilt);
+        let (costs, pitch) = pair.costs_and_pitch(heights, tilt);
         self.tilt = TILT_KEPT * (self.tilt + pitch);
         costs
     }
@@ -181,8 +182,8 @@ impl ScaleMonitor {
         }
     }
 
-    /// Before anything is known: a coarse sweep over all heights that can be.
-    fn look_around(&mut self, pair: &GroundPair) {
+    /// A coarse sweep over all possible heights, before a guess is known.
+    fn coarse_search(&mut self, pair: &GroundPair) {
         let count = ((FIRST_M.1 / FIRST_M.0).ln() / 0.06).ceil() as usize;
         let heights: Vec<f64> = (0..=count)
             .map(|i| FIRST_M.0 * (0.06 * i as f64).exp())
@@ -196,7 +197,7 @@ impl ScaleMonitor {
         }
     }
 
-    fn look(&mut self, pair: &GroundPair, guess: f64) {
+    fn refine(&mut self, pair: &GroundPair, guess: f64) {
         let count = (2.0 * REACH / STEP).round() as usize;
         let heights: Vec<f64> = (0..=count)
             .map(|i| guess * (STEP * i as f64 - REACH).exp())
@@ -261,8 +262,8 @@ impl ScaleMonitor {
     }
 }
 
-/// Place of the least pooled cost, between the steps by a parabola; `None` where no height does clearly better, or the
-/// best is the last that was tried.
+/// Index of the least pooled cost, interpolated by a parabola; `None` if no height is clearly better, or the best is
+/// the first or last.
 fn best(costs: &[Vec<f64>]) -> Option<f64> {
     let count = costs.first()?.len();
     let pooled: Vec<f64> = (0..count)
@@ -274,7 +275,7 @@ fn best(costs: &[Vec<f64>]) -> Option<f64> {
     (sorted[0] <= CONCLUSIVE * sorted[count / 2]).then_some(place)
 }
 
-/// Mean and standard error of independent values; the middle half of them, so that a car ahead in one block does not count.
+/// Mean and standard error of the middle half of independent values, so that a car ahead in one block has no effect.
 fn mean_and_error(values: &[f64]) -> Option<(f64, f64)> {
     if values.is_empty() {
         return None;

@@ -1,18 +1,17 @@
-//! One number over time, as a sensor sends it.
+//! A sensor's value over time.
 
-/// Longest gap between two samples that is bridged by interpolation, in seconds: five packets of
-/// KITTI's oxts. Across a longer one the value is unknown, not straight.
+/// Longest gap between two samples that is interpolated, in seconds: five packets of KITTI's oxts.
+/// Across a longer one the value is unknown.
 const LONGEST_GAP_S: f64 = 0.5;
-/// The same for fast sensors: a gap of this many usual intervals is one, where it lasts at least
-/// [`SHORTEST_GAP_S`].
+/// The same for fast sensors, in median intervals, if that is at least [`SHORTEST_GAP_S`].
 const GAP_INTERVALS: f64 = 5.0;
-/// Scheduling on a recorder's computer delays packets by tens of milliseconds; that is no gap.
+/// Scheduling on a recorder's computer delays packets by tens of milliseconds; that does not count as a gap.
 const SHORTEST_GAP_S: f64 = 0.1;
-/// How far beyond its first or last sample a signal is taken as constant, in seconds: the clocks of
-/// sensors that belong to one frame differ by some milliseconds either way.
+/// How far a signal is extended as constant beyond its first or last sample, in seconds: the clocks
+/// of sensors that belong to one frame differ by some milliseconds either way.
 const OVERHANG_S: f64 = 0.15;
 
-/// A number over time: samples in order, straight lines between them, and gaps that are not bridged.
+/// A value over time: samples in order, linear interpolation between them, and gaps that are not bridged.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Signal {
     time_s: Vec<f64>,
@@ -24,8 +23,7 @@ pub struct Signal {
 impl Signal {
     /// A signal of samples (time in s, value). Samples that are not finite, and samples that are not
     /// later than the one before them (recorders repeat packets, clocks step back), are dropped and
-    /// counted. A gap is what lasts longer than five usual intervals, but no less than 0.1 s and no
-    /// more than 0.5 s.
+    /// counted. A gap is longer than five median intervals, a limit kept between 0.1 s and 0.5 s.
     #[must_use]
     pub fn new(samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let mut signal = Self::with_max_gap(samples, LONGEST_GAP_S);
@@ -66,25 +64,25 @@ impl Signal {
         &self.value
     }
 
-    /// How many samples were dropped: not finite, or not later than the one before.
+    /// Number of samples dropped: not finite, or not later than the one before.
     #[must_use]
     pub fn dropped(&self) -> usize {
         self.dropped
     }
 
-    /// The longest interval between two samples that is no gap, in seconds.
+    /// The longest interval between two samples that is not a gap, in seconds.
     #[must_use]
     pub fn max_gap_s(&self) -> f64 {
         self.max_gap_s
     }
 
-    /// Whether there is no sample.
+    /// Whether there are no samples.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
 
-    /// The usual (median) interval between samples, in seconds; `None` below two samples.
+    /// The median interval between samples, in seconds; `None` for fewer than two samples.
     #[must_use]
     pub fn interval_s(&self) -> Option<f64> {
         let mut intervals: Vec<f64> = self.time_s.windows(2).map(|w| w[1] - w[0]).collect();
@@ -92,7 +90,7 @@ impl Signal {
         (!intervals.is_empty()).then(|| *intervals.select_nth_unstable_by(middle, f64::total_cmp).1)
     }
 
-    /// The same samples with every value changed.
+    /// The same samples with `change` applied to every value.
     #[must_use]
     pub fn map(&self, change: impl Fn(f64) -> f64) -> Self {
         Self {
@@ -101,7 +99,7 @@ impl Signal {
         }
     }
 
-    /// Whether `from_s` to `to_s` lies within the samples (or 0.15 s beyond) and meets no gap.
+    /// Whether `from_s` to `to_s` lies within the samples (or 0.15 s beyond) and contains no gap.
     #[must_use]
     pub fn covers(&self, from_s: f64, to_s: f64) -> bool {
         let (Some(first), Some(last)) = (self.time_s.first(), self.time_s.last()) else {
@@ -119,14 +117,14 @@ impl Signal {
         around.windows(2).all(|w| w[1] - w[0] <= self.max_gap_s)
     }
 
-    /// The value at a time, between its neighbours; `None` where the signal does not cover it.
+    /// The interpolated value at a time; `None` if the signal does not cover it.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Option<f64> {
         self.covers(time_s, time_s).then(|| self.between(time_s))
     }
 
     /// ∫ value dt from `from_s` to `to_s`: the trapezoidal rule over the samples between, interpolated
-    /// at both ends. `None` where the signal does not cover the time, or it runs backward.
+    /// at both ends. `None` if the signal does not cover the interval, or it runs backwards.
     #[must_use]
     pub fn integral(&self, from_s: f64, to_s: f64) -> Option<f64> {
         self.covers(from_s, to_s).then(|| {
@@ -234,7 +232,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever comes in, what comes out is a finite number or none.
+        /// For any input the output is a finite number or `None`.
         #[test]
         fn never_made_up(samples in proptest::collection::vec((any::<f64>(), -1e6..1e6f64), 0..40), t in any::<f64>(), dt in 0.0..1.0f64) {
             let signal = Signal::new(samples);

@@ -1,4 +1,4 @@
-//! The camera's clock against the vehicle's.
+//! The offset between the camera's clock and the vehicle's.
 //!
 //! When a car turns, the picture moves sideways; when its nose dips, up; when it rolls, it turns; when
 //! it drives faster, it grows faster. The offset at which the picture's motion follows the vehicle's
@@ -20,7 +20,7 @@ use crate::{FusedTrack, ImageMotion, MotionModel, Signal, VehicleTrack};
 use correlation::Channel;
 use deepfusion_hint::Hint;
 
-/// The vehicle's side of the comparison, on the vehicle's clock: whatever of it is measured.
+/// The vehicle's rates, on its own clock, as far as they are measured.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct VehicleRates {
     /// Forward speed, in m/s.
@@ -66,12 +66,12 @@ impl From<&MotionModel> for VehicleRates {
     }
 }
 
-/// How the offset is searched.
+/// Settings of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OffsetConfig {
     /// Largest offset either way, in seconds.
     pub search_s: f64,
-    /// What is slower than this is taken off, in seconds.
+    /// Slower trends than this are removed, in seconds.
     pub trend_s: f64,
 }
 
@@ -87,12 +87,12 @@ impl Default for OffsetConfig {
 /// The offset of two clocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeOffset {
-    /// What to add to a time of the camera's clock to have the vehicle's, in seconds.
+    /// Added to a time of the camera's clock it gives the vehicle's, in seconds.
     pub vehicle_minus_camera_s: f64,
     /// Its standard error, in seconds.
     pub std_error_s: f64,
-    /// Correlation of the picture's shift with the yaw rate there; `None` where it is not measured or
-    /// does not change.
+    /// Correlation of the picture's shift with the yaw rate at that offset; `None` if it is not
+    /// measured or does not change.
     pub yaw_correlation: Option<f64>,
     /// The same of drop and pitch rate.
     pub pitch_correlation: Option<f64>,
@@ -100,7 +100,7 @@ pub struct TimeOffset {
     pub roll_correlation: Option<f64>,
     /// The same of growth and speed.
     pub speed_correlation: Option<f64>,
-    /// How many pairs of frames were compared.
+    /// Number of pairs of frames compared.
     pub pairs: usize,
 }
 
@@ -129,7 +129,7 @@ pub enum NoTimeOffset {
         "time offset: within ±{search_s} s the picture's motion follows the vehicle's nowhere (best correlation {correlation:.2})"
     )]
     NoPeak {
-        /// How far was searched, in seconds.
+        /// The search range, in seconds.
         search_s: f64,
         /// The highest correlation.
         correlation: f64,
@@ -155,12 +155,12 @@ impl Hint for NoTimeOffset {
     }
 }
 
-/// Fewer pairs than this prove nothing.
+/// Fewest pairs for a result.
 const LEAST_PAIRS: usize = 40;
 /// Changes below these are noise: rad/s and m/s.
 const LEAST_TURN_STD: f64 = 0.004;
 const LEAST_SPEED_STD: f64 = 0.1;
-/// Below this the picture does not follow the vehicle.
+/// Least correlation of a picture that follows the vehicle.
 const LEAST_CORRELATION: f64 = 0.15;
 
 /// Estimates the offset from the picture's motion (in the order of time) and the vehicle's.

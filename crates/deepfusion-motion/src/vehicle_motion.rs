@@ -1,23 +1,23 @@
-//! A piece of a drive: an arc, and how a camera on the vehicle moved thereby (SPEC 3.4).
+//! One stretch of a drive as an arc, and the camera motion that follows from it (docs/concepts/ego-motion.md).
 
 use deepfusion_geometry::Se3;
 use nalgebra::{Rotation3, Vector3};
 
-/// A piece of an arc that a car drove, seen from its start: x forward, y left, z up.
+/// A vehicle's motion along an arc, in the vehicle frame at its start: x forward, y left, z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VehicleMotion {
     /// Distance along the arc, in metres; negative when reversing.
     pub distance_m: f64,
     /// Change of heading, in radians; positive to the left.
     pub yaw_rad: f64,
-    /// How the body leans at the end, seen from its start after the turn, in radians: roll (about x, the left side up)
-    /// and pitch (about y, the nose down), as Rz(yaw)·Ry(pitch)·Rx(roll). Zero where nothing measured it.
+    /// Roll and pitch of the body at the end relative to its start, after the yaw, in radians: roll (about x, the left
+    /// side up) and pitch (about y, the nose down), as Rz(yaw)·Ry(pitch)·Rx(roll). Zero if not measured.
     pub tilt_rad: [f64; 2],
 }
 
 impl VehicleMotion {
     /// `vehicle0_from_vehicle1`: the car's frame at the end seen from its frame at the start, along
-    /// the arc Δ = d·sinc(θ/2)·(cos θ/2, sin θ/2, 0) with heading θ (SPEC 3.4).
+    /// the arc Δ = d·sinc(θ/2)·(cos θ/2, sin θ/2, 0) with heading θ.
     #[must_use]
     pub fn vehicle0_from_vehicle1(&self) -> Se3 {
         let half = 0.5 * self.yaw_rad;
@@ -34,7 +34,7 @@ impl VehicleMotion {
         )
     }
 
-    /// The same on a body that does not lean.
+    /// The same without roll and pitch.
     #[must_use]
     pub fn level(self) -> Self {
         Self {
@@ -44,19 +44,19 @@ impl VehicleMotion {
     }
 
     /// `camera0_from_camera1` of a camera fixed to the car: the rigid body's motion along the arc at the
-    /// camera's place, lever arm included, and the body's lean. What the body leans about is not known (it
-    /// hangs on springs, between the axles); it turns the camera and leaves it in its place.
+    /// camera's position, lever arm included, and the body's roll and pitch. Their axes are unknown (the
+    /// body hangs on springs, between the axles); so they rotate the camera without moving it.
     #[must_use]
     pub fn camera0_from_camera1(&self, cam_from_vehicle: &Se3) -> Se3 {
         let level = *cam_from_vehicle * self.vehicle0_from_vehicle1() * cam_from_vehicle.inverse();
         let [roll, pitch] = self.tilt_rad;
-        let lean = Rotation3::from_euler_angles(roll, pitch, 0.0).scaled_axis();
-        level * Se3::from_axis_angle(cam_from_vehicle.rotate(&lean), Vector3::zeros())
+        let tilt = Rotation3::from_euler_angles(roll, pitch, 0.0).scaled_axis();
+        level * Se3::from_axis_angle(cam_from_vehicle.rotate(&tilt), Vector3::zeros())
     }
 }
 
-/// [`VehicleMotion::tilt_rad`] of a body that leans `from` at the start and `to` at the end (roll and pitch against the
-/// vertical, in radians): the turn T₀ᵀ·Rz(θ)·T₁ without its yaw.
+/// [`VehicleMotion::tilt_rad`] from roll and pitch against the vertical at the start and at the end, in radians: the
+/// turn T₀ᵀ·Rz(θ)·T₁ without its yaw.
 pub(crate) fn tilt_between(from: [f64; 2], to: [f64; 2], yaw_rad: f64) -> [f64; 2] {
     let [from, to] = [from, to].map(|[roll, pitch]| Rotation3::from_euler_angles(roll, pitch, 0.0));
     let turn = Rotation3::from_euler_angles(0.0, 0.0, yaw_rad);
@@ -70,7 +70,7 @@ mod tests {
     use nalgebra::Matrix3;
     use proptest::prelude::*;
 
-    /// A camera `forward` metres before and `up` above the vehicle's origin, looking ahead.
+    /// A camera `forward` metres ahead of and `up` metres above the vehicle's origin, looking ahead.
     fn cam_from_vehicle(forward: f64, up: f64) -> Se3 {
         let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
         Se3::from_parts(&axes, -(axes * Vector3::new(forward, 0.0, up)))
@@ -119,16 +119,16 @@ mod tests {
             tilt_rad: [0.02, 0.03],
         };
         let mount = cam_from_vehicle(1.5, 1.2);
-        let (leaning, level) = [motion, motion.level()]
+        let (tilted, level) = [motion, motion.level()]
             .map(|m| m.camera0_from_camera1(&mount))
             .into();
-        assert!((leaning.translation() - level.translation()).norm() < 1e-12);
+        assert!((tilted.translation() - level.translation()).norm() < 1e-12);
         // The camera's y points down: looking down moves its axis to +y; Rz(yaw)·Ry(pitch) takes x to
         // z = −sin(pitch).
-        let axis = leaning.rotate(&Vector3::z());
+        let axis = tilted.rotate(&Vector3::z());
         assert!((axis.y - 0.03_f64.sin()).abs() < 1e-12, "{axis}");
         // The left side up: the camera's x (right) dips, by cos(pitch)·sin(roll).
-        let right = leaning.rotate(&Vector3::x());
+        let right = tilted.rotate(&Vector3::x());
         assert!(
             (right.y - 0.03_f64.cos() * 0.02_f64.sin()).abs() < 1e-12,
             "{right}"

@@ -1,12 +1,12 @@
-//! A vehicle's forward speed and yaw rate over time, and how its body leans, as one unit measures all.
+//! A vehicle's forward speed and yaw rate over time, and its roll and pitch, measured by one unit.
 
 use crate::vehicle_motion::tilt_between;
 use crate::{Signal, VehicleMotion};
 
-/// Longest gap that is bridged, in seconds: five packets of KITTI's oxts.
+/// Longest gap that is interpolated, in seconds: five packets of KITTI's oxts.
 const MAX_GAP_S: f64 = 0.5;
 
-/// A car's forward speed and yaw rate over time, and its roll and pitch where they are known.
+/// A vehicle's forward speed and yaw rate over time, and its roll and pitch if known.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct VehicleTrack {
     speed_mps: Signal,
@@ -33,7 +33,7 @@ impl VehicleTrack {
         }
     }
 
-    /// The same with samples of how the body leans (time in s, roll and pitch in radians, as [`VehicleTrack::tilt`]).
+    /// The same with samples of the body's tilt (time in s, roll and pitch in radians, as [`VehicleTrack::tilt`]).
     #[must_use]
     pub fn with_tilt(self, samples: &[(f64, f64, f64)]) -> Self {
         let good = || {
@@ -49,7 +49,7 @@ impl VehicleTrack {
         }
     }
 
-    /// The same with every speed `scale` times what it was: true speed over the vehicle's.
+    /// The same with every speed multiplied by `scale`, the ratio of true to measured speed.
     #[must_use]
     pub fn with_speed_scale(self, scale: f64) -> Self {
         Self {
@@ -58,7 +58,7 @@ impl VehicleTrack {
         }
     }
 
-    /// Roll (the left side up) and pitch (the nose down) at a time, in radians; `None` where they are not known.
+    /// Roll (the left side up) and pitch (the nose down) at a time, in radians; `None` if unknown.
     #[must_use]
     pub fn tilt(&self, time_s: f64) -> Option<[f64; 2]> {
         let [roll, pitch] = self.tilt_rad.as_ref()?;
@@ -83,15 +83,15 @@ impl VehicleTrack {
         &self.yaw_rate_radps
     }
 
-    /// Forward speed at a time, in m/s, between its neighbours; `None` where the track does not cover it.
+    /// Forward speed at a time, in m/s, interpolated; `None` if the track does not cover it.
     #[must_use]
     pub fn speed_at(&self, time_s: f64) -> Option<f64> {
         self.speed_mps.at(time_s)
     }
 
-    /// What the car did from `from_s` to `to_s`: the integrals of speed and yaw rate by the trapezoidal
-    /// rule over the samples between, and interpolated at both ends. `None` where the track does not
-    /// cover the time, or it does not run forward.
+    /// The vehicle's motion from `from_s` to `to_s`: the integrals of speed and yaw rate by the
+    /// trapezoidal rule over the samples between, interpolated at both ends. `None` if the track does
+    /// not cover the interval, or it does not run forward.
     #[must_use]
     pub fn motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {
         if from_s >= to_s {

@@ -1,26 +1,26 @@
-//! What gyro and steering are wrong by about the vertical, found by what they disagree by while driving.
+//! Errors of gyro and steering about the vertical, estimated from their disagreement while driving.
 
 use crate::imu::{DrivingBias, by_windows};
 use crate::{Bicycle, Signal};
 use nalgebra::{SMatrix, SVector, Vector3};
 
-/// Usual errors of the road wheels' straight ahead, in radians: a degree of the steering wheel.
+/// Typical error of the road wheels' zero, in radians: a degree of the steering wheel.
 const USUAL_OFFSET: f64 = 0.001;
-/// Usual errors of the steering's factor: wheelbase, ratio, and tyres that slip.
+/// Typical error of the steering's factor: wheelbase, ratio, and tyres that slip.
 const USUAL_FACTOR: f64 = 0.1;
-/// Usual errors of the steering's yaw rate, in rad/s, and how long one lasts, in seconds.
+/// Typical error of the steering's yaw rate, in rad/s, and its duration, in seconds.
 const RATE_ERROR: f64 = 0.01;
 const RATE_ERROR_S: f64 = 0.5;
 
-/// How well the gyro's bias is known before the two are compared, in rad/s: not at all, or from a standstill.
+/// Prior standard deviation of the gyro's bias, in rad/s: unknown, or known from a standstill.
 pub(crate) const UNKNOWN_BIAS: f64 = 0.01;
 pub(crate) const KNOWN_BIAS: f64 = 1e-4;
 
-/// By windows: the gyro's bias in rad/s; the steering's error per speed, in rad/m (it is not straight where it says
-/// so); and the share by which it turns too little (the vehicle's geometry).
+/// By windows: the gyro's bias in rad/s; the steering's error per speed, in rad/m (an error of its zero); and the
+/// relative error of its yaw rate (the vehicle's geometry).
 ///
-/// gyro − steering is the sum of the three: least squares, each held to what is usual. On a straight drive at one speed
-/// the first two cannot be told apart, and the difference goes where it is likelier.
+/// gyro − steering is the sum of the three: least squares with a prior on each. On a straight drive at one speed the
+/// first two cannot be separated, and the difference goes to the likelier one.
 pub(crate) fn yaw_errors(
     gyro: &Signal,
     steering: &Signal,

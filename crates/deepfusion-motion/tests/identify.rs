@@ -173,7 +173,7 @@ fn outliers_do_not_move_the_fit() {
 }
 
 #[test]
-fn at_one_speed_zero_and_bias_cannot_be_told_apart_but_the_product_can() {
+fn at_one_speed_zero_and_bias_cannot_be_separated_but_the_product_can() {
     let drive = Drive::new(&car(), 120.0, |_| 10.0, |t| 0.06 * (0.4 * t).sin());
     let config = IdentifyConfig {
         steering_ratio: Some(15.4),

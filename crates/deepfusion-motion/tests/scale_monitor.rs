@@ -66,7 +66,8 @@ fn zoomed(image: &GreyImage, zoom: f64) -> GreyImage {
     GreyImage { data, ..*image }
 }
 
-/// The readings after each frame; from the second stretch on the images are zoomed and the speed is told so much too high.
+/// The readings after each frame; from the second stretch on the images are zoomed and the reported speed is too high by these
+/// factors.
 fn readings(drive: &Drive, zoom: f64, speed: f64, config: ScaleMonitorConfig) -> Vec<ScaleReading> {
     let mut monitor = ScaleMonitor::new(config);
     let images: Vec<Arc<RoadTexture>> = drive
@@ -104,7 +105,7 @@ fn readings(drive: &Drive, zoom: f64, speed: f64, config: ScaleMonitorConfig) ->
         .collect()
 }
 
-/// What a vehicle's speed and yaw rate tell of a motion: neither its pitch nor its heave.
+/// The part of a motion that a vehicle's speed and yaw rate measure: neither its pitch nor its heave.
 fn planar(motion: &Se3) -> Se3 {
     let turn = Vector3::new(0.0, motion.axis_angle().y, 0.0);
     let way = motion.translation();
@@ -155,12 +156,12 @@ fn a_height_that_was_measured_needs_no_learning() {
         ..ScaleMonitorConfig::default()
     };
     let first = readings(&drive, 1.0, 1.0, config.clone());
-    let told = first.iter().position(|r| r.ratio.is_some()).unwrap();
-    assert!(told < 60, "{told}");
+    let ready = first.iter().position(|r| r.ratio.is_some()).unwrap();
+    assert!(ready < 60, "{ready}");
     assert!(
-        (first[told].ratio.unwrap() - 1.0).abs() < 0.06,
+        (first[ready].ratio.unwrap() - 1.0).abs() < 0.06,
         "{:?}",
-        first[told]
+        first[ready]
     );
     // Half the true height: an alarm from the first reading on.
     let wrong = ScaleMonitorConfig {

@@ -277,15 +277,15 @@ fn a_drive_without_a_stop_shows_the_gyros_bias_too() {
 }
 
 #[test]
-fn the_body_leans_as_the_gyro_says() {
+fn roll_and_pitch_follow_the_gyro() {
     for sensors in [all(), without_standstill()] {
         let track = FusedTrack::new(&sensors, &config()).unwrap();
         let (mut error, mut usual) = (0.0_f64, 0.0_f64);
         for step in 0..340 {
             let (from, to) = (18.0 + 0.1 * f64::from(step), 18.4 + 0.1 * f64::from(step));
-            let [roll, leaned] = track.motion(from, to).unwrap().tilt_rad;
+            let [roll, measured] = track.motion(from, to).unwrap().tilt_rad;
             let change = pitch(to) - pitch(from);
-            error += (leaned - change).powi(2);
+            error += (measured - change).powi(2);
             usual += change.powi(2);
             // A turn of θ on a slope rolls the body by −θ·sin(pitch).
             let turned = exact(yaw_rate, from, to);

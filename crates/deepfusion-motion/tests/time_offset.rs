@@ -90,7 +90,7 @@ fn the_offset_of_simulated_drives_is_found_within_ten_milliseconds() {
             assert!(found.std_error_s < 0.015, "{found:?}");
             assert!(error.abs() < 3.0 * found.std_error_s, "{found:?}");
 
-            // Bends alone are slow: the error is larger, and so is what it is said to be.
+            // Bends alone are slow: the error is larger, and so is its estimate.
             let bends_only = VehicleRates {
                 roll_rate_radps: None,
                 pitch_rate_radps: None,

@@ -1,4 +1,4 @@
-//! Channel and spatial attention (SPEC 1.1, Eq. 13–15), and the aggregation of a global feature.
+//! Channel and spatial attention (the paper's Eq. 13–15), and the aggregation of a global feature.
 
 use burn::module::Module;
 use burn::tensor::activation::{relu, sigmoid};
@@ -8,7 +8,7 @@ use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig, global_mean};
 use crate::{AttentionConfig, AttentionForm, Error};
 
-/// Where an [`Attention`] looks, between 0 and 1.
+/// The masks of an [`Attention`], in (0, 1).
 #[derive(Debug, Clone)]
 pub struct AttentionMasks {
     /// M_c, `[batch, channels, 1, 1]`.
@@ -31,7 +31,7 @@ pub struct Attention {
 }
 
 impl Attention {
-    /// A new one for a feature of `channels`.
+    /// A new module for a feature of `channels` channels.
     ///
     /// # Errors
     /// As [`AttentionConfig::validate`].
@@ -91,7 +91,7 @@ impl Attention {
     }
 }
 
-/// Global feature aggregation: what the whole image says about each channel, added at every pixel.
+/// Global feature aggregation: each channel's mean over the image, projected and added at every pixel.
 #[derive(Module, Debug)]
 pub struct GlobalAggregation {
     /// 1×1 on the mean over the image.
@@ -99,7 +99,7 @@ pub struct GlobalAggregation {
 }
 
 impl GlobalAggregation {
-    /// A new one for a feature of `channels`.
+    /// A new module for a feature of `channels` channels.
     #[must_use]
     pub fn new(channels: usize, rng: &mut WeightRng, device: &Device) -> Self {
         Self {

@@ -8,7 +8,7 @@ use crate::layers::{Conv2d, Conv2dConfig};
 use crate::ops::{elu, upsample_concat};
 use crate::{DecoderConfig, Error};
 
-/// How many scales a disparity is predicted at: 1, 1/2, 1/4, 1/8 of the input's size.
+/// Number of scales at which disparity is predicted: 1, 1/2, 1/4, 1/8 of the input's size.
 pub const SCALES: usize = 4;
 
 /// One stage: 3×3 + ELU, nearest ×2 (but for the first at output stride 16), the skip feature appended,
@@ -39,7 +39,7 @@ impl DecoderStage {
     }
 }
 
-/// The decoder and its four disparity heads (SPEC 1.1).
+/// The decoder and its four disparity heads.
 #[derive(Module, Debug)]
 pub struct DisparityDecoder {
     /// Coarse to fine.

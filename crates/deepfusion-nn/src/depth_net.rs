@@ -1,4 +1,4 @@
-//! DepthNet: an encoder, context and attention on its skip paths, the disparity decoder (SPEC 1.1).
+//! DepthNet: an encoder, context and attention on its skip paths, the disparity decoder (docs/concepts/network.md).
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
@@ -12,7 +12,7 @@ use crate::resnet::ResNet;
 use crate::weights::{self, Weights};
 use crate::{DepthNetConfig, Error};
 
-/// The error of ln depth that the head for uncertainty starts at everywhere.
+/// Initial output of the uncertainty head: the expected error of ln depth, the same at every pixel.
 const FIRST_SCALE: f32 = 0.2;
 
 /// Disparity of a single image, at four scales.
@@ -24,7 +24,7 @@ pub struct DepthNet {
     pub hce: Vec<HierarchicalContext>,
     /// Attention on the same; empty where there is none.
     pub attention: Vec<Attention>,
-    /// Of the coarsest feature.
+    /// Global aggregation of the coarsest feature.
     pub aggregation: Option<GlobalAggregation>,
     /// The decoder.
     pub decoder: DisparityDecoder,
@@ -32,13 +32,13 @@ pub struct DepthNet {
     pub uncertainty: Option<Conv2d>,
 }
 
-/// The tensors of [`DepthNet::uncertainty`] begin so.
+/// Prefix of the tensor names of [`DepthNet::uncertainty`].
 const UNCERTAINTY: &str = "uncertainty.";
 
-/// What [`DepthNet::forward_with_uncertainty`] says of images.
+/// The output of [`DepthNet::forward_with_uncertainty`].
 #[derive(Debug, Clone)]
 pub struct DepthOutput {
-    /// As [`DepthNet::forward`] gives them.
+    /// Sigmoid disparities, as from [`DepthNet::forward`].
     pub disparities: Vec<Tensor<4>>,
     /// ln b of each pixel, `[batch, 1, height, width]`; `None` of a network without that head.
     pub log_scale: Option<Tensor<4>>,
@@ -131,13 +131,13 @@ impl DepthNet {
     /// - output: `[batch, 1, height / 2ˢ, width / 2ˢ]` in (0, 1) for scales s = 0…3, finest first
     ///
     /// # Panics
-    /// When the images' size is no [`InputSize`](crate::InputSize); check it where it enters the program.
+    /// If the images' size is not a valid [`InputSize`](crate::InputSize); check it where it enters the program.
     pub fn forward(&self, images: Tensor<4>) -> Vec<Tensor<4>> {
         self.decode(self.encoder.forward(images))
     }
 
-    /// The same, and how sure the network is: it errs by b in ln depth, in the mean. What the head learns changes nothing
-    /// else: no gradient passes from it into the decoder.
+    /// As [`Self::forward`], with the uncertainty ln b: b is the expected absolute error of ln depth. No gradient passes
+    /// from the uncertainty head into the decoder.
     ///
     /// # Shapes
     /// - `images`: as for [`Self::forward`]
@@ -151,7 +151,8 @@ impl DepthNet {
         }
     }
 
-    /// The same where the head for uncertainty alone learns: of everything else nothing is kept for a backward pass.
+    /// As [`Self::forward_with_uncertainty`], for training the uncertainty head alone: the rest of the network keeps nothing for
+    /// a backward pass.
     ///
     /// # Shapes
     /// - `images`: as for [`Self::forward`]
@@ -166,9 +167,8 @@ impl DepthNet {
         }
     }
 
-    /// The network with these weights, which must be its own; but a network with the head for uncertainty may take the
-    /// weights of one without, and keeps its own head then, and one without leaves the other's head aside. Says whether the
-    /// head is new.
+    /// The network with these weights, which must fit it. One exception is the uncertainty head: if the weights lack it,
+    /// the network keeps its own; if the network lacks it, theirs is ignored. Returns whether the head is new.
     ///
     /// # Errors
     /// As [`weights::apply`].
@@ -190,7 +190,7 @@ impl DepthNet {
         Ok((weights::apply(self, &weights)?, is_new))
     }
 
-    /// The same from the encoder's features, for whoever shares the encoder with another decoder.
+    /// As [`Self::forward`], from the encoder's features, for callers that share the encoder with another decoder.
     ///
     /// # Shapes
     /// - `features`: those of [`ResNet::forward`]
@@ -199,7 +199,7 @@ impl DepthNet {
         self.decoder.forward(self.refine(features, |_| ()))
     }
 
-    /// The features of images and where the network looks in them.
+    /// The features of images and the attention masks on them.
     ///
     /// # Shapes
     /// - `images`: as for [`Self::forward`]

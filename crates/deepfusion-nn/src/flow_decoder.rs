@@ -1,4 +1,4 @@
-//! The optical-flow decoder on the depth network's encoder (SPEC 1.3). Training only.
+//! The optical-flow decoder on the depth network's encoder. Training only.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
@@ -8,10 +8,10 @@ use crate::layers::{Conv2d, Conv2dConfig};
 use crate::ops::{elu, flow_coords, local_correlation, warp};
 use crate::{BilinearResize, Error, FlowDecoderConfig};
 
-/// How many sizes the flow is predicted at, coarse to fine: 1/16, 1/8 and 1/4 of the image.
+/// Number of levels at which flow is predicted, coarse to fine: 1/16, 1/8 and 1/4 of the image.
 pub const FLOW_LEVELS: usize = 3;
 
-/// From the finest level to the image.
+/// Enlargement from the finest level to the image.
 const LAST_ENLARGEMENT: usize = 4;
 
 /// Added to a feature's mean square before it is divided by its root.
@@ -23,8 +23,8 @@ fn feature(level: usize) -> usize {
     FLOW_LEVELS - level
 }
 
-/// A flow at several sizes. u points right, v down: the pixel p of the first frame is found at p + flow(p) in the
-/// second.
+/// Optical flow at several sizes. u points right, v down: the pixel p of the first frame is found at p + flow(p)
+/// in the second.
 #[derive(Debug, Clone)]
 pub struct FlowOutput {
     /// `[batch, 2, height, width]`, the image's own size, in its pixels.
@@ -34,7 +34,7 @@ pub struct FlowOutput {
     pub levels: [Tensor<4>; FLOW_LEVELS],
 }
 
-/// One size of the flow.
+/// One level of the flow decoder.
 #[derive(Module, Debug)]
 pub struct FlowLevel {
     /// 1×1, from the encoder's feature to what is correlated.

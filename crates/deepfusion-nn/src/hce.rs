@@ -1,4 +1,4 @@
-//! Hierarchical context encoding (HCE): one feature seen at several scales at once (SPEC 1.1, Eq. 11–12).
+//! Hierarchical context encoding (HCE): one feature seen at several scales at once (the paper's Eq. 11–12).
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation::relu};
@@ -24,7 +24,7 @@ pub struct HierarchicalContext {
 }
 
 impl HierarchicalContext {
-    /// A new one for a feature of `channels`.
+    /// A new module for a feature of `channels` channels.
     ///
     /// # Errors
     /// As [`HceConfig::validate`].
@@ -63,7 +63,7 @@ impl HierarchicalContext {
     }
 
     /// H = P([B₁(x); B_d(R(x)) for each rate d; relu(W·mean(x) + b)]): B, R and P are a convolution, batch
-    /// normalisation and ReLU each; the last branch stands at every pixel alike.
+    /// normalisation and ReLU each; the last branch has the same value at every pixel.
     ///
     /// # Shapes
     /// - `x`: `[batch, channels, height, width]`

@@ -16,7 +16,7 @@ impl WeightRng {
         Self::with_stream(seed, 0)
     }
 
-    /// The same for one of several networks of a run: each stream has numbers of its own.
+    /// As [`Self::new`], for one of several networks of a run: each `stream` has its own numbers.
     #[must_use]
     pub fn with_stream(seed: u64, stream: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -51,7 +51,7 @@ pub enum WeightInit {
     KaimingNormalFanOut,
     /// Uniform in ±1/√fan_in, the bias too: PyTorch's default for a convolution.
     UniformFanIn,
-    /// Zero, the bias too: an output that starts at nothing.
+    /// Zero, the bias too: the initial output is zero.
     Zeros,
 }
 

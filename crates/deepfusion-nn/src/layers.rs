@@ -68,7 +68,7 @@ impl Conv2dConfig {
         self
     }
 
-    /// The same with its taps `rate` pixels apart, still keeping the size; a 1×1 has but one tap.
+    /// The same with dilation `rate`, still keeping the size; no change for a 1×1 kernel.
     #[must_use]
     pub fn dilated(mut self, rate: usize) -> Self {
         self.options.dilation = rate;
@@ -157,7 +157,7 @@ pub struct ConvNorm {
 }
 
 impl ConvNorm {
-    /// A new one that keeps the size, its taps `rate` pixels apart.
+    /// A new layer with dilation `rate` that keeps the size.
     #[must_use]
     pub fn new(
         [channels_in, channels_out]: [usize; 2],

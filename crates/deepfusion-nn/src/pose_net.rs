@@ -1,4 +1,4 @@
-//! PoseNet: the motion between two frames (SPEC 1.2).
+//! PoseNet: the motion between two frames.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation::relu};
@@ -21,7 +21,7 @@ pub struct PoseOutput {
     pub translation: Tensor<2>,
 }
 
-/// From the encoder's coarsest feature to six numbers a pose.
+/// From the encoder's coarsest feature to six numbers per pose.
 #[derive(Module, Debug)]
 pub struct PoseDecoder {
     /// 1×1 to 256, ReLU.
@@ -30,7 +30,7 @@ pub struct PoseDecoder {
     pub conv1: Conv2d,
     /// 3×3, ReLU.
     pub conv2: Conv2d,
-    /// 1×1 to six numbers a pose.
+    /// 1×1 to six numbers per pose.
     pub output: Conv2d,
 }
 
@@ -52,8 +52,8 @@ impl PoseDecoder {
     }
 }
 
-/// The camera's motion between the two stacked frames. Which way it points is the trainer's matter:
-/// the network is only ever given the frames in time order.
+/// The camera's motion between the two stacked frames. The trainer decides on its direction: the
+/// network is always given the frames in time order.
 #[derive(Module, Debug)]
 pub struct PoseNet {
     /// The backbone.

@@ -7,7 +7,7 @@ use crate::ResNetDepth;
 use crate::init::WeightRng;
 use crate::layers::{BatchNorm2d, Conv2d, Conv2dConfig};
 
-/// Where a block stands: what it is built from beside its kind.
+/// What a block is built from, beside its kind.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BlockConfig {
     pub(crate) depth: ResNetDepth,

@@ -1,14 +1,14 @@
-//! Whether two engines see the same: pictures to show them, and how far apart their answers are.
+//! Compares two engines: test pictures, and the deviation of their outputs.
 
 use crate::DepthMaps;
 
-/// The largest deviation with which a file counts as the network it was made from.
+/// Largest deviation of a file from the network it was made from.
 ///
 /// Sums of some thousand f32 products in another order differ by about 1e-6 of the largest output; a wrong
 /// border, a wrong order of channels or a missed layer by far more than this.
 pub const TOLERANCE: f64 = 1e-4;
 
-/// How far the maps of one engine are from another's: max |a − b| / max |b| over a set of pictures.
+/// Deviation of one engine's maps from another's: max |a − b| / max |b| over a set of pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
     /// Of depth in metres.
@@ -31,7 +31,7 @@ impl Deviation {
     }
 }
 
-/// Deviation of `found` from `expected`, one entry a picture.
+/// Deviation of `found` from `expected`, one entry per picture.
 #[must_use]
 pub fn deviation(found: &[DepthMaps], expected: &[DepthMaps]) -> Deviation {
     let of = |map: fn(&DepthMaps) -> &[f32]| {
@@ -66,8 +66,8 @@ pub fn relative(a: &[f32], b: &[f32]) -> f64 {
 /// Names of the [`pictures`].
 pub const PICTURES: [&str; 4] = ["noise", "ramps", "checkerboard", "street"];
 
-/// Pictures that a wrong network cannot see right: noise in every pixel, ramps of another direction in each
-/// colour (channels and axes), a checkerboard (strides and offsets), a street of flat areas with edges.
+/// Pictures that reveal a wrong network: noise in every pixel, ramps of another direction in each colour
+/// (channels and axes), a checkerboard (strides and offsets), a street of flat areas with edges.
 ///
 /// # Shapes
 /// - each: `height` × `width` × 3 bytes, RGB

@@ -1,9 +1,9 @@
-//! Depth networks as ONNX files: written, read back, run.
+//! Writes, reads back and runs depth networks as ONNX files.
 //!
-//! [`write()`] turns a [`DepthModel`] into a file that takes an 8-bit picture and gives metres; [`read()`] gets
-//! the model back from such a file and from no other. What a file means can be found out in two ways:
-//! [`reference`](mod@reference) runs the graph read back, in this program's own operations, and
-//! [`runtime`] runs the file itself in an ONNX Runtime library, where the machine has one.
+//! [`write()`] turns a [`DepthModel`] into a file whose input is an 8-bit picture and whose output is metres;
+//! [`read()`] gets the model back from such a file and from no other. A file can be checked in two ways:
+//! [`reference`](mod@reference) runs the graph that was read, in this program's own operations, and [`runtime`]
+//! runs the file itself in an ONNX Runtime library, if the machine has one.
 
 pub mod check;
 mod error;
@@ -20,6 +20,6 @@ pub use model::{DepthMaps, DepthModel, FocalLength};
 pub use read::read;
 pub use write::write;
 
-/// The operator set of the files; it has everything that is needed and is older than any library that
-/// [`runtime`] opens.
+/// The operator set of the files; it has every operator needed, and every library that [`runtime`]
+/// opens supports it.
 pub const OPSET: i64 = 17;

@@ -12,12 +12,12 @@ pub struct FocalLength {
     pub fy: f64,
 }
 
-/// A depth network for images of one size: from an RGB picture to metres.
+/// A depth network for images of one size, from an RGB picture to metres.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthModel {
     /// The network; its one output is the sigmoid disparity σ at the image's size.
     pub graph: Graph,
-    /// What σ means: 1/depth = 1/D_max + (1/D_min − 1/D_max)·σ.
+    /// The depth range of σ: 1/depth = 1/D_max + (1/D_min − 1/D_max)·σ.
     pub range: DepthRange,
     /// Width of the images, in pixels.
     pub width: usize,
@@ -28,7 +28,7 @@ pub struct DepthModel {
     pub trained_with: Option<FocalLength>,
 }
 
-/// What a [`DepthModel`] sees: two maps of H×W values, row by row.
+/// The output of a [`DepthModel`]: two maps of H×W values, row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthMaps {
     /// Camera z, in metres.
@@ -38,11 +38,11 @@ pub struct DepthMaps {
 }
 
 impl DepthModel {
-    /// That the model can work on its images, and that there is one map of depth in it.
+    /// Checks that the model can run on its images and has a single output, the depth map.
     ///
     /// # Errors
-    /// [`Error::Network`] for a size the network cannot halve or whose borders are wider than what they mirror,
-    /// [`Error::Model`] for a range that is none or other outputs.
+    /// [`Error::Network`] for a size that the network cannot halve, or that is smaller than its reflected
+    /// borders; [`Error::Model`] for an invalid range or other outputs.
     pub fn validate(&self) -> Result<(), Error> {
         self.graph.check_size(self.width, self.height)?;
         let fail = |part: &'static str, reason: String| Err(Error::Model { part, reason });

@@ -117,7 +117,7 @@ impl AttributeProto {
         }
     }
 
-    /// A word.
+    /// A string.
     pub fn text(name: &str, value: &str) -> Self {
         Self {
             name: name.into(),
@@ -153,7 +153,7 @@ pub struct TensorProto {
 }
 
 impl TensorProto {
-    /// 32-bit floating-point numbers; no dimensions make a single number.
+    /// 32-bit floating-point numbers; without dimensions a scalar.
     pub fn floats(name: &str, dims: &[usize], values: &[f32]) -> Self {
         Self {
             dims: dims.iter().map(|d| *d as i64).collect(),
@@ -173,7 +173,7 @@ impl TensorProto {
         }
     }
 
-    /// The numbers, where they are 32-bit floating-point ones and as many as the dimensions say.
+    /// The numbers, if they are 32-bit floats and their count matches the dimensions.
     pub fn as_floats(&self) -> Option<Vec<f32>> {
         let wanted = self.dims.iter().try_fold(4_usize, |product, d| {
             product.checked_mul(usize::try_from(*d).ok()?)
@@ -186,7 +186,7 @@ impl TensorProto {
     }
 }
 
-/// What goes in or comes out.
+/// An input or an output.
 #[derive(Clone, PartialEq, prost::Message)]
 pub struct ValueInfoProto {
     #[prost(string, tag = "1")]
@@ -217,14 +217,14 @@ impl ValueInfoProto {
         }
     }
 
-    /// Its dimensions, where it is an array and all of them are fixed.
+    /// Its dimensions, if it is an array and all of them are fixed.
     pub fn dims(&self) -> Option<Vec<i64>> {
         let shape = self.r#type.as_ref()?.tensor_type.as_ref()?.shape.as_ref()?;
         shape.dim.iter().map(|d| d.dim_value).collect()
     }
 }
 
-/// A type; only arrays are known.
+/// A type; only arrays are supported.
 #[derive(Clone, PartialEq, prost::Message)]
 pub struct TypeProto {
     #[prost(message, optional, tag = "1")]

@@ -14,11 +14,11 @@ use crate::{DepthModel, Error, FocalLength};
 
 /// The model in an ONNX file that [`write`](crate::write()) wrote.
 ///
-/// Nothing is guessed: what was understood is written again, and must be the network that was read.
+/// Nothing is guessed: the model is written again, and the result must be the network that was read.
 ///
 /// # Errors
-/// [`Error::Decode`] for bytes that are no such file, [`Error::Node`] naming the first node and
-/// [`Error::Model`] naming the part that are not as this program writes them.
+/// [`Error::Decode`] for bytes that are not an ONNX file; [`Error::Node`] naming the first node, or
+/// [`Error::Model`] naming the part, that this program would write differently.
 pub fn read(bytes: &[u8]) -> Result<DepthModel, Error> {
     let proto = ModelProto::decode(bytes)?;
     let graph = proto

@@ -1,4 +1,4 @@
-//! Runs a graph the plain way, one operation after another: what faster engines are compared with.
+//! Runs a graph in a simple way, one operation after another, as a reference for faster engines.
 
 use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
 use deepfusion_kernels::{ConvShape, conv2d};
@@ -31,7 +31,7 @@ pub fn depth(model: &DepthModel, rgb: &[u8]) -> Result<DepthMaps, Error> {
 /// - each output: C×H×W, row by row
 ///
 /// # Errors
-/// [`Error::Length`] for a picture of another size, [`Error::Network`] for a size that the graph cannot work
+/// [`Error::Length`] for a picture of another size, [`Error::Network`] for a size that the graph cannot run
 /// on.
 pub fn run(graph: &Graph, rgb: &[u8], width: usize, height: usize) -> Result<Vec<Vec<f32>>, Error> {
     graph.check_size(width, height)?;

@@ -23,7 +23,7 @@ const MOST_BYTES: usize = i32::MAX as usize;
 /// - output `depth`: f32, 1×1×H×W, camera z in metres.
 /// - output `disparity`: f32, 1×1×H×W, 1 / depth, in 1/m.
 ///
-/// Nodes, their outputs and their weights bear the names of the network's layers. The metadata tells the
+/// Nodes, their outputs and their weights have the names of the network's layers. The metadata holds the
 /// range, the camera trained with and the program's version.
 ///
 /// # Errors
@@ -124,7 +124,7 @@ fn along_channels() -> Vec<AttributeProto> {
 struct Writer {
     nodes: Vec<NodeProto>,
     initializers: Vec<TensorProto>,
-    /// Every name there is: of what nodes give and of constants.
+    /// All names in use, of node outputs and constants.
     taken: HashSet<String>,
     /// The name of each value of the graph.
     values: Vec<String>,

@@ -38,7 +38,7 @@ proptest! {
 }
 
 #[test]
-fn files_that_are_none_are_told() {
+fn files_of_another_format_are_refused() {
     assert!(matches!(read(b"no onnx"), Err(Error::Decode(_))));
     assert!(matches!(read(b""), Err(Error::Model { part: "graph", .. })));
 }
@@ -109,7 +109,7 @@ fn other_networks_are_refused_by_the_node() {
 }
 
 #[test]
-fn models_that_cannot_be_written_are_told() {
+fn models_that_cannot_be_written_are_refused() {
     let part = |model: &DepthModel| match write(model) {
         Err(Error::Model { part, .. }) => part.to_owned(),
         Err(Error::Node { name, .. }) => name,

@@ -1,4 +1,4 @@
-//! Files in ONNX Runtime, where this machine has one; what is said where it has none.
+//! Files in ONNX Runtime, if this machine has one; the messages if it has none.
 
 #![allow(
     clippy::unwrap_used,
@@ -19,7 +19,7 @@ use deepfusion_onnx::runtime::{OrtEngine, find};
 use deepfusion_onnx::{DepthMaps, DepthModel, Error, reference, write};
 use support::model;
 
-/// The library, or what is said without one.
+/// The library, or the message without one.
 fn library_is_here() -> bool {
     match find(None) {
         Ok(library) => {
@@ -31,10 +31,10 @@ fn library_is_here() -> bool {
             true
         }
         Err(error) => {
-            let told = error.hint().unwrap();
+            let error = error.hint().unwrap();
             assert!(
-                told.contains("ORT_DYLIB_PATH") || told.contains("1.17"),
-                "{told}"
+                error.contains("ORT_DYLIB_PATH") || error.contains("1.17"),
+                "{error}"
             );
             let loaded = OrtEngine::load(None, &write(&model(1)).unwrap(), 1);
             assert_eq!(loaded.unwrap_err().to_string(), error.to_string());
@@ -130,7 +130,7 @@ fn engines_move_between_threads() {
 }
 
 #[test]
-fn wrong_sizes_and_models_are_told() {
+fn wrong_sizes_and_models_are_refused() {
     if !library_is_here() {
         return;
     }
@@ -140,13 +140,13 @@ fn wrong_sizes_and_models_are_told() {
     let pixels = model.width * model.height;
     let mut out = vec![0.0; pixels];
     for (rgb, len) in [(3 * pixels - 1, pixels), (3 * pixels, pixels - 1), (0, 0)] {
-        let told = engine.run(&vec![0; rgb], &mut out[..len]);
-        assert!(matches!(told, Err(Error::Length { .. })), "{told:?}");
+        let error = engine.run(&vec![0; rgb], &mut out[..len]);
+        assert!(matches!(error, Err(Error::Length { .. })), "{error:?}");
     }
     assert!(engine.run(&vec![0; 3 * pixels], &mut out).is_ok());
     for bad in [&bytes[..bytes.len() / 2], b"no onnx", b""] {
-        let told = OrtEngine::load(None, bad, 1);
-        assert!(matches!(told, Err(Error::Runtime { .. })), "{told:?}");
+        let error = OrtEngine::load(None, bad, 1);
+        assert!(matches!(error, Err(Error::Runtime { .. })), "{error:?}");
     }
     // Another library cannot be used beside the one that is open.
     let other = OrtEngine::load(Some(Path::new("/nowhere/libonnxruntime.so")), &bytes, 1);
@@ -154,7 +154,7 @@ fn wrong_sizes_and_models_are_told() {
 }
 
 #[test]
-fn files_that_are_no_library_are_told_by_their_name() {
+fn files_that_are_no_library_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let text = folder.path().join("libonnxruntime.so");
     std::fs::write(&text, "no library").unwrap();
@@ -175,18 +175,18 @@ fn files_that_are_no_library_are_told_by_their_name() {
             .find(|p: &std::path::PathBuf| p.exists()),
     );
     for path in wrong {
-        let told = find(Some(&path)).unwrap_err();
+        let error = find(Some(&path)).unwrap_err();
         assert!(
-            told.to_string().starts_with(path.to_str().unwrap()),
-            "{told}"
+            error.to_string().starts_with(path.to_str().unwrap()),
+            "{error}"
         );
-        assert!(told.hint().unwrap().contains("1.17"), "{told}");
+        assert!(error.hint().unwrap().contains("1.17"), "{error}");
     }
 }
 
 /// Libraries with the right entry point that cannot be used all the same: too old, or damaged.
 #[test]
-fn unusable_versions_are_told() {
+fn unusable_versions_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     for (name, version, entry) in [("old", "1.16.3", "&base"), ("null", "1.20.0", "0")] {
         let source = format!(
@@ -209,12 +209,12 @@ fn unusable_versions_are_told() {
             eprintln!("not run here: no C compiler");
             return;
         }
-        let told = find(Some(&so)).unwrap_err().to_string();
+        let error = find(Some(&so)).unwrap_err().to_string();
         let expected = if name == "old" {
             "it is version 1.16.3, expected 1.17 or later"
         } else {
             "gives nothing"
         };
-        assert!(told.contains(expected), "{told}");
+        assert!(error.contains(expected), "{error}");
     }
 }

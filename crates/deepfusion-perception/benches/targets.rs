@@ -54,13 +54,13 @@ fn targets(criterion: &mut Criterion) {
                 time_s += 0.1;
                 if i == 0 {
                     // The drive begins anew: what was remembered is not there.
-                    perception.forget();
+                    perception.reset();
                 }
                 let stamp = Stamp {
                     time_s,
                     world_from_cam: frames[i].world_from_cam,
                 };
-                perception.look(&frames[i].depth, k, Some(stamp))
+                perception.detect(&frames[i].depth, k, Some(stamp))
             });
         });
     }

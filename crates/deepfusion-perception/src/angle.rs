@@ -1,16 +1,16 @@
-//! How a box around a contour is turned.
+//! The orientation of a box around a contour.
 
 use crate::ground_box::axes;
 use crate::lanes::{LANES, Points};
 
-/// How near a point of the contour lies to a face that it belongs to, metres.
+/// Distance within which a point of the contour belongs to a face, metres.
 pub const FACE: f32 = 0.25;
-/// Angles that are tried first, over a quarter of a turn.
+/// Number of angles of the coarse search, over a quarter of a turn.
 const COARSE: usize = 30;
-/// What being turned as expected is worth, per point of the contour.
+/// Weight of the expected orientation, per point of the contour.
 const EXPECTED: f32 = 0.03;
 
-/// The angle at which most of the contour lies on the two faces that look at the camera (after the closeness
+/// The angle at which most of the contour lies on the two faces towards the camera (after the closeness
 /// criterion of Zhang et al., "Efficient L-shape fitting for vehicle detection using laser scanners", 2017).
 pub fn best_angle(contour: &[[f32; 2]], along: f32) -> f32 {
     let contour = Points::new(contour.iter().copied());
@@ -31,7 +31,7 @@ pub fn best_angle(contour: &[[f32; 2]], along: f32) -> f32 {
     best_of(&mut (-4..=4).map(|i| coarse + i as f32 * step / 5.0))
 }
 
-/// How many points lie on one of the two faces that look at the camera, those beside them in part.
+/// Number of points on one of the two faces towards the camera; points close to a face count in part.
 fn closeness(contour: &Points, axes: [[f32; 2]; 2]) -> f32 {
     let near = axes.map(|axis| {
         let [low, high] = contour.extent(axis);

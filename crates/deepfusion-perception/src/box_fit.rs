@@ -1,4 +1,4 @@
-//! An upright box around what is seen of an object, completed to what it must be.
+//! An upright box around the visible part of an object, completed to its likely size.
 
 use crate::angle::{FACE, best_angle};
 use crate::ground_box::{GroundBox, axes};
@@ -6,23 +6,23 @@ use crate::outermost::ends;
 use crate::rows::{Turn, Vote};
 use crate::silhouette::{FOOT_M, Silhouette};
 
-/// Length and width of a usual car, metres.
+/// Length and width of a typical car, metres.
 pub const CAR: [f32; 2] = [4.4, 1.8];
 /// Length and width of the smallest car, metres.
 const SHORTEST: [f32; 2] = [3.2, 1.45];
-/// Up to this extent in metres something is taken for a person or a thing of that size, even where a part is hidden.
+/// Up to this extent, in metres, something counts as a person or a thing of that size, even if partly hidden.
 pub const SMALL: f32 = 1.0;
-/// Extent from which on a side that is seen says how long it is, metres.
+/// Least visible extent of a side that counts as a measurement of its length, metres.
 const MEASURED: f32 = 0.6;
-/// Less than this of something, in metres, says nothing about the rest.
+/// A visible part smaller than this, in metres, says nothing about the rest.
 const SLIVER: f32 = 0.8;
-/// Least that is seen of a bumper that stands for a car, metres.
+/// Least visible width of a bumper that is completed to a car, metres.
 const BUMPER: f32 = 1.2;
 /// Smallest extent of a box, metres.
 const THIN: f32 = 0.3;
 
-/// Fits a box to a silhouette. `expected`: how objects are expected to be turned, which decides only between fits that
-/// are about as good. The box comes with the say that it has on how its neighbours are turned.
+/// Fits a box to a silhouette. `expected` is the expected orientation, which decides only between fits of about equal
+/// quality. The box comes with its vote on the orientation of its neighbours.
 #[must_use]
 pub fn fit(silhouette: &Silhouette, expected: Turn) -> Option<Vote> {
     let angle = best_angle(&silhouette.contour, expected.angle());
@@ -30,7 +30,7 @@ pub fn fit(silhouette: &Silhouette, expected: Turn) -> Option<Vote> {
     let span = axes.map(|axis| extent(&silhouette.points, axis));
     let size = span.map(|[from, to]| to - from);
     let room = [0, 1].map(|i| room(silhouette, axes[i], axes[1 - i], span[i]));
-    let (whole, lean) = completed(size, room, angle, expected, silhouette)?;
+    let (whole, margin) = completed(size, room, angle, expected, silhouette)?;
     let (mut middle, mut fixed) = ([0.0; 2], [0.0; 2]);
     for i in 0..2 {
         let [from, to] = span[i];
@@ -63,7 +63,7 @@ pub fn fit(silhouette: &Silhouette, expected: Turn) -> Option<Vote> {
         anchor: on_ground(fixed),
     };
     let at = on_ground(span.map(|[from, to]| 0.5 * (from + to)));
-    Some(Vote { at, place, lean })
+    Some(Vote { at, place, margin })
 }
 
 /// An angle in [0, π).
@@ -71,7 +71,7 @@ fn half_turn(angle: f32) -> f32 {
     angle.rem_euclid(std::f32::consts::PI)
 }
 
-/// From where to where the points reach along an axis, less the outermost ones.
+/// The extent of the points along an axis, without the outermost ones.
 fn extent(points: &[[f32; 3]], axis: [f32; 2]) -> [f32; 2] {
     let mut along: Vec<f32> = points
         .iter()
@@ -80,9 +80,9 @@ fn extent(points: &[[f32; 3]], axis: [f32; 2]) -> [f32; 2] {
     ends(&mut along, 100).unwrap_or_default()
 }
 
-/// How far an axis may go on beyond its low and its high end, in metres: 0 where a free end of the contour shows that
-/// it does not, or a face that is seen. Behind what hides an end it may go on as far as it likes, towards the camera
-/// only up to it.
+/// How far the box may extend beyond its low and its high end along an axis, in metres: 0 where a free end of the
+/// contour or a visible face shows its limit. Behind an occluder it may extend without limit, towards the camera only
+/// up to the occluder.
 fn room(
     silhouette: &Silhouette,
     axis: [f32; 2],
@@ -126,8 +126,8 @@ fn room(
     })
 }
 
-/// How much of the face at `place` along `axis` is seen down to the ground, metres: above something that hides the rest,
-/// what is seen may lie farther in.
+/// How much of the face at `place` along `axis` is visible down to the ground, metres: above an occluder, the visible
+/// part may lie farther in.
 fn face_width(silhouette: &Silhouette, axis: [f32; 2], across: [f32; 2], place: f32) -> f32 {
     let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
     for (p, foot) in silhouette.contour.iter().zip(&silhouette.feet) {
@@ -141,7 +141,7 @@ fn face_width(silhouette: &Silhouette, axis: [f32; 2], across: [f32; 2], place: 
     high - low
 }
 
-/// Whole extents along the two axes, from those seen.
+/// Full extents along the two axes, from the visible ones.
 fn completed(
     size: [f32; 2],
     room: [[f32; 2]; 2],
@@ -188,7 +188,7 @@ fn completed(
     let against =
         |i: usize| costs[i] + expected.against(angle + i as f32 * std::f32::consts::FRAC_PI_2);
     let length_on = usize::from(against(1) < against(0));
-    let lean = costs[1 - length_on] - costs[length_on];
+    let margin = costs[1 - length_on] - costs[length_on];
     let whole = [0, 1].map(|i| {
         let usual = usual(i, length_on);
         let least = SHORTEST[usize::from(i != length_on)];
@@ -199,7 +199,7 @@ fn completed(
             size[i].max(usual.min(size[i] + room[i]))
         }
     });
-    Some((whole, lean))
+    Some((whole, margin))
 }
 
 #[cfg(test)]
@@ -232,7 +232,7 @@ mod tests {
             "{seen:?}"
         );
         assert!(
-            seen.place.angle.sin().abs() < 0.1 && seen.lean > 0.5,
+            seen.place.angle.sin().abs() < 0.1 && seen.margin > 0.5,
             "{seen:?}"
         );
         // Where the side's foot is hidden it may lie farther in than the car's end.

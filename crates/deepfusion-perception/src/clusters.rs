@@ -1,9 +1,9 @@
-//! Obstacle pixels that belong together: runs along the rows, joined from row to row.
+//! Clusters of obstacle pixels: runs along the rows, joined from row to row.
 
 use crate::obstacles::{NONE, Obstacles};
 use crate::{PerceptionConfig, Rays};
 
-/// Pixels of one row, next to each other, that belong together.
+/// Adjacent pixels of one row that belong together.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Run {
     /// The row.
@@ -27,7 +27,7 @@ impl Run {
 pub struct Cluster {
     /// Its runs, from the top row down.
     pub runs: Vec<Run>,
-    /// How many pixels they have.
+    /// Number of pixels.
     pub pixels: usize,
 }
 
@@ -48,8 +48,8 @@ impl Cluster {
         )
     }
 
-    /// Its two parts: where `beyond`, of a pixel's point in the camera's frame, is not so, and where it is; `None` where
-    /// one of them would be empty.
+    /// Splits it in two: the pixels for whose point in the camera's frame `beyond` is false, and those for which it is
+    /// true; `None` if one part would be empty.
     pub fn divided(
         &self,
         depth: &[f32],
@@ -94,7 +94,7 @@ pub struct Gaps {
 }
 
 impl Gaps {
-    /// Of a camera's depth.
+    /// The gaps for a camera.
     pub fn of(rays: &Rays, config: &PerceptionConfig) -> Self {
         Self {
             error: config.relative_error,
@@ -107,7 +107,7 @@ impl Gaps {
         0.12 + self.limit(x.abs(), z, self.step[0])
     }
 
-    /// Only of level surfaces below the camera one sees more than the edge.
+    /// Of level surfaces, only those below the camera show more than their edge.
     fn down(&self, y: f32, z: f32) -> f32 {
         0.35 + self.limit(y, z, self.step[1])
     }
@@ -202,7 +202,7 @@ fn find_runs(
     }
 }
 
-/// Widest thing before a surface that does not cut it in two, metres: a lamp post, a sign.
+/// Widest object in front of a surface that does not cut it in two, metres: a lamp post, a sign.
 const POST_M: f32 = 0.7;
 
 /// Joins the runs of a row that go on, at the same depth, behind a narrow thing that stands nearer.

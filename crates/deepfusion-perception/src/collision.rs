@@ -1,4 +1,4 @@
-//! When the vehicle would meet a target if both went on as they do.
+//! Time to collision of the vehicle and a target, if both keep their motion.
 
 use crate::Target;
 use serde::{Deserialize, Serialize};
@@ -28,7 +28,7 @@ impl Default for VehicleShape {
     }
 }
 
-/// A meeting that is to come.
+/// A predicted collision.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Collision {
     /// The target's id.
@@ -37,13 +37,13 @@ pub struct Collision {
     pub time_s: f64,
 }
 
-/// How far ahead is looked, and in which steps, seconds.
+/// Prediction horizon and time step, seconds.
 const HORIZON_S: f64 = 10.0;
 /// See [`HORIZON_S`].
 const STEP_S: f64 = 0.05;
 
 /// The first target that the vehicle's front would touch, at its present speed (m/s) and yaw rate (rad/s, positive to the
-/// left), every target going on at its own velocity; one whose velocity is not known yet is taken to stand.
+/// left), if every target keeps its velocity; a target of unknown velocity counts as static.
 #[must_use]
 pub fn time_to_collision(
     targets: &[Target],
@@ -65,7 +65,7 @@ pub fn time_to_collision(
     })
 }
 
-/// Where the camera is after a while: x right, z forward, and how far it has turned to the left.
+/// The camera's future pose: x right, z forward, and its turn to the left.
 struct Pose {
     x: f64,
     z: f64,
@@ -145,11 +145,14 @@ mod tests {
         let vehicle = VehicleShape::default();
         // The rear is 2 m before the centre, the bumper 1.7 m before the camera: 20 - 2 - 1.7 = 16.3 m.
         let standing = [target(1, 0.0, 20.0, [0.0; 3])];
-        let met = time_to_collision(&standing, 10.0, 0.0, &vehicle).unwrap();
-        assert!((met.time_s - 1.63).abs() < STEP_S, "{met:?}");
+        let collision = time_to_collision(&standing, 10.0, 0.0, &vehicle).unwrap();
+        assert!((collision.time_s - 1.63).abs() < STEP_S, "{collision:?}");
         let fleeing = [target(1, 0.0, 20.0, [0.0, 0.0, 6.0])];
-        let met = time_to_collision(&fleeing, 10.0, 0.0, &vehicle).unwrap();
-        assert!((met.time_s - 16.3 / 4.0).abs() < STEP_S, "{met:?}");
+        let collision = time_to_collision(&fleeing, 10.0, 0.0, &vehicle).unwrap();
+        assert!(
+            (collision.time_s - 16.3 / 4.0).abs() < STEP_S,
+            "{collision:?}"
+        );
         let faster = [target(1, 0.0, 20.0, [0.0, 0.0, 12.0])];
         assert_eq!(time_to_collision(&faster, 10.0, 0.0, &vehicle), None);
     }
@@ -160,13 +163,13 @@ mod tests {
         let left = [target(4, -3.5, 25.0, [0.0; 3])];
         assert_eq!(time_to_collision(&left, 10.0, 0.0, &vehicle), None);
         // Left with a radius of about 89 m: 25² / 178 = 3.5 m to the side at 25 m.
-        let met = time_to_collision(&left, 10.0, 0.112, &vehicle).unwrap();
-        assert_eq!(met.id, 4);
+        let collision = time_to_collision(&left, 10.0, 0.112, &vehicle).unwrap();
+        assert_eq!(collision.id, 4);
         assert_eq!(time_to_collision(&left, 10.0, -0.112, &vehicle), None);
     }
 
     #[test]
-    fn the_nearest_is_told_and_a_standing_car_meets_what_comes() {
+    fn the_nearest_is_reported_and_a_standing_car_is_hit_by_what_comes() {
         let vehicle = VehicleShape::default();
         let two = [
             target(1, 0.0, 30.0, [0.0; 3]),
@@ -174,8 +177,8 @@ mod tests {
         ];
         assert_eq!(time_to_collision(&two, 8.0, 0.0, &vehicle).unwrap().id, 2);
         let coming = [target(3, 0.0, 30.0, [0.0, 0.0, -10.0])];
-        let met = time_to_collision(&coming, 0.0, 0.0, &vehicle).unwrap();
-        assert!((met.time_s - 2.63).abs() < STEP_S);
+        let collision = time_to_collision(&coming, 0.0, 0.0, &vehicle).unwrap();
+        assert!((collision.time_s - 2.63).abs() < STEP_S);
         assert_eq!(time_to_collision(&[], 30.0, 0.0, &vehicle), None);
     }
 }

@@ -6,13 +6,13 @@ use crate::clusters::Cluster;
 pub struct Columns {
     /// Leftmost column in the image.
     left: u32,
-    /// Of each column the place after its last pixel.
+    /// The index after each column's last pixel.
     ends: Vec<usize>,
     pixels: Vec<(f32, u32)>,
 }
 
 impl Columns {
-    /// Of a cluster in a depth image of this width.
+    /// The columns of a cluster in a depth image of this width.
     pub fn of(cluster: &Cluster, depth: &[f32], width: usize) -> Self {
         let [left, _, right, _] = cluster.bounds();
         let mut ends = vec![0; (right - left + 1) as usize];
@@ -38,7 +38,7 @@ impl Columns {
         Self { left, ends, pixels }
     }
 
-    /// Calls `each` with every column that has pixels, and them.
+    /// Calls `each` with every column that has pixels, and with those pixels.
     pub fn for_each(&mut self, mut each: impl FnMut(usize, &mut [(f32, u32)])) {
         let mut start = 0;
         for (column, end) in self.ends.iter().enumerate() {

@@ -1,22 +1,22 @@
 //! How far a predicted depth can be trusted, pixel by pixel: exp(−expected relative error).
 //!
-//! Two things betray an error before any truth is known: the disparity's local gradient (edges bleed), and that the network
-//! says otherwise of the mirrored image. What each is worth is learned from pixels whose truth is known.
+//! Two things indicate an error without ground truth: the disparity's local gradient (edges bleed), and a different
+//! prediction for the mirrored image. Their weights are fitted on pixels with ground truth.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// What betrays an error at one pixel.
+/// Indicators of an error at one pixel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Evidence {
     /// Largest difference of the disparity to the pixels beside it, over the disparity.
     pub gradient: f32,
-    /// Difference between the disparity and that of the mirrored image, over their mean; 0 where that was not asked.
+    /// Difference between the disparity and that of the mirrored image, over their mean; 0 if that was not computed.
     pub flip: f32,
 }
 
 impl Evidence {
-    /// Of every pixel of a disparity image, row by row; `mirrored`: the mirrored image's disparity, mirrored back.
+    /// Computes it for every pixel of a disparity image, row by row; `mirrored` is the mirrored image's disparity, mirrored back.
     #[must_use]
     pub fn of(disparity: &[f32], mirrored: Option<&[f32]>, width: usize) -> Vec<Self> {
         let width = width.max(1);
@@ -55,15 +55,15 @@ impl Evidence {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConfidenceModel {
-    /// Of every pixel.
+    /// The error of every pixel.
     pub constant: f64,
-    /// For [`Evidence::gradient`].
+    /// Weight of [`Evidence::gradient`].
     pub gradient: f64,
-    /// For [`Evidence::flip`].
+    /// Weight of [`Evidence::flip`].
     pub flip: f64,
 }
 
-/// A relative error counts at most so much: one pixel beside a pole says no more than "wrong".
+/// Cap of a relative error, so that a single pixel beside a pole does not dominate.
 pub const MOST_ERROR: f64 = 1.0;
 
 impl ConfidenceModel {
@@ -129,14 +129,15 @@ impl ConfidenceModel {
     /// error, and number of each.
     #[must_use]
     pub fn reliability(&self, samples: &[(Evidence, f64)], bins: usize) -> Vec<Reliability> {
-        let mut told: Vec<(f64, f64)> = samples
+        let mut pairs: Vec<(f64, f64)> = samples
             .iter()
             .filter(|(_, error)| error.is_finite())
             .map(|(evidence, error)| (self.expected_error(evidence), error.min(MOST_ERROR)))
             .collect();
-        told.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let size = told.len().div_ceil(bins.max(1)).max(1);
-        told.chunks(size)
+        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let size = pairs.len().div_ceil(bins.max(1)).max(1);
+        pairs
+            .chunks(size)
             .map(|part| {
                 let n = part.len();
                 let mean = |value: &dyn Fn(&(f64, f64)) -> f64| {
@@ -153,7 +154,7 @@ impl ConfidenceModel {
     }
 }
 
-/// What a confidence promised, and what came true.
+/// Expected and observed error of one bin of confidence.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Reliability {
     /// Mean confidence.

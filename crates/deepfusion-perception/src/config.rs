@@ -1,16 +1,16 @@
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// What counts as ground, obstacle and target, and how much its depth can be trusted.
+/// Limits of ground, obstacles and targets, and the accuracy of depth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PerceptionConfig {
-    /// Farthest camera z that is looked at, in metres.
+    /// Largest camera z that is used, in metres.
     pub max_depth_m: f32,
-    /// Height above the ground from which on something is an obstacle, in metres: kerbs are lower.
+    /// Least height of an obstacle above the ground, in metres: kerbs are lower.
     pub min_height_m: f32,
-    /// Height up to which pixels are joined into clusters, in metres: what hangs above, a tree's crown or a
-    /// sign, would join the cars below it. Where a cluster reaches it, its box goes on to [`Self::max_target_height_m`].
+    /// Height up to which pixels are joined into clusters, in metres: what hangs above, a tree's crown or a sign, would
+    /// join the cars below it. If a cluster reaches it, its box extends up to [`Self::max_target_height_m`].
     pub join_height_m: f32,
     /// Lowest and highest target, in metres.
     pub min_target_height_m: f32,
@@ -20,21 +20,21 @@ pub struct PerceptionConfig {
     pub max_footprint_m: [f32; 2],
     /// Fewest pixels of a target in an image of 640×192; other sizes in proportion to their area.
     pub min_pixels: f32,
-    /// Least confidence of a target that is told; tracks below it go on in silence.
+    /// Least confidence of a reported target; tracks below it continue unreported.
     pub min_confidence: f64,
-    /// Frames in which a target must have been seen before it is told.
+    /// Number of frames in which a target must have been seen before it is reported.
     pub confirm_frames: u32,
-    /// Standard deviation of a disparity over itself: 0.01 says that a depth of 30 m is good to 30 cm for each
-    /// of its pixels. Exact depth: 0. It widens the gaps that a cluster may bridge.
+    /// Standard deviation of a disparity over itself: with 0.01 a depth of 30 m is accurate to 30 cm at each
+    /// pixel. Exact depth: 0. It widens the gaps that a cluster may bridge.
     pub relative_error: f32,
-    /// Jump of depth, as a share of it, from which on a pixel that hangs between a near and a far surface is left out
+    /// Jump of depth, as a share of it, beyond which a pixel between a near and a far surface is dropped
     /// ([`crate::flying_pixels`]); 0 keeps all.
     pub edge_jump: f32,
-    /// How far such a pixel may lie from both, in pixels of an image 640 wide.
+    /// Largest distance of such a pixel from both surfaces, in pixels of an image 640 wide.
     pub edge_radius: f32,
     /// Steepest ground, rise over run, in the direction of sight.
     pub max_slope: f32,
-    /// Lowest and highest place of a camera above the ground, in metres.
+    /// Lowest and highest camera position above the ground, in metres.
     pub camera_height_m: [f32; 2],
     /// Largest angle between the camera's up and the ground's normal, in degrees.
     pub max_tilt_deg: f32,
@@ -44,7 +44,7 @@ pub struct PerceptionConfig {
 }
 
 impl PerceptionConfig {
-    /// For depth that a network predicted: its edges bleed, and its error grows with depth.
+    /// Settings for predicted depth: its edges bleed, and its error grows with depth.
     #[must_use]
     pub fn predicted() -> Self {
         Self {
@@ -59,11 +59,11 @@ impl PerceptionConfig {
 }
 
 impl PerceptionConfig {
-    /// Whether the settings can be.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// [`Error::Config`] naming the first that cannot: lengths, counts and shares that are negative or not finite, and
-    /// limits of which the lower is above the upper.
+    /// [`Error::Config`] naming the first invalid one: a length, count or share that is negative or not finite, or a
+    /// lower limit above its upper limit.
     pub fn validate(&self) -> Result<()> {
         let [camera_low, camera_high] = self.camera_height_m;
         let [length, width] = self.max_footprint_m;
@@ -133,7 +133,7 @@ impl PerceptionConfig {
     }
 }
 
-/// For exact depth.
+/// Settings for exact depth.
 impl Default for PerceptionConfig {
     fn default() -> Self {
         Self {

@@ -5,11 +5,11 @@ use crate::lanes::LANES;
 use crate::{Ground, PerceptionConfig};
 use nalgebra::{Matrix3, Vector3};
 
-/// Hypotheses that are drawn.
+/// Number of hypotheses drawn.
 const HYPOTHESES: usize = 160;
-/// Fewest level samples that make a ground.
+/// Fewest level samples needed for a ground plane.
 const FEWEST: usize = 30;
-/// Farther below the plane than so many tolerances lies what cannot be.
+/// Points more than this many tolerances below the plane are impossible.
 const BELOW: f32 = -2.5;
 
 /// The best of the last frame's plane and some through three level samples each, `None` where it has no support.
@@ -60,9 +60,9 @@ fn score([level, all]: &[Witnesses; 2], plane: &DisparityPlane) -> f32 {
     on - 0.5 * all.sum(plane, |above| if above < BELOW { 1.0 } else { 0.0 })
 }
 
-/// Samples in lanes, of which the last may be filled up with some above every plane, which say nothing.
+/// Samples in SIMD lanes; the last block is padded with samples above every plane, which have no effect.
 struct Witnesses {
-    /// Disparity, the ray's x and y, and 1, each times what makes tolerances of them, 1 m below the camera.
+    /// Disparity, the ray's x and y, and 1, each scaled to tolerances, 1 m below the camera.
     blocks: Vec<[[f32; LANES]; 4]>,
 }
 

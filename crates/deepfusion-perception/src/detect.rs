@@ -1,4 +1,4 @@
-//! One depth image to boxes.
+//! From one depth image to boxes.
 
 use crate::box_fit::fit;
 use crate::clusters::{Cluster, Run, clusters};
@@ -11,31 +11,31 @@ use crate::split::split;
 use crate::{Ground, GroundBox, PerceptionConfig, Rays, Target};
 use rayon::prelude::*;
 
-/// Visible height from which on something is a target, metres.
+/// Least visible height of a target, metres.
 const MIN_VISIBLE_HEIGHT: f32 = 0.25;
 
-/// How often the boxes are fitted again by what those in their row say.
+/// Number of times that boxes are refitted with the votes of their row.
 const ROUNDS: usize = 2;
 
-/// How things are usually turned at a place on the ground.
+/// The usual orientation of objects at a point on the ground.
 pub(crate) type UsualTurn<'a> = dyn Fn([f32; 2]) -> Turn + Sync + 'a;
 
-/// A box and what it was made from.
+/// A box and the pixels it was made from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detection {
-    /// In the ground's axes.
+    /// The box, in the ground's axes.
     pub place: GroundBox,
-    /// How many pixels see it.
+    /// Number of its pixels.
     pub pixels: usize,
     /// Left, top, right, bottom of those pixels.
     pub bounds: [u32; 4],
     /// Those pixels.
     pub runs: Vec<Run>,
-    /// 0 to 1.
+    /// Confidence, 0 to 1.
     pub confidence: f32,
     /// Standard deviation of its depth over itself, where the depth came with one.
     pub relative_error: Option<f32>,
-    /// What it is, where somebody knows.
+    /// Its class, if a segmentation model gave one.
     pub kind: Option<Kind>,
 }
 
@@ -72,8 +72,8 @@ impl Detection {
 }
 
 impl Detection {
-    /// Takes what is said of its pixels: the median of `sigma` over `depth`, both row by row in images of this width.
-    /// They err together, so that many of them say no more than one.
+    /// Sets the relative error from its pixels: the median of `sigma` over `depth`, both row by row in images of this
+    /// width. The pixels' errors are correlated, so that averaging does not reduce them.
     pub(crate) fn weigh(&mut self, depth: &[f32], sigma: &[f32], width: usize) {
         let pixels = self.runs.iter().flat_map(|run| run.pixels(width));
         let shares = pixels.map(|i| sigma[i] / depth[i]);
@@ -88,7 +88,7 @@ impl Detection {
 }
 
 /// Boxes of the obstacles of one depth image, row by row at `rays`' size, that have a target's size: first of the `instances`,
-/// of which somebody else knows the pixels, then of what is left.
+/// whose pixels are given, then of the rest.
 #[must_use]
 pub fn detect(
     depth: &[f32],
@@ -102,7 +102,7 @@ pub fn detect(
     detect_turned(depth, obstacles, instances, rays, ground, &ahead, config)
 }
 
-/// As [`detect`], where somebody knows how things are usually turned at a place on the ground (right, forward).
+/// As [`detect`], with the usual orientation of objects at a point on the ground (right, forward).
 pub(crate) fn detect_turned(
     depth: &[f32],
     obstacles: &Obstacles,
@@ -125,18 +125,18 @@ pub(crate) fn detect_turned(
     let unnamed = (!taken.is_empty()).then(|| obstacles.without(&taken, rays.x.len()));
     let unnamed = unnamed.as_ref().unwrap_or(obstacles);
     let mut left = clusters(depth, unnamed, rays, min_pixels, config);
-    // What is cut in two is looked at again.
+    // What is cut in two is classified again.
     while !left.is_empty() {
-        let looked_at: Vec<Looked> = std::mem::take(&mut left)
+        let outcomes: Vec<Outcome> = std::mem::take(&mut left)
             .into_par_iter()
             .filter(|cluster| cluster.pixels >= min_pixels)
-            .map(|cluster| look(cluster, depth, obstacles, rays, ground, config))
+            .map(|cluster| classify(cluster, depth, obstacles, rays, ground, config))
             .collect();
-        for looked in looked_at {
-            match looked {
-                Looked::Several(halves) => left.extend(halves),
-                Looked::Target(candidate) => candidates.push(*candidate),
-                Looked::Nothing => {}
+        for outcome in outcomes {
+            match outcome {
+                Outcome::Split(halves) => left.extend(halves),
+                Outcome::Target(candidate) => candidates.push(*candidate),
+                Outcome::Nothing => {}
             }
         }
     }
@@ -151,7 +151,7 @@ struct Candidate {
     vote: Vote,
 }
 
-/// Their boxes, fitted again as those beside each say that it is turned.
+/// The candidates' boxes, refitted with the orientation that their neighbours suggest.
 fn in_rows(
     candidates: Vec<Candidate>,
     usual_turn: &UsualTurn,
@@ -171,8 +171,9 @@ fn in_rows(
             })
             .collect();
     }
-    let told = candidates.into_iter().zip(votes);
-    told.filter(|(candidate, vote)| is_target(&candidate.silhouette, &vote.place, config))
+    let fitted = candidates.into_iter().zip(votes);
+    fitted
+        .filter(|(candidate, vote)| is_target(&candidate.silhouette, &vote.place, config))
         .map(|(candidate, vote)| Detection {
             place: vote.place,
             pixels: candidate.cluster.pixels,
@@ -185,13 +186,13 @@ fn in_rows(
         .collect()
 }
 
-/// How much of a box is seen, and what a model says of it: independent witnesses.
+/// Combines the visible share of a box and the model's score as independent evidence.
 fn confidence(place: &GroundBox, kind: Option<&Kind>) -> f32 {
     let seen = 0.5 * (place.seen[0] + place.seen[1]);
     1.0 - (1.0 - seen) * (1.0 - kind.map_or(0.0, |kind| kind.score))
 }
 
-/// Drops what lies inside a larger detection (a roof's edge, a mirror, a number plate's frame), or in one that is known.
+/// Drops what lies inside a larger detection (a roof's edge, a mirror, a number plate's frame), or in one with a class.
 fn without_parts(mut detections: Vec<Detection>) -> Vec<Detection> {
     detections.sort_by_key(|d| std::cmp::Reverse((d.kind.is_some(), d.pixels)));
     let mut kept: Vec<Detection> = Vec::with_capacity(detections.len());
@@ -203,43 +204,43 @@ fn without_parts(mut detections: Vec<Detection>) -> Vec<Detection> {
     kept
 }
 
-/// What a cluster turned out to be.
-enum Looked {
-    Several([Cluster; 2]),
+/// The result of classifying a cluster.
+enum Outcome {
+    Split([Cluster; 2]),
     Target(Box<Candidate>),
     Nothing,
 }
 
-fn look(
+fn classify(
     cluster: Cluster,
     depth: &[f32],
     obstacles: &Obstacles,
     rays: &Rays,
     ground: &Ground,
     config: &PerceptionConfig,
-) -> Looked {
+) -> Outcome {
     let silhouette = Silhouette::of(&cluster, depth, obstacles, rays, ground, config);
     if let Some(parts) = part_at_seam(&cluster, &silhouette, depth, rays, ground, config) {
-        return Looked::Several(parts);
+        return Outcome::Split(parts);
     }
     let Some(vote) = fit(&silhouette, Turn::ahead()) else {
-        return Looked::Nothing;
+        return Outcome::Nothing;
     };
     if let Some(halves) = split(&cluster, &silhouette, &vote.place, depth, rays, ground) {
-        Looked::Several(halves)
+        Outcome::Split(halves)
     } else if is_target(&silhouette, &vote.place, config) {
-        Looked::Target(Box::new(Candidate {
+        Outcome::Target(Box::new(Candidate {
             kind: None,
             cluster,
             silhouette,
             vote,
         }))
     } else {
-        Looked::Nothing
+        Outcome::Nothing
     }
 }
 
-/// A thing that is known to be one: it is not cut.
+/// A candidate from a single object's pixels: it is not split.
 fn candidate(
     cluster: Cluster,
     kind: Option<Kind>,

@@ -1,12 +1,12 @@
-//! Pixels between a near and a far surface: a network draws them halfway, where nothing is.
+//! Flying pixels: at an edge between a near and a far surface, a network predicts depths halfway between the two.
 
 use deepfusion_geometry::DepthMap;
 use rayon::prelude::*;
 
-/// Fewest rows that are worth another core.
+/// Fewest rows for which another core pays off.
 const ROWS: usize = 16;
 
-/// Tells which pixels of a depth image (row by row) hang between two surfaces.
+/// Marks the pixels of a depth image (row by row) that hang between two surfaces.
 ///
 /// Such a pixel is farther than what is `radius` pixels to one side and nearer than what is as far to the other,
 /// by more than `jump` of its own depth (and 0.3 m) each: a surface that is seen at a grazing angle rises no

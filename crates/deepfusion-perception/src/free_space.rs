@@ -1,15 +1,15 @@
-//! Where one could drive: the ground seen from above.
+//! Free space: the drivable ground, seen from above.
 
 use crate::{Ground, Obstacles, PerceptionConfig, Rays};
 use serde::Serialize;
 
-/// What is known of a cell.
+/// The state of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Cell {
     /// Not seen.
     Unknown,
-    /// Ground was seen there, and nothing before it.
+    /// Ground was seen there, with nothing in front of it.
     Free,
     /// Something stands there.
     Occupied,
@@ -28,7 +28,7 @@ pub struct FreeSpace {
     pub cells: Vec<Cell>,
 }
 
-/// Obstacle pixels of a cell from which on it is occupied.
+/// Fewest obstacle pixels of an occupied cell.
 const WITNESSES: u16 = 3;
 
 impl FreeSpace {
@@ -44,7 +44,7 @@ impl FreeSpace {
         }
     }
 
-    /// The cell at a place (right, forward, metres); `None` outside the grid.
+    /// The cell at a point (right, forward, metres); `None` outside the grid.
     #[must_use]
     pub fn at(&self, right_m: f32, forward_m: f32) -> Option<Cell> {
         self.index(right_m, forward_m).map(|i| self.cells[i])

@@ -1,13 +1,13 @@
-//! The ground: a plane by consensus, then how the road rises and falls along the way.
+//! The ground: a plane by consensus, then the height profile of the road ahead.
 
 use crate::consensus::consensus;
 use crate::{PerceptionConfig, Rays};
 use nalgebra::{Matrix3, Vector3};
 
-/// Samples for the plane, at most about this many.
+/// Approximate limit on the number of samples for the plane.
 const SAMPLES: usize = 1_600;
-/// How far from the plane a point may lie, as a share of its distance plus a constant: slopes and the
-/// disparity's error both grow with distance.
+/// Largest distance of a point from the plane, as a share of its distance plus a constant: slopes and
+/// the disparity's error both grow with distance.
 const TOLERANCE: (f32, f32) = (0.08, 0.006);
 /// Length of a piece of the height profile, metres, and how many there are.
 const PIECE_M: f32 = 4.0;
@@ -21,7 +21,7 @@ const PIECES: usize = 20;
 pub struct Ground {
     /// Unit normal, away from the ground.
     pub up: [f32; 3],
-    /// The camera's z, laid onto the plane.
+    /// The camera's z, projected onto the plane.
     pub forward: [f32; 3],
     /// To the right, on the plane.
     pub right: [f32; 3],
@@ -57,7 +57,7 @@ impl Ground {
     }
 
     /// The ground of a depth image, row by row at `rays`' size; `before` is the last frame's, tried first.
-    /// `None` where no plane that a vehicle could stand on has the points' support.
+    /// `None` if no plausible plane has enough support.
     #[must_use]
     pub fn find(
         depth: &[f32],
@@ -83,7 +83,7 @@ impl Ground {
         Some(ground)
     }
 
-    /// Whether a vehicle could stand on it.
+    /// Whether its slope and the camera's height are plausible for a vehicle.
     pub(crate) fn is_plausible(&self, config: &PerceptionConfig) -> bool {
         let [low, high] = config.camera_height_m;
         -self.up[1] >= config.max_tilt_deg.to_radians().cos()
@@ -117,7 +117,7 @@ impl Ground {
         })
     }
 
-    /// Median height of the samples in each piece of the way, as long as they go on from the piece before.
+    /// Median height of the samples in each piece of the profile, as long as it continues the piece before.
     fn follow_slope(&mut self, samples: &[Sample], config: &PerceptionConfig) {
         let mut heights: Vec<Vec<f32>> = vec![Vec::new(); PIECES];
         for sample in samples {
@@ -163,7 +163,7 @@ pub(crate) struct Sample {
     pub ray: [f32; 2],
     pub disparity: f32,
     pub depth: f32,
-    /// What the disparity gains from row to row, per unit of the ray's y: on a level surface 1 over the camera's
+    /// Gain of the disparity from row to row, per unit of the ray's y: on a level surface 1 over the camera's
     /// height above it, on an upright one 0.
     gain: f32,
 }
@@ -208,7 +208,7 @@ impl Sample {
         samples
     }
 
-    /// Whether the surface seen could be ground that a camera stands above.
+    /// Whether the surface could be ground below the camera.
     fn is_level(&self, config: &PerceptionConfig) -> bool {
         let [low, high] = config.camera_height_m;
         (0.5 / high..2.0 / low).contains(&self.gain)
@@ -219,7 +219,7 @@ impl Sample {
         [self.ray[0] * z, self.ray[1] * z, z]
     }
 
-    /// How far above the plane the point lies, in metres, and how far it may; `height` is 1 / |plane|, the camera's.
+    /// The point's height above the plane and its tolerance, in metres; `height` is 1 / |plane|, the camera's.
     fn residual(&self, plane: &Vector3<f32>, height: f32) -> (f32, f32) {
         let on_plane = plane.x * self.ray[0] + plane.y * self.ray[1] + plane.z;
         let above = (self.disparity - on_plane) * self.depth * height;
@@ -227,7 +227,7 @@ impl Sample {
         (above, self.tolerance())
     }
 
-    /// How far above or below the plane it may lie, metres.
+    /// Tolerance of its height above or below the plane, metres.
     pub fn tolerance(&self) -> f32 {
         TOLERANCE.0 + TOLERANCE.1 * self.depth
     }
@@ -248,8 +248,8 @@ pub(crate) fn plane_of(plane: &DisparityPlane) -> Option<([f32; 3], f32)> {
     })
 }
 
-/// Weighted least squares on the points near the plane, a few times (Tukey's weights), ever nearer: the road is to
-/// win over the pavement a kerb above it, so what lies before the camera counts most.
+/// Weighted least squares on the points near the plane, a few times (Tukey's weights), ever nearer: what lies in
+/// front of the camera counts most, so that the road wins over a pavement a kerb higher.
 fn refine(level: &[Sample], mut plane: DisparityPlane) -> DisparityPlane {
     for narrow in [1.0, 0.8, 0.6, 0.6, 0.6] {
         let height = 1.0 / plane.norm();

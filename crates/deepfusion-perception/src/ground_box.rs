@@ -13,13 +13,13 @@ pub struct GroundBox {
     pub heights: [f32; 2],
     /// Share of the length and of the width that was seen.
     pub seen: [f32; 2],
-    /// The point of the footprint that stays where it is if the extents are found to be others: the corner or the
-    /// middle of the side that was seen, (right, forward) in metres.
+    /// The point of the footprint that stays fixed if the extents are corrected: the corner or the middle of the
+    /// visible side, (right, forward) in metres.
     pub anchor: [f32; 2],
 }
 
 impl GroundBox {
-    /// The four corners of the footprint: right, forward, in metres, around it.
+    /// The four corners of the footprint in order: right, forward, in metres.
     #[must_use]
     pub fn corners(&self) -> [[f32; 2]; 4] {
         let [along, across] = axes(self.angle);
@@ -29,7 +29,7 @@ impl GroundBox {
         })
     }
 
-    /// Middle of the footprint if its extents along its own length and width were these, in metres.
+    /// Middle of the footprint with these extents along its length and width, in metres.
     #[must_use]
     pub fn middle_with(&self, extents: [f32; 2]) -> [f32; 2] {
         let mut middle = self.anchor;
@@ -42,7 +42,7 @@ impl GroundBox {
         middle
     }
 
-    /// Area that two footprints share over that of the smaller, 0 to 1.
+    /// Shared area of two footprints over that of the smaller, 0 to 1.
     #[must_use]
     pub fn overlap(&self, other: &Self) -> f32 {
         let apart = [0, 1].map(|k| self.middle[k] - other.middle[k]);
@@ -92,7 +92,7 @@ fn polygon_area(polygon: &[[f32; 2]]) -> f32 {
     0.5 * twice.abs()
 }
 
-/// Along and across an angle.
+/// Unit vectors along and across an angle.
 pub fn axes(angle: f32) -> [[f32; 2]; 2] {
     let (sin, cos) = angle.sin_cos();
     [[cos, sin], [-sin, cos]]

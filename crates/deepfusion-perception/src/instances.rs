@@ -1,41 +1,40 @@
-//! Pixels that somebody else says belong to one thing, as a segmentation model does, fused with their depth.
+//! Instances: objects whose pixels a segmentation model gives, fused with their depth.
 
 use crate::clusters::{Cluster, Run};
 use crate::obstacles::{NONE, Obstacles};
 use crate::{Error, PerceptionConfig, Result};
 
-/// What something is, and how sure that is.
+/// An object's class and its score.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kind {
-    /// Such as `car`.
+    /// The class, such as `car`.
     pub class: String,
     /// 0 to 1.
     pub score: f32,
 }
 
-/// Something in the image that is known by its pixels.
+/// An object in the image, given by its pixels.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Instance {
-    /// What it is, such as `car`.
+    /// Its class, such as `car`.
     pub class: String,
-    /// How sure that is, 0 to 1.
+    /// Score of the class, 0 to 1.
     pub score: f32,
-    /// Its pixels, in the depth image's size; all of a box for one that is known by its box alone.
+    /// Its pixels, at the depth image's size; the whole box if only that is known.
     pub runs: Vec<Run>,
-    /// Whether somebody drew its pixels, rather than a box about it.
+    /// Whether the pixels are a mask, rather than a box.
     pub drawn: bool,
 }
 
-/// Depths between which a thing's pixels are taken to lie, as shares of those that its mask covers: a mask's edge, and what
-/// is seen through windows, shows what stands behind.
+/// Quantiles of depth between which an object's pixels are taken to lie: a mask's edge and windows show what is behind.
 const OF_A_MASK: [f32; 2] = [0.05, 0.9];
-/// As [`OF_A_MASK`], of a box, whose corners show what stands behind too, and whose foot what stands before.
+/// As [`OF_A_MASK`], for a box, whose corners show the background, and whose lower edge the foreground.
 const OF_A_BOX: [f32; 2] = [0.1, 0.6];
-/// How far beyond them pixels may lie, metres.
+/// Margin beyond them, metres.
 const MARGIN_M: f32 = 1.0;
 
 impl Instance {
-    /// What it is.
+    /// Its class and score.
     pub(crate) fn kind(&self) -> Kind {
         Kind {
             class: self.class.clone(),
@@ -60,7 +59,7 @@ impl Instance {
         }
     }
 
-    /// Its obstacle pixels that are about as far away as most of them.
+    /// The obstacle pixels of it at about the distance of most of them.
     pub(crate) fn cluster(
         &self,
         depth: &[f32],

@@ -1,18 +1,18 @@
-//! Points on the ground, as many at a time as a machine takes in one step.
+//! Points on the ground in SIMD lanes.
 
-/// How many that is.
+/// Number of lanes.
 pub const LANES: usize = 8;
 
-/// Points in lanes, of which the last are filled up with the last point.
+/// Points in blocks of lanes; the last block is padded with the last point.
 pub struct Points {
     /// Right and forward of each, metres.
     pub blocks: Vec<[[f32; LANES]; 2]>,
-    /// How many there are.
+    /// Number of points.
     pub count: usize,
 }
 
 impl Points {
-    /// These.
+    /// Packs the points.
     pub fn new(points: impl IntoIterator<Item = [f32; 2]>) -> Self {
         let mut blocks: Vec<[[f32; LANES]; 2]> = Vec::new();
         let mut count = 0;
@@ -31,7 +31,7 @@ impl Points {
         Self { blocks, count }
     }
 
-    /// Squared distance of a place from the nearest of them, infinite where there is none.
+    /// Squared distance of a point from the nearest of them, infinite without any.
     pub fn nearest(&self, [x, y]: [f32; 2]) -> f32 {
         let mut nearest = [f32::INFINITY; LANES];
         for [right, forward] in &self.blocks {
@@ -43,7 +43,7 @@ impl Points {
         nearest.into_iter().fold(f32::INFINITY, less)
     }
 
-    /// From where to where they reach along an axis.
+    /// Their extent along an axis.
     pub fn extent(&self, axis: [f32; 2]) -> [f32; 2] {
         let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
         for [right, forward] in &self.blocks {
@@ -58,7 +58,7 @@ impl Points {
     }
 }
 
-/// The lesser of two numbers: unlike [`f32::min`], which asks for NaN, one instruction.
+/// The lesser of two numbers, in one instruction: unlike [`f32::min`] it does not handle NaN.
 fn less(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }

@@ -1,4 +1,4 @@
-//! Which pixels see something that stands on the ground.
+//! Which pixels belong to obstacles on the ground.
 
 use crate::clusters::Cluster;
 use crate::{Ground, PerceptionConfig, Rays};
@@ -12,14 +12,14 @@ pub struct Obstacles {
     pub height: Vec<f32>,
 }
 
-/// Fewest rows that are worth another core.
+/// Fewest rows for which another core pays off.
 const ROWS: usize = 16;
 
 /// Not an obstacle.
 pub const NONE: f32 = -1.0;
 
 impl Obstacles {
-    /// Without the pixels of these clusters.
+    /// The obstacles without the pixels of these clusters.
     pub(crate) fn without(&self, clusters: &[&Cluster], width: usize) -> Self {
         let mut rest = self.clone();
         for run in clusters.iter().flat_map(|cluster| &cluster.runs) {

@@ -1,6 +1,7 @@
-//! From where to where some values reach, but for strays.
+//! The range of some values, without outliers.
 
-/// The least and the largest of some values, but for one in `stray` at both ends; `None` of no values. Changes their order.
+/// The least and the largest of some values after dropping one in `stray` at both ends; `None` without values. Changes their
+/// order.
 pub fn ends(values: &mut [f32], stray: usize) -> Option<[f32; 2]> {
     let stray = values.len() / stray;
     let last = values.len().checked_sub(1 + stray)?;

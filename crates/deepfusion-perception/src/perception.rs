@@ -7,19 +7,19 @@ use crate::{
 };
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 
-/// When a frame was taken and from where.
+/// Time and pose of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stamp {
-    /// Seconds, on any clock that goes on from frame to frame.
+    /// Seconds, on any monotonic clock.
     pub time_s: f64,
-    /// Camera to a frame that stays where it is, metres: that of the first camera, say.
+    /// Camera to a fixed frame, metres: that of the first camera, for instance.
     pub world_from_cam: Se3,
 }
 
-/// What stands before the camera.
+/// The result for one frame.
 #[derive(Debug, Clone, Default)]
 pub struct Surroundings {
-    /// The road; `None` where none was found, and then there are no targets.
+    /// The road; `None` if none was found, and then there are no targets.
     pub ground: Option<Ground>,
     /// The boxes of this image alone.
     pub detections: Vec<Detection>,
@@ -27,9 +27,9 @@ pub struct Surroundings {
     pub targets: Vec<Target>,
 }
 
-/// From depth images to targets, one after the other.
+/// Turns a sequence of depth images into tracked targets.
 ///
-/// Its buffers grow to an image's size once; what it remembers of the past is the tracks.
+/// Its buffers grow to an image's size once; its only state is the last ground, the tracks and the rows of parked cars.
 #[derive(Debug, Default)]
 pub struct Perception {
     config: PerceptionConfig,
@@ -42,7 +42,7 @@ pub struct Perception {
 }
 
 impl Perception {
-    /// With these settings.
+    /// A new one with these settings.
     #[must_use]
     pub fn new(config: PerceptionConfig) -> Self {
         Self {
@@ -63,51 +63,51 @@ impl Perception {
         &self.obstacles
     }
 
-    /// Forgets the past: what comes next does not go on from what was.
-    pub fn forget(&mut self) {
-        self.tracker.forget();
-        self.parking.forget();
+    /// Drops all tracks and remembered cars: the next image does not continue the last one.
+    pub fn reset(&mut self) {
+        self.tracker.reset();
+        self.parking.reset();
         self.ground = None;
     }
 
-    /// Looks at a depth image of a camera `k` (of the same size). Without a `stamp` it stands for itself: every target
-    /// has a new id and no velocity.
+    /// Finds the targets in a depth image of a camera `k` (of the same size). Without a `stamp` the image is
+    /// independent of others: every target has a new id and no velocity.
     ///
-    /// Pixels without depth, with NaN or infinity are none.
+    /// Pixels without depth, with NaN or infinity are ignored.
     ///
     /// # Errors
-    /// [`Error::Size`] where the depth is not of the camera's size, [`Error::Camera`] where `k` is none.
-    pub fn look(
+    /// [`Error::Size`] if the depth does not have the camera's size, [`Error::Camera`] if `k` is implausible.
+    pub fn detect(
         &mut self,
         depth: &DepthMap,
         k: &Intrinsics,
         stamp: Option<Stamp>,
     ) -> Result<Surroundings> {
-        self.look_with(depth, k, stamp, &[])
+        self.detect_with_instances(depth, k, stamp, &[])
     }
 
-    /// As [`Self::look`], with things whose pixels somebody else knows: each becomes a target of its own, of its class,
-    /// where its depth makes it one; all others are found by depth alone.
+    /// As [`Self::detect`], with instances from a segmentation model: each becomes a target with its class, if its depth
+    /// allows it; all others are found by depth alone.
     ///
     /// # Errors
-    /// As [`Self::look`], and [`Error::Instance`] for pixels outside the depth image.
-    pub fn look_with(
+    /// As [`Self::detect`], and [`Error::Instance`] for pixels outside the depth image.
+    pub fn detect_with_instances(
         &mut self,
         depth: &DepthMap,
         k: &Intrinsics,
         stamp: Option<Stamp>,
         instances: &[Instance],
     ) -> Result<Surroundings> {
-        self.look_with_sigma(depth, None, k, stamp, instances)
+        self.detect_with_sigma(depth, None, k, stamp, instances)
     }
 
-    /// As [`Self::look_with`], where each pixel's depth comes with its standard deviation (metres, of the same size): what a
-    /// target's place is worth, and how far off it may be found again, follow from its own pixels, and
-    /// [`PerceptionConfig::relative_error`] is for those without.
+    /// As [`Self::detect_with_instances`], with each pixel's standard deviation of depth (metres, same size). The uncertainty of
+    /// a target's position, and with it the tracker's gate, follow from its own pixels; [`PerceptionConfig::relative_error`] is
+    /// used for pixels without one.
     ///
     /// # Errors
-    /// As [`Self::look_with`].
-    pub fn look_with_sigma(
+    /// As [`Self::detect_with_instances`].
+    pub fn detect_with_sigma(
         &mut self,
         depth: &DepthMap,
         sigma: Option<&DepthMap>,
@@ -154,7 +154,7 @@ impl Perception {
             .find(&depth.data, rays, &ground, &self.config);
         let pose = stamp.as_ref().map(|stamp| &stamp.world_from_cam);
         if self.config.parking_rows {
-            self.parking.recall(&ground, pose);
+            self.parking.begin_frame(&ground, pose);
         }
         let mut detections = detect_turned(
             &depth.data,

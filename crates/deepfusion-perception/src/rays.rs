@@ -1,7 +1,7 @@
 use deepfusion_geometry::Intrinsics;
 
-/// Where each column and each row looks: the point at depth z of pixel (u, v) is z·(x\[u\], y\[v\], 1) in the
-/// camera's frame.
+/// Viewing rays of each column and each row: the point at depth z of pixel (u, v) is z·(x\[u\], y\[v\], 1) in
+/// the camera's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rays {
     /// (u − c_x) / f_x of each column.
@@ -13,7 +13,7 @@ pub struct Rays {
 }
 
 impl Rays {
-    /// Those of a camera.
+    /// The rays of a camera.
     #[must_use]
     pub fn of(k: &Intrinsics) -> Self {
         Self {

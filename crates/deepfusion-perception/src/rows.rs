@@ -1,25 +1,25 @@
-//! Cars stand in rows: how one is turned says how its neighbours are, of which less is seen.
+//! Cars stand in rows: the orientation of a clearly visible one helps with its less visible neighbours.
 
 use crate::GroundBox;
 
-/// How something is turned, up to half a turn, and how surely.
+/// An orientation, up to half a turn, and its weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turn {
     /// Cosine and sine of twice the angle (as [`crate::GroundBox::angle`]), times the weight.
     doubled: [f32; 2],
 }
 
-/// What one that is turned otherwise than all expect costs, per unit of weight.
+/// Cost of an orientation against all expectation, per unit of weight.
 const COST: f32 = 0.25;
-/// Most weight of a vote for the way of the road, of one against it, and of all together.
+/// Largest weight of a vote for the road's direction, of one against it, and of all together.
 const MOST: [f32; 3] = [0.5, 4.0, 6.0];
-/// How far a row goes on to both sides of one that stands in it, metres; what is near says more.
+/// How far a row reaches to both sides of a car in it, metres; nearer cars count more.
 const ROW_M: f32 = 15.0;
-/// How far beside a box's own length or width its row reaches, metres.
+/// Margin of a row beside a box's own length or width, metres.
 const BESIDE_M: f32 = 0.3;
 
 impl Turn {
-    /// To an angle in radians, with a weight; one of 1 is that of the road.
+    /// From an angle in radians and a weight; the road has weight 1.
     pub fn new(angle: f32, weight: f32) -> Self {
         let (sin, cos) = (2.0 * angle).sin_cos();
         Self {
@@ -41,7 +41,7 @@ impl Turn {
         self.doubled[0].hypot(self.doubled[1])
     }
 
-    /// What speaks against an angle.
+    /// The cost of an angle.
     pub fn against(self, angle: f32) -> f32 {
         let (sin, cos) = (2.0 * angle).sin_cos();
         COST * (self.weight() - self.doubled[0] * cos - self.doubled[1] * sin)
@@ -61,19 +61,19 @@ impl Turn {
     }
 }
 
-/// What one that is seen says about its neighbours.
+/// A box's vote on the orientation of its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vote {
-    /// Middle of what is seen of it: right, forward, in metres.
+    /// Middle of its visible part: right, forward, in metres.
     pub at: [f32; 2],
-    /// Where it is taken to stand.
+    /// Its box.
     pub place: GroundBox,
-    /// How much worse it would be turned otherwise.
-    pub lean: f32,
+    /// How much worse the other orientation would fit.
+    pub margin: f32,
 }
 
 impl Vote {
-    /// What it says of something that is seen at `at`, if that lies in its row: before, behind or beside it.
+    /// Its vote for something at `at`, if that lies in its row: before, behind or beside it.
     fn on(&self, at: [f32; 2]) -> Option<Turn> {
         let (sin, cos) = self.place.angle.sin_cos();
         let middle = self.place.middle;
@@ -83,12 +83,12 @@ impl Vote {
         let farthest = apart[0].max(apart[1]);
         // That something stands as all do says less than that it does not.
         let as_all = Turn::ahead().against(self.place.angle) < COST;
-        let weight = self.lean.min(MOST[usize::from(!as_all)]) * (1.0 - farthest / ROW_M);
+        let weight = self.margin.min(MOST[usize::from(!as_all)]) * (1.0 - farthest / ROW_M);
         ((inside(0) || inside(1)) && weight > 0.0).then(|| Turn::new(self.place.angle, weight))
     }
 }
 
-/// How the `index`-th is expected to be turned by what is `usual` there, and by what the others in its row say.
+/// The expected orientation of the `index`-th box, from what is `usual` there and the votes of the others in its row.
 pub fn expected(votes: &[Vote], index: usize, usual: Turn) -> Turn {
     let others = votes.iter().enumerate().filter(|(i, _)| *i != index);
     others
@@ -103,7 +103,7 @@ mod tests {
     use std::f32::consts::FRAC_PI_2;
 
     /// A car that is seen whole, turned to `angle`.
-    fn vote(middle: [f32; 2], angle: f32, lean: f32) -> Vote {
+    fn vote(middle: [f32; 2], angle: f32, margin: f32) -> Vote {
         Vote {
             at: middle,
             place: GroundBox {
@@ -114,7 +114,7 @@ mod tests {
                 seen: [1.0; 2],
                 anchor: middle,
             },
-            lean,
+            margin,
         }
     }
 

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 /// A labelled box in one frame, in the camera's axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Label {
-    /// The same from frame to frame.
+    /// Its identity, constant over frames.
     pub object: u64,
     /// Centre of the box, metres.
     pub center_m: [f64; 3],
@@ -18,8 +18,8 @@ pub struct Label {
     pub yaw_rad: f64,
     /// Over ground, in the camera's axes, m/s, where it is known.
     pub velocity_mps: Option<[f64; 3]>,
-    /// Whether it should be found. What should not (a tree, a house, a car of which nothing is seen) counts as neither:
-    /// a target on it is not false, and no target on it is not missed.
+    /// Whether it should be found. Others (a tree, a house, an invisible car) count neither way: a target on one is not
+    /// false, and a missing one is not missed.
     pub counts: bool,
 }
 
@@ -28,7 +28,7 @@ impl Label {
         norm(self.center_m)
     }
 
-    /// Whether a point's footprint lies on the box's, grown by a metre.
+    /// Whether a point lies on the box's footprint, enlarged by a metre.
     fn covers(&self, point: [f64; 3]) -> bool {
         let (sin, cos) = self.yaw_rad.sin_cos();
         let (x, z) = (point[0] - self.center_m[0], point[2] - self.center_m[2]);
@@ -37,14 +37,14 @@ impl Label {
     }
 }
 
-/// What counts as found.
+/// The rules for what counts as found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoringRules {
     /// Farthest distance between centres of a target and its label, metres.
     pub match_m: f64,
-    /// Labels beyond this distance from the camera count as neither, metres.
+    /// Labels beyond this distance from the camera count neither way, metres.
     pub max_distance_m: f64,
-    /// Velocities are compared once a label has been found for so long by one track, seconds.
+    /// Velocities are compared once one track has followed a label for this long, seconds.
     pub velocity_after_s: f64,
 }
 
@@ -61,9 +61,9 @@ impl Default for ScoringRules {
 /// Counts and errors of the labels in one range of distances.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct RangeScore {
-    /// Metres from the camera.
+    /// Start of the range, metres from the camera.
     pub from_m: f64,
-    /// See `from_m`.
+    /// End of the range, metres from the camera.
     pub to_m: f64,
     /// Labels that count.
     pub labels: usize,
@@ -73,10 +73,10 @@ pub struct RangeScore {
     pub recall: Option<f64>,
 }
 
-/// How well targets agree with labels, over all frames.
+/// Agreement of targets with labels, over all frames.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct TargetScore {
-    /// Frames looked at.
+    /// Number of frames.
     pub frames: usize,
     /// Labels that count.
     pub labels: usize,
@@ -92,22 +92,22 @@ pub struct TargetScore {
     pub center_error_m: Option<f64>,
     /// Mean angle between the lengths, up to half a turn, degrees.
     pub yaw_error_deg: Option<f64>,
-    /// Mean length of the velocities' difference once told for long enough, m/s.
+    /// Mean length of the difference of velocities, once tracked for long enough, m/s.
     pub velocity_error_mps: Option<f64>,
-    /// How many velocities were compared.
+    /// Number of velocities compared.
     pub velocities: usize,
-    /// Share of those rightly told to move or to stand.
+    /// Share of those correctly classified as dynamic or static.
     pub motion_accuracy: Option<f64>,
-    /// Times that an object's track changed.
+    /// Number of times that an object's track changed.
     pub identity_switches: usize,
     /// By distance.
     pub ranges: Vec<RangeScore>,
 }
 
-/// Which target is which label's in one frame.
+/// The assignment of targets to labels in one frame.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Matched {
-    /// For each label the target that found it, by index.
+    /// For each label its target, by index.
     pub found: Vec<Option<usize>>,
     /// The targets on no label, by index.
     pub false_targets: Vec<usize>,
@@ -119,7 +119,7 @@ pub struct Scorer {
     rules: ScoringRules,
     score: TargetScore,
     errors: Errors,
-    /// Of each object: the track that found it last, and since when that one does.
+    /// For each object the track that found it last, and since when.
     tracks: HashMap<u64, (u64, f64)>,
 }
 
@@ -133,11 +133,11 @@ struct Errors {
 
 /// Borders of [`TargetScore::ranges`], metres.
 const RANGES: [f64; 5] = [0.0, 10.0, 20.0, 30.0, 40.0];
-/// Speed from which on a label moves, m/s.
+/// Least speed of a dynamic label, m/s.
 const MOVES_MPS: f64 = 0.75;
 
 impl Scorer {
-    /// Without any frame yet.
+    /// A scorer without frames.
     #[must_use]
     pub fn new(rules: ScoringRules) -> Self {
         let ranges = RANGES
@@ -159,12 +159,12 @@ impl Scorer {
         }
     }
 
-    /// Forgets which track was which object: a new drive begins.
+    /// Begins a new drive: drops the assignment of tracks to objects.
     pub fn begin_drive(&mut self) {
         self.tracks.clear();
     }
 
-    /// Takes a frame in.
+    /// Adds a frame and returns its assignment.
     pub fn add(&mut self, time_s: f64, targets: &[Target], labels: &[Label]) -> Matched {
         let counts = |label: &Label| label.counts && label.distance() <= self.rules.max_distance_m;
         let mut pairs = Vec::new();
@@ -234,10 +234,10 @@ impl Scorer {
         };
         self.tracks.insert(label.object, (target.id, since));
         if time_s - since >= self.rules.velocity_after_s
-            && let (Some(truth), Some(told)) = (label.velocity_mps, target.velocity_mps)
+            && let (Some(truth), Some(measured)) = (label.velocity_mps, target.velocity_mps)
         {
             self.score.velocities += 1;
-            self.errors.velocity += norm(minus(truth, told));
+            self.errors.velocity += norm(minus(truth, measured));
             let moves = norm(truth) >= MOVES_MPS;
             self.errors.motion += usize::from(target.moving == Some(moves));
         }
@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn found_missed_false_and_neither_are_told_apart() {
+    fn found_missed_false_and_neither_are_distinguished() {
         let mut scorer = Scorer::new(ScoringRules::default());
         let labels = [
             label(1, [0.0, 1.0, 10.0], true),

@@ -1,19 +1,19 @@
-//! What the contour of a cluster shows to be two things: a step back between two that stand one behind the other, and
-//! a border between what rises to the ceiling and what does not.
+//! Seams in a cluster's contour between two objects: a step back between one and another behind it, and a border
+//! between what reaches the ceiling and what does not.
 
 use crate::clusters::{Cluster, Gaps};
 use crate::lanes::Points;
 use crate::silhouette::{FOOT_M, Silhouette};
 use crate::{Ground, PerceptionConfig, Rays};
 
-/// By how much more than a surface's own step the contour must step back, metres.
+/// How far the contour must step back, beyond a surface's own step, metres.
 const STEP_M: f32 = 0.15;
-/// Points of a part's contour, at most, to which a pixel's distance is measured.
+/// Limit on the points of a part's contour to which a pixel's distance is measured.
 const POINTS: usize = 24;
-/// Fewest columns on each side of a border between high and low.
+/// Fewest columns on each side of a border between tall and low parts.
 const COLUMNS: usize = 2;
 
-/// The two sides of the cut through a cluster's clearest seam, `None` where it has none.
+/// The two sides of a cluster's clearest seam; `None` if it has none.
 #[must_use]
 pub fn part_at_seam(
     cluster: &Cluster,
@@ -32,13 +32,13 @@ pub fn part_at_seam(
     })
 }
 
-/// About as many points of a part of a contour as say where it is; the last is among them.
+/// A subsample of a part of a contour; the last point is included.
 fn some_of(part: &[[f32; 2]]) -> Points {
     let stride = part.len().div_ceil(POINTS);
     Points::new(part.iter().step_by(stride).chain(part.last()).copied())
 }
 
-/// The place in the contour after which the widest seam is.
+/// The index in the contour after which the widest seam lies.
 fn clearest(silhouette: &Silhouette, rays: &Rays, config: &PerceptionConfig) -> Option<usize> {
     let gaps = Gaps::of(rays, config);
     let contour = &silhouette.contour;
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
     use deepfusion_geometry::Intrinsics;
 
-    /// A contour, one point a column, that stands on the ground and rises where told.
+    /// A contour, one point per column, that stands on the ground and rises where `rises` is true.
     fn silhouette(contour: Vec<[f32; 2]>, rises: Vec<bool>) -> Silhouette {
         Silhouette {
             feet: vec![0.3; contour.len()],
@@ -110,7 +110,7 @@ mod tests {
     fn two_fronts_are_parted_where_one_ends() {
         let mut row = silhouette(fronts(), vec![false; 20]);
         assert_eq!(seam(&row), Some(9));
-        // Where the lower part is hidden, a windscreen lies behind a bonnet.
+        // Where the lower part is hidden, a windscreen lies behind a hood.
         row.feet = vec![0.9; 20];
         assert_eq!(seam(&row), None);
     }

@@ -1,4 +1,4 @@
-//! What a cluster looks like from above, and which of its ends are its own.
+//! A cluster seen from above, and which of its ends are its own.
 
 use crate::clusters::Cluster;
 use crate::columns::Columns;
@@ -6,16 +6,16 @@ use crate::obstacles::Obstacles;
 use crate::outermost::ends;
 use crate::{Ground, PerceptionConfig, Rays};
 
-/// A cluster laid onto the ground.
+/// A cluster projected onto the ground.
 #[derive(Debug, Clone, Default)]
 pub struct Silhouette {
-    /// Of each column the near end: (right, forward) in metres, from left to right.
+    /// The near end of each column: (right, forward) in metres, from left to right.
     pub contour: Vec<[f32; 2]>,
-    /// Of each of those columns the highest point's height, metres.
+    /// Height of each of those columns' highest point, metres.
     pub tops: Vec<f32>,
-    /// Of each of those columns the lowest point's height, metres; 0 where the image ends below it.
+    /// Height of each of those columns' lowest point, metres; 0 if the image ends below it.
     pub feet: Vec<f32>,
-    /// Whether it goes on upwards there, beyond the highest target, up to a ceiling or out of the image.
+    /// Whether each column continues upwards beyond the highest target, to a ceiling or out of the image.
     pub rises: Vec<bool>,
     /// Those columns in the image.
     pub columns: Vec<u32>,
@@ -23,24 +23,24 @@ pub struct Silhouette {
     pub points: Vec<[f32; 3]>,
     /// Height of its top, metres.
     pub top: f32,
-    /// Whether it goes on above that, beyond the highest target or the image's border.
+    /// Whether it continues above that, beyond the highest target or the image's border.
     pub tall: bool,
     /// Height of its lowest point, metres.
     pub bottom: f32,
-    /// How far before its left and its right end stands what hides that end, in metres of depth; infinite where the
-    /// image ends there, 0 where nothing hides it.
+    /// How far in front of its left and its right end an occluder stands, in metres of depth; infinite if the image
+    /// ends there, 0 if nothing hides it.
     pub hidden: [f32; 2],
 }
 
 /// A column whose lowest point is higher than this does not show its near end: something hides it, metres.
 pub const FOOT_M: f32 = 0.6;
-/// Points that are kept of a cluster, about.
+/// Approximate number of points kept of a cluster.
 const POINTS: usize = 400;
-/// Of a column's depths, sorted, which share lies before its contour: single pixels do not decide.
+/// One in this many of a column's sorted depths lies in front of the contour, so that single pixels do not decide.
 const NEAR_SHARE: usize = 8;
 
 impl Silhouette {
-    /// Of a cluster in a depth image.
+    /// The silhouette of a cluster in a depth image.
     #[must_use]
     pub fn of(
         cluster: &Cluster,
@@ -59,7 +59,7 @@ impl Silhouette {
         let mut above = Above::default();
         Columns::of(cluster, depth, width).for_each(|u, pixels| {
             let top = obstacles.height[pixels[0].1 as usize * width + u];
-            let rises = above.look(u, pixels[0], depth, rays, ground, config);
+            let rises = above.follow(u, pixels[0], depth, rays, ground, config);
             let lowest = pixels[pixels.len() - 1].1 as usize;
             // Below the image's last row it goes on.
             let foot = if lowest + 1 == rays.y.len() {
@@ -83,7 +83,7 @@ impl Silhouette {
     }
 }
 
-/// Where about [`POINTS`] of a cluster's pixels lie: (right, forward, height) in metres.
+/// About [`POINTS`] of a cluster's pixels as points: (right, forward, height) in metres.
 fn sampled(cluster: &Cluster, depth: &[f32], rays: &Rays, ground: &Ground) -> Vec<[f32; 3]> {
     let width = rays.x.len();
     let stride = Stride::new((cluster.pixels / POINTS).max(1) as u32);
@@ -101,13 +101,13 @@ fn sampled(cluster: &Cluster, depth: &[f32], rays: &Rays, ground: &Ground) -> Ve
     points
 }
 
-/// A number that looks like chance, the same for the same place.
+/// A deterministic pseudo-random number for an index.
 fn scatter(place: usize) -> u32 {
     ((place as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as u32
 }
 
-/// Asks for every pixel whether a number is a multiple of the same one, without a division (Lemire et al., "Faster
-/// remainder by direct computation", 2019).
+/// Tests whether numbers are multiples of a constant, without a division (Lemire et al., "Faster remainder by
+/// direct computation", 2019).
 struct Stride(u64);
 
 impl Stride {
@@ -131,7 +131,7 @@ fn reach(cluster: &Cluster, obstacles: &Obstacles, width: usize) -> [f32; 2] {
     ends(&mut heights, 100).unwrap_or_default()
 }
 
-/// What goes on above a cluster, past the height up to which pixels are joined.
+/// The continuation of a cluster above the height up to which pixels are joined.
 #[derive(Default)]
 struct Above {
     columns: usize,
@@ -140,9 +140,9 @@ struct Above {
 }
 
 impl Above {
-    /// Follows a column upwards from its topmost pixel (depth and row) as long as it stays at its distance: whether it
-    /// goes on to where no target ends.
-    fn look(
+    /// Follows a column upwards from its topmost pixel (depth and row) as long as it stays at its distance. Returns
+    /// whether it rises above the highest target.
+    fn follow(
         &mut self,
         u: usize,
         (start, v): (f32, u32),
@@ -197,7 +197,7 @@ impl Above {
     }
 }
 
-/// An end is hidden where most of the outermost runs end at something nearer, or at the border.
+/// An end is hidden if most of the outermost runs end at something nearer, or at the border.
 fn hidden_ends(cluster: &Cluster, depth: &[f32], width: usize) -> [f32; 2] {
     let [left, _, right, _] = cluster.bounds();
     let reach = ((right - left) / 6).max(1);

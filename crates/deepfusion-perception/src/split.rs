@@ -1,16 +1,16 @@
-//! A row of parked cars seen at a grazing angle comes as one cluster: cut where one ends and the next begins.
+//! Splits a row of parked cars that, seen at a grazing angle, forms one cluster.
 
 use crate::clusters::Cluster;
 use crate::silhouette::Silhouette;
 use crate::{Ground, GroundBox, Rays};
 
-/// Longer than this, and as wide and high as a car, a cluster is taken for several, metres.
+/// A cluster longer than this, and as wide and high as a car, counts as several cars, metres.
 const LONGEST: f32 = 5.7;
 /// Width and height up to which that is so, metres: a lorry is more.
 const WIDEST: f32 = 2.7;
 /// See [`WIDEST`].
 const HIGHEST: f32 = 2.4;
-/// Wider than this and no higher than a car, a cluster is taken for two side by side, metres.
+/// A cluster wider than this and no higher than a car counts as two side by side, metres.
 const TWO_ABREAST: f32 = 2.3;
 /// Length of a piece across, metres.
 const ABREAST_PIECE_M: f32 = 0.2;
@@ -23,7 +23,7 @@ const LEVEL: f32 = 0.85;
 /// Length of a piece of the height profile, metres.
 const PIECE_M: f32 = 0.25;
 
-/// The two sides of the cut through a box's cluster, `None` where it is no row of cars.
+/// The two parts of a box's cluster; `None` if it is not a row of cars.
 #[must_use]
 pub fn split(
     cluster: &Cluster,
@@ -50,7 +50,7 @@ pub fn split(
     cluster.divided(depth, rays, |p| dot(axis, ground.locate(p)) > cut)
 }
 
-/// Whether hardly any of it is as low as a car: a lorry, a wall.
+/// Whether almost all of it is higher than a car: a lorry, a wall.
 fn is_high_throughout(silhouette: &Silhouette, place: &GroundBox) -> bool {
     if silhouette.top <= HIGHEST {
         return false;
@@ -70,7 +70,7 @@ fn dot(axis: [f32; 2], p: [f32; 3]) -> f32 {
     axis[0] * p[0] + axis[1] * p[1]
 }
 
-/// Where the fewest points are across two that stand side by side.
+/// The lateral position with the fewest points, for two cars side by side.
 fn emptiest(silhouette: &Silhouette, axis: [f32; 2]) -> Option<f32> {
     let places: Vec<f32> = silhouette.points.iter().map(|p| dot(axis, *p)).collect();
     let from = places.iter().copied().fold(f32::INFINITY, f32::min);
@@ -85,7 +85,7 @@ fn emptiest(silhouette: &Silhouette, axis: [f32; 2]) -> Option<f32> {
         .map(|i| from + (i as f32 + 0.5) * ABREAST_PIECE_M)
 }
 
-/// Where the row is lowest, between cars of a usual length.
+/// The position where the row is lowest, between cars of typical length.
 fn best_cut(silhouette: &Silhouette, axis: [f32; 2]) -> Option<f32> {
     let along = |p: &[f32; 2]| p[0] * axis[0] + p[1] * axis[1];
     let columns = silhouette.contour.iter().map(along);

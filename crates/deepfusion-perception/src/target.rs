@@ -3,34 +3,34 @@ use serde::{Deserialize, Serialize};
 /// Something that stands on the ground: a box in the camera's frame (x right, y down, z forward).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Target {
-    /// The track it belongs to; the same from frame to frame.
+    /// Its track's id, constant over frames.
     pub id: u64,
     /// Centre of the box, metres.
     pub center_m: [f64; 3],
     /// Length, width and height, metres.
     pub size_m: [f64; 3],
-    /// KITTI's rotation_y: the length points along (cos, 0, −sin) of it. Without a velocity it is known up to half a
-    /// turn.
+    /// KITTI's rotation_y: the length points along (cos, 0, −sin) of it. Without a velocity it is ambiguous by half
+    /// a turn.
     pub yaw_rad: f64,
     /// From the camera to the centre, metres.
     pub distance_m: f64,
-    /// Standard deviation of that, metres, where the depth came with one.
+    /// Standard deviation of the distance, metres, if the depth came with one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_m: Option<f64>,
     /// Over ground, in the camera's axes, m/s; `None` before it could be measured.
     pub velocity_mps: Option<[f64; 3]>,
-    /// Whether it moves over ground; `None` before that could be told.
+    /// Whether it is dynamic (moves over ground); `None` until that is known.
     pub moving: Option<bool>,
-    /// How sure it is that something of this kind is there, 0 to 1.
+    /// Confidence that the target exists, 0 to 1.
     pub confidence: f64,
-    /// How many pixels see it; 0 where the track goes on without being seen.
+    /// Number of pixels in this frame; 0 if the track continues unseen.
     pub pixels: usize,
-    /// What it is, where a model of instances says so: the class it was seen as most.
+    /// Its class by a segmentation model, if there is one: the class with the most votes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<String>,
     /// Left, top, right, bottom of those pixels.
     pub bounds: Option<[u32; 4]>,
-    /// Which of the image's detections it is.
+    /// Its index among the image's detections.
     #[serde(skip)]
     pub detection: Option<usize>,
 }

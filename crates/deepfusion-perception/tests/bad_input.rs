@@ -1,4 +1,4 @@
-//! Depth images that are none.
+//! Invalid depth images.
 
 #![allow(
     clippy::unwrap_used,
@@ -45,13 +45,13 @@ fn both(depth: &DepthMap, k: &Intrinsics) {
     };
     for config in [PerceptionConfig::default(), with_rows] {
         let mut perception = Perception::new(config);
-        perception.look(depth, k, None).unwrap();
+        perception.detect(depth, k, None).unwrap();
         for time in 0..3 {
             let stamp = Stamp {
                 time_s: f64::from(time) * 0.1,
                 world_from_cam: Se3::identity(),
             };
-            let seen = perception.look(depth, k, Some(stamp)).unwrap();
+            let seen = perception.detect(depth, k, Some(stamp)).unwrap();
             for target in &seen.targets {
                 assert!(target.center_m.iter().all(|x| x.is_finite()), "{target:?}");
                 assert!(target.size_m.iter().all(|x| *x > 0.0), "{target:?}");
@@ -75,7 +75,7 @@ fn nothing_sky_one_point_and_nan_give_no_targets() {
     flat.data.fill(5.0);
     for depth in [&empty, &one, &nan, &infinite, &flat] {
         both(depth, &k);
-        let seen = Perception::new(PerceptionConfig::default()).look(depth, &k, None);
+        let seen = Perception::new(PerceptionConfig::default()).detect(depth, &k, None);
         assert_eq!(seen.unwrap().targets, []);
     }
 }
@@ -92,7 +92,7 @@ fn a_million_pixels_and_a_single_one_are_looked_at() {
 fn a_wall_across_the_road_is_no_target_and_the_road_is_found() {
     let k = camera(640, 192);
     let mut perception = Perception::new(PerceptionConfig::default());
-    let seen = perception.look(&road(&k, 2.2), &k, None).unwrap();
+    let seen = perception.detect(&road(&k, 2.2), &k, None).unwrap();
     let ground = seen.ground.unwrap();
     assert!((ground.camera_height_m - 1.6).abs() < 0.01, "{ground:?}");
     assert_eq!(seen.targets, []);
@@ -102,7 +102,9 @@ fn a_wall_across_the_road_is_no_target_and_the_road_is_found() {
 fn wrong_sizes_and_cameras_are_errors_with_hints() {
     let mut perception = Perception::new(PerceptionConfig::default());
     let depth = DepthMap::empty(64, 24);
-    let error = perception.look(&depth, &camera(32, 24), None).unwrap_err();
+    let error = perception
+        .detect(&depth, &camera(32, 24), None)
+        .unwrap_err();
     assert!(matches!(error, Error::Size { .. }), "{error}");
     assert!(
         error.to_string().contains("64x24") && error.hint().is_some(),
@@ -110,12 +112,12 @@ fn wrong_sizes_and_cameras_are_errors_with_hints() {
     );
     let mut short = depth.clone();
     short.data.pop();
-    assert!(perception.look(&short, &camera(64, 24), None).is_err());
+    assert!(perception.detect(&short, &camera(64, 24), None).is_err());
     let wrong = Intrinsics {
         fx: f64::NAN,
         ..camera(64, 24)
     };
-    let error = perception.look(&depth, &wrong, None).unwrap_err();
+    let error = perception.detect(&depth, &wrong, None).unwrap_err();
     assert!(matches!(error, Error::Camera(_)), "{error}");
 }
 
@@ -139,7 +141,7 @@ fn a_clock_that_jumps_begins_anew_and_ids_are_not_used_twice() {
             time_s,
             world_from_cam,
         };
-        let seen = perception.look(&depth, &k, Some(stamp)).unwrap();
+        let seen = perception.detect(&depth, &k, Some(stamp)).unwrap();
         assert_eq!(seen.targets.len(), 1, "{:?}", seen.targets);
         ids.push(seen.targets[0].id);
     }

@@ -39,7 +39,7 @@ fn targets_of_true_depth_are_where_the_simulator_put_them() {
 
 /// Cars doors to doors along an aisle, behind pillars: a row tells where those stand of which little is seen.
 #[test]
-fn rows_of_cars_in_a_garage_are_told_apart() {
+fn rows_of_cars_in_a_garage_are_separated() {
     let score = common::score(&[201, 202, 203, 204].map(|seed| drive(Scene::Garage, seed)));
     assert!(score.labels > 1000, "{score:?}");
     assert!(score.recall.unwrap() >= 0.85, "{score:?}");
@@ -80,7 +80,7 @@ fn rows_are_completed_where_they_are_asked_for() {
                 time_s: frame.time_s,
                 world_from_cam: frame.world_from_cam,
             };
-            let seen = perception.look(&frame.depth, &k, Some(stamp)).unwrap();
+            let seen = perception.detect(&frame.depth, &k, Some(stamp)).unwrap();
             let ground = seen.ground.unwrap();
             let (obstacles, config) = (perception.obstacles(), perception.config());
             let alone = detect(&frame.depth.data, obstacles, &[], &rays, &ground, config);

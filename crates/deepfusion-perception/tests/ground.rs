@@ -46,7 +46,7 @@ fn find(depth: &DepthMap) -> Ground {
     Ground::find(&depth.data, &Rays::of(&CAMERA), None, &config).unwrap()
 }
 
-/// Where a point of the road is said to lie above it, at distances forward of the camera.
+/// The estimated height of points of the road, at distances ahead of the camera.
 fn heights(ground: &Ground, height: impl Fn(f64) -> f64, camera_m: f64, pitch: f64) -> Vec<f32> {
     let (sin, cos) = f64::sin_cos(pitch);
     [6.0, 12.0, 20.0, 30.0]

@@ -1,4 +1,4 @@
-//! Masks of somebody's model beside depth: what touches is told apart, and keeps its class.
+//! Masks of a segmentation model with depth: touching objects are separated and keep their classes.
 
 #[path = "common/blocks.rs"]
 mod blocks;
@@ -38,12 +38,12 @@ fn near(targets: &[Target], x: f64) -> Option<&Target> {
 }
 
 #[test]
-fn what_touches_is_told_apart_by_its_masks() {
+fn what_touches_is_separated_by_its_masks() {
     let (depth, seen) = scene(&CARS);
     let mut perception = Perception::new(PerceptionConfig::default());
     let masks = [mask(&seen, 0, "car"), mask(&seen, 1, "van")];
     let found = perception
-        .look_with(&depth, &camera(), None, &masks)
+        .detect_with_instances(&depth, &camera(), None, &masks)
         .unwrap()
         .targets;
     assert_eq!(found.len(), 2, "{found:#?}");
@@ -55,7 +55,7 @@ fn what_touches_is_told_apart_by_its_masks() {
     }
     // Of one alone, the other is still found by its depth, and nobody says what it is.
     let found = perception
-        .look_with(&depth, &camera(), None, &masks[..1])
+        .detect_with_instances(&depth, &camera(), None, &masks[..1])
         .unwrap()
         .targets;
     assert_eq!(found.len(), 2);
@@ -71,7 +71,7 @@ fn what_touches_is_told_apart_by_its_masks() {
         })
         .collect();
     let found = perception
-        .look_with(&depth, &camera(), None, &[road])
+        .detect_with_instances(&depth, &camera(), None, &[road])
         .unwrap()
         .targets;
     assert!(found.iter().all(|t| t.class.is_none()), "{found:?}");
@@ -100,7 +100,7 @@ fn a_track_keeps_the_class_it_was_seen_as_most() {
             .into_iter()
             .collect();
         let found = perception
-            .look_with(&depth, &camera(), Some(stamp), &masks)
+            .detect_with_instances(&depth, &camera(), Some(stamp), &masks)
             .unwrap();
         last = found.targets;
     }
@@ -119,7 +119,7 @@ fn masks_of_another_size_are_refused() {
     });
     let mut perception = Perception::new(PerceptionConfig::default());
     let error = perception
-        .look_with(&depth, &camera(), None, &[wrong])
+        .detect_with_instances(&depth, &camera(), None, &[wrong])
         .unwrap_err();
     assert!(
         matches!(error, Error::Instance { .. }) && error.hint().is_some(),

@@ -53,7 +53,7 @@ fn ten_thousand_frames_hold_no_more_than_a_thousand() {
             time_s: number as f64 * 0.1,
             world_from_cam: Se3::identity(),
         };
-        let seen = perception.look(&frame.depth, &k, Some(stamp)).unwrap();
+        let seen = perception.detect(&frame.depth, &k, Some(stamp)).unwrap();
         seen.targets.iter().map(|t| t.id).max()
     };
     for number in 0..1_000 {

@@ -1,4 +1,4 @@
-//! What depth is said to be worth, in targets and in how far off they may be found again.
+//! The standard deviation of depth, in targets and in the tracker's gate.
 
 #[path = "common/blocks.rs"]
 mod blocks;
@@ -46,12 +46,12 @@ fn a_target_says_what_its_distance_is_worth() {
     deviation.data[middle] = f32::NAN;
     for time in [None, stamp(0.0)] {
         let mut perception = Perception::new(PerceptionConfig::default());
-        let seen = perception.look_with_sigma(&depth, Some(&deviation), &k, time, &[]);
+        let seen = perception.detect_with_sigma(&depth, Some(&deviation), &k, time, &[]);
         let seen = seen.unwrap();
         let target = only(&seen);
         let share = target.sigma_m.unwrap() / target.distance_m;
         assert!((share - 0.07).abs() < 1e-4, "{share}");
-        let unsaid = perception.look(&depth, &k, stamp(0.1)).unwrap();
+        let unsaid = perception.detect(&depth, &k, stamp(0.1)).unwrap();
         assert!(unsaid.targets.iter().all(|t| t.sigma_m.is_none()));
     }
 }
@@ -68,7 +68,7 @@ fn what_is_unsure_may_be_found_farther_off() {
             let depth = if frame < 10 { &before } else { &after };
             let time = stamp(0.1 * f64::from(frame));
             let deviation = sigma(depth, share);
-            let seen = perception.look_with_sigma(depth, Some(&deviation), &k, time, &[]);
+            let seen = perception.detect_with_sigma(depth, Some(&deviation), &k, time, &[]);
             let targets = seen.unwrap().targets;
             targets.iter().find(|t| t.pixels > 0).unwrap().id
         });
@@ -86,7 +86,7 @@ fn a_sigma_of_another_size_is_refused() {
     let (depth, k) = (car(14.0), camera());
     let small = DepthMap::empty(64, 24);
     let error = Perception::new(PerceptionConfig::default())
-        .look_with_sigma(&depth, Some(&small), &k, None, &[])
+        .detect_with_sigma(&depth, Some(&small), &k, None, &[])
         .unwrap_err();
     assert!(
         matches!(

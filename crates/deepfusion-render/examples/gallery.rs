@@ -122,7 +122,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             &format!("{:.3}", report.unscaled.abs_rel),
         ),
         (
-            "trivial row",
+            "mean-depth baseline",
             &format!(
                 "{:.3}",
                 report.trivial.map_or(f64::NAN, |t| t.unscaled.abs_rel)

@@ -8,7 +8,7 @@ pub(crate) const PAPER: Rgb<u8> = Rgb([24, 24, 27]);
 pub(crate) const INK: Rgb<u8> = Rgb([228, 228, 231]);
 const GAP: u32 = 6;
 
-/// A picture with the words above it.
+/// A picture with its caption.
 #[derive(Debug, Clone)]
 pub struct Tile {
     /// What it shows.
@@ -59,8 +59,8 @@ pub fn sheet(tiles: &[Tile], columns: usize) -> RgbImage {
     out
 }
 
-/// Pictures of several models: a row an image, a column a model, the columns of all rows alike, with the depth scale's legend
-/// below. Captions are cut to their column.
+/// Pictures of several models: one row per image, one column per model, equal columns in all rows, with the depth scale's
+/// legend below. Captions are cut to their column.
 #[must_use]
 pub fn model_sheet(rows: &[Vec<Tile>], scale: &DepthScale) -> RgbImage {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);

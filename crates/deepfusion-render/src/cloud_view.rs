@@ -6,7 +6,7 @@ use crate::DepthScale;
 use crate::captioned::PAPER;
 use crate::text::{TextSize, draw_text};
 
-/// From where a cloud is looked at. The cloud is in the camera's axes: x right, y down, z forward, metres.
+/// A viewpoint of a cloud. The cloud is in the camera's axes: x right, y down, z forward, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CloudView {
     /// From straight above, a map: `ahead_m` metres ahead from bottom to top, with lines every ten metres.
@@ -16,9 +16,9 @@ pub enum CloudView {
     },
     /// In perspective from `eye_m`, looking at `at_m`, the picture's sides upright.
     Perspective {
-        /// Where the eye is.
+        /// Position of the eye.
         eye_m: [f64; 3],
-        /// What it looks at.
+        /// The point it looks at.
         at_m: [f64; 3],
         /// Field of view from left to right, in radians.
         fov_rad: f64,
@@ -45,8 +45,8 @@ impl CloudView {
 
 /// Draws a cloud, near points over far ones. Points without colour are coloured by distance.
 ///
-/// Each point is a square that is as large as the gap to its neighbours would be (about 7 cm per 10 m of the distance at
-/// which the camera saw it), within 1 to 6 pixels.
+/// Each point is a square as large as the gap to its neighbours (about 7 cm per 10 m of distance from the camera), 1 to
+/// 6 pixels wide.
 #[must_use]
 pub fn render_cloud(cloud: &PointCloud, view: &CloudView, width: u32, height: u32) -> RgbImage {
     let mut canvas = Canvas {

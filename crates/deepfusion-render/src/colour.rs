@@ -50,7 +50,7 @@ fn of(gradient: &dyn Gradient, t: f32) -> Rgb<u8> {
 /// Where there is no depth.
 pub(crate) const NOTHING: Rgb<u8> = Rgb([40, 40, 44]);
 
-/// How metres become colours: by their logarithm, red at `near_m`, blue at `far_m`, clamped beyond.
+/// The colour scale of depth: logarithmic, red at `near_m`, blue at `far_m`, clamped beyond.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthScale {
     /// Depth at the warm end, in metres.
@@ -70,7 +70,7 @@ impl Default for DepthScale {
 }
 
 impl DepthScale {
-    /// Where `depth_m` lies: 0 near, 1 far.
+    /// Position of `depth_m` on the scale: 0 near, 1 far.
     #[must_use]
     pub fn place(&self, depth_m: f32) -> f32 {
         ((depth_m / self.near_m).ln() / (self.far_m / self.near_m).ln()).clamp(0.0, 1.0)

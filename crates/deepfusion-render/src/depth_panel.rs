@@ -10,7 +10,7 @@ use crate::{ColourMap, Result};
 /// An error of this factor, up or down, has the strongest colour.
 const WORST_FACTOR: f32 = 1.5;
 
-/// What a training step saw and made of one image whose depth is known: planes of `width` × `height`, row by row.
+/// Input and output of a training step for one image with known depth: planes of `width` × `height`, row by row.
 #[derive(Debug, Clone, Copy)]
 pub struct DepthPanel<'a> {
     /// Width, in pixels.
@@ -21,7 +21,7 @@ pub struct DepthPanel<'a> {
     pub image: &'a [f32],
     /// The network's disparity, H×W.
     pub disparity: &'a [f32],
-    /// The true one, H×W, NaN where it is not known.
+    /// The true disparity, H×W, NaN where unknown.
     pub truth: &'a [f32],
     /// ln of predicted over true depth, H×W, 0 where nothing is known.
     pub error: &'a [f32],

@@ -9,8 +9,8 @@ use crate::{ColourMap, DepthScale, Result};
 const END: f32 = 0.3;
 
 /// Signed relative error (prediction − truth) / truth where there is ground truth, drawn on the darkened image with a
-/// legend: blue where the prediction is too near, red where it is too far, white where it is right; ±30 % at the ends.
-/// Dots grow with the image, since ground truth is sparse.
+/// legend: blue: the prediction is too near, red: too far, white: correct; ±30 % at the ends. Dots grow with the
+/// image, since ground truth is sparse.
 ///
 /// # Errors
 /// [`crate::Error::Size`] where a map has another size than the image.

@@ -7,7 +7,7 @@ use crate::error::require_size;
 /// An optical flow in the field's colours: the hue is the direction (red to the right, then yellow, green, blue
 /// clockwise), the saturation the length, full at the 98th percentile. White does not move.
 ///
-/// Gives the picture and the length that is full, in pixels.
+/// Returns the picture and the length of full saturation, in pixels.
 ///
 /// # Errors
 /// [`crate::Error::Size`] where `flow` is not 2×H×W.

@@ -2,8 +2,8 @@ use std::path::Path;
 
 use crate::{Error, Result};
 
-/// How a run learned: its `log.csv`, column by column. Any columns besides `step` and `split` are taken, so that logs of
-/// other versions are shown too.
+/// The learning curve of a run: its `log.csv`, column by column. Any columns besides `step` and `split` are accepted, so
+/// that logs of other versions are shown too.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LearningLog {
     columns: Vec<String>,
@@ -14,7 +14,7 @@ pub struct LearningLog {
 struct Row {
     step: f64,
     validation: bool,
-    /// In the order of the columns; NaN where a cell is empty or no number.
+    /// In the order of the columns; NaN where a cell is empty or does not parse.
     values: Vec<f64>,
 }
 
@@ -22,7 +22,7 @@ impl LearningLog {
     /// Reads a log.
     ///
     /// # Errors
-    /// [`Error::Data`] where the file cannot be read, [`Error::Log`] where it is no log.
+    /// [`Error::Data`] if the file cannot be read, [`Error::Log`] if it is not a log.
     pub fn read(path: &Path) -> Result<Self> {
         let text =
             std::fs::read_to_string(path).map_err(|e| deepfusion_data::Error::file(path, e))?;

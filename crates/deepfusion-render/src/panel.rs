@@ -6,7 +6,7 @@ use crate::error::require_size;
 use crate::flow_picture::flow_picture;
 use crate::{ColourMap, Result};
 
-/// What a training step saw and made of one pair: planes of `width` × `height`, row by row.
+/// Input and output of a training step for one pair: planes of `width` × `height`, row by row.
 #[derive(Debug, Clone, Copy)]
 pub struct SamplePanel<'a> {
     /// Width, in pixels.
@@ -21,16 +21,16 @@ pub struct SamplePanel<'a> {
     pub warped: &'a [f32],
     /// The photometric error of the warped frame, H×W.
     pub error: &'a [f32],
-    /// How much each pixel's warp counts in the loss, H×W: 1 yes, 0 masked out.
+    /// Weight of each pixel's warp in the loss, H×W: 1 used, 0 masked out.
     pub mask: &'a [f32],
     /// The optical flow to the source, 2×H×W in pixels, where one is learned.
     pub flow: Option<&'a [f32]>,
-    /// 1 where a pixel is taken to move by itself, H×W, where that is looked for.
+    /// 1 where a pixel counts as dynamic, H×W, if such pixels are masked.
     pub moving: Option<&'a [f32]>,
 }
 
-/// Image, disparity, warped source, error and mask (red: moves by itself) with their captions, and the flow where there
-/// is one, for the eye that watches a training.
+/// Image, disparity, warped source, error and mask (red: dynamic) with their captions, and the flow if there is one,
+/// for watching a training run.
 ///
 /// # Errors
 /// [`crate::Error::Size`] naming the part that has another size than the image.
@@ -179,7 +179,7 @@ mod tests {
         let drawn = sample_panel(&moving(&[1.0; 32])).unwrap();
         assert!(
             drawn.pixels().any(|p| p.0 == [200, 30, 30]),
-            "what moves is red"
+            "dynamic pixels are red"
         );
         assert!(
             drawn.pixels().any(|p| p.0[0] == 255 && p.0[2] == 0),

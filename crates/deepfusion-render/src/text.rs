@@ -9,10 +9,10 @@ use embedded_graphics::primitives::Rectangle;
 use embedded_graphics::text::{Baseline, Text};
 use image::{Rgb, RgbImage};
 
-/// Size of drawn text: a bitmap font has no sizes between.
+/// Size of drawn text: the sizes of the bitmap font.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum TextSize {
-    /// 6×10 pixels a letter.
+    /// 6×10 pixels per letter.
     Small,
     /// 7×13.
     Medium,
@@ -52,7 +52,7 @@ pub fn text_width(text: &str, size: TextSize) -> u32 {
     text.chars().count() as u32 * size.font().character_size.width
 }
 
-/// Draws a line of text (Latin letters) with its top left corner at (`x`, `y`); what lies outside the picture is cut off.
+/// Draws a line of text (Latin letters) with its top left corner at (`x`, `y`); parts outside the picture are cut off.
 pub fn draw_text(
     picture: &mut RgbImage,
     text: &str,

@@ -2,7 +2,7 @@ use std::fmt::Write as _;
 
 use crate::html::escape;
 
-/// Paths seen from above, as an SVG file of its own: one scale for both axes, and a bar that says which.
+/// Paths seen from above, as a separate SVG file: one scale for both axes, and a scale bar.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TopView {
     /// What it shows.

@@ -38,11 +38,11 @@ pub fn is_ros2_bag(path: &Path) -> bool {
 pub struct Ros2Bag {
     path: PathBuf,
     files: Vec<Box<dyn Storage>>,
-    /// Files that `metadata.yaml` names and that are not there.
+    /// Files that `metadata.yaml` names but that do not exist.
     missing: Vec<PathBuf>,
 }
 
-/// What a file is, by its name.
+/// The kind of a file, by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Mcap,
@@ -68,7 +68,7 @@ impl Kind {
 impl Ros2Bag {
     /// Opens a recording's folder, or one file of it. An MCAP file without a summary (its recorder was stopped) and a
     /// damaged one are scanned from the front to the break; a database that was cut off is read as far as it goes.
-    /// [`MessageSource::damage`] says so.
+    /// [`MessageSource::damage`] reports either.
     ///
     /// MCAP files are mapped: they must not be shortened while the bag is open.
     ///
@@ -107,7 +107,7 @@ impl Ros2Bag {
         self.channels().map(|channel| &channel.connection)
     }
 
-    /// How many messages the bag holds.
+    /// Number of messages in the bag.
     #[must_use]
     pub fn message_count(&self) -> u64 {
         self.connections().map(|c| c.count).sum()
@@ -167,7 +167,7 @@ impl MessageSource for Ros2Bag {
             let Some((first, last)) = file.range() else {
                 continue;
             };
-            if wanted.contains(&true) && selection.meets(first, last) {
+            if wanted.contains(&true) && selection.overlaps(first, last) {
                 waiting.push(Waiting {
                     first,
                     file: file.as_ref(),

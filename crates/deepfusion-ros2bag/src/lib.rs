@@ -1,15 +1,15 @@
-//! Bags of ROS 2 as the messages that `deepfusion-rosbag` knows.
+//! Reads bags of ROS 2 into the messages of `deepfusion-rosbag`.
 //!
 //! [`Ros2Bag::open`] takes a recording's folder (`metadata.yaml` and its files) or one of its files: MCAP or SQLite. It is
 //! a [`MessageSource`](deepfusion_rosbag::MessageSource): messages by topic and time, in time order, decoded as
-//! `deepfusion_rosbag::msg`'s types by name. ROS 2 has no MD5 of a type; a message of another definition shows by its
-//! length.
+//! `deepfusion_rosbag::msg`'s types by name. ROS 2 has no MD5 of a type; a different definition is noticed by the
+//! message's length.
 //!
-//! The way of a message: `metadata` (which files) → `storage` (what MCAP and SQLite have in common): `mcap` (`record` →
-//! `index`, or `scan` where there is none → `chunk` → `messages`) or `sqlite` → `bag` (all files in time order) →
+//! The path of a message: `metadata` (which files) → `storage` (what MCAP and SQLite have in common): `mcap` (`record`
+//! → `index`, or `scan` where there is none → `chunk` → `messages`) or `sqlite` → `bag` (all files in time order) →
 //! [`Message`](deepfusion_rosbag::Message), whose bytes are CDR.
 //!
-//! A crate of its own because it brings C code (SQLite, Zstandard) that a reader of ROS 1 needs none of.
+//! A separate crate, because it brings C code (SQLite, Zstandard) that a reader of ROS 1 does not need.
 
 mod bag;
 mod mcap;

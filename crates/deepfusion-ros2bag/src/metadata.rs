@@ -1,4 +1,4 @@
-//! `metadata.yaml`: which files a recording's folder holds. What is in them they say themselves.
+//! `metadata.yaml`: the list of files in a recording's folder. Their content is described by the files themselves.
 
 use crate::storage::error;
 use deepfusion_rosbag::{Error, Result};

@@ -14,12 +14,12 @@ use std::sync::Mutex;
 /// A database of messages, open for reading.
 pub(crate) struct SqliteFile {
     path: PathBuf,
-    /// One reader at a time: a connection is no thing to share.
+    /// One reader at a time: a connection cannot be shared.
     database: Mutex<Connection>,
     channels: Vec<Channel>,
     /// From a topic's number to its place in `channels`.
     places: HashMap<i64, usize>,
-    /// Every message in time order, where the database cannot order them itself: its index is missing, or it is damaged.
+    /// Every message in time order, if the database cannot order them itself: its index is missing, or it is damaged.
     listed: Option<Vec<Key>>,
     damage: Option<String>,
 }
@@ -28,7 +28,7 @@ impl SqliteFile {
     /// Opens a database; one that was cut off is read as far as it goes.
     ///
     /// # Errors
-    /// [`Error::Storage`] for a file that is no recorder's database.
+    /// [`Error::Storage`] for a file that is not a recorder's database.
     pub(crate) fn open(path: &Path) -> Result<Self> {
         std::fs::File::open(path).map_err(|e| Error::file(path, e))?;
         let failed = |e: rusqlite::Error| failed(path, &e);
@@ -43,7 +43,7 @@ impl SqliteFile {
         };
         match file.read_topics() {
             Err(e) if is_damage(&e) => {
-                // SQLite refuses a file that is shorter than it says, unless it is told that the file is being mended.
+                // SQLite refuses a file that is shorter than its header claims, except in recovery mode.
                 let database = file.database();
                 database
                     .execute_batch("PRAGMA writable_schema = ON")
@@ -87,7 +87,7 @@ impl SqliteFile {
         Ok(())
     }
 
-    /// Counts the messages; lists them where their order is not at hand.
+    /// Counts the messages; lists them if the database cannot order them.
     fn read_index(&mut self) -> Result<()> {
         let (keys, broken) = {
             let database = self.database();
@@ -127,15 +127,18 @@ impl SqliteFile {
             self.channels[key.topic as usize].add(Time::from_nanos(key.time));
         }
         if let Some(problem) = &mut self.damage {
-            let found = keys.len();
-            *problem = format!("the database is damaged ({problem}); {found} messages were found");
+            let found = match keys.len() {
+                1 => "1 message was found".to_owned(),
+                n => format!("{n} messages were found"),
+            };
+            *problem = format!("the database is damaged ({problem}); {found}");
         }
         self.listed = Some(keys);
         Ok(())
     }
 }
 
-/// Opens the file for reading only; what a recorder left in its journal is taken in, where there is one.
+/// Opens the file read-only, including what a recorder left in its journal.
 fn connect(path: &Path) -> rusqlite::Result<Connection> {
     let beside = |ending: &str| {
         let mut name = path.as_os_str().to_owned();
@@ -158,7 +161,7 @@ fn connect(path: &Path) -> rusqlite::Result<Connection> {
     Ok(database)
 }
 
-/// The path as SQLite's URI for a file that does not change; `None` for a path that is no text.
+/// The path as SQLite's URI for a file that does not change; `None` for a path that is not Unicode.
 fn uri(path: &Path) -> Option<String> {
     let absolute = std::path::absolute(path).ok()?;
     let mut uri = String::from("file:");

@@ -1,4 +1,4 @@
-//! What a file of either kind gives.
+//! The common interface of both kinds of file.
 
 use deepfusion_rosbag::{
     Connection, Error, MessageIter, Selection, Serialization, Time, TopicInfo,
@@ -9,7 +9,7 @@ use std::path::Path;
 /// The largest chunk or message that is read, in bytes: what a damaged or hostile file can make one take.
 pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
-/// The remedy for what a copy gone wrong looks like.
+/// The remedy for damage typical of an incomplete copy.
 pub(crate) const COPY_AGAIN: &str = "copy the file again; what can be read of it is";
 
 /// A file of a bag.

@@ -1,4 +1,4 @@
-//! Chunks decompressed ahead of need, on threads of their own.
+//! Decompresses chunks ahead of need, on its own threads.
 
 use crate::buffer::Pool;
 use crate::content::{self, Opened};
@@ -31,7 +31,7 @@ pub(crate) struct Ahead {
     limit: usize,
     threads: usize,
     pool: Arc<Pool>,
-    /// Both ends of the queue: the second is for taking back what nobody needs any more.
+    /// Both ends of the queue: the second is for withdrawing jobs that are no longer needed.
     queue: Option<(Sender<Job>, Receiver<Job>)>,
     workers: Vec<JoinHandle<()>>,
 }
@@ -49,7 +49,7 @@ impl Ahead {
         }
     }
 
-    /// Begins to open a chunk, where that is work; the threads start with the first one that is.
+    /// Starts to open a chunk if that takes work; the threads start with the first such chunk.
     pub fn submit(&mut self, info: &ChunkInfo) -> Ticket {
         if self.threads == 0 || !content::is_compressed(&self.source, info) {
             return Ticket::OnDemand;

@@ -14,16 +14,17 @@ use std::sync::Arc;
 const MAGIC: &[u8] = b"#ROSBAG V";
 const VERSION: &[u8] = b"2.0\n";
 
-/// How a bag is opened.
+/// Options for opening a bag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BagOptions {
-    /// The largest chunk that is decompressed, in bytes: what a damaged or hostile file can make one chunk take.
-    /// Recorders make chunks of 768 KiB, or of one message where that is larger. 1 GiB by default.
+    /// The largest chunk that is decompressed, in bytes: a limit on the memory that a damaged or hostile file
+    /// can claim for a chunk. Recorders make chunks of 768 KiB, or of one message if that is larger. 1 GiB by
+    /// default.
     pub max_chunk_bytes: u64,
-    /// Threads that decompress chunks ahead, for each reading; 0 decompresses where a message is asked for. By default
-    /// as many as the machine runs at once. Bags without compression need none and start none.
+    /// Threads that decompress chunks ahead, for each iteration; 0 decompresses on demand. By default as many as the
+    /// machine has. Bags without compression start none.
     pub threads: usize,
-    /// Read the file from the front instead of by its index: for bags whose index is wrong.
+    /// Read the file from the front instead of by its index: for bags with a wrong index.
     pub ignore_index: bool,
 }
 
@@ -74,7 +75,7 @@ impl std::fmt::Debug for Bag {
 
 impl Bag {
     /// Opens a bag by its index, without touching its chunks. A bag whose index is missing or damaged is scanned from
-    /// the front to its break, and [`Bag::damage`] says so.
+    /// the front to the break, and [`Bag::damage`] reports it.
     ///
     /// The file is mapped: it must not be shortened while the bag is open (the system then ends the process). A bag
     /// that is still being recorded can be opened; what was appended later is not seen.
@@ -93,7 +94,7 @@ impl Bag {
         Self::new(Source::map(path.as_ref())?, options)
     }
 
-    /// A bag that is in memory; `name` stands for its path in errors.
+    /// Opens a bag in memory; `name` is used as its path in errors.
     ///
     /// # Errors
     /// As [`Bag::open`].
@@ -140,14 +141,14 @@ impl Bag {
         &self.index.connections
     }
 
-    /// What is wrong with the bag, where its index could not be used. `None` does not say that every chunk is sound:
-    /// they are looked at when read.
+    /// The damage of a bag whose index could not be used. `None` does not mean that every chunk is intact: chunks
+    /// are checked when read.
     #[must_use]
     pub fn damage(&self) -> Option<&Damage> {
         self.damage.as_ref()
     }
 
-    /// How many messages the bag holds.
+    /// Number of messages in the bag.
     #[must_use]
     pub fn message_count(&self) -> u64 {
         self.connections().iter().map(|c| c.count).sum()
@@ -171,7 +172,7 @@ impl Bag {
     /// a topic's first and last message.
     ///
     /// # Errors
-    /// [`Error::Chunk`] where that index data is damaged.
+    /// [`Error::Chunk`] if that index data is damaged.
     pub fn topics(&self) -> Result<Vec<TopicInfo>> {
         topic::topics(self)
     }
@@ -179,7 +180,7 @@ impl Bag {
     /// The messages that `selection` asks for, in time order.
     ///
     /// # Errors
-    /// [`Error::NoSuchTopic`], naming the topics there are.
+    /// [`Error::NoSuchTopic`], naming the available topics.
     pub fn messages(&self, selection: Selection) -> Result<Messages<'_>> {
         Messages::new(self, selection)
     }

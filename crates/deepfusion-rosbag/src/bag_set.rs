@@ -13,7 +13,7 @@ use std::path::Path;
 pub struct BagSet {
     bags: Vec<Bag>,
     connections: Vec<Connection>,
-    /// For each bag, from a connection's place in it to the place in `connections`.
+    /// For each bag, from a connection's index in it to the index in `connections`.
     places: Vec<Vec<u32>>,
 }
 
@@ -38,7 +38,7 @@ impl BagSet {
         Self::new(bags.collect::<Result<_>>()?)
     }
 
-    /// A set of bags that are open.
+    /// A set of open bags.
     ///
     /// # Errors
     /// [`Error::EmptySet`].
@@ -77,13 +77,13 @@ impl BagSet {
         &self.bags
     }
 
-    /// The merged connections; `id` is the place in this list.
+    /// The merged connections; `id` is the index in this list.
     #[must_use]
     pub fn connections(&self) -> &[Connection] {
         &self.connections
     }
 
-    /// How many messages all bags hold.
+    /// Number of messages in all bags.
     #[must_use]
     pub fn message_count(&self) -> u64 {
         self.bags.iter().map(Bag::message_count).sum()
@@ -130,7 +130,7 @@ impl BagSet {
             .filter_map(|bag| Some((self.bags[bag].time_range()?.0, bag)))
             .collect();
         waiting.sort_unstable();
-        let start = |(first, bag): (Time, usize)| Part {
+        let start = |(first, bag): (Time, usize)| BagMessages {
             first,
             bag,
             messages: Messages::of(
@@ -152,16 +152,16 @@ fn hull(ranges: impl Iterator<Item = (Time, Time)>) -> Option<(Time, Time)> {
     ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-/// The messages of a [`BagSet`] in time order; see [`Messages`] for errors. Memory is that of every bag whose times
-/// overlap.
+/// The messages of a [`BagSet`] in time order; see [`Messages`] for errors. It uses the memory of all bags whose
+/// times overlap.
 pub struct SetMessages<'set> {
     set: &'set BagSet,
     /// Bags not begun, by their first message.
-    waiting: VecDeque<Part<'set>>,
-    active: Vec<Part<'set>>,
+    waiting: VecDeque<BagMessages<'set>>,
+    active: Vec<BagMessages<'set>>,
 }
 
-struct Part<'set> {
+struct BagMessages<'set> {
     first: Time,
     bag: usize,
     messages: Messages<'set>,
@@ -174,15 +174,24 @@ impl<'set> Iterator for SetMessages<'set> {
         loop {
             // A bag that is through gives back its threads.
             self.active
-                .retain_mut(|part| part.messages.next_time().is_some());
-            let time =
-                |part: &mut Part<'set>| part.messages.next_time().map(|time| (time, part.bag));
+                .retain_mut(|bag_messages| bag_messages.messages.next_time().is_some());
+            let time = |bag_messages: &mut BagMessages<'set>| {
+                bag_messages
+                    .messages
+                    .next_time()
+                    .map(|time| (time, bag_messages.bag))
+            };
             let earliest = self.active.iter_mut().filter_map(time).min();
             match (earliest, self.waiting.front()) {
                 (None, None) => return None,
-                (Some((time, bag)), front) if front.is_none_or(|part| part.first > time) => {
-                    let part = self.active.iter_mut().find(|part| part.bag == bag)?;
-                    let message = part.messages.next()?;
+                (Some((time, bag)), front)
+                    if front.is_none_or(|bag_messages| bag_messages.first > time) =>
+                {
+                    let bag_messages = self
+                        .active
+                        .iter_mut()
+                        .find(|bag_messages| bag_messages.bag == bag)?;
+                    let message = bag_messages.messages.next()?;
                     return Some(message.map(|message| self.merged(message, bag)));
                 }
                 _ => self.active.extend(self.waiting.pop_front()),

@@ -1,4 +1,4 @@
-//! Buffers for decompressed chunks, used again: a fresh one costs the system a page fault every 4 KiB.
+//! Reusable buffers for decompressed chunks: a fresh one costs a page fault per 4 KiB.
 
 use std::ops::Deref;
 use std::sync::{Arc, Mutex};

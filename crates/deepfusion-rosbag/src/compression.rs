@@ -1,4 +1,4 @@
-//! LZ4 frames and bzip2, both ways.
+//! Compression and decompression of LZ4 frames and bzip2.
 
 use crate::buffer::Buffer;
 use crate::lz4_frame;
@@ -8,10 +8,10 @@ use lz4_flex::frame::{BlockMode, BlockSize, FrameEncoder, FrameInfo};
 use std::borrow::Cow;
 use std::io::{self, Read, Write};
 
-/// How a chunk's bytes are compressed.
+/// The compression of a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Compression {
-    /// Not at all: read without copying.
+    /// None: read without copying.
     #[default]
     None,
     /// LZ4 frames: fast both ways.

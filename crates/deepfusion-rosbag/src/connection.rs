@@ -1,10 +1,10 @@
 use crate::error::Fault;
 use crate::record::{Fields, Record};
 
-/// A topic as one publisher filled it: what the messages of a connection are.
+/// A connection: a topic as published by one node.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Connection {
-    /// The number its messages carry in the file. In a [`BagSet`](crate::BagSet) its place in the set's list.
+    /// The number its messages carry in the file; in a [`BagSet`](crate::BagSet) its index in the set's list.
     pub id: u32,
     /// The topic, with its leading slash as recorded.
     pub topic: String,
@@ -14,11 +14,11 @@ pub struct Connection {
     pub md5: String,
     /// The definition: the type's fields, then those of every type it uses.
     pub definition: String,
-    /// The node that published, where it was recorded.
+    /// The publishing node, if it was recorded.
     pub caller_id: Option<String>,
-    /// Whether new subscribers got the last message again.
+    /// Whether the topic is latched: new subscribers receive the last message again.
     pub latching: bool,
-    /// How many messages the bag holds.
+    /// Number of its messages in the bag.
     pub count: u64,
 }
 

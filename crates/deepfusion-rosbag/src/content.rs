@@ -1,4 +1,4 @@
-//! A chunk made readable: its bytes in the file, or a buffer that lives as long as somebody holds it.
+//! A readable chunk: its bytes in the file, or a reference-counted buffer.
 
 use crate::buffer::{Buffer, Pool};
 use crate::chunk::Chunk;

@@ -1,4 +1,4 @@
-//! Records as they are written; [`record`](crate::record) reads them.
+//! Encodes records; [`record`](crate::record) reads them.
 
 use crate::Time;
 use crate::record::op;

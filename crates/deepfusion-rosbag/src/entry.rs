@@ -1,4 +1,4 @@
-//! Where a chunk's messages are: from the index data behind it, or by walking through its content.
+//! The positions of a chunk's messages, from the index data behind it or by walking through its content.
 
 use crate::Time;
 use crate::connection::Connection;

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 /// The bag header record, the first of the file.
 pub(crate) struct BagHeader {
-    /// Where the index begins; 0 where the recorder never came to write it.
+    /// Start of the index; 0 if the recorder never wrote it.
     pub index_pos: u64,
     pub connections: u32,
     pub chunks: u32,
@@ -60,7 +60,7 @@ pub(crate) struct Index {
 }
 
 impl Index {
-    /// The index section that `header` points to. The counts are not trusted: memory is taken record by record.
+    /// The index section that `header` points to. The counts are not trusted: memory is allocated record by record.
     pub fn read(bytes: &[u8], header: &BagHeader) -> Result<Self, Fault> {
         let mut index = Self::default();
         let mut at = usize::try_from(header.index_pos).unwrap_or(usize::MAX);

@@ -1,14 +1,14 @@
-//! ROS 1 bags (format 2.0): reader, writer, and the messages of a vehicle's recording.
+//! ROS 1 bags (format 2.0): reader, writer, and the message types of a vehicle's recording.
 //!
-//! [`Bag::open`] reads a bag's index; [`Bag::messages`] gives the messages that a [`Selection`] asks for, in time order,
-//! raw or decoded as one of [`msg`]'s types. [`BagSet`] reads several bags as one. [`BagWriter`] writes.
+//! [`Bag::open`] reads a bag's index; [`Bag::messages`] yields the messages of a [`Selection`] in time order, raw or
+//! decoded as one of [`msg`]'s types. [`BagSet`] reads several bags as one. [`BagWriter`] writes.
 //!
-//! The way of a message: `record` (a file's building block) → `index` (where chunks are; `scan` where there is none) →
-//! `chunk` and `content` (its bytes, decompressed `ahead`) → `entry` (where its messages are) → [`Messages`] (in time
-//! order) → [`Message`] → `msg`. The format: <http://wiki.ros.org/Bags/Format/2.0>.
+//! The path of a message: `record` (a file's building block) → `index` (where chunks are; `scan` where there is none)
+//! → `chunk` and `content` (its bytes, decompressed `ahead`) → `entry` (where its messages are) → [`Messages`] (in
+//! time order) → [`Message`] → `msg`. The format: <http://wiki.ros.org/Bags/Format/2.0>.
 //!
-//! [`MessageSource`] is what recordings of any format have in common; `deepfusion-ros2bag` reads those of ROS 2 to the
-//! same [`Message`] and the same types.
+//! [`MessageSource`] is the common interface of recordings of any format; `deepfusion-ros2bag` reads those of ROS 2
+//! into the same [`Message`] and the same types.
 
 mod ahead;
 mod bag;

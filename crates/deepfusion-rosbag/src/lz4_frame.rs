@@ -1,7 +1,7 @@
-//! LZ4's frame around its blocks: <https://github.com/lz4/lz4/blob/dev/doc/lz4_Frame_format.md>.
+//! LZ4's frame format: <https://github.com/lz4/lz4/blob/dev/doc/lz4_Frame_format.md>.
 //!
-//! `lz4_flex` has a decoder of frames, too; it goes through two buffers of its own. Here blocks are unpacked straight to
-//! where they stay.
+//! `lz4_flex` also decodes frames, but through two buffers of its own. Here blocks are decompressed directly to their
+//! destination.
 
 use crate::buffer::Buffer;
 use lz4_flex::block::{decompress_into, decompress_into_with_dict};

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A recorded message: who said it, when, and its bytes.
+/// A recorded message: its connection, its time, and its bytes.
 ///
 /// It borrows the bag. Of a compressed chunk it keeps the whole decompressed chunk alive (768 KiB by default): keep
 /// what you decode rather than many messages.
@@ -30,18 +30,18 @@ pub(crate) enum Payload<'bag> {
     Held(Arc<Vec<u8>>, Range<usize>),
 }
 
-/// How a message's fields became bytes.
+/// The serialisation format of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Serialization {
     /// ROS 1: little-endian, without padding.
     Ros1,
-    /// ROS 2: CDR, which says its byte order itself.
+    /// ROS 2: CDR, which states its own byte order.
     Cdr,
 }
 
 impl<'bag> Message<'bag> {
     /// A message from a recording of another format than [`Bag`](crate::Bag)'s: its bytes are `range` of `held`.
-    /// `connection`'s MD5 is `*` where that format knows none.
+    /// `connection`'s MD5 is `*` if that format has none.
     ///
     /// # Panics
     /// If `range` lies outside of `held`.
@@ -67,7 +67,7 @@ impl<'bag> Message<'bag> {
         }
     }
 
-    /// As [`Message::held`], with its bytes in what lives as long as the recording, such as a mapped file.
+    /// As [`Message::held`], with its bytes in memory that lives as long as the recording, such as a mapped file.
     #[must_use]
     pub fn stored(
         path: &'bag Path,
@@ -85,7 +85,7 @@ impl<'bag> Message<'bag> {
         }
     }
 
-    /// The connection it came by: topic, type, definition.
+    /// Its connection: topic, type, definition.
     #[must_use]
     pub fn connection(&self) -> &'bag Connection {
         self.connection
@@ -97,13 +97,13 @@ impl<'bag> Message<'bag> {
         &self.connection.topic
     }
 
-    /// When it was recorded, by the recorder's clock. When it was measured stands in the message's own header.
+    /// The time of recording, by the recorder's clock. The time of measurement is in the message's own header.
     #[must_use]
     pub fn time(&self) -> Time {
         self.time
     }
 
-    /// Its bytes as they were sent.
+    /// Its serialised bytes.
     #[must_use]
     pub fn data(&self) -> &[u8] {
         match &self.payload {
@@ -113,14 +113,14 @@ impl<'bag> Message<'bag> {
         }
     }
 
-    /// How its fields became these bytes.
+    /// The serialisation format of its bytes.
     #[must_use]
     pub fn serialization(&self) -> Serialization {
         self.serialization
     }
 
-    /// When it was measured, of a message that begins with a header, without decoding it; `None` where that is not set,
-    /// or the message is too short for it.
+    /// The header's time of measurement, without decoding the message, which must begin with a header; `None` if it is
+    /// not set, or the message is too short.
     #[must_use]
     pub fn header_stamp(&self) -> Option<Time> {
         let data = self.data();
@@ -151,11 +151,11 @@ impl<'bag> Message<'bag> {
         self.connection.type_name == T::TYPE && (md5 == T::MD5 || md5 == "*")
     }
 
-    /// The message as a `T`. Pixels and points are borrowed from it, all else is copied.
+    /// Decodes the message as a `T`. Pixels and points are borrowed, everything else is copied.
     ///
     /// # Errors
-    /// [`Error::WrongType`] where the connection has another type or another version of it, [`Error::Message`] naming
-    /// the field where the bytes do not fit the type.
+    /// [`Error::WrongType`] if the connection has another type or another version of it, [`Error::Message`] naming
+    /// the field if the bytes do not fit the type.
     pub fn decode<'m, T: RosMessage<'m>>(&'m self) -> Result<T> {
         if !self.is::<T>() {
             return Err(self.wrong_type::<T>());

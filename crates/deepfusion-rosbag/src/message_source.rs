@@ -6,12 +6,12 @@ use crate::{Result, Selection, Time};
 use std::fmt;
 use std::path::Path;
 
-/// Messages in time order, with what could not be read between them.
+/// Messages in time order, with errors for those that cannot be read.
 pub type MessageIter<'a> = Box<dyn Iterator<Item = Result<Message<'a>>> + 'a>;
 
-/// A recording of messages by topic and time, whatever its format: [`Bag`] is one, a bag of ROS 2 another.
+/// A recording of messages by topic and time, in any format: a [`Bag`], or a bag of ROS 2.
 ///
-/// What is read from it can be read from several threads at once.
+/// Several threads may read from it at once.
 pub trait MessageSource: fmt::Debug + Send + Sync {
     /// The recording's file or folder.
     fn path(&self) -> &Path;

@@ -13,22 +13,23 @@ use std::collections::{BinaryHeap, VecDeque, binary_heap::PeekMut};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// The messages of a [`Bag`] that a [`Selection`] asks for, in time order; of equal times, in the file's order.
+/// The messages of a [`Bag`] in a [`Selection`], in time order; with equal times, in the file's order.
 ///
-/// An error names what is wrong with one chunk or one message; the iterator goes on behind it, so that a caller may
-/// stop there (`?`) or count and continue.
+/// An error is about one chunk or one message; the iterator continues behind it, so that a caller may stop there
+/// (`?`) or count and continue.
 ///
-/// Memory: a chunk is decompressed shortly before its first message and released after its last. Held at one time are
-/// the chunks whose times overlap, up to two a thread decompressed ahead, and those that the caller's messages keep;
-/// of each open chunk 16 bytes a message. The rest is the file's mapping, which the system can drop at any time.
+/// Memory: a chunk is decompressed shortly before its first message and released after its last. In memory at one
+/// time are the chunks whose times overlap, up to two per thread decompressed ahead, those that the caller's messages
+/// keep alive, and 16 bytes per message of each open chunk. The rest is the file's mapping, which the system can drop
+/// at any time.
 pub struct Messages<'bag> {
     bag: &'bag Bag,
     wanted: Vec<bool>,
     selection: Selection,
     /// Chunks not open yet, by their first message's time.
     waiting: VecDeque<Waiting<'bag>>,
-    /// How many of `waiting`'s first have been submitted, and how many may be: it grows from one, so that asking for a
-    /// single message does not unpack many chunks.
+    /// How many chunks at the front of `waiting` have been submitted, and how many may be: it grows from one, so that
+    /// a request for a single message does not decompress many chunks.
     submitted: usize,
     window: usize,
     ahead: Ahead,
@@ -71,7 +72,7 @@ impl<'bag> Messages<'bag> {
         let mut chunks: Vec<_> = bag
             .chunks()
             .iter()
-            .filter(|info| selection.meets(info.first, info.last))
+            .filter(|info| selection.overlaps(info.first, info.last))
             .filter(|info| {
                 info.counts
                     .iter()
@@ -160,7 +161,7 @@ impl<'bag> Messages<'bag> {
                 problem,
             });
         }
-        entries.retain(|e| wanted(e.connection) && self.selection.holds(e.time));
+        entries.retain(|e| wanted(e.connection) && self.selection.contains(e.time));
         entries.sort_by_key(|e| (e.time, e.offset));
         let first = entries.first().map(|e| e.time);
         Ok(first.map(|time| OpenChunk {

@@ -22,7 +22,7 @@ pub(crate) struct Record<'a> {
     pub fields: Fields<'a>,
     /// Where its data begins.
     pub data_at: usize,
-    /// How long its data claims to be; [`Record::read`] has checked it, [`Record::read_header`] has not.
+    /// The stated length of its data; [`Record::read`] has checked it, [`Record::read_header`] has not.
     pub data_len: usize,
     pub data: &'a [u8],
 }
@@ -42,7 +42,7 @@ impl<'a> Record<'a> {
         Ok(record)
     }
 
-    /// The record at `at` with what there is of its data.
+    /// The record at `at` with the part of its data that is there.
     pub fn read_header(bytes: &'a [u8], at: usize) -> Result<Self, Fault> {
         let cut = |what: &str| {
             Fault::new(

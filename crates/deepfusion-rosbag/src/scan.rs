@@ -14,17 +14,17 @@ use rayon::prelude::*;
 use std::fmt;
 use std::sync::Arc;
 
-/// What is wrong with a bag that was scanned instead of opened by its index.
+/// The damage of a bag that was scanned instead of opened by its index.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Damage {
     /// The byte of the file where its records end, or the first one that cannot be read.
     pub offset: u64,
-    /// What is wrong there.
+    /// The problem there.
     pub what: String,
-    /// How many chunks the bag's header counts beyond those found; `None` where the recorder never wrote the count.
+    /// Number of chunks in the bag's header beyond those found; `None` if the recorder never wrote the count.
     pub chunks_lost: Option<u64>,
-    /// How many messages were found and cannot be told, because the record of their connection is lost. Messages that
-    /// were never written, or lie behind the break, are in no count.
+    /// Number of messages found that cannot be assigned, because the record of their connection is lost. Messages
+    /// that were never written, or lie behind the break, are not counted.
     pub messages_without_connection: u64,
 }
 
@@ -33,16 +33,18 @@ impl fmt::Display for Damage {
         write!(f, "byte {}: {}", self.offset, self.what)?;
         match self.chunks_lost {
             Some(0) | None => {}
+            Some(1) => write!(f, "; 1 chunk is lost")?,
             Some(n) => write!(f, "; {n} chunks are lost")?,
         }
         match self.messages_without_connection {
             0 => Ok(()),
+            1 => write!(f, "; 1 message belongs to a connection that is lost"),
             n => write!(f, "; {n} messages belong to connections that are lost"),
         }
     }
 }
 
-/// What scanning found: an index of its own, and the first break.
+/// The result of a scan: an index, and the first break.
 pub(crate) struct Scan {
     pub index: Index,
     pub broken: Option<Fault>,

@@ -3,7 +3,7 @@ use crate::{Error, Result, Time};
 use std::ops::Bound;
 use std::path::Path;
 
-/// Which messages to read: of all topics and all times unless narrowed.
+/// A selection of messages: all topics and all times unless narrowed.
 ///
 /// ```
 /// use deepfusion_rosbag::{Selection, Time};
@@ -34,7 +34,7 @@ impl Selection {
         }
     }
 
-    /// The messages of these topics, by their whole names. A topic that is not there is an error when reading begins.
+    /// The messages of these topics, by their full names. A topic that does not exist is an error when reading begins.
     #[must_use]
     pub fn topics<T: Into<String>>(topics: impl IntoIterator<Item = T>) -> Self {
         Self {
@@ -58,15 +58,15 @@ impl Selection {
         }
     }
 
-    /// Whether a message recorded at `time` is wanted.
+    /// Whether a message recorded at `time` is selected.
     #[must_use]
-    pub fn holds(&self, time: Time) -> bool {
+    pub fn contains(&self, time: Time) -> bool {
         self.from <= time && self.is_before_end(time)
     }
 
-    /// Whether anything of a stretch from `first` to `last` can be wanted.
+    /// Whether the interval from `first` to `last` overlaps the selected times.
     #[must_use]
-    pub fn meets(&self, first: Time, last: Time) -> bool {
+    pub fn overlaps(&self, first: Time, last: Time) -> bool {
         self.from <= last && self.is_before_end(first)
     }
 
@@ -84,7 +84,7 @@ impl Selection {
         self.from
     }
 
-    /// Which of `connections` are wanted, by place, for readers of other formats.
+    /// Which of `connections` are selected, by index, for readers of other formats.
     ///
     /// # Errors
     /// [`Error::NoSuchTopic`] for a topic that none of them has.

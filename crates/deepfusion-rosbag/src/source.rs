@@ -1,4 +1,4 @@
-//! Where a bag's bytes are: mapped from a file, or in memory.
+//! A bag's bytes: mapped from a file, or in memory.
 
 use crate::{Error, Result};
 use memmap2::{Advice, Mmap};

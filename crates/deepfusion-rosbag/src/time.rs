@@ -3,13 +3,13 @@ use std::fmt;
 
 const NANOS: u64 = 1_000_000_000;
 
-/// A ROS 1 time stamp: seconds and nanoseconds since the Unix epoch (or since the start of a simulation), as they
-/// stand in the file.
+/// A ROS 1 time stamp: seconds and nanoseconds since the Unix epoch (or since the start of a simulation), as
+/// stored in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Time {
     /// Whole seconds.
     pub sec: u32,
-    /// Nanoseconds on top; below 10⁹ in sound files, but nothing enforces it.
+    /// Additional nanoseconds; below 10⁹ in valid files, but nothing enforces it.
     pub nsec: u32,
 }
 

@@ -7,26 +7,26 @@ use crate::error::Fault;
 use crate::index::ChunkInfo;
 use crate::{Error, Result, Time, content};
 
-/// What a bag holds of a topic.
+/// A topic's content in a bag.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TopicInfo {
     /// Its name.
     pub name: String,
-    /// Its message type; of several connections with different types, the first one's.
+    /// Its message type; that of the first connection if they differ.
     pub type_name: String,
     /// The MD5 of that type's definition.
     pub md5: String,
-    /// How many connections, that is publishers, it has.
+    /// Number of connections, that is publishers.
     pub connections: usize,
-    /// How many messages.
+    /// Number of messages.
     pub count: u64,
     /// The recording times of its first and last message; `None` without any.
     pub range: Option<(Time, Time)>,
 }
 
 impl TopicInfo {
-    /// Messages a second: their number less one over the time between the first and the last, in Hz. `None` for fewer
-    /// than two messages, or all at one time.
+    /// Message rate in Hz: their number minus one over the time between the first and the last. `None` for fewer than
+    /// two messages, or all at one time.
     #[must_use]
     pub fn rate_hz(&self) -> Option<f64> {
         let (first, last) = self.range?;

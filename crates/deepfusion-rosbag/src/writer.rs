@@ -12,12 +12,12 @@ use std::path::{Path, PathBuf};
 /// Offsets within a chunk are 32-bit, and other readers hold a chunk's length in an i32.
 const LARGEST_CHUNK: usize = i32::MAX as usize;
 
-/// How a bag is written.
+/// Options for writing a bag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WriterOptions {
-    /// How chunks are compressed.
+    /// The compression of chunks.
     pub compression: Compression,
-    /// The size from which a chunk is closed, in bytes before compression: 768 KiB, as ROS's recorder has it.
+    /// The size from which a chunk is closed, in bytes before compression: 768 KiB, as in ROS's recorder.
     pub chunk_bytes: usize,
 }
 
@@ -36,8 +36,8 @@ pub struct ConnectionId(u32);
 
 /// Writes a bag. The same calls give the same bytes.
 ///
-/// The bag appears under its name when [`BagWriter::finish`] has written the index; a writer that is dropped before
-/// leaves nothing behind. Memory: one chunk, and 12 bytes a message of it.
+/// The bag gets its name when [`BagWriter::finish`] has written the index; a writer that is dropped before leaves
+/// nothing behind. Memory: one chunk, and 12 bytes per message in it.
 ///
 /// ```no_run
 /// use deepfusion_rosbag::{BagWriter, Time, WriterOptions, msg::Float32};
@@ -100,7 +100,7 @@ impl BagWriter {
         Ok(writer)
     }
 
-    /// Adds a topic of a known type. Each call is a connection of its own, even to the same topic.
+    /// Adds a topic of a known type. Each call adds a separate connection, even for the same topic.
     ///
     /// # Errors
     /// [`Error::TooLarge`] for a topic name that the format cannot hold.
@@ -109,7 +109,7 @@ impl BagWriter {
     }
 
     /// Adds a topic of any type: its name, the MD5 of its definition and the definition with those of the types it
-    /// uses, as another bag's [`Connection`](crate::Connection) has them.
+    /// uses, as in another bag's [`Connection`](crate::Connection).
     ///
     /// # Errors
     /// As [`BagWriter::add_connection`].
@@ -204,10 +204,10 @@ impl BagWriter {
         }
     }
 
-    /// Writes what is left and the index, and gives the bag its name; a file of that name is replaced.
+    /// Writes the rest and the index, and gives the bag its name; an existing file of that name is replaced.
     ///
     /// # Errors
-    /// [`Error::File`]; nothing is left behind then.
+    /// [`Error::File`]; then nothing is left behind.
     pub fn finish(mut self) -> Result<()> {
         self.close_chunk()?;
         let index_pos = self.at;

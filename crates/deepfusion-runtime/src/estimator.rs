@@ -13,26 +13,26 @@ use crate::{
     Preparer,
 };
 
-/// A trained depth network, ready for images. It belongs to one thread: another one asks for [`Self::another`].
+/// A trained depth network, ready for images. It belongs to one thread; [`Self::another`] makes one for another thread.
 #[derive(Debug)]
 pub struct DepthEstimator {
     config: Arc<TrainConfig>,
     /// The camera it learned with.
     camera: Option<Intrinsics>,
     runner: Box<dyn DepthRunner>,
-    /// For input sizes beside the one trained with; none of a network that has no use for them.
+    /// Runners for other input sizes; `None` for a network that runs at one size only.
     others: Option<OtherSizes>,
     /// Steps it was trained for.
     pub step: usize,
 }
 
-/// Input sizes beside the one trained with, for which runners are kept: a camera has one.
+/// Number of other input sizes for which runners are kept; each camera needs one.
 const SIZES_KEPT: usize = 3;
 
-/// Runners for other input sizes, made when they are asked for.
+/// Runners for other input sizes, made on demand.
 struct OtherSizes {
     make: Arc<MakeRunner>,
-    /// The one used last stands last.
+    /// Most recently used last.
     made: Vec<(InputSize, Box<dyn DepthRunner>)>,
 }
 
@@ -61,8 +61,8 @@ impl OtherSizes {
 
 impl DepthEstimator {
     /// A network by its path (a run's folder, a checkpoint in it, a packed file) or by the name of an embedded one, in the
-    /// fused engine and f32. A run that learned several data sets has metres of each: [`ModelSource::load`] takes the name of
-    /// one, for [`Self::of`].
+    /// fused engine and f32. For a run that learned several data sets, use [`ModelSource::load`] with the name of one, and
+    /// [`Self::of`]: each has its own metric scale.
     ///
     /// # Errors
     /// As [`ModelSource::named`] and [`ModelSource::load`].
@@ -74,7 +74,7 @@ impl DepthEstimator {
         })
     }
 
-    /// Of a network wherever it is stored; `runner` makes what runs it of its configuration and weights.
+    /// An estimator for a stored network; `runner` makes its [`DepthRunner`] from configuration and weights.
     ///
     /// A network with a canonical focal length runs at the input size that fits an image ([`crate::fitting`]): its weights
     /// are kept, and `runner` is asked again for each other size.
@@ -120,7 +120,7 @@ impl DepthEstimator {
         })
     }
 
-    /// Another estimator for another thread: it shares the packed weights and has buffers of its own.
+    /// An estimator for another thread: it shares the packed weights and has its own buffers.
     ///
     /// # Errors
     /// As [`DepthRunner::another`].
@@ -144,24 +144,24 @@ impl DepthEstimator {
         Ok(another)
     }
 
-    /// What runs the network at the size trained with.
+    /// The runner at the size trained with.
     pub fn runner(&mut self) -> &mut dyn DepthRunner {
         &mut *self.runner
     }
 
-    /// The same, for keeps.
+    /// Consumes the estimator and returns the runner at the size trained with.
     #[must_use]
     pub fn into_runner(self) -> Box<dyn DepthRunner> {
         self.runner
     }
 
-    /// What reports call that which runs the network.
+    /// The runner's name for reports.
     #[must_use]
     pub fn engine(&self) -> &'static str {
         self.runner.name()
     }
 
-    /// Whether it says how sure it is of each pixel ([`Prediction::sigma`]).
+    /// Whether it predicts each pixel's uncertainty ([`Prediction::sigma`]).
     #[must_use]
     pub fn knows_uncertainty(&self) -> bool {
         self.config.depth_net.uncertainty && self.runner.tells_uncertainty()
@@ -173,13 +173,13 @@ impl DepthEstimator {
         &self.config
     }
 
-    /// The camera the network learned with, at the size of its images; `None` for imported weights.
+    /// The camera the network was trained with, at the size of its images; `None` for imported weights.
     #[must_use]
     pub fn training_camera(&self) -> Option<Intrinsics> {
         self.camera
     }
 
-    /// What makes images this network's input.
+    /// The preparer that turns images into this network's input.
     #[must_use]
     pub fn preparer(&self) -> Preparer {
         Preparer {
@@ -189,8 +189,8 @@ impl DepthEstimator {
         }
     }
 
-    /// The metric depth of an image. `camera` is the image's own; an unknown one is taken for the one trained with, and
-    /// the metres are then as right as that guess.
+    /// The metric depth of an image. `camera` is the image's own; without it the training camera is assumed, and the
+    /// metric scale is only as good as that guess.
     ///
     /// # Errors
     /// As [`DepthRunner::run`].
@@ -202,7 +202,7 @@ impl DepthEstimator {
         self.predict(image, camera, true, true)
     }
 
-    /// The same as metres at the image's own size, in place of what `depth` holds.
+    /// As [`Self::estimate`], with metres at the image's own size written into `depth`.
     ///
     /// # Errors
     /// As [`DepthRunner::run`].
@@ -216,8 +216,8 @@ impl DepthEstimator {
         Ok(())
     }
 
-    /// As [`Self::estimate`], with the correction for another focal length and the cut to the aspect ratio trained with as
-    /// the caller wants them: [`Preparer::prepare`], then [`Self::infer`].
+    /// As [`Self::estimate`], with the caller's choice of focal correction and of cropping to the aspect ratio trained
+    /// with: [`Preparer::prepare`], then [`Self::infer`].
     ///
     /// # Errors
     /// As [`DepthRunner::run`].

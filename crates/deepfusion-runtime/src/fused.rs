@@ -10,8 +10,8 @@ use crate::{DepthRunner, Error, NetworkOutput, metric_disparity};
 
 /// The network laid out and packed once for this processor.
 ///
-/// In f32 its sigmoid differs from the training framework's by rounding alone (below 1e-4 in the tests); in bf16 by what
-/// eight bits of mantissa lose.
+/// In f32 its sigmoid differs from the training framework's by rounding alone (below 1e-4 in the tests); in bf16 by the
+/// rounding of eight bits of mantissa.
 #[derive(Debug)]
 pub struct FusedRunner {
     engine: Engine,

@@ -1,20 +1,20 @@
 /// A map over the image, as coarse as the layer it comes from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FeatureMap {
-    /// Pixels of a row.
+    /// Width, in pixels.
     pub width: usize,
-    /// Rows.
+    /// Height, in pixels.
     pub height: usize,
     /// H×W, row by row.
     pub values: Vec<f32>,
 }
 
-/// Where a network looks in an image, from one layer of its encoder.
+/// Feature and attention maps of one layer of a network's encoder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerMaps {
     /// Mean magnitude of the encoder's feature over its channels.
     pub feature: FeatureMap,
-    /// The same of what the decoder reads, where context or attention make it another one.
+    /// The same for what the decoder reads, if context or attention change it.
     pub refined: Option<FeatureMap>,
     /// The spatial mask and the least and greatest value of the channel mask, where there is attention.
     pub attention: Option<(FeatureMap, [f32; 2])>,

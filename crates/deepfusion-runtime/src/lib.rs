@@ -1,4 +1,4 @@
-//! Trained depth networks that run, without the framework that trains them: image and camera in, metres out.
+//! Runs trained depth networks without the training framework: image and camera in, metres out.
 //!
 //! ```no_run
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -12,9 +12,9 @@
 //! # }
 //! ```
 //!
-//! [`ModelSource`] says which network is meant, [`DepthEstimator`] runs it over a [`DepthRunner`]: the fused engine
-//! ([`FusedRunner`]), ONNX Runtime ([`OrtRunner`]), or whatever else gives disparities. Every thread has an estimator of its
-//! own ([`DepthEstimator::another`]); they share one copy of the packed weights, and nothing is locked.
+//! [`ModelSource`] finds a network, [`DepthEstimator`] runs it on a [`DepthRunner`]: the fused engine ([`FusedRunner`]),
+//! ONNX Runtime ([`OrtRunner`]), or any other that yields disparities. Every thread has its own estimator
+//! ([`DepthEstimator::another`]); they share one copy of the packed weights, and nothing is locked.
 
 mod error;
 mod estimator;

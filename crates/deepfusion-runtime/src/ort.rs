@@ -13,19 +13,20 @@ use crate::{DepthRunner, Error, NetworkOutput};
 #[derive(Debug)]
 pub struct OrtRunner {
     engine: OrtEngine,
-    /// The model's file, for further sessions.
+    /// The serialised model, for further sessions.
     model: Arc<[u8]>,
     library: Option<PathBuf>,
     pixels: usize,
-    /// The image as the model takes it: H×W×3 bytes.
+    /// The image as model input: H×W×3 bytes.
     rgb: Vec<u8>,
 }
 
 impl OrtRunner {
-    /// The network of a configuration with these weights, in an ONNX Runtime library: the one given, or the one that is found.
+    /// The network of a configuration with these weights, in an ONNX Runtime library: the given one, or the one found on this
+    /// system.
     ///
     /// # Errors
-    /// [`Error::Model`] for weights of another network; [`Error::Onnx`] where there is no library, or it refuses the model.
+    /// [`Error::Model`] for weights of another network; [`Error::Onnx`] if there is no library, or it refuses the model.
     pub fn new(
         library: Option<&Path>,
         config: &TrainConfig,
@@ -58,7 +59,7 @@ impl DepthRunner for OrtRunner {
         "ort"
     }
 
-    /// An exported model gives depth alone.
+    /// An exported model outputs depth alone.
     fn tells_uncertainty(&self) -> bool {
         false
     }

@@ -5,17 +5,17 @@ use deepfusion_geometry::{DepthMap, Intrinsics};
 pub struct Prediction {
     /// Metric disparity, 1/m, at network size, row by row; focal correction applied.
     pub disparity: Vec<f32>,
-    /// ln b at network size, b the Laplace scale of the error of ln depth; of a network that says so.
+    /// ln b at network size, b the Laplace scale of the error of ln depth; `None` if the network does not predict it.
     pub log_scale: Option<Vec<f32>>,
     /// Width of `disparity`.
     pub width: usize,
     /// Height of `disparity`.
     pub height: usize,
-    /// The part of the image that was looked at: x, y, width, height.
+    /// The part of the image that the network saw: x, y, width, height.
     pub window: [u32; 4],
     /// Size of the whole image.
     pub image_size: [u32; 2],
-    /// What depth was multiplied by for another focal length than the one trained with.
+    /// Factor applied to depth because the focal length differs from the one trained with.
     pub focal_factor: f64,
 }
 
@@ -28,7 +28,7 @@ impl Prediction {
         }
     }
 
-    /// Depth at the network's size, and the camera that sees it so; `camera` is the whole image's.
+    /// Depth at the network's size, and the camera at that size; `camera` is the whole image's.
     #[must_use]
     pub fn network_depth(&self, camera: &Intrinsics) -> (DepthMap, Intrinsics) {
         let [x, y, w, h] = self.window;
@@ -42,7 +42,7 @@ impl Prediction {
     }
 
     /// Depth at the image's own size: disparity is enlarged (bilinear, half-pixel centres), then
-    /// inverted; 0 outside the window that was looked at.
+    /// inverted; 0 outside the window that the network saw.
     #[must_use]
     pub fn depth(&self) -> DepthMap {
         let mut depth = DepthMap::empty(0, 0);
@@ -50,19 +50,19 @@ impl Prediction {
         depth
     }
 
-    /// The same in place of what `depth` holds, whatever its size.
+    /// As [`Self::depth`], written into `depth`, which is resized.
     pub fn depth_into(&self, depth: &mut DepthMap) {
         self.enlarge(&self.disparity, |disparity| 1.0 / disparity, depth);
     }
 
-    /// Standard deviation of depth in metres at the image's own size, √2·b·depth, 0 outside the window; `None` of a network
-    /// that does not say how sure it is. It is what the network expects, and not calibrated.
+    /// Standard deviation of depth in metres at the image's own size, √2·b·depth, 0 outside the window; `None` if the
+    /// network does not predict it. It is the network's own estimate, not calibrated.
     #[must_use]
     pub fn sigma(&self) -> Option<DepthMap> {
         self.sigma_of(&self.depth())
     }
 
-    /// As [`Self::sigma`], where [`Self::depth`] is at hand.
+    /// As [`Self::sigma`], from the result of [`Self::depth`].
     #[must_use]
     pub fn sigma_of(&self, depth: &DepthMap) -> Option<DepthMap> {
         let relative = |log_scale: f32| std::f32::consts::SQRT_2 * log_scale.exp();
@@ -74,7 +74,7 @@ impl Prediction {
         Some(sigma)
     }
 
-    /// Values at the image's own size, bilinear; `of` each in the window, 0 outside.
+    /// Values at the image's own size, bilinear, with `of` applied to each; 0 outside the window.
     fn enlarge(&self, values: &[f32], of: impl Fn(f32) -> f32, map: &mut DepthMap) {
         let [x0, y0, w, h] = self.window.map(|v| v as usize);
         let [width, height] = self.image_size.map(|v| v as usize);

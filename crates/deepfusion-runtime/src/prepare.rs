@@ -2,33 +2,33 @@ use deepfusion_data::{RgbImage, to_network_input};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_model::InputSize;
 
-/// How far two aspect ratios may differ and still count as the same camera's.
+/// Relative difference up to which two aspect ratios count as equal.
 const ASPECT_TOLERANCE: f64 = 0.02;
 
-/// Makes a network's input of images. It knows the network's size and camera but not the network, so that any
-/// thread can prepare images while another one computes.
+/// Turns images into a network's input. It knows the network's size and camera but not the network, so that
+/// any thread can prepare images while another one computes.
 #[derive(Debug, Clone, Copy)]
 pub struct Preparer {
     /// Size of the network's input in training.
     pub size: InputSize,
-    /// The camera the network learned with, at the size of its images; `None` for imported weights.
+    /// The camera the network was trained with, at the size of its images; `None` for imported weights.
     pub training_camera: Option<Intrinsics>,
-    /// The focal length in pixels that the network's depth is of, where it learned with many cameras.
+    /// The canonical focal length in pixels, for a network trained with many cameras.
     pub canonical_focal_px: Option<f64>,
 }
 
-/// An image as the network takes it.
+/// An image as network input.
 #[derive(Debug, Clone)]
 pub struct PreparedImage {
     /// 3×H×W at network size, in [0, 1], channel by channel.
     pub input: Vec<f32>,
-    /// That size.
+    /// The network's input size.
     pub size: InputSize,
-    /// The part of the image that is looked at: x, y, width, height.
+    /// The part of the image that the network sees: x, y, width, height.
     pub window: [u32; 4],
     /// Size of the whole image.
     pub image_size: [u32; 2],
-    /// What depth will be multiplied by for another focal length than the one trained with.
+    /// Factor to be applied to depth because the focal length differs from the one trained with.
     pub focal_factor: f64,
 }
 
@@ -36,9 +36,9 @@ impl Preparer {
     /// Resizes an image. With its camera, depth will be corrected for a focal length other than the one trained with,
     /// unless `focal_correction` is off.
     ///
-    /// A network with a canonical focal length has learned with cameras of many kinds: it is shown the whole image, at the
-    /// input size that fits the image's aspect ratio ([`fitting`]). To another, an image of another aspect ratio than the one
-    /// trained with is cut about its principal point, or stretched, as `crop` says.
+    /// A network with a canonical focal length was trained with many cameras: it sees the whole image, at the input size that
+    /// fits the image's aspect ratio ([`fitting`]). For other networks, an image of a different aspect ratio is cropped about
+    /// its principal point, or stretched, depending on `crop`.
     #[must_use]
     pub fn prepare(
         &self,
@@ -64,8 +64,8 @@ impl Preparer {
         }
     }
 
-    /// What depth must be multiplied by for an image of this camera, at network size: f_y(test)/f_y(train) (SPEC 5), or
-    /// f_y(test)/f_c of a network with a canonical focal length. An unknown camera is taken for the one trained with.
+    /// The factor for depth with this camera, at network size: f_y(test)/f_y(train) (docs/concepts/scale.md), or f_y(test)/f_c
+    /// with a canonical focal length. Without a camera the training camera is assumed.
     fn focal_factor(&self, camera: Option<&Intrinsics>, window: [u32; 4], size: InputSize) -> f64 {
         let at =
             |k: Intrinsics, size: InputSize| k.resized(size.width as u32, size.height as u32).fy;
@@ -83,8 +83,8 @@ impl Preparer {
         test.or(assumed).map_or(1.0, |test| test / canonical)
     }
 
-    /// The part of the image with the aspect ratio trained with: all of it where they agree, else cut
-    /// about the principal point.
+    /// The part of the image with the aspect ratio trained with: the whole image if they agree, else
+    /// cropped about the principal point.
     fn window(&self, image: &RgbImage, camera: Option<&Intrinsics>, crop: bool) -> [u32; 4] {
         let (width, height) = image.dimensions();
         let whole = [0, 0, width, height];
@@ -116,8 +116,8 @@ impl Preparer {
     }
 }
 
-/// The input size for an image of a network that has learned with many cameras: of all sizes that the encoder takes, the
-/// one that stretches the image least and has about as many pixels as the one trained with. `trained` where it fits.
+/// The input size for an image, of a network trained with many cameras: of all sizes that the encoder accepts, the one
+/// that stretches the image least and has about as many pixels as `trained`; `trained` itself if it fits.
 #[must_use]
 pub fn fitting(trained: InputSize, width: u32, height: u32) -> InputSize {
     let aspect = f64::from(width) / f64::from(height);

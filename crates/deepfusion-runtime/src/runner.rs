@@ -1,4 +1,4 @@
-//! What runs a trained depth network: the fused engine, ONNX Runtime, or whatever else gives disparities.
+//! The interface to what runs a trained depth network: the fused engine, ONNX Runtime, Burn.
 
 use std::fmt::Debug;
 use std::time::Duration;
@@ -7,24 +7,24 @@ use deepfusion_geometry::DepthRange;
 
 use crate::Error;
 
-/// Runs a depth network of one input size, one image at a time. A thread has one of its own: [`Self::another`].
+/// Runs a depth network of one input size, one image at a time. Every thread has its own: [`Self::another`].
 pub trait DepthRunner: Debug + Send + Sync {
-    /// What reports call it.
+    /// Its name for reports.
     fn name(&self) -> &'static str;
 
-    /// What the network says of an image, in place of what `output` holds.
+    /// Runs the network on an image and writes the result into `output`.
     ///
     /// # Shapes
     /// - `image`: 3×H×W at network size, RGB in [0, 1], channel by channel
     ///
     /// # Errors
-    /// [`Error::ImageSize`] for an image of another size; where a library that runs the network fails.
+    /// [`Error::ImageSize`] for an image of another size; [`Error::Engine`] or [`Error::Onnx`] if the network fails to run.
     fn run(&mut self, image: &[f32], output: &mut NetworkOutput) -> Result<(), Error>;
 
-    /// Another one on the same weights, with buffers of its own.
+    /// A second runner on the same weights, with its own buffers.
     ///
     /// # Errors
-    /// Where memory has no room for them.
+    /// If there is no memory for them.
     fn another(&self) -> Result<Box<dyn DepthRunner>, Error>;
 
     /// Metric disparity alone, as [`Self::run`] gives it.
@@ -37,24 +37,24 @@ pub trait DepthRunner: Debug + Send + Sync {
         Ok(output.disparity)
     }
 
-    /// Whether [`NetworkOutput::log_scale`] is there of a network that has the head for it.
+    /// Whether [`NetworkOutput::log_scale`] is set for a network with an uncertainty head.
     fn tells_uncertainty(&self) -> bool {
         true
     }
 
-    /// Runs once and says what each step took, by name; `None` where the engine cannot say.
+    /// Runs once and returns each step's name and duration; `None` if the engine cannot measure them.
     fn profile(&mut self, image: &[f32]) -> Option<Vec<(String, Duration)>> {
         let _ = image;
         None
     }
 }
 
-/// What a network says of an image, pixel by pixel, row by row.
+/// A network's output for an image, row by row.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct NetworkOutput {
     /// Metric disparity, 1/m, H×W.
     pub disparity: Vec<f32>,
-    /// ln b, H×W, b the Laplace scale of the error of ln depth; `None` where the network, or what runs it, does not say.
+    /// ln b, H×W, b the Laplace scale of the error of ln depth; `None` if the network or its runner does not predict it.
     pub log_scale: Option<Vec<f32>>,
 }
 
@@ -65,7 +65,7 @@ pub fn metric_disparity(range: DepthRange, sigmoid: &mut [f32]) {
     }
 }
 
-/// That an image has as many values as the network takes.
+/// Checks that an image has as many values as the network expects.
 pub(crate) fn check_image(image: &[f32], expected: usize) -> Result<(), Error> {
     let found = image.len();
     if found == expected {

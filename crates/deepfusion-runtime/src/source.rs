@@ -1,4 +1,4 @@
-//! Which trained network is meant: a path, or the name of one that the program carries.
+//! Finds trained networks: by path, or by the name of an embedded one.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ pub enum ModelSource {
         given: PathBuf,
         /// The folder.
         folder: RunFolder,
-        /// The checkpoint meant: the one given, or the one the folder prefers.
+        /// The checkpoint: the given one, or the folder's default.
         kind: CheckpointKind,
     },
     /// A network without a run: an embedded one by its name, or a packed file with its card beside it.
@@ -29,10 +29,10 @@ pub enum ModelSource {
 }
 
 impl ModelSource {
-    /// The network that is meant where none is named; `None` where this build has none.
+    /// The default embedded network; `None` if this build has none.
     ///
     /// # Errors
-    /// As [`deepfusion_weights::find`] for one that is there.
+    /// As [`deepfusion_weights::find`], for a network that exists.
     pub fn embedded_default() -> Result<Option<Self>, Error> {
         let network = embedded(Path::new(DEFAULT))?;
         Ok(network.map(|network| Self::Packed {
@@ -41,7 +41,7 @@ impl ModelSource {
         }))
     }
 
-    /// What a path or a name says: a path that is there comes first, then an embedded network's name.
+    /// Resolves a path or a name: an existing path comes first, then an embedded network's name.
     ///
     /// # Errors
     /// [`Error::NoSuchModel`] for neither; [`RunFolder::open`]'s and [`Shipped::read`]'s for a path that holds no network.
@@ -70,7 +70,7 @@ impl ModelSource {
         })
     }
 
-    /// As it was given: a path, or a name.
+    /// The path or name that was given.
     #[must_use]
     pub fn given(&self) -> &Path {
         match self {
@@ -78,7 +78,7 @@ impl ModelSource {
         }
     }
 
-    /// The run's folder, where there is one.
+    /// The run's folder, if there is one.
     #[must_use]
     pub fn folder(&self) -> Option<&Path> {
         match self {
@@ -87,7 +87,7 @@ impl ModelSource {
         }
     }
 
-    /// Its configuration and weights; `set` names one of the data sets it learned from, where it learned several.
+    /// Loads configuration and weights; `set` names one of the data sets it learned from, if there are several.
     ///
     /// # Errors
     /// As [`StoredNetwork::of_checkpoint`] and [`StoredNetwork::packed`].
@@ -98,7 +98,7 @@ impl ModelSource {
         }
     }
 
-    /// SHA-256 of a packed network's weights; none of a run's, whose checkpoints change.
+    /// SHA-256 of a packed network's weights; `None` for a run, whose checkpoints change.
     #[must_use]
     pub fn packed_sha256(&self) -> Option<&str> {
         match self {
@@ -108,10 +108,10 @@ impl ModelSource {
     }
 }
 
-/// The embedded network that a path names which is not there, if it is the name of one.
+/// The embedded network whose name `model` is; `None` if there is none.
 ///
 /// # Errors
-/// As [`deepfusion_weights::find`] for one that is there.
+/// As [`deepfusion_weights::find`], for a network that exists.
 pub fn embedded(model: &Path) -> Result<Option<Box<Shipped>>, deepfusion_weights::Error> {
     let name = deepfusion_weights::names().find(|name| Path::new(name) == model);
     let network = name.map(deepfusion_weights::find).transpose()?;

@@ -111,7 +111,7 @@ fn a_name_that_is_none_says_which_there_are() {
     let error = ModelSource::named(Path::new("no-such-network")).unwrap_err();
     assert!(error.to_string().contains("no-such-network"), "{error}");
     assert!(error.hint().is_some_and(|hint| hint.contains("street")));
-    // A folder that is no run.
+    // A folder that is not a run.
     let folder = tempfile::tempdir().unwrap();
     let error = DepthEstimator::load(folder.path()).unwrap_err();
     assert!(error.hint().is_some(), "{error}");

@@ -59,7 +59,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Near is bright; what moves is red.
+/// Near is bright; dynamic objects are red.
 fn tones(view: &View) -> RgbImage {
     let (w, h) = view.rgb.dimensions();
     RgbImage::from_fn(w, h, |x, y| {

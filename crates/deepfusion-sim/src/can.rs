@@ -1,14 +1,14 @@
-//! What the vehicle says of itself: speed and the angle of its front wheels.
+//! The vehicle's CAN signals: speed and the angle of its front wheels.
 
 use crate::scanner::gaussian;
 use crate::texture::noise::hash;
 
-/// Speeds and angles a second.
+/// Rates of speed and angle, per second.
 pub const SPEED_RATE_HZ: f64 = 50.0;
 /// See [`SPEED_RATE_HZ`].
 pub const STEERING_RATE_HZ: f64 = 80.0;
 
-/// From the rear axle to the front one, metres.
+/// Distance of the axles, metres.
 pub const WHEELBASE_M: f64 = 2.7;
 
 /// Smallest step of the speed, m/s (0.05 km/h), and its noise.

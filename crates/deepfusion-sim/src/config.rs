@@ -1,7 +1,7 @@
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// The kind of place that is driven through.
+/// The kind of scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
@@ -26,7 +26,7 @@ pub enum Scene {
 }
 
 impl Scene {
-    /// Every scene, UMAD's five scenarios.
+    /// UMAD's five scenarios.
     pub const ALL: [Self; 5] = [
         Self::Urban,
         Self::Park,
@@ -85,7 +85,7 @@ impl std::str::FromStr for Scene {
     }
 }
 
-/// What the car carries.
+/// The sensors of the car.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sensors {
@@ -110,11 +110,11 @@ impl Sensors {
 /// A street of half an hour's drive still fits into memory, and its coordinates into f32.
 const LONGEST_DRIVE_S: f64 = 1800.0;
 
-/// What to simulate. Equal configurations give equal drives, byte for byte.
+/// The configuration of a simulation. Equal configurations give equal drives, byte for byte.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimConfig {
-    /// Chooses the street, its look, the light and the way it is driven.
+    /// Seed of the street, its appearance, the light and the driving.
     pub seed: u64,
     /// Number of frames, at least 1.
     pub frames: usize,
@@ -122,13 +122,13 @@ pub struct SimConfig {
     pub width: u32,
     /// Height of the pictures, in pixels.
     pub height: u32,
-    /// Number of cars that move.
+    /// Number of moving cars.
     pub moving_cars: usize,
-    /// Frames a second; the real intervals vary by ±1 ms around 1 / `fps`.
+    /// Frames per second; the actual intervals vary by ±1 ms around 1 / `fps`.
     pub fps: f64,
-    /// The kind of place.
+    /// The kind of scene.
     pub scene: Scene,
-    /// What the car carries, and where.
+    /// The sensors of the car, and their mounts.
     pub sensors: Sensors,
     /// [`crate::write_kitti`] writes a velodyne scan for every n-th frame; 0 writes none.
     pub scan_every: usize,
@@ -157,7 +157,7 @@ impl SimConfig {
     /// Checks every field.
     ///
     /// # Errors
-    /// [`Error::Config`] names the first field that is out of range.
+    /// [`Error::Config`] naming the first field out of range.
     pub fn validate(&self) -> Result<()> {
         let check = |ok: bool, field, value: String, expected| {
             if ok {

@@ -1,4 +1,4 @@
-//! A frequency-modulated LiDAR: 120 lines ahead, and how fast each point comes nearer or recedes.
+//! A frequency-modulated LiDAR: 120 lines ahead, with each point's radial velocity.
 
 use crate::light::GroundLight;
 use crate::primitive::{Primitive, V3};
@@ -30,19 +30,19 @@ const VELOCITY_NOISE: f32 = 0.05;
 /// Time over which velocities are taken from two positions, seconds.
 pub const VELOCITY_STEP_S: f64 = 1e-3;
 
-/// A scan, with the truth about it.
+/// A scan with its ground truth.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FmcwScan {
     /// Points in the sensor's axes (x forward, y left, z up), metres, with intensity and the radial velocity
     /// against the sensor in m/s, positive receding.
     pub cloud: PointCloud,
-    /// Whether each point is on something that moves.
+    /// Whether each point is on a dynamic object.
     pub moving: Vec<bool>,
-    /// The exact speed over ground of each point along its ray, m/s, positive receding: 0 for what stands still.
+    /// The exact speed over ground of each point along its ray, m/s, positive receding: 0 for static objects.
     pub ground_radial_mps: Vec<f32>,
 }
 
-/// What moves, now and [`VELOCITY_STEP_S`] later, solid by solid.
+/// Dynamic objects, now and [`VELOCITY_STEP_S`] later, solid by solid.
 pub struct MovingSolids {
     /// Now.
     pub now: Vec<Primitive>,

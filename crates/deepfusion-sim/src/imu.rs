@@ -6,7 +6,7 @@ use crate::texture::noise::{hash, unit};
 use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 
-/// Readings a second.
+/// Readings per second.
 pub const RATE_HZ: f64 = 100.0;
 
 /// Standard deviations of a reading: m/s² and rad/s. Those of a good MEMS unit at this rate.
@@ -18,7 +18,7 @@ const BIAS: (f64, f64) = (0.08, 0.008);
 /// Positions this far apart give velocities and accelerations, seconds.
 const STEP_S: f64 = 0.02;
 
-/// What an inertial unit reads, in its own axes.
+/// A reading of an inertial unit, in its own axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImuReading {
     /// Seconds since the drive's begin.

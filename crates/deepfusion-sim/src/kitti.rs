@@ -20,19 +20,18 @@ const BATCH: usize = 8;
 
 /// Writes the whole drive below `out`, which must be new or empty, and returns the drive's folder.
 ///
-/// Below `out/2026_01_01`: the three calibration files and `2026_01_01_drive_<seed>_sync` with
-/// `image_02` (PNG), `oxts`, `velodyne_points` (every [`crate::SimConfig::scan_every`]-th frame),
-/// `proj_depth/groundtruth/image_02` (dense exact camera z, 16-bit PNG, metres × 256, 0 beyond
-/// 255 m), `moving_02` (255 on things that move), `tracklet_labels.xml` (exact boxes of everything in reach, in
-/// the velodyne's axes; objects are `Car`, `Pole`, `Tree`, `Building`, `Fence`), and `poses.txt` (`world_from_cam`, the upper three
-/// rows of the matrix in 12 numbers a line).
+/// Below `out/2026_01_01`: the three calibration files and `2026_01_01_drive_<seed>_sync` with `image_02` (PNG), `oxts`,
+/// `velodyne_points` (every [`crate::SimConfig::scan_every`]-th frame), `proj_depth/groundtruth/image_02` (dense exact camera z,
+/// 16-bit PNG, metres × 256, 0 beyond 255 m), `moving_02` (255 on dynamic objects), `tracklet_labels.xml` (exact boxes of
+/// everything in reach, in the velodyne's axes; objects are `Car`, `Pole`, `Tree`, `Building`, `Fence`), and `poses.txt`
+/// (`world_from_cam`, the upper three rows of the matrix in 12 numbers a line).
 ///
 /// `progress` is called with the frames done and their number. Everything is written to a folder
 /// beside its final place and renamed at the end: after an error `out` is as it was.
 ///
 /// # Errors
-/// [`Error::OutputNotEmpty`] where `out` holds anything; [`Error::Io`] and [`Error::Encode`], with
-/// the path, where something cannot be written.
+/// [`Error::OutputNotEmpty`] if `out` holds anything; [`Error::Io`] and [`Error::Encode`], with the
+/// path, if something cannot be written.
 pub fn write_kitti(
     simulation: &Simulation,
     out: &Path,

@@ -1,5 +1,5 @@
-//! A procedural drive: a street nobody has seen, a car driving along it, and what its camera, its
-//! scanner and its inertial unit record, with the exact truth beside it.
+//! A procedural drive: a generated street, a car driving along it, and the recordings of its
+//! camera, scanner and inertial unit, with exact ground truth.
 //!
 //! ```
 //! use deepfusion_sim::{SimConfig, Simulation};
@@ -16,7 +16,7 @@
 //! World: x east, y north, z up, the road at z = 0. Camera: x right, y down, z forward; depth is
 //! camera z. Vehicle, IMU, velodyne: x forward, y left, z up. Metres, seconds, radians.
 //!
-//! # What makes it a fair teacher
+//! # Consistency
 //! Textures are attached to the surfaces and never depend on the viewer, and what a pixel cannot
 //! resolve is averaged rather than aliased: one frame warped by its true depth and pose is the next
 //! one. Shadows under moving cars move with them; the mask of moving pixels holds the cars only.

@@ -22,7 +22,7 @@ const LONGEST: f32 = 26.0;
 /// Rows of cells that are baked together.
 const CHUNK: usize = 64;
 
-/// How much of the sun and of the sky each place on the street sees.
+/// The share of sun and sky that is visible from each point of the street.
 pub struct GroundLight {
     start: f32,
     rows: usize,
@@ -55,7 +55,7 @@ pub struct Foot {
 }
 
 impl GroundLight {
-    /// Bakes the light of everything that stands still.
+    /// Bakes the light of all static objects.
     pub fn bake(world: &World, cores: Cores) -> Self {
         let (start, end) = (world.road.start as f32, world.road.end() as f32);
         let rows = (((end - start) / CELL).ceil() as usize).next_multiple_of(CHUNK);

@@ -1,4 +1,4 @@
-//! How the car is driven: speed over time, and the pose of its IMU at any time.
+//! The car's motion: speed over time, and the pose of its IMU at any time.
 
 use crate::road::Road;
 use deepfusion_geometry::Se3;

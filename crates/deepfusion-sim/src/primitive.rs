@@ -1,4 +1,4 @@
-//! The solids everything above the ground is made of, and where a ray enters them.
+//! The solids that make up everything above the ground, and their intersection with rays.
 
 use crate::crown::Crown;
 use nalgebra::Vector3;
@@ -74,13 +74,13 @@ pub struct Primitive {
     pub position: [f64; 3],
     /// Heading of its x axis in the world: cosine and sine.
     pub heading: (f32, f32),
-    /// What it is.
+    /// Its shape.
     pub shape: Shape,
     /// Index into the scene's materials.
     pub material: u32,
     /// Varies its texture.
     pub seed: u32,
-    /// Belongs to something that moves.
+    /// Whether it belongs to a dynamic object.
     pub moving: bool,
 }
 
@@ -89,7 +89,7 @@ pub struct Primitive {
 pub struct Entry {
     /// In units of the ray's direction.
     pub t: f32,
-    /// Which face.
+    /// The face.
     pub face: u8,
 }
 

@@ -10,8 +10,8 @@ pub const CAMERA_HEIGHT: f64 = 1.65;
 /// Camera 2 sits this far left of camera 0, metres (KITTI's P_rect_02 has the same 6 cm).
 pub const CAM2_FROM_CAM0_X: f64 = 0.06;
 
-/// Where the sensors are on the car. "The IMU" is KITTI's: it stands for the car itself, above the middle of the
-/// rear axle.
+/// The mounts of the sensors on the car. "The IMU" is KITTI's: it represents the car itself, above the middle of
+/// the rear axle.
 #[derive(Debug, Clone, Copy)]
 pub struct Rig {
     /// Rectified camera 0 from the velodyne (with UMAD: from the FMCW LiDAR).
@@ -85,8 +85,8 @@ pub fn kitti_like_intrinsics(width: u32, height: u32) -> Intrinsics {
     .resized(width, height)
 }
 
-/// UMAD's camera as the paper prints it, 640×480, but for the row of its centre: the printed 117.6 cannot be
-/// right for 480 rows, and the middle is taken instead. Resized to `width` × `height`.
+/// UMAD's camera as the paper prints it, 640×480, except for the row of its centre: the printed 117.6 is
+/// implausible for 480 rows, and the middle is used instead. Resized to `width` × `height`.
 pub fn umad_like_intrinsics(width: u32, height: u32) -> Intrinsics {
     Intrinsics {
         fx: 703.64,

@@ -148,7 +148,7 @@ impl Road {
         road
     }
 
-    /// Forgets everything beyond `end` metres.
+    /// Removes everything beyond `end` metres.
     pub fn truncate(&mut self, end: f64) {
         let keep = (((end - self.start) / STEP).ceil() as usize + 1).min(self.samples.len());
         self.samples.truncate(keep);
@@ -310,7 +310,7 @@ impl Road {
         width + slope * along
     }
 
-    /// Builds what the look-ups need; after any change of the samples.
+    /// Builds the look-up tables; call it after any change of the samples.
     pub fn index(&mut self) {
         let n = self.samples.len();
         self.packed = (0..n)

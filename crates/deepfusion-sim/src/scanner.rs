@@ -1,4 +1,4 @@
-//! Rays of a scanner into the street: what both scanners share.
+//! Casts a scanner's rays into the street; shared by both scanners.
 
 use crate::light::GroundLight;
 use crate::primitive::{Primitive, V3};
@@ -25,7 +25,7 @@ pub struct Scanner<'a> {
     world_from_sensor: Matrix3<f32>,
 }
 
-/// What a ray comes back with.
+/// The return of a ray.
 #[derive(Debug, Clone, Copy)]
 pub struct Echo {
     /// Exact range, metres.

@@ -22,14 +22,14 @@ use rand_chacha::ChaCha8Rng;
 const LEAD_IN: f64 = 60.0;
 const LEAD_OUT: f64 = 430.0;
 
-/// The camera's picture at one time, with what is true about it.
+/// The camera's picture at one time, with its ground truth.
 #[derive(Debug, Clone)]
 pub struct SimFrame {
     /// H×W 8-bit RGB.
     pub rgb: RgbImage,
     /// Exact camera z of each pixel's centre, metres; 0 = sky.
     pub depth: DepthMap,
-    /// H·W flags, row by row: the pixel's centre sees something that moves.
+    /// H·W flags, row by row: the pixel's centre is on a dynamic object.
     pub moving: Vec<bool>,
     /// Camera (x right, y down, z forward) to world (z up), metres.
     pub world_from_cam: Se3,
@@ -63,7 +63,7 @@ impl Simulation {
         Self::varied(config, &Variety::none())
     }
 
-    /// The same through a varied world; with [`Variety::none`] it is [`Simulation::new`].
+    /// As [`Simulation::new`], through a varied world; with [`Variety::none`] both are the same.
     ///
     /// # Errors
     /// [`crate::Error::Config`] where a setting is out of range.
@@ -103,7 +103,7 @@ impl Simulation {
         })
     }
 
-    /// What this drive was made from.
+    /// The configuration of this drive.
     #[must_use]
     pub fn config(&self) -> &SimConfig {
         &self.config
@@ -121,7 +121,7 @@ impl Simulation {
         self.intrinsics
     }
 
-    /// Where the sensors are on the car.
+    /// The mounts of the sensors on the car.
     #[must_use]
     pub fn rig(&self) -> Rig {
         self.rig
@@ -164,7 +164,7 @@ impl Simulation {
         self.world_from_imu(frame) * self.rig.velo_from_imu.inverse()
     }
 
-    /// What the inertial unit reads at a frame.
+    /// The inertial unit's reading at a frame.
     ///
     /// # Panics
     /// Where there is no such frame.
@@ -218,8 +218,8 @@ impl Simulation {
         )
     }
 
-    /// One scan of an FMCW LiDAR at the velodyne's place at a time, in seconds since the drive's begin, with
-    /// the truth about each point.
+    /// One scan of an FMCW LiDAR at the velodyne's position at a time, in seconds since the drive's begin,
+    /// with each point's ground truth.
     #[must_use]
     pub fn fmcw(&self, time_s: f64) -> FmcwScan {
         let solids = |time_s| self.traffic.solids(&self.world, time_s);
@@ -302,7 +302,7 @@ impl Simulation {
         (motion.velocity.xy().norm(), yaw_rate)
     }
 
-    /// Everything on the street at a frame, standing or moving, with exact boxes.
+    /// Everything on the street at a frame, static or dynamic, with exact boxes.
     ///
     /// # Panics
     /// Where there is no such frame.

@@ -1,4 +1,4 @@
-//! `tracklet_labels.xml`: the exact boxes, as KITTI's raw recordings have those of their annotators.
+//! `tracklet_labels.xml`: the exact boxes, in the format of KITTI's annotations.
 
 use crate::{SceneObject, Simulation};
 use nalgebra::Vector3;

@@ -36,7 +36,7 @@ pub mod topic {
     pub const CAMERA_INFO: &str = "/camera/camera_info";
     /// `sensor_msgs/PointCloud2`: x, y, z, intensity, velocity (receding is positive).
     pub const LIDAR: &str = "/lidar/points";
-    /// `sensor_msgs/PointCloud2` of the points that move.
+    /// `sensor_msgs/PointCloud2` of the dynamic points.
     pub const DYNAMIC: &str = "/lidar/dynamic_points";
     /// `sensor_msgs/Imu`.
     pub const IMU: &str = "/imu/data";
@@ -50,7 +50,7 @@ pub mod topic {
     pub const TRUE_DEPTH: &str = "/truth/depth/compressed";
 }
 
-/// How a bag is written.
+/// Settings of a bag.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BagSettings {
     /// Compression of the bag's chunks.
@@ -71,13 +71,13 @@ impl Default for BagSettings {
     }
 }
 
-/// Writes the drive as `out/<scene>_<seed>.bag` and, beside it, `<scene>_<seed>.toml` with the places of the sensors
-/// and the vehicle's wheelbase, which a bag does not hold. `out` must be new or empty. Returns the bag's path.
+/// Writes the drive as `out/<scene>_<seed>.bag` and, beside it, `<scene>_<seed>.toml` with the mounts of the sensors
+/// and the vehicle's wheelbase, which a bag does not contain. `out` must be new or empty. Returns the bag's path.
 ///
 /// The camera's stamps and those of the LiDAR carry the clock's offset; IMU, speed, steering and truth do not.
 ///
 /// # Errors
-/// [`Error::OutputNotEmpty`] where `out` holds anything; [`Error::Io`], [`Error::Encode`], [`Error::Bag`].
+/// [`Error::OutputNotEmpty`] if `out` holds anything; [`Error::Io`], [`Error::Encode`], [`Error::Bag`].
 pub fn write_bag(
     simulation: &Simulation,
     out: &Path,

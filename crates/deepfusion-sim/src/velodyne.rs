@@ -1,4 +1,4 @@
-//! A scanner like KITTI's: 64 lines, ray-cast from its own place.
+//! A scanner like KITTI's: 64 lines, ray-cast from its own position.
 
 use crate::light::GroundLight;
 use crate::primitive::{Primitive, V3};

@@ -222,7 +222,7 @@ fn a_matrix_of_another_size_is_named() {
 }
 
 #[test]
-fn kilometres_an_hour_are_told_by_the_road() {
+fn kilometres_an_hour_are_found_by_the_road() {
     let drive = Drive::clean();
     drive.oxts(|_, values| {
         for i in [oxts::VF, oxts::VL, oxts::VN, oxts::VE] {
@@ -292,7 +292,7 @@ fn blurred_frames_are_counted() {
 }
 
 #[test]
-fn a_drive_out_of_focus_is_told() {
+fn a_drive_out_of_focus_is_reported() {
     let drive = Drive::clean();
     drive.images(|_, image| *image = image::imageops::blur(image, 2.5));
     let diagnosis = drive.diagnose();
@@ -320,7 +320,7 @@ fn a_jumping_exposure_is_counted() {
 }
 
 #[test]
-fn a_bonnet_is_measured_and_cut() {
+fn an_ego_vehicle_in_view_is_measured_and_cut() {
     let drive = Drive::clean();
     drive.images(|_, image| {
         let (width, height) = image.dimensions();
@@ -363,13 +363,13 @@ fn a_black_frame_is_measured_and_cut() {
         assert!(value(finding) > 50.0, "{finding:?}");
         assert!(finding.remedy.contains(kept), "{finding:?}");
         // The rim itself may belong to either.
-        let told = finding.what.starts_with("12 ") || finding.what.starts_with("13 ");
-        assert!(told, "{finding:?}");
+        let named = finding.what.starts_with("12 ") || finding.what.starts_with("13 ");
+        assert!(named, "{finding:?}");
     }
 }
 
 #[test]
-fn cameras_that_are_swapped_are_told() {
+fn cameras_that_are_swapped_are_reported() {
     let drive = Drive::clean();
     drive.second_camera(-6);
     let right = drive.diagnose();
@@ -390,7 +390,7 @@ fn cameras_that_are_swapped_are_told() {
 }
 
 #[test]
-fn frames_between_which_hardly_anything_moves_are_told() {
+fn frames_between_which_hardly_anything_moves_are_reported() {
     let drive = Drive::clean();
     // Everything far away: from frame to frame the picture grows by a fifth of a thousandth.
     let far = std::sync::Mutex::new(None);
@@ -476,7 +476,7 @@ fn what_cannot_be_opened_is_a_finding() {
 }
 
 #[test]
-fn a_bag_whose_camera_clock_is_off_is_told() {
+fn a_bag_whose_camera_clock_is_off_is_reported() {
     for ahead_s in [0.3, -0.3] {
         let folder = tempfile::tempdir().unwrap();
         let settings = BagSettings {
@@ -486,7 +486,7 @@ fn a_bag_whose_camera_clock_is_off_is_told() {
         let path = bag(folder.path(), Scene::Urban, settings);
         let diagnosis = doctor(&path, None);
         let finding = found(&diagnosis, "clock", "offset");
-        // `data inspect` tells the same, as a figure.
+        // `data inspect` shows the same, as a figure.
         let seen = deepfusion_doctor::inspect(&path, &OpenOptions::default()).unwrap();
         let offset = seen.drives[0].time_offset.unwrap();
         assert_eq!(offset.vehicle_minus_camera_s, value(finding));
@@ -497,7 +497,7 @@ fn a_bag_whose_camera_clock_is_off_is_told() {
 }
 
 #[test]
-fn a_gap_in_the_speed_is_told_with_its_frame() {
+fn a_gap_in_the_speed_is_reported_with_its_frame() {
     let drive = Drive::clean();
     drive.remove_oxts(40..56);
     let diagnosis = drive.diagnose();
@@ -512,7 +512,7 @@ fn a_gap_in_the_speed_is_told_with_its_frame() {
 }
 
 #[test]
-fn a_wrong_wheelbase_is_told_by_the_gyro() {
+fn a_wrong_wheelbase_is_found_by_the_gyro() {
     let folder = tempfile::tempdir().unwrap();
     let config = SimConfig {
         frames: 300,
@@ -540,7 +540,7 @@ fn a_wrong_wheelbase_is_told_by_the_gyro() {
 }
 
 #[test]
-fn a_lidar_that_is_turned_or_pitched_on_the_car_is_told_by_its_velocities() {
+fn a_lidar_that_is_turned_or_pitched_on_the_car_is_found_by_its_velocities() {
     let folder = tempfile::tempdir().unwrap();
     let path = bag(folder.path(), Scene::Urban, BagSettings::default());
     let sidecar = path.with_extension("toml");

@@ -1,5 +1,5 @@
-//! The promises of the endless mode: a view hangs on the settings and its index alone, and its depth is exact
-//! whatever the weather and the camera do to its colours.
+//! The guarantees of the endless mode: a view depends on the settings and its index alone, and its depth is
+//! exact whatever the weather and the camera do to its colours.
 
 #![allow(
     clippy::unwrap_used,

@@ -160,7 +160,7 @@ fn the_lidar_s_depth_is_the_exact_depth() {
 }
 
 #[test]
-fn radial_velocities_tell_what_moves() {
+fn radial_velocities_separate_dynamic_points() {
     let (mut hits, mut called, mut targets, mut found) = (0, 0, 0, 0);
     for (scene, seed_frames) in [
         (Scene::Urban, 120),

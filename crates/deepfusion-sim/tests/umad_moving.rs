@@ -58,7 +58,7 @@ fn describe(bag: &Path, change: impl Fn(String) -> String) {
     std::fs::write(&sidecar, change(text)).unwrap();
 }
 
-/// Gives the clouds' field of the velocity a name of which nothing can be told, so that the LiDAR has none.
+/// Gives the clouds' field of the velocity an unknown name, so that the LiDAR has none.
 fn without_velocities(bag: &Path) {
     let bytes = std::fs::read(bag).unwrap();
     let (field, other) = (b"\x08\0\0\0velocity", b"\x08\0\0\0reserved");

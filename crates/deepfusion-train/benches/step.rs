@@ -127,7 +127,7 @@ fn light_step(criterion: &mut Criterion) {
     }
 }
 
-/// The same with every loss: optical flow both ways, what moves, agreement, affine invariance.
+/// The same with every loss: optical flow both ways, dynamic pixels, agreement, affine invariance.
 fn full_step(criterion: &mut Criterion) {
     let mut config = Preset::Light.config();
     config.loss = config.loss.with_every_term();

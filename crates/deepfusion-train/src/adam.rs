@@ -22,15 +22,15 @@ pub struct Adam {
     steps: u32,
 }
 
-/// What a step did.
+/// The outcome of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepOutcome {
-    /// The parameters moved.
+    /// The parameters were updated.
     Done {
         /// Norm of the gradient before clipping.
         gradient_norm: f64,
     },
-    /// The gradient was not finite: nothing moved.
+    /// The gradient was not finite; nothing changed.
     Skipped,
 }
 
@@ -113,9 +113,9 @@ impl Adam {
         self.steps
     }
 
-    /// Prepares a step: the factor that clips the gradient to `clip_norm` (0: no limit), or that
-    /// nothing should move. `weight_decay` is decoupled (AdamW, Loshchilov and Hutter) and is of matrices and kernels alone:
-    /// biases and the weights of norms are free.
+    /// Prepares a step: computes the factor that clips the gradient to `clip_norm` (0: no limit), or decides to skip the
+    /// step. `weight_decay` is decoupled (AdamW, Loshchilov and Hutter) and applies to matrices and kernels only, not to
+    /// biases and the weights of norms.
     #[must_use]
     pub fn begin(
         &mut self,
@@ -151,7 +151,7 @@ impl Adam {
         (outcome, Some(step))
     }
 
-    /// Moves the parameters of one module, named with `prefix`.
+    /// Updates the parameters of one module, named with `prefix`.
     #[must_use]
     pub fn apply<M: Module>(
         &mut self,
@@ -187,8 +187,8 @@ impl Adam {
     /// The optimiser that [`Self::state`] came from, after `steps` steps with this model.
     ///
     /// # Errors
-    /// [`Error::Model`] naming the first moment that is not as long as its parameter, has none, or lacks the other
-    /// one beside it.
+    /// [`Error::Model`] naming the first moment that differs in length from its parameter, has no parameter, or
+    /// has no counterpart (`m.` without `v.`).
     pub fn restore(state: Weights, steps: u32, model: &Model) -> Result<Self, Error> {
         let lengths = parameter_lengths(model);
         let Weights {

@@ -15,7 +15,7 @@ enum Change {
     Brightness(f32),
     Contrast(f32),
     Saturation(f32),
-    /// Turns of the colour wheel.
+    /// Hue shift, in turns of the colour wheel.
     Hue(f32),
 }
 
@@ -76,7 +76,7 @@ impl Jitter {
     }
 }
 
-/// Turns the hue of a pixel, keeping its value and saturation (HSV).
+/// Shifts the hue of a pixel, keeping its value and saturation (HSV).
 fn turn_hue(r: f32, g: f32, b: f32, turns: f32) -> (f32, f32, f32) {
     let (max, min) = (r.max(g).max(b), r.min(g).min(b));
     let chroma = max - min;

@@ -11,15 +11,15 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-/// Bytes of resized images that are kept, so that a small drive is decoded once and not every epoch.
+/// Size of the cache of resized images, in bytes: a small drive is decoded once, not every epoch.
 const CACHE_BYTES: usize = 2 << 30;
 
 /// A batch of B samples with F frames each: the target, then its sources.
 #[derive(Debug, Clone)]
 pub struct SnippetBatch {
-    /// Clean images by frame, each B×3×H×W; the losses see these.
+    /// Clean images by frame, each B×3×H×W; the losses use these.
     pub clean: Vec<Tensor<4>>,
-    /// Jittered images by frame; the networks see these.
+    /// Jittered images by frame; the networks use these.
     pub network: Vec<Tensor<4>>,
     /// K, B×3×3, in pixels of these images.
     pub intrinsics: Tensor<3>,
@@ -27,13 +27,13 @@ pub struct SnippetBatch {
     pub inverse_intrinsics: Tensor<3>,
     /// Length of the camera's translation by source, each B, in metres.
     pub distance_m: Vec<Tensor<1>>,
-    /// `source_from_target` of the camera by the vehicle's sensors, by source, B each.
+    /// The camera's `source_from_target` as measured by the vehicle's sensors, by source, B each.
     pub measured: Vec<Motion>,
     /// Offsets of the sources.
     pub offsets: Vec<i32>,
     /// Drive and frame of each target.
     pub names: Vec<String>,
-    /// What each sample's data set means by the networks' outputs; `None` where the run has no sets.
+    /// The scale factors of each sample's data set; `None` if the run has no sets.
     pub factors: Option<BatchFactors>,
 }
 
@@ -62,14 +62,14 @@ struct RawBatch {
     translation: Vec<Vec<f32>>,
     offsets: Vec<i32>,
     names: Vec<String>,
-    /// What each sample's outputs mean; empty where that is the same for all.
+    /// The scale factors of each sample; empty if they are the same for all.
     factors: Vec<SampleFactors>,
 }
 
 /// Resized images, H×W×3 bytes, by data set and frame.
 type ImageCache = HashMap<(usize, usize), Arc<Vec<u8>>>;
 
-/// Everything that making a batch needs.
+/// Everything needed to make a batch.
 struct Maker {
     config: TrainConfig,
     set: SampleSet,
@@ -140,8 +140,8 @@ impl BatchLoader {
     /// The next batch on `device`; `None` after the last.
     ///
     /// # Errors
-    /// [`Error::Data`] for an image that cannot be read or has another size than its camera;
-    /// [`Error::Threads`] where the loader could not start; [`Error::Loader`] where its thread has died.
+    /// [`Error::Data`] if an image cannot be read or its size differs from its camera's;
+    /// [`Error::Threads`] if the loader could not start; [`Error::Loader`] if its thread has died.
     pub fn next(&self, device: &Device) -> Option<Result<SnippetBatch, Error>> {
         let raw = match self.batches.next()? {
             Ok(raw) => raw,

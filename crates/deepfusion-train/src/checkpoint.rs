@@ -6,7 +6,7 @@ use deepfusion_nn::weights::{self, Weights};
 
 use crate::{Adam, Error, Model};
 
-/// The networks and the optimiser, to a run's checkpoints and from them.
+/// Saves networks and optimiser to a run's checkpoints and loads them.
 pub trait Checkpoints {
     /// Writes a checkpoint; it replaces the one before only when it is complete.
     ///
@@ -20,12 +20,12 @@ pub trait Checkpoints {
         state: &Checkpoint,
     ) -> Result<PathBuf, Error>;
 
-    /// The networks, the optimiser where it was saved, and where training stood.
+    /// The networks, the optimiser if it was saved, and the training progress.
     ///
     /// # Errors
-    /// [`ModelError::Checkpoint`] for a file of another version, or one that training cannot go on from because it lacks the
-    /// flow decoder; [`Error::Model`] for one of another architecture or with other moments than its
-    /// parameters', naming the first tensor that differs.
+    /// [`ModelError::Checkpoint`] for a file of another version, or one without the flow decoder that training needs;
+    /// [`Error::Model`] for one of another architecture or whose moments do not fit its parameters, naming the first tensor
+    /// that differs.
     fn load(
         &self,
         kind: CheckpointKind,
@@ -33,9 +33,9 @@ pub trait Checkpoints {
         device: &Device,
     ) -> Result<(Model, Option<Adam>, Checkpoint), Error>;
 
-    /// The networks of a new run that starts from this one's, and what of them starts anew, because the checkpoint
-    /// does not have it. From one whose encoders alone were ever trained, the encoders alone are taken: the rest of
-    /// the network may then be another.
+    /// The networks of a new run that starts from this one's, and the names of the parts that start anew because
+    /// the checkpoint lacks them. If only the encoders were trained, only they are taken: the rest of the network
+    /// may then differ.
     ///
     /// # Errors
     /// [`ModelError::Checkpoint`] for a file of another version, [`Error::Model`] for one of another architecture, naming
@@ -58,7 +58,7 @@ impl Checkpoints for RunFolder {
     ) -> Result<PathBuf, Error> {
         let mut all = weights::collect(&model.depth_net).with_prefix("depth.");
         all = all.merged(weights::collect(&model.pose_net).with_prefix("pose."));
-        // Training alone needs it, but whoever starts from `best` trains.
+        // Only training needs it, but a run that starts from `best` trains.
         if let Some(decoder) = &model.flow_decoder {
             all = all.merged(weights::collect(decoder).with_prefix("flow."));
         }
@@ -133,7 +133,8 @@ impl Checkpoints for RunFolder {
     }
 }
 
-/// Gives the model the flow decoder of a checkpoint. Says whether its own, a new one, stays for want of it.
+/// Gives the model a checkpoint's flow decoder. Returns whether the checkpoint has none, so that the model keeps its own, new
+/// one.
 fn take_flow_decoder(model: &mut Model, saved: &Weights) -> Result<bool, Error> {
     let Some(decoder) = model.flow_decoder.take() else {
         return Ok(false);

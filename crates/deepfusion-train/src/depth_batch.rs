@@ -11,8 +11,8 @@ use deepfusion_nn::InputSize;
 use rand::Rng;
 use rayon::prelude::*;
 
-/// Share of the farthest depth that the networks can say from which on a pixel only has to be far: the sigmoid
-/// reaches its end nowhere.
+/// Share of the largest depth that the networks can express beyond which a pixel only has to be far: the
+/// sigmoid never reaches its end.
 const FAR_SHARE: f64 = 0.9;
 
 /// A batch of B images whose depth is known.
@@ -20,11 +20,11 @@ const FAR_SHARE: f64 = 0.9;
 pub struct DepthBatch {
     /// Clean images, B×3×H×W.
     pub clean: Tensor<4>,
-    /// Jittered images, B×3×H×W; the networks see these.
+    /// Jittered images, B×3×H×W; the networks use these.
     pub network: Tensor<4>,
     /// Their depth.
     pub truth: DepthTruth,
-    /// What the network's output means of each.
+    /// The scale factors of each.
     pub factors: BatchFactors,
     /// Drive and frame, or set and view, of each.
     pub names: Vec<String>,
@@ -103,8 +103,8 @@ impl DepthLoader {
     /// The next batch on `device`; `None` after the last.
     ///
     /// # Errors
-    /// [`Error::Data`] for an image or a depth that cannot be read; [`Error::Threads`] where the loader could not start;
-    /// [`Error::Loader`] where its thread has died.
+    /// [`Error::Data`] if an image or a depth cannot be read; [`Error::Threads`] if the loader could not start;
+    /// [`Error::Loader`] if its thread has died.
     pub fn next(&self, device: &Device) -> Option<Result<DepthBatch, Error>> {
         let raw = match self.batches.next()? {
             Ok(raw) => raw,
@@ -173,7 +173,7 @@ struct Item {
     name: String,
 }
 
-/// A view as the network takes it: cut at random, resized, mirrored, jittered.
+/// A view as network input: randomly cropped, resized, mirrored, jittered.
 fn item(config: &TrainConfig, view: &DepthView, draw: usize, augment: bool) -> Result<Item, Error> {
     let mut rng = stream(config.seed, 3, draw);
     let flip = rng.random::<bool>() && augment && config.augmentation.flip;

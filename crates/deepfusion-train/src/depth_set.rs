@@ -1,4 +1,4 @@
-//! What known depth is learned from: frames of recordings that have it, and views rendered for it.
+//! Images with known depth to learn from: frames of recordings, and simulated views.
 
 use crate::fit_depth::fit_depth;
 use crate::sampler::stream;
@@ -10,7 +10,7 @@ use deepfusion_sim::{Endless, EndlessConfig};
 use rand::Rng;
 use std::sync::Arc;
 
-/// Worlds to validate on are those of other seeds than any that training sees.
+/// Offset of the seeds of validation worlds, so that training never sees them.
 const VALIDATION_SEED: u64 = 0xDEE9_F051_0000_0000;
 
 /// Focal length over width of the images: 26 mm on 36 mm of film.
@@ -30,9 +30,9 @@ pub struct DepthFrame {
 pub struct SimulatedViews {
     /// Name of the data set.
     pub name: String,
-    /// Place in `data.sets`.
+    /// Index in `data.sets`.
     pub set: usize,
-    /// Views that count as a pass.
+    /// Number of views in one pass.
     pub views: usize,
     /// What renders them.
     pub endless: Arc<Endless>,
@@ -56,9 +56,9 @@ pub struct DepthView {
     pub depth: DepthMap,
     /// Its camera.
     pub camera: Intrinsics,
-    /// Whether no depth means the sky, rather than that nothing is known.
+    /// Whether a pixel without depth is sky, rather than unknown.
     pub sky: bool,
-    /// Place in `data.sets`.
+    /// Index in `data.sets`.
     pub set: usize,
     /// Drive and frame, or set and view.
     pub name: String,
@@ -67,9 +67,9 @@ pub struct DepthView {
 /// Which view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Pick {
-    /// A frame of a recording, by its place in [`DepthSet::frames`].
+    /// A frame of a recording, by its index in [`DepthSet::frames`].
     Frame(usize),
-    /// A view of [`DepthSet::simulated`], by its place there and its number.
+    /// A view of [`DepthSet::simulated`], by its index there and its number.
     View(usize, u64),
 }
 
@@ -78,7 +78,7 @@ pub(crate) enum Pick {
 pub struct DepthSet {
     /// The recordings.
     pub datasets: Arc<Vec<Dataset>>,
-    /// The place in `data.sets` of each.
+    /// The index in `data.sets` of each.
     pub set_of: Arc<Vec<usize>>,
     /// Their frames with depth.
     pub frames: Vec<DepthFrame>,
@@ -87,8 +87,8 @@ pub struct DepthSet {
 }
 
 impl DepthSet {
-    /// The frames with depth of the recordings that `learn` says it of: those to train on, and the last `share` of each
-    /// drive; and the simulated views, for each.
+    /// Splits into training and validation: of the recordings for which `learn` is true, the last `share` of each
+    /// drive's frames with depth is held out; simulated views are made for both.
     ///
     /// # Errors
     /// [`Error::NoDepth`] for a drive that has none; [`Error::Simulator`].
@@ -149,8 +149,8 @@ impl DepthSet {
         frames.chain(views).collect()
     }
 
-    /// What training sees as its `draw`-th view: of each set as often as it has views. Simulated views are taken in the
-    /// order of their numbers, since neighbours share a world; frames in a new order each epoch.
+    /// The `draw`-th view of training: each set is drawn in proportion to its number of views. Simulated views come in
+    /// the order of their numbers, since neighbours share a world; frames in a new order each epoch.
     pub(crate) fn pick(&self, seed: u64, draw: usize) -> Pick {
         let mut place = stream(seed, 2, draw).random_range(0..self.len().max(1));
         if place < self.frames.len() {
@@ -170,7 +170,7 @@ impl DepthSet {
     /// A view; a simulated one by a camera of the given size.
     ///
     /// # Errors
-    /// [`Error::Data`] where an image or its depth cannot be read; [`Error::NoDepth`] where it is gone since.
+    /// [`Error::Data`] if an image or its depth cannot be read; [`Error::NoDepth`] if it has disappeared.
     pub(crate) fn view(&self, pick: Pick, size: InputSize) -> Result<DepthView, Error> {
         match pick {
             Pick::Frame(index) => self.frame(self.frames[index]),
@@ -215,7 +215,7 @@ impl DepthSet {
         })
     }
 
-    /// A camera of it at the size of its images: the first recording's, else the simulator's typical one.
+    /// A camera of this set at the size of its images: the first recording's, else a typical one of the simulator.
     #[must_use]
     pub fn camera(&self) -> Option<Intrinsics> {
         let recorded = self.frames.first();
@@ -228,7 +228,7 @@ impl DepthSet {
         recorded.map(of_frame).or_else(simulated)
     }
 
-    /// Its part of one set of `data.sets`.
+    /// The part that belongs to one set of `data.sets`.
     #[must_use]
     pub fn of_set(&self, set: usize) -> Self {
         let own = |f: &&DepthFrame| self.set_of[f.dataset] == set;
@@ -242,7 +242,7 @@ impl DepthSet {
     }
 }
 
-/// A lens as most phones have it, 69° wide: what is assumed of a camera that is not known.
+/// A lens as most phones have it, 69° wide: assumed for an unknown camera.
 fn typical_camera(config: &EndlessConfig) -> Intrinsics {
     let focal = TYPICAL_FOCAL * f64::from(config.width);
     Intrinsics::centred(focal, (config.width, config.height))

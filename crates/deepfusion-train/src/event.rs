@@ -1,7 +1,7 @@
 use crate::{LossTerms, SamplePanel};
 use std::path::PathBuf;
 
-/// What the trainer reports. It never prints; whoever runs it decides what becomes of these.
+/// What the trainer reports. It never prints; the caller decides what to do with its events.
 #[derive(Debug, Clone)]
 pub enum TrainEvent {
     /// Training begins, or goes on.
@@ -25,9 +25,9 @@ pub enum TrainEvent {
         steps: usize,
         /// The loss of the step's samples, the mean over its batches where several are accumulated.
         losses: LossTerms,
-        /// The step size.
+        /// The learning rate.
         learning_rate: f64,
-        /// Images a second, targets and sources, over the last steps.
+        /// Images per second, targets and sources, over the last steps.
         images_per_second: f64,
         /// Seconds until the end at the present pace.
         remaining_s: f64,
@@ -37,20 +37,20 @@ pub enum TrainEvent {
         /// Norm of the gradient before clipping.
         gradient_norm: f64,
     },
-    /// The held-out samples were looked at.
+    /// The held-out samples were evaluated.
     Validated {
         /// After this step.
         step: usize,
         /// Their loss.
         losses: LossTerms,
-        /// What `best` is chosen by: the part of it that depth can change.
+        /// The value that selects `best`: the part of the loss that depth can change.
         selection: f64,
         /// Displacement by speed over displacement by PoseNet.
         scale_ratio: f64,
         /// Whether this is the best so far.
         best: bool,
     },
-    /// A look at what is learned.
+    /// A picture of what is being learned.
     Panel {
         /// After this step.
         step: usize,
@@ -68,12 +68,12 @@ pub enum TrainEvent {
     Warning {
         /// After this step.
         step: usize,
-        /// What, with the figure.
+        /// The warning, with the figure.
         message: String,
     },
 }
 
-/// What the listener wants next.
+/// What the listener wants the trainer to do next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Control {
     /// Go on.

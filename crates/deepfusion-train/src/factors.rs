@@ -3,7 +3,7 @@ use deepfusion_model::SampleFactors;
 
 use crate::Motion;
 
-/// What turns the networks' raw outputs into metres, for each sample of a batch whose samples differ in it.
+/// The factors that turn the networks' raw outputs into metres, for each sample of a batch from several data sets.
 #[derive(Debug, Clone)]
 pub struct BatchFactors {
     /// The set's metres per unit of translation over the pose network's own, B.
@@ -15,7 +15,7 @@ pub struct BatchFactors {
 }
 
 impl BatchFactors {
-    /// Of the samples; `unit_m` is the pose network's own metres per unit.
+    /// From the samples' factors; `unit_m` is the pose network's own metres per unit.
     #[must_use]
     pub fn new(samples: &[SampleFactors], unit_m: f64, device: &Device) -> Self {
         let tensor = |value: &dyn Fn(&SampleFactors) -> f64| {
@@ -30,7 +30,7 @@ impl BatchFactors {
         }
     }
 
-    /// Motions with their sets' unit of translation. T is B, or a multiple of it: the samples again and again.
+    /// Motions with their sets' unit of translation. T is B, or a multiple of it: the samples repeated.
     #[must_use]
     pub fn scale(&self, motion: &Motion) -> Motion {
         let [n, _] = motion.translation.dims();
@@ -53,7 +53,7 @@ impl BatchFactors {
     }
 }
 
-/// The values again and again, until there are `n`.
+/// The values repeated until there are `n`.
 fn repeated(values: &Tensor<1>, n: usize) -> Tensor<1> {
     let [len] = values.dims();
     match n / len.max(1) {
@@ -77,7 +77,7 @@ mod tests {
         max_m: 30.0,
     };
 
-    /// Each sample's depth and motion are exactly its own set's, in both halves of a batch that looks both ways.
+    /// Each sample's depth and motion are exactly its own set's, in both halves of a bidirectional batch.
     #[test]
     fn every_sample_has_its_own_metres() {
         let device = Device::flex();

@@ -1,10 +1,12 @@
 use deepfusion_geometry::DepthMap;
 
-/// Below this share of pixels with depth a map is a scan's: of the points that fall into a pixel the nearest is taken.
+/// A map with a smaller share of pixels with depth is treated as sparse (a scan): of the points that fall into a pixel the
+/// nearest is taken.
 const DENSE: f64 = 0.3;
 
 /// Depth at another size, row by row, 0 = none. A dense map is read at each pixel's centre, never averaged across an edge;
-/// of a sparse one no point is lost but behind a nearer one. With `sky` holes are the sky's, and the map is dense.
+/// of a sparse one every point is kept, unless a nearer one falls into its pixel. With `sky` the holes are sky, and the
+/// map counts as dense.
 pub(crate) fn fit_depth(depth: &DepthMap, width: usize, height: usize, sky: bool) -> Vec<f32> {
     if (depth.width, depth.height) == (width, height) {
         return depth.data.clone();

@@ -1,4 +1,4 @@
-//! What a trained network sees on the way to depth: the paper's Fig. 5.
+//! Intermediate feature maps of a trained network, as in the paper's Fig. 5.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_nn::{DepthNet, InputSize};
@@ -7,7 +7,7 @@ use deepfusion_runtime::{FeatureMap, LayerMaps};
 use crate::runner::depth_net;
 use crate::{Error, StoredNetwork};
 
-/// Shows what a depth network computes within. It runs in Burn, beside whatever engine predicts.
+/// Shows a depth network's intermediate feature maps. It runs in Burn, whichever engine predicts.
 #[derive(Debug)]
 pub struct Inspector {
     net: DepthNet,
@@ -15,7 +15,7 @@ pub struct Inspector {
 }
 
 impl Inspector {
-    /// For a network, on a device.
+    /// An inspector of a network, on a device.
     ///
     /// # Errors
     /// [`Error::Model`] for weights of another architecture.

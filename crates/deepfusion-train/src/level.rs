@@ -4,7 +4,7 @@ use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Device, Tensor};
 use deepfusion_nn::{SCALES, ops};
 
-/// The images and cameras at which views are compared.
+/// Images and cameras at one size at which views are compared.
 #[derive(Debug, Clone)]
 pub(crate) struct Level {
     /// Targets, T×3×H×W.
@@ -15,7 +15,7 @@ pub(crate) struct Level {
     pub(crate) intrinsics: Tensor<3>,
     /// K⁻¹.
     pub(crate) inverse_intrinsics: Tensor<3>,
-    /// What standing still would explain, by view, T×1×H×W, without gradient.
+    /// Photometric error of the unwarped sources (the automask's baseline), by view, T×1×H×W, without gradient.
     pub(crate) unwarped: Vec<Tensor<4>>,
 }
 
@@ -61,7 +61,7 @@ pub(crate) fn levels(
     scales.collect()
 }
 
-/// K and K⁻¹ of images at 1/2ˢ of their size: f' = s·f and c' = s·(c + ½) − ½ (SPEC 0), as matrices.
+/// K and K⁻¹ of images at 1/2ˢ of their size: f' = s·f and c' = s·(c + ½) − ½, as matrices.
 fn cameras(pass: &ForwardPass, scale: usize) -> (Tensor<3>, Tensor<3>) {
     let [count, _, _] = pass.intrinsics.dims();
     let device = pass.intrinsics.device();
@@ -74,7 +74,7 @@ fn cameras(pass: &ForwardPass, scale: usize) -> (Tensor<3>, Tensor<3>) {
     )
 }
 
-/// Takes pixels of an image to those of the image resized by `factor`, 1×3×3.
+/// Maps pixel coordinates of an image to those of the image resized by `factor`, 1×3×3.
 #[allow(clippy::cast_possible_truncation)]
 fn resizing(factor: f64, device: &Device) -> Tensor<3> {
     let (scale, shift) = (factor as f32, (0.5 * (factor - 1.0)) as f32);

@@ -1,7 +1,7 @@
 //! Learning metric depth from a drive: view synthesis, losses, the trainer and its checkpoints.
 //!
-//! The way of a training step: [`Sampler`] → [`SnippetBatch`] → [`Model`] → [`synthesise`] →
-//! [`LossTerms`] → [`Adam`] → [`TrainEvent`]. The trainer prints nothing: whoever runs it reads its
+//! The path of a training step: [`Sampler`] → [`SnippetBatch`] → [`Model`] → [`synthesise`] →
+//! [`LossTerms`] → [`Adam`] → [`TrainEvent`]. The trainer prints nothing: its caller reads its
 //! events.
 
 mod adam;
@@ -33,7 +33,7 @@ mod trainer;
 mod view_synthesis;
 mod window;
 
-/// Where networks are trained: `Device::flex()` is the processor.
+/// The device on which networks are trained: `Device::flex()` is the CPU.
 pub use burn::tensor::Device;
 
 pub use adam::{Adam, NamedGradients, StepOutcome};

@@ -1,4 +1,4 @@
-//! Batches made ahead of the trainer, on a thread of their own.
+//! Batches prepared ahead of the trainer, on their own thread.
 
 use crate::Error;
 use std::any::Any;
@@ -6,20 +6,20 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, sync_channel};
 
-/// Threads that decode, resize and render.
+/// Number of threads that decode, resize and render.
 const MAX_THREADS: usize = 4;
-/// Batches made ahead of the trainer.
+/// Number of batches prepared ahead of the trainer.
 const AHEAD: usize = 3;
 
-/// What a loader's thread makes, in order.
+/// The items that a loader's thread makes, in order.
 pub(crate) struct Ahead<T> {
-    /// `None` says that the last one was sent. A channel that ends without it has lost its thread.
+    /// `None` marks the end. A channel that closes without it has lost its thread.
     made: Receiver<Result<Option<T>, Error>>,
     ended: Cell<bool>,
 }
 
 impl<T: Send + 'static> Ahead<T> {
-    /// Makes one of each of the plans, with a number that only counts them in messages.
+    /// Makes one item for each plan; the number passed along only counts them in messages.
     pub(crate) fn start<P: Send + Sync + 'static>(
         plans: impl Iterator<Item = (usize, P)> + Send + 'static,
         make: impl Fn(usize, &P) -> Result<T, Error> + Send + Sync + 'static,
@@ -52,7 +52,7 @@ impl<T: Send + 'static> Ahead<T> {
     /// The next one; `None` after the last.
     ///
     /// # Errors
-    /// What making it said; [`Error::Threads`] where the thread could not start; [`Error::Loader`] where it has died.
+    /// The error of making it; [`Error::Threads`] if the thread could not start; [`Error::Loader`] if it has died.
     pub(crate) fn next(&self) -> Option<Result<T, Error>> {
         if self.ended.get() {
             return None;
@@ -88,7 +88,7 @@ fn start_thread(make: impl FnOnce(rayon::ThreadPool) + Send + 'static) -> Result
     Ok(())
 }
 
-/// What a panic while a batch was made means to whoever waits for it.
+/// The error for a panic while a batch was being made.
 fn panicked(number: usize, panic: &(dyn Any + Send)) -> Error {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or_else(|| panic.downcast_ref::<&str>().copied());

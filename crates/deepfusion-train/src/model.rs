@@ -4,7 +4,7 @@ use burn::tensor::{Device, Tensor};
 use deepfusion_geometry::DepthRange;
 use deepfusion_nn::{DepthNet, FlowDecoder, PoseNet, SCALES, WeightRng};
 
-/// The networks of a run, and what their training step needs.
+/// The networks of a run, and what a training step needs.
 #[derive(Debug, Clone)]
 pub struct Model {
     /// Disparity of an image.
@@ -21,20 +21,20 @@ pub struct Model {
 /// The optical flow between targets and sources, T×2×H×W each, in pixels.
 #[derive(Debug, Clone)]
 pub struct ViewFlow {
-    /// From the targets to the sources: what is at p is at p + f(p) there.
+    /// From the targets to the sources: what is at p in the target is at p + f(p) in the source.
     pub flow: Tensor<4>,
     /// From the sources to the targets.
     pub back: Tensor<4>,
 }
 
-/// What the networks say about a batch: T targets, which are frame 0 alone, or frames 0 and 1.
+/// The networks' outputs for a batch: T targets, which are frame 0 alone, or frames 0 and 1.
 #[derive(Debug, Clone)]
 pub struct ForwardPass {
     /// Sigmoid disparities of the targets by scale, T×1×H/2ˢ×W/2ˢ.
     pub disparities: Vec<Tensor<4>>,
-    /// `source_from_target` by PoseNet, by view, T each.
+    /// PoseNet's `source_from_target`, by view, T each.
     pub motions: Vec<Motion>,
-    /// The same by the vehicle's sensors.
+    /// The same, measured by the vehicle's sensors.
     pub measured: Vec<Motion>,
     /// The optical flow by view; empty without a flow decoder.
     pub flows: Vec<ViewFlow>,
@@ -122,7 +122,7 @@ impl Model {
         )
     }
 
-    /// A scale's disparity at the full size, the run's or that of a batch that has one of its own.
+    /// A scale's disparity at full resolution: the run's size, or the batch's where it has its own.
     pub(crate) fn enlarged(
         &self,
         scale: usize,
@@ -144,7 +144,7 @@ impl Model {
         &self.config
     }
 
-    /// The depths that the disparities mean.
+    /// The depth range of the disparities.
     #[must_use]
     pub fn range(&self) -> DepthRange {
         self.config.depth_net.range
@@ -246,8 +246,8 @@ impl Model {
         }
     }
 
-    /// Disparities of the targets, and the flow between them and every source where there is a decoder for
-    /// it: the encoder then looks at the sources too.
+    /// Disparities of the targets, and, with a flow decoder, the flow between them and every source: the
+    /// encoder then runs on the sources too.
     fn depth_and_flows(&self, batch: &SnippetBatch) -> (Vec<Tensor<4>>, Vec<ViewFlow>) {
         let Some(decoder) = &self.flow_decoder else {
             return (self.depth_net.forward(batch.network[0].clone()), Vec::new());

@@ -1,4 +1,4 @@
-//! What is minimised: L = Σ_s ¼(L_rp + λ_s·L_smooth) + λ_v·L_speed + λ_a·L_aff + λ_f·L_flow + agreement.
+//! The objective: L = Σ_s ¼(L_rp + λ_s·L_smooth) + λ_v·L_speed + λ_a·L_aff + λ_f·L_flow + agreement.
 
 use crate::level::{Level, levels, pyramid};
 use crate::losses::{self, FlowView, LossTerms, ReprojectionOutput, RigidView, View, share};
@@ -12,16 +12,16 @@ use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Bool, Tensor};
 use deepfusion_nn::{DepthOutput, SCALES, ops};
 
-/// What of the loss depends on how far training is.
+/// The parts of the loss that depend on training progress.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule {
     /// λ_v.
     pub speed_weight: f64,
-    /// Whether moving pixels are looked for, and the flow and the rigid flow have to agree.
+    /// Whether dynamic pixels are masked, and the flow and the rigid flow have to agree.
     pub masks_active: bool,
 }
 
-/// The loss of a batch: the sum to differentiate, its terms, and what the finest scale saw.
+/// The loss of a batch: the sum to differentiate, its terms, and the results of the finest scale.
 #[derive(Debug, Clone)]
 pub struct BatchLoss {
     /// What is minimised, one value.
@@ -30,13 +30,13 @@ pub struct BatchLoss {
     pub terms: LossTerms,
     /// The reprojection at the finest scale.
     pub finest: ReprojectionOutput,
-    /// The first view's source seen from the targets' place at that scale, T×3×H×W.
+    /// The first view's source warped to the targets at that scale, T×3×H×W.
     pub warped: Tensor<4>,
-    /// The pixels of the first view that move by themselves, T×1×H×W, where they were looked for.
+    /// The dynamic pixels of the first view, T×1×H×W, if they were computed.
     pub moving: Option<Tensor<4, Bool>>,
 }
 
-/// What a batch of known depth taught.
+/// The loss of a batch with known depth.
 #[derive(Debug, Clone)]
 pub struct DepthPass {
     /// What is minimised, one value.
@@ -60,7 +60,7 @@ impl Model {
     #[must_use]
     pub fn loss(&self, pass: &ForwardPass, batch: &SnippetBatch, schedule: Schedule) -> BatchLoss {
         let settings = &self.config.loss;
-        let motions = self.view_motions(pass, batch);
+        let motions = self.warp_poses(pass, batch);
         let targets = pyramid(pass.targets.clone());
         let levels = levels(pass, &targets, settings.compare_at, settings.ssim_weight);
         let mut sum = Sum::default();
@@ -128,7 +128,7 @@ impl Model {
         }
     }
 
-    /// The loss of images whose depth is known, and what the network says of them.
+    /// The loss of images whose depth is known, and the network's prediction for them.
     #[must_use]
     pub fn learn_depth(&self, batch: &DepthBatch) -> DepthPass {
         // At weight 0 the head for uncertainty learns alone: what has no gradient is not even decayed.
@@ -169,7 +169,7 @@ impl Model {
         }
     }
 
-    /// The sources as a scale's disparity sees them, and their errors.
+    /// The sources warped by a scale's disparity, and their errors.
     fn views(
         &self,
         (pass, batch): (&ForwardPass, &SnippetBatch),
@@ -208,7 +208,7 @@ impl Model {
         }
     }
 
-    /// 1/depth in 1/m, of a sigmoid disparity: d = 1/D_max + (1/D_min − 1/D_max)·σ, the range that of the run
+    /// 1/depth in 1/m, of a sigmoid disparity: d = 1/D_max + (1/D_min − 1/D_max)·σ, with the range of the run
     /// or of each sample's data set.
     fn inverse_depth(&self, disparity: Tensor<4>, batch: &SnippetBatch) -> Tensor<4> {
         if let Some(factors) = &batch.factors {
@@ -219,7 +219,7 @@ impl Model {
         disparity.mul_scalar(high - low).add_scalar(low)
     }
 
-    /// The sources as the flow sees them, by view; none without a flow.
+    /// The sources warped by the flow, by view; none without a flow.
     fn flow_views(&self, pass: &ForwardPass) -> Vec<FlowView> {
         let ssim_weight = self.config.loss.ssim_weight;
         let views = pass.flows.iter().zip(&pass.sources);
@@ -260,9 +260,9 @@ impl Model {
     /// The affine invariant loss between each frame's depth and the other's seen from it. Both frames are
     /// targets here: the other depth is that of the batch's other half.
     ///
-    /// Where a pixel lies in the other frame follows from depth and motion together, and so would tell the one's
-    /// scale from the other's: both stand still here. The translation is left out of the depth seen from here, since
-    /// it moves all of it by the same length, which b takes up.
+    /// Where a pixel lies in the other frame depends on depth and motion together, and would couple the scale of one
+    /// to that of the other; so both are detached here. The translation is left out of the depth seen from this
+    /// frame: it shifts all of it by the same length, which b takes up.
     fn affine_loss(
         &self,
         (pass, batch): (&ForwardPass, &SnippetBatch),
@@ -294,7 +294,7 @@ impl Model {
         })
     }
 
-    /// What PoseNet learns from the vehicle.
+    /// The loss between PoseNet's motion and the vehicle's.
     fn motion_loss(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Tensor<1> {
         let views = pass.motions.iter().zip(&pass.measured);
         match self.config.view_motion {
@@ -319,8 +319,8 @@ impl Model {
         }
     }
 
-    /// The motions that the views are synthesised with.
-    fn view_motions(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Vec<Motion> {
+    /// The poses used for warping, by view.
+    fn warp_poses(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Vec<Motion> {
         match self.config.view_motion {
             ViewMotion::PoseNet => pass.motions.clone(),
             ViewMotion::Vehicle => pass.measured.clone(),
@@ -333,7 +333,7 @@ impl Model {
     }
 }
 
-/// The pixels that move by themselves at the finest scale, by view, T×1×H×W.
+/// The dynamic pixels at the finest scale, by view, T×1×H×W.
 fn moving_masks(
     model: &Model,
     finest: &ScaleViews,
@@ -357,7 +357,7 @@ fn moving_masks(
         .collect()
 }
 
-/// A scale's views as the reprojection compares them, the masks brought to their size.
+/// A scale's views for the reprojection loss, with the masks resized to them.
 fn compared(views: &ScaleViews, level: &Level, masks: Option<&[Tensor<4, Bool>]>) -> Vec<View> {
     let parts = views.synthesised.iter().zip(&views.errors);
     let parts = parts.zip(&level.unwarped).enumerate();
@@ -381,8 +381,8 @@ fn shrunk(mask: &Tensor<4, Bool>, width: usize) -> Tensor<4, Bool> {
     avg_pool2d(mask.clone().float(), options).greater_elem(0.5)
 }
 
-/// Mean over the views of the distance between rigid flow and flow, where both explain the pixel and it does
-/// not move by itself.
+/// Mean over the views of the distance between rigid flow and flow, where both explain the pixel and it is
+/// static.
 fn agreement(
     finest: &ScaleViews,
     flow_views: &[FlowView],
@@ -408,7 +408,7 @@ struct Sum {
 }
 
 impl Sum {
-    /// Adds a term where there is one, and gives its unweighted value.
+    /// Adds a term if there is one, and returns its unweighted value.
     fn add(&mut self, term: Option<Tensor<1>>, weight: f64) -> f64 {
         let Some(term) = term else { return 0.0 };
         let value = number(&term);

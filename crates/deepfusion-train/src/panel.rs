@@ -2,7 +2,7 @@ use crate::losses::log_depth_error;
 use crate::{BatchLoss, DepthBatch, DepthPass, ForwardPass};
 use burn::tensor::Tensor;
 
-/// What the networks make of one training image. All planes are row by row, of `width` × `height`.
+/// The networks' outputs for one training image. All planes are row by row, of `width` × `height`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SamplePanel {
     /// Width, in pixels.
@@ -15,16 +15,16 @@ pub struct SamplePanel {
     pub image: Vec<f32>,
     /// Its disparity at the finest scale, H×W: the sigmoid's, or in 1/m beside known depth.
     pub disparity: Vec<f32>,
-    /// What it is learned from.
+    /// Its supervision.
     pub lesson: Lesson,
 }
 
-/// What an image of a panel is learned from.
+/// The supervision of a panel's image.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Lesson {
     /// Its neighbour in the video.
     View {
-        /// The source seen from its place, 3×H×W.
+        /// The source warped to the image, 3×H×W.
         warped: Vec<f32>,
         /// The photometric error that counts, H×W.
         error: Vec<f32>,
@@ -32,12 +32,12 @@ pub enum Lesson {
         mask: Vec<f32>,
         /// The optical flow to the source, 2×H×W in pixels, where one is learned.
         flow: Option<Vec<f32>>,
-        /// 1 where the pixel is taken to move by itself, H×W, once that is looked for.
+        /// 1 where the pixel counts as dynamic, H×W, once such pixels are masked.
         moving: Option<Vec<f32>>,
     },
     /// Its known depth.
     Depth {
-        /// The disparity that the depth is, 1/m, H×W, 0 in the sky; NaN where nothing is known.
+        /// True disparity, 1/m, H×W, 0 in the sky; NaN where unknown.
         truth: Vec<f32>,
         /// ln of predicted over known depth, H×W, 0 where nothing is known.
         error: Vec<f32>,

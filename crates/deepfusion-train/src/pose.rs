@@ -67,7 +67,7 @@ impl Motion {
         }
     }
 
-    /// ‖t‖ as √(‖t‖² + 1e-8), N: its gradient at 0 is finite (SPEC 2).
+    /// ‖t‖ as √(‖t‖² + 1e-8), N: its gradient at 0 is finite.
     #[must_use]
     pub fn distance(&self) -> Tensor<1> {
         let [n, _] = self.translation.dims();

@@ -8,23 +8,23 @@ use std::path::Path;
 
 /// A trained pose network, ready for consecutive images of a drive.
 ///
-/// Nothing is corrected for another camera than the one trained on: PoseNet sees pixels, and a camera of
-/// another focal length at network size shows it other pixels for the same motion.
+/// Nothing is corrected for a camera other than the one trained on: PoseNet sees pixels, and with
+/// another focal length the same motion moves them differently.
 #[derive(Debug)]
 pub struct PosePredictor {
     config: TrainConfig,
     camera: Option<Intrinsics>,
     pose_net: PoseNet,
     device: Device,
-    /// Which checkpoint it was loaded from.
+    /// The checkpoint it was loaded from.
     pub checkpoint: CheckpointKind,
     /// Steps it was trained for.
     pub step: usize,
 }
 
 impl PosePredictor {
-    /// Loads a run's folder or a checkpoint in it; the folder means `best` where there is one.
-    /// `set` names one of the data sets the run learned from, where it learned several.
+    /// Loads a run's folder or a checkpoint in it; a folder means its `best` checkpoint if there is
+    /// one. `set` names one of the data sets the run learned from, where it learned several.
     ///
     /// # Errors
     /// As [`RunFolder::open`], [`Checkpoints::load`] and [`TrainConfig::for_set`].
@@ -57,7 +57,7 @@ impl PosePredictor {
         self.camera
     }
 
-    /// An image as the network takes it, as in training: all of it, resized.
+    /// An image as network input, as in training: the whole image, resized.
     ///
     /// # Shapes
     /// - output: 3×H×W at network size, in [0, 1], channel by channel
@@ -68,7 +68,7 @@ impl PosePredictor {
         to_network_input(image, whole, size.width as u32, size.height as u32)
     }
 
-    /// `frame(i+1)_from_frame(i)` of prepared images in time order: one motion less than images.
+    /// `frame(i+1)_from_frame(i)` of prepared images in time order: one motion fewer than images.
     ///
     /// # Shapes
     /// - `images`: 3×H×W at network size each

@@ -53,7 +53,7 @@ impl Sampler {
     }
 }
 
-/// A random stream of its own for every purpose and index.
+/// An independent random stream for every purpose and index.
 pub(crate) fn stream(seed: u64, purpose: u64, index: usize) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ purpose.wrapping_mul(0x9E37_79B9_7F4A_7C15));
     rng.set_stream(index as u64);

@@ -1,16 +1,16 @@
 use crate::{LossTerms, TrainConfig, ViewMotion};
 
-/// What `best` is chosen by: the part of a held-out loss that depth can change, at weights that never change.
+/// The value that selects `best`: the part of a held-out loss that depth can change, at weights that never change.
 ///
-/// Photometric error is all of it where the vehicle's sensors give the distance of the views (`distance`, `vehicle`): what
-/// PoseNet learns beside them says nothing about depth, and more of it than of depth would be chosen by. With
-/// `posenet` the views follow PoseNet alone, depth and motion share one scale, and photometric error cannot see it: the
-/// speed term, at its full weight, does.
+/// It is the photometric error alone if the vehicle's sensors give the distance of the views (`distance`, `vehicle`):
+/// PoseNet's own loss says nothing about depth and would dominate the choice. With `posenet` the views depend on PoseNet
+/// alone, depth and motion share one scale, and the photometric error cannot see it; the speed term, at its full weight,
+/// can.
 ///
-/// Smoothness and the affine term are no part of it, though depth changes them: a flat depth has the least of the
-/// one, and neither asks whether the images are explained. Flow and masks are training's alone.
+/// Smoothness and the affine term are left out, though depth changes them: a flat depth minimises the former, and
+/// neither measures how well the images are explained. Flow and masks exist only in training.
 ///
-/// Known depth is all of it where it is learned from, and stands beside the rest at its own weight.
+/// The loss on known depth is included at its own weight, and is the whole value for a run that learns from known depth alone.
 pub(crate) fn selection(config: &TrainConfig, held_out: &LossTerms) -> f64 {
     let views = match config.view_motion {
         ViewMotion::PoseNet => held_out.reprojection + config.loss.speed * held_out.speed,
@@ -24,7 +24,7 @@ mod tests {
     use super::*;
     use crate::Preset;
 
-    /// Depth explains the images better, while PoseNet forgets what the vehicle measured.
+    /// Depth explains the images better, while PoseNet drifts from the vehicle's measurements.
     #[test]
     fn only_what_depth_can_change_decides() {
         let mut config = Preset::Tiny.config();

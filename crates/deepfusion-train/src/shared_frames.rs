@@ -1,23 +1,23 @@
-//! Frames that are both learned from and validated on.
+//! Frames used for both training and validation.
 
 use crate::SampleSet;
 use deepfusion_data::FrameImage;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
-/// The validation frames of a drive that training sees.
+/// The validation frames of a drive that training also uses.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SharedFrames {
     /// The drive.
     pub drive: String,
-    /// How many of its validation targets are targets of training samples, too.
+    /// Number of its validation targets that are also targets of training samples.
     pub targets: usize,
-    /// How many more are sources of training samples.
+    /// Number of further ones that are sources of training samples.
     pub sources: usize,
 }
 
 /// The validation targets that are frames of training samples, drive by drive in order of names; drives without any are
-/// left out. A frame is one wherever it was opened: its file counts, with links resolved, and its place in it.
+/// left out. Frames are identified by their file, with links resolved, and their position in it.
 #[must_use]
 pub fn shared_frames(train: &SampleSet, validation: &SampleSet) -> Vec<SharedFrames> {
     let mut files = Files::default();
@@ -54,7 +54,7 @@ pub fn shared_frames(train: &SampleSet, validation: &SampleSet) -> Vec<SharedFra
         .collect()
 }
 
-/// Files by a number each, links resolved. A file of many frames is looked up once in a row.
+/// Files by number, with links resolved. Consecutive frames of one file need a single look-up.
 #[derive(Default)]
 struct Files {
     numbers: HashMap<PathBuf, usize>,
@@ -62,7 +62,7 @@ struct Files {
 }
 
 impl Files {
-    /// An image's file, and its place in it.
+    /// An image's file, and its position in it.
     fn place(&mut self, image: &FrameImage) -> (usize, u64) {
         match image {
             FrameImage::File(path) => (self.number(path), 0),
@@ -76,7 +76,7 @@ impl Files {
         {
             return *number;
         }
-        // One that is gone meanwhile is told when it is read.
+        // A file that has disappeared is reported when it is read.
         let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         let next = self.numbers.len();
         let number = *self.numbers.entry(real).or_insert(next);

@@ -17,22 +17,22 @@ pub struct Sample {
 pub struct SampleSet {
     /// The recordings.
     pub datasets: Arc<Vec<Dataset>>,
-    /// The place in `data.sets` of each recording; 0 where the run has no sets.
+    /// The index in `data.sets` of each recording; 0 if the run has no sets.
     pub set_of: Arc<Vec<usize>>,
-    /// The samples of video.
+    /// The samples from video.
     pub samples: Vec<Sample>,
-    /// What is learned from by its known depth.
+    /// The images with known depth.
     pub depth: DepthSet,
 }
 
 impl SampleSet {
-    /// The training samples of `train`, and the validation samples: those of `validation` where it is
-    /// given, else the held-out end of each training drive. Drives without a usable pair are skipped
-    /// and reported in the last result, as long as one is left.
+    /// The training samples of `train`, and the validation samples: those of `validation` if given,
+    /// else the held-out end of each training drive. Drives without a usable pair are skipped and
+    /// listed in the last result, as long as one drive is left.
     ///
     /// # Errors
     /// [`Error::NoSamples`] with the reason for the last drive when no drive has a pair;
-    /// [`Error::NoYawRate`] where the configuration reads how the car turned and a drive does not say.
+    /// [`Error::NoYawRate`] if the configuration needs the yaw rate and a drive has none.
     pub fn split(
         config: &TrainConfig,
         train: Vec<Dataset>,
@@ -42,11 +42,11 @@ impl SampleSet {
         Self::split_sets(config, one_set(train), validation.map(one_set))
     }
 
-    /// As [`Self::split`], of recordings with the place of their set in `data.sets`.
+    /// As [`Self::split`], for recordings with the index of their set in `data.sets`.
     ///
     /// # Errors
-    /// As [`Self::split`]; [`Error::NoSamples`] for a set of which nothing is left to train on;
-    /// [`Error::SharedFrames`] where a target of `validation` is one of `train`.
+    /// As [`Self::split`]; [`Error::NoSamples`] for a set with nothing left to train on;
+    /// [`Error::SharedFrames`] if a target of `validation` is also one of `train`.
     pub fn split_sets(
         config: &TrainConfig,
         train: Vec<(usize, Dataset)>,

@@ -15,13 +15,13 @@ use std::time::{Duration, Instant};
 
 /// Skipped steps in a row after which training gives up.
 const MAX_SKIPPED: usize = 20;
-/// Share of the learning rate that a cosine ends at.
+/// Share of the learning rate at which the cosine schedule ends.
 const COSINE_END: f64 = 0.01;
-/// Steps that the pace and the scale ratio are averaged over.
+/// Number of steps over which the pace and the scale ratio are averaged.
 const SMOOTHING: f64 = 20.0;
-/// Below this share of pixels in view the geometry has come apart (SPEC 2).
+/// Below this share of pixels in view the geometry has diverged: a warning.
 const MIN_VALID_SHARE: f64 = 0.2;
-/// Above this share of moving pixels the masks take away what depth should learn from (SPEC 2).
+/// Above this share of dynamic pixels the masks remove too much of what depth should learn from: a warning.
 const MAX_MOVING_SHARE: f64 = 0.4;
 
 /// A training run.
@@ -45,7 +45,7 @@ pub struct TrainSummary {
     pub steps: usize,
     /// Steps skipped for a gradient that was not finite.
     pub skipped: usize,
-    /// The lowest value that `best` is chosen by.
+    /// The lowest value of the quantity that selects `best`.
     pub best_validation: Option<f64>,
     /// Wall time of this call, in seconds.
     pub seconds: f64,
@@ -63,8 +63,6 @@ impl std::fmt::Debug for Trainer {
 }
 
 impl Trainer {
-    /// A new run in `folder`. What the data alone can say (its camera, metres per unit of pose) is found out and stored beside the
-    /// configuration. `init` changes the networks before the first step.
     ///
     /// # Errors
     /// [`Error::Model`], [`Error::NoSamples`], [`Error::NoValidation`].
@@ -102,7 +100,7 @@ impl Trainer {
         })
     }
 
-    /// Goes on where the folder's last checkpoint stood: weights, optimiser, schedule and samples.
+    /// Resumes from the folder's last checkpoint: weights, optimiser, schedule and samples.
     ///
     /// # Errors
     /// As [`RunFolder::load`]; [`Error::NoSamples`], [`Error::NoValidation`].
@@ -133,13 +131,13 @@ impl Trainer {
         })
     }
 
-    /// Steps of the optimiser in the whole run.
+    /// Optimiser steps in the whole run.
     #[must_use]
     pub fn steps(&self) -> usize {
         self.config.steps_of(self.epoch_steps())
     }
 
-    /// Steps of the optimiser in a pass over the data: over its video, where there is any.
+    /// Optimiser steps in one pass over the data: over its video, if there is any.
     #[must_use]
     pub fn epoch_steps(&self) -> usize {
         let (samples, batch) = match self.train.samples.len() {
@@ -174,12 +172,12 @@ impl Trainer {
         &self.config
     }
 
-    /// Trains to the end, or until `listen` says stop; either way the last checkpoint is written.
+    /// Trains to the end, or until `listen` returns [`Control::Stop`]; either way the last checkpoint is written.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] naming term and frames: the last good checkpoint stays. [`Error::Data`]
-    /// for an image that cannot be read, [`Error::Loader`] where the loader has died, [`Error::Model`] for a
-    /// checkpoint that cannot be written.
+    /// [`Error::NotFinite`] naming term and frames; the last good checkpoint stays. [`Error::Data`] if an
+    /// image cannot be read, [`Error::Loader`] if the loader has died, [`Error::Model`] if a checkpoint
+    /// cannot be written.
     pub fn run(
         &mut self,
         listen: &mut dyn FnMut(TrainEvent) -> Control,
@@ -324,13 +322,13 @@ impl Trainer {
         })
     }
 
-    /// Whether so much time has passed since a checkpoint that one is written between validations, too.
+    /// Whether enough time has passed since the last checkpoint to write one between validations.
     fn checkpoint_is_due(&self, passed: Duration) -> bool {
         let minutes = self.config.checkpoint_minutes;
         minutes > 0.0 && passed.as_secs_f64() >= 60.0 * minutes
     }
 
-    /// What of the loss depends on the step.
+    /// The schedule at the current step.
     fn schedule(&self, steps: usize) -> Schedule {
         let (step, loss) = (self.state.step, &self.config.loss);
         Schedule {
@@ -361,7 +359,7 @@ impl Trainer {
     }
 
     /// # Errors
-    /// [`Error::NotFinite`] naming the first term that is not a number.
+    /// [`Error::NotFinite`] naming the first term that is not finite.
     fn check_finite(&self, terms: &LossTerms, names: &[String]) -> Result<(), Error> {
         match terms.not_finite() {
             None => Ok(()),
@@ -439,7 +437,7 @@ impl Trainer {
         self.save_last(listen)
     }
 
-    /// Writes the checkpoint to go on from.
+    /// Writes the checkpoint to resume from.
     fn save_last(&self, listen: &mut dyn FnMut(TrainEvent) -> Control) -> Result<(), Error> {
         let step = self.state.step;
         let path = self.folder.save(
@@ -453,7 +451,7 @@ impl Trainer {
     }
 }
 
-/// The loaders of what there is to learn from.
+/// The loaders of the training data.
 struct Loaders {
     video: Option<BatchLoader>,
     depth: Option<DepthLoader>,
@@ -470,7 +468,7 @@ impl Loaders {
     }
 }
 
-/// What a panel is drawn of.
+/// What a panel shows.
 enum Shown {
     View(Box<(ForwardPass, BatchLoss, String)>),
     Depth(Box<(DepthPass, DepthBatch)>),
@@ -488,7 +486,7 @@ impl Shown {
     }
 }
 
-/// A batch of a loader that never ends.
+/// The next batch of a loader that never ends.
 fn next<T>(batch: impl FnOnce() -> Option<Result<T, Error>>) -> Result<T, Error> {
     batch().unwrap_or_else(|| {
         Err(Error::Loader {
@@ -497,7 +495,7 @@ fn next<T>(batch: impl FnOnce() -> Option<Result<T, Error>>) -> Result<T, Error>
     })
 }
 
-/// The metres of a unit of PoseNet's translation; where there is no video it says nothing, and 1 will do.
+/// Metres per unit of PoseNet's translation; 1 without video, where it does not matter.
 fn first_unit(config: &TrainConfig, set: &SampleSet) -> f64 {
     if set.samples.is_empty() {
         1.0
@@ -525,7 +523,6 @@ fn findings(config: &TrainConfig, train: &SampleSet) -> TrainFindings {
 }
 
 /// # Errors
-/// [`Error::Precision`] where the device cannot do what the configuration asks for.
 fn check_precision(config: &TrainConfig, device: &Device) -> Result<(), Error> {
     if supports(device, config.precision) {
         return Ok(());
@@ -539,7 +536,7 @@ fn check_precision(config: &TrainConfig, device: &Device) -> Result<(), Error> {
 }
 
 /// # Errors
-/// [`Error::NoSamples`] without anything to train on, [`Error::NoValidation`] where samples should be held out and
+/// [`Error::NoSamples`] without anything to train on, [`Error::NoValidation`] if samples should be held out and
 /// none are.
 fn check_samples(
     config: &TrainConfig,
@@ -562,12 +559,12 @@ fn no_samples(data: &str) -> Error {
     }
 }
 
-/// The mean loss over the held-out samples, with λ_v at its full weight and without the flow, which training
-/// alone has; and the ratio of measured to predicted displacement.
+/// The mean loss over the held-out samples, with λ_v at its full weight and without the flow, which exists
+/// only in training; and the ratio of measured to predicted displacement.
 ///
 /// # Errors
-/// [`Error::NoSamples`] without samples, [`Error::Data`] for an image that cannot be read, [`Error::Loader`] where
-/// the loader has died.
+/// [`Error::NoSamples`] without samples, [`Error::Data`] if an image cannot be read, [`Error::Loader`] if the
+/// loader has died.
 pub fn validation_loss(
     model: &Model,
     config: &TrainConfig,

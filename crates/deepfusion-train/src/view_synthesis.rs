@@ -2,7 +2,7 @@ use crate::Motion;
 use burn::tensor::{Bool, Tensor};
 use deepfusion_nn::ops;
 
-/// A source seen from the target.
+/// A source warped to the target.
 #[derive(Debug, Clone)]
 pub struct Synthesised {
     /// Î, N×C×H×W; border-padded where out of view.
@@ -13,8 +13,8 @@ pub struct Synthesised {
     pub valid: Tensor<4, Bool>,
 }
 
-/// Sees a source image from the target's place (SPEC 2, Eq. 3–5): Î(p) = source⟨p'⟩,
-/// p' ~ K·(R·D(p)·K⁻¹·p̃ + t).
+/// Warps a source image to the target's view (the paper's Eq. 3–5): Î(p) = source⟨p'⟩, p' ~
+/// K·(R·D(p)·K⁻¹·p̃ + t).
 ///
 /// # Shapes
 /// - `source`: `[N, C, H, W]`

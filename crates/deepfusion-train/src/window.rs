@@ -8,7 +8,7 @@ use std::borrow::Cow;
 /// How far two aspect ratios may differ and still count as the same.
 const ASPECT_TOLERANCE: f64 = 0.02;
 
-/// The part of an image that a network is shown, with the aspect ratio of its input: nothing is stretched.
+/// The part of an image that becomes network input, with the input's aspect ratio: nothing is stretched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Window {
     x: u32,
@@ -18,7 +18,7 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// As much of the image as fits, about its middle.
+    /// The largest window, about the image's middle.
     pub(crate) fn centred(camera: &Intrinsics, config: &TrainConfig) -> Self {
         let [width, height] = largest(camera, config);
         Self {
@@ -29,7 +29,7 @@ impl Window {
         }
     }
 
-    /// A part of it at a random place, smaller by up to `augmentation.zoom`: as a longer lens sees it.
+    /// A random window, smaller by up to `augmentation.zoom`, as a longer lens would see it.
     pub(crate) fn draw(camera: &Intrinsics, config: &TrainConfig, rng: &mut impl Rng) -> Self {
         let zoom = f64::from(config.augmentation.zoom.max(1.0));
         // Evenly in the logarithm: half the draws are below its root.

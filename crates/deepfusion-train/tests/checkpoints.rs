@@ -1,4 +1,4 @@
-//! What a run goes on from, and what another one starts from.
+//! Resuming a run, and starting another one from it.
 
 #![allow(
     clippy::unwrap_used,
@@ -91,15 +91,15 @@ fn moments_that_are_not_their_parameters_are_refused_by_name() {
             moment.values.resize(length, 0.0);
             moment.shape = vec![length];
         });
-        let told = format!("tensor `{name}` has shape [{length}], expected [8]");
-        assert!(error.to_string().contains(&told), "{error}");
+        let expected = format!("tensor `{name}` has shape [{length}], expected [8]");
+        assert!(error.to_string().contains(&expected), "{error}");
         assert!(error.to_string().contains("last.safetensors"), "{error}");
     }
     let error = refused(&|w| {
         w.tensors.remove(name);
     });
-    let told = format!("tensor `{name}` [8] is missing");
-    assert!(error.to_string().contains(&told), "{error}");
+    let expected = format!("tensor `{name}` [8] is missing");
+    assert!(error.to_string().contains(&expected), "{error}");
     let error = refused(&|w| {
         let moment = w.tensors.remove(name).unwrap();
         w.tensors.insert("adam.m.depth.nothing".into(), moment);

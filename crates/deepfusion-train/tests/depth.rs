@@ -309,7 +309,7 @@ fn a_longer_lens_sees_the_same_as_farther() {
             let view = train.depth.simulated[0].endless.view(number);
             let focal = view.intrinsics.fy / 60.0;
             assert!((f64::from(*span) * focal - spans).abs() < 1e-4 * spans);
-            // What the sigmoid says of a pixel is canonical: depth × f_c/f_y.
+            // The sigmoid's depth is canonical: depth × f_c/f_y.
             let known: Vec<f32> = batch.truth.known.clone().into_data().iter().collect();
             let logs: Vec<f32> = batch.truth.log_depth.clone().into_data().iter().collect();
             let at = i * 96 * 64;

@@ -1,4 +1,4 @@
-//! What the trainer tells of a run, and what ends one.
+//! The trainer's events, and the ends of a run.
 
 #![allow(
     clippy::unwrap_used,

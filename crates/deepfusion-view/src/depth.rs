@@ -1,4 +1,4 @@
-//! A frame's depth as the page gets it: the file's own numbers, without a step in between.
+//! A frame's depth as sent to the page: the file's own numbers, unconverted.
 
 use std::io::Read;
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::{Error, Result};
 /// More pixels than any camera's image; a file that says more is refused before anything is set aside for it.
 const MOST_PIXELS: u64 = 64 << 20;
 
-/// What the numbers of a [`DepthFile`] are.
+/// The number format of a [`DepthFile`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DepthCode {
     /// `u16` in steps of 1/256 m, 0 = none: a depth PNG.
@@ -26,21 +26,21 @@ pub struct DepthFile {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// What the numbers are.
+    /// The number format.
     pub code: DepthCode,
     /// The numbers, little endian.
     pub values: Vec<u8>,
 }
 
 impl DepthFile {
-    /// Marks the begin of [`DepthFile::into_bytes`].
+    /// First bytes of [`DepthFile::into_bytes`].
     pub const MAGIC: &[u8; 4] = b"DFD1";
 
     /// Reads `NAME_depth.png` or `NAME_depth.npy`.
     ///
     /// # Errors
-    /// [`Error::Picture`] for a PNG that is cut off or not 16-bit grey, [`Error::Content`] for an array that is cut off, of another type
-    /// than `f32` or `f64` or not two-dimensional, [`Error::File`] where reading fails.
+    /// [`Error::Picture`] for a PNG that is cut off or not 16-bit grey, [`Error::Content`] for an array that is cut off, of
+    /// another type than `f32` or `f64` or not two-dimensional, [`Error::File`] if reading fails.
     pub fn read(path: &Path) -> Result<Self> {
         if path.extension().is_some_and(|e| e == "npy") {
             return read_npy(path);
@@ -60,7 +60,7 @@ impl DepthFile {
         })
     }
 
-    /// As it is sent: magic, width, height and code as 32-bit little endian numbers, then the values.
+    /// The bytes sent to the page: magic, width, height and code as 32-bit little endian numbers, then the values.
     #[must_use]
     pub fn into_bytes(self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(16 + self.values.len());

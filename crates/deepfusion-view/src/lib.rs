@@ -1,12 +1,12 @@
-//! Results in the browser: a server of one page, and of what the page asks for.
+//! Shows results in the browser: a server for one page and its data.
 //!
-//! [`Folder`] is what `predict` and `perceive` wrote (or a training run), read anew as it grows; [`Server`] answers for one or two of
-//! them. Files are decoded when they are asked for and not kept: what the server holds is the list of frames and a few numbers a frame.
+//! A [`Folder`] is the output of `predict` or `perceive` (or a training run), refreshed as it grows; a [`Server`] serves one or
+//! two of them. Files are decoded on demand and not kept: the server holds only the list of frames and a few numbers per frame.
 //! The page makes pictures, cloud, boxes and the metres under the pointer from one download of a frame's depth.
 //!
 //! With the feature `rerun`, `write_rerun` writes a folder's frames to a file for that viewer.
 //!
-//! Only names that a folder's listing holds are served, and the pictures that sidecars name; no path is ever made from a request.
+//! Only files in a folder's listing and pictures named by sidecars are served; no path is ever built from a request.
 
 mod assets;
 mod depth;

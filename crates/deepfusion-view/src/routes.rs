@@ -1,4 +1,4 @@
-//! What is answered to which path.
+//! The server's routes.
 //!
 //! | Path | Answer |
 //! |---|---|
@@ -18,7 +18,7 @@ use deepfusion_hint::Hint;
 use deepfusion_render::{ColourMap, DepthScale};
 use serde_json::{Value, json};
 
-use crate::folder::{Kind, PartFile, frame_json, picture_of, targets_of};
+use crate::folder::{FrameFile, Kind, frame_json, picture_of, targets_of};
 use crate::http::{Request, Response};
 use crate::{DepthFile, Error, Folder, assets, training};
 
@@ -149,8 +149,8 @@ fn of_folder(folder: &Folder, rest: &[&str], request: &Request) -> Response {
 }
 
 /// The numbers of a depth or of its standard deviation.
-fn map(folder: &Path, file: Option<&PartFile>, missing: &str) -> Response {
-    let Some(PartFile { file, .. }) = file else {
+fn map(folder: &Path, file: Option<&FrameFile>, missing: &str) -> Response {
+    let Some(FrameFile { file, .. }) = file else {
         return Response::problem(404, missing, None);
     };
     let read = DepthFile::read(&folder.join(file));

@@ -1,4 +1,4 @@
-//! Where the page is served.
+//! The server of the page.
 
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
@@ -12,10 +12,10 @@ use crate::{Error, Folder, Result};
 /// A browser opens six connections; this is for some tabs and phones.
 const MOST_CONNECTIONS: usize = 64;
 
-/// Where to listen.
+/// The address to listen on.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
-    /// The address; an unspecified one is every network's.
+    /// The address; an unspecified one means all networks.
     pub host: IpAddr,
     /// The port; 0 takes any that is free.
     pub port: u16,
@@ -33,7 +33,7 @@ impl Server {
     /// Listens, for one folder or two side by side; nothing is answered before [`Server::run_until`].
     ///
     /// # Errors
-    /// [`Error::PortInUse`], [`Error::Listen`]; [`Error::OtherKind`] where one folder is a run and the other is not.
+    /// [`Error::PortInUse`], [`Error::Listen`]; [`Error::OtherKind`] if one folder is a run and the other is not.
     pub fn bind(settings: Settings, folder: Folder, other: Option<Folder>) -> Result<Self> {
         if let Some(other) = &other
             && other.kind() != folder.kind()
@@ -62,7 +62,7 @@ impl Server {
         })
     }
 
-    /// Where it listens, with the port that was found.
+    /// The address it listens on, with the actual port.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
@@ -75,7 +75,7 @@ impl Server {
         format!("http://{here}/")
     }
 
-    /// The page's address for other machines; `None` where only this one is served, or there is no network.
+    /// The page's address for other machines; `None` if only this machine is served, or there is no network.
     #[must_use]
     pub fn url_for_others(&self) -> Option<String> {
         if !self.address.ip().is_unspecified() {
@@ -89,7 +89,7 @@ impl Server {
         (!ip.is_loopback()).then(|| format!("http://{}/", SocketAddr::new(ip, self.address.port())))
     }
 
-    /// Answers until `stop` says so, asked ten times a second.
+    /// Serves until `stop` returns true; it is polled ten times a second.
     pub fn run_until(self, stop: impl Fn() -> bool) {
         let ended = Arc::new(AtomicBool::new(false));
         let (acceptor_ended, address) = (ended.clone(), self.url_address());

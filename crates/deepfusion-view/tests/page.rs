@@ -30,13 +30,13 @@ fn opened(server: &Running) -> Option<Browser> {
 }
 
 /// Moves the mouse onto a pixel of the depth pane, and gives what the page then says.
-fn told_at(browser: &mut Browser, pane: &str, x: u32, y: u32) -> (f64, String) {
+fn reading_at(browser: &mut Browser, pane: &str, x: u32, y: u32) -> (f64, String) {
     let place = format!(
         "(() => {{ const pane = deepfusion.app.kinds[0].{pane}, at = pane.layout(), box = pane.canvas.getBoundingClientRect(); \
          return [box.left + at.left + ({x} + 0.5) / {} * at.width, box.top + at.top + ({y} + 0.5) / {} * at.height]; }})()",
         SIZE.0, SIZE.1
     );
-    let told =
+    let reading =
         format!("(document.getElementById('tip').innerText + '\\n').includes('pixel {x}, {y}\\n')");
     // The panes take their shapes from the first pictures: a place may move once.
     let begin = Instant::now();
@@ -44,7 +44,7 @@ fn told_at(browser: &mut Browser, pane: &str, x: u32, y: u32) -> (f64, String) {
         let at = browser.value(&place);
         browser.mouse(at[0].as_f64().unwrap(), at[1].as_f64().unwrap());
         std::thread::sleep(Duration::from_millis(50));
-        if browser.value(&told) == json!(true) {
+        if browser.value(&reading) == json!(true) {
             break;
         }
         assert!(
@@ -80,14 +80,14 @@ fn the_page_shows_what_the_files_hold() {
     // Metres under the pointer: the file's, to the last digit, on either picture.
     for (x, y) in [(10, 5), (0, 47), (95, 0), (48, 24), (71, 33)] {
         for pane in ["depth", "picture"] {
-            let (metres, text) = told_at(&mut browser, pane, x, y);
+            let (metres, text) = reading_at(&mut browser, pane, x, y);
             let expected = f64::from(steps(0, x, y)) / 256.0;
             assert_eq!(metres, expected, "{pane} {x}, {y}");
             assert_eq!(text, format!("{expected:.2} m"));
         }
     }
     assert_eq!(
-        told_at(&mut browser, "depth", 2, 2),
+        reading_at(&mut browser, "depth", 2, 2),
         (0.0, "no depth".into())
     );
 
@@ -106,7 +106,7 @@ fn the_page_shows_what_the_files_hold() {
         "deepfusion.app.drawnFrame === '{:06}'",
         FRAMES - 1
     ));
-    let (metres, _) = told_at(&mut browser, "depth", 48, 24);
+    let (metres, _) = reading_at(&mut browser, "depth", 48, 24);
     assert_eq!(
         metres,
         f64::from(steps(FRAMES - 1, 48, 24)) / 256.0,
@@ -187,7 +187,7 @@ fn boxes_are_where_they_belong(browser: &mut Browser) {
             "{corner} is {off} pixels from the nearest of {pixels:?}"
         );
     }
-    // An upright edge's middle has the colour of what moves.
+    // An upright edge's middle has the colour of dynamic targets.
     let colour = browser.value(&format!(
         "(() => {{ const {{ app }} = deepfusion, pane = app.kinds[0].picture, at = pane.layout(), {{ canvas }} = pane; \
          app.point(null); pane.draw(); \
@@ -241,7 +241,7 @@ fn a_broken_frame_says_so_and_a_new_one_comes() {
         "{}.hidden && deepfusion.app.drawnFrame === '000001'",
         problem("depth")
     ));
-    let (metres, _) = told_at(&mut browser, "depth", 48, 24);
+    let (metres, _) = reading_at(&mut browser, "depth", 48, 24);
     assert_eq!(metres, f64::from(steps(1, 48, 24)) / 256.0);
 }
 
@@ -278,7 +278,7 @@ fn two_runs_stand_side_by_side() {
     browser.wait_for(
         "deepfusion.app.shown(0)?.name === '000001' && deepfusion.app.shown(1)?.name === '000001'",
     );
-    let (metres, _) = told_at(&mut browser, "depth", 30, 30);
+    let (metres, _) = reading_at(&mut browser, "depth", 30, 30);
     let expected = f64::from(steps(1, 30, 30)) / 256.0;
     assert_eq!(metres, expected);
     let versus = browser.value("document.querySelector('#tip .versus').innerText");
@@ -334,11 +334,11 @@ fn what_is_unsure_fades() {
         10 * sure < 8 * all && 10 * sure > all,
         "{sure} pixels of {all} of the cloud"
     );
-    let (metres, _) = told_at(&mut browser, "depth", 20, 30);
-    let told = browser.value("document.querySelector('#tip [data-sigma]').innerText");
-    assert_eq!(told, json!(format!("± {:.2} m", 0.02 * metres)));
+    let (metres, _) = reading_at(&mut browser, "depth", 20, 30);
+    let reading = browser.value("document.querySelector('#tip [data-sigma]').innerText");
+    assert_eq!(reading, json!(format!("± {:.2} m", 0.02 * metres)));
 
-    // Of another size it is told, and nothing fades; without any likewise.
+    // A sigma of another size is reported and fades nothing; a missing one fades nothing either.
     browser.key("ArrowRight");
     browser.wait_for(
         "deepfusion.app.kinds[0].picture.problem.innerText.includes('sigma is 48x48, depth 96x48')",

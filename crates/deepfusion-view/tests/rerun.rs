@@ -94,11 +94,11 @@ fn write(folder: &Path, to: &Path) -> RerunReport {
 fn what_was_written_comes_back() {
     let folder = results(3);
     let file = folder.path().join("out.rrd");
-    let told = Cell::new(Vec::new());
+    let reported = Cell::new(Vec::new());
     let progress = |done, total| {
-        let mut so_far = told.take();
+        let mut so_far = reported.take();
         so_far.push((done, total));
-        told.set(so_far);
+        reported.set(so_far);
     };
     let report = write_rerun(
         &Folder::open(folder.path()).unwrap(),
@@ -110,7 +110,7 @@ fn what_was_written_comes_back() {
         (report.as_ref().unwrap().frames, &*report.unwrap().problems),
         (3, &[][..])
     );
-    assert_eq!(told.take(), [(1, 3), (2, 3), (3, 3)]);
+    assert_eq!(reported.take(), [(1, 3), (2, 3), (3, 3)]);
 
     let read = Read::of(&file);
     assert_eq!(read.application, "deepfusion");

@@ -95,14 +95,14 @@ fn a_frame_has_its_camera_targets_and_picture() {
 #[test]
 fn the_watch_over_the_metres_is_shown_of_predictions_too() {
     let folder = results(2);
-    let told = json!({"ratio": 1.08, "state": "drift", "correction": 1.02});
-    write_sidecar(folder.path(), "000001", &json!({"scale_monitor": told}));
+    let answer = json!({"ratio": 1.08, "state": "drift", "correction": 1.02});
+    write_sidecar(folder.path(), "000001", &json!({"scale_monitor": answer}));
     let server = Running::start(folder.path(), None);
     let index = server.json("/api/runs/0/index");
     assert_eq!(index["series"]["scale_ratio"], json!([null, 1.08]));
     assert_eq!(index["series"]["scale_state"], json!([null, "drift"]));
     let frame = server.json("/api/runs/0/frame/000001");
-    assert_eq!(frame["scale_monitor"], told);
+    assert_eq!(frame["scale_monitor"], answer);
 }
 
 /// Whichever program wrote the sidecar.
@@ -144,7 +144,7 @@ fn what_is_broken_says_so_and_the_rest_goes_on() {
     std::fs::write(at("notes.json"), r#"{"written by": "somebody else"}"#).unwrap();
     std::fs::write(at("coming.json"), r#"{"image": "#).unwrap();
     let server = Running::start(folder.path(), None);
-    let told = |name: &str| problems(&server.json(&format!("/api/runs/0/frame/{name}")));
+    let problems_of = |name: &str| problems(&server.json(&format!("/api/runs/0/frame/{name}")));
     for (name, expected) in [
         ("000000", "000000.json: half-written, or cut off"),
         ("000001", ""),
@@ -159,21 +159,21 @@ fn what_is_broken_says_so_and_the_rest_goes_on() {
         ("000006", ""),
         ("coming", "half-written, or cut off"),
     ] {
-        let told = told(name);
+        let text = problems_of(name);
         assert!(
-            told.contains(expected) && told.is_empty() == expected.is_empty(),
-            "{name}: {told}"
+            text.contains(expected) && text.is_empty() == expected.is_empty(),
+            "{name}: {text}"
         );
     }
     let (status, body) = server.get("/api/runs/0/depth/000001");
-    let told: Value = serde_json::from_slice(&body).unwrap();
+    let answer: Value = serde_json::from_slice(&body).unwrap();
     assert_eq!(status, 422);
     assert!(
-        told["error"]
+        answer["error"]
             .as_str()
             .unwrap()
             .contains("000001_depth.png: the image is truncated"),
-        "{told}"
+        "{answer}"
     );
     assert_eq!(server.get("/api/runs/0/image/000003").0, 422);
     assert_eq!(
@@ -360,13 +360,13 @@ fn a_run_shows_its_curve_and_panels() {
         "step,split,total,speed\n1,train,0.5,1\n2,train,0.4,NaN\n2,validation,0.45,\n3,train,0.3";
     std::fs::write(run.path().join("log.csv"), log).unwrap();
     let server = Running::start(run.path(), None);
-    let told = server.json("/api/runs/0/training");
+    let answer = server.json("/api/runs/0/training");
     assert_eq!(
-        told["train"],
+        answer["train"],
         json!({"step": [1.0, 2.0], "total": [0.5, 0.4], "speed": [1.0, null]})
     );
-    assert_eq!(told["validation"]["total"], json!([0.45]));
-    assert_eq!(told["panels"], json!(["000034.png"]));
+    assert_eq!(answer["validation"]["total"], json!([0.45]));
+    assert_eq!(answer["panels"], json!(["000034.png"]));
     assert_eq!(server.get("/api/runs/0/panel/000034.png").0, 200);
     assert_eq!(server.get("/api/runs/0/panel/000035.png").0, 404);
     assert_eq!(

@@ -2,26 +2,26 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
-/// The version of the pair of files; others are refused.
+/// The version of the file pair; others are refused.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// What a packed network is and what it was made from: the content of `NAME.toml`.
+/// The description of a packed network and its origin: the content of `NAME.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Card {
     /// [`FORMAT_VERSION`].
     pub format_version: u32,
-    /// What `--model` calls it.
+    /// Its name, as for `--model`.
     pub name: String,
     /// SHA-256 of `NAME.safetensors`, in hexadecimal.
     pub sha256: String,
     /// That file's length.
     pub bytes: u64,
-    /// Parameters of the depth network that were learned.
+    /// Number of learned parameters of the depth network.
     pub parameters: u64,
     /// Steps it was trained for.
     pub steps: usize,
-    /// Which checkpoint of its run it is: `best` or `last`.
+    /// The checkpoint of its run: `best` or `last`.
     pub checkpoint: String,
     /// The day that checkpoint was written, `2026-01-31`, UTC.
     pub date: String,
@@ -29,25 +29,25 @@ pub struct Card {
     pub data: Vec<String>,
     /// Whether no real image was among them.
     pub simulated_only: bool,
-    /// How to make it again: a file of `recipes/`, or a command.
+    /// How to reproduce it: a file of `recipes/`, or a command.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recipe: Option<String>,
-    /// Under which terms it may be used.
+    /// Its licence.
     pub licence: String,
-    /// In which numbers the tensors are kept.
+    /// The number formats of the tensors.
     pub numbers: String,
-    /// Largest |packed − original| / original of the depths of a picture: what the shorter numbers cost.
+    /// Largest |packed − original| / original of the depths of a picture: the cost of the shorter numbers.
     pub depth_difference: f64,
-    /// What else there is to say.
+    /// Anything else worth knowing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
-    /// What was measured of the checkpoint before it was packed.
+    /// Evaluations of the checkpoint before it was packed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
-    /// How the intervals are to be stretched that the network says, as `eval --calibrate-uncertainty` found it.
+    /// The calibration of the network's uncertainty, as found by `eval --calibrate-uncertainty`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<toml::Table>,
-    /// The run's configuration, without the places of its recordings.
+    /// The run's configuration, without the paths of its recordings.
     pub config: toml::Table,
 }
 
@@ -57,12 +57,12 @@ pub struct Card {
 pub struct Figure {
     /// The recordings measured on, by name.
     pub data: String,
-    /// Images.
+    /// Number of images.
     pub images: usize,
-    /// Whether training saw none of them; absent where that is not known.
+    /// Whether training saw none of them; absent if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<bool>,
-    /// Mean |prediction − truth| / truth, in metres as they are.
+    /// Mean |prediction − truth| / truth, unscaled.
     pub abs_rel: f64,
     /// The same after each image was scaled to the truth's median.
     pub abs_rel_scaled: f64,
@@ -106,7 +106,7 @@ impl Card {
     /// Reads a card; `origin` is what an error calls it.
     ///
     /// # Errors
-    /// [`Error::Version`] for one of another version, [`Error::Card`] for a text that is no card.
+    /// [`Error::Version`] for a card of another version, [`Error::Card`] for a text that is not a card.
     pub fn parse(origin: &str, text: &str) -> Result<Self, Error> {
         let failed = |e: toml::de::Error| Error::Card {
             origin: origin.to_owned(),
@@ -174,20 +174,20 @@ pub(crate) mod tests {
         assert_eq!((card.preset(), card.size()), ("light", Some([640, 192])));
     }
 
-    /// What cannot be read names the card, and another version says so before anything else is complained of.
+    /// Errors name the card, and another version is reported before any other problem.
     #[test]
     fn what_is_no_card_is_named() {
-        let told = |text: &str| Card::parse("street.toml", text).unwrap_err().to_string();
-        let newer = told("format_version = 7\nnew = 'thing'");
+        let message = |text: &str| Card::parse("street.toml", text).unwrap_err().to_string();
+        let newer = message("format_version = 7\nnew = 'thing'");
         assert!(
             newer.contains("street.toml") && newer.contains("version 7"),
             "{newer}"
         );
         for text in ["", "name = 3", "not toml", "format_version = 1"] {
-            assert!(told(text).contains("street.toml"), "{text}");
+            assert!(message(text).contains("street.toml"), "{text}");
         }
         let text = card("street").to_toml().unwrap();
         let unknown = text.replacen("steps", "stepz", 1);
-        assert!(told(&unknown).contains("stepz"));
+        assert!(message(&unknown).contains("stepz"));
     }
 }

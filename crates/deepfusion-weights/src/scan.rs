@@ -1,5 +1,5 @@
-//! Which networks lie in a folder, and the Rust text that embeds them. The build script and the crate's tests share this file: it uses
-//! the standard library alone.
+//! Finds the networks in a folder and generates the Rust code that embeds them. The build script and the crate's tests share this
+//! file: it uses the standard library alone.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// The two files of a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pair {
-    /// What `--model` calls it: the files' name without the ending.
+    /// Its name, as for `--model`: the files' name without the ending.
     pub name: String,
     /// `NAME.toml`.
     pub card: PathBuf,
@@ -15,16 +15,16 @@ pub struct Pair {
     pub weights: PathBuf,
 }
 
-/// Whether a network may be called so: letters a to z, digits and dashes, a letter first. `none` is what `--init none` means.
+/// Whether this is a valid network name: letters a to z, digits and dashes, a letter first. `none` is reserved for `--init none`.
 pub fn is_name(name: &str) -> bool {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     name.starts_with(|c: char| c.is_ascii_lowercase()) && name.chars().all(plain) && name != "none"
 }
 
-/// The networks in a folder, by name; none where there is no such folder. Hidden files and those of other endings are not looked at.
+/// The networks in a folder, by name; none where there is no such folder. Hidden files and those with other endings are ignored.
 ///
 /// # Errors
-/// Says in a line which file lacks its other half or has a name that is none, or why the folder cannot be read.
+/// A line that names a file without its counterpart or with an invalid name, or says why the folder cannot be read.
 pub fn scan(folder: &Path) -> Result<Vec<Pair>, String> {
     if !folder.exists() {
         return Ok(Vec::new());
@@ -83,7 +83,7 @@ pub fn scan(folder: &Path) -> Result<Vec<Pair>, String> {
 /// A Rust expression: `&[Embedded { … }, …]` with the content of every file.
 ///
 /// # Errors
-/// Where a path is not absolute, or no Unicode: `include_bytes!` could not name it.
+/// If a path is not absolute, or not Unicode: `include_bytes!` could not name it.
 pub fn list(pairs: &[Pair]) -> Result<String, String> {
     let quoted = |path: &Path| match path.to_str() {
         Some(text) if path.is_absolute() => Ok(format!("{text:?}")),

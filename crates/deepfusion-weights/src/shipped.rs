@@ -7,22 +7,22 @@ use sha2::{Digest, Sha256};
 use crate::scan::is_name;
 use crate::{Card, Error};
 
-/// The network that is meant where none is named.
+/// The default network.
 pub const DEFAULT: &str = "street";
 
-/// The most bytes that an embedded network's weights may have.
+/// Largest size of an embedded network's weights, in bytes.
 pub const MAX_BYTES: u64 = 32_000_000;
 
 /// A packed network: its card and its weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shipped {
-    /// What it is and what it was made from.
+    /// Its description.
     pub card: Card,
     /// A safetensors file.
     pub bytes: Cow<'static, [u8]>,
 }
 
-/// A network in the program, as the build found it.
+/// An embedded network, as found by the build.
 struct Embedded {
     name: &'static str,
     card: &'static str,
@@ -39,7 +39,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// The embedded networks, by name.
 ///
 /// # Errors
-/// [`Error::Card`], [`Error::Version`] for a card that this program was built with and cannot read.
+/// [`Error::Card`], [`Error::Version`] for an embedded card that this program cannot read.
 pub fn all() -> Result<Vec<Shipped>, Error> {
     EMBEDDED.iter().map(Shipped::embedded).collect()
 }
@@ -47,7 +47,7 @@ pub fn all() -> Result<Vec<Shipped>, Error> {
 /// The embedded network of a name.
 ///
 /// # Errors
-/// [`Error::NotEmbedded`] with the names there are; as [`all`].
+/// [`Error::NotEmbedded`] with the available names; otherwise as [`all`].
 pub fn find(name: &str) -> Result<Shipped, Error> {
     match EMBEDDED.iter().find(|network| network.name == name) {
         Some(network) => Shipped::embedded(network),
@@ -64,7 +64,7 @@ impl Shipped {
         Self::named(network.name, card, Cow::Borrowed(network.weights))
     }
 
-    /// A card under another name than its own would be found by one and told by the other.
+    /// The card's name must be its file's name: a network is found by one and shown by the other.
     fn named(origin: &str, card: Card, bytes: Cow<'static, [u8]>) -> Result<Self, Error> {
         if card.name != origin {
             return Err(Error::Card {
@@ -82,7 +82,7 @@ impl Shipped {
         ending && path.is_file() && path.with_extension("toml").is_file()
     }
 
-    /// Reads `NAME.safetensors` and the card beside it, and checks that the one is the other's.
+    /// Reads `NAME.safetensors` and the card beside it, and checks that they belong together.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Card`], [`Error::Version`], [`Error::OtherWeights`].
@@ -103,10 +103,10 @@ impl Shipped {
         Self::named(&name, card, Cow::Owned(bytes))
     }
 
-    /// Puts together what [`Self::write`] writes; the card's length and digest become the bytes' own.
+    /// A network of this card and these weights; the card's length and digest are set from the bytes.
     ///
     /// # Errors
-    /// [`Error::Name`] for a name that no network can have.
+    /// [`Error::Name`] for an invalid name.
     pub fn new(mut card: Card, bytes: Vec<u8>) -> Result<Self, Error> {
         if !is_name(&card.name) {
             return Err(Error::Name { name: card.name });
@@ -116,17 +116,17 @@ impl Shipped {
         Ok(Self { card, bytes })
     }
 
-    /// Where the two files of a name lie in a folder: the card, the weights.
+    /// The paths of a network's two files in a folder: the card, the weights.
     #[must_use]
     pub fn paths(folder: &Path, name: &str) -> [PathBuf; 2] {
         [".toml", ".safetensors"].map(|ending| folder.join(format!("{name}{ending}")))
     }
 
-    /// Writes both files into a folder, which is made; they get their names when both are on the disk. Gives their paths, the card's
-    /// first.
+    /// Writes both files into a folder, which is created; they get their final names when both are on the disk. Returns their
+    /// paths, the card's first.
     ///
     /// # Errors
-    /// [`Error::Exists`] where one is there, unless it may be replaced; [`Error::Io`].
+    /// [`Error::Exists`] if one exists already, unless `replace` is set; [`Error::Io`].
     pub fn write(&self, folder: &Path, replace: bool) -> Result<[PathBuf; 2], Error> {
         use std::io::Write;
         let text = self.card.to_toml()?;
@@ -227,7 +227,7 @@ mod tests {
         }
     }
 
-    /// What the build script does, on a folder of this test's.
+    /// The build script's work, on a folder of this test.
     #[test]
     fn a_folder_of_pairs_becomes_a_list_in_the_order_of_names() {
         let folder = tempfile::tempdir().unwrap();
@@ -284,9 +284,9 @@ mod tests {
             assert_eq!(find(&card.name).unwrap(), *network);
         }
         let error = find("no-such-network").unwrap_err();
-        let told = error.to_string();
+        let message = error.to_string();
         for name in names() {
-            assert!(told.contains(name), "{told}");
+            assert!(message.contains(name), "{message}");
         }
         assert!(error.hint().is_some());
     }

@@ -4,13 +4,13 @@ use safetensors::tensor::{Dtype, TensorView};
 
 use crate::Error;
 
-/// In which numbers [`pack`] keeps tensors, as cards tell it.
+/// The number formats of [`pack`], as stated in cards.
 pub const NUMBERS: &str = "bf16, tensors of one dimension f32";
 
 /// A tensor to be packed.
 #[derive(Debug, Clone, Copy)]
 pub struct Tensor<'a> {
-    /// Its path in the network, `encoder.layer1.0.conv1.weight`.
+    /// Its path in the network, such as `encoder.layer1.0.conv1.weight`.
     pub name: &'a str,
     /// Extents, outermost first.
     pub shape: &'a [usize],
@@ -18,13 +18,13 @@ pub struct Tensor<'a> {
     pub values: &'a [f32],
 }
 
-/// A safetensors file of the tensors. Those of one dimension stay f32: biases and what batch normalisation multiplies, adds and divides
-/// by act on whole channels, and are few. All others are rounded to bf16, to the nearest and of two to the even one. Equal tensors
-/// give equal bytes, whatever their order.
+/// A safetensors file of the tensors. One-dimensional ones (biases and batch-norm parameters) stay f32: they act on whole
+/// channels and are few. All others are rounded to bf16, to nearest, ties to even. Equal tensors give equal bytes, whatever their
+/// order.
 ///
 /// # Errors
-/// [`Error::Value`] naming a tensor with a value that is not finite, or too large for bf16; [`Error::Tensors`] for a shape that is not
-/// its values'.
+/// [`Error::Value`] naming a tensor with a value that is not finite or too large for bf16; [`Error::Tensors`] for a shape that
+/// does not match its values.
 pub fn pack(tensors: &[Tensor]) -> Result<Vec<u8>, Error> {
     let mut packed = Vec::with_capacity(tensors.len());
     for tensor in tensors {
@@ -73,7 +73,7 @@ fn refused(tensor: &Tensor, value: f32) -> Error {
     }
 }
 
-/// The bits of the nearest bf16, of two equally near the even one; `None` where that is not finite.
+/// The bits of the nearest bf16, ties to even; `None` if it is not finite.
 fn bf16(value: f32) -> Option<u16> {
     // bf16 is f32's upper half. Adding just less than half of its last place, and one more where that place is odd, carries into it
     // exactly where rounding goes up; a carry out of the mantissa raises the exponent, as it should.

@@ -67,7 +67,7 @@ mod tests {
         }
     }
 
-    /// What `tests/reference/pcd.py` (pypcd4) writes of the same points.
+    /// The file that `tests/reference/pcd.py` (pypcd4) writes for the same points.
     #[test]
     fn it_is_what_pypcd4_reads_and_writes() {
         let mut bytes = Vec::new();

@@ -4,9 +4,9 @@
 use super::{Error, PointCloud, Result};
 use std::io::{BufRead, Read, Write};
 
-/// Longest header line taken, so that a binary file that is no PLY is not read whole as one line.
+/// Longest header line accepted, so that a binary file of another format is not read whole as one line.
 const MAX_HEADER_LINE: u64 = 4096;
-/// Points read at a time: a wrong vertex count in the header must not allocate by itself.
+/// Number of points read at a time: a wrong vertex count in the header must not allocate memory by itself.
 const CHUNK_POINTS: usize = 4096;
 
 impl PointCloud {

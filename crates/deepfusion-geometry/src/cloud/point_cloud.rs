@@ -1,7 +1,7 @@
 use super::{Error, Result};
 use crate::{DepthMap, Intrinsics};
 
-/// Points and what is known of each, column by column. Every column present has one entry a point.
+/// Points and their attributes, column by column. Every column present has one entry per point.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PointCloud {
     /// Position, in metres.
@@ -39,7 +39,7 @@ impl PointCloud {
     }
 
     /// As [`Self::from_depth`], from metric disparity (1/m) of the camera's size, row by row: one pass over
-    /// the pixels. Disparities that are not above 0 give no point.
+    /// the pixels. Disparities that are not positive give no point.
     ///
     /// # Errors
     /// [`Error::Size`] where the disparity's or the image's size is not the camera's.
@@ -65,19 +65,19 @@ impl PointCloud {
         kept.map(|(_, value)| *value).collect()
     }
 
-    /// How many points.
+    /// Number of points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.xyz.len()
     }
 
-    /// Whether there is no point.
+    /// Whether the cloud has no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.xyz.is_empty()
     }
 
-    /// Checks that every column present has one entry a point.
+    /// Checks that every column present has one entry per point.
     ///
     /// # Errors
     /// [`Error::Size`], naming the column.

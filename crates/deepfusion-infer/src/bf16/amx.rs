@@ -8,7 +8,7 @@ use std::arch::asm;
 
 use deepfusion_kernels::matrix_unit::{TileSizes, configured};
 
-use super::{Finish, Place};
+use super::{Finish, OutputPixel};
 use crate::Conv;
 use crate::aligned::Aligned;
 use crate::conv::{Geometry, Runs, Tasks, padded_bias, weight};
@@ -53,7 +53,7 @@ struct Strip {
     /// Where the first pixel's first tap lies.
     input: usize,
     /// None where it is no pixel of the output.
-    places: [Option<Place>; PIXELS],
+    places: [Option<OutputPixel>; PIXELS],
 }
 
 impl ConvForm<Bf16> for Amx {
@@ -213,7 +213,7 @@ fn strips(g: &Geometry) -> Vec<Strip> {
     let corner = g.corner();
     let place = |x: usize, y: usize| {
         let inside = x < g.out.width && y < g.out.height;
-        inside.then(|| Place::new(g, x, y))
+        inside.then(|| OutputPixel::new(g, x, y))
     };
     // From a row's last pixel to the next row's first it is as far as over the border between them, so
     // strips can run on over it; over a wide border that is more strips than a row at a time.

@@ -6,7 +6,7 @@ use std::arch::x86_64::{
 };
 use std::mem::transmute;
 
-use super::{Finish, Place};
+use super::{Finish, OutputPixel};
 use crate::Conv;
 use crate::aligned::Aligned;
 use crate::conv::{Geometry, Runs, Tasks, padded_bias, weight};
@@ -165,7 +165,7 @@ impl Dot {
     ) {
         let g = &self.geometry;
         let finish = Finish::new(g, &self.bias, arena);
-        let place = |p: usize| Place::new(g, p % g.out.width, p / g.out.width);
+        let place = |p: usize| OutputPixel::new(g, p % g.out.width, p / g.out.width);
         if g.out.result {
             for first in pixels.clone().step_by(LANES) {
                 let inside = |p: &usize| *p < pixels.end;

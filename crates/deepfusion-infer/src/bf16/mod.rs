@@ -31,14 +31,14 @@ pub(crate) fn has_amx() -> bool {
     has_dot() && deepfusion_kernels::matrix_unit::available()
 }
 
-/// Where an output pixel is written, and its residual read.
+/// Offsets of an output pixel and of its residual.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct OutputPixel {
     out: usize,
     residual: usize,
 }
 
-impl Place {
+impl OutputPixel {
     fn new(g: &Geometry, x: usize, y: usize) -> Self {
         Self {
             out: g.out.at(x, y),
@@ -76,7 +76,7 @@ impl<'a> Finish<'a> {
     /// [`has_dot`] must hold.
     #[inline]
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
-    unsafe fn channels(&self, place: Place, c: usize, sums: *const f32) {
+    unsafe fn channels(&self, place: OutputPixel, c: usize, sums: *const f32) {
         let bias = &self.bias[c..][..LANES];
         // SAFETY: sixteen values of the bias and, as `at` checks, of the arena; the rest is the caller's promise.
         // Vectors of one size are arrays of the same numbers, whoever names them.
@@ -100,7 +100,7 @@ impl<'a> Finish<'a> {
     ///
     /// # Safety
     /// As [`Self::channels`].
-    unsafe fn results(&self, places: &[Option<Place>], sums: impl Fn(usize) -> f32) {
+    unsafe fn results(&self, places: &[Option<OutputPixel>], sums: impl Fn(usize) -> f32) {
         let mut values = [0.0_f32; LANES];
         for (p, value) in values.iter_mut().enumerate().take(places.len()) {
             *value = sums(p) + self.bias[0];

@@ -9,7 +9,7 @@ use crate::{Activation, Border, Conv, Engine, Graph, Op, Precision, ValueId};
 
 /// What a skip path of a small network has.
 #[derive(Debug, Clone)]
-struct Parts {
+struct SkipPath {
     widths: [usize; 3],
     rates: Vec<usize>,
     global: bool,
@@ -41,7 +41,12 @@ fn point(
 }
 
 /// The paper's skip path.
-fn skip(b: &mut Builder<impl FnMut() -> f32>, input: ValueId, width: usize, p: &Parts) -> ValueId {
+fn skip(
+    b: &mut Builder<impl FnMut() -> f32>,
+    input: ValueId,
+    width: usize,
+    p: &SkipPath,
+) -> ValueId {
     let mut branches = vec![point(b, input, width, Activation::Relu)];
     let reduced = point(b, input, width, Activation::Relu);
     for rate in &p.rates {
@@ -67,7 +72,7 @@ fn skip(b: &mut Builder<impl FnMut() -> f32>, input: ValueId, width: usize, p: &
     })
 }
 
-fn network(seed: u64, p: &Parts) -> Graph {
+fn network(seed: u64, p: &SkipPath) -> Graph {
     let mut b = Builder {
         graph: Graph::new([0.485, 0.456, 0.406], [0.229, 0.224, 0.225]),
         noise: noise(seed),
@@ -101,7 +106,7 @@ fn network(seed: u64, p: &Parts) -> Graph {
 
 /// Of all of them, small.
 pub(super) fn small_network() -> Graph {
-    let parts = Parts {
+    let parts = SkipPath {
         widths: [8, 16, 16],
         rates: vec![3],
         global: true,
@@ -158,7 +163,7 @@ proptest! {
         dilation in 1_usize..5,
         (across, down) in (6_usize..12, 6_usize..12),
     ) {
-        let parts = Parts { widths, rates, global, residual, dilation };
+        let parts = SkipPath { widths, rates, global, residual, dilation };
         check(&network(seed, &parts), 4 * across, 4 * down, seed ^ 1)?;
     }
 }
@@ -166,7 +171,7 @@ proptest! {
 /// At least 1,024 pixels at a quarter of the size: dilated kernels take Winograd's form, phase by phase.
 #[test]
 fn large_dilated_convolutions_take_the_winograd_form_and_agree_too() {
-    let parts = Parts {
+    let parts = SkipPath {
         widths: [16, 32, 48],
         rates: vec![2, 3, 6],
         global: true,

@@ -1,4 +1,4 @@
-//! Random graphs and images, and how far results are off.
+//! Random graphs and images, and the deviation of results.
 
 use super::oracle::Image;
 use crate::{Activation, Border, Conv, Graph, Op, ValueId};

@@ -220,14 +220,14 @@ fn odd_network() -> Graph {
 }
 
 #[test]
-fn graphs_of_any_shape_are_laid_out_right_and_images_do_not_meet() {
+fn graphs_of_any_shape_are_laid_out_right_and_images_do_not_mix() {
     let graph = odd_network();
     let (width, height) = (64, 40);
     let mut engine = Engine::new(graph.clone(), width, height, Precision::F32).unwrap();
     for seed in [1, 2, 3] {
         let mut image = noise_image(seed, width, height);
         if seed == 2 {
-            // An image that is none must not be seen in the next.
+            // An invalid image must not affect the next one.
             image.fill(f32::NAN);
             engine.run(&image);
             assert!(engine.output(0).iter().all(|v| v.is_nan()));

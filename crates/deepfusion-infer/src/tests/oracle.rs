@@ -1,4 +1,4 @@
-//! What the operations mean, in f64.
+//! Reference implementations of the operations, in f64.
 
 use crate::{Activation, Border, Conv, Graph, Op};
 
@@ -45,7 +45,7 @@ impl Image {
 fn conv(conv: &Conv, values: &[Image]) -> Image {
     let input = &values[conv.input.0];
     let half = conv.reach() as isize;
-    // Where a tap looks, none for zeros.
+    // Where a tap reads; `None` for zeros.
     let place = |i: isize, n: usize| {
         let n = n as isize;
         match conv.border {
@@ -61,10 +61,10 @@ fn conv(conv: &Conv, values: &[Image]) -> Image {
         for c in 0..conv.channels_in {
             for ky in 0..conv.kernel {
                 for kx in 0..conv.kernel {
-                    let look = |i: usize, k: usize, n| {
+                    let tap_at = |i: usize, k: usize, n| {
                         place((i * conv.stride + k * conv.dilation) as isize - half, n)
                     };
-                    let places = (look(y, ky, input.height), look(x, kx, input.width));
+                    let places = (tap_at(y, ky, input.height), tap_at(x, kx, input.width));
                     if let (Some(i), Some(j)) = places {
                         let tap =
                             ((o * conv.channels_in + c) * conv.kernel + ky) * conv.kernel + kx;

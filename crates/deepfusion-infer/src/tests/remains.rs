@@ -1,4 +1,4 @@
-//! Nothing of an image is seen in the next, whatever it was.
+//! No image affects the next one, whatever its content.
 
 use super::build::{Builder, deviation, noise, noise_image};
 use super::oracle::run;
@@ -74,15 +74,15 @@ fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|v| v.to_bits()).collect()
 }
 
-/// The first output's bits with an arena of zeros, and with one that was full of what is no number.
-fn fresh_and_spoilt<E: Element, C: ConvForm<E>>(
+/// The first output's bits with an arena of zeros, and with one that was full of NaN.
+fn fresh_and_nan_filled<E: Element, C: ConvForm<E>>(
     graph: &Graph,
     (width, height): (usize, usize),
 ) -> [Vec<f32>; 2] {
     let image = noise_image(8, width, height);
-    [false, true].map(|spoilt| {
+    [false, true].map(|nan_filled| {
         let mut engine = Typed::<E, C>::new(graph.clone(), width, height).unwrap();
-        if spoilt {
+        if nan_filled {
             engine.poison();
         }
         engine.run(&image, |_, _| {});
@@ -92,9 +92,9 @@ fn fresh_and_spoilt<E: Element, C: ConvForm<E>>(
 
 fn nothing_stale_is_read<E: Element, C: ConvForm<E>>() {
     for (i, (graph, width, height)) in graphs().into_iter().enumerate() {
-        let [fresh, spoilt] = fresh_and_spoilt::<E, C>(&graph, (width, height));
+        let [fresh, nan_filled] = fresh_and_nan_filled::<E, C>(&graph, (width, height));
         assert!(fresh.iter().all(|v| v.is_finite()), "network {i}");
-        assert!(bits(&fresh) == bits(&spoilt), "network {i}");
+        assert!(bits(&fresh) == bits(&nan_filled), "network {i}");
     }
 }
 
@@ -125,8 +125,8 @@ fn what_bf16_reads_is_what_the_operations_mean() {
         let size = (width, height);
         let values = run(&graph, &noise_image(8, width, height), height, width);
         let exact = &values[graph.outputs()[0].0];
-        let [dot, _] = fresh_and_spoilt::<Bf16, Plain<2>>(&graph, size);
-        let [amx, _] = fresh_and_spoilt::<Bf16, Plain<32>>(&graph, size);
+        let [dot, _] = fresh_and_nan_filled::<Bf16, Plain<2>>(&graph, size);
+        let [amx, _] = fresh_and_nan_filled::<Bf16, Plain<32>>(&graph, size);
         for off in [deviation(&dot, exact), deviation(&amx, exact)] {
             assert!(off < 0.06, "network {i} off by {off}");
         }

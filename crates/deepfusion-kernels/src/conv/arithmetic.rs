@@ -1,5 +1,5 @@
-//! What a product over taps is computed in: f32, or pairs of bf16. It decides how channels lie in a tile's planes, how
-//! weights are laid out, and in what multiples rows and columns come.
+//! The arithmetic of a product over taps: f32, or pairs of bf16. It determines the layout of channels in a tile's
+//! planes, the layout of weights, and the multiples in which rows and columns come.
 
 use super::ConvShape;
 use super::bf16::{self, TapPairs, Unit};

@@ -116,7 +116,7 @@ fn margin(shape: &ConvShape) -> usize {
     if needless { 0 } else { shape.padding }
 }
 
-/// How a phase of the input, with its margin, looks at ∂Y.
+/// How a phase of the input, with its margin, reads ∂Y.
 fn gradient_window(shape: &ConvShape, margin: usize) -> Window {
     let (down, right) = shape.reach();
     let reach = (down / shape.stride, right / shape.stride);

@@ -50,7 +50,7 @@ pub(super) fn tiles(images: usize, first_row: usize, rows: usize, row_floats: us
     tiles
 }
 
-/// How a kernel looks at an image.
+/// How a kernel samples an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Window {
     pub(super) height: usize,

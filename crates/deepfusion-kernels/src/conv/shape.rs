@@ -28,7 +28,7 @@ pub struct ConvShape {
     pub dilation: usize,
     /// Padding mirrors the image (without repeating its edge) instead of being zero.
     pub reflect: bool,
-    /// How its numbers are multiplied.
+    /// The precision of its products.
     pub precision: Precision,
 }
 
@@ -88,7 +88,7 @@ impl ConvShape {
         (0..height).flat_map(move |y| (0..width).map(move |x| (y * step, x * step)))
     }
 
-    /// How the kernel looks at the input.
+    /// How the kernel samples the input.
     pub(super) fn window(&self) -> Window {
         Window {
             height: self.in_height,

@@ -211,8 +211,8 @@ fn pairs_equal_the_definition_across_tiles() {
     }
 }
 
-/// Leaves buffers full of NaN to whoever borrows them next on this thread.
-fn spoil_scratch() {
+/// Leaves buffers full of NaN for the next borrower on this thread.
+fn fill_scratch_with_garbage() {
     let fill = |buffer: &mut [f32]| buffer.fill(f32::NAN);
     with_scratch(1 << 20, |outer| {
         with_scratch(1 << 20, |inner| {
@@ -276,7 +276,7 @@ fn threads_do_not_change_a_bit() {
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             pool.build().unwrap().install(|| {
-                spoil_scratch();
+                fill_scratch_with_garbage();
                 all_passes(&shape)
             })
         };

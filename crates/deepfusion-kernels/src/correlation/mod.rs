@@ -1,4 +1,4 @@
-//! Local correlation: how alike each pixel's feature is to those around the same place in another image.
+//! Local correlation: the similarity of each pixel's feature to those around the same pixel of another image.
 //!
 //! out(d, p) = (1/C) Σ_c a(c, p)·b(c, p + d) for every displacement d of at most r pixels along each axis; outside
 //! of its image b is zero. Displacements come row by row: channel (d_y + r)·(2r + 1) + (d_x + r).

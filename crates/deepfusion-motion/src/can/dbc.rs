@@ -3,10 +3,10 @@ use crate::{Error, Result};
 use can_dbc::{MessageId, MultiplexIndicator, SignalExtendedValueType};
 use std::path::Path;
 
-/// How many names an error lists.
+/// Number of names that an error lists.
 const NAMES_SHOWN: usize = 12;
 
-/// A DBC file: which signals lie where in which frames.
+/// A DBC file: the description of the signals in CAN frames.
 #[derive(Debug, Clone)]
 pub struct Dbc(can_dbc::Dbc);
 
@@ -56,7 +56,7 @@ impl Dbc {
     /// A signal by its name, "Message.Signal".
     ///
     /// # Errors
-    /// [`Error::NoSignal`] lists what there is; [`Error::Layout`] for a signal that fits into no frame.
+    /// [`Error::NoSignal`] with the signals there are; [`Error::Layout`] for a signal that fits into no frame.
     pub fn signal(&self, name: &str) -> Result<CanSignal> {
         let (message, signal) = self.find(name)?;
         let layout = self.layout(message, signal);
@@ -122,8 +122,8 @@ impl Dbc {
         }
     }
 
-    /// What must hold for a signal to be in its frame: its own multiplexor's value, and what must hold
-    /// for that multiplexor to be there itself.
+    /// The conditions for a signal to be in its frame: its multiplexor's value, and the conditions of
+    /// that multiplexor itself.
     fn conditions(
         &self,
         message: &can_dbc::Message,
@@ -146,7 +146,7 @@ impl Dbc {
             None => s.multiplexer_indicator == MultiplexIndicator::Multiplexor,
         };
         let Some(switch) = message.signals.iter().find(is_switch) else {
-            // Nothing selects it: it can never be told to be there.
+            // Nothing selects it, so that it can never be known to be present.
             return found.push(MultiplexCondition {
                 switch: self.layout(message, signal),
                 ranges: Vec::new(),

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 /// The longest frame (CAN FD), in bits.
 const MOST_BITS: u16 = 64 * 8;
 
-/// Which way a number's bits lie in a frame.
+/// The byte order of a number in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ByteOrder {
@@ -15,11 +15,11 @@ pub enum ByteOrder {
     Motorola,
 }
 
-/// How a number's bits are read.
+/// The type of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Number {
-    /// A natural number.
+    /// An unsigned integer.
     #[default]
     Unsigned,
     /// Two's complement.
@@ -30,7 +30,7 @@ pub enum Number {
     Float64,
 }
 
-/// Where a number lies in a frame, and what it stands for: value = raw · scale + offset.
+/// Position and type of a number in a frame, and its physical value: value = raw · scale + offset.
 ///
 /// Bits are counted as DBC files do: bit b of byte B (both from 0, b from the lowest) is 8 B + b.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -38,11 +38,11 @@ pub enum Number {
 pub struct BitLayout {
     /// The first bit: the lowest one (Intel) or the highest one (Motorola).
     pub start_bit: u16,
-    /// How many bits, 1 to 64.
+    /// Number of bits, 1 to 64.
     pub length: u16,
-    /// Which way they lie.
+    /// Their byte order.
     pub byte_order: ByteOrder,
-    /// How they are read.
+    /// Their type.
     #[serde(default)]
     pub number: Number,
     /// Factor to the physical value.
@@ -58,7 +58,7 @@ fn one() -> f64 {
 }
 
 impl BitLayout {
-    /// Checks that the bits lie within a frame of 64 bytes, and that the numbers are some.
+    /// Checks that the bits lie within a frame of 64 bytes, and that scale and offset are finite.
     ///
     /// # Errors
     /// [`Error::Layout`] with the signal's `name` and the field.
@@ -100,8 +100,8 @@ impl BitLayout {
         )
     }
 
-    /// The physical value in a frame's data; `None` where the data is too short for it, or it is a
-    /// float that is no number.
+    /// The physical value in a frame's data; `None` if the data is too short, or the value is not
+    /// finite.
     #[must_use]
     pub fn decode(&self, data: &[u8]) -> Option<f64> {
         let raw = self.raw(data)?;
@@ -119,7 +119,7 @@ impl BitLayout {
         value.is_finite().then_some(value)
     }
 
-    /// The bits as a natural number; `None` where the data is too short.
+    /// The bits as an unsigned integer; `None` if the data is too short.
     #[must_use]
     pub fn raw(&self, data: &[u8]) -> Option<u64> {
         let within = (1..=64).contains(&self.length) && self.last_byte() < data.len();
@@ -224,8 +224,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the layout and the data, there is a finite number or none; and bits beyond the
-        /// data are none.
+        /// For any layout and data the result is a finite number or `None`; bits beyond the data
+        /// give `None`.
         #[test]
         fn nothing_is_read_beyond_the_data(start in any::<u16>(), length in any::<u16>(), motorola in any::<bool>(),
             kind in 0usize..4, data in proptest::collection::vec(any::<u8>(), 0..65)) {

@@ -1,7 +1,8 @@
-//! A vehicle's signals out of the frames of its CAN bus.
+//! Decodes a vehicle's signals from the frames of its CAN bus.
 //!
-//! [`Dbc`] reads the maker's description (or a community's); [`CanSignal`] can also be written into a
-//! configuration by hand. [`CanSignal::over_time`] makes a [`crate::Signal`] of a recording.
+//! [`Dbc`] reads the manufacturer's description (or a community's); a [`CanSignal`] can also be
+//! written into a configuration by hand. [`CanSignal::over_time`] turns a recording into a
+//! [`crate::Signal`].
 
 mod dbc;
 mod layout;

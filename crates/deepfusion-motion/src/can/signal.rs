@@ -2,26 +2,26 @@ use super::BitLayout;
 use crate::Signal;
 use serde::{Deserialize, Serialize};
 
-/// What a frame is known by on the bus.
+/// The identifier of a frame on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(
     untagged,
     expecting = "id must be a number for 11 bits, or { extended = … } for 29"
 )]
 pub enum CanId {
-    /// 11 bits.
+    /// A standard identifier, 11 bits.
     Standard(u16),
-    /// 29 bits.
+    /// An extended identifier, 29 bits.
     Extended {
-        /// The identifier, without a flag for its kind.
+        /// The identifier, without the flag for its kind.
         extended: u32,
     },
 }
 
-/// A frame off the bus.
+/// A frame from the bus.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CanFrame<'a> {
-    /// When it was received, in seconds.
+    /// Time of reception, in seconds.
     pub time_s: f64,
     /// Its identifier.
     pub id: CanId,
@@ -29,31 +29,31 @@ pub struct CanFrame<'a> {
     pub data: &'a [u8],
 }
 
-/// A signal that is in a frame only when another number of the frame says so.
+/// The condition of a multiplexed signal: another number of the frame selects it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MultiplexCondition {
-    /// Where the multiplexor (the number that selects) lies.
+    /// Position of the multiplexor (the number that selects).
     pub switch: BitLayout,
-    /// Its raw values, first and last of each range, for which the signal is there.
+    /// Its raw values for which the signal is present, first and last of each range.
     pub ranges: Vec<(u64, u64)>,
 }
 
-/// One signal of one frame: what a DBC file's `SG_` line says, or a configuration.
+/// One signal of one frame, as in an `SG_` line of a DBC file or in a configuration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CanSignal {
     /// The frame's identifier.
     pub id: CanId,
-    /// Where the number lies, and its scale and offset.
+    /// The number's position, type, scale and offset.
     pub layout: BitLayout,
-    /// All must hold for the signal to be there.
+    /// Conditions that must all hold for the signal to be present.
     #[serde(default)]
     pub multiplexed: Vec<MultiplexCondition>,
 }
 
 impl CanSignal {
-    /// The physical value in the data of a frame with this signal's identifier; `None` where the frame
+    /// The physical value in the data of a frame with this signal's identifier; `None` if the frame
     /// does not carry it, or is too short.
     #[must_use]
     pub fn decode(&self, data: &[u8]) -> Option<f64> {
@@ -82,7 +82,7 @@ impl CanSignal {
 mod tests {
     use super::*;
 
-    /// What somebody without a DBC file writes.
+    /// A configuration without a DBC file.
     const CONFIG: &str = r#"
         id = 0x158
         layout = { start_bit = 7, length = 16, byte_order = "motorola", scale = 0.0027777778 }

@@ -29,9 +29,9 @@ pub struct CommaSegment {
     pub sensors: VehicleSensors,
     /// Speeds of the four wheels in m/s, where the segment has them, in the file's order.
     pub wheel_speeds_mps: Vec<Signal>,
-    /// Where the car was: `world_from_vehicle` over time. World: east, north, up at the first pose, in
-    /// metres; vehicle: x forward, y left, z up of the **device**, which looks a few degrees down. Empty
-    /// without `global_pose`.
+    /// The car's reference trajectory: `world_from_vehicle` over time. World: east, north, up at the
+    /// first pose, in metres; vehicle: x forward, y left, z up of the **device**, which looks a few
+    /// degrees down. Empty without `global_pose`.
     pub reference: Trajectory,
     /// Times of the video's frames, in seconds. Empty without `global_pose`.
     pub frame_times_s: Vec<f64>,
@@ -41,8 +41,8 @@ impl CommaSegment {
     /// Reads a segment's folder. Steering, inertial unit and pose may be absent; the speed may not.
     ///
     /// # Errors
-    /// [`Error::File`] and [`Error::Array`] name the array that is missing or is not what the layout
-    /// says.
+    /// [`Error::File`] and [`Error::Array`] name the array that is missing or does not match the
+    /// layout.
     pub fn open(folder: &Path) -> Result<Self> {
         let (sensors, wheel_speeds_mps) = recorded(folder)?;
         let (reference, frame_times_s) = reference::read(&folder.join("global_pose"))?;
@@ -55,7 +55,7 @@ impl CommaSegment {
     }
 }
 
-/// A segment's sensors without its pose: [`CommaSegment::sensors`].
+/// A segment's [`CommaSegment::sensors`] without its reference.
 ///
 /// # Errors
 /// As [`CommaSegment::open`].

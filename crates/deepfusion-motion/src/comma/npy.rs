@@ -1,4 +1,4 @@
-//! A NumPy array file of numbers in rows.
+//! Reads NumPy array files of one or two dimensions.
 
 use crate::{Error, Result};
 use ndarray::ArrayD;
@@ -13,7 +13,7 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// Reads an array of `float64` or `float32` with so many columns; one column may be flat.
+    /// Reads an array of `float64` or `float32` with this many columns; a single column may be one-dimensional.
     pub fn read(path: &Path, columns: usize) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
         Self::parse(&bytes, columns).map_err(|problem| Error::Array {
@@ -44,7 +44,7 @@ impl Table {
     }
 }
 
-/// Checks what a reader would allocate before it reads: the header's length against the file's.
+/// Checks the header's length against the file's before anything is allocated for it.
 fn check_header(bytes: &[u8]) -> std::result::Result<(), String> {
     let two = |at: usize| {
         bytes

@@ -6,10 +6,10 @@ use deepfusion_geometry::{Se3, StampedPose, Trajectory};
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
-/// Flattening of the WGS 84 ellipsoid: e².
+/// e² of the WGS 84 ellipsoid, the square of its eccentricity.
 const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_14e-3;
 
-/// Reads `frame_times`, `frame_positions` and `frame_orientations`; nothing where the folder is absent.
+/// Reads `frame_times`, `frame_positions` and `frame_orientations`; empty if the folder is absent.
 pub(super) fn read(folder: &Path) -> Result<(Trajectory, Vec<f64>)> {
     if !folder.exists() {
         return Ok((Trajectory::default(), Vec::new()));
@@ -52,7 +52,7 @@ fn rows<const N: usize>(folder: &Path, name: &str, expected: usize) -> Result<Ve
     Ok(rows.to_vec())
 }
 
-/// Rotation from earth-centred axes to east, north, up at a place.
+/// Rotation from earth-centred axes to east, north, up at a position.
 fn enu_from_ecef(place: &Vector3<f64>) -> Matrix3<f64> {
     let longitude = place.y.atan2(place.x);
     // Exact on the ellipsoid; some micro-radians off at a kilometre's height, which turns all alike.

@@ -4,14 +4,14 @@ use super::problem::{BIAS, Covariance, PRODUCT, Parameters, Problem, RATIO, RATI
 use super::{Estimate, IdentifyConfig};
 use crate::Signal;
 
-/// The streams are averaged over this, in seconds: it takes off the noise of single samples and their
-/// different rates, and no driver steers faster.
+/// The streams are averaged over this time, in seconds: it removes the noise of single samples and
+/// the difference of rates, and no driver steers faster.
 const STEP_S: f64 = 0.1;
-/// Yaw rates below this are no turning, in rad/s.
+/// Least yaw rate that counts as turning, in rad/s.
 const TURNING_RADPS: f64 = 0.03;
-/// Ratios tried as a start.
+/// Initial ratios.
 const RATIOS: [f64; 6] = [1.0, 8.0, 12.0, 16.0, 20.0, 25.0];
-/// No road wheel turns further, in radians.
+/// Largest angle of a road wheel, in radians.
 const LOCK_RAD: f64 = 1.1;
 const ITERATIONS: usize = 60;
 
@@ -72,7 +72,7 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// The best of the fits from several starts; `None` where none converges.
+    /// The best of the fits from several starts; `None` if none converges.
     pub fn best(observations: &[Observation], config: &IdentifyConfig) -> Option<Self> {
         let turning: f64 = observations
             .iter()

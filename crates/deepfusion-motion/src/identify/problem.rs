@@ -1,18 +1,18 @@
-//! What the identification minimises: the bicycle model against the gyro, with derivatives.
+//! The objective of the identification: the bicycle model against the gyro, with derivatives.
 
 use super::fit::Observation;
 use nalgebra::{SMatrix, SVector};
 
-/// How far a ratio may move.
+/// Range of the ratio.
 pub(super) const RATIO_RANGE: (f64, f64) = (0.7, 40.0);
-/// What is expected of the steering's zero (at the road wheel, in radians) and of the gyro's bias (in
-/// rad/s) before anything is seen. It keeps the fit finite where a drive at one speed cannot tell them
-/// apart, and is far wider than either is.
+/// Priors of the steering's zero (at the road wheel, in radians) and of the gyro's bias (in rad/s).
+/// They keep the fit finite if a drive at one speed cannot separate the two, and are far wider than
+/// either.
 const ZERO_PRIOR_RAD: f64 = 0.1;
 const BIAS_PRIOR_RADPS: f64 = 0.05;
 /// Huber's constant: 95 % efficient on normal noise.
 const HUBER: f64 = 1.345;
-/// A gyro's noise is not below this, in rad/s: it keeps weights finite on noiseless data.
+/// Least noise of a gyro, in rad/s: it keeps weights finite on noiseless data.
 const LEAST_SIGMA: f64 = 1e-7;
 /// Parameters: ln(L·ρ), ln ρ, the zero at the road wheel s₀/ρ (rad), b (rad/s).
 pub(super) type Parameters = SVector<f64, 4>;
@@ -137,7 +137,7 @@ impl Problem<'_> {
         Some(inverse)
     }
 
-    /// By how much residuals that come in runs widen the variance: (1 + r) / (1 − r), r the
+    /// Factor by which correlated residuals widen the variance: (1 + r) / (1 − r), r the
     /// correlation of neighbours.
     pub fn runs(&self, p: &Parameters) -> f64 {
         let residuals: Vec<f64> = self

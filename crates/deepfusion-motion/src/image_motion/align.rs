@@ -1,4 +1,4 @@
-//! Fitting shift and growth to a pair of pictures.
+//! Fits shift and growth to a pair of pictures.
 
 mod blocks;
 
@@ -9,13 +9,13 @@ const ROWS: (f64, f64) = (0.08, 0.60);
 /// The coarsest picture is at least this wide and high, in pixels.
 const COARSEST: (usize, usize) = (32, 12);
 const ITERATIONS: usize = 12;
-/// A difference larger than so many times the usual one counts less: cars, things that appear.
+/// Huber's constant: a difference larger than this many times the median counts less (cars, things that appear).
 const HUBER: f64 = 1.5;
-/// Mean squared horizontal slope below which a picture has nothing to hold on to, in squared grey
-/// levels of 255 per pixel: a wall's noise is below it.
+/// Least mean squared horizontal gradient of a picture that can be aligned, in squared grey levels
+/// of 255 per pixel: a wall's noise is below it.
 const LEAST_SLOPE: f64 = 0.5;
 
-/// A picture of numbers.
+/// A single-channel picture.
 #[derive(Debug, Clone)]
 pub(super) struct Plane {
     width: usize,
@@ -23,7 +23,7 @@ pub(super) struct Plane {
     values: Vec<f64>,
 }
 
-/// How one picture lies in the next.
+/// The warp from one picture to the next.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Warp {
     pub right: f64,
@@ -62,7 +62,7 @@ impl Plane {
         })
     }
 
-    /// Whether its aligned rows are (nearly) all alike, or no numbers.
+    /// Whether its aligned rows are (nearly) all alike, or NaN.
     fn is_plain(&self) -> bool {
         let rows = &self.values[aligned_rows(self.height).start * self.width
             ..aligned_rows(self.height).end * self.width];
@@ -71,9 +71,9 @@ impl Plane {
         !has_structure
     }
 
-    /// Value and slopes (right, down) at a place, bilinear; `None` outside.
+    /// Value and gradient (right, down) at a position, bilinear; `None` outside.
     fn sample(&self, x: f64, y: f64) -> Option<(f64, f64, f64)> {
-        // Also false for what is no number.
+        // Also false for NaN.
         let inside =
             x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64;
         if !inside {
@@ -97,7 +97,7 @@ fn aligned_rows(height: usize) -> std::ops::Range<usize> {
     (height as f64 * ROWS.0) as usize..(height as f64 * ROWS.1) as usize
 }
 
-/// The point that growth leaves in place: the middle of the picture.
+/// The fixed point of growth: the middle of the picture.
 pub(super) fn centre(width: usize, height: usize) -> (f64, f64) {
     (0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0))
 }
@@ -125,7 +125,7 @@ pub(super) fn align(before: &[Plane], after: &[Plane]) -> Option<Warp> {
     (warp.right.abs() < limit && warp.growth.abs() < 0.5).then_some(warp)
 }
 
-/// What one pixel says: I₀ + β − I₁ there, and I₁'s slopes (right, down).
+/// One pixel's residual, I₀ + β − I₁, and I₁'s gradient (right, down).
 struct Reading {
     difference: f64,
     right: f64,

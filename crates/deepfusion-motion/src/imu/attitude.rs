@@ -1,14 +1,14 @@
-//! Which way is up: a complementary filter. The gyro carries the direction over short times, the
-//! accelerometer holds it over long ones.
+//! The direction of up by a complementary filter: the gyro for short times, the accelerometer for
+//! long ones.
 
 use super::ImuSample;
 use crate::Signal;
 use nalgebra::Vector3;
 
-/// Half the time over which the vehicle's acceleration is taken from its speed, in seconds: a wheel's
-/// pulses make shorter slopes rough.
+/// Half the time over which the speed is differentiated to acceleration, in seconds: a wheel's pulses
+/// make shorter differences noisy.
 const SLOPE_S: f64 = 0.25;
-/// Without a speed, the accelerometer counts where it reads gravity's length to within this, in m/s².
+/// Without a speed, the accelerometer counts while its reading's norm is within this of gravity, in m/s².
 const CLOSE_TO_GRAVITY: f64 = 0.3;
 
 /// The direction of up in the vehicle's axes, over time.
@@ -21,7 +21,7 @@ pub(super) struct Attitude<'a> {
 }
 
 impl<'a> Attitude<'a> {
-    /// Starts at the mean of what the samples of the first `start_s` say.
+    /// Starts at the mean direction over the samples of the first `start_s` seconds.
     pub(super) fn level(
         stretch: &[ImuSample],
         speed: &'a Signal,
@@ -42,8 +42,8 @@ impl<'a> Attitude<'a> {
         }
     }
 
-    /// Up at the next sample: turned back by what the vehicle turned, then drawn towards what the
-    /// accelerometer says.
+    /// Advances to the next sample: rotates back by the vehicle's rotation, then corrects towards
+    /// the accelerometer. Returns the new direction of up.
     pub(super) fn advance(&mut self, sample: &ImuSample) -> Vector3<f64> {
         let dt = sample.time_s - self.last_s;
         self.last_s = sample.time_s;
@@ -63,7 +63,7 @@ impl<'a> Attitude<'a> {
 }
 
 /// The specific force without the vehicle's own acceleration: (v̇, v ω_z, 0) for wheels that do not
-/// slip. Without a speed the force itself, where it is as long as gravity.
+/// slip. Without a speed the force itself, if its norm is about gravity's.
 pub(super) fn gravity_reaction(sample: &ImuSample, speed: &Signal) -> Option<Vector3<f64>> {
     let force = sample.acceleration_mps2;
     if let Some((v, slope)) = speed_and_slope(speed, sample.time_s) {

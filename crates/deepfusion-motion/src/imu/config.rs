@@ -3,14 +3,14 @@ use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// Where an inertial unit sits on the vehicle, `vehicle_from_imu`.
+/// The mount of an inertial unit on the vehicle, `vehicle_from_imu`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImuMount {
     /// Axis-angle of the rotation that takes the unit's axes to the vehicle's (x forward, y left, z
     /// up), in radians. A unit with x forward, y right, z down has (π, 0, 0).
     pub rotation_rad: [f64; 3],
-    /// The unit's place in the vehicle's frame (origin: middle of the rear axle), in metres.
+    /// The unit's position in the vehicle's frame (origin: middle of the rear axle), in metres.
     pub translation_m: [f64; 3],
 }
 
@@ -38,16 +38,17 @@ impl ImuMount {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImuConfig {
-    /// Where the unit sits.
+    /// The unit's mount.
     pub vehicle_from_imu: ImuMount,
     /// Time constant of the attitude's complementary filter, in seconds: slower changes of up follow
-    /// the accelerometer, faster ones the gyro. The filter takes the vehicle's own acceleration out
-    /// with the speed, so that it need not be long; a long one lets the gyro's drift tilt the horizon.
+    /// the accelerometer, faster ones the gyro. The filter removes the vehicle's own acceleration by
+    /// means of the speed, so that it need not be long; with a long one the gyro's drift tilts the
+    /// horizon.
     pub attitude_time_s: f64,
-    /// The gyro's bias where the recording has no standstill, in rad/s about the vehicle's axes. Where it is not given,
-    /// roll's and pitch's are found against gravity while driving, yaw's against the steering where there is one.
+    /// The gyro's bias for recordings without a standstill, in rad/s about the vehicle's axes. If not given, the biases
+    /// of roll and pitch are estimated against gravity while driving, that of yaw against the steering if there is one.
     pub gyro_bias_radps: Option<[f64; 3]>,
-    /// When the vehicle counts as standing still.
+    /// The conditions for a standstill.
     pub standstill: StandstillConfig,
 }
 
@@ -62,8 +63,8 @@ impl Default for ImuConfig {
     }
 }
 
-/// When a vehicle counts as standing still: its speed says so, and the unit is quiet. Wheel sensors
-/// read 0 below walking speed, so the speed alone would take creeping for standing.
+/// The conditions for a standstill: the speed is low, and the unit is quiet. Wheel sensors read 0
+/// below walking speed, so that the speed alone would count creeping as standing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StandstillConfig {
@@ -71,8 +72,8 @@ pub struct StandstillConfig {
     pub speed_mps: f64,
     /// Largest standard deviation of the angular rate about any axis over a window, in rad/s.
     pub gyro_std_radps: f64,
-    /// Largest standard deviation of the acceleration along any axis over a window, in m/s². An engine
-    /// that idles shakes the unit by some tenths.
+    /// Largest standard deviation of the acceleration along any axis over a window, in m/s². An idling
+    /// engine shakes the unit by some tenths.
     pub acceleration_std_mps2: f64,
     /// Length of a window, and the shortest standstill, in seconds.
     pub window_s: f64,
@@ -93,7 +94,7 @@ impl ImuConfig {
     /// Checks every field.
     ///
     /// # Errors
-    /// [`Error::Config`] names the first field that is out of range.
+    /// [`Error::Config`] naming the first field out of range.
     pub fn validate(&self) -> Result<()> {
         let check = |ok: bool, field, value: f64, expected| {
             ok.then_some(()).ok_or(Error::Config {

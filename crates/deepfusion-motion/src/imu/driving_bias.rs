@@ -1,23 +1,24 @@
-//! The gyro's bias where a vehicle never stands: what its turning and the direction of gravity disagree by.
+//! The gyro's bias without a standstill, from the disagreement between the gyro and the direction of gravity.
 
 use super::ImuSample;
 use super::attitude::gravity_reaction;
 use crate::Signal;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-/// A bias is found over at most this long, in seconds: it follows the unit's temperature.
+/// Longest window over which a bias counts as constant, in seconds: it follows the unit's temperature.
 const WINDOW_S: f64 = 30.0;
-/// Shorter windows say too little, in seconds.
+/// Shortest window, in seconds.
 const SHORTEST_S: f64 = 1.0;
-/// Usual biases, in rad/s.
+/// Typical bias, in rad/s.
 const USUAL_BIAS: f64 = 0.008;
-/// Usual errors of up by the accelerometer, in radians, and how long one lasts, in seconds: bumps, and a speed's slope.
+/// Typical error of the accelerometer's direction of up, in radians, and its duration, in seconds: bumps, and errors of the
+/// acceleration from speed.
 const UP_ERROR: f64 = 0.01;
 const UP_ERROR_S: f64 = 0.5;
-/// Usual errors of the first direction of up, in radians.
+/// Typical error of the initial direction of up, in radians.
 const START_ERROR: f64 = 0.1;
 
-/// Three numbers that a sensor is wrong by, and when that was found.
+/// A sensor's bias in three axes, and the time it was estimated for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct DrivingBias {
     pub(crate) middle_s: f64,
@@ -25,10 +26,10 @@ pub(crate) struct DrivingBias {
 }
 
 /// The bias about roll and pitch by windows, vehicle axes, in rad/s; none about the vertical, which gravity does not
-/// show.
+/// determine.
 ///
-/// In each window up is turned on from where it first was by the gyro alone; how it then leaves what the accelerometer
-/// says is linear in the first direction's error δ and in the bias b: up' = −(ω − b) × up.
+/// In each window the initial direction of up is rotated by the gyro alone; its deviation from the accelerometer's is
+/// linear in the initial error δ and in the bias b: up' = −(ω − b) × up.
 pub(super) fn tilt_biases(
     samples: &[ImuSample],
     speed: &Signal,
@@ -42,8 +43,8 @@ pub(super) fn tilt_biases(
     )
 }
 
-/// What `find` says of each window: stretches without a gap, cut into parts of equal length so that none is a rest. Shorter
-/// ones than a second are left out.
+/// Applies `find` to each window: stretches without a gap, cut into parts of equal length. Windows shorter than a second
+/// are left out.
 pub(crate) fn by_windows<T>(
     samples: &[T],
     time_s: impl Fn(&T) -> f64,
@@ -104,7 +105,7 @@ fn tilt_bias(samples: &[ImuSample], speed: &Signal) -> Option<Vector3<f64>> {
     Some(Vector3::new(found[2], found[3], 0.0))
 }
 
-/// The bias at a time, in proportion between those found before and after; `None` without any.
+/// The bias at a time, interpolated between the estimates before and after; `None` without any.
 pub(crate) fn at(found: &[DrivingBias], time_s: f64) -> Option<Vector3<f64>> {
     let after = found.partition_point(|b| b.middle_s <= time_s);
     match (after.checked_sub(1).map(|i| found[i]), found.get(after)) {

@@ -1,4 +1,4 @@
-//! Distance and heading from an inertial unit (Eq. 23–25): turned into the vehicle's axes, freed of
+//! Distance and heading from an inertial unit (Eq. 23–25): rotated into the vehicle's axes, without
 //! bias and gravity.
 
 mod attitude;
@@ -17,15 +17,15 @@ use nalgebra::Vector3;
 /// Standard gravity, m/s².
 pub(crate) const GRAVITY: f64 = 9.806_65;
 
-/// The mean specific force of a drive is gravity, give or take a drive that ends faster than it began
-/// and an accelerometer that is off by some percent.
+/// Plausible norm of a drive's mean specific force, m/s²: gravity, with room for a drive that ends
+/// faster than it began and an accelerometer that is off by some percent.
 const GRAVITY_RANGE: std::ops::Range<f64> = 8.3..11.3;
-/// No mount is crooked by more: beyond this angle, in radians, axes are swapped.
+/// Largest tilt of a mount, in radians: beyond it, axes are swapped.
 const MOST_TILT_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
-/// Time constant of the filter that says how the body leans, in seconds. Long: within the second between two frames the
-/// gyro, freed of its bias, knows a change to a thousandth of a radian, the accelerometer does not.
-const LEAN_TIME_S: f64 = 15.0;
+/// Time constant of the filter for the body's roll and pitch, in seconds. It is long: over the second between two
+/// frames the gyro without bias is accurate to a thousandth of a radian, the accelerometer is not.
+const TILT_TIME_S: f64 = 15.0;
 
 /// One reading of an inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +46,7 @@ impl ImuSample {
     }
 }
 
-/// What an inertial unit says about the vehicle's motion over time.
+/// A vehicle's motion over time, as measured by an inertial unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImuTrack {
     forward_mps2: Signal,
@@ -59,9 +59,8 @@ pub struct ImuTrack {
 }
 
 impl ImuTrack {
-    /// Processes a recording. `speed` is the vehicle's speed in m/s over the same clock: it finds the
-    /// standstills (for the biases) and takes the vehicle's own acceleration out of what tells up from
-    /// down.
+    /// Processes a recording. `speed` is the vehicle's speed in m/s on the same clock: it finds the
+    /// standstills (for the biases), and its derivative is removed from the specific force to find up.
     ///
     /// # Errors
     /// [`Error::TooFewSamples`], [`Error::NotGravity`] (units, or gravity already removed),
@@ -113,10 +112,11 @@ impl ImuTrack {
         for stretch in clean.chunk_by(|a, b| b.time_s - a.time_s <= max_gap_s) {
             let start_s = config.attitude_time_s;
             let mut attitude = Attitude::level(stretch, speed, start_s, start_s);
-            let mut leaning = Attitude::level(stretch, speed, start_s, LEAN_TIME_S.max(start_s));
+            let mut slow_attitude =
+                Attitude::level(stretch, speed, start_s, TILT_TIME_S.max(start_s));
             for sample in stretch {
                 let up = attitude.advance(sample);
-                let lean = leaning.advance(sample);
+                let slow_up = slow_attitude.advance(sample);
                 // Ahead, level: what the specific force has along it is the vehicle's acceleration
                 // alone. Standing or climbing, with the unit's nose up or down.
                 let ahead = Vector3::x() - up * up.x;
@@ -124,8 +124,8 @@ impl ImuTrack {
                 forward.push((sample.time_s, sample.acceleration_mps2.dot(&ahead)));
                 yaw.push((sample.time_s, sample.angular_rate_radps.dot(&up)));
                 // Up is the third row of Rz(yaw)·Ry(pitch)·Rx(roll).
-                tilt[0].push((sample.time_s, lean.y.atan2(lean.z)));
-                tilt[1].push((sample.time_s, (-lean.x).clamp(-1.0, 1.0).asin()));
+                tilt[0].push((sample.time_s, slow_up.y.atan2(slow_up.z)));
+                tilt[1].push((sample.time_s, (-slow_up.x).clamp(-1.0, 1.0).asin()));
             }
         }
         Ok(Self {
@@ -152,9 +152,9 @@ impl ImuTrack {
         &self.yaw_rate_radps
     }
 
-    /// Roll (the left side up) and pitch (the nose down) against gravity at a time, in radians: the gyro's over
-    /// short times, the accelerometer's over long ones. Climbing counts as pitch. `None` where the recording does
-    /// not cover the time.
+    /// Roll (the left side up) and pitch (the nose down) against gravity at a time, in radians: from the gyro
+    /// over short times, from the accelerometer over long ones. Climbing counts as pitch. `None` if the recording
+    /// does not cover the time.
     #[must_use]
     pub fn tilt(&self, time_s: f64) -> Option<[f64; 2]> {
         let [roll, pitch] = &self.tilt_rad;
@@ -173,7 +173,7 @@ impl ImuTrack {
         &self.tilt_rates_radps[1]
     }
 
-    /// Where the vehicle stood still. Without any, the gyro's bias is that of the configuration, or found while driving.
+    /// The standstills. Without any, the gyro's bias is that of the configuration, or estimated while driving.
     #[must_use]
     pub fn standstills(&self) -> &[Standstill] {
         &self.standstills
@@ -193,8 +193,8 @@ impl ImuTrack {
     }
 }
 
-/// Whether the mean specific force is one g upward. It says before anything is integrated that the
-/// units or the mount are wrong.
+/// Checks that the mean specific force is one g upward: wrong units or a wrong mount are found
+/// before anything is integrated.
 fn check_gravity(samples: &[ImuSample]) -> Result<()> {
     let sum: Vector3<f64> = samples.iter().map(|s| s.acceleration_mps2).sum();
     let mean = sum / samples.len() as f64;

@@ -1,10 +1,10 @@
-//! Stretches in which the vehicle stands: what the gyro reads there is its bias.
+//! Standstills: the gyro's reading there is its bias.
 
 use super::{GRAVITY, ImuSample, StandstillConfig};
 use crate::Signal;
 use nalgebra::Vector3;
 
-/// A stretch in which the vehicle stood still, and what the unit read.
+/// A stretch in which the vehicle stood still, and the unit's mean readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standstill {
     /// Begin, in seconds.
@@ -13,16 +13,16 @@ pub struct Standstill {
     pub to_s: f64,
     /// Mean angular rate about the vehicle's axes, in rad/s: the gyro's bias.
     pub gyro_bias_radps: Vector3<f64>,
-    /// Mean specific force along the vehicle's axes, in m/s²: the direction of up. What a bias adds
-    /// across it looks like a slope of the road, and is taken for one.
+    /// Mean specific force along the vehicle's axes, in m/s²: the direction of up. A bias across it
+    /// cannot be distinguished from a slope of the road, and counts as one.
     pub specific_force_mps2: Vector3<f64>,
-    /// By how much the specific force is longer than gravity, in m/s²: the one part of the
-    /// accelerometer's bias that a standstill shows.
+    /// Norm of the specific force minus gravity, in m/s²: the only part of the accelerometer's bias
+    /// that a standstill determines.
     pub up_bias_mps2: f64,
 }
 
 /// Finds the standstills of a recording in vehicle axes, by speed and by the unit's own variance.
-/// Where the speed is unknown, the vehicle does not count as standing.
+/// With an unknown speed the vehicle does not count as standing.
 #[must_use]
 pub fn standstills(
     samples: &[ImuSample],
@@ -43,8 +43,8 @@ pub fn standstills(
     found
 }
 
-/// The gyro's bias at a time: between the standstills before and after, in proportion; `None` without
-/// any. Biases follow the unit's temperature, slowly.
+/// The gyro's bias at a time, interpolated between the standstills before and after; `None` without
+/// any. Biases slowly follow the unit's temperature.
 pub(super) fn gyro_bias(standstills: &[Standstill], time_s: f64) -> Option<Vector3<f64>> {
     let middle = |s: &Standstill| 0.5 * (s.from_s + s.to_s);
     let after = standstills.partition_point(|s| middle(s) <= time_s);
@@ -57,7 +57,7 @@ pub(super) fn gyro_bias(standstills: &[Standstill], time_s: f64) -> Option<Vecto
     Some(before.gyro_bias_radps.lerp(&next.gyro_bias_radps, fraction))
 }
 
-/// The quiet windows of a slow run, neighbours joined.
+/// The quiet windows of a slow stretch, neighbours joined.
 fn quiet_stretches(run: &[ImuSample], config: &StandstillConfig) -> Vec<Standstill> {
     let begin = run[0].time_s;
     let window = |s: &ImuSample| ((s.time_s - begin) / config.window_s) as u64;
@@ -109,7 +109,7 @@ fn mean(samples: &[ImuSample], of: fn(&ImuSample) -> Vector3<f64>) -> Vector3<f6
 mod tests {
     use super::*;
 
-    /// 20 s at 100 Hz: standing from 5 to 10 s by the speed; `shake` is the unit's unrest then.
+    /// 20 s at 100 Hz: standing from 5 to 10 s by the speed; `shake` is the unit's vibration then.
     fn drive(shake: f64) -> (Vec<ImuSample>, Signal) {
         let standing = |t: f64| (5.0..10.0).contains(&t);
         let samples = (0..2000)

@@ -1,4 +1,4 @@
-//! Correlation over offsets, its peak, and how sure the peak is.
+//! Correlation over offsets, its peak, and the peak's standard error.
 
 use super::OffsetConfig;
 use crate::{ImageMotion, Signal};
@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 
 /// Step of the search, in seconds; the peak is interpolated between.
 const STEP_S: f64 = 0.01;
-/// Length of a block that is resampled as a whole, in seconds: longer than a wiggle of the road.
+/// Length of a resampled block, in seconds: longer than a wiggle of the road.
 const BLOCK_S: f64 = 1.5;
-/// How many resamples.
+/// Number of resamples.
 const RESAMPLES: usize = 200;
 
 /// The offsets searched: 2 `half` + 1 of them.
@@ -33,7 +33,7 @@ pub(super) struct Channel {
 
 impl Channel {
     /// Compares over the pairs that the vehicle's signal covers at every offset, so that all offsets
-    /// compare the same. `None` without a pair.
+    /// use the same pairs. `None` without pairs.
     pub fn new(
         pictures: &[ImageMotion],
         picture: fn(&ImageMotion) -> f64,
@@ -98,7 +98,7 @@ impl Channel {
         })
     }
 
-    /// How many pairs of frames are compared.
+    /// Number of pairs of frames compared.
     pub fn pairs(&self) -> usize {
         self.pairs
     }
@@ -121,7 +121,7 @@ impl Channel {
     }
 }
 
-/// Where the likelihood is largest.
+/// The maximum of the likelihood.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Peak {
     pub offset_s: f64,
@@ -220,7 +220,7 @@ fn correlation(sums: &Sums) -> f64 {
     }
 }
 
-/// Values without their mean over ± half the trend's time.
+/// Values minus their mean over ± half the trend's time.
 fn without_trend(times: &[f64], values: &[f64], trend_s: f64) -> Vec<f64> {
     let mut totals = vec![0.0];
     for value in values {

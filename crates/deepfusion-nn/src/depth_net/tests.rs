@@ -19,7 +19,7 @@ fn a_config_without_the_optional_fields_is_the_published_network() {
     assert_eq!(config, DepthNetConfig::new(ResNetDepth::ResNet18));
 }
 
-/// A network with the head for uncertainty starts from one without, and the other way round; depth is the same either way.
+/// A network with the uncertainty head can start from one without, and the other way round; depth is the same either way.
 #[test]
 fn the_head_for_uncertainty_comes_and_goes() {
     let device = Device::flex();

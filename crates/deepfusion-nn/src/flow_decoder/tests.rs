@@ -20,7 +20,7 @@ fn largest(t: Tensor<4>) -> f32 {
     t.abs().max().into_scalar()
 }
 
-/// Down to 64×64, where the coarsest level has 4×4 pixels and a radius of 4 always looks out of it.
+/// Down to 64×64, where the coarsest level has 4×4 pixels and a radius of 4 always reaches beyond it.
 #[test]
 fn a_new_decoders_flow_is_zero_at_every_size_and_learns() {
     let device = Device::flex().autodiff();

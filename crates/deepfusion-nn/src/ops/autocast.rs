@@ -1,4 +1,4 @@
-//! Convolutions in another precision than their layers say, for as long as some work takes.
+//! Runs a closure's convolutions in another precision than their layers are configured for.
 
 use super::{ConvOptions, Precision};
 use burn::backend::DispatchDevice;
@@ -10,7 +10,7 @@ thread_local! {
     static PRECISION: Cell<Option<Precision>> = const { Cell::new(None) };
 }
 
-/// Puts the precision back that was there before, however the work ends.
+/// Restores the previous precision when dropped.
 struct Before(Option<Precision>);
 
 impl Drop for Before {
@@ -19,14 +19,14 @@ impl Drop for Before {
     }
 }
 
-/// Does `work` with the convolutions that it asks for on this thread in `precision`. Their gradients keep it, also where they are
-/// asked for afterwards. As `torch.autocast`, but that all tensors stay f32: only what is multiplied is rounded.
+/// Runs `work` with the convolutions of this thread in `precision`. Their backward passes use the same precision, even if they
+/// run later. As `torch.autocast`, except that all tensors stay f32: only the factors of the products are rounded.
 pub fn autocast<R>(precision: Precision, work: impl FnOnce() -> R) -> R {
     let _before = Before(PRECISION.replace(Some(precision)));
     work()
 }
 
-/// A convolution's options where it is asked for.
+/// A convolution's options, with the precision that is in force on this thread.
 pub(super) fn within(options: ConvOptions) -> ConvOptions {
     ConvOptions {
         precision: PRECISION.get().unwrap_or(options.precision),
@@ -34,8 +34,7 @@ pub(super) fn within(options: ConvOptions) -> ConvOptions {
     }
 }
 
-/// Whether convolutions on a device can be in this precision: bf16 needs this project's kernels, so no GPU, and a processor
-/// that multiplies bf16.
+/// Whether a device supports this precision: bf16 needs this project's CPU kernels and a processor with bf16 instructions.
 #[must_use]
 pub fn supports(device: &Device, precision: Precision) -> bool {
     let on_cpu = matches!(

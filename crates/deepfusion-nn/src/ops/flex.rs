@@ -35,13 +35,13 @@ fn dims<const D: usize>(tensor: &Float) -> [usize; D] {
     tensor.shape().dims()
 }
 
-/// Memory for an operation's result, cleared: for small results, and kernels that need it so.
+/// Zeroed memory for an operation's result: for small results, and for kernels that need it cleared.
 fn zeros(sizes: &[usize]) -> Vec<f32> {
     vec![0.0; count(sizes)]
 }
 
-/// An operation's result as `write` leaves it. For the large ones: clearing them first took a fourteenth of a training
-/// step.
+/// An operation's result in uninitialised memory that `write` fills. For large results: clearing them first took a
+/// fourteenth of a training step.
 ///
 /// # Safety
 /// `write` must write every value it is given room for.

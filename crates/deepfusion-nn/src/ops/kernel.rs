@@ -14,7 +14,7 @@ pub struct ConvOptions {
     pub dilation: usize,
     /// Padding mirrors the image (without repeating its edge) instead of being zero.
     pub reflect: bool,
-    /// How it multiplies where the kernels run; within [`super::autocast`] as that says.
+    /// Precision of the products in the CPU kernels; [`super::autocast`] overrides it.
     pub precision: Precision,
 }
 

@@ -26,7 +26,7 @@ pub use composed::{
 pub use deepfusion_kernels::Precision;
 pub use kernel::ConvOptions;
 
-/// Whether the tensor lives where the kernels run.
+/// Whether the tensor is on the device on which the kernels run.
 fn on_cpu<const D: usize>(tensor: &Tensor<D>) -> bool {
     matches!(
         tensor.device().inner().as_dispatch(),
@@ -69,7 +69,7 @@ pub fn conv2d(
     ))
 }
 
-/// What batch normalisation over a batch gives.
+/// The output of [`batch_norm`].
 #[derive(Debug, Clone)]
 pub struct BatchNormOutput {
     /// The normalised values, `[N, C, H, W]`.
@@ -145,7 +145,7 @@ pub fn upsample_concat(x: Tensor<4>, skip: Option<Tensor<4>>) -> Tensor<4> {
     ))
 }
 
-/// The bilinear warp, out(p) = image⟨coords(p)⟩; outside the image its border counts (SPEC 0).
+/// The bilinear warp, out(p) = image⟨coords(p)⟩; outside the image its border counts.
 ///
 /// # Shapes
 /// - `image`: `[N, C, H, W]`
@@ -167,7 +167,7 @@ pub fn warp(image: Tensor<4>, coords: Tensor<4>) -> Tensor<4> {
     ))
 }
 
-/// Where a flow leads, p + f(p): what [`warp`] reads the second image at.
+/// The end points of a flow, p + f(p): the coordinates at which [`warp`] reads the second image.
 ///
 /// # Shapes
 /// - `flow`: `[N, 2, H, W]`, u and v in pixels
@@ -183,10 +183,9 @@ pub fn flow_coords(flow: Tensor<4>) -> Tensor<4> {
     flow.add(Tensor::from_data(grid, &device))
 }
 
-/// Local correlation: how alike each pixel's feature is to those around the same place in another image,
-/// out(d, p) = (1/C) Σ_c first(c, p)·second(c, p + d) for every displacement d of at most `radius` pixels along each
-/// axis; outside of its image `second` is zero. Displacement d is channel
-/// (d_y + radius)·(2·radius + 1) + (d_x + radius).
+/// Local correlation: the similarity of each pixel's feature to those around the same pixel of another image, out(d,
+/// p) = (1/C) Σ_c first(c, p)·second(c, p + d) for every displacement d of at most `radius` pixels along each axis;
+/// outside of its image `second` is zero. Displacement d is channel (d_y + radius)·(2·radius + 1) + (d_x + radius).
 ///
 /// # Shapes
 /// - `first`, `second`: `[N, C, H, W]`
@@ -208,8 +207,8 @@ pub fn local_correlation(first: Tensor<4>, second: Tensor<4>, radius: usize) -> 
     ))
 }
 
-/// Where the pixels of a view lie in another (SPEC 2, Eq. 3–5): p' ~ H·p̃ + d·s, d the inverse depth.
-/// Points behind the other camera are sent far outside of its image.
+/// The pixel coordinates of one view's points in another view (the paper's Eq. 3–5): p' ~ H·p̃ + d·s, d
+/// the inverse depth. Points behind the other camera are sent far outside of its image.
 ///
 /// # Shapes
 /// - `inverse_depth`: `[N, 1, H, W]`, 1/m
@@ -243,7 +242,7 @@ pub fn in_view(coords: Tensor<4>, [height, width]: [usize; 2]) -> Tensor<4, Bool
     Tensor::<4>::from_dispatch(inside).greater_elem(0.5)
 }
 
-/// Edge-aware smoothness (SPEC 2, Eq. 8): mean(|∂ₓd*|·e^(−|∂ₓI|)) + mean(|∂ᵧd*|·e^(−|∂ᵧI|)), d* = disparity
+/// Edge-aware smoothness (the paper's Eq. 8): mean(|∂ₓd*|·e^(−|∂ₓI|)) + mean(|∂ᵧd*|·e^(−|∂ᵧI|)), d* = disparity
 /// over its mean in the image, |∂I| averaged over channels.
 ///
 /// # Shapes
@@ -262,8 +261,8 @@ pub fn smoothness(disparity: Tensor<4>, image: Tensor<4>) -> Tensor<1> {
     ))
 }
 
-/// The photometric error of SPEC 2, Eq. 6: pe(a, b) = α·clamp((1 − SSIM(a, b))/2, 0, 1) +
-/// (1 − α)·|a − b|, mean over channels. The gradient flows to `a` alone: `b` is what was observed.
+/// The photometric error (the paper's Eq. 6): pe(a, b) = α·clamp((1 − SSIM(a, b))/2, 0, 1) + (1 −
+/// α)·|a − b|, mean over channels. Only `a` has a gradient: `b` is the observation.
 ///
 /// # Shapes
 /// - `a`, `b`: `[N, C, H, W]`

@@ -9,12 +9,12 @@ use deepfusion_model::weights::{FileKind, floats, read_safetensors};
 use super::{WeightTensor, Weights};
 use crate::Error;
 
-/// Reads every float tensor of a `.safetensors`, `.pth` or `.pt` file; the kind is told by content,
-/// not by name. f64, f16 and bf16 become f32; integers (PyTorch's `num_batches_tracked`) and
-/// entries that are no tensors are skipped.
+/// Reads every float tensor of a `.safetensors`, `.pth` or `.pt` file; the format is recognised by
+/// content, not by name. f64, f16 and bf16 become f32; integers (PyTorch's `num_batches_tracked`)
+/// and entries that are not tensors are skipped.
 ///
 /// # Errors
-/// [`Error::Io`] for a file that cannot be read, [`Error::Format`] for one that holds no weights.
+/// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it holds no weights.
 pub fn read(path: &Path) -> Result<Weights, Error> {
     let weights = match FileKind::of(path)? {
         FileKind::Safetensors => read_safetensors(path)?,

@@ -1,8 +1,8 @@
-//! Weights out of a network, into a network, and from other programs' files.
+//! Weights: collected from a network, applied to a network, and imported from other programs' files.
 //!
-//! A tensor's name is its path in the module, `encoder.layer1.0.conv1.weight`; the encoders' paths are
-//! torchvision's names. What PyTorch saved (`.pth`) can be read. Importing renames the tensors of a foreign file to ours and
-//! then asks for an exact fit: nothing missing, nothing left over, every shape equal.
+//! A tensor's name is its path in the module, `encoder.layer1.0.conv1.weight`; the encoders' paths are torchvision's names.
+//! PyTorch's `.pth` files can be read. An import renames the tensors of a foreign file to ours and then requires an exact
+//! fit: nothing missing, nothing left over, every shape equal.
 
 mod file;
 mod module;

@@ -1,4 +1,4 @@
-//! Weights out of a module and into it.
+//! Collects a module's weights, and applies weights to a module.
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{Tensor, TensorData};

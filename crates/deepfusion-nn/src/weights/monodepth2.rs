@@ -59,7 +59,7 @@ pub struct Monodepth2 {
 /// recognised by their blocks; the configs are the `monodepth2` preset.
 ///
 /// # Errors
-/// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] for an encoder that is no ResNet.
+/// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] if the encoder is not a ResNet.
 pub fn load_monodepth2(files: &Monodepth2Files, device: &Device) -> Result<Monodepth2, Error> {
     let encoder = read_encoder(&files.encoder)?;
     let depth_config = DepthNetConfig::monodepth2(detect_resnet(&encoder)?);
@@ -109,7 +109,7 @@ fn read_encoder(path: &Path) -> Result<Weights, Error> {
     Ok(read(path)?.under("encoder."))
 }
 
-/// Renames every tensor, or says which one has no place in the network.
+/// Renames every tensor; an error names the first that the network does not have.
 fn rename(weights: Weights, name_of: fn(&str) -> Option<String>) -> Result<Weights, Error> {
     let unknown: Vec<_> = weights
         .tensors

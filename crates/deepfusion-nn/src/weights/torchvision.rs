@@ -11,7 +11,7 @@ use crate::{Error, ResNet, ResNetDepth};
 /// so that equal frames give the activations of the single image.
 ///
 /// # Errors
-/// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] for weights that are no ResNet.
+/// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] for weights that are not a ResNet's.
 pub fn load_torchvision_resnet(encoder: ResNet, path: &Path) -> Result<ResNet, Error> {
     let weights = read(path)?;
     detect_resnet(&weights)?;
@@ -44,7 +44,7 @@ pub(super) fn apply_torchvision(encoder: ResNet, weights: Weights) -> Result<Res
 /// Which ResNet these are the weights of, by torchvision's names.
 ///
 /// # Errors
-/// [`Error::UnknownArchitecture`] when the blocks are none of the known ones'.
+/// [`Error::UnknownArchitecture`] if the blocks match no known ResNet.
 pub fn detect_resnet(weights: &Weights) -> Result<ResNetDepth, Error> {
     let blocks: [usize; 4] = std::array::from_fn(|layer| {
         (0..)

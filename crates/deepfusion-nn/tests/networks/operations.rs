@@ -29,7 +29,7 @@ struct Case {
     options: Options,
 }
 
-/// What the operation is told; each reads its own.
+/// The operation's parameters; each reads its own.
 #[derive(Deserialize, Default)]
 #[serde(default)]
 struct Options {

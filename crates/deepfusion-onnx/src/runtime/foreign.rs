@@ -1,4 +1,4 @@
-//! Models that others made: any names and shapes, numbers in f32.
+//! Third-party models: any names and shapes, numbers in f32.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use ort::value::{TensorElementType, TensorRef};
 use super::{Library, refused, session};
 use crate::Error;
 
-/// What a model says of an input or an output.
+/// A model's description of an input or an output.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TensorInfo {
     /// Its name.
@@ -28,7 +28,7 @@ pub struct Tensor {
     pub data: Vec<f32>,
 }
 
-/// A model of somebody's in ONNX Runtime, with one input.
+/// A third-party model in ONNX Runtime, with one input.
 #[derive(Debug)]
 pub struct ForeignModel {
     session: Session,
@@ -39,7 +39,7 @@ impl ForeignModel {
     /// Loads a file; `library` and `threads` as for [`super::OrtEngine::load`].
     ///
     /// # Errors
-    /// As [`super::find`]; [`Error::Library`] where this process uses another library already, [`Error::Runtime`]
+    /// As [`super::find`]; [`Error::Library`] if this process already uses another library, [`Error::Runtime`]
     /// for a model that the library refuses.
     pub fn load(library: Option<&Path>, model: &[u8], threads: usize) -> Result<Self, Error> {
         let (session, library) = session(library, model, threads)?;
@@ -52,19 +52,19 @@ impl ForeignModel {
         &self.library
     }
 
-    /// What it takes.
+    /// Its inputs.
     #[must_use]
     pub fn inputs(&self) -> Vec<TensorInfo> {
         self.session.inputs().iter().map(info).collect()
     }
 
-    /// What it gives.
+    /// Its outputs.
     #[must_use]
     pub fn outputs(&self) -> Vec<TensorInfo> {
         self.session.outputs().iter().map(info).collect()
     }
 
-    /// What its maker wrote into it under a key.
+    /// The metadata stored in it under a key.
     #[must_use]
     pub fn note(&self, key: &str) -> Option<String> {
         self.session.metadata().ok()?.custom(key)
@@ -76,7 +76,7 @@ impl ForeignModel {
     /// - `data`: as many numbers as `shape`'s product, row by row
     ///
     /// # Errors
-    /// [`Error::Model`] for a model of several inputs, or of outputs that are no f32; [`Error::Runtime`].
+    /// [`Error::Model`] for a model with several inputs, or with outputs that are not f32; [`Error::Runtime`].
     pub fn run(&mut self, shape: &[usize], data: &[f32]) -> Result<Vec<Tensor>, Error> {
         const RUN: &str = "run the model";
         let names: Vec<&str> = self.session.inputs().iter().map(|i| i.name()).collect();

@@ -1,4 +1,4 @@
-//! Which ONNX Runtime library, and whether it can be used.
+//! Finds a usable ONNX Runtime library.
 
 use std::ffi::CStr;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use ort::sys::OrtApiBase;
 use super::places;
 use crate::Error;
 
-/// An ONNX Runtime library that can be used.
+/// A usable ONNX Runtime library.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Library {
     /// The file.
@@ -18,13 +18,13 @@ pub struct Library {
     pub version: String,
 }
 
-/// The ONNX Runtime library: the file given, else the one that `ORT_DYLIB_PATH` names, else the first that
-/// can be used next to the program, in the system's folders, or in a Python installation on `PATH`
-/// (`pip install onnxruntime`). No Python is started.
+/// Finds the ONNX Runtime library: the given file, else the one that `ORT_DYLIB_PATH` names, else the
+/// first usable one next to the program, in the system's folders, or in a Python installation on `PATH`
+/// (`pip install onnxruntime`). Python is not started.
 ///
 /// # Errors
-/// [`Error::Library`] for a file that was named and cannot be used, or where none of those found can be;
-/// [`Error::NoLibrary`] where there is none.
+/// [`Error::Library`] if the named file is not usable, or none of those found is; [`Error::NoLibrary`]
+/// if there is none.
 pub fn find(asked: Option<&Path>) -> Result<Library, Error> {
     let named = asked.map(Path::to_owned).or_else(|| {
         let variable = std::env::var_os("ORT_DYLIB_PATH")?;

@@ -1,4 +1,4 @@
-//! ONNX files in ONNX Runtime, on the processor. The library is found and opened at run time; a process uses
+//! Runs ONNX files in ONNX Runtime, on the CPU. The library is found and opened at run time; a process uses
 //! one library for all its models.
 
 mod foreign;
@@ -32,13 +32,12 @@ static ENVIRONMENT: Mutex<Option<(Library, Environment)>> = Mutex::new(None);
 impl OrtEngine {
     /// Loads a model as [`crate::write()`] makes it.
     ///
-    /// `library` is the ONNX Runtime library; without it, one is [found](find), or the one in use is taken.
-    /// `threads` is how many of the processor's a run may use; 0 leaves it to ONNX Runtime.
+    /// `library` is the ONNX Runtime library; without it, the one in use is taken, or one is [found](find).
+    /// `threads` is the number of CPU threads of a run; 0 leaves it to ONNX Runtime.
     ///
     /// # Errors
-    /// As [`find`]; [`Error::Library`] where this process uses another library already,
-    /// [`Error::Runtime`] for a model that the library refuses, [`Error::Model`] for one that is no depth
-    /// model.
+    /// As [`find`]; [`Error::Library`] if this process already uses another library, [`Error::Runtime`]
+    /// for a model that the library refuses, [`Error::Model`] for one that is not a depth model.
     pub fn load(library: Option<&Path>, model: &[u8], threads: usize) -> Result<Self, Error> {
         let (session, library) = session(library, model, threads)?;
         let (width, height) = size_of(&session)?;

@@ -1,4 +1,4 @@
-//! Where an ONNX Runtime library may lie. Only folders are listed: nothing is started.
+//! Folders that may hold an ONNX Runtime library. They are only listed: nothing is started.
 
 use std::collections::HashSet;
 use std::env;
@@ -32,7 +32,7 @@ pub fn folders() -> Vec<PathBuf> {
     all
 }
 
-/// Libraries in a folder, the newest first as far as their names tell.
+/// Libraries in a folder, the newest first, by their names.
 pub fn libraries_in(folder: &Path) -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = entries(folder)
         .filter(|path| {

@@ -1,21 +1,21 @@
-//! What stands in a row by itself: a person, a pillar's base, a trolley. No car is as small that is seen from one side to
-//! the other.
+//! Objects that stand in a row by themselves: a person, a pillar's base, a trolley. A car that is visible from side to
+//! side is larger.
 
 use super::View;
 use crate::Detection;
 use crate::box_fit::SMALL;
 use crate::obstacles::NONE;
 
-/// So many columns beside a thing it is looked at what is there.
+/// Number of columns beside an object that are checked.
 const BESIDE: u32 = 2;
 
-/// Whether a detection is small and nothing nearer hides how it goes on, on either side: then it is no part of a car.
+/// Whether a detection is small and nothing nearer hides its continuation on either side: then it is not part of a car.
 pub fn stands_alone(detection: &Detection, view: &View) -> bool {
     let small = detection.place.footprint.iter().all(|side| *side <= SMALL);
     small && is_open(detection, view)
 }
 
-/// Whether it ends on both sides where it is seen to end: what is beside it lies farther back, in most of its rows.
+/// Whether both its ends are visible: what is beside it lies farther back, in most of its rows.
 fn is_open(detection: &Detection, view: &View) -> bool {
     let width = view.rays.x.len() as u32;
     let (mut rows, mut closed) = (0, [0; 2]);
@@ -34,7 +34,7 @@ fn is_open(detection: &Detection, view: &View) -> bool {
     rows > 0 && closed.iter().all(|closed| 3 * closed <= rows)
 }
 
-/// Whether what is seen in a pixel may go on at another: something nearer stands there, or an obstacle as far away.
+/// Whether the object in one pixel may continue at another: something nearer stands there, or an obstacle at the same distance.
 fn may_go_on(from: usize, at: usize, view: &View) -> bool {
     let (here, there) = (view.depth[from], view.depth[at]);
     let step = 0.4 + 0.01 * here;

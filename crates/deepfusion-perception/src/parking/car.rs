@@ -1,21 +1,21 @@
 //! A car of a row: a box of usual size, square to it.
 
-use super::parts::Seen;
+use super::segments::Seen;
 use super::{Row, View};
 use crate::box_fit::CAR;
 use crate::clusters::Cluster;
 use crate::outermost::ends;
 use crate::{Detection, GroundBox, Run};
 
-/// Where a car's near end may lie off the row's middle, away from the lane, metres.
+/// Range of a car's near end relative to the row's middle, away from the lane, metres.
 const FRONT_M: [f32; 2] = [-3.0, -1.5];
-/// What is taken to be seen of a length, at least: the row tells how it is turned, and where it stands.
+/// Least visible share of the length that is assumed: the row gives orientation and position.
 const KNOWN: f32 = 0.4;
 
-/// No car is lower, metres: of some only the lower part is seen.
+/// Least height of a car, metres: of some only the lower part is visible.
 const LOWEST_M: f32 = 1.3;
 
-/// The car at a place along a row that some points belong to, and whether its front is seen, which says where it stands.
+/// The car at a position along a row, from its points, and whether its front is visible, which fixes its position.
 pub fn car(along: f32, points: &[&Seen], row: &Row, view: &View) -> Option<(Detection, bool)> {
     let mut alongs: Vec<f32> = points.iter().map(|p| p.along).collect();
     let [first, last] = ends(&mut alongs, 1000)?;
@@ -56,7 +56,7 @@ pub fn car(along: f32, points: &[&Seen], row: &Row, view: &View) -> Option<(Dete
     Some((detection, front))
 }
 
-/// A cluster of some pixels, in their order.
+/// A cluster of pixels, in their order.
 fn cluster(pixels: &[u32], width: u32) -> Cluster {
     let mut runs: Vec<Run> = Vec::new();
     for pixel in pixels {

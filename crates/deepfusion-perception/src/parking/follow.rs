@@ -1,15 +1,15 @@
-//! A row from its near end to its far one.
+//! Follows a row from its near to its far end.
 
 use super::View;
 use super::car::car;
-use super::parts::Standing;
 use super::row::{Parked, Row};
+use super::segments::Standing;
 use crate::Detection;
 
-/// What a car that was found by its row says about where the row goes on, in looks.
+/// Weight of a car found by its row for the row's continuation, in sightings.
 const FOUND: f32 = 2.0;
 
-/// Follows a row from its near end to its far one: each car of which enough is seen says where it goes on.
+/// Follows a row from its near to its far end: each car that is visible enough updates the row's direction.
 pub fn follow(row: &mut Row, standing: &Standing, view: &View) -> Vec<Detection> {
     let mut found = Vec::new();
     let mut done = f32::NEG_INFINITY;
@@ -21,13 +21,13 @@ pub fn follow(row: &mut Row, standing: &Standing, view: &View) -> Vec<Detection>
         }
         let ends = [from, row.end()];
         let before = done;
-        for part in standing.parts(row, ends, view) {
+        for part in standing.segments(row, ends, view) {
             if part.along[1] <= done + 0.3 {
                 continue;
             }
             done = part.along[1];
             let slope = part.slope(row);
-            let mut told = slope.is_some();
+            let mut updated = slope.is_some();
             let line = row.clone();
             for (along, points) in part.cars(&line, view) {
                 let Some((car, front)) = car(along, &points, &line, view) else {
@@ -39,11 +39,11 @@ pub fn follow(row: &mut Row, standing: &Standing, view: &View) -> Vec<Detection>
                         slope: slope.unwrap_or_else(|| line.slope(along)),
                         weight: FOUND,
                     });
-                    told = true;
+                    updated = true;
                 }
                 found.push(car);
             }
-            if told {
+            if updated {
                 // It may go on otherwise than was thought.
                 break;
             }

@@ -1,48 +1,48 @@
-//! Cars side by side, as in a car park: those that are seen well tell where the others stand, of which only a corner, a
-//! bonnet or a strip of a door is seen.
+//! Cars side by side, as in a car park: those that are clearly visible show where the others stand, of which only a
+//! corner, a hood or a strip of a door is visible.
 //!
-//! A row is a line through the middles of cars that stand across the way; the rows on both sides of a lane go the same
-//! way. What stands on such a line is parted by its gaps, and each part is a car of usual size, square to the row. Cars
-//! are remembered, so that a row that was passed goes on ahead.
+//! A row is a line through the middles of cars that stand across the lane; the rows on both sides of a lane are
+//! parallel. What stands on such a line is split at its gaps, and each segment is a car of typical size, at a right
+//! angle to the row. Cars are remembered, so that a row continues ahead of those already passed.
 
 mod alone;
 mod car;
 mod follow;
-mod known;
-mod parts;
+mod remembered;
 mod row;
 #[cfg(test)]
 mod scene;
+mod segments;
 
 use crate::rows::Turn;
 use crate::{Detection, Ground, Obstacles, PerceptionConfig, Rays};
 use alone::stands_alone;
 use deepfusion_geometry::Se3;
 use follow::follow;
-use known::{Known, distance, heading, meet, on_ground, parked};
 use nalgebra::Vector3;
-use parts::Standing;
+use remembered::{RememberedCar, distance, heading, merge, on_ground, parked};
 use row::{Heading, Parked, Row};
+use segments::Standing;
 
-/// From this share of a detection's pixels, or of the smaller footprint, in a car of a row, it is a part of that car; that
-/// it is one is likelier than that something else of a car's size stands there.
+/// From this share of a detection's pixels, or of the smaller footprint, within a car of a row, it is part of that car:
+/// that is likelier than another object in the car's place.
 const PART: f32 = 0.2;
-/// From this share of the smaller footprint in something else on, a car of a row is that.
+/// From this share of the smaller footprint within another detection, a car of a row is that detection.
 const SAME: f32 = 0.4;
-/// Within this distance of where something moves it is that, metres.
+/// Within this distance of a dynamic track a detection counts as dynamic, metres.
 const MOVING_M: f32 = 1.5;
 /// Half of a row's depth, metres.
 const HALF_M: f32 = 2.8;
-/// Cars that were seen often, of all rows together, before a row is believed: on a street hedges and drives look like one.
+/// Number of cars seen often, over all rows, before rows are used: on a street, hedges and driveways look like a row.
 const LEAST_SURE: usize = 3;
-/// From where to where, across the lane from a row's line, the cars of the other side may be, metres.
+/// Distance range across the lane from a row's line to the cars of the other side, metres.
 const ACROSS_M: [f32; 2] = [8.6, 15.0];
 
 /// Completes rows of parked cars, frame by frame.
 #[derive(Debug, Clone, Default)]
 pub struct Parking {
-    known: Vec<Known>,
-    /// Those cars as they are seen from here, and the rows of which two are certain.
+    remembered: Vec<RememberedCar>,
+    /// Those cars as seen from the present pose, and the rows with two certain cars.
     cars: Vec<Parked>,
     rows: Vec<Row>,
 }
@@ -59,22 +59,22 @@ pub struct View<'a> {
 
 impl Parking {
     /// Forgets all cars.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         *self = Self::default();
     }
 
-    /// Before a frame is looked at: where the known cars are, seen from there.
-    pub fn recall(&mut self, ground: &Ground, world_from_cam: Option<&Se3>) {
+    /// Starts a frame: transforms the remembered cars to the present camera and finds their rows.
+    pub fn begin_frame(&mut self, ground: &Ground, world_from_cam: Option<&Se3>) {
         self.cars = world_from_cam.map_or(Vec::new(), |pose| {
             let cam_from_world = pose.inverse();
-            let seen = |known: &Known| known.seen(ground, &cam_from_world);
-            self.known.iter().filter_map(seen).collect()
+            let seen = |known: &RememberedCar| known.seen(ground, &cam_from_world);
+            self.remembered.iter().filter_map(seen).collect()
         });
         self.rows = Row::all(&self.cars);
         self.rows.retain(|row| row.sure() > 1);
     }
 
-    /// How something is usually turned at a place: along the way in the lane, square to it in a row and across from one.
+    /// The usual orientation at a point: along the lane, but at a right angle to it in a row and across the lane from one.
     pub fn usual_turn(&self, at: [f32; 2]) -> Turn {
         let square = |row: &Row| {
             let [along, off] = row.locate(at);
@@ -86,8 +86,9 @@ impl Parking {
         angle.map_or(Turn::ahead(), |angle| Turn::new(angle, 1.0))
     }
 
-    /// Puts the cars of rows in the place of their parts, which were found one by one. All else stays as it is: what moves (in
-    /// the world), what is known by name, what stands in a row by itself, and what none of its cars explains. Without a pose nothing is remembered, and no row believed.
+    /// Replaces detections that are parts of parked cars by the cars of their row. Everything else is kept: what is dynamic
+    /// (`moving`, in the world), what has a class, what stands in a row by itself, and what no car of a row explains. Without a
+    /// pose nothing is remembered and no rows are used.
     pub fn complete(
         &mut self,
         detections: Vec<Detection>,
@@ -109,10 +110,12 @@ impl Parking {
             .partition(|d| d.kind.is_some() || moves(d));
         let mut cars = std::mem::take(&mut self.cars);
         for car in open.iter().filter_map(|d| parked(&d.place)) {
-            meet(&mut cars, car);
+            merge(&mut cars, car);
         }
-        self.known = world_from_cam.map_or(Vec::new(), |pose| {
-            let known = cars.iter().map(|car| Known::new(car, view.ground, pose));
+        self.remembered = world_from_cam.map_or(Vec::new(), |pose| {
+            let known = cars
+                .iter()
+                .map(|car| RememberedCar::new(car, view.ground, pose));
             known.collect()
         });
         let rows = believed(&cars);
@@ -124,9 +127,9 @@ impl Parking {
             open = others;
             let standing = Standing::find(&view, kept.iter().chain(&alone));
             let (rows, found) = follow_all(rows, &lane, &standing, &view);
-            let parts = Parts::of(&found, &view);
+            let explained = Explained::of(&found, &view);
             let in_row = |d: &Detection| rows.iter().any(|row| row.holds(d.place.middle));
-            open.retain(|d| !(in_row(d) && parts.explain(d)));
+            open.retain(|d| !(in_row(d) && explained.covers(d)));
             for car in found {
                 let taken = |other: &Detection| other.place.overlap(&car.place) > SAME;
                 if !kept.iter().chain(&open).any(taken) {
@@ -140,14 +143,14 @@ impl Parking {
     }
 }
 
-/// What the cars of rows explain: where they stand, and what is seen of them.
-struct Parts<'a> {
+/// What the cars of rows explain: their footprints and their pixels.
+struct Explained<'a> {
     cars: &'a [Detection],
     pixels: Vec<bool>,
     width: usize,
 }
 
-impl<'a> Parts<'a> {
+impl<'a> Explained<'a> {
     fn of(cars: &'a [Detection], view: &View) -> Self {
         let width = view.rays.x.len();
         let mut pixels = vec![false; view.depth.len()];
@@ -161,8 +164,8 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// Whether a detection is a part of one of the cars.
-    fn explain(&self, detection: &Detection) -> bool {
+    /// Whether a detection is part of one of the cars.
+    fn covers(&self, detection: &Detection) -> bool {
         let within = |car: &Detection| car.place.overlap(&detection.place) > PART;
         let own = detection.runs.iter().flat_map(|run| {
             let pixels = &self.pixels[run.pixels(self.width)];
@@ -172,7 +175,7 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// The rows that some cars stand in, if enough of them were seen often.
+/// The rows of some cars, if enough of the cars were seen often.
 fn believed(cars: &[Parked]) -> Vec<Row> {
     let mut rows = Row::all(cars);
     if rows.iter().map(Row::sure).sum::<usize>() < LEAST_SURE {
@@ -181,7 +184,7 @@ fn believed(cars: &[Parked]) -> Vec<Row> {
     rows
 }
 
-/// Follows each of some rows, which bend alike, and as the lane does: they themselves, as they go then, and their cars.
+/// Follows each row; all have the curvature of the lane. Returns the updated rows and their cars.
 fn follow_all(
     rows: Vec<Row>,
     lane: &[Heading],
@@ -194,7 +197,7 @@ fn follow_all(
         let mut row = rows[i].clone();
         row.keep_to(lane);
         for other in followed.iter().chain(&rows[i + 1..]) {
-            row.lean_on(other);
+            row.align_with(other);
         }
         found.extend(follow(&mut row, standing, view));
         followed.push(row);
@@ -233,11 +236,11 @@ mod tests {
         }
     }
 
-    /// Three cars of a row, looked at so often.
-    fn passed(scene: &Scene, looks: usize, pose: Option<&Se3>) -> Parking {
+    /// Three cars of a row, seen this often.
+    fn passed(scene: &Scene, sightings: usize, pose: Option<&Se3>) -> Parking {
         let mut parking = Parking::default();
-        for _ in 0..looks {
-            parking.recall(scene.view().ground, pose);
+        for _ in 0..sightings {
+            parking.begin_frame(scene.view().ground, pose);
             let seen = [8.0, 11.0, 14.0].map(|forward| detection(car(forward)));
             parking.complete(seen.into(), &[], scene.view(), pose);
         }
@@ -249,7 +252,7 @@ mod tests {
         let scene = Scene::of(&[8.0, 11.0, 14.0, 17.0].map(car));
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
-        parking.recall(scene.view().ground, Some(&pose));
+        parking.begin_frame(scene.view().ground, Some(&pose));
         // Beside its neighbour only a strip of its front is seen: across it.
         let mut wrong = car(17.4);
         wrong.angle = 1.2;
@@ -275,19 +278,19 @@ mod tests {
         strip.angle = 1.2;
         strip.seen = [0.1, 0.2];
         let looked_at = |mut parking: Parking, pose: Option<&Se3>| {
-            parking.recall(scene.view().ground, pose);
+            parking.begin_frame(scene.view().ground, pose);
             let seen = vec![detection(strip)];
             let found = parking.complete(seen, &[], scene.view(), pose);
             assert_eq!(found.len(), 1, "{found:?}");
             found[0].place != strip
         };
         let believed =
-            |looks: usize, pose: Option<&Se3>| looked_at(passed(&scene, looks, pose), pose);
+            |sightings: usize, pose: Option<&Se3>| looked_at(passed(&scene, sightings, pose), pose);
         assert!(believed(2, Some(&pose)));
         assert!(!believed(1, Some(&pose)));
         assert!(!believed(5, None));
         let mut parking = passed(&scene, 5, Some(&pose));
-        parking.forget();
+        parking.reset();
         assert!(!looked_at(parking, Some(&pose)));
     }
 
@@ -296,7 +299,7 @@ mod tests {
         let scene = Scene::of(&[]);
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
-        parking.recall(scene.view().ground, Some(&pose));
+        parking.begin_frame(scene.view().ground, Some(&pose));
         // On the row's line, where nothing tells of a car.
         let seen = vec![detection(car(17.0))];
         let found = parking.complete(seen.clone(), &[], scene.view(), Some(&pose));
@@ -306,13 +309,13 @@ mod tests {
     #[test]
     fn who_stands_in_a_row_or_before_a_car_of_it_stays() {
         let cars = [8.0, 11.0, 14.0].map(car);
-        // Beyond the last car; between two; before the bonnet of one, at whose place the row has a car.
+        // Beyond the last car; between two; before the hood of one, at whose place the row has a car.
         for middle in [[4.0, 19.0], [3.5, 12.5], [3.3, 13.9]] {
             let standing = person(middle);
             let scene = Scene::of(&[cars[0], cars[1], cars[2], standing]);
             let pose = Se3::identity();
             let mut parking = passed(&scene, 2, Some(&pose));
-            parking.recall(scene.view().ground, Some(&pose));
+            parking.begin_frame(scene.view().ground, Some(&pose));
             let mut seen: Vec<_> = cars.map(|car| scene.detection(car)).into();
             let who = scene.detection(standing);
             seen.push(who.clone());
@@ -333,7 +336,7 @@ mod tests {
         let scene = Scene::of(&[car(17.0)]);
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
-        parking.recall(scene.view().ground, Some(&pose));
+        parking.begin_frame(scene.view().ground, Some(&pose));
         let mut named = detection(car(8.0));
         named.kind = Some(Kind {
             class: "truck".into(),
@@ -353,7 +356,7 @@ mod tests {
         let scene = Scene::of(&[]);
         let pose = Se3::identity();
         let mut parking = passed(&scene, 2, Some(&pose));
-        parking.recall(scene.view().ground, Some(&pose));
+        parking.begin_frame(scene.view().ground, Some(&pose));
         let turned = |at: [f32; 2]| parking.usual_turn(at).angle();
         assert!(turned([6.0, 14.0]).sin().abs() < 0.1);
         // Across the lane from it too, but not in the lane.

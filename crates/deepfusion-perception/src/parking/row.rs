@@ -3,58 +3,58 @@
 use super::HALF_M;
 use nalgebra::{Matrix4, Vector4};
 
-/// A car that stands across the way, in the ground's axes.
+/// A car that stands across the lane, in the ground's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parked {
     /// Its middle: right, forward, in metres.
     pub middle: [f32; 2],
-    /// How the row goes on beside it, right over forward: at a right angle to the car.
+    /// Direction of the row at the car, right over forward: at a right angle to the car.
     pub slope: f32,
-    /// How often it was seen, about.
+    /// About how often it was seen.
     pub weight: f32,
 }
 
-/// How far the middles of two neighbours may lie off the line through them, and off each other along it, metres.
+/// Limits for two neighbours: the offset of their middles from a common line, and their distance along it, metres.
 const OFF_M: f32 = 0.9;
 /// See [`OFF_M`].
 const APART_M: [f32; 2] = [1.5, 14.0];
-/// How differently two neighbours may be turned, radians.
+/// Largest angle between two neighbours, radians.
 const TURN: f32 = 0.35;
-/// How much a car's own turn counts beside its place: as a place so far away would, metres.
+/// Weight of a car's orientation relative to its position: that of a position at this distance, metres.
 const TURN_M: f32 = 12.0;
-/// What keeps a row straight, and in the way's direction, where its cars do not say otherwise.
+/// Prior weights for a straight row, and for one along the lane.
 const STRAIGHT: f32 = 4.0;
 /// See [`STRAIGHT`].
 const AHEAD: f32 = 1.0;
-/// A row's bend is counted in 1/this, per metre.
+/// Unit of a row's curvature: 1/this per metre.
 const BEND: f32 = 10.0;
-/// How far along a row what its cars say counts, metres: a lane does not bend alike everywhere. Beyond, a little is left.
+/// Distance along a row over which its cars count, metres: a lane's curvature varies. Beyond it a small weight remains.
 const COUNTS_M: f32 = 15.0;
 /// See [`COUNTS_M`].
 const LEFT: f32 = 0.02;
-/// Looks from which on it is certain that a car stands there.
+/// Sightings from which on a car is certain.
 const SURE: f32 = 2.0;
-/// How far before its first car, and beyond the last one of its own or across the lane, a row is looked at, metres.
+/// How far a row is searched before its first car, and beyond the last car of its own or across the lane, metres.
 const BEFORE_M: f32 = 10.0;
 /// See [`BEFORE_M`].
 const GOES_ON_M: f32 = 15.0;
-/// What something that drives along the lane says about how it bends, in looks at a car: the same wherever it is.
+/// Weight of a vehicle driving along the lane for its curvature, in sightings of a car, at any distance.
 const DRIVEN: f32 = 2.0;
 /// Two rows are at least so far apart, metres.
 const ROWS_M: f32 = 5.0;
 
-/// How the lane goes somewhere, as something that drives along it shows.
+/// The lane's direction at a point, as shown by a vehicle driving along it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heading {
-    /// Where, forward in metres.
+    /// The point, forward in metres.
     pub forward: f32,
-    /// Right over forward.
+    /// Its direction, right over forward.
     pub slope: f32,
 }
 
 /// A row of cars, side by side along the way: right = p₀ + p₁ q + p₂ q² / 10 with q = forward − `from`.
 ///
-/// The row across the lane, if there is one, goes the same way at another p₀.
+/// The row across the lane, if there is one, has the same p₁ and p₂ and its own p₀.
 #[derive(Debug, Clone)]
 pub struct Row {
     cars: Vec<Parked>,
@@ -63,12 +63,12 @@ pub struct Row {
     from: f32,
     /// p₀, p₁, p₂, and the other row's p₀.
     line: Vector4<f32>,
-    /// What is near this far forward counts most.
+    /// Cars near this forward position count most.
     focus: Option<f32>,
 }
 
 impl Row {
-    /// The rows that some cars stand in, the surest first: of at least two each, or of one across the lane from such a row.
+    /// The rows of some cars, the most certain first: of at least two cars each, or of one across the lane from such a row.
     pub fn all(cars: &[Parked]) -> Vec<Self> {
         let mut groups: Vec<Vec<Parked>> = Vec::new();
         for car in cars {
@@ -121,7 +121,7 @@ impl Row {
             && self.at(car.middle[1]) * car.middle[0] < 0.0
     }
 
-    /// Whether two are closer to each other than rows can be.
+    /// Whether two rows are too close to each other.
     fn crowds(&self, other: &Self) -> bool {
         let [from, to] = self.reach();
         [from, 0.5 * (from + to), to]
@@ -129,8 +129,8 @@ impl Row {
             .any(|at| (self.at(*at) - other.at(*at)).abs() < ROWS_M)
     }
 
-    /// Goes as another goes, if that is across the lane.
-    pub fn lean_on(&mut self, other: &Self) {
+    /// Takes the other row's cars into the fit, if it is across the lane.
+    pub fn align_with(&mut self, other: &Self) {
         let [from, to] = self.reach();
         let [other_from, other_to] = other.reach();
         let between = 0.5 * (from.max(other_from) + to.min(other_to));
@@ -141,25 +141,25 @@ impl Row {
         }
     }
 
-    /// Bends as what drives along the lane shows.
+    /// Takes the headings of vehicles along the lane into the fit.
     pub fn keep_to(&mut self, lane: &[Heading]) {
         self.lane = lane.to_vec();
         self.fit();
     }
 
-    /// One more car.
+    /// Adds a car.
     pub fn add(&mut self, car: Parked) {
         self.cars.push(car);
         self.fit();
     }
 
-    /// From now on what is near this place counts most, forward in metres.
+    /// From now on cars near this forward position, in metres, count most.
     pub fn focus(&mut self, forward: f32) {
         self.focus = Some(forward);
         self.fit();
     }
 
-    /// Weighted least squares over places and turns.
+    /// Weighted least squares over positions and orientations.
     fn fit(&mut self) {
         let weight: f32 = self.cars.iter().map(|c| c.weight).sum();
         let forward = |c: &Parked| c.weight * c.middle[1];
@@ -193,18 +193,18 @@ impl Row {
         }
     }
 
-    /// Where its cars' middles are, right in metres, so far forward.
+    /// Lateral position of its cars' middles, right in metres, at this forward position.
     pub fn at(&self, forward: f32) -> f32 {
         let q = forward - self.from;
         self.line[0] + self.line[1] * q + self.line[2] * q * q / BEND
     }
 
-    /// Its direction there, right over forward.
+    /// Its direction at this forward position, right over forward.
     pub fn slope(&self, forward: f32) -> f32 {
         self.line[1] + 2.0 * self.line[2] * (forward - self.from) / BEND
     }
 
-    /// From where to where its own cars stand, forward in metres.
+    /// Range of its own cars, forward in metres.
     pub fn reach(&self) -> [f32; 2] {
         let ends = [f32::INFINITY, f32::NEG_INFINITY];
         self.cars.iter().fold(ends, |[low, high], car| {
@@ -212,47 +212,47 @@ impl Row {
         })
     }
 
-    /// From how far forward on it is looked at, metres.
+    /// Start of the search range, forward in metres.
     pub fn start(&self) -> f32 {
         self.reach()[0] - BEFORE_M
     }
 
-    /// How far forward it is looked at, metres.
+    /// End of the search range, forward in metres.
     pub fn end(&self) -> f32 {
         let all = self.cars.iter().chain(&self.across);
         let last = all.map(|car| car.middle[1]);
         last.fold(f32::NEG_INFINITY, f32::max) + GOES_ON_M
     }
 
-    /// Whether it is looked at so far along.
+    /// Whether this forward position is within the search range.
     pub fn passes(&self, along: f32) -> bool {
         (self.start()..self.end()).contains(&along)
     }
 
-    /// Whether what stands at a point (right, forward) stands in it.
+    /// Whether a point (right, forward) is in the row.
     pub fn holds(&self, at: [f32; 2]) -> bool {
         let [along, off] = self.locate(at);
         off.abs() <= HALF_M && self.passes(along)
     }
 
-    /// How many of its cars were seen often.
+    /// Number of its cars that were seen often.
     pub fn sure(&self) -> usize {
         self.cars.iter().filter(|car| car.weight >= SURE).count()
     }
 
-    /// A point as seen from the row: how far along it (as forward, on its line), and how far off the line to the right.
+    /// A point in the row's coordinates: position along it (as forward, on its line), and offset from the line to the right.
     pub fn locate(&self, [right, forward]: [f32; 2]) -> [f32; 2] {
         let off = right - self.at(forward);
         [forward + self.slope(forward) * off, off]
     }
 
-    /// The point so far along the row and, square to it, so far off to the right: right, forward in metres.
+    /// The point at this position along the row and this offset to the right of it: right, forward in metres.
     pub fn place(&self, along: f32, off: f32) -> [f32; 2] {
         let (sin, cos) = self.angle(along).sin_cos();
         [self.at(along) + off * cos, along + off * sin]
     }
 
-    /// How its cars are turned there: as [`crate::GroundBox::angle`].
+    /// Orientation of its cars at this position, as [`crate::GroundBox::angle`].
     pub fn angle(&self, along: f32) -> f32 {
         (-self.slope(along)).atan()
     }
@@ -344,7 +344,7 @@ mod tests {
         };
         let mut right = Row::through(vec![on(6.0, 2.0), on(6.0, 5.0)]);
         let left = Row::through((1..7).map(|i| on(-6.0, 4.0 * i as f32)).collect());
-        right.lean_on(&left);
+        right.align_with(&left);
         let expected = 6.0 + 24.0 * 24.0 / 80.0;
         assert!((right.at(24.0) - expected).abs() < 0.6, "{right:?}");
         assert!((right.end() - 39.0).abs() < 1e-3);

@@ -1,11 +1,11 @@
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector2, Vector4};
 
-/// Acceleration that a target is expected to have, m/s²: a car that brakes in comfort.
+/// Expected acceleration of a target, m/s²: a car that brakes comfortably.
 const ACCELERATION: f64 = 1.5;
-/// Speed that a target of which only a place is known may have, m/s.
+/// Standard deviation of the speed of a new target, m/s.
 const UNKNOWN_SPEED: f64 = 8.0;
 
-/// A place on the ground and its constant velocity, in the world's horizontal axes, metres and m/s.
+/// A constant-velocity Kalman filter on the ground, in the world's horizontal axes, metres and m/s.
 #[derive(Debug, Clone)]
 pub struct Kalman {
     /// x, z, and their velocities.
@@ -14,7 +14,7 @@ pub struct Kalman {
 }
 
 impl Kalman {
-    /// At a measured place with its covariance, of unknown velocity.
+    /// A filter at a measured position with its covariance, of unknown velocity.
     pub fn new(place: Vector2<f64>, noise: &Matrix2<f64>) -> Self {
         let mut covariance = Matrix4::identity() * UNKNOWN_SPEED.powi(2);
         covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(noise);
@@ -24,7 +24,7 @@ impl Kalman {
         }
     }
 
-    /// Lets `dt` seconds pass.
+    /// Predicts `dt` seconds ahead.
     pub fn predict(&mut self, dt: f64) {
         let mut step = Matrix4::identity();
         step[(0, 2)] = dt;
@@ -41,7 +41,7 @@ impl Kalman {
         self.covariance = step * self.covariance * step.transpose() + noise;
     }
 
-    /// Takes a measured place with its covariance in.
+    /// Updates with a measured position and its covariance.
     pub fn update(&mut self, place: Vector2<f64>, noise: &Matrix2<f64>) {
         let observe = Matrix2x4::identity();
         let Some(inverse) = self.innovation(noise).try_inverse() else {
@@ -54,7 +54,7 @@ impl Kalman {
         self.covariance = 0.5 * (self.covariance + self.covariance.transpose());
     }
 
-    /// Squared Mahalanobis distance of a measured place.
+    /// Squared Mahalanobis distance of a measured position.
     pub fn distance2(&self, place: Vector2<f64>, noise: &Matrix2<f64>) -> f64 {
         let off = place - self.place();
         self.innovation(noise)
@@ -68,12 +68,12 @@ impl Kalman {
         self.covariance.fixed_view::<2, 2>(0, 0) + noise
     }
 
-    /// Where it is.
+    /// The position.
     pub fn place(&self) -> Vector2<f64> {
         self.state.fixed_rows::<2>(0).into()
     }
 
-    /// How fast it moves.
+    /// The velocity.
     pub fn velocity(&self) -> Vector2<f64> {
         self.state.fixed_rows::<2>(2).into()
     }

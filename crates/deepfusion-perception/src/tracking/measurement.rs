@@ -2,22 +2,22 @@ use crate::{Detection, Ground, PerceptionConfig};
 use deepfusion_geometry::Se3;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
-/// A detection, seen from the world.
+/// A detection in world coordinates.
 pub struct Measurement<'a> {
-    /// Which of the image's detections it is.
+    /// Its index among the image's detections.
     pub index: usize,
-    /// What was detected.
+    /// The detection.
     pub detection: &'a Detection,
     /// Angle of its length in the world's horizontal axes, x to z, radians.
     pub heading: f64,
-    /// How well its heading is known: metres of it that were seen.
+    /// Weight of its heading: metres of it that were seen.
     pub heading_weight: f64,
     ground: &'a Ground,
     world_from_cam: &'a Se3,
 }
 
 impl<'a> Measurement<'a> {
-    /// Of the image's detection `index` on `ground`, by a camera at `world_from_cam`.
+    /// The measurement of detection `index` on `ground`, by a camera at `world_from_cam`.
     pub fn new(
         (index, detection): (usize, &'a Detection),
         ground: &'a Ground,
@@ -38,7 +38,7 @@ impl<'a> Measurement<'a> {
         }
     }
 
-    /// Centre of the box in the world if its length and width were these, metres.
+    /// Centre of the box in the world with this length and width, metres.
     pub fn centre_with(&self, extents: [f64; 2]) -> Vector3<f64> {
         let [right, forward] = self.detection.place.middle_with(extents.map(|e| e as f32));
         let [low, high] = self.detection.place.heights;
@@ -47,8 +47,8 @@ impl<'a> Measurement<'a> {
             .transform(&Vector3::from(p.map(f64::from)))
     }
 
-    /// How far the centre may be off, as a covariance in the world's horizontal axes: along the ray by the depth's own
-    /// error, as it was told of these pixels or else as it usually is, and by what had to be completed.
+    /// Covariance of the centre in the world's horizontal axes: the error of depth along the ray, from these pixels or
+    /// else the configured one, and the part of the box that had to be completed.
     pub fn noise(&self, config: &PerceptionConfig) -> Matrix2<f64> {
         let place = &self.detection.place;
         let ray = self

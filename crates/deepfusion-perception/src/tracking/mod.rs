@@ -1,4 +1,4 @@
-//! Targets over time: which box of this frame is which of the last, and how fast it moves over ground.
+//! Tracking: associates the boxes of this frame with those of the last, and estimates their velocity over ground.
 
 mod kalman;
 mod measurement;

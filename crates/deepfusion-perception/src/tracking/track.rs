@@ -5,19 +5,19 @@ use deepfusion_geometry::Se3;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Speed over ground from which on, and below which, something is said to move, m/s.
+/// Speeds over ground above which a target counts as dynamic, and below which as static, m/s.
 const MOVING_MPS: [f64; 2] = [1.0, 0.5];
-/// Standard deviation of the speed below which that is said at all, m/s.
-const TOLD_MPS: f64 = 0.7;
-/// Weight of what was not measured but completed.
+/// Largest standard deviation of the speed for that decision, m/s.
+const MAX_SPEED_SIGMA_MPS: f64 = 0.7;
+/// Weight of a value that was completed, not measured.
 const GUESS: f64 = 0.05;
-/// Most weight that a size or a heading gathers, so that it stays able to change.
+/// Largest weight of a size or a heading, so that it can still change.
 const MOST_WEIGHT: f64 = 40.0;
 
-/// Most that a class can have behind it, in looks of score 1: so that it stays able to change.
+/// Largest sum of a class' votes, in sightings of score 1, so that it can still change.
 const MOST_VOTES: f32 = 5.0;
 
-/// A mean that remembers how much it is worth.
+/// A weighted running mean.
 #[derive(Debug, Clone, Copy)]
 struct Mean {
     value: f64,
@@ -32,7 +32,7 @@ impl Mean {
     }
 }
 
-/// How a track was seen.
+/// How a track was seen in a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen {
     pixels: usize,
@@ -50,7 +50,7 @@ impl Seen {
     }
 }
 
-/// A target that is followed.
+/// A tracked target.
 #[derive(Debug, Clone)]
 pub struct Track {
     pub id: u64,
@@ -65,13 +65,13 @@ pub struct Track {
     pub hits: u32,
     /// Time since it was last seen, seconds.
     pub unseen_s: f64,
-    /// Whether it is said to move.
+    /// Whether it counts as dynamic.
     moving: Option<bool>,
     /// Confidence of the last detection.
     confidence: f64,
-    /// What it was seen as most, and by how much.
+    /// The class with the most votes, and their sum.
     kind: Option<Kind>,
-    /// Standard deviation of its depth over itself when it was last seen, where that was told.
+    /// Standard deviation of its depth over itself when it was last seen, if known.
     relative_error: Option<f32>,
     /// How it was seen in the last frame, if it was.
     pub seen: Option<Seen>,
@@ -106,7 +106,7 @@ impl Track {
         }
     }
 
-    /// Whether it is said to move.
+    /// Whether it counts as dynamic.
     pub fn is_moving(&self) -> bool {
         self.moving == Some(true)
     }
@@ -122,8 +122,8 @@ impl Track {
         0.5 * self.heading.y.atan2(self.heading.x)
     }
 
-    /// The measured centre, given what this track knows of its size and heading, and whether the measurement's length
-    /// is this track's width.
+    /// The measured centre, given this track's size and heading, and whether the measurement's length is this track's
+    /// width.
     fn centre_of(&self, measurement: &Measurement) -> (Vector3<f64>, bool) {
         let off = (measurement.heading - self.axis()).rem_euclid(PI);
         let crossed = (off - FRAC_PI_2).abs() < 0.25 * PI;
@@ -183,7 +183,7 @@ impl Track {
         self.tell_motion();
     }
 
-    /// One more look at what it is: the class with the most behind it stays.
+    /// Adds a vote for a class; the class with the most votes stays.
     fn vote(&mut self, seen: Option<&Kind>) {
         let Some(seen) = seen else { return };
         match &mut self.kind {
@@ -197,7 +197,7 @@ impl Track {
 
     fn tell_motion(&mut self) {
         let doubt = self.filter.speed_deviation();
-        if doubt > TOLD_MPS {
+        if doubt > MAX_SPEED_SIGMA_MPS {
             return;
         }
         let speed = self.filter.velocity().norm();
@@ -270,7 +270,7 @@ impl Track {
     }
 }
 
-/// What is seen to nine tenths is measured, what is seen to a half is a guess.
+/// Nine tenths seen counts as measured, half seen as a guess.
 fn weight_of(seen: f32) -> f64 {
     GUESS + (1.0 - GUESS) * f64::from(seen).powi(6)
 }

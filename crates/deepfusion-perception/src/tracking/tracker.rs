@@ -4,18 +4,18 @@ use crate::{Detection, Ground, PerceptionConfig, Rays, Target};
 use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 
-/// Squared standard deviations, and metres, within which a detection may be a track's.
+/// The gate of the association: squared standard deviations, and metres.
 const GATE: (f64, f64) = (16.0, 3.5);
-/// How long a track goes on unseen, seconds: while it is hidden, and where it should be seen and is not.
+/// How long a track continues unseen, seconds: while it is hidden, and while it should be visible but is not.
 const HIDDEN_S: f64 = 1.5;
 /// See [`HIDDEN_S`].
 const MISSED_S: f64 = 0.35;
-/// Frames in which a track must have been seen before it is told without being seen.
+/// Number of frames in which a track must have been seen before it is reported while unseen.
 const CONFIRMED: u32 = 3;
-/// A longer pause than this, in seconds, and everything starts anew.
+/// A longer pause than this, in seconds, drops all tracks.
 const LONGEST_PAUSE_S: f64 = 2.0;
 
-/// When and from where a frame was taken, and what it shows.
+/// Time, pose and content of a frame.
 pub struct Now<'a> {
     pub time_s: f64,
     pub world_from_cam: Se3,
@@ -33,25 +33,25 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// An id that no target has had.
+    /// A new, unused id.
     pub fn new_id(&mut self) -> u64 {
         self.next_id += 1;
         self.next_id
     }
 
-    /// Gives all tracks up; their ids are not used again.
-    pub fn forget(&mut self) {
+    /// Drops all tracks; their ids are not used again.
+    pub fn reset(&mut self) {
         self.tracks.clear();
         self.time_s = None;
     }
 
-    /// Where what moves was last, in the world.
+    /// The last positions of dynamic targets, in the world.
     pub fn moving(&self) -> impl Iterator<Item = Vector3<f64>> {
         let moving = self.tracks.iter().filter(|track| track.is_moving());
         moving.map(Track::centre)
     }
 
-    /// Takes a frame's detections in and tells the targets that are there.
+    /// Updates the tracks with a frame's detections and returns its targets.
     pub fn step(
         &mut self,
         detections: &[Detection],
@@ -85,7 +85,7 @@ impl Tracker {
             .collect()
     }
 
-    /// The nearest pairs first; what is left over begins a track.
+    /// Greedy association, nearest pairs first; unmatched detections start tracks.
     fn associate(&mut self, detections: &[Detection], now: &Now, config: &PerceptionConfig) {
         let measurements: Vec<Measurement> = detections
             .iter()
@@ -124,7 +124,7 @@ impl Tracker {
     }
 }
 
-/// What the image says of the place where a track should be.
+/// The visibility of the position where a track should be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Whereabouts {
     /// Nothing stands before it.

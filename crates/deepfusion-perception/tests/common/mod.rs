@@ -81,7 +81,7 @@ pub fn score(drives: &[SimConfig]) -> TargetScore {
                 world_from_cam: first_from_world * frame.world_from_cam,
             };
             let seen = perception
-                .look(&frame.depth, &simulation.intrinsics(), Some(stamp))
+                .detect(&frame.depth, &simulation.intrinsics(), Some(stamp))
                 .unwrap();
             scorer.add(
                 frame.time_s,

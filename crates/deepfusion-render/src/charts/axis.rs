@@ -1,4 +1,4 @@
-//! What all charts share: a frame of 640 × 260 units, axes with round ticks, a key.
+//! Common parts of all charts: a frame of 640 × 260 units, axes with round ticks, a legend.
 
 use std::fmt::Write as _;
 
@@ -14,7 +14,7 @@ pub(super) const COLOURS: [&str; 6] = [
     "#2563eb", "#ea580c", "#16a34a", "#9333ea", "#dc2626", "#0891b2",
 ];
 
-/// A chart that can stand in a page.
+/// A chart as part of a page.
 pub trait Svg {
     /// The chart as an SVG element that needs nothing from outside.
     fn to_svg(&self) -> String;

@@ -31,7 +31,7 @@ impl BarChart {
         }
     }
 
-    /// Adds a bar to each group, from 0 up; `None`, and what is not finite or below 0, leaves a gap.
+    /// Adds a bar to each group, from 0 up; `None` and values that are negative or not finite leave a gap.
     #[must_use]
     pub fn bars(mut self, name: impl Into<String>, values: Vec<Option<f64>>) -> Self {
         self.series.push((name.into(), values));

@@ -8,7 +8,7 @@ use crate::html::escape;
 /// A line of a [`LineChart`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Its name in the key.
+    /// Its name in the legend.
     pub name: String,
     /// x and y of its points, by x. Points that are not finite leave a gap.
     pub points: Vec<(f64, f64)>,
@@ -25,18 +25,18 @@ impl Series {
     }
 }
 
-/// Lines over a number, such as losses over steps, as an inline SVG that needs nothing from outside.
+/// Lines over a number, such as losses over steps, as a self-contained inline SVG.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineChart {
     /// What it shows.
     pub title: String,
-    /// What x is.
+    /// Label of the x axis.
     pub x_label: String,
     /// The lines.
     pub series: Vec<Series>,
     /// A dashed horizontal line and its name, such as the scale ratio 1.
     pub reference: Option<(f64, String)>,
-    /// Whether y is shown by its logarithm; values that are not above 0 are then left out.
+    /// Whether y is shown by its logarithm; values that are not positive are then left out.
     pub log_y: bool,
 }
 

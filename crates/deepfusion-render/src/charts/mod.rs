@@ -1,4 +1,4 @@
-//! Charts as inline SVG that need nothing from outside.
+//! Charts as self-contained inline SVG.
 
 mod axis;
 mod bars;
@@ -10,8 +10,8 @@ pub use bars::BarChart;
 pub use line::{LineChart, Series};
 pub use scatter::ScatterChart;
 
-/// Shares of `values` per bin of equal width from 0 to `to`, as the outline of a histogram; what lies beyond is left out of
-/// the picture, yet counts in the share.
+/// Shares of `values` per bin of equal width from 0 to `to`, as the outline of a histogram; values beyond `to` are not
+/// drawn but count in the shares.
 #[must_use]
 pub fn histogram(values: &[f64], to: f64, bins: usize) -> Vec<(f64, f64)> {
     if bins == 0 || !(to.is_finite() && to > 0.0) {

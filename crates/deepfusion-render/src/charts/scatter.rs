@@ -18,7 +18,7 @@ pub struct ScatterChart {
 }
 
 impl ScatterChart {
-    /// Of points (x, y); what is not finite is left out.
+    /// A chart of points (x, y); those that are not finite are left out.
     #[must_use]
     pub fn new(
         title: impl Into<String>,

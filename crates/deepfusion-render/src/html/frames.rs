@@ -19,10 +19,10 @@ const CLOUD_SIZE: (u32, u32) = (640, 400);
 /// Farther points are left out of clouds.
 const CLOUD_DEPTH_M: f32 = 60.0;
 
-/// A frame that is shown in a report.
+/// A frame shown in a report.
 #[derive(Debug, Clone)]
 pub struct ShownFrame {
-    /// Its heading: why it is shown, which one it is, what it scored.
+    /// Its heading: the reason for showing it, its name, its score.
     pub title: String,
     /// The image; black where there is none.
     pub image: Option<RgbImage>,

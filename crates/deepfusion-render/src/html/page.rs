@@ -21,7 +21,7 @@ pub enum PictureFormat {
     Png,
 }
 
-/// Builds a report, part by part, in the order in which they will be read.
+/// Builds a report, part by part, in reading order.
 ///
 /// ```
 /// use deepfusion_render::HtmlReport;
@@ -65,7 +65,7 @@ impl HtmlReport {
         self
     }
 
-    /// The few numbers that matter, in large: name and value.
+    /// The key figures in large type: name and value.
     #[must_use]
     pub fn facts(mut self, facts: &[(&str, &str)]) -> Self {
         self.body.push_str(r#"<div class="facts">"#);
@@ -116,7 +116,7 @@ impl HtmlReport {
         self
     }
 
-    /// What is known of something, a line each: name and value.
+    /// Properties, one per line: name and value.
     #[must_use]
     pub fn properties(mut self, rows: &[(String, String)]) -> Self {
         self.body
@@ -129,7 +129,7 @@ impl HtmlReport {
         self
     }
 
-    /// A table whose cells carry marks: the best bold, the second underlined, the doubtful struck with a sign.
+    /// A table with marked cells: the best bold, the second underlined, doubtful ones grey with a sign.
     #[must_use]
     pub fn marked_table(mut self, header: &[&str], rows: &[Vec<Cell>]) -> Self {
         self.body.push_str(&tables::marked(header, rows));
@@ -143,7 +143,7 @@ impl HtmlReport {
         self
     }
 
-    /// The tables of an evaluation: rows of metrics with the trivial row, scale, ranges.
+    /// The tables of an evaluation: rows of metrics with the mean-depth baseline, scale, ranges.
     #[must_use]
     pub fn evaluation(mut self, report: &deepfusion_eval::Report) -> Self {
         self.body.push_str(&tables::evaluation(report));
@@ -168,10 +168,10 @@ impl HtmlReport {
         self
     }
 
-    /// A picture with the words below it.
+    /// A picture with a caption below it.
     ///
     /// # Errors
-    /// [`crate::Error::Encode`] where it cannot be encoded (it has no pixels).
+    /// [`crate::Error::Encode`] if it cannot be encoded (it has no pixels).
     pub fn picture(self, caption: &str, picture: &RgbImage, format: PictureFormat) -> Result<Self> {
         self.figure("", caption, picture, format)
     }
@@ -237,7 +237,7 @@ impl HtmlReport {
         self
     }
 
-    /// Settings as they were written to a file, folded away.
+    /// The text of a settings file, collapsed.
     #[must_use]
     pub fn settings(mut self, title: &str, text: &str) -> Self {
         let _ = write!(
@@ -277,7 +277,7 @@ impl HtmlReport {
         format!("<nav>{}</nav>\n", links.join(""))
     }
 
-    /// Writes the page, whole or not at all.
+    /// Writes the page atomically.
     ///
     /// # Errors
     /// [`crate::Error::Data`] naming the file.

@@ -26,7 +26,7 @@ const TITLES: [(&str, &str); 13] = [
     ("selection", "What `best` is chosen by"),
 ];
 
-/// One bin of a reliability plot: what a confidence promised, and what came true.
+/// One bin of a reliability plot: expected and observed error of a confidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReliabilityBin {
     /// The bin's middle confidence, 0 to 1.
@@ -35,13 +35,13 @@ pub struct ReliabilityBin {
     pub expected: f64,
     /// Mean relative error against ground truth.
     pub observed: f64,
-    /// How many pixels.
+    /// Number of pixels.
     pub n: usize,
 }
 
 impl HtmlReport {
     /// Curves of every column of the log, training and held out. Terms that are zero throughout are named instead.
-    /// `images_a_step` turns images a second into seconds a step.
+    /// `images_a_step` converts images per second into seconds per step.
     #[must_use]
     pub fn learning(mut self, log: &LearningLog, images_a_step: Option<f64>) -> Self {
         let mut off = Vec::new();
@@ -166,7 +166,7 @@ impl HtmlReport {
         ))
     }
 
-    /// Whether a confidence keeps its promise: observed over expected relative error, bin by bin.
+    /// A reliability plot: observed over expected relative error, bin by bin.
     #[must_use]
     pub fn reliability(self, bins: &[ReliabilityBin]) -> Self {
         let rows: Vec<Vec<String>> = bins

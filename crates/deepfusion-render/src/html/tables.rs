@@ -9,7 +9,7 @@ pub(super) fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     table_of_class("plain", header, rows)
 }
 
-/// What a cell of a table stands out by.
+/// The mark of a table cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mark {
     /// Nothing.
@@ -19,18 +19,18 @@ pub enum Mark {
     Best,
     /// The second best: underlined.
     Second,
-    /// Cannot be right, or hardly: grey, with a sign in its row.
+    /// Implausible: grey, with a sign in its row.
     Doubtful,
 }
 
 /// A cell of a table.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Cell {
-    /// What it says.
+    /// Its text.
     pub text: String,
-    /// What it stands out by.
+    /// Its mark.
     pub mark: Mark,
-    /// Whether it is words, aligned on the left, and no number.
+    /// Whether it is text, aligned on the left, rather than a number.
     pub words: bool,
 }
 
@@ -127,7 +127,7 @@ pub(super) fn evaluation(report: &Report) -> String {
         report.protocol.min_m,
         report.protocol.cap_m,
         if report.trivial.is_some() {
-            " The trivial row is the mean depth of each pixel over the training scans, without looking at the image."
+            " The mean-depth baseline predicts each pixel's mean depth over the training scans, without looking at the image."
         } else {
             ""
         },
@@ -182,8 +182,11 @@ fn metric_rows(report: &Report) -> Vec<Vec<String>> {
         rows.push(row(&label, metrics));
     }
     if let Some(trivial) = &report.trivial {
-        rows.push(row("trivial", &trivial.unscaled));
-        rows.push(row("trivial, median-scaled", &trivial.median_scaled));
+        rows.push(row("mean-depth baseline", &trivial.unscaled));
+        rows.push(row(
+            "mean-depth baseline, median-scaled",
+            &trivial.median_scaled,
+        ));
     }
     for scenario in &report.scenarios {
         let label = format!("{}, scale {:.3}", scenario.name, scenario.scale.median);
@@ -192,7 +195,7 @@ fn metric_rows(report: &Report) -> Vec<Vec<String>> {
     rows
 }
 
-/// What truth without a boundary leaves open has no row.
+/// Metrics that truth without boundaries cannot provide have no row.
 fn sharp_rows(sharpness: &Sharpness) -> Vec<Vec<String>> {
     let px = |v: f64| format!("{v:.2} px");
     let percent = |v: f64| format!("{:.1} %", 100.0 * v);
@@ -259,7 +262,7 @@ fn scale_table(report: &Report) -> String {
     ];
     if let Some(rate) = report.hole_rate {
         let moving = report.hole_rate_moving.map_or_else(String::new, |rate| {
-            format!("; {:.2} % of what moves", 100.0 * rate)
+            format!("; {:.2} % of dynamic pixels", 100.0 * rate)
         });
         rows.push(vec![
             format!(

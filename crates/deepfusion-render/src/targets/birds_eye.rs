@@ -15,8 +15,8 @@ const GRID: Rgb<u8> = Rgb([200, 204, 212]);
 /// How far an arrow shows, seconds of motion.
 const ARROW_S: f64 = 1.0;
 
-/// The road from above, `ahead_m` metres from bottom to top: free and occupied ground, boxes with their numbers, and where
-/// what moves will be in a second. `width` × `height` pixels.
+/// The road from above, `ahead_m` metres from bottom to top: free and occupied ground, boxes with their numbers, and the
+/// positions of dynamic targets in a second. `width` × `height` pixels.
 #[must_use]
 pub fn birds_eye(
     ground: &Ground,

@@ -1,4 +1,4 @@
-//! Targets drawn: boxes on the image, seen from above, and as segments.
+//! Draws targets: boxes on the image, seen from above, and as segments.
 
 mod birds_eye;
 mod line;
@@ -11,7 +11,7 @@ pub use segments::target_segments;
 
 use image::Rgb;
 
-/// A target's colour: the same for all its frames, and other than its neighbours'.
+/// A target's colour: constant over frames, and different from its neighbours'.
 #[must_use]
 pub fn colour_of(id: u64) -> Rgb<u8> {
     /// Distinct on grey and on each other.

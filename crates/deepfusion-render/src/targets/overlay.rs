@@ -10,8 +10,8 @@ use crate::text::{TextSize, draw_text, text_width};
 /// Nearest depth at which an edge is still drawn, metres.
 const NEAR_M: f64 = 0.3;
 
-/// The image with the targets' boxes, farthest first: the face they move with is crossed, and above each stands its class
-/// (where that is known), number, distance and, where it moves, speed.
+/// The image with the targets' boxes, farthest first: the front face of a dynamic one is crossed, and above each is its
+/// class (if known), number, distance and, if dynamic, speed.
 #[must_use]
 pub fn box_overlay(image: &RgbImage, k: &Intrinsics, targets: &[Target]) -> RgbImage {
     let mut picture = image.clone();

@@ -1,4 +1,4 @@
-//! A chunk made readable, and where its messages are.
+//! A decompressed chunk, and the positions of its messages.
 
 use super::record::{ChunkHead, Fields, MESSAGE_HEAD, MessageHead, op, record};
 use crate::storage::MOST_BYTES;
@@ -32,7 +32,7 @@ pub(super) struct Entry {
     pub range: Range<usize>,
 }
 
-/// Unpacks the chunk whose record's content is `content`; where that goes wrong, what was read up to there, and why.
+/// Decompresses the chunk whose record's content is `content`; on an error it returns what was read up to there, and the reason.
 pub(super) fn open(content: &[u8]) -> (Content<'_>, Option<String>) {
     let Some(head) = ChunkHead::read(content) else {
         let problem = "its head is cut off".to_owned();
@@ -81,7 +81,7 @@ fn unpack<'a>(decoder: impl Read, size: u64) -> Result<Content<'a>, (Vec<u8>, St
     }
 }
 
-/// Size and checksum as the head has them; a checksum of 0 is none.
+/// Size and checksum from the header; a checksum of 0 means none.
 fn wrong(head: &ChunkHead, bytes: &[u8]) -> Option<String> {
     if bytes.len() as u64 != head.size {
         return Some(format!(
@@ -94,7 +94,7 @@ fn wrong(head: &ChunkHead, bytes: &[u8]) -> Option<String> {
     differs.then(|| "its checksum differs".to_owned())
 }
 
-/// What a walk through a chunk's records finds.
+/// The result of walking through a chunk's records.
 #[derive(Default)]
 pub(super) struct Walk<'a> {
     pub messages: Vec<Entry>,

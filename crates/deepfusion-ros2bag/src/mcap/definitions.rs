@@ -1,4 +1,4 @@
-//! Schemas and channels: what the messages are.
+//! Schemas and channels: the definitions of messages.
 
 use super::record::{Fields, op};
 use crate::storage::Channel;
@@ -14,7 +14,7 @@ pub(super) struct Definitions {
 }
 
 impl Definitions {
-    /// Takes a record in; `None` where it is not sound. The first channel of a number counts.
+    /// Adds a record; `None` if it is malformed. The first channel of a number counts.
     pub fn add(&mut self, op: u8, content: &[u8]) -> Option<()> {
         let mut fields = Fields(content);
         let id = fields.u16()?;

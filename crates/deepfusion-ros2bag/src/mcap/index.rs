@@ -1,4 +1,4 @@
-//! A file's summary, which stands at its end.
+//! A file's summary, which is at its end.
 
 use super::chunk::{self, indexed_times, walk};
 use super::definitions::Definitions;
@@ -16,10 +16,10 @@ struct Statistics {
     counts: Vec<(u16, u64)>,
 }
 
-/// Where a chunk's message indexes are, by channel.
+/// Positions of a chunk's message indexes, by channel.
 struct Indexes(Vec<(u16, u64)>);
 
-/// The index by the summary; else why the file has to be scanned.
+/// The index from the summary; else the reason why the file has to be scanned.
 pub(super) fn read(bytes: &[u8]) -> Result<Index, String> {
     let tail = bytes.len().checked_sub(TAIL);
     let (Some(tail), true) = (tail, bytes.ends_with(MAGIC)) else {

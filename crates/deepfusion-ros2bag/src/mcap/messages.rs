@@ -34,13 +34,13 @@ impl<'a> Messages<'a> {
         let is_wanted = |channel: &u16| index.places.get(channel).is_some_and(|p| wanted[*p]);
         let chunks = index.chunks.iter().filter(|info| {
             let holds = info.channels.as_ref();
-            selection.meets(info.first, info.last)
+            selection.overlaps(info.first, info.last)
                 && holds.is_none_or(|channels| channels.iter().any(is_wanted))
         });
         let mut waiting: Vec<&ChunkInfo> = chunks.collect();
         waiting.sort_by_key(|info| (info.first, info.from));
         let loose = index.loose.iter();
-        let loose = loose.filter(|e| is_wanted(&e.channel) && selection.holds(e.time));
+        let loose = loose.filter(|e| is_wanted(&e.channel) && selection.contains(e.time));
         let loose: Vec<Entry> = loose.cloned().collect();
         let mut messages = Self {
             file,
@@ -87,7 +87,7 @@ impl<'a> Messages<'a> {
         }
         let places = &self.file.index.places;
         let wanted = |channel: &u16| places.get(channel).is_some_and(|p| self.wanted[*p]);
-        entries.retain(|e| wanted(&e.channel) && self.selection.holds(e.time));
+        entries.retain(|e| wanted(&e.channel) && self.selection.contains(e.time));
         entries.sort_by_key(|e| (e.time, e.range.start));
         self.push(content, entries, info.from);
     }

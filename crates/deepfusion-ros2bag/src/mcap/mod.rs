@@ -1,6 +1,6 @@
 //! MCAP files, mapped. The format: <https://mcap.dev/spec>.
 //!
-//! Read by an own reader: the `mcap` crate copies every chunk, and stops at the first thing that is wrong.
+//! The reader is our own: the `mcap` crate copies every chunk and stops at the first problem.
 
 mod chunk;
 mod definitions;
@@ -50,9 +50,9 @@ struct ChunkInfo {
     to: usize,
     first: Time,
     last: Time,
-    /// The channels it has messages of, by number; `None` where nothing says it.
+    /// The channels it has messages of, by number; `None` if unknown.
     channels: Option<Vec<u16>>,
-    /// What of it is not sound is known: it is read as far as it goes.
+    /// Found by a scan: it is read up to the first malformed record.
     scanned: bool,
 }
 

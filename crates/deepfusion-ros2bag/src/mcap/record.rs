@@ -1,4 +1,4 @@
-//! Records, from which everything in the file is built: a number that says what it is, its length, its content.
+//! Records, the building blocks of the file: a number for the kind, the length, the content.
 //!
 //! All numbers are little-endian; a string is its length (u32) and its bytes.
 
@@ -43,7 +43,7 @@ pub(super) struct Cut<'a> {
     pub op: Option<u8>,
     /// Where it begins.
     pub at: usize,
-    /// Where its content begins, and what is there of it.
+    /// Start of its content, and the part of it that is there.
     pub start: usize,
     pub content: &'a [u8],
     pub missing: u64,
@@ -130,7 +130,7 @@ impl<'a> Fields<'a> {
         Some(String::from_utf8_lossy(bytes).into_owned())
     }
 
-    /// A map of numbers, whose length in bytes stands in front.
+    /// A map of numbers, preceded by its length in bytes.
     pub fn map(&mut self) -> Option<Vec<(u16, u64)>> {
         let length = self.u32()? as usize;
         let mut inside = Fields(self.bytes(length)?);
@@ -160,7 +160,7 @@ impl MessageHead {
     }
 }
 
-/// What a chunk says of itself, and where its content lies in the file.
+/// A chunk's header, and the position of its content in the file.
 #[derive(Debug, Clone)]
 pub(super) struct ChunkHead {
     pub size: u64,

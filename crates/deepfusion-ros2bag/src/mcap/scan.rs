@@ -6,7 +6,7 @@ use super::record::{MAGIC, MESSAGE_HEAD, MessageHead, op, record};
 use super::{ChunkInfo, Index};
 use deepfusion_rosbag::Time;
 
-/// The index by going through the file; `why` is what was wrong with its summary, nothing where it never had one.
+/// The index by going through the file; `why` is the problem with its summary, `None` if it never had one.
 pub(super) fn read(bytes: &[u8], why: String) -> Index {
     let mut scan = Scan {
         bytes,

@@ -1,4 +1,4 @@
-//! Messages out of rows: first where they are, some thousand at a time, then each one's bytes.
+//! Messages from rows: first their positions, some thousand at a time, then each one's bytes.
 
 use super::{SqliteFile, failed};
 use crate::storage::{MOST_BYTES, error};
@@ -9,12 +9,12 @@ use std::collections::VecDeque;
 use std::io::Read;
 use std::sync::Arc;
 
-/// Rows asked for at once: their keys alone.
+/// Number of rows requested at once, keys only.
 const PAGE: i64 = 4096;
-/// What a Zstandard frame begins with, and a CDR message never.
+/// The first bytes of a Zstandard frame, with which a CDR message never begins.
 const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
-/// Where a message is.
+/// The key of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Key {
     /// Nanoseconds.
@@ -123,7 +123,7 @@ impl<'a> Rows<'a> {
                 },
             };
             let time = Time::from_nanos(key.time);
-            if !self.selection.holds(time) {
+            if !self.selection.contains(time) {
                 // In time order: behind the end nothing is wanted.
                 return None;
             }

@@ -1,4 +1,4 @@
-//! Colours of a sensor that sees one a pixel, by bilinear interpolation.
+//! Bilinear demosaicing of Bayer images.
 //!
 //! A missing colour is the mean of the two or four nearest pixels that have it, rounded half up: OpenCV's
 //! `COLOR_Bayer…2RGB`, which cv_bridge takes, to the last digit. At the image's edge the neighbours outside are those inside,

@@ -15,7 +15,7 @@ message! {
         "uint8[8] data";
         header!()
     );
-    /// When it was seen.
+    /// Time of reception.
     header: Header,
     /// The arbitration identifier: 11 bits, or 29 where `is_extended`.
     id: u32,
@@ -25,7 +25,7 @@ message! {
     is_extended: bool,
     /// An error frame.
     is_error: bool,
-    /// How many bytes of `data` count.
+    /// Number of valid bytes of `data`.
     dlc: u8,
     /// The payload.
     data: [u8; 8],

@@ -1,9 +1,9 @@
-//! A point cloud's numbers by the names of its fields, whatever its layout.
+//! Access to a point cloud's values by field name, for any layout.
 
 use super::{Header, MessageError, PointCloud2, PointField};
 use std::borrow::Cow;
 
-/// A type of number that points are made of.
+/// The number type of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Datatype {
@@ -26,7 +26,7 @@ pub enum Datatype {
 }
 
 impl Datatype {
-    /// Of the number that stands for it in a [`PointField`].
+    /// From its code in a [`PointField`].
     #[must_use]
     pub fn from_number(number: u8) -> Option<Self> {
         Some(match number {
@@ -42,7 +42,7 @@ impl Datatype {
         })
     }
 
-    /// Bytes it takes.
+    /// Size in bytes.
     #[must_use]
     pub fn size(self) -> usize {
         match self {
@@ -91,25 +91,25 @@ pub struct Column<'a> {
 }
 
 impl<'a> Column<'a> {
-    /// The type its numbers have in the message.
+    /// The type of its numbers in the message.
     #[must_use]
     pub fn datatype(&self) -> Datatype {
         self.datatype
     }
 
-    /// How many points there are.
+    /// Number of points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.width * self.height
     }
 
-    /// Whether there are none.
+    /// Whether there are no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The numbers, exactly.
+    /// The values, exactly.
     pub fn f64s(&self) -> impl Iterator<Item = f64> + 'a {
         let Self {
             data,
@@ -128,17 +128,17 @@ impl<'a> Column<'a> {
         })
     }
 
-    /// The numbers, rounded to the nearest f32 where they are wider.
+    /// The values, rounded to the nearest f32 if they are wider.
     pub fn f32s(&self) -> impl Iterator<Item = f32> + 'a {
         self.f64s().map(|number| number as f32)
     }
 }
 
 impl PointCloud2<'_> {
-    /// How many points the cloud has.
+    /// Number of points in the cloud.
     ///
     /// # Errors
-    /// [`MessageError::Layout`] where its data is too short for them.
+    /// [`MessageError::Layout`] if its data is too short for them.
     pub fn points(&self) -> Result<usize, MessageError> {
         let (width, height) = (u64::from(self.width), u64::from(self.height));
         if width == 0 || height == 0 {
@@ -170,16 +170,16 @@ impl PointCloud2<'_> {
     /// The field `name` of all points: any datatype, offset, padding and byte order.
     ///
     /// # Errors
-    /// [`MessageError::NoField`] naming the fields there are, [`MessageError::Datatype`], [`MessageError::Layout`] where
+    /// [`MessageError::NoField`] naming the available fields, [`MessageError::Datatype`], [`MessageError::Layout`] if
     /// the field lies outside of its point or the points outside of the data.
     pub fn column(&self, name: &str) -> Result<Column<'_>, MessageError> {
         self.column_at(name, 0)
     }
 
-    /// As [`PointCloud2::column`], the number at place `element` of a field that has several (`count`).
+    /// As [`PointCloud2::column`], for element `element` of a field with several values (`count`).
     ///
     /// # Errors
-    /// As [`PointCloud2::column`]; [`MessageError::Layout`] where the field has fewer numbers.
+    /// As [`PointCloud2::column`]; [`MessageError::Layout`] if the field has fewer values.
     pub fn column_at(&self, name: &str, element: u32) -> Result<Column<'_>, MessageError> {
         let field = self.field(name)?;
         let datatype =
@@ -228,10 +228,10 @@ impl PointCloud2<'_> {
 
 impl PointCloud2<'static> {
     /// An unordered cloud of f32 fields, packed and little-endian: what LiDAR drivers publish. `columns` are names and
-    /// numbers, one for each point.
+    /// values, one per point.
     ///
     /// # Errors
-    /// [`MessageError::Layout`] for columns of different lengths, or more points than the message's lengths can tell.
+    /// [`MessageError::Layout`] for columns of different lengths, or more points than the message's length fields can hold.
     pub fn from_columns(header: Header, columns: &[(&str, &[f32])]) -> Result<Self, MessageError> {
         let points = columns.first().map_or(0, |(_, numbers)| numbers.len());
         let wrong = |name: &str, problem| MessageError::Layout {

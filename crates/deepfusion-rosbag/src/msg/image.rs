@@ -1,4 +1,4 @@
-//! An image's pixels, by its encoding and step.
+//! Access to an image's pixels by its encoding and step.
 
 use super::{Image, MessageError, bayer, yuv};
 use std::borrow::Cow;
@@ -9,7 +9,7 @@ const PICTURES: &str = "mono8, 8UC1, mono16, rgb8, bgr8, 8UC3, rgba8, bgra8, 8UC
 /// What is known beside [`PICTURES`].
 const NUMBERS: &str = "16UC1, 32FC1, bayer_rggb16, bayer_bggr16, bayer_gbrg16, bayer_grbg16";
 
-/// The order of a sensor's colour filters: the first row's two, then the second's.
+/// A Bayer pattern: the colours of the first row, then of the second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]
 pub enum BayerPattern {
@@ -19,7 +19,7 @@ pub enum BayerPattern {
     Grbg,
 }
 
-/// What an image's pixels are.
+/// The encoding of an image's pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Encoding {
     /// `mono8`, `8UC1`: brightness.
@@ -34,13 +34,13 @@ pub enum Encoding {
     Bgra8,
     /// `mono16`: brightness over the whole range of 16 bits.
     Mono16,
-    /// `16UC1`: any number, mostly depth in millimetres, which is no picture.
+    /// `16UC1`: any number, mostly depth in millimetres; not a picture.
     U16,
     /// `32FC1`: depth in metres.
     Float32,
-    /// `bayer_rggb8` and its kin: one colour a pixel, to be interpolated before use.
+    /// `bayer_rggb8` and the like: one colour per pixel, to be interpolated before use.
     Bayer8(BayerPattern),
-    /// `bayer_rggb16` and its kin.
+    /// `bayer_rggb16` and the like.
     Bayer16(BayerPattern),
     /// `yuv422`, `uyvy`: brightness and, of every two pixels, a colour, in the order U, Y, V, Y.
     Uyvy,
@@ -49,7 +49,7 @@ pub enum Encoding {
 }
 
 impl Encoding {
-    /// From the message's text.
+    /// From its name in a message.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         if let Some(bayer) = name.strip_prefix("bayer_") {
@@ -81,7 +81,7 @@ impl Encoding {
         })
     }
 
-    /// Bytes a pixel.
+    /// Bytes per pixel.
     #[must_use]
     pub fn pixel_bytes(self) -> usize {
         match self {
@@ -94,10 +94,10 @@ impl Encoding {
 }
 
 impl Image<'_> {
-    /// What its pixels are.
+    /// The encoding of its pixels.
     ///
     /// # Errors
-    /// [`MessageError::Encoding`] for one that is not known here.
+    /// [`MessageError::Encoding`] for an unknown one.
     pub fn pixel_encoding(&self) -> Result<Encoding, MessageError> {
         Encoding::from_name(&self.encoding)
             .ok_or_else(|| self.wrong_encoding(format!("{PICTURES}, {NUMBERS}")))
@@ -106,7 +106,7 @@ impl Image<'_> {
     /// Its rows from top to bottom, each `width` pixels without the padding behind them.
     ///
     /// # Errors
-    /// [`MessageError::Encoding`], and [`MessageError::Layout`] where a row does not fit into its step, or the rows into
+    /// [`MessageError::Encoding`], and [`MessageError::Layout`] if a row does not fit into its step, or the rows into
     /// the data.
     pub fn rows(&self) -> Result<impl Iterator<Item = &[u8]>, MessageError> {
         let (width, height) = (self.width as usize, self.height as usize);
@@ -174,11 +174,11 @@ impl Image<'_> {
         Ok(self.rows()?.flat_map(|row| row.as_chunks().0).map(number))
     }
 
-    /// The picture as RGB, `height` × `width` × 3, without padding; alpha is dropped, brightness becomes grey, 16 bits of it are
-    /// scaled by 255 / 65535. Bayer patterns are interpolated bilinearly, and YUV is BT.601 in its limited range, as cv_bridge has both.
+    /// The picture as RGB, `height` × `width` × 3, without padding; alpha is dropped, brightness becomes grey, 16-bit values are
+    /// scaled by 255 / 65535. Bayer patterns are interpolated bilinearly and YUV is limited-range BT.601, both as in cv_bridge.
     ///
     /// # Errors
-    /// As [`Image::rows`]; [`MessageError::Encoding`] for wider pixels, which are no picture or none that is read yet;
+    /// As [`Image::rows`]; [`MessageError::Encoding`] for wider pixels, which are not pictures or not supported yet;
     /// [`MessageError::Layout`] for a Bayer pattern below 2 × 2 and for YUV of an odd width.
     pub fn to_rgb8(&self) -> Result<Vec<u8>, MessageError> {
         let Some(encoding) = Encoding::from_name(&self.encoding) else {

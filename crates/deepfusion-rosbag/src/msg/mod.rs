@@ -1,4 +1,4 @@
-//! The messages of a vehicle's recording, one file a package.
+//! The message types of a vehicle's recording, one file per package.
 //!
 //! Each type is declared once, as the list of its fields: the struct, its decoder and its encoder follow from that list
 //! (`message!` in `wire`). MD5 and definition are those of the ROS packages, which the tests check against another
@@ -33,7 +33,7 @@ pub use sensor_msgs::{
 };
 pub use std_msgs::{Float32, Float64, Header};
 
-/// A type that messages of a topic can have.
+/// A message type.
 pub trait RosMessage<'a>: Sized {
     /// Its name, such as `sensor_msgs/Imu`.
     const TYPE: &'static str;

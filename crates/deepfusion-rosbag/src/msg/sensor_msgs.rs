@@ -22,7 +22,7 @@ message! {
     height: u32,
     /// Columns.
     width: u32,
-    /// What a pixel is: `mono8`, `rgb8`, `16UC1`, …
+    /// Encoding of a pixel: `mono8`, `rgb8`, `16UC1`, …
     encoding: String,
     /// Whether numbers of several bytes begin with the highest (0 or 1).
     is_bigendian: u8,
@@ -60,7 +60,7 @@ message! {
     height: u32,
     /// Its columns.
     width: u32,
-    /// Whether the rectified image is to be cut, too.
+    /// Whether the rectified image is to be cropped, too.
     do_rectify: bool,
 }
 
@@ -104,9 +104,9 @@ message! {
     r: [f64; 9],
     /// The field `P`: projection of the rectified image, 3×4, row-major, pixels.
     p: [f64; 12],
-    /// Columns joined into one; 0 is 1.
+    /// Columns combined into one; 0 means 1.
     binning_x: u32,
-    /// Rows joined into one; 0 is 1.
+    /// Rows combined into one; 0 means 1.
     binning_y: u32,
     /// The part of the sensor that was read.
     roi: RegionOfInterest,
@@ -122,7 +122,7 @@ message! {
     offset: u32,
     /// 1 to 8: i8, u8, i16, u16, i32, u32, f32, f64.
     datatype: u8,
-    /// How many of them; 0 is read as 1.
+    /// Number of elements; 0 means 1.
     count: u32,
 }
 
@@ -160,9 +160,9 @@ message! {
     header: Header,
     /// Rows; 1 for an unordered cloud.
     height: u32,
-    /// Points a row.
+    /// Points per row.
     width: u32,
-    /// What a point is made of.
+    /// The fields of a point.
     fields: Vec<PointField>,
     /// Whether numbers of several bytes begin with the highest.
     is_bigendian: bool,
@@ -190,7 +190,7 @@ message! {
     );
     /// When it was measured, and the sensor's frame.
     header: Header,
-    /// `world_from_imu`, where the sensor gives it.
+    /// `world_from_imu`, if the sensor provides it.
     orientation: Quaternion,
     /// 3×3, row-major, rad². A first element of −1: there is no orientation.
     orientation_covariance: [f64; 9],

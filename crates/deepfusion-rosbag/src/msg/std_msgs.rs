@@ -3,12 +3,12 @@ use super::definition::definition;
 use super::wire::{Reader, Wire, message};
 use crate::Time;
 
-/// What most messages begin with: when and in which frame something was measured.
+/// The header of most messages: time and frame of a measurement.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 pub struct Header {
-    /// A number that the publisher counts up; many leave it 0. ROS 2 has none, it is 0 there.
+    /// A counter of the publisher; many leave it 0. ROS 2 has none: it is 0 there.
     pub seq: u32,
-    /// When it was measured, by the sensor's or its driver's clock.
+    /// Time of measurement, by the sensor's or its driver's clock.
     pub stamp: Time,
     /// The frame its coordinates are in.
     pub frame_id: String,

@@ -1,4 +1,4 @@
-//! The bytes of messages: every field's type reads and writes itself, and `message!` makes a type of a list of fields.
+//! Serialisation of messages: every field's type reads and writes itself, and `message!` makes a type from a list of fields.
 
 use super::MessageError;
 use crate::Time;

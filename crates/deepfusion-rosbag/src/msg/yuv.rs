@@ -1,4 +1,4 @@
-//! Brightness and two colour differences as RGB.
+//! Conversion of YUV to RGB.
 //!
 //! BT.601 in its limited range: brightness 16 to 235, differences 16 to 240 around 128, as OpenCV's `COLOR_YUV2RGB_UYVY` and `_YUYV` take them, which
 //! cv_bridge uses for `yuv422` and `yuv422_yuy2`. A camera that sends the full range comes out with a little too much contrast. OpenCV's

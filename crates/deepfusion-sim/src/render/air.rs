@@ -1,4 +1,4 @@
-//! The light of a picture: sky, sun, and what is between the things and the camera.
+//! The light of a picture: sky, sun, and the air between objects and camera.
 
 use crate::primitive::V3;
 use crate::scene::World;
@@ -6,7 +6,7 @@ use crate::texture::Rgb;
 use crate::texture::noise::Noise;
 use crate::texture::sky::Sky;
 
-/// The weather and the hour of one picture. It changes colours only: where a ray ends does not hang on it.
+/// The weather and the hour of one picture. It changes colours only, never the end of a ray.
 #[derive(Debug, Clone, Copy)]
 pub struct Air {
     /// The sky's gradient and clouds.

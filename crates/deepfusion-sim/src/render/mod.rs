@@ -26,7 +26,7 @@ const BEHIND: f32 = 70.0;
 /// Ground beyond this depth counts as horizon, metres.
 const FARTHEST_GROUND: f32 = 600.0;
 
-/// What a ray meets.
+/// What a ray hits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Surface {
     /// Nothing.
@@ -59,7 +59,7 @@ impl Surface {
 pub struct Hit {
     /// In units of the ray's direction; infinite for the sky.
     pub t: f32,
-    /// What it met.
+    /// The surface it hit.
     pub surface: Surface,
 }
 
@@ -86,13 +86,13 @@ pub fn gather(world: &World, moving: &[Primitive], eye: &Vector3<f64>) -> Vec<Pr
         .collect()
 }
 
-/// An eye in the world: what rays start from.
+/// The origin of rays in the world.
 pub struct Eye<'a> {
     /// The world.
     pub world: &'a World,
-    /// Where it is.
+    /// Its position.
     pub position: Vector3<f64>,
-    /// What it may see, nearest first.
+    /// Solids that may be visible, nearest first.
     pub solids: Vec<FrameSolid>,
 }
 
@@ -175,32 +175,32 @@ pub struct Picture {
     pub rgb: RgbImage,
     /// Camera z in metres, 0 for the sky.
     pub depth: DepthMap,
-    /// Pixels of things that move.
+    /// Pixels of dynamic objects.
     pub moving: Vec<bool>,
 }
 
-/// What a camera sees before any camera makes an image of it.
+/// The linear light at the camera, before image formation.
 pub struct Exposure {
     /// Linear light, row by row.
     pub light: Vec<Rgb>,
-    /// What the rays of the pixels' centres meet.
+    /// The hits of the rays through the pixels' centres.
     pub hits: Vec<Hit>,
     /// Camera z in metres, 0 for the sky.
     pub depth: DepthMap,
-    /// Pixels of things that move.
+    /// Pixels of dynamic objects.
     pub moving: Vec<bool>,
 }
 
-/// What is to be rendered.
+/// The input of a rendering.
 #[derive(Clone, Copy)]
 pub struct Shot<'a> {
     /// The world.
     pub world: &'a World,
     /// Light on its ground.
     pub light: &'a GroundLight,
-    /// Sky, sun and what is between them and the camera.
+    /// Sky, sun and air.
     pub air: &'a Air,
-    /// The boxes of what moves.
+    /// The boxes of dynamic objects.
     pub cars: &'a [SceneObject],
     /// World (z up) from the camera (x right, y down, z forward), metres.
     pub world_from_cam: &'a Se3,
@@ -235,14 +235,14 @@ pub fn render(
     }
 }
 
-/// The image of a steady camera, without any of a real one's faults.
+/// The image of an ideal camera, without a real one's imperfections.
 pub fn encode(light: &[Rgb], width: u32, height: u32) -> RgbImage {
     let bytes = light.iter().flat_map(encode_srgb).collect();
     // The buffer has 3 · width · height bytes by construction.
     RgbImage::from_raw(width, height, bytes).unwrap_or_else(|| RgbImage::new(width, height))
 }
 
-/// On how many cores to work.
+/// The cores to use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cores {
     /// On this thread, for callers that have many of their own.
@@ -273,7 +273,7 @@ impl Cores {
     }
 }
 
-/// How a pixel that sees several surfaces gets its colour from the four rays through it.
+/// The antialiasing of a pixel with several surfaces, from the four rays through it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Edges {
     /// Every ray is shaded.

@@ -24,7 +24,7 @@ pub struct Shader<'a> {
     pub pixel: f32,
     /// At most this many samples along the longer side of a ray's footprint.
     pub samples: f32,
-    /// Cars that move: what they keep off the ground below them.
+    /// Dynamic cars, for their shadows on the ground.
     pub moving: &'a [Foot],
 }
 
@@ -147,8 +147,8 @@ impl Shader<'_> {
                 }
                 Surface::Kerb => {
                     let height = height.clamp(0.0, world.road.kerb);
-                    match &layout.look {
-                        Some(look) => look.kerb(&world.noise, &patch, height),
+                    match &layout.style {
+                        Some(style) => style.kerb(&world.noise, &patch, height),
                         None => ground::kerb(&world.noise, &patch, height),
                     }
                 }

@@ -1,4 +1,4 @@
-//! Which solids a tile of the picture can see.
+//! The solids visible in each tile of the picture.
 
 use super::FrameSolid;
 use crate::primitive::Primitive;

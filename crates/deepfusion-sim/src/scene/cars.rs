@@ -50,8 +50,8 @@ pub(super) struct Body {
     /// Where the cabin ends at the waist and at the roof, from the middle: front and rear.
     pub(super) cabin: [f32; 2],
     pub(super) roof: [f32; 2],
-    /// Length of the bonnet's slope and its drop.
-    pub(super) bonnet: [f32; 2],
+    /// Length of the hood's slope and its drop.
+    pub(super) hood: [f32; 2],
 }
 
 pub(super) const BODIES: [Body; 5] = [
@@ -61,7 +61,7 @@ pub(super) const BODIES: [Body; 5] = [
         waist: 0.93,
         cabin: [0.85, -1.8],
         roof: [0.1, -1.55],
-        bonnet: [1.0, 0.2],
+        hood: [1.0, 0.2],
     },
     // A saloon.
     Body {
@@ -69,7 +69,7 @@ pub(super) const BODIES: [Body; 5] = [
         waist: 0.92,
         cabin: [0.95, -1.6],
         roof: [0.15, -0.95],
-        bonnet: [1.2, 0.16],
+        hood: [1.2, 0.16],
     },
     // An estate.
     Body {
@@ -77,7 +77,7 @@ pub(super) const BODIES: [Body; 5] = [
         waist: 0.94,
         cabin: [0.95, -2.15],
         roof: [0.15, -1.85],
-        bonnet: [1.2, 0.18],
+        hood: [1.2, 0.18],
     },
     // An off-roader.
     Body {
@@ -85,7 +85,7 @@ pub(super) const BODIES: [Body; 5] = [
         waist: 1.06,
         cabin: [0.85, -2.1],
         roof: [0.2, -1.85],
-        bonnet: [1.0, 0.16],
+        hood: [1.0, 0.16],
     },
     // A van.
     Body {
@@ -93,7 +93,7 @@ pub(super) const BODIES: [Body; 5] = [
         waist: 1.15,
         cabin: [1.75, -2.45],
         roof: [0.95, -2.4],
-        bonnet: [0.7, 0.3],
+        hood: [0.7, 0.3],
     },
 ];
 
@@ -178,7 +178,7 @@ fn slope(a: [f32; 2], b: [f32; 2]) -> (V3, f32) {
 
 pub(super) fn lower_hull(body: &Body) -> Hull {
     let (half, wide, top) = (0.5 * body.size[0], 0.5 * body.size[1], body.waist - FLOOR);
-    let [length, drop] = body.bonnet;
+    let [length, drop] = body.hood;
     let sides = V3::new(0.0, 0.97, -0.243).normalize();
     Hull {
         planes: vec![

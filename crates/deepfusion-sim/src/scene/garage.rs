@@ -131,7 +131,7 @@ fn lay_ground(world: &mut World, rng: &mut ChaCha8Rng) {
         bays: false,
         beyond: [Beyond::Paved; 2],
         paving: [Paving::Asphalt; 2],
-        look: None,
+        style: None,
     });
     let samples = world.road.samples_mut();
     for sample in samples.iter_mut() {

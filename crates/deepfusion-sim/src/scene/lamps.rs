@@ -40,8 +40,8 @@ impl Lamps {
         self.lamps.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
 
-    /// What they send onto a surface at `place`, `s` metres along the street. It hangs on the surface's place and
-    /// direction alone, never on the viewer's. Nothing casts a shadow in it.
+    /// What they send onto a surface at `place`, `s` metres along the street. It depends on the surface's
+    /// position and direction alone, never on the viewer's. Nothing casts a shadow in it.
     pub fn irradiance(&self, place: &Vector3<f64>, s: f32, normal: &V3) -> Rgb {
         let first = self.lamps.partition_point(|lamp| lamp.0 < s - REACH);
         let near = self.lamps[first..]

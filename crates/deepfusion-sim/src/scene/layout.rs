@@ -1,4 +1,4 @@
-//! Where things stand: stretches of road, side streets, and the two sides of the street.
+//! The layout of a street: stretches of road, side streets, and the two sides of the street.
 
 use super::World;
 use super::buildings::{self, Plot, Style};
@@ -167,7 +167,7 @@ fn sections(world: &mut World, rng: &mut ChaCha8Rng) -> Vec<Section> {
             bays: half_width > 5.0 && rng.random_bool(0.5),
             beyond: [beyond(&sides[0], rng), beyond(&sides[1], rng)],
             paving,
-            look: None,
+            style: None,
         });
         sections.push(Section {
             from,

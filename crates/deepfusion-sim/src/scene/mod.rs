@@ -25,7 +25,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// What an object is.
+/// The class of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
@@ -59,9 +59,9 @@ pub enum ObjectClass {
 /// Something on the street, with its exact box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneObject {
-    /// The same from frame to frame.
+    /// Its identity, constant over frames.
     pub id: u64,
-    /// What it is.
+    /// Its class.
     pub class: ObjectClass,
     /// Centre of its box and its axes (x forward, y left, z up) in the world, metres.
     pub world_from_object: Se3,
@@ -71,7 +71,7 @@ pub struct SceneObject {
     pub velocity: Vector3<f64>,
 }
 
-/// The parts of the world that no camera moves.
+/// The static world.
 pub struct World {
     /// The street.
     pub road: Road,
@@ -87,9 +87,9 @@ pub struct World {
     pub along: Vec<f32>,
     /// Convex solids that primitives refer to.
     pub hulls: Vec<Hull>,
-    /// What primitives are made of.
+    /// Materials of the primitives.
     pub materials: Vec<Material>,
-    /// Everything that stands still.
+    /// All static objects.
     pub objects: Vec<SceneObject>,
     /// The models of cars, for the moving ones.
     pub models: Vec<cars::CarModel>,
@@ -109,7 +109,7 @@ pub struct World {
     pub light: (Rgb, Rgb),
     /// Lamps that burn.
     pub lamps: Lamps,
-    /// The kind of place.
+    /// The kind of scene.
     pub scene: Scene,
     /// The drive's seed, folded.
     pub seed: u32,
@@ -137,7 +137,7 @@ pub struct Lane {
 }
 
 impl ObjectClass {
-    /// Whether it is a vehicle or someone who moves.
+    /// Whether it is a vehicle or a person that can move.
     #[must_use]
     pub fn is_traffic(self) -> bool {
         matches!(

@@ -1,14 +1,14 @@
 //! Varied worlds: streets, roads and rooms that differ from seed to seed in everything a camera can see.
 //!
-//! A network that learns depth from drawn worlds alone must not be able to read it from a colour, a texture or a
-//! habit of one drawing. So materials are random over wide ranges, streets are crowded as real ones are, and no two
-//! trees or cars are of one kind.
+//! A network that learns depth from rendered worlds alone must not be able to infer it from a colour, a texture or
+//! a habit of the generator. So materials are random over wide ranges, streets are as crowded as real ones, and no
+//! two trees or cars are the same.
 
 mod country;
+mod ground_styles;
 mod houses;
 mod indoor;
 mod land;
-mod looks;
 mod models;
 mod motorway;
 mod people;

@@ -16,7 +16,7 @@ pub enum Wall {
     Stone,
 }
 
-/// The look of one house.
+/// How one house looks.
 #[derive(Debug, Clone)]
 pub struct Facade {
     /// Half the house's extents along its x and y axes, metres.

@@ -1,7 +1,7 @@
 //! Asphalt, markings, kerbs, pavements, grass.
 
 use super::facade::courses;
-use super::look::Look;
+use super::ground_style::GroundStyle;
 use super::noise::{Noise, band, bands, beyond, hash, length, lerp, smoothstep, unit};
 use super::{Rgb, mix, vary};
 
@@ -44,7 +44,7 @@ pub struct Stretch {
     /// How the pavement is laid: right, left.
     pub paving: [Paving; 2],
     /// The ground of a varied world, in the place of all of the above.
-    pub look: Option<Look>,
+    pub style: Option<GroundStyle>,
 }
 
 /// Ground beyond the pavement.
@@ -73,8 +73,8 @@ pub enum Paving {
 
 /// The carriageway.
 pub fn road(noise: &Noise, p: &GroundPatch, stretch: &Stretch, seed: u32) -> Rgb {
-    if let Some(look) = &stretch.look {
-        return look.carriageway(noise, p, seed);
+    if let Some(style) = &stretch.style {
+        return style.carriageway(noise, p, seed);
     }
     let mut tone = stretch.asphalt;
     // Whole stretches were laid at different times; patches were mended.
@@ -246,8 +246,8 @@ pub fn beside(
     pavement: f32,
     seed: u32,
 ) -> Rgb {
-    if let Some(look) = &stretch.look {
-        return look.beside(noise, p, verge, pavement, seed);
+    if let Some(style) = &stretch.style {
+        return style.beside(noise, p, verge, pavement, seed);
     }
     let side = usize::from(p.lateral > 0.0);
     let fl = p.extent[1];

@@ -1,9 +1,9 @@
-//! What surfaces look like: albedo as a function of the place on the surface, never of the viewer.
+//! Textures: albedo as a function of the position on the surface, never of the viewer.
 
 pub mod facade;
 pub mod ground;
+pub mod ground_style;
 pub mod leaves;
-pub mod look;
 pub mod noise;
 pub mod objects;
 pub mod pattern;
@@ -33,7 +33,7 @@ pub struct Patch {
     pub seed: u32,
 }
 
-/// What a solid is made of.
+/// The material of a solid.
 #[derive(Debug, Clone)]
 pub enum Material {
     /// Walls with windows and doors; also the flat top of the house.

@@ -206,7 +206,7 @@ impl Paint {
                 (0.8 * grille).max(0.75 * bumper),
             );
         } else {
-            // Bonnet and boot: joints along the edges.
+            // Hood and boot: joints along the edges.
             let joint = band(
                 p.y.abs(),
                 0.42 * self.size[1] - 0.015,

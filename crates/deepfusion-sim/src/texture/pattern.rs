@@ -1,7 +1,7 @@
 //! Random surfaces: walls, boards, cloth and boxes of any colour, contrast and grain.
 //!
-//! A network that shall read depth from geometry must not find it in a colour or in the size of a grain, so both are
-//! drawn at random, over ranges wider than a street's.
+//! A network should learn depth from geometry, not from a colour or the size of a grain; so both are random, over
+//! ranges wider than a street's.
 
 use super::facade::courses;
 use super::noise::{Noise, band, bands, beyond, hash, smoothstep, unit};

@@ -1,10 +1,10 @@
-//! Built things that several threads share, a bounded number of them.
+//! A bounded cache of built objects, shared by threads.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Keeps the `capacity` most recently used things. The lock is not held while one is built: threads that want
-/// others go on, and those that want the same one wait for it.
+/// Keeps the `capacity` most recently used objects. The lock is not held during a build: threads that want
+/// other objects proceed, and those that want the same one wait for it.
 pub struct Cache<T> {
     capacity: usize,
     entries: Mutex<Entries<T>>,
@@ -15,7 +15,7 @@ type Cell<T> = Arc<OnceLock<Arc<T>>>;
 
 struct Entries<T> {
     clock: u64,
-    /// When it was last asked for, and the thing.
+    /// The time of the last use, and the object.
     of: HashMap<u64, (u64, Cell<T>)>,
 }
 
@@ -31,10 +31,10 @@ impl<T> Cache<T> {
         }
     }
 
-    /// The thing of a key, built where it is not there.
+    /// The object of a key, built if necessary.
     pub fn get(&self, key: u64, build: impl FnOnce() -> T) -> Arc<T> {
         let cell = {
-            // The map is never left half changed, so a panic elsewhere does not spoil it.
+            // The map is never left half changed, so a panic elsewhere does not corrupt it.
             let mut entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
             entries.clock += 1;
             let now = entries.clock;

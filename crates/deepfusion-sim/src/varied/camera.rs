@@ -1,7 +1,7 @@
-//! Where a view is taken from, and with which lens.
+//! The camera of a view: its pose and its lens.
 
+use super::built_world::BuiltWorld;
 use super::draw::{normal, weighted};
-use super::place::Place;
 use crate::config::Scene;
 use crate::motion::rotation;
 use crate::primitive::{Primitive, V3, enter};
@@ -26,18 +26,18 @@ const NEARBY: f64 = 14.0;
 /// Tries before a camera goes where cars drive.
 const TRIES: usize = 40;
 
-/// The camera's place in a world.
+/// The camera's pose in a world.
 #[derive(Debug, Clone, Copy)]
 pub struct Stand {
     /// World (z up) from the camera.
     pub world_from_cam: Se3,
     /// Height above the ground below it, metres.
     pub height: f64,
-    /// Whether the traffic had to give way: no free place was found among it.
+    /// Whether the traffic was removed, because no free position was found among it.
     pub alone: bool,
 }
 
-/// Draws a lens, and how its picture came to the size that is asked for.
+/// Draws a lens, and the crop or squeeze of its picture to the requested size.
 ///
 /// Horizontal field of view: 70 % normal around 78° (deviation 8°, 64° to 92°), in rooms around 64°; the rest uniform
 /// from 35° to 60° or from 90° to 110°. Half of the pictures, nine in ten of those of rooms, are ones of another aspect
@@ -129,7 +129,7 @@ enum Kind {
 
 /// Street coordinates, a heading, and how far the view ahead must be free, metres. `anchor` is where the traffic's own
 /// car drives.
-fn spot(rng: &mut ChaCha8Rng, place: &Place, anchor: f64) -> ((f64, f64, f64), f32) {
+fn spot(rng: &mut ChaCha8Rng, place: &BuiltWorld, anchor: f64) -> ((f64, f64, f64), f32) {
     let kind = weighted(
         rng,
         &[
@@ -179,7 +179,7 @@ fn spot(rng: &mut ChaCha8Rng, place: &Place, anchor: f64) -> ((f64, f64, f64), f
 }
 
 /// A place in the room at `s` or near it, looking anywhere.
-fn in_room(rng: &mut ChaCha8Rng, place: &Place, s: f64) -> (f64, f64, f64) {
+fn in_room(rng: &mut ChaCha8Rng, place: &BuiltWorld, s: f64) -> (f64, f64, f64) {
     let rooms = &place.world.rooms;
     let number = rooms.partition_point(|room| room.high[0] < s);
     let room = &rooms[number.min(rooms.len() - 1)];
@@ -193,7 +193,7 @@ fn in_room(rng: &mut ChaCha8Rng, place: &Place, s: f64) -> (f64, f64, f64) {
 /// close to one, and not with most of its view within arm's length of one.
 pub fn stand(
     rng: &mut ChaCha8Rng,
-    place: &Place,
+    place: &BuiltWorld,
     (moving, anchor): (&[Primitive], f64),
     k: &Intrinsics,
 ) -> Stand {
@@ -210,7 +210,7 @@ pub fn stand(
             return stand;
         }
     }
-    // A lane is free of everything that stands, and from here on of what moves.
+    // A lane is free of everything that stands, and from here on of dynamic objects.
     let lane = place.world.lanes().into_iter().find(|lane| lane.forward);
     let lateral = lane.map_or(-1.65, |lane| lane.lateral);
     Stand {
@@ -220,7 +220,7 @@ pub fn stand(
 }
 
 fn pose(
-    place: &Place,
+    place: &BuiltWorld,
     (s, lateral, turn): (f64, f64, f64),
     (height, pitch, roll): (f64, f64, f64),
 ) -> Stand {
@@ -242,7 +242,7 @@ fn pose(
 }
 
 fn is_free(
-    place: &Place,
+    place: &BuiltWorld,
     moving: &[Primitive],
     world_from_cam: &Se3,
     k: &Intrinsics,

@@ -1,4 +1,4 @@
-//! What an endless stream of views is made from.
+//! Settings of an endless stream of views.
 
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EndlessConfig {
-    /// Chooses every world, camera, weather and image.
+    /// Seed of every world, camera, weather and image.
     pub seed: u64,
     /// Width of the pictures, in pixels.
     pub width: u32,
@@ -15,17 +15,17 @@ pub struct EndlessConfig {
     pub height: u32,
     /// Views taken of one world before the next one is built.
     pub views_per_world: usize,
-    /// Worlds in use at a time: so many consecutive views are of different ones.
+    /// Number of worlds in use at a time: this many consecutive views are of different worlds.
     pub worlds_at_once: usize,
-    /// Share of the views that a grey camera took.
+    /// Share of the views taken by a grey camera.
     pub grey: f64,
     /// Share of the views by daylight in the open; the rest are of garages and of nights.
     pub daylight: f64,
     /// Whether the camera's image formation (exposure, noise, blur, JPEG and so on) is applied. Without it the
     /// pictures are as [`crate::Simulation`]'s, in varied light.
     pub formation: bool,
-    /// Share of the worlds, and of the views, that are as [`crate::Simulation`] draws them: nothing varied but the
-    /// camera, in plain weather, without image formation.
+    /// Share of the worlds, and of the views, that are as in [`crate::Simulation`]: varied only in the camera, in
+    /// plain weather, without image formation.
     pub plain: f64,
 }
 
@@ -49,7 +49,7 @@ impl EndlessConfig {
     /// Checks every field.
     ///
     /// # Errors
-    /// [`Error::Config`] names the first field that is out of range.
+    /// [`Error::Config`] naming the first field out of range.
     pub fn validate(&self) -> Result<()> {
         let check = |ok: bool, field, value: String, expected| {
             if ok {

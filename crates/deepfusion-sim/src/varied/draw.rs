@@ -1,9 +1,9 @@
-//! Random draws: seeds that do not hang on the order of calls, and a few distributions.
+//! Random draws: seeds that do not depend on the order of calls, and a few distributions.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A generator of its own for each (seed, number, purpose).
+/// An independent generator for each (seed, number, purpose).
 pub fn generator(seed: u64, number: u64, purpose: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(mix(mix(mix(seed) ^ number) ^ purpose))
 }

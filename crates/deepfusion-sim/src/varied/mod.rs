@@ -1,14 +1,14 @@
-//! The endless mode: views of ever new streets by ever new cameras, for a network that learns depth from them.
+//! The endless mode: views of ever new streets by ever new cameras, as training data for depth networks.
 //!
-//! What a view shows hangs on the settings and its index alone, so loaders may ask for any view, from any thread,
-//! in any order. The depth is exact whatever is done to the colours.
+//! A view depends on the settings and its index alone, so that loaders may request any view, from any thread, in
+//! any order. The depth is exact whatever is done to the colours.
 
+mod built_world;
 mod cache;
 mod camera;
 mod config;
 mod draw;
 mod formation;
-mod place;
 mod schedule;
 mod weather;
 mod wet;
@@ -16,13 +16,13 @@ mod wet;
 use crate::Result;
 use crate::config::Scene;
 use crate::render::{self, Air, Cores, Edges, Shot};
+use built_world::BuiltWorld;
 use cache::Cache;
 pub use config::EndlessConfig;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use draw::generator;
 use formation::{Brightness, Formation};
 use image::RgbImage;
-use place::Place;
 use rand::Rng;
 use schedule::Schedule;
 pub use weather::Weather;
@@ -30,7 +30,7 @@ pub use weather::Weather;
 /// Worlds kept beyond those in use: as many threads may be behind or ahead of the others.
 const SPARE_WORLDS: usize = 6;
 
-/// One view, with what is true about it.
+/// One view, with its ground truth.
 #[derive(Debug, Clone)]
 pub struct View {
     /// H×W 8-bit RGB; three equal channels where the camera is grey.
@@ -39,13 +39,13 @@ pub struct View {
     pub depth: DepthMap,
     /// The camera, in pixels of the picture.
     pub intrinsics: Intrinsics,
-    /// H·W flags, row by row: the pixel's centre sees something that moves.
+    /// H·W flags, row by row: the pixel's centre is on a dynamic object.
     pub moving: Vec<bool>,
     /// Camera (x right, y down, z forward) to world (z up), metres.
     pub world_from_cam: Se3,
     /// Number of the world; views with the same number are of the same street.
     pub world: u64,
-    /// The kind of place.
+    /// The kind of scene.
     pub scene: Scene,
     /// The weather.
     pub weather: Weather,
@@ -62,7 +62,7 @@ pub struct View {
 pub struct Endless {
     config: EndlessConfig,
     schedule: Schedule,
-    places: Cache<Place>,
+    worlds: Cache<BuiltWorld>,
 }
 
 impl Endless {
@@ -74,33 +74,33 @@ impl Endless {
         config.validate()?;
         Ok(Self {
             schedule: Schedule::new(config.worlds_at_once, config.views_per_world),
-            places: Cache::new(config.worlds_at_once + SPARE_WORLDS),
+            worlds: Cache::new(config.worlds_at_once + SPARE_WORLDS),
             config,
         })
     }
 
-    /// What the stream is made from.
+    /// The settings of the stream.
     #[must_use]
     pub fn config(&self) -> &EndlessConfig {
         &self.config
     }
 
     /// View number `index`, the same at every call, from any thread, in any order. Works on the calling thread
-    /// alone; where its world is not built yet, that is done first.
+    /// alone; its world is built first if necessary.
     #[must_use]
     pub fn view(&self, index: u64) -> View {
         self.view_sized(index, (self.config.width, self.config.height))
     }
 
-    /// The same place, seen by a camera of another size (width, height; in pixels). Its lens and where it stands are
-    /// drawn for that size.
+    /// The same place, seen by a camera of another size (width, height; in pixels). Its lens and position are drawn
+    /// for that size.
     #[must_use]
     pub fn view_sized(&self, index: u64, size: (u32, u32)) -> View {
         let config = &self.config;
         let world_number = self.schedule.turn(index).world;
         let place = self
-            .places
-            .get(world_number, || Place::build(config, world_number));
+            .worlds
+            .get(world_number, || BuiltWorld::build(config, world_number));
         let world = &place.world;
 
         let mut rng = generator(config.seed, index, 0x00CA_4E4A);
@@ -179,7 +179,7 @@ mod tests {
         })?;
         for index in 0..14 {
             assert_eq!(endless.view(index).world, index);
-            assert!(endless.places.len() <= 2 + SPARE_WORLDS);
+            assert!(endless.worlds.len() <= 2 + SPARE_WORLDS);
         }
         Ok(())
     }

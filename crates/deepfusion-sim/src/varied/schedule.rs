@@ -1,4 +1,4 @@
-//! Which world a view is of.
+//! The schedule of worlds over views.
 
 /// Views take turns over `worlds` slots, so that as many consecutive ones are of different worlds. Each slot's
 /// world is replaced after `views` views; the slots' replacements are spread evenly over time, so that never two

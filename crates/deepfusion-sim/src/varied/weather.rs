@@ -19,7 +19,7 @@ pub enum Weather {
     Clear,
     /// Sun between clouds.
     Cloudy,
-    /// No sun, no shadows but the sky's.
+    /// No sun, and no shadows except from the sky's light.
     Overcast,
     /// Visibility of 30 to 400 m.
     Fog,
@@ -29,7 +29,7 @@ pub enum Weather {
     Night,
 }
 
-/// The weather of a world as it is without any drawn for it.
+/// The weather of a world without a random draw.
 pub fn plain(world: &World) -> Weather {
     match world.scene {
         Scene::Garage | Scene::Indoor => Weather::Indoor,

@@ -1,4 +1,4 @@
-//! Wet ground mirrors what is above it.
+//! Reflections of wet ground.
 
 use crate::primitive::V3;
 use crate::render::{Camera, Exposure, Shot, Surface};

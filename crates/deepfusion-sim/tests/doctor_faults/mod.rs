@@ -12,7 +12,7 @@ use image::RgbImage;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Places of values in an oxts packet.
+/// Indices of values in an OXTS packet.
 pub mod oxts {
     pub const VN: usize = 6;
     pub const VE: usize = 7;
@@ -124,14 +124,14 @@ impl Drive {
             let mut values: Vec<f64> = words.iter().map(|w| w.parse().unwrap()).collect();
             let before = values.clone();
             change(number, &mut values);
-            let told = words.iter().enumerate().map(|(i, word)| {
+            let changed = words.iter().enumerate().map(|(i, word)| {
                 if values[i] == before[i] {
                     (*word).to_owned()
                 } else {
                     format!("{:.9}", values[i])
                 }
             });
-            std::fs::write(&path, told.collect::<Vec<_>>().join(" ")).unwrap();
+            std::fs::write(&path, changed.collect::<Vec<_>>().join(" ")).unwrap();
         }
     }
 

@@ -4,7 +4,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
-/// `log.csv`: a line a record, `split` "train" or "validation".
+/// `log.csv`: one line per record, `split` is "train" or "validation".
 #[derive(Debug)]
 pub struct CsvLog {
     file: File,
@@ -14,20 +14,20 @@ pub struct CsvLog {
 /// The columns after the loss terms.
 const EXTRA: &str = "learning_rate,scale_ratio,images_per_second,selection";
 
-/// What a line of the log says.
+/// The content of a line of the log.
 #[derive(Debug, Clone, Copy)]
 pub struct CsvRecord<'a> {
     /// After this step.
     pub step: usize,
     /// The loss.
     pub losses: &'a LossTerms,
-    /// The step size; 0 of a validation.
+    /// The learning rate; 0 for a validation.
     pub learning_rate: f64,
     /// Displacement by speed over displacement by PoseNet.
     pub scale_ratio: f64,
-    /// The pace; 0 of a validation.
+    /// Images per second; 0 for a validation.
     pub images_per_second: f64,
-    /// What `best` is chosen by, of a validation; `None` of a step of training.
+    /// The value that selects `best`, of a validation; `None` for a training step.
     pub selection: Option<f64>,
 }
 
@@ -40,8 +40,8 @@ fn header() -> String {
     format!("step,split,{},{EXTRA}", terms.join(","))
 }
 
-/// A line of a log that may have been begun with other columns, in the columns of today; what it lacks is
-/// empty.
+/// A line of a log that may have been begun with other columns, arranged in the current columns; missing
+/// values are empty.
 fn arranged(columns: &str, line: &str) -> String {
     let values: HashMap<&str, &str> = columns.split(',').zip(line.split(',')).collect();
     let header = header();

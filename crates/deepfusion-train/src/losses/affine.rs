@@ -4,17 +4,17 @@ use crate::model::swap_halves;
 use burn::tensor::{Bool, Int, Tensor};
 use deepfusion_nn::ops;
 
-/// Least spread and residual that count, as a share of the depths themselves.
+/// ε of the loss, as a share of the median depth, and the ridge of the fit, as a share of the mean depth.
 const FLATNESS: f64 = 1e-2;
 
 /// The affine invariant loss (Eq. 9): a and b by least squares of a·x + b on y over the valid pixels of each image;
 /// (mean |a·x + b − y| + ε) / (mean |y − median(y)| + ε), averaged over the images, ε a hundredth of y's median.
 ///
-/// It neither sees nor moves the scale of either. y is what x is held against and has no gradient: in a batch that
-/// holds both directions each depth is x once. x counts up to a and b alone, and those are differentiated too.
+/// It neither depends on nor changes the scale of either. y is the reference and has no gradient: in a batch that
+/// holds both directions each depth is x once. The gradient of x goes through a and b, too.
 ///
-/// Nor does it pay to be flat. Equation 9 has ε below alone; two flat depths would then cost nothing. With ε above
-/// as well they cost 1, the most, like any depth that says nothing about the other.
+/// A flat depth is not rewarded. Equation 9 has ε in the denominator alone, so that two flat depths would cost
+/// nothing. With ε in the numerator as well they cost 1, the maximum, as any depth that is unrelated to the other.
 ///
 /// # Shapes
 /// - `x`, `y`: `[N, 1, H, W]`, depths in metres
@@ -27,7 +27,7 @@ pub fn affine_invariant(x: Tensor<4>, y: Tensor<4>, valid: &Tensor<4, Bool>) -> 
     let outside = valid.clone().bool_not();
     let inside = flat(valid.clone().float());
     let count = inside.clone().sum_dim(1).clamp_min(1.0);
-    // What is outside may be anything, also no number.
+    // What is outside may be anything, NaN included.
     let x = flat(x.mask_fill(outside.clone(), 0.0));
     let y = flat(y.detach().mask_fill(outside, 0.0));
     let mean = |t: Tensor<2>| t.sum_dim(1).div(count.clone());
@@ -68,9 +68,8 @@ fn medians(values: &Tensor<2>, inside: &Tensor<2>) -> Tensor<2> {
     values.clone().gather(1, places.reshape([n, 1]))
 }
 
-/// The pixels whose depths two frames can be held against each other by: in view, not hidden in the other frame (its
-/// own depth and motion bring them back), and not moving by themselves. The batch's halves are each other's frames.
-/// No gradient.
+/// The pixels at which two frames' depths can be compared: in view, not occluded in the other frame (its own depth
+/// and motion bring them back), and static. The two halves of the batch are each other's frames. No gradient.
 ///
 /// # Shapes
 /// - `coords`: where each pixel lies in the other frame, `[2N, 2, H, W]`, in pixels
@@ -92,8 +91,8 @@ pub fn seen_in_both(
     }
 }
 
-/// D₁→₀, the depth of the other frame seen from this one: the other depth map read where each pixel goes,
-/// back-projected there, brought back, and its z.
+/// D₁→₀, the depth of the other frame seen from this one: the z of the other depth map, read where each
+/// pixel lies in it, back-projected and transformed back.
 ///
 /// # Shapes
 /// - `other_depth_there`: the source's depth at `coords`, `[N, 1, H, W]`, in metres

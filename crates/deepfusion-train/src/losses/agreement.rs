@@ -2,8 +2,8 @@ use super::flow::FlowView;
 use super::mean::mean_where;
 use burn::tensor::{Bool, Tensor};
 
-/// How far the rigid flow and the flow are apart where both explain the pixel: mean ‖p' − (p + f(p))‖₁ over
-/// the mask, in pixels.
+/// The distance between the rigid flow and the optical flow where both explain the pixel: mean ‖p' − (p +
+/// f(p))‖₁ over the mask, in pixels.
 ///
 /// # Shapes
 /// - `rigid`, `flow`: where each pixel goes, `[N, 2, H, W]`, in pixels
@@ -15,9 +15,9 @@ pub fn agreement(rigid: Tensor<4>, flow: Tensor<4>, both: &Tensor<4, Bool>) -> T
     mean_where(rigid.sub(flow).abs(), both).mul_scalar(2.0)
 }
 
-/// Where both the rigid warp and the flow explain the pixel: in view, back again, and each better than no motion
-/// at all does. Without the last, a car ahead at the camera's speed, whose flow is zero, would draw its depth
-/// to infinity. No gradient.
+/// Where both the rigid warp and the flow explain the pixel: in view, consistent forward and backward, and each
+/// with a smaller error than no motion at all. Without the last, a car ahead at the camera's speed, whose flow
+/// is zero, would draw its depth to infinity. No gradient.
 ///
 /// # Shapes
 /// - `rigid_error`, `unwarped_error`, output: `[N, 1, H, W]`

@@ -1,4 +1,4 @@
-//! Learning from known depth (SPEC 7.1): error of log depth, and of its differences between neighbours.
+//! Learning from known depth (docs/concepts/learning-from-depth.md): error of log depth, and of its differences between neighbours.
 
 use crate::DepthLossConfig;
 use burn::tensor::Tensor;
@@ -6,7 +6,7 @@ use burn::tensor::Tensor;
 /// Distances in pixels at which the error's differences are compared, at the finest scale (MiDaS's term, on log depth).
 const STEPS: [usize; 3] = [1, 2, 4];
 
-/// What is known of a batch's depth, pixel by pixel.
+/// Ground-truth depth of a batch, pixel by pixel.
 #[derive(Debug, Clone)]
 pub struct DepthTruth {
     /// ln D, D in metres; ln of the farthest depth that counts where `far` is 1; anything finite where neither is.
@@ -42,7 +42,7 @@ pub fn log_depth_error(inverse_depth: Tensor<4>, truth: &DepthTruth) -> Tensor<4
 }
 
 /// L_depth = Σ_s w_s·mean |e_s| + λ_g·Σ_k mean(|∂ₓᵏe₀| + |∂ᵧᵏe₀|), k = 1, 2, 4; w_0 = 1, w_s = 1/(4s). Means are over the
-/// pixels, and the pairs of pixels, of which the depth is known or known to be far; without any the loss is 0.
+/// pixels, and the pairs of pixels, whose depth is known or known to be far; without any the loss is 0.
 ///
 /// # Shapes
 /// - `inverse_depths`: the scales, finest first, each enlarged to B×1×H×W, in 1/m
@@ -80,7 +80,7 @@ pub fn depth(
     }
 }
 
-/// Mean |e(p + step) − e(p)| along an axis, over the pairs of which both count.
+/// Mean |e(p + step) − e(p)| along an axis, over the pairs of which both are valid.
 fn difference(error: &Tensor<4>, valid: &Tensor<4>, axis: usize, step: usize) -> Tensor<1> {
     let length = error.dims()[axis] - step;
     let pair = |x: &Tensor<4>| {

@@ -3,7 +3,7 @@ use crate::FlowLossConfig;
 use burn::tensor::{Bool, Device, Tensor};
 use deepfusion_nn::ops;
 
-/// The pixels' own places, u then v.
+/// The pixels' own coordinates, u then v.
 ///
 /// # Shapes
 /// - output: `[1, 2, height, width]`
@@ -22,19 +22,19 @@ pub struct FlowView {
     pub error: Tensor<4>,
     /// Where the flow ends, p + f(p), N×2×H×W, in pixels.
     pub coords: Tensor<4>,
-    /// f(p) + f'(p + f(p)), N×2×H×W, in pixels: zero where going there and back ends at the start.
+    /// f(p) + f'(p + f(p)), N×2×H×W, in pixels: zero where flow and reversed flow agree.
     pub round_trip: Tensor<4>,
     /// Where the flow ends in view and at a pixel that comes back: ‖f + f'‖² < 0.01·(‖f‖² + ‖f'‖²) + 0.5. In an
-    /// image of which less than half comes back, wherever it ends in view: there the flow is wrong, and not
-    /// the pixels hidden. N×1×H×W, without gradient.
+    /// image of which less than half comes back, wherever it ends in view: there the flow is wrong, not the
+    /// pixels occluded. N×1×H×W, without gradient.
     pub visible: Tensor<4, Bool>,
 }
 
-/// Share of an image's pixels in view that must come back for the rest to count as hidden. Without this limit
-/// two flows that contradict each other everywhere see nothing, learn nothing, and stay so.
+/// Share of an image's pixels in view that must come back for the rest to count as occluded. Without this
+/// limit two flows that contradict each other everywhere see nothing, learn nothing, and stay so.
 const LEAST_CONSISTENT: f64 = 0.5;
 
-/// Sees a source from the targets by the flow between them.
+/// Warps a source to the targets by the flow between them.
 ///
 /// # Shapes
 /// - `target`, `source`: `[N, C, H, W]`
@@ -61,9 +61,8 @@ pub fn flow_view(
     }
 }
 
-/// The pixels in view that are not hidden there: going there and back ends at the start,
-/// ‖f + f'‖² < 0.01·(‖f‖² + ‖f'‖²) + 0.5. In an image of which less than half comes back, all that is in view. No
-/// gradient.
+/// The pixels in view that are not occluded: forward and backward flow agree, ‖f + f'‖² < 0.01·(‖f‖² + ‖f'‖²) +
+/// 0.5. In an image of which less than half comes back, all that is in view. No gradient.
 ///
 /// # Shapes
 /// - `flow`: f, `[N, 2, H, W]`, pixels of one frame to those of the other
@@ -85,14 +84,14 @@ pub fn visible(
     in_view.clone().bool_and(back_again.bool_or(wrong))
 }
 
-/// The images of which too little of what is in view comes back, N×1×1×1 made as large as the masks.
+/// The images in which too few of the pixels in view come back, N×1×1×1 expanded to the masks' size.
 fn contradictory(back_again: &Tensor<4, Bool>, in_view: &Tensor<4, Bool>) -> Tensor<4, Bool> {
     let count = |mask: &Tensor<4, Bool>| mask.clone().float().sum_dim(2).sum_dim(3);
     let few = count(back_again).lower(count(in_view).mul_scalar(LEAST_CONSISTENT));
     few.expand(in_view.dims())
 }
 
-/// L_f + L_b + w_c·L_c (Eq. 16–20) and the smoothness, of a flow looked at in both directions. The two
+/// L_f + L_b + w_c·L_c (Eq. 16–20) and the smoothness, of a flow in both directions. The two
 /// directions' pixels are pooled: L_f + L_b is twice the mean error, L_c the mean over both.
 ///
 /// # Shapes
@@ -129,10 +128,10 @@ pub fn flow(
 fn sum(terms: impl Iterator<Item = Tensor<1>>) -> Tensor<1> {
     terms
         .reduce(|a, b| a + b)
-        .expect("a flow is looked at from at least one side")
+        .expect("a flow has at least one view")
 }
 
-/// How sharp an edge of the image must be to excuse one of the flow: e^(−10·|∂I|), as flow networks use it.
+/// Weight of image edges, e^(−10·|∂I|), as is common for flow networks.
 const EDGE_SHARPNESS: f64 = 10.0;
 
 /// Edge-aware smoothness of a flow, of second order, since a plane's flow is linear:

@@ -1,6 +1,6 @@
 use burn::tensor::{Bool, Tensor};
 
-/// The mean of the values where the mask is true; nothing true gives 0, not NaN.
+/// The mean of the values where the mask is true; 0, not NaN, if it is true nowhere.
 ///
 /// # Shapes
 /// - `values`: `[N, C, H, W]`

@@ -1,4 +1,4 @@
-//! The loss terms of SPEC 2, one file each, and their sum.
+//! The loss terms (docs/concepts/losses.md), one file each, and their sum.
 
 mod affine;
 mod agreement;
@@ -31,8 +31,8 @@ pub struct LossTerms {
     pub reprojection: f64,
     /// Edge-aware smoothness, mean over scales, weighted by 1/2ˢ but not by λ_s.
     pub smoothness: f64,
-    /// L_speed in metres per pair, unweighted; the distance of PoseNet's motion from the measured one
-    /// while that synthesises the views.
+    /// L_speed in metres per pair, unweighted; if the measured motion synthesises the views, the
+    /// distance of PoseNet's motion from it.
     pub speed: f64,
     /// The affine invariant loss, unweighted.
     pub affine: f64,
@@ -42,13 +42,13 @@ pub struct LossTerms {
     pub agreement: f64,
     /// L_depth of known depth, unweighted.
     pub depth: f64,
-    /// L_nll of a network that says how sure it is, on known depth.
+    /// L_nll of a network that predicts uncertainty, on known depth.
     pub uncertainty: f64,
     /// Share of pixels that the warp finds in view, at full resolution.
     pub valid_share: f64,
     /// Share of pixels that the warped source explains best (the rest are masked).
     pub explained_share: f64,
-    /// Share of pixels taken out of the reprojection because they move by themselves.
+    /// Share of pixels taken out of the reprojection because they are dynamic.
     pub moving_share: f64,
 }
 
@@ -72,7 +72,7 @@ impl LossTerms {
         ]
     }
 
-    /// Adds every term of another batch, `weight` times: sums up to a weighted mean.
+    /// Adds every term of another batch, times `weight`, to accumulate a weighted mean.
     pub fn add(&mut self, other: &Self, weight: f64) {
         self.total += weight * other.total;
         self.reprojection += weight * other.reprojection;
@@ -88,7 +88,7 @@ impl LossTerms {
         self.moving_share += weight * other.moving_share;
     }
 
-    /// The first term that is not a finite number; the parts before the sum.
+    /// The first term that is not finite; the parts come before the sum.
     #[must_use]
     pub fn not_finite(&self) -> Option<(&'static str, f64)> {
         let [total, parts @ ..] = self.named();

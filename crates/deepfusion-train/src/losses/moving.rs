@@ -5,10 +5,10 @@ use crate::{Motion, Synthesised};
 use burn::tensor::{Bool, Tensor};
 use deepfusion_nn::ops;
 
-/// A target's view by depth and motion, as far as it matters to what moves.
+/// A target's rigid view (by depth and camera motion), as the test for dynamic pixels needs it.
 #[derive(Debug, Clone)]
 pub struct RigidView<'a> {
-    /// The source seen from the target.
+    /// The source warped to the target.
     pub synthesised: &'a Synthesised,
     /// Its photometric error, N×1×H×W.
     pub error: &'a Tensor<4>,
@@ -20,10 +20,10 @@ pub struct RigidView<'a> {
     pub inverse_intrinsics: &'a Tensor<3>,
 }
 
-/// The pixels that move by themselves (SPEC 2): the flow explains them and the rigid warp does not, by the
-/// limits of the settings; and the flow leaves the epipolar line, or goes along it much farther or less far
-/// than the depth there lets it. SPEC 2 asks for the first of these two alone, but what drives along the road
-/// like the camera, ahead of it or towards it, never leaves its epipolar lines. No gradient.
+/// The dynamic pixels (docs/concepts/losses.md): the flow explains them and the rigid warp does not, by the limits of the
+/// settings; and the flow leaves the epipolar line, or follows it much farther or less far than the depth allows. The
+/// test along the line is needed for traffic ahead of the camera or towards it, which never leaves its epipolar lines. No
+/// gradient.
 ///
 /// # Shapes
 /// - output: `[N, 1, H, W]`
@@ -59,8 +59,8 @@ pub fn moving_pixels(
     }
 }
 
-/// Where no depth, or none near the predicted one, lets a pixel that stands still end where the flow does;
-/// `None` where the settings ask for neither.
+/// Where no depth, or none near the predicted one, lets a static pixel end where the flow does; `None`
+/// where the settings ask for neither.
 fn impossible(
     ends: &Tensor<4>,
     rigid_ends: &Tensor<4>,
@@ -86,7 +86,7 @@ fn impossible(
     }
 }
 
-/// Where each pixel would go if it were infinitely far away, K·R·K⁻¹·p̃: the start of its parallax.
+/// Where each pixel would lie if it were infinitely far away, K·R·K⁻¹·p̃: the start of its parallax.
 fn infinitely_far(
     like: &Tensor<4>,
     source_from_target: &Motion,
@@ -104,7 +104,7 @@ fn infinitely_far(
     ops::project(far, homography, Tensor::zeros([n, 3], &device))
 }
 
-/// How far each pixel's end lies from its epipolar line l = F·p̃, F = K⁻ᵀ·\[t\]×·R·K⁻¹. No gradient.
+/// The distance of each pixel's end from its epipolar line l = F·p̃, F = K⁻ᵀ·\[t\]×·R·K⁻¹. No gradient.
 ///
 /// # Shapes
 /// - `ends`: where the pixels go, `[N, 2, H, W]`, in pixels

@@ -7,13 +7,13 @@ pub struct View {
     pub error: Tensor<4>,
     /// Where the pixel is in view of the source, N×1×H×W.
     pub valid: Tensor<4, Bool>,
-    /// pe(unwarped source, target), N×1×H×W, without gradient: what standing still would explain.
+    /// pe(unwarped source, target), N×1×H×W, without gradient: the automask's baseline.
     pub unwarped_error: Tensor<4>,
-    /// Where the pixel moves by itself, N×1×H×W: the warp must not explain it.
+    /// Where the pixel is dynamic, N×1×H×W: the warp must not explain it.
     pub moving: Option<Tensor<4, Bool>>,
 }
 
-/// The reprojection loss and what it saw.
+/// The reprojection loss and its per-pixel results.
 #[derive(Debug, Clone)]
 pub struct ReprojectionOutput {
     /// The loss, one value.
@@ -22,19 +22,19 @@ pub struct ReprojectionOutput {
     pub error: Tensor<4>,
     /// Where a warped source explains the pixel best, N×1×H×W.
     pub explained: Tensor<4, Bool>,
-    /// Where some source has the pixel in view, N×1×H×W.
+    /// Where at least one source has the pixel in view, N×1×H×W.
     pub valid: Tensor<4, Bool>,
 }
 
 /// L_rp of one scale: the mean over **all** pixels of the smallest error among the views.
 ///
-/// A view has a pixel's warped error where the pixel is in its sight, and its unwarped error, a constant, where the
-/// pixel moves by itself. With `automask` the unwarped errors of all views compete at every pixel. Without it a view
-/// that does not see a pixel has no part in the minimum there; only where no view sees it, the smallest of their
-/// constants stands in. The denominator never shrinks, so that throwing pixels out of view does not pay.
+/// A view contributes a pixel's warped error where it sees the pixel, and its unwarped error, a constant, where the
+/// pixel is dynamic. With `automask` the unwarped errors of all views compete at every pixel. Without it a view that
+/// does not see a pixel does not take part in the minimum there; where no view sees it, the smallest of their
+/// constants is used. The denominator never shrinks, so that throwing pixels out of view does not pay.
 ///
 /// # Panics
-/// Without a view.
+/// If there are no views.
 #[must_use]
 #[expect(
     clippy::expect_used,

@@ -1,4 +1,4 @@
-//! Edge-aware smoothness (Eq. 8); the operation is one of the networks' own.
+//! Edge-aware smoothness (Eq. 8); the operation itself is in `deepfusion-nn`.
 
 pub use deepfusion_nn::ops::smoothness;
 

@@ -2,7 +2,7 @@ use crate::Motion;
 use burn::tensor::Tensor;
 
 /// The speed loss (Eq. 32–39): mean over pairs of |‖t̂‖ − d| + β_R·angle(R̂ᵀ·R), d and R from the
-/// vehicle's sensors. It is what fixes the scale in metres.
+/// vehicle's sensors. It fixes the metric scale.
 ///
 /// # Shapes
 /// - `motion`: N predicted motions
@@ -36,11 +36,11 @@ pub fn speed(
     translation + angle.mean().mul_scalar(rotation_weight)
 }
 
-/// Metres that a radian counts for in [`motion`]: what a rotation moves a point ten metres away.
+/// Weight of a radian in [`motion`], in metres: the distance that it moves a point ten metres away.
 const METRES_PER_RADIAN: f64 = 10.0;
 
-/// How far predicted motions are from measured ones: mean over pairs of ‖t̂ − t‖ + 10 m·angle(R̂ᵀ·R). What
-/// PoseNet learns from while the views are synthesised with the measured motion.
+/// The distance of predicted motions from measured ones: mean over pairs of ‖t̂ − t‖ + 10 m·angle(R̂ᵀ·R).
+/// PoseNet learns from it when the measured motion synthesises the views.
 ///
 /// # Shapes
 /// - `predicted`, `measured`: N motions in the same direction

@@ -1,12 +1,13 @@
-//! Learning how sure a depth is (SPEC 7.2): the likelihood of its error under a Laplace distribution.
+//! Learning the uncertainty of depth (docs/concepts/learning-from-depth.md): the negative log-likelihood of its error under a
+//! Laplace distribution.
 
 use super::DepthTruth;
 use super::depth::log_depth_error;
 use burn::tensor::Tensor;
 use deepfusion_model::LOG_SCALE_BOUNDS;
 
-/// L_nll = mean(|e|/b + ln b) over the pixels of known depth, e = ln D̂ − ln D. It is least where b is the error that is to be
-/// expected. The depth itself learns nothing from it: e counts as a constant.
+/// L_nll = mean(|e|/b + ln b) over the pixels of known depth, e = ln D̂ − ln D. It is smallest where b is the expected error.
+/// No gradient reaches the depth: e counts as a constant.
 ///
 /// # Shapes
 /// - `inverse_depth` (1/m), `log_scale` (ln b) and the truth: B×1×H×W

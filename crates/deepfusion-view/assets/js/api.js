@@ -1,4 +1,4 @@
-// What the server is asked for.
+// Requests to the server.
 
 /** A failure that the server explains. */
 export class Problem extends Error {
@@ -12,9 +12,9 @@ export class Problem extends Error {
 async function get(path) {
   const answer = await fetch(path);
   if (answer.ok) return answer;
-  let told = {};
-  try { told = await answer.json(); } catch { /* not this server's words */ }
-  throw new Problem(told.error ?? `${answer.status} ${answer.statusText}`, told.hint, answer.status);
+  let body = {};
+  try { body = await answer.json(); } catch { /* not JSON of this server */ }
+  throw new Problem(body.error ?? `${answer.status} ${answer.statusText}`, body.hint, answer.status);
 }
 
 const of = (run, ...parts) => `/api/runs/${run}/${parts.map(encodeURIComponent).join('/')}`;

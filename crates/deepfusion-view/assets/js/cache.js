@@ -1,4 +1,4 @@
-// A cache that holds so many bytes and no more; what was used last stays.
+// A least-recently-used cache with a limit in bytes.
 
 export class Cache {
   constructor(mostBytes, dropped = () => {}) {

@@ -10,12 +10,12 @@ import { LINES, POINTS, program } from './shaders.js';
 
 const MOST_POINTS = matchMedia('(pointer: coarse)').matches ? 400_000 : 1_200_000;
 const MOST_PATCHES = MOST_POINTS / 3;
-/** While things move on a machine that cannot keep up. */
+/** While the view moves on a machine that cannot keep up. */
 const COARSE_POINTS = 60_000;
 const MODES = { picture: 0, depth: 1, height: 2 };
 const VIEW_NAMES = { chase: 'Chase', top: 'Top', side: 'Side', eye: 'Camera' };
 
-/** Whether there is no graphics card behind WebGL: edges are then not smoothed, and what moves is drawn coarsely. */
+/** Whether there is no graphics card behind WebGL: edges are then not smoothed, and a moving view is drawn coarsely. */
 export function drawnBySoftware() {
   const gl = document.createElement('canvas').getContext('webgl2');
   const info = gl?.getExtension('WEBGL_debug_renderer_info');
@@ -124,7 +124,7 @@ export class CloudView {
     if (frame && !frame.ground) frame.ground = groundOf(frame);
     if (scene || resized) this.drawScene(frame);
     this.drawOver(frame);
-    this.tell(frame);
+    this.describe(frame);
   }
 
   drawScene(frame) {
@@ -176,15 +176,15 @@ export class CloudView {
 
   drawLines(frame) {
     const { gl, app, canvas, lines } = this, { made, at } = this.strokes, { options } = app;
-    const look = { byTrack: options.byTrack, light: app.light, isChosen: t => app.isChosen(this.run, t) };
+    const style = { byTrack: options.byTrack, light: app.light, isChosen: t => app.isChosen(this.run, t) };
     lines.clear();
     this.ringLabels = frame && options.ground ? addGround(lines, frame.ground) : [];
     if (frame?.camera) addCamera(lines, frame.camera);
     if (frame && options.tracks && frame.worldFromCam) {
       const history = app.runs[this.run].history(app.place(this.run), TRACK_FRAMES, () => app.touch('scene'));
-      addTracks(lines, frame, history, look);
+      addTracks(lines, frame, history, style);
     }
-    if (frame && options.boxes) addTargets(lines, frame, look);
+    if (frame && options.boxes) addTargets(lines, frame, style);
     if (!lines.count) return;
     gl.useProgram(made);
     gl.bindVertexArray(this.segments);
@@ -238,12 +238,12 @@ export class CloudView {
     }
   }
 
-  tell(frame) {
+  describe(frame) {
     const { app } = this, { options } = app;
     const letter = app.runs.length > 1 ? `${'AB'[this.run]} ` : '';
     const count = frame?.depth && frame.cameraOfDepth ? `<span>${Math.round((this.drawn ?? 0) / 1000)}k pixels, to ${options.farthest} m</span>` : '';
     const text = `${letter}Cloud${count}`;
-    if (text !== this.told) this.caption.innerHTML = this.told = text;
+    if (text !== this.captioned) this.caption.innerHTML = this.captioned = text;
     for (const button of this.element.querySelectorAll('[data-view]')) button.setAttribute('aria-pressed', String(app.orbit.name === button.dataset.view));
     this.surfaceButton.textContent = options.surface ? 'Surface' : 'Points';
     this.modeButton.textContent = { picture: 'Colour', depth: 'Depth', height: 'Height' }[options.mode];

@@ -9,7 +9,7 @@ export class Colours {
   constructor(session) {
     this.scale = session.depth_scale;
     this.diverging = session.colours.diverging;
-    // One entry a step of 1/256 m: a picture is then one look-up a pixel. Bytes in memory are r, g, b, a on every machine of today.
+    // One entry per step of 1/256 m: a picture then needs one look-up per pixel. Bytes in memory are r, g, b, a on every machine of today.
     this.bySteps = new Uint32Array(65536);
     this.bySteps[0] = packed(NOTHING);
     for (let step = 1; step < 65536; step++) this.bySteps[step] = packed(this.ofDepth(step / 256));
@@ -18,7 +18,7 @@ export class Colours {
     this.bySigned[256] = packed(NOTHING);
   }
 
-  /** Where a depth lies: 0 near, 1 far. */
+  /** Position of a depth on the scale: 0 near, 1 far. */
   place(metres) {
     const { near_m, far_m } = this.scale;
     return Math.min(1, Math.max(0, Math.log(metres / near_m) / Math.log(far_m / near_m)));

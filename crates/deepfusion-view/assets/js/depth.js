@@ -1,9 +1,9 @@
 // A frame's depth: the file's own numbers.
 
-/** Standard deviation over depth from which on a place fades, and at which nothing of it is left. */
+/** Standard deviation over depth at which a pixel starts to fade, and at which it is gone. */
 export const FADE = [0.2, 0.6];
 
-/** How much of a place is shown: 1 where it is sure, 0 where it is not. */
+/** Opacity of a pixel: 1 where depth is certain, 0 where it is not. */
 export function sureness(depth, sigma) {
   if (!(depth > 0 && sigma >= 0)) return 0;
   return Math.min(1, Math.max(0, (FADE[1] - sigma / depth) / (FADE[1] - FADE[0])));
@@ -47,12 +47,12 @@ export class Depth {
     }
     for (let i = 0; i < values.length; i++) {
       const step = values[i] * 256;
-      // NaN and what is not above 0 are none; what is there at all is at least one step.
+      // NaN and values that are not positive mean no depth; any depth is at least one step.
       pixels[i] = table[step > 0 ? Math.min(65535, Math.max(1, Math.round(step))) : 0];
     }
   }
 
-  /** Lets painted pixels go over into `background` (r, g, b) where they are unsure. */
+  /** Fades uncertain pixels into `background` (r, g, b). */
   fade(sigma, pixels, background) {
     const channels = new Uint8ClampedArray(pixels.buffer), rescale = this.perMetre / sigma.perMetre;
     for (let i = 0; i < this.values.length; i++) {

@@ -50,7 +50,7 @@ export function projectEdge(k, a, b, near = 0.1) {
   return [project(k, a), project(k, b)];
 }
 
-/** A 3x4 row-major motion from what was read (nested rows or twelve numbers); null if it is none. */
+/** A 3x4 row-major motion from what was read (nested rows or twelve numbers); null if it is not one. */
 export function motion(value) {
   const m = Array.isArray(value) ? value.flat() : [];
   return (m.length === 12 || m.length === 16) && m.every(Number.isFinite) ? m.slice(0, 12) : null;

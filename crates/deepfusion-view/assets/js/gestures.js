@@ -1,4 +1,4 @@
-// Mouse, pen and fingers on a canvas, told in the same words.
+// Mouse, pen and fingers on a canvas, reported by the same names.
 
 /**
  * Calls `on.hover(x, y)`, `on.leave()`, `on.drag(dx, dy, {secondary, touch, x, y})`, `on.pinch(factor, x, y, dx, dy)`,
@@ -55,7 +55,7 @@ export function gestures(element, on) {
   }, { passive: false });
 }
 
-/** Keeps a canvas as fine as the screen; whether its size changed. */
+/** Keeps a canvas at the screen's resolution. Returns whether its size changed. */
 export function fit(canvas, most = 2) {
   const ratio = Math.min(devicePixelRatio || 1, most), box = canvas.getBoundingClientRect();
   const width = Math.max(1, Math.round(box.width * ratio)), height = Math.max(1, Math.round(box.height * ratio));

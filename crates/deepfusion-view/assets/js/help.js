@@ -1,6 +1,6 @@
 // What the keys do: one table, for the help and for the keyboard.
 
-/** Groups of [keys as they are told, keys as events say them, what they do, action of the app]. */
+/** Groups of [keys as they are shown, keys as events name them, what they do, action of the app]. */
 export const KEYS = [
   ['Time', [
     [['Space'], [' '], 'play, pause', app => app.player.toggle()],
@@ -31,7 +31,7 @@ export const KEYS = [
     [['B'], ['b'], 'boxes', app => app.flip('boxes')],
     [['T'], ['t'], 'tracks', app => app.flip('tracks')],
     [['N'], ['n'], 'numbers at the boxes', app => app.flip('labels')],
-    [['I'], ['i'], 'colour by track, or by what moves', app => app.flip('byTrack')],
+    [['I'], ['i'], 'colour by track, or by motion', app => app.flip('byTrack')],
     [['G'], ['g'], 'rings on the ground', app => app.flip('ground')],
     [['X'], ['x'], 'two runs: depth against the first', app => app.flip('difference')],
   ]],
@@ -55,10 +55,10 @@ export function onKey(app, e) {
 export function help() {
   const dialog = document.getElementById('help');
   if (dialog.open) return dialog.close();
-  const groups = KEYS.map(([name, keys]) => `<section><h3>${name}</h3>${keys.map(([told, , what]) => `<div><span>${what}</span><span>${told.map(k => `<kbd>${k.replace('<', '&lt;')}</kbd>`).join('')}</span></div>`).join('')}</section>`);
+  const groups = KEYS.map(([name, keys]) => `<section><h3>${name}</h3>${keys.map(([shown, , what]) => `<div><span>${what}</span><span>${shown.map(k => `<kbd>${k.replace('<', '&lt;')}</kbd>`).join('')}</span></div>`).join('')}</section>`);
   dialog.innerHTML = `<button class="close" aria-label="Close">✕</button><h2>Keys</h2><div class="keys">${groups.join('')}</div>`
-    + '<p>Pictures: the pointer tells metres, the wheel zooms, dragging moves, a double click shows all. Cloud: dragging turns, with Shift or the right button moves, the wheel comes nearer, a double click turns about that point. A click on a box chooses its track.</p>'
-    + '<p>Fingers: one tells metres or turns the cloud, two zoom and move, a double tap shows all.</p>';
+    + '<p>Pictures: the pointer shows metres, the wheel zooms, dragging moves, a double click shows all. Cloud: dragging turns, with Shift or the right button moves, the wheel comes nearer, a double click turns about that point. A click on a box chooses its track.</p>'
+    + '<p>Fingers: one shows metres or turns the cloud, two zoom and move, a double tap shows all.</p>';
   dialog.querySelector('.close').onclick = () => dialog.close();
   dialog.onclick = e => { if (e.target === dialog) dialog.close(); };
   dialog.showModal();

@@ -79,7 +79,7 @@ class App {
     });
   }
 
-  /** Shows a frame that is at hand. */
+  /** Shows a frame that is loaded. */
   show(i) {
     this.frame = i;
     this.runs.forEach((run, r) => {
@@ -91,7 +91,7 @@ class App {
     this.touch('scene', 'time');
   }
 
-  /** Goes to a frame; what is not at hand is fetched, and shown if it is still wanted then. */
+  /** Goes to a frame; one that is not loaded is fetched, and shown if it is still wanted then. */
   async seek(i) {
     const n = this.runs[0].length;
     if (!n) return;
@@ -104,7 +104,7 @@ class App {
       return place === undefined ? null : run.load(place);
     }));
     if (this.frame !== wanted) return;
-    // A frame that the server did not give is shown all the same: it says why.
+    // A frame that the server did not send is shown with its problem.
     this.shownFrames = frames.map(f => f ?? null);
     this.runs.forEach((run, r) => { run.show(this.shownFrames[r]); });
     if (frames.some(f => f?.lost)) this.lost = true;
@@ -207,7 +207,7 @@ class App {
   }
 
   theme() {
-    this.light = (recall('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark')) === 'light';
+    this.light = (stored('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark')) === 'light';
     document.documentElement.dataset.theme = this.light ? 'light' : 'dark';
     this.panes?.forEach(p => { p.state = null; p.legendState = null; });
     this.touch('scene', 'time');
@@ -227,7 +227,7 @@ class App {
     if (this.runs.length > 1) this.options.list = false;
     for (const key of ['options', `panes-${this.shape()}`]) {
       try {
-        for (const [name, value] of Object.entries(JSON.parse(recall(key) ?? '{}'))) if (typeof value === typeof this.options[name]) this.options[name] = value;
+        for (const [name, value] of Object.entries(JSON.parse(stored(key) ?? '{}'))) if (typeof value === typeof this.options[name]) this.options[name] = value;
       } catch { /* another version's */ }
     }
   }
@@ -378,7 +378,7 @@ class App {
     }
   }
 
-  /** Which of the optional things there are: the buttons change with it. */
+  /** Which optional data there are: the buttons depend on it. */
   shownOf() {
     return this.runs.map(r => [r.series.targets?.some(v => v !== null), r.hasSigma?.some(Boolean)].map(Boolean)).join();
   }
@@ -395,7 +395,7 @@ class App {
       if (changed) {
         const [run] = this.runs, grown = run.length > before && before > 0;
         if (grown) this.grownAt = performance.now();
-        // The same frame, wherever it stands now; the newest where that was looked at while it was the last.
+        // Stay on the same frame, wherever it is now; follow the newest if the last one was shown.
         const follow = grown && this.live && this.following;
         this.frame = follow ? run.length - 1 : run.places.get(name) ?? Math.min(this.frame, Math.max(0, run.length - 1));
         if (this.shownOf() !== had) this.build();
@@ -418,7 +418,7 @@ class App {
     const wanted = decodeURIComponent(location.hash.slice(1));
     await Promise.all(this.runs.map(run => run.refresh()));
     this.restore();
-    if (narrow() && recall(`panes-${this.shape()}`) === null) {
+    if (narrow() && stored(`panes-${this.shape()}`) === null) {
       // A high picture leaves no room for two and the cloud.
       const { size } = await api.frame(0, this.runs[0].names[0]).then(f => ({ size: f.intrinsics ?? { width: f.picture?.size[0], height: f.picture?.size[1] } })).catch(() => ({}));
       this.options.depth = !(size?.height > 0.55 * size?.width);
@@ -460,9 +460,9 @@ class App {
 
 const narrow = () => matchMedia('(max-width: 820px), (max-aspect-ratio: 3/4)').matches && !matchMedia('(max-height: 520px) and (orientation: landscape)').matches;
 
-// Private windows may refuse to remember.
+// Private windows may refuse to store anything.
 function remember(key, value) { try { localStorage.setItem(`deepfusion-${key}`, value); } catch { /* then not */ } }
-function recall(key) { try { return localStorage.getItem(`deepfusion-${key}`); } catch { return null; } }
+function stored(key) { try { return localStorage.getItem(`deepfusion-${key}`); } catch { return null; } }
 
 function message(title, text) {
   const element = document.createElement('div');
@@ -471,7 +471,7 @@ function message(title, text) {
   $('stage').replaceChildren(element);
 }
 
-/** What tests, and the console, may ask. */
+/** The interface for tests and the console. */
 const hook = window.deepfusion = { ready: false, geometry };
 
 try {

@@ -34,7 +34,7 @@ export class PicturePane {
     });
   }
 
-  /** What is painted: a bitmap, or the depth's sheet. */
+  /** The source that is painted: a bitmap, or the painted depth. */
   size(frame) {
     if (this.kind === 'depth' && frame?.depth) return [frame.depth.width, frame.depth.height];
     if (this.kind === 'picture' && frame?.bitmap) return [frame.bitmap.width, frame.bitmap.height];
@@ -42,7 +42,7 @@ export class PicturePane {
     return size ? [size.width, size.height] : frame?.bitmap ? [frame.bitmap.width, frame.bitmap.height] : null;
   }
 
-  /** The picture's place in the canvas, in CSS pixels. */
+  /** The picture's position in the canvas, in CSS pixels. */
   layout() {
     const { width, height } = this.canvas.getBoundingClientRect();
     const [w, h] = this.pixels ?? [16, 9];
@@ -121,14 +121,14 @@ export class PicturePane {
     ctx.clearRect(0, 0, at.pane.width, at.pane.height);
     const source = this.source(frame);
     if (source) {
-      // Pixels are told apart once they are large.
+      // Single pixels show once they are large.
       ctx.imageSmoothingEnabled = at.scale * canvas.ratio < 3;
       ctx.imageSmoothingQuality = 'high';
       ctx.drawImage(source, at.left, at.top, at.width, at.height);
     }
     if (frame?.camera && app.options.boxes) this.drawBoxes(ctx, at, frame);
     if (app.pointer) this.drawCross(ctx, at);
-    this.tell(frame);
+    this.describe(frame);
     if (this.legend) this.drawLegend();
   }
 
@@ -200,13 +200,13 @@ export class PicturePane {
     }
   }
 
-  tell(frame) {
+  describe(frame) {
     const { app } = this, run = app.runs[this.run];
     const name = app.runs.length > 1 ? `${'AB'[this.run]} ` : '';
     const size = this.pixels ? `${this.pixels[0]} × ${this.pixels[1]}` : '';
     const what = this.kind === 'picture' ? 'Picture' : this.against ? 'Depth, B against A' : 'Depth';
     const text = `${name}${what}<span>${app.runs.length > 1 ? escape(run.name) + ' ' : ''}${size}</span>`;
-    if (text !== this.told) this.caption.innerHTML = this.told = text;
+    if (text !== this.captioned) this.caption.innerHTML = this.captioned = text;
     const all = this.kind === 'picture'
       ? [frame?.imageProblem, ...(frame?.problems ?? []).filter(p => p !== frame.imageProblem && p !== frame.depthProblem)]
       : [frame?.depthProblem, frame && !frame.depth && !frame.depthProblem ? 'no depth for this frame' : null];
@@ -214,9 +214,9 @@ export class PicturePane {
     const problems = all.filter(Boolean);
     this.problem.hidden = problems.length === 0 || (app.hideProblems && !app.missing(this.run));
     this.problem.classList.toggle('bad', Boolean(this.kind === 'picture' ? frame?.imageProblem : frame?.depthProblem));
-    const told = problems.join('\n');
-    if (this.problem.textContent !== told) {
-      this.problem.textContent = told;
+    const list = problems.join('\n');
+    if (this.problem.textContent !== list) {
+      this.problem.textContent = list;
       this.problem.style.whiteSpace = 'pre-line';
     }
   }
@@ -260,7 +260,7 @@ export class PicturePane {
 
 export const escape = text => text.replace(/[&<>"]/g, c => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]);
 
-/** A target in a few signs: its number, metres, and its speed if it moves. */
+/** A target's short label: its number, metres, and its speed if it moves. */
 export function labelOf(target) {
   const distance = target.distance_m ?? Math.hypot(...target.center_m);
   const speed = target.moving && target.velocity_mps ? `  ${Math.hypot(...target.velocity_mps).toFixed(1)} m/s` : '';

@@ -9,12 +9,12 @@ export class Player {
     this.playing = false;
     this.rate = 1;
     this.loop = false;
-    /** When frames were shown, for the frames a second that are told. */
+    /** Times at which frames were shown, for the measured frame rate. */
     this.shownAt = [];
     this.waited = 0;
   }
 
-  /** Frames a second of the recording; 10 where no times are known. */
+  /** Frames per second of the recording; 10 if no times are known. */
   get fps() {
     const times = this.app.runs[0].series.time_s ?? [];
     if (this.timesOf !== times) {
@@ -61,7 +61,7 @@ export class Player {
     while (this.shownAt[0] < now - 1500) this.shownAt.shift();
   }
 
-  /** Frames a second that are really shown. */
+  /** Frames per second that are really shown. */
   get measured() {
     const shown = this.shownAt;
     return shown.length > 2 ? 1000 * (shown.length - 1) / (shown.at(-1) - shown[0]) : null;

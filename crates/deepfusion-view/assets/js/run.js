@@ -1,4 +1,4 @@
-// One folder of results: its list of frames, and the frames that are at hand.
+// One folder of results: its list of frames, and the frames that are loaded.
 
 import * as api from './api.js';
 import { Cache } from './cache.js';
@@ -36,7 +36,7 @@ export class Run {
     if (before && before !== frame && this.frames.entries.get(before.key)?.value !== before) before.bitmap?.close();
   }
 
-  /** Asks for the list of frames; whether it changed. */
+  /** Fetches the list of frames. Returns whether it changed. */
   async refresh() {
     const index = await api.index(this.number, this.version);
     this.failure = index.failure;
@@ -53,15 +53,15 @@ export class Run {
     return true;
   }
 
-  /** What tells a frame's present files apart from earlier ones. */
+  /** What distinguishes a frame's present files from earlier ones. */
   key(i) { return i >= 0 && i < this.length ? `${this.names[i]}@${this.revisions[i]}` : ''; }
 
-  /** A frame that is at hand; undefined otherwise. */
+  /** A frame that is loaded; undefined otherwise. */
   at(i) { return this.frames.get(this.key(i)); }
 
   has(i) { return this.frames.has(this.key(i)); }
 
-  /** A frame, fetched if need be. It always comes: what cannot be read is told in its `problems`. */
+  /** A frame, fetched if need be. It always comes: what cannot be read is listed in its `problems`. */
   load(i) {
     const key = this.key(i);
     if (!key) return Promise.resolve(undefined);
@@ -71,7 +71,7 @@ export class Run {
     if (!coming) {
       coming = this.fetch(this.names[i], this.hasDepth[i], this.hasSigma[i]).then(frame => {
         frame.key = key;
-        // A server that does not answer is asked again, not remembered.
+        // A failed request is retried, not cached.
         if (!frame.lost) this.frames.set(key, frame, frame.bytes);
         return frame;
       }).finally(() => this.coming.delete(key));
@@ -129,7 +129,7 @@ export class Run {
     return frame;
   }
 
-  /** Targets of the frames up to `i`, the newest last, as far as they are at hand; what is missing is asked for. */
+  /** Targets of the frames up to `i`, the newest last, as far as they are loaded; missing ones are requested. */
   history(i, count, arrived) {
     const found = [];
     for (let j = Math.max(0, i - count + 1); j <= i; j++) {

@@ -92,7 +92,7 @@ export function addCamera(lines, camera) {
   });
 }
 
-/** Boxes and where they will be in a second. */
+/** Boxes and their positions in a second. */
 export function addTargets(lines, frame, { byTrack, light, isChosen }) {
   for (const target of frame.targets) {
     const chosen = isChosen(target), corners = boxCorners(target);
@@ -116,7 +116,7 @@ function addArrow(lines, from, velocity, colour) {
   for (const sign of [1, -1]) lines.add(to, to.map((c, i) => c - head * way[i] + sign * 0.5 * head * side[i]), colour, 0.95, 2.4);
 }
 
-/** Where the targets and the camera were, in the present camera's axes. Without the camera's motion nothing can be said. */
+/** Where the targets and the camera were, in the present camera's axes. Without the camera's motion there are none. */
 export function addTracks(lines, frame, history, { byTrack, light, isChosen }) {
   if (!frame.worldFromCam) return;
   const camFromWorld = inverseMotion(frame.worldFromCam), states = new Map(frame.targets.map(t => [t.id, t]));

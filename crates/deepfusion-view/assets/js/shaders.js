@@ -1,4 +1,4 @@
-// What the graphics processor runs.
+// Shader programs.
 
 /** Points straight from the depth texture: no vertex is ever uploaded. Pixel, depth, camera axes, screen. */
 export const POINTS = {
@@ -52,7 +52,7 @@ void main() {
   }
   vec3 point = vec3((vec2(p) - camera.zw) / camera.xy * d, d);
   gl_Position = viewProjection * vec4(point, 1.0);
-  // As large as the way to the point below, so that what is seen at an angle is closed, too; within reason.
+  // As large as the distance to the point below, within limits, so that slanted surfaces are closed, too.
   float patchSize = d / camera.x * float(stride);
   float below = at(p + ivec2(0, stride));
   float way = below > 0.0 ? clamp(0.75 * abs(below - d), patchSize, 4.0 * patchSize) : patchSize;
@@ -68,7 +68,7 @@ void main() {
   }
   if (fades) {
     colour = mix(background, colour, sureness(p, d));
-    // What is left of the least sure would cover what is behind; a patch goes as a whole.
+    // The remains of an uncertain patch would cover what is behind it: a patch vanishes as a whole.
     if (sureness(whole, at(whole)) < 0.15) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   }
 }`,

@@ -129,13 +129,13 @@ export class Timeline {
       ctx.stroke(path);
     });
     const now = values[0][this.over ?? app.frame];
-    const told = now === null || now === undefined ? '–' : `${now.toFixed(Math.abs(now) < 10 ? (lane.key === 'targets' ? 0 : 2) : lane.key === 'targets' ? 0 : 1)}${lane.unit ? ' ' + lane.unit : ''}`;
+    const value = now === null || now === undefined ? '–' : `${now.toFixed(Math.abs(now) < 10 ? (lane.key === 'targets' ? 0 : 2) : lane.key === 'targets' ? 0 : 1)}${lane.unit ? ' ' + lane.unit : ''}`;
     ctx.textBaseline = 'middle';
     ctx.font = '10.500px system-ui, sans-serif';
     ctx.textAlign = 'left';
     if (narrow) {
       ctx.font = '600 10.500px system-ui, sans-serif';
-      const both = `${lane.text}  ${told}`;
+      const both = `${lane.text}  ${value}`;
       ctx.lineWidth = 3;
       ctx.strokeStyle = css(themeColour('--panel'), 0.85);
       ctx.strokeText(both, 10, top + 8);
@@ -148,7 +148,7 @@ export class Timeline {
       ctx.fillStyle = colours.text;
       ctx.textAlign = 'right';
       const free = this.gutter - 14 - ctx.measureText(lane.text).width - 6;
-      if (ctx.measureText(told).width <= free) ctx.fillText(told, this.gutter - 8, top + tall / 2);
+      if (ctx.measureText(value).width <= free) ctx.fillText(value, this.gutter - 8, top + tall / 2);
     }
     ctx.textBaseline = 'alphabetic';
   }

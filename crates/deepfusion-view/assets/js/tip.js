@@ -2,7 +2,7 @@
 
 const element = document.getElementById('tip');
 
-/** Tells the depth under the pointer, of both runs where there are two. */
+/** Shows the depth under the pointer, of both runs if there are two. */
 export function tip(app) {
   const { pointer } = app, first = pointer && app.pixelUnderPointer(pointer.run);
   element.hidden = !first;

@@ -19,7 +19,7 @@ export async function showTraining(stage, runs) {
     chart.className = 'chart';
     chart.innerHTML = `<h3>${escape(column.replaceAll('_', ' '))}<span></span></h3><canvas></canvas>`;
     element.querySelector('.charts').append(chart);
-    return { column, canvas: chart.querySelector('canvas'), told: chart.querySelector('span') };
+    return { column, canvas: chart.querySelector('canvas'), readout: chart.querySelector('span') };
   });
   stage.replaceChildren(element);
   const picks = [...element.querySelectorAll('.pick')], pictures = [...element.querySelectorAll('.panel img')];
@@ -40,14 +40,14 @@ export async function showTraining(stage, runs) {
   draw();
 }
 
-function drawChart({ column, canvas, told }, logs) {
+function drawChart({ column, canvas, readout }, logs) {
   fit(canvas);
   const ctx = canvas.getContext('2d'), width = canvas.width / canvas.ratio, height = canvas.height / canvas.ratio;
   ctx.setTransform(canvas.ratio, 0, 0, canvas.ratio, 0, 0);
   ctx.clearRect(0, 0, width, height);
   const lines = logs.flatMap((log, i) => ['train', 'validation'].map(part => ({
     colour: PALETTE[i % 2], dots: part === 'validation',
-    // A validation takes no step: what it says of steps is 0.
+    // A validation makes no step: its step columns are 0.
     points: (part === 'validation' && ['learning_rate', 'images_per_second'].includes(column) ? [] : log[part][column] ?? []).map((v, j) => [log[part][log.step_column][j], v]).filter(p => p[0] !== null && p[1] !== null),
   }))).filter(l => l.points.length);
   const all = lines.flatMap(l => l.points);
@@ -87,7 +87,7 @@ function drawChart({ column, canvas, told }, logs) {
     draw(line.points, 0.3, 1);
     draw(smooth(line.points), 1, 1.6);
   }
-  told.textContent = Number(smooth(lines[0].points).at(-1)[1].toPrecision(4)).toString();
+  readout.textContent = Number(smooth(lines[0].points).at(-1)[1].toPrecision(4)).toString();
 }
 
 /** An exponential mean over about a fiftieth of the points. */

@@ -6,9 +6,9 @@ use std::hash::{Hash, Hasher};
 
 use super::summary::Summary;
 
-/// What a file is to its frame, by its name.
+/// The kind of a frame's file, by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Part {
+pub(crate) enum FileKind {
     /// `NAME.json`.
     Sidecar,
     /// `NAME_depth.png` or `.npy`.
@@ -21,40 +21,40 @@ pub(crate) enum Part {
     Targets,
 }
 
-/// The parts' names: endings, and what they mean. The plain `.json` is last: it ends others, too.
-const ENDINGS: [(&str, Part); 8] = [
-    ("_depth.png", Part::Depth),
-    ("_depth.npy", Part::Depth),
-    ("_sigma.npy", Part::Sigma),
-    ("_image.jpg", Part::Image),
-    ("_image.jpeg", Part::Image),
-    ("_image.png", Part::Image),
-    ("_targets.json", Part::Targets),
-    (".json", Part::Sidecar),
+/// File name endings, and the kind each means. The plain `.json` is last: it ends others, too.
+const ENDINGS: [(&str, FileKind); 8] = [
+    ("_depth.png", FileKind::Depth),
+    ("_depth.npy", FileKind::Depth),
+    ("_sigma.npy", FileKind::Sigma),
+    ("_image.jpg", FileKind::Image),
+    ("_image.jpeg", FileKind::Image),
+    ("_image.png", FileKind::Image),
+    ("_targets.json", FileKind::Targets),
+    (".json", FileKind::Sidecar),
 ];
 
-/// The frame and part that a file's name stands for.
-pub(super) fn part_of(file: &str) -> Option<(&str, Part)> {
+/// The frame and kind that a file's name stands for.
+pub(super) fn frame_and_kind(file: &str) -> Option<(&str, FileKind)> {
     // Temporary files begin with a dot; a shard's manifest is no sidecar.
     if file.starts_with('.') || file.ends_with(".manifest.json") {
         return None;
     }
-    let (name, part) = ENDINGS
+    let (name, kind) = ENDINGS
         .iter()
-        .find_map(|(ending, part)| Some((file.strip_suffix(ending)?, *part)))?;
-    (!name.is_empty()).then_some((name, part))
+        .find_map(|(ending, kind)| Some((file.strip_suffix(ending)?, *kind)))?;
+    (!name.is_empty()).then_some((name, kind))
 }
 
-/// A file of a frame: its name, and what tells that it changed.
+/// A file of a frame: its name, and what shows that it changed.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) struct PartFile {
+pub(crate) struct FrameFile {
     /// Its name in the folder.
     pub file: String,
     /// Bytes and time of change.
     mark: (u64, u128),
 }
 
-impl PartFile {
+impl FrameFile {
     pub fn new(file: String, meta: &Metadata) -> Self {
         let since = meta
             .modified()
@@ -73,11 +73,11 @@ impl PartFile {
 pub(crate) struct Entry {
     /// What its files' names begin with.
     pub name: String,
-    pub sidecar: Option<PartFile>,
-    pub depth: Option<PartFile>,
-    pub sigma: Option<PartFile>,
-    pub image: Option<PartFile>,
-    pub targets: Option<PartFile>,
+    pub sidecar: Option<FrameFile>,
+    pub depth: Option<FrameFile>,
+    pub sigma: Option<FrameFile>,
+    pub image: Option<FrameFile>,
+    pub targets: Option<FrameFile>,
     /// `None` until its small files were read.
     pub summary: Option<Summary>,
 }
@@ -91,20 +91,20 @@ impl Entry {
     }
 
     /// Takes in a file. Of two of a kind the first in the order of names stays (`.npy`, whose metres are exact, before `.png`).
-    pub fn add(&mut self, part: Part, file: PartFile) {
-        let place = match part {
-            Part::Sidecar => &mut self.sidecar,
-            Part::Depth => &mut self.depth,
-            Part::Sigma => &mut self.sigma,
-            Part::Image => &mut self.image,
-            Part::Targets => &mut self.targets,
+    pub fn add(&mut self, kind: FileKind, file: FrameFile) {
+        let place = match kind {
+            FileKind::Sidecar => &mut self.sidecar,
+            FileKind::Depth => &mut self.depth,
+            FileKind::Sigma => &mut self.sigma,
+            FileKind::Image => &mut self.image,
+            FileKind::Targets => &mut self.targets,
         };
         if place.as_ref().is_none_or(|there| file.file < there.file) {
             *place = Some(file);
         }
     }
 
-    /// A number that is another one when one of the files has changed.
+    /// A number that changes with any of the files.
     pub fn revision(&self) -> u64 {
         let mut hash = DefaultHasher::new();
         let files = [
@@ -125,17 +125,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_told_apart() {
+    fn names_are_split_into_frame_and_kind() {
         for (file, expected) in [
-            ("0000000005.json", Some(("0000000005", Part::Sidecar))),
+            ("0000000005.json", Some(("0000000005", FileKind::Sidecar))),
             (
                 "0000000005_targets.json",
-                Some(("0000000005", Part::Targets)),
+                Some(("0000000005", FileKind::Targets)),
             ),
-            ("a_b_depth.npy", Some(("a_b", Part::Depth))),
-            ("a_depth.png", Some(("a", Part::Depth))),
-            ("a_sigma.npy", Some(("a", Part::Sigma))),
-            ("a_image.jpeg", Some(("a", Part::Image))),
+            ("a_b_depth.npy", Some(("a_b", FileKind::Depth))),
+            ("a_depth.png", Some(("a", FileKind::Depth))),
+            ("a_sigma.npy", Some(("a", FileKind::Sigma))),
+            ("a_image.jpeg", Some(("a", FileKind::Image))),
             ("predict-1-of-1.manifest.json", None),
             (".a.json.12-0.partial", None),
             (".a.json", None),
@@ -144,7 +144,7 @@ mod tests {
             ("a_color.png", None),
             ("a.ply", None),
         ] {
-            assert_eq!(part_of(file), expected, "{file}");
+            assert_eq!(frame_and_kind(file), expected, "{file}");
         }
     }
 }

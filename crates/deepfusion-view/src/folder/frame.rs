@@ -1,4 +1,4 @@
-//! All that is said about one frame.
+//! The details of one frame.
 
 use std::fs::File;
 use std::io::Read;
@@ -33,7 +33,7 @@ const PASSED_ON: [&str; 12] = [
 /// `name` may be missing.
 pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
     let mut problems = Vec::new();
-    let mut small = |file: &Option<super::entry::PartFile>| {
+    let mut small = |file: &Option<super::entry::FrameFile>| {
         let outcome = read_json(&folder.join(&file.as_ref()?.file));
         outcome.map_err(|e| problems.push(e.to_string())).ok()
     };
@@ -106,7 +106,7 @@ pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
     frame
 }
 
-/// Targets without those that have no place or size: nothing of them can be drawn.
+/// Targets without a position or size are dropped: they cannot be drawn.
 fn checked_targets(frame: &Value, problems: &mut Vec<String>) -> Value {
     let mut frame = frame.clone();
     let Some(list) = frame.get_mut("targets").and_then(Value::as_array_mut) else {
@@ -119,9 +119,10 @@ fn checked_targets(frame: &Value, problems: &mut Vec<String>) -> Value {
             && numbers::<3>(t.get("size_m")).is_some_and(|s| s.iter().all(|side| *side > 0.0))
     });
     if list.len() < all {
+        let unusable = all - list.len();
+        let verb = if unusable == 1 { "has" } else { "have" };
         problems.push(format!(
-            "{} of {all} targets have no place or size",
-            all - list.len()
+            "{unusable} of {all} targets {verb} no position or size"
         ));
     }
     frame
@@ -149,7 +150,7 @@ pub(crate) struct Picture {
     pub content_type: &'static str,
     /// Width and height.
     pub size: (u32, u32),
-    /// Whether it is another file than depth was made of.
+    /// Whether it has changed since depth was made from it.
     pub changed: bool,
 }
 
@@ -179,7 +180,7 @@ fn picture(folder: &Path, entry: &Entry, sidecar: Option<&Value>) -> Result<Pict
         .map(|p| (p, true))
         .chain(beside.iter().map(|p| (p, false)))
     {
-        match look(path) {
+        match picture_type(path) {
             Ok(Some((content_type, size))) => {
                 let said = sidecar
                     .filter(|_| is_named)
@@ -204,9 +205,9 @@ fn picture(folder: &Path, entry: &Entry, sidecar: Option<&Value>) -> Result<Pict
     })
 }
 
-/// What a picture is, from its first bytes; `None` where there is no file or none of a picture. Only what this accepts is ever sent, so
-/// that a sidecar cannot name any other file.
-fn look(path: &Path) -> Result<Option<(&'static str, (u32, u32))>> {
+/// A picture's type, from its first bytes; `None` if there is no file or it is not a picture. Only accepted files are ever sent,
+/// so that a sidecar cannot expose any other file.
+fn picture_type(path: &Path) -> Result<Option<(&'static str, (u32, u32))>> {
     // Not a pipe or a device: those may block.
     if !std::fs::metadata(path).is_ok_and(|m| m.is_file()) {
         return Ok(None);

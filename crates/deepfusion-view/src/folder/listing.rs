@@ -7,12 +7,12 @@ use std::time::{Duration, Instant, SystemTime};
 
 use serde_json::{Value, json};
 
-use super::entry::{Entry, PartFile, part_of};
+use super::entry::{Entry, FrameFile, frame_and_kind};
 use super::order::natural;
 use super::summary::Summary;
 
-/// Files that are written in place change without the folder noticing; so often they are looked at all the same.
-const LOOK_AGAIN: Duration = Duration::from_secs(5);
+/// Files that are written in place change without the folder noticing; so the folder is listed again after this time in any case.
+const RELIST_AFTER: Duration = Duration::from_secs(5);
 /// How long an answer may be held up by reading small files; the rest is read for the next one.
 const READING_TIME: Duration = Duration::from_millis(150);
 
@@ -25,7 +25,7 @@ pub(super) struct Listing {
     /// Counts the changes, from 1.
     version: u64,
     /// When the folder was listed, and the time of change that it had.
-    looked: Option<(Instant, SystemTime)>,
+    listed: Option<(Instant, SystemTime)>,
 }
 
 impl Listing {
@@ -35,7 +35,7 @@ impl Listing {
             entries: Vec::new(),
             places: HashMap::new(),
             version: 1,
-            looked: None,
+            listed: None,
         }
     }
 
@@ -65,9 +65,9 @@ impl Listing {
         let changed = std::fs::metadata(&self.folder)?
             .modified()
             .unwrap_or(SystemTime::UNIX_EPOCH);
-        if let Some((when, at_change)) = self.looked
+        if let Some((when, at_change)) = self.listed
             && at_change == changed
-            && when.elapsed() < LOOK_AGAIN
+            && when.elapsed() < RELIST_AFTER
         {
             return Ok(());
         }
@@ -77,10 +77,10 @@ impl Listing {
             let Ok(file_name) = file.file_name().into_string() else {
                 continue;
             };
-            let Some((name, part)) = part_of(&file_name) else {
+            let Some((name, kind)) = frame_and_kind(&file_name) else {
                 continue;
             };
-            // A file that went between the two calls is none.
+            // A file that was removed between the two calls is ignored.
             let Ok(meta) = std::fs::metadata(file.path()) else {
                 continue;
             };
@@ -89,11 +89,11 @@ impl Listing {
                     hash_map::Entry::Occupied(there) => there.into_mut(),
                     hash_map::Entry::Vacant(free) => free.insert(Entry::new(name)),
                 };
-                entry.add(part, PartFile::new(file_name, &meta));
+                entry.add(kind, FrameFile::new(file_name, &meta));
             }
         }
         self.replace(found);
-        self.looked = Some((Instant::now(), changed));
+        self.listed = Some((Instant::now(), changed));
         Ok(())
     }
 
@@ -136,7 +136,7 @@ impl Listing {
         }
     }
 
-    /// As the page gets it: columns, a place a frame.
+    /// The list as sent to the page: columns with one entry per frame.
     pub fn json(&self, known: Option<u64>, failure: Option<String>) -> Value {
         let version = self.version;
         if known == Some(version) && failure.is_none() {

@@ -1,4 +1,4 @@
-//! A folder of results, read anew as it grows.
+//! A folder of results, refreshed as it grows.
 
 mod entry;
 mod frame;
@@ -9,7 +9,7 @@ mod summary;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-pub(crate) use entry::{Entry, PartFile};
+pub(crate) use entry::{Entry, FrameFile};
 pub(crate) use frame::{frame_json, picture_of, targets_of};
 #[cfg(feature = "rerun")]
 pub(crate) use summary::{Summary, numbers};
@@ -21,14 +21,14 @@ use crate::{Error, Result};
 /// What a folder holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// What `predict` or `perceive` wrote.
+    /// The output of `predict` or `perceive`.
     Predictions,
     /// A training run without predictions: its learning curve and panels.
     Training,
 }
 
 impl Kind {
-    /// In words.
+    /// A description for messages.
     pub fn describe(self) -> &'static str {
         match self {
             Self::Predictions => "predictions",
@@ -46,10 +46,10 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Looks into a folder that `predict` or `perceive` wrote (or still writes), or a run of `train`.
+    /// Opens a folder that `predict` or `perceive` wrote (or still writes), or a run of `train`.
     ///
     /// # Errors
-    /// [`Error::NoSuchFolder`], [`Error::NotAFolder`], [`Error::File`] where it cannot be listed, [`Error::NothingToShow`].
+    /// [`Error::NoSuchFolder`], [`Error::NotAFolder`], [`Error::File`] if it cannot be listed, [`Error::NothingToShow`].
     pub fn open(path: &Path) -> Result<Self> {
         match std::fs::metadata(path) {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
@@ -89,7 +89,7 @@ impl Folder {
         &self.path
     }
 
-    /// How many frames it held when it was last looked at; 0 for a training run.
+    /// Number of frames when it was last listed; 0 for a training run.
     #[must_use]
     pub fn frames(&self) -> usize {
         self.listing().len()
@@ -114,7 +114,7 @@ impl Folder {
         )
     }
 
-    /// The list of frames as JSON, looked at anew; only that nothing changed where the client's `known` version is the present one.
+    /// The list of frames as JSON, refreshed; only a note that nothing changed if the client's `known` version is current.
     pub(crate) fn index_json(&self, known: Option<u64>) -> serde_json::Value {
         let mut listing = self.listing();
         let failure = listing.refresh().err().map(|e| e.to_string());

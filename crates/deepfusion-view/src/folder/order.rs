@@ -1,4 +1,4 @@
-//! The order in which a person counts: `frame2` before `frame10`.
+//! Natural order of names: `frame2` before `frame10`.
 
 use std::cmp::Ordering;
 

@@ -15,7 +15,7 @@ const MOST_JSON_BYTES: u64 = 16 << 20;
 pub(crate) struct Summary {
     /// Whether this is a frame at all: other JSON files may lie in the folder.
     pub is_frame: bool,
-    /// What is wrong with a small file.
+    /// The problem with a small file, if any.
     pub problem: Option<String>,
     pub time_s: Option<f64>,
     pub depth_m: Option<[f64; 2]>,
@@ -36,7 +36,7 @@ impl Summary {
             ..Self::default()
         };
         let mut problems = Vec::new();
-        let mut small = |file: &Option<super::entry::PartFile>| {
+        let mut small = |file: &Option<super::entry::FrameFile>| {
             let outcome = read_json(&folder.join(&file.as_ref()?.file));
             outcome.map_err(|e| problems.push(e.to_string())).ok()
         };
@@ -70,7 +70,7 @@ impl Summary {
         self.add_scale(frame);
     }
 
-    /// What `predict` and `perceive` say of the metres.
+    /// The scale fields of the sidecar of `predict` and `perceive`.
     fn add_scale(&mut self, file: &Value) {
         if let Some(monitor) = file.get("scale_monitor").filter(|m| m.is_object()) {
             self.scale_ratio = monitor.get("ratio").and_then(Value::as_f64);

@@ -1,4 +1,4 @@
-//! As much of HTTP/1.1 as one page needs: GET and HEAD, connections that stay open, limits on everything a client chooses.
+//! The subset of HTTP/1.1 that one page needs: GET and HEAD, persistent connections, limits on everything a client chooses.
 
 mod connection;
 mod request;

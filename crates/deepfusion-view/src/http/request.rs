@@ -9,7 +9,7 @@ pub(crate) struct Request {
     pub path: Vec<String>,
     /// The query's pairs, percent-decoded.
     pub query: Vec<(String, String)>,
-    /// The host that the client believes to speak to, without its port.
+    /// The host that the client addressed, without its port.
     pub host: Option<String>,
     /// Whether the connection may stay open.
     pub keep_alive: bool,
@@ -25,7 +25,7 @@ pub(crate) enum Refusal {
 }
 
 impl Request {
-    /// Of a head's bytes; `None` while it is not complete. With it the number of bytes it took.
+    /// Parses a request's head; `None` while it is incomplete. Returns it with its length in bytes.
     pub fn parse(bytes: &[u8]) -> Result<Option<(Self, usize)>, Refusal> {
         let mut headers = [httparse::EMPTY_HEADER; 64];
         let mut head = httparse::Request::new(&mut headers);
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_answered_is_told_apart() {
+    fn what_is_not_answered_is_distinguished() {
         assert_eq!(parsed("GET / HTTP/1.1\r\nHo"), Ok(None));
         assert_eq!(parsed("POST / HTTP/1.1\r\n\r\n"), Err(Refusal::Method));
         assert_eq!(

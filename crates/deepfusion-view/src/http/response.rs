@@ -1,4 +1,4 @@
-//! An answer, and how it is written.
+//! A response, and how it is written.
 
 use std::borrow::Cow;
 use std::io::{self, Write};
@@ -16,7 +16,7 @@ const POLICY: &str = "default-src 'self'; img-src 'self' blob: data:; style-src 
                       base-uri 'none'; frame-ancestors 'none'";
 
 impl Response {
-    /// Something found.
+    /// A successful response.
     pub fn ok(content_type: &'static str, body: impl Into<Cow<'static, [u8]>>) -> Self {
         Self {
             status: 200,

@@ -130,7 +130,7 @@ fn picture(
     size: Option<(u32, u32)>,
     problems: &mut Vec<String>,
 ) -> Option<EncodedImage> {
-    // That there is none has been told with the frame, as has a size that the sidecar contradicts.
+    // A missing file has been reported with the frame, as has a size that contradicts the sidecar.
     let picture = picture_of(folder, entry).ok()?;
     if size.is_some_and(|size| size != picture.size) {
         return None;

@@ -3,7 +3,7 @@
 //! | Entity | Holds |
 //! |---|---|
 //! | `world` | the axes: x right, y down, z forward, of the recording's first camera |
-//! | `world/camera` | `world_from_cam`; identity where the camera's way is not known |
+//! | `world/camera` | `world_from_cam`; identity if the camera's motion is unknown |
 //! | `world/camera/image` | the pinhole camera |
 //! | `world/camera/image/rgb`, `…/depth` | the picture's own bytes; depth in the numbers of its file, with their metre |
 //! | `world/camera/targets`, `…/velocities`, `…/ground` | boxes, where they will be in a second, the road's plane; in the camera's axes |
@@ -42,8 +42,8 @@ pub struct RerunReport {
     pub problems: Vec<(String, String)>,
 }
 
-/// Writes all frames of a folder to a file for the rerun viewer, beside its name first. What is wrong with a frame is reported, and the
-/// rest goes on. `progress` is told the frames done and in all; where `stop` says so, nothing stays behind.
+/// Writes all frames of a folder to a file for the rerun viewer, beside its name first. What is wrong with a frame is reported,
+/// and the rest goes on. `progress` receives the frames done and the total; if `stop` returns true, nothing is left behind.
 ///
 /// # Errors
 /// [`Error::NoFrames`] for a training run, [`Error::Stopped`], [`Error::File`] where writing fails, [`Error::Encoding`].

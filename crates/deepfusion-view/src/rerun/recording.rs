@@ -1,4 +1,4 @@
-//! Messages of the viewer, one after the other.
+//! Writes the viewer's messages in order.
 
 use std::collections::HashSet;
 use std::io::Write;
@@ -20,12 +20,12 @@ const APPLICATION: &str = "deepfusion";
 pub(super) struct Recording<W: Write> {
     encoder: Encoder<W>,
     store: StoreId,
-    /// Entities that show something now: what is not there any more has to be taken away.
+    /// Entities with content, which has to be cleared when it disappears.
     shown: HashSet<&'static str>,
 }
 
 impl<W: Write> Recording<W> {
-    /// Begins with what holds at all times. `name` is what a person calls it.
+    /// Begins with the static content. `name` is shown to users.
     pub fn begin(out: W, name: &str) -> Result<Self, Problem> {
         // Another id each time: two files of one folder stay two recordings.
         let store = StoreId::random(StoreKind::Recording, APPLICATION);
@@ -53,7 +53,7 @@ impl<W: Write> Recording<W> {
         Ok(recording)
     }
 
-    /// Logs what an entity shows from then on.
+    /// Logs an entity's content from then on.
     pub fn log(
         &mut self,
         entity: &'static str,
@@ -64,7 +64,7 @@ impl<W: Write> Recording<W> {
         self.append(entity.into(), time, what)
     }
 
-    /// Logs what an entity shows, or that it shows nothing any more: the viewer holds on to the last thing it was told.
+    /// Logs an entity's content, or clears it: the viewer keeps showing the last logged content.
     pub fn log_or_clear(
         &mut self,
         entity: &'static str,

@@ -80,7 +80,7 @@ pub(super) fn boxes(targets: &[SeenTarget]) -> Option<Boxes3D> {
     })
 }
 
-/// From the centre of what moves to where it will be in a second.
+/// From the centre of each dynamic target to its position in a second.
 pub(super) fn velocities(targets: &[SeenTarget]) -> Option<Arrows3D> {
     let moving: Vec<_> = targets
         .iter()

@@ -1,4 +1,4 @@
-//! Where the targets were, in the world's axes (those of the recording's first camera).
+//! Paths of the targets, in the world's axes (those of the recording's first camera).
 
 use std::collections::{HashMap, VecDeque};
 
@@ -20,7 +20,8 @@ pub(super) struct Tracks {
 type Way = VecDeque<(usize, [f32; 3])>;
 
 impl Tracks {
-    /// Takes in a frame; the ways of its targets, where there are any. Without the camera's place there is no world to draw them in.
+    /// Adds a frame and returns the paths of its targets, if there are any. Without the camera's pose there is no world to draw
+    /// them in.
     pub fn add(
         &mut self,
         targets: &[SeenTarget],

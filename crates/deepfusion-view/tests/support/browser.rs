@@ -47,7 +47,7 @@ fn program() -> Option<PathBuf> {
 }
 
 impl Browser {
-    /// Starts it with a window of the given size; `None`, and a word about it, where there is none.
+    /// Starts it with a window of the given size; prints a note and returns `None` if there is no browser.
     pub fn start(width: u32, height: u32) -> Option<Self> {
         let Some(program) = program() else {
             eprintln!("no Chromium found (CHROMIUM names one): the page is not tested");

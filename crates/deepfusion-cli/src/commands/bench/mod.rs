@@ -282,7 +282,7 @@ impl Bench {
                 time_s,
                 world_from_cam: Se3::identity(),
             };
-            Ok(perception.look(&self.truth, &self.k, Some(stamp))?)
+            Ok(perception.detect(&self.truth, &self.k, Some(stamp))?)
         })
     }
 

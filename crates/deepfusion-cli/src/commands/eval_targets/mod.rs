@@ -156,7 +156,7 @@ impl Measured {
     /// What stands there.
     fn targets(&self, perception: &mut Perception, stamp: Option<Stamp>) -> Result<Vec<Target>> {
         let sigma = self.sigma.as_ref();
-        let seen = perception.look_with_sigma(&self.depth, sigma, &self.camera, stamp, &[])?;
+        let seen = perception.detect_with_sigma(&self.depth, sigma, &self.camera, stamp, &[])?;
         Ok(seen.targets)
     }
 }
@@ -223,7 +223,7 @@ impl Work {
             };
             let motion = motions.of(dataset, *index);
             if !motion.goes_on {
-                self.perception.forget();
+                self.perception.reset();
             }
             let targets = measured.targets(&mut self.perception, motion.stamp)?;
             // Without a witness nothing says which boxes are seen: such a frame is followed, but not scored.
@@ -245,7 +245,7 @@ impl Work {
         let before = self.scorer.score().frames;
         for frame in object_frames::read(folder)? {
             self.scorer.begin_drive();
-            self.perception.forget();
+            self.perception.reset();
             let Some(measured) = self.source.of_object_frame(&frame)? else {
                 continue;
             };

@@ -90,7 +90,7 @@ impl<'a> Eyes<'a> {
         }
         let camera = loaded.camera.ok_or(CliError::NoCamera)?;
         if !motion.goes_on {
-            self.perception.forget();
+            self.perception.reset();
         }
         let whole = prediction.depth();
         let sigma = uncertainty::sigma(&prediction, &whole, &self.intervals);
@@ -99,7 +99,7 @@ impl<'a> Eyes<'a> {
         let things = self.spotter.find(&loaded.image, &depth)?;
         let perception = &mut self.perception;
         let surroundings =
-            perception.look_with_sigma(&depth, sigma.as_ref(), &k, motion.stamp, &things)?;
+            perception.detect_with_sigma(&depth, sigma.as_ref(), &k, motion.stamp, &things)?;
         let collision = motion.speed_mps.and_then(|speed| {
             let vehicle = VehicleShape::default();
             time_to_collision(&surroundings.targets, speed, motion.yaw_rate, &vehicle)

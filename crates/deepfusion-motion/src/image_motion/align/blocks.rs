@@ -1,16 +1,16 @@
-//! The last refinement: every block of the picture grows by itself, and the picture may roll.
+//! The last refinement: every block of the picture has its own growth, and the picture may roll.
 //!
-//! What is near grows faster than what is far: a house on one side, taken as growing like the rest,
-//! looks like a turn to the other side. Turning moves all alike and rolling turns all about the
-//! centre; driving moves everything along its own ray from the centre by an amount of its own. With a
-//! growth per block, only what no driving explains is left to shift, drop and roll.
+//! Near objects grow faster than far ones: with a single growth, a house on one side looks like a
+//! turn to the other side. A turn moves all pixels alike, and a roll rotates them about the centre;
+//! driving moves each along its own ray from the centre by its own amount. With a growth per block,
+//! only what driving cannot explain is left to shift, drop and roll.
 
 use super::{Plane, Reading, Warp, aligned_rows, centre};
 use nalgebra::{Matrix4, Vector4};
 
 /// Blocks across and down.
 const GRID: (usize, usize) = (10, 3);
-/// How much the growth of a block is expected to differ from the others', per pair of frames.
+/// Prior standard deviation of the blocks' growths, per pair of frames.
 const SPREAD: f64 = 0.1;
 const ITERATIONS: usize = 8;
 

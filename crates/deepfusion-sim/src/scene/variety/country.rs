@@ -6,7 +6,7 @@ use super::site::{Site, Spot};
 use super::street::{Section, Side, apply_widths};
 use crate::scene::ObjectClass;
 use crate::texture::ground::{Beyond, Paving, Stretch};
-use crate::texture::look::Line;
+use crate::texture::ground_style::Line;
 use rand::Rng;
 
 /// Furnishes a country road.
@@ -23,7 +23,7 @@ pub fn furnish(site: &mut Site) {
             half_width: half as f32,
             sides: [Side::open(), Side::open()],
         });
-        let look = ground(site, half);
+        let style = ground(site, half);
         site.world.stretches.push(Stretch {
             dashes: [0.0; 2],
             edge_lines: false,
@@ -32,15 +32,15 @@ pub fn furnish(site: &mut Site) {
             bays: false,
             beyond: [Beyond::Grass; 2],
             paving: [Paving::Asphalt; 2],
-            look: Some(look),
+            style: Some(style),
         });
         from = to;
     }
     // The road itself stays the same.
-    let road = site.world.stretches[0].look.map(|look| look.road);
+    let road = site.world.stretches[0].style.map(|style| style.road);
     for stretch in &mut site.world.stretches {
-        if let (Some(look), Some(road)) = (&mut stretch.look, road) {
-            look.road = road;
+        if let (Some(style), Some(road)) = (&mut stretch.style, road) {
+            style.road = road;
         }
     }
     apply_widths(site, &sections);
@@ -53,16 +53,16 @@ pub fn furnish(site: &mut Site) {
     site.hills(0.75);
 }
 
-fn ground(site: &mut Site, half: f64) -> crate::texture::look::Look {
-    let mut look = site.look(half as f32);
+fn ground(site: &mut Site, half: f64) -> crate::texture::ground_style::GroundStyle {
+    let mut style = site.style(half as f32);
     if site.chance(0.85) {
-        look.road = site.asphalt();
+        style.road = site.asphalt();
     } else {
-        look.road = site.loose();
-        look.lines = [None; 6];
+        style.road = site.loose();
+        style.lines = [None; 6];
     }
-    look.crossing = 0.0;
-    look.beyond = [0, 1].map(|_| {
+    style.crossing = 0.0;
+    style.beyond = [0, 1].map(|_| {
         if site.chance(0.4) {
             site.field()
         } else {
@@ -71,14 +71,14 @@ fn ground(site: &mut Site, half: f64) -> crate::texture::look::Look {
     });
     if site.chance(0.5) {
         for (slot, side) in [(2, -1.0), (3, 1.0)] {
-            look.lines[slot] = Some(Line {
+            style.lines[slot] = Some(Line {
                 at: side * (half as f32 - 0.25),
                 half: 0.06,
                 dash: [0.0; 2],
             });
         }
     }
-    look
+    style
 }
 
 /// One side of a section.

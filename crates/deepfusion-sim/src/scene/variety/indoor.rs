@@ -4,7 +4,7 @@ use super::site::{Site, Spot};
 use crate::road::Road;
 use crate::scene::{ObjectClass, Room};
 use crate::texture::ground::{Beyond, Paving, Stretch};
-use crate::texture::look::{Kind as Floor, Look, Surface};
+use crate::texture::ground_style::{GroundStyle, Kind as Floor, Surface};
 use crate::texture::pattern::{Kind, Pattern, wall_colour};
 use crate::texture::{Material, Rgb};
 use rand::Rng;
@@ -110,7 +110,7 @@ fn floor(site: &mut Site) -> Surface {
 
 fn lay(site: &mut Site, room: &Room) {
     let road = floor(site);
-    let look = Look {
+    let style = GroundStyle {
         road,
         pavement: [road; 2],
         beyond: [road; 2],
@@ -135,7 +135,7 @@ fn lay(site: &mut Site, room: &Room) {
         bays: false,
         beyond: [Beyond::Paved; 2],
         paving: [Paving::Slabs; 2],
-        look: Some(look),
+        style: Some(style),
     });
     let road = &site.world.road;
     let (from, to) = (road.index_at(room.low[0]), road.index_at(room.high[0]));

@@ -50,7 +50,7 @@ pub fn vehicles(world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> Vec<CarMo
             waist: rng.random_range(1.2..1.5),
             cabin: [0.0; 2],
             roof: [0.0; 2],
-            bonnet: [rng.random_range(0.5..1.0), rng.random_range(0.25..0.5)],
+            hood: [rng.random_range(0.5..1.0), rng.random_range(0.25..0.5)],
         };
         models.push(van(world, rng, kit, body));
     }
@@ -78,7 +78,7 @@ fn varied(rng: &mut ChaCha8Rng, body: &Body) -> Body {
         x[1] = (x[1] * l + rng.random_range(-0.1..0.1)).max(-0.49 * body.size[0]);
     }
     body.roof[1] = body.roof[1].max(body.cabin[1] + 0.05);
-    body.bonnet[1] *= rng.random_range(0.7..1.3);
+    body.hood[1] *= rng.random_range(0.7..1.3);
     body
 }
 
@@ -101,12 +101,12 @@ fn shell(half: f32, wide: f32, top: f32, bevel: [f32; 2]) -> Hull {
 }
 
 /// Collects the parts of a model.
-struct Parts<'a> {
+struct ModelParts<'a> {
     world: &'a mut World,
     parts: Vec<(Shape, [f64; 3], u32)>,
 }
 
-impl Parts<'_> {
+impl ModelParts<'_> {
     fn hull(&mut self, hull: Hull, at: [f64; 3], material: u32) {
         let index = self.world.hull(hull);
         self.parts.push((Shape::Hull(index), at, material));
@@ -154,20 +154,20 @@ fn van(world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit, body: Body) -> CarMod
     let upper = painted(world, colour, body.size, body.waist, true);
     let side = kit.wild[rng.random_range(0..kit.wild.len())];
     let load = if rng.random_bool(0.4) { side } else { lower };
-    let mut parts = Parts {
+    let mut parts = ModelParts {
         world,
         parts: Vec::new(),
     };
     let [l, w, h] = body.size;
     parts.hull(
-        shell(0.5 * l, 0.5 * w, body.waist - 0.24, body.bonnet),
+        shell(0.5 * l, 0.5 * w, body.waist - 0.24, body.hood),
         [0.0, 0.0, 0.24],
         lower,
     );
     // The cab's glass in front, the load behind it.
     let cab = 1.5f32;
     let slope = rng.random_range(0.5..0.9);
-    let front = 0.5 * l - body.bonnet[0] - 0.5 * cab;
+    let front = 0.5 * l - body.hood[0] - 0.5 * cab;
     parts.hull(
         shell(
             0.5 * cab,
@@ -208,7 +208,7 @@ fn lorry(world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> CarModel {
     let glass = painted(world, tint, [cab, w, cab_height], 1.6, true);
     let load = kit.wild[rng.random_range(0..kit.wild.len())];
     let plain = kit.metal[rng.random_range(0..kit.metal.len())];
-    let mut parts = Parts {
+    let mut parts = ModelParts {
         world,
         parts: Vec::new(),
     };
@@ -271,7 +271,7 @@ fn coach(world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit, tram: bool) -> CarM
     let size = [l, w, h];
     let lower = painted(world, tint, size, 0.35, false);
     let upper = painted(world, tint, size, 1.15, true);
-    let mut parts = Parts {
+    let mut parts = ModelParts {
         world,
         parts: Vec::new(),
     };

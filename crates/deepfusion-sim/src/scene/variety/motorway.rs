@@ -4,7 +4,7 @@ use super::site::{Site, Spot};
 use super::street::{Section, Side, apply_widths};
 use crate::scene::{Lane, ObjectClass};
 use crate::texture::ground::{Beyond, Paving, Stretch};
-use crate::texture::look::Line;
+use crate::texture::ground_style::Line;
 use rand::Rng;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -28,7 +28,7 @@ pub fn furnish(site: &mut Site) {
     lanes(site, [right, left]);
     rails(site, half);
     let second = site.world.stretches[0]
-        .look
+        .style
         .map_or(0.0, |l| f64::from(l.second[1]));
     for side in [-1.0, 1.0] {
         let from = half + 2.0 + if side > 0.0 { second } else { 0.0 };
@@ -39,16 +39,16 @@ pub fn furnish(site: &mut Site) {
 }
 
 fn paint(site: &mut Site, half: f64, [right, left]: [u8; 2]) {
-    let mut look = site.look(half as f32);
-    look.road = site.asphalt();
-    look.crossing = 0.0;
-    look.leaves = [0.0, 0.1];
-    look.beyond = [site.grass(), site.grass()];
-    look.lines = [None; 6];
+    let mut style = site.style(half as f32);
+    style.road = site.asphalt();
+    style.crossing = 0.0;
+    style.leaves = [0.0, 0.1];
+    style.beyond = [site.grass(), site.grass()];
+    style.lines = [None; 6];
     let mut slot = 0;
     let mut line = |at: f64, dash| {
         if slot < 6 {
-            look.lines[slot] = Some(Line {
+            style.lines[slot] = Some(Line {
                 at: at as f32,
                 half: 0.075,
                 dash,
@@ -65,7 +65,7 @@ fn paint(site: &mut Site, half: f64, [right, left]: [u8; 2]) {
     line(-1.65 + LANE * (f64::from(left) + 0.5), [0.0; 2]);
     if site.chance(0.75) {
         let from = site.draw(1.5, 5.0) as f32;
-        look.second = [from, from + site.draw(8.0, 14.0) as f32];
+        style.second = [from, from + site.draw(8.0, 14.0) as f32];
     }
     site.world.stretches.push(Stretch {
         dashes: [0.0; 2],
@@ -75,7 +75,7 @@ fn paint(site: &mut Site, half: f64, [right, left]: [u8; 2]) {
         bays: false,
         beyond: [Beyond::Grass; 2],
         paving: [Paving::Asphalt; 2],
-        look: Some(look),
+        style: Some(style),
     });
 }
 

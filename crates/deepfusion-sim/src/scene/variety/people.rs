@@ -40,7 +40,7 @@ impl Figure {
         self.parts.push((shape, at, material));
     }
 
-    /// A wheel one can look through: a ring of rods in the plane y = `at[1]`.
+    /// A wheel one can see through: a ring of rods in the plane y = `at[1]`.
     fn ring(&mut self, at: [f64; 3], radius: f64, thick: f64, material: u32) {
         let point = |i: usize| {
             let angle = i as f64 * std::f64::consts::TAU / 9.0;

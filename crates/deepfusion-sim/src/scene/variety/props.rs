@@ -327,7 +327,7 @@ impl Site<'_> {
                 self.close(ObjectClass::Fence, spot, mark);
             }
             _ => {
-                // Bars or pickets one can look through.
+                // Bars or pickets one can see through.
                 let mark = self.mark();
                 let metal = self.often(&kit.metal);
                 let foot = if self.chance(0.4) {

@@ -127,7 +127,7 @@ fn sections(site: &mut Site) -> Vec<Section> {
             _ => site.draw(6.0, 9.0),
         } as f32;
         let sides = [0, 1].map(|side| plan(site, scene, home, half_width, side));
-        let look = site.look(half_width);
+        let style = site.style(half_width);
         site.world.stretches.push(Stretch {
             dashes: [0.0; 2],
             edge_lines: false,
@@ -136,7 +136,7 @@ fn sections(site: &mut Site) -> Vec<Section> {
             bays: false,
             beyond: [Beyond::Grass; 2],
             paving: [Paving::Slabs; 2],
-            look: Some(look),
+            style: Some(style),
         });
         sections.push(Section {
             from,

@@ -44,7 +44,7 @@ fn intrudes(world: &World, way: &Way, solid: &Primitive) -> bool {
         z: 0.0,
         heading: f64::from(solid.heading.1.atan2(solid.heading.0)),
     };
-    // A long solid along a bend is looked at in pieces.
+    // A long solid along a bend is checked in pieces.
     let (hx, hy) = (f64::from(half_x), f64::from(half_y));
     let round = matches!(
         solid.shape,

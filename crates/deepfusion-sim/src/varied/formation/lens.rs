@@ -1,4 +1,4 @@
-//! What the lens does to the light.
+//! Effects of the lens.
 
 use super::plane::{Planes, bell, filter, sample};
 use super::{scale, sometimes, stops};

@@ -15,7 +15,7 @@ use plane::Planes;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// One camera's way of making an image, with the accidents of one picture.
+/// One camera's image formation, with the random effects of one picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Formation {
     lens: lens::Lens,
@@ -25,7 +25,7 @@ pub struct Formation {
     quality: Option<u8>,
 }
 
-/// How bright the place is, for the automatic exposure.
+/// Brightness of the scene, for the automatic exposure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Brightness {
     /// Daylight: the exposure is what it should be, but for its error.

@@ -59,7 +59,7 @@ impl Processing {
         }
     }
 
-    /// The image of what a sensor read.
+    /// The image of a sensor's reading.
     pub fn develop(&self, mut planes: Planes) -> RgbImage {
         self.colour(&mut planes);
         let tones = self.tones();

@@ -59,7 +59,7 @@ impl Sensor {
         }
     }
 
-    /// Linear light to what the sensor reads, 0 to 1.
+    /// Linear light to the sensor's reading, 0 to 1.
     pub fn expose(&self, planes: &mut Planes, hiss: &mut Hiss) {
         self.deepen(planes);
         let towards_grey = self.towards_grey(planes);

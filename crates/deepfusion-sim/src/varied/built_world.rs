@@ -23,21 +23,21 @@ const DURATION_S: f64 = 9.0;
 /// Share of the worlds that are not varied, but seen in any weather and through any camera.
 const UNVARIED: f64 = 0.12;
 
-/// A built world.
-pub struct Place {
+/// A built world, ready to be viewed.
+pub struct BuiltWorld {
     /// The street and what stands on it.
     pub world: World,
     /// Light on its ground.
     pub light: GroundLight,
     /// How dense its traffic is at most, in [0, 1]; none where nothing drives.
     density: f64,
-    /// Whether its views are as [`crate::Simulation`] draws them.
+    /// Whether its views are rendered as in [`crate::Simulation`].
     pub plain: bool,
     /// Cameras are placed from 0 to here, metres along the street.
     pub length: f64,
 }
 
-impl Place {
+impl BuiltWorld {
     /// Builds world `number` of a stream.
     pub fn build(config: &EndlessConfig, number: u64) -> Self {
         // Drawn apart, so that the other worlds are the same whatever the share of the plain ones is.

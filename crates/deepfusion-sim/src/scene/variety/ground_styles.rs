@@ -2,7 +2,7 @@
 
 use super::site::Site;
 use crate::texture::Rgb;
-use crate::texture::look::{Kind, Line, Look, Surface};
+use crate::texture::ground_style::{GroundStyle, Kind, Line, Surface};
 use crate::texture::pattern::{colour, wall_colour};
 use rand::Rng;
 
@@ -125,7 +125,7 @@ impl Site<'_> {
     }
 
     /// The ground of a stretch of street of this half width, painted as streets are.
-    pub fn look(&mut self, half_width: f32) -> Look {
+    pub fn style(&mut self, half_width: f32) -> GroundStyle {
         let road = match self.rng.random_range(0..20) {
             0..=15 => self.asphalt(),
             16..=18 => self.laid(),
@@ -149,7 +149,7 @@ impl Site<'_> {
                 Rgb::new(tone, tone, tone * 0.97)
             }
         };
-        Look {
+        GroundStyle {
             road,
             pavement: [pavement, other_side],
             beyond: [self.yard(), self.yard()],

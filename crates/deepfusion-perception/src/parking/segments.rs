@@ -1,4 +1,4 @@
-//! What stands on the line of a row, parted by its gaps.
+//! What stands on the line of a row, split at its gaps.
 
 use super::{HALF_M, Row, View};
 use crate::Detection;
@@ -6,34 +6,34 @@ use crate::box_fit::CAR;
 use crate::obstacles::NONE;
 use crate::outermost::ends;
 
-/// Cells in which it is told whether something rises to the ceiling, metres, and how many of them to the sides and ahead.
+/// Size of the cells in which objects that reach the ceiling are found, metres, and the number of cells to the sides and ahead.
 const CELL_M: f32 = 0.25;
 /// See [`CELL_M`].
 const CELLS: [usize; 2] = [160, 280];
 /// What rises above this is a pillar, metres; a car does not.
 const TALL_M: f32 = 2.1;
-/// Heights at which a car is seen, metres.
+/// Heights between which points of a car lie, metres.
 const HEIGHTS_M: [f32; 2] = [0.1, 2.0];
-/// How far to the side something may stand, metres.
+/// Largest lateral distance, metres.
 const SIDE_M: f32 = 14.0;
-/// Size of the places along a row that are free or not, and from how much free a gap is one, metres.
+/// Size of the bins along a row, and least width of a gap, metres.
 const PLACE_M: f32 = 0.1;
 /// See [`PLACE_M`].
 const GAP_M: f32 = 0.25;
-/// Widest part that is one car, and from one car to the next, metres.
+/// Widest segment that is a single car, and spacing of cars, metres.
 const WIDEST_M: f32 = 2.4;
 /// See [`WIDEST_M`].
 const BAY_M: f32 = 2.6;
-/// More than so many that cannot be told apart are a wall or a hedge.
+/// More cars than this in one segment are a wall or a hedge.
 const MOST_CARS: usize = 3;
-/// Least depth of one car, and of several that cannot be told apart, across the row, metres: a fence has less.
+/// Least depth of a segment across the row, of one car and of several, metres: a fence has less.
 const DEPTH_M: [f32; 2] = [0.15, 0.5];
-/// A part as wide as this shows both ends of a car, metres.
+/// A segment as wide as this shows both ends of a car, metres.
 const WHOLE_M: f32 = 1.4;
-/// How much of a car's side must be seen to say where its near end is, metres.
+/// Least visible length of a car's side for its near end to be known, metres.
 const SIDE_SEEN_M: f32 = 0.5;
-/// Width of the places, across the row, of which the nearest point is taken to find a side's direction, how many of them
-/// there are, how many must show the side, and how far they may lie off one line, metres.
+/// For the direction of a side: the width of the strips across the row whose nearest points are used, their number, how
+/// many must show the side, and their largest distance from a line, metres.
 const STRIP_M: f32 = 0.25;
 /// See [`STRIP_M`].
 const STRIPS: usize = 24;
@@ -41,7 +41,7 @@ const STRIPS: usize = 24;
 const SIDE_STRIPS: usize = 5;
 /// See [`STRIP_M`].
 const STRAIGHT_M: f32 = 0.08;
-/// Steepest direction of a side that still is one.
+/// Steepest direction of a side.
 const STEEPEST: f32 = 0.7;
 
 /// A point of an obstacle that may be a car.
@@ -51,13 +51,13 @@ struct Point {
     pixel: u32,
 }
 
-/// What stands about, without what rises to the ceiling.
+/// The obstacle points, without what reaches the ceiling.
 pub struct Standing {
     points: Vec<Point>,
 }
 
 impl Standing {
-    /// In an image, but for the pixels of what is known not to be parked.
+    /// Finds them in an image, leaving out the pixels of `others`, which are known not to be parked.
     pub fn find<'a>(view: &View, others: impl Iterator<Item = &'a Detection>) -> Self {
         let width = view.rays.x.len();
         let mut taken = vec![false; view.depth.len()];
@@ -93,8 +93,8 @@ impl Standing {
         Self { points }
     }
 
-    /// What of it stands on a row between two places along it, in their order.
-    pub fn parts(&self, row: &Row, [from, to]: [f32; 2], view: &View) -> Vec<Part> {
+    /// The segments on a row between two positions along it, in order.
+    pub fn segments(&self, row: &Row, [from, to]: [f32; 2], view: &View) -> Vec<Segment> {
         let places = ((to - from).max(0.0) / PLACE_M) as usize + 1;
         let mut taken = vec![false; places];
         let mut there = Vec::new();
@@ -117,7 +117,7 @@ impl Standing {
                 ));
             }
         }
-        let mut parts: Vec<Part> = Vec::new();
+        let mut parts: Vec<Segment> = Vec::new();
         let mut part_of = vec![0; places];
         let mut last: Option<usize> = None;
         for place in (0..places).filter(|place| taken[*place]) {
@@ -125,7 +125,7 @@ impl Standing {
             let start = from + place as f32 * PLACE_M;
             match parts.last_mut().filter(|_| near) {
                 Some(part) => part.along[1] = start + PLACE_M,
-                None => parts.push(Part {
+                None => parts.push(Segment {
                     along: [start, start + PLACE_M],
                     points: Vec::new(),
                 }),
@@ -150,7 +150,7 @@ fn cell([right, forward]: [f32; 2]) -> Option<usize> {
     inside.then(|| y as usize * CELLS[0] + x as usize)
 }
 
-/// A point as its row has it, metres.
+/// A point in its row's coordinates, metres.
 pub struct Seen {
     /// Along the line.
     pub along: f32,
@@ -158,19 +158,19 @@ pub struct Seen {
     pub off: f32,
     /// Over the ground.
     pub height: f32,
-    /// Which it is.
+    /// Index of its pixel.
     pub pixel: u32,
 }
 
-/// What stands together on a row.
-pub struct Part {
-    /// From where to where along it, metres.
+/// A contiguous stretch of a row that is occupied.
+pub struct Segment {
+    /// Start and end along the row, metres.
     pub along: [f32; 2],
     points: Vec<Seen>,
 }
 
-impl Part {
-    /// Where the middles of the cars are that it is, along the row, and their points.
+impl Segment {
+    /// Its cars: the position of each one's middle along the row, and its points.
     pub fn cars(&self, row: &Row, view: &View) -> Vec<(f32, Vec<&Seen>)> {
         let [from, to] = self.along;
         let width = to - from;
@@ -195,13 +195,13 @@ impl Part {
             .collect()
     }
 
-    /// How deep it is across the row, metres.
+    /// Depth across the row, metres.
     fn depth(&self) -> f32 {
         let mut off: Vec<f32> = self.points.iter().map(|p| p.off).collect();
         ends(&mut off, 20).map_or(0.0, |[low, high]| high - low)
     }
 
-    /// Where the middle of a single car is along the row: inwards of the end that is its own.
+    /// Position of a single car's middle along the row: inwards of the end that is its own.
     fn middle(&self, row: &Row, view: &View) -> f32 {
         let [near, far] = self.along;
         let by_near = near + 0.5 * CAR[1];
@@ -219,7 +219,7 @@ impl Part {
         }
     }
 
-    /// Whether the side towards the camera is seen.
+    /// Whether the side towards the camera is visible.
     fn shows_side(&self) -> bool {
         let near = self.points.iter();
         let near = near.filter(|p| p.along < self.along[0] + 0.2);
@@ -228,7 +228,7 @@ impl Part {
         high - low > SIDE_SEEN_M
     }
 
-    /// Whether something nearer, or the image's border, hides how it goes on at an end, `step` columns farther.
+    /// Whether something nearer, or the image's border, hides its continuation at an end, `step` columns farther.
     fn is_hidden(&self, end: f32, step: i64, view: &View) -> bool {
         let width = view.rays.x.len() as i64;
         let (mut hidden, mut all) = (0, 0);
@@ -243,7 +243,7 @@ impl Part {
         2 * hidden > all
     }
 
-    /// The slope of a row to which the near side of its first car is square, where that side is seen.
+    /// The slope of a row at a right angle to the near side of its first car, if that side is visible.
     pub fn slope(&self, row: &Row) -> Option<f32> {
         let half = 0.5 * STRIP_M * STRIPS as f32;
         let (mut near, mut counts) = ([f32::INFINITY; STRIPS], [0; STRIPS]);
@@ -262,7 +262,7 @@ impl Part {
         if side.len() < SIDE_STRIPS {
             return None;
         }
-        // The median over pairs: a bonnet or a roof lies behind.
+        // The median over pairs: a hood or a roof lies behind.
         let pairs = side
             .iter()
             .enumerate()
@@ -318,7 +318,7 @@ mod tests {
     fn what_stands_on_a_row_is_parted_by_its_gaps() {
         let scene = Scene::of(&[]);
         let standing = standing(&[[9.0, 10.8, 2.0], [11.4, 13.2, 2.0]]);
-        let parts = standing.parts(&row(), [6.0, 20.0], &scene.view());
+        let parts = standing.segments(&row(), [6.0, 20.0], &scene.view());
         assert_eq!(parts.len(), 2);
         let cars = parts[1].cars(&row(), &scene.view());
         let [(along, points)] = &cars[..] else {
@@ -327,14 +327,17 @@ mod tests {
         assert!((along - 12.3).abs() < 0.15, "{along}");
         assert!(points.len() > 400);
         // Only what lies between the ends asked for.
-        assert_eq!(standing.parts(&row(), [6.0, 11.0], &scene.view()).len(), 1);
+        assert_eq!(
+            standing.segments(&row(), [6.0, 11.0], &scene.view()).len(),
+            1
+        );
     }
 
     #[test]
-    fn cars_doors_to_doors_are_told_apart_by_their_width_and_a_wall_is_none() {
+    fn cars_doors_to_doors_are_separated_by_their_width_and_a_wall_is_none() {
         let scene = Scene::of(&[]);
         let count = |piece: [f32; 3]| {
-            let parts = standing(&[piece]).parts(&row(), [6.0, 40.0], &scene.view());
+            let parts = standing(&[piece]).segments(&row(), [6.0, 40.0], &scene.view());
             parts[0].cars(&row(), &scene.view()).len()
         };
         assert_eq!(count([9.0, 10.9, 2.0]), 1);
@@ -360,7 +363,7 @@ mod tests {
         let standing = Standing {
             points: points.collect(),
         };
-        let parts = standing.parts(&row(), [6.0, 20.0], &scene.view());
+        let parts = standing.segments(&row(), [6.0, 20.0], &scene.view());
         let slope = parts[0].slope(&row()).unwrap();
         assert!((slope + 0.15).abs() < 0.03, "{slope}");
     }

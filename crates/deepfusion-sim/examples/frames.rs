@@ -1,5 +1,5 @@
 //! Renders some frames of a drive into a folder, with their depth, and says how long each took:
-//! `cargo run --release -p deepfusion-sim --example look -- DIR [SEED] [FRAMES] [EVERY] [WIDTHxHEIGHT] [CARS]`
+//! `cargo run --release -p deepfusion-sim --example frames -- DIR [SEED] [FRAMES] [EVERY] [WIDTHxHEIGHT] [CARS]`
 
 use deepfusion_sim::{SimConfig, Simulation};
 use image::{Rgb, RgbImage};
@@ -13,7 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .and_then(|a| a.parse().ok())
             .unwrap_or(otherwise)
     };
-    let folder = std::path::PathBuf::from(arguments.first().map_or("look", String::as_str));
+    let folder = std::path::PathBuf::from(arguments.first().map_or("frames", String::as_str));
     let (seed, frames, every) = (number(1, 1), number(2, 60), number(3, 20).max(1));
     let size = arguments.get(4).map_or("640x192", String::as_str);
     let (width, height) = size.split_once('x').ok_or("a size looks like 640x192")?;

@@ -1,4 +1,4 @@
-//! Cars of rows, remembered in the world, and what makes a box one of them.
+//! Cars of rows, remembered in the world, and the test for boxes that may be such cars.
 
 use super::row::{Heading, Parked};
 use crate::{Ground, GroundBox};
@@ -12,38 +12,38 @@ const LENGTHS_M: [f32; 2] = [3.2, 5.6];
 const WIDTHS_M: [f32; 2] = [1.4, 2.3];
 /// See [`LENGTHS_M`].
 const HIGHEST_M: f32 = 2.15;
-/// Shares of length and width that must have been seen of a car that makes a row.
+/// Least visible shares of length and width of a car that may start a row.
 const SEEN: [f32; 2] = [0.02, 0.3];
-/// Up to this share of its length hardly more than one flat face of a car is seen.
+/// Up to this visible share of its length, hardly more than one flat face of a car is visible.
 const FLAT: f32 = 0.1;
-/// Least height of a car of which no more is seen, metres: a hedge looks alike, and is lower.
+/// Least height of such a car, metres: a hedge looks the same but is lower.
 const FLAT_HEIGHT_M: f32 = 1.3;
-/// How far from square to the way a car of a row may stand, radians.
+/// Largest deviation of a car of a row from a right angle to the lane, radians.
 const TURN: f32 = 0.6;
-/// How far beside the camera a row is, at least, metres.
+/// Least lateral distance of a row from the camera, metres.
 const BESIDE_M: f32 = 3.0;
 /// Within this distance it is the same car, metres.
 const SAME_M: f32 = 1.2;
-/// Most looks that count of one car.
-const MOST_LOOKS: f32 = 4.0;
+/// Limit on the sightings of one car.
+const MOST_SIGHTINGS: f32 = 4.0;
 /// How far behind the camera cars are remembered, metres.
 const BEHIND_M: f32 = 15.0;
-/// Nearest to the camera that something drives along the lane ahead, metres, and how far it may be turned out of the way, radians.
+/// Least distance of a vehicle that drives along the lane ahead, metres, and its largest angle to the lane, radians.
 const AHEAD_M: f32 = 4.0;
 /// See [`AHEAD_M`].
 const ASTRAY: f32 = 0.6;
 
 /// A car of a row, remembered.
 #[derive(Debug, Clone)]
-pub struct Known {
+pub struct RememberedCar {
     /// Its middle and the row's direction, in the world's axes.
     middle: Vector3<f64>,
     along: Vector3<f64>,
-    looks: f32,
+    sightings: f32,
 }
 
-impl Known {
-    /// A car as it stands on this ground, seen by a camera at this pose.
+impl RememberedCar {
+    /// A car on this ground, seen by a camera at this pose.
     pub fn new(car: &Parked, ground: &Ground, world_from_cam: &Se3) -> Self {
         let in_world = |at: [f32; 2]| {
             let p = ground.place([at[0], at[1], 0.0]);
@@ -54,11 +54,11 @@ impl Known {
         Self {
             middle,
             along: in_world([right + car.slope, forward + 1.0]) - middle,
-            looks: car.weight,
+            sightings: car.weight,
         }
     }
 
-    /// As it is seen now; `None` where it was passed long ago, or does not stand across the way any more.
+    /// The car as seen from the present camera; `None` if it was passed long ago or no longer stands across the lane.
     pub fn seen(&self, ground: &Ground, cam_from_world: &Se3) -> Option<Parked> {
         let middle = on_ground(ground, &cam_from_world.transform(&self.middle));
         let next = cam_from_world.transform(&(self.middle + self.along));
@@ -68,12 +68,12 @@ impl Known {
         (across && middle[1] > -BEHIND_M).then(|| Parked {
             middle,
             slope: along[0] / along[1],
-            weight: self.looks,
+            weight: self.sightings,
         })
     }
 }
 
-/// A box as a car of a row, if it may be one.
+/// A box as a car of a row, if it passes the limits.
 pub fn parked(place: &GroundBox) -> Option<Parked> {
     let off = (place.angle + FRAC_PI_2).rem_euclid(PI) - FRAC_PI_2;
     let [length, width] = place.footprint;
@@ -92,8 +92,8 @@ pub fn parked(place: &GroundBox) -> Option<Parked> {
     })
 }
 
-/// Takes a car into those that are known.
-pub fn meet(cars: &mut Vec<Parked>, car: Parked) {
+/// Merges a car into the known ones.
+pub fn merge(cars: &mut Vec<Parked>, car: Parked) {
     let same = |other: &&mut Parked| distance(other.middle, car.middle) < SAME_M;
     let Some(known) = cars.iter_mut().find(same) else {
         cars.push(car);
@@ -103,10 +103,10 @@ pub fn meet(cars: &mut Vec<Parked>, car: Parked) {
     let mean = |a: f32, b: f32| (a * known.weight + b * car.weight) / weight;
     known.middle = [0, 1].map(|i| mean(known.middle[i], car.middle[i]));
     known.slope = mean(known.slope, car.slope);
-    known.weight = weight.min(MOST_LOOKS);
+    known.weight = weight.min(MOST_SIGHTINGS);
 }
 
-/// How the lane goes where something that moves drives along it, if it does: who walks goes anywhere.
+/// The lane's direction at a dynamic box, if that is a vehicle along the lane: pedestrians walk in any direction.
 pub fn heading(place: &GroundBox) -> Option<Heading> {
     let off = place.angle.rem_euclid(PI) - FRAC_PI_2;
     let [_, forward] = place.middle;
@@ -123,7 +123,7 @@ pub fn on_ground(ground: &Ground, p: &Vector3<f64>) -> [f32; 2] {
     [right, forward]
 }
 
-/// Of two points on the ground, metres.
+/// Distance of two points on the ground, metres.
 pub fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
@@ -174,16 +174,16 @@ mod tests {
         let mut cars = vec![parked(&place()).unwrap()];
         let mut again = cars[0];
         again.middle[1] += 0.4;
-        meet(&mut cars, again);
+        merge(&mut cars, again);
         assert_eq!((cars.len(), cars[0].weight), (1, 2.0));
         assert!((cars[0].middle[1] - 12.2).abs() < 1e-5, "{cars:?}");
         again.middle[1] += 3.0;
-        meet(&mut cars, again);
+        merge(&mut cars, again);
         assert_eq!(cars.len(), 2);
         for _ in 0..9 {
-            meet(&mut cars, again);
+            merge(&mut cars, again);
         }
-        assert_eq!(cars[1].weight, MOST_LOOKS);
+        assert_eq!(cars[1].weight, MOST_SIGHTINGS);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Grounds of varied worlds: what a stretch of road and the land beside it are made of, and how they are painted.
+//! Grounds of varied worlds: the materials and markings of a stretch of road and the land beside it.
 
 use super::facade::courses;
 use super::ground::{self, GroundPatch};
@@ -16,7 +16,7 @@ pub struct Line {
     pub dash: [f32; 2],
 }
 
-/// What a ground is made of.
+/// The material of a ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Even, with grain and stains.
@@ -34,7 +34,7 @@ pub enum Kind {
 /// One ground.
 #[derive(Debug, Clone, Copy)]
 pub struct Surface {
-    /// What it is made of.
+    /// Its material.
     pub kind: Kind,
     /// Its main colour.
     pub colour: Rgb,
@@ -50,7 +50,7 @@ pub struct Surface {
 
 /// The ground of a stretch.
 #[derive(Debug, Clone, Copy)]
-pub struct Look {
+pub struct GroundStyle {
     /// The carriageway.
     pub road: Surface,
     /// Pavement and what lies beyond it: right, left.
@@ -136,7 +136,7 @@ impl Surface {
     }
 }
 
-impl Look {
+impl GroundStyle {
     /// The carriageway.
     pub fn carriageway(&self, noise: &Noise, p: &GroundPatch, seed: u32) -> Rgb {
         let mut colour = self.road.albedo(noise, p, seed);
