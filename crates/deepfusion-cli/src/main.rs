@@ -15,9 +15,9 @@ mod commands;
 mod engine;
 mod error;
 mod interrupt;
+mod jobs;
 mod model;
 mod output;
-mod pipeline;
 mod progress;
 
 use std::process::ExitCode;

@@ -24,6 +24,7 @@ pub struct Target {
     /// How sure it is that something of this kind is there, 0 to 1.
     pub confidence: f64,
     /// How many pixels see it; 0 where the track goes on without being seen.
+    #[serde(default)]
     pub pixels: usize,
     /// What it is, where a model of instances says so: the class it was seen as most.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::ValueEnum;
+use deepfusion_jobs::recordings::camera_word;
 use deepfusion_model::{Learn, TrainConfig, ViewMotion};
 
-use super::recordings::camera_word;
 use super::start;
 use crate::cli::TrainArgs;
 use crate::error::CliError;

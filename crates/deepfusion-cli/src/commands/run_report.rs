@@ -3,11 +3,10 @@
 use std::path::Path;
 
 use anyhow::Result;
+use deepfusion_jobs::evaluation::Evaluated;
 use deepfusion_perception::Reliability;
 use deepfusion_render::{HtmlReport, LearningLog, ReliabilityBin, ShownFrame};
 use serde::Deserialize;
-
-use super::evaluate::Evaluated;
 
 /// How many of the best and of the worst frames are shown.
 const BEST: usize = 2;
