@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use crate::cli::Shard;
 use crate::failure::{Exit, Reportable};
 
 /// Failures that only the command line knows.
@@ -59,18 +58,6 @@ pub enum CliError {
         /// Its name.
         model: String,
     },
-    /// Encoders without a depth network.
-    #[error("{}: only its encoders were ever trained: there is no depth to pack", path.display())]
-    NothingToPack {
-        /// The checkpoint.
-        path: PathBuf,
-    },
-    /// A packed network where a run is needed.
-    #[error("{}: is packed already", path.display())]
-    PackedAlready {
-        /// What was given.
-        path: PathBuf,
-    },
     /// An embedded network that is not the one a configuration began from.
     #[error(
         "the embedded network `{name}` is another one than this configuration began from: SHA-256 {found}, not {expected}"
@@ -102,12 +89,6 @@ pub enum CliError {
     NoRos2Writer {
         /// The output's name.
         path: PathBuf,
-    },
-    /// Intrinsics that cannot be the image's.
-    #[error("the intrinsics do not fit the image: {why}")]
-    Camera {
-        /// Why.
-        why: String,
     },
     /// An exported file that is not the network.
     #[error(
@@ -147,14 +128,6 @@ pub enum CliError {
         path: PathBuf,
         /// In what it differs.
         why: String,
-    },
-    /// A shard that another process works on.
-    #[error("{}: another run is at work on shard {shard} there", folder.display())]
-    Busy {
-        /// The output folder.
-        folder: PathBuf,
-        /// The shard.
-        shard: Shard,
     },
     /// A recording that should not be trained on.
     #[error("{}: {errors} {} would make training fail or give a wrong scale", path.display(), if *errors == 1 { "error" } else { "errors" })]
@@ -220,12 +193,6 @@ pub enum CliError {
         /// The work.
         what: &'static str,
     },
-    /// No frame of a recording has both labels and the depth asked for.
-    #[error("{}: no frame has the depth that was asked for", path.display())]
-    NothingToMeasure {
-        /// The recording.
-        path: PathBuf,
-    },
     /// A live source beside other inputs.
     #[error("{address}: a live source is looked at alone, without other inputs")]
     LiveAlone {
@@ -252,7 +219,7 @@ pub enum CliError {
         /// The first input that cannot be watched.
         input: String,
         /// Why not.
-        why: &'static str,
+        why: String,
     },
     /// A correction that follows the frames, of which this run sees a part.
     #[error("`--correct-scale` follows all frames of a recording, and a shard sees only some")]
@@ -262,18 +229,6 @@ pub enum CliError {
         "`--save video` shows the frames of a recording one after the other, and a shard sees only some"
     )]
     VideoShard,
-    /// A split of which not everything could be used, where everything has to be.
-    #[error("{}: {found} of its {expected} frames {what}", split.display())]
-    Incomplete {
-        /// The split file.
-        split: PathBuf,
-        /// Frames that could be used.
-        found: usize,
-        /// Frames that the file lists.
-        expected: usize,
-        /// What those have that could be.
-        what: &'static str,
-    },
     /// A cloud without a camera.
     #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
     NoCamera,
@@ -315,8 +270,6 @@ impl Reportable for CliError {
                 "train on from it (deepfusion train --data DRIVE --init NAME), and give that run's folder".into(),
             ),
             Self::NoPoseNet { .. } => Some("give the folder of a run that `train` wrote".into()),
-            Self::NothingToPack { .. } => Some("train from it first: deepfusion train --data DRIVE --init RUN".into()),
-            Self::PackedAlready { .. } => Some("give the folder of the run that it was packed from".into()),
             Self::OtherStart { .. } => Some(
                 "take the version of the program that made the run, or remove init_sha256 from the file to begin from this one".into(),
             ),
@@ -324,9 +277,6 @@ impl Reportable for CliError {
             Self::SeveralDrives { .. } => Some("convert them one by one: give a drive's own folder".into()),
             Self::NoRos2Writer { .. } => {
                 Some("give a name that ends in .bag for a ROS 1 bag, or another folder for KITTI raw".into())
-            }
-            Self::Camera { .. } => {
-                Some("give fx,fy,cx,cy in pixels of the input image, at its own size".into())
             }
             Self::Deviates { .. } => {
                 Some("this is a fault of the program or of the library that ran the file; please report it".into())
@@ -342,9 +292,6 @@ impl Reportable for CliError {
                  another folder"
                     .into(),
             ),
-            Self::Busy { .. } => {
-                Some("wait for it, or share the work with --shard I/N, a different I each".into())
-            }
             Self::SomeFailed { hint, .. } => Some(match hint {
                 Some(hint) => format!("{hint}; then run the same again: only what is missing is done"),
                 None => "mend them and run the same again: only what is missing is done".into(),
@@ -365,9 +312,6 @@ impl Reportable for CliError {
                 run.join("config.toml").display()
             )),
             Self::Ended { .. } => Some("start it again, into another folder".into()),
-            Self::NothingToMeasure { .. } => Some(
-                "exact depth is the simulator's (proj_depth), scans are in velodyne_points; without either nothing says which boxes are seen".into(),
-            ),
             Self::LiveAlone { .. } => Some("start one run for each source, each with a folder of its own".into()),
             Self::Terminal => Some("… | deepfusion … -, or give a camera or an address instead of -".into()),
             Self::LiveShard => Some("leave --shard out".into()),
@@ -379,9 +323,6 @@ impl Reportable for CliError {
             Self::VideoShard => {
                 Some("save side-by-side in the shards, then run once more with --save video and without --shard".into())
             }
-            Self::Incomplete { .. } => Some(
-                "give the folder that holds every drive that the split names, or leave --strict out to use what is there".into(),
-            ),
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
             Self::NoUncertainty => Some(
                 "leave out sigma of --save and --max-sigma, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"

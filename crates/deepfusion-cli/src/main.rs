@@ -16,9 +16,9 @@ mod engine;
 mod error;
 mod failure;
 mod interrupt;
+mod jobs;
 mod model;
 mod output;
-mod pipeline;
 mod progress;
 
 use std::process::ExitCode;

@@ -32,6 +32,7 @@ mod silhouette;
 mod split;
 mod target;
 mod tracking;
+mod working_depth;
 
 pub use clusters::Run;
 pub use collision::{Collision, VehicleShape, time_to_collision};
@@ -49,3 +50,4 @@ pub use perception::{Perception, Stamp, Surroundings};
 pub use rays::Rays;
 pub use scoring::{Label, Matched, RangeScore, Scorer, ScoringRules, TargetScore};
 pub use target::Target;
+pub use working_depth::working_depth;

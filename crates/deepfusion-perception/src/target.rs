@@ -24,6 +24,7 @@ pub struct Target {
     /// Confidence that the target exists, 0 to 1.
     pub confidence: f64,
     /// Number of pixels in this frame; 0 if the track continues unseen.
+    #[serde(default)]
     pub pixels: usize,
     /// Its class by a segmentation model, if there is one: the class with the most votes.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -87,7 +87,6 @@
 //! | [`video`] | frames of videos, cameras and streams, through the user's ffmpeg |
 //! | [`motion`] | how a vehicle moved, from inertial unit, CAN, GPS |
 //! | [`bags`] | ROS bags, read and written |
-//! | [`eval`] | the field's metrics and protocols; odometry; intervals and their coverage; `compare`: evaluations side by side |
 //! | [`perception`] | a depth image to 3D targets, tracks, free space |
 //! | [`geometry`] | cameras, motions, depth images; `cloud`: point clouds and their files |
 //! | [`sim`] | streets with exact depth, to learn from and to test on |
@@ -103,12 +102,14 @@ pub use deepfusion_data as data;
 pub use deepfusion_doctor as doctor;
 pub use deepfusion_eval as eval;
 pub use deepfusion_geometry as geometry;
+pub use deepfusion_jobs as jobs;
 pub use deepfusion_model as model;
 pub use deepfusion_motion as motion;
 #[cfg(feature = "train")]
 pub use deepfusion_nn as nn;
 pub use deepfusion_onnx as onnx;
 pub use deepfusion_perception as perception;
+pub use deepfusion_records as records;
 pub use deepfusion_render as render;
 pub use deepfusion_rosbag as bags;
 pub use deepfusion_runtime as runtime;

@@ -10,7 +10,7 @@ use deepfusion_render::{
 };
 use deepfusion_runtime::ModelSource;
 
-use super::evaluate::open_datasets;
+use super::recordings::open_datasets;
 use super::{eval, run_report};
 use crate::cli::{CompareArgs, TableFormat};
 use crate::engine;

@@ -2,7 +2,7 @@ use std::path::Path;
 
 use deepfusion_data::{Converted, Dataset, OpenOptions, convert_to_bag, convert_to_kitti};
 
-use super::evaluate::open_recordings;
+use super::recordings::open_recordings;
 use super::remarks;
 use crate::cli::{CameraIntrinsics, ConvertArgs};
 use crate::error::CliError;

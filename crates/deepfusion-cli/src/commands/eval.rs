@@ -1,25 +1,27 @@
 use std::path::Path;
 
-use deepfusion_data::{Cameras, Dataset, GtKind, OpenOptions, RgbImage};
+use deepfusion_data::{Cameras, Dataset, OpenOptions, RgbImage};
 use deepfusion_eval::compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
-use deepfusion_eval::{
-    ArraySet, Crop, Grid, Prediction, Protocol, Report, Sample, TrivialBaseline, match_names,
-};
+use deepfusion_eval::{ArraySet, Crop, Grid, Prediction, Protocol, Report};
 use deepfusion_geometry::Intrinsics;
+use deepfusion_jobs::evaluation::confidence::{self, Calibrated};
+pub use deepfusion_jobs::evaluation::predict;
+use deepfusion_jobs::evaluation::{
+    Evaluated, Place, Truth, array_places, check_used, default_crop, depth_map, evaluate_arrays,
+    evaluate_datasets, expected_frames, trivial_from_arrays, trivial_from_training,
+};
+use deepfusion_jobs::held_out::{held_out, unseen};
+use deepfusion_jobs::intervals;
+use deepfusion_jobs::recordings::read_split;
+use deepfusion_perception::Reliability;
 use deepfusion_render::{HtmlReport, ShownFrame};
 use deepfusion_runtime::DepthEstimator;
 use deepfusion_runtime::ModelSource;
 use serde::Serialize;
 
-use super::confidence;
-use super::evaluate::{
-    Comparison, Evaluated, Place, Truth, array_places, check_used, default_crop, depth_map,
-    evaluate_datasets, expected_frames, open_recordings, read_split, trivial_from_arrays,
-    trivial_from_datasets,
-};
-use super::held_out::{held_out, unseen};
+use super::recordings::open_recordings;
+use super::remarks;
 use super::run_report::{self, Choice};
-use super::uncertainty;
 use super::used_checkpoint::UsedCheckpoint;
 use crate::cli::{CameraIntrinsics, EvalArgs, PredKind};
 use crate::engine;
@@ -72,7 +74,7 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
     }
     let mut estimator = engine::load(&model, &args.engine)?;
     if args.calibrate_uncertainty {
-        uncertainty::check(&model, &estimator)?;
+        check_calibration(&model, &estimator)?;
     }
     let options = OpenOptions {
         camera: args.camera,
@@ -90,11 +92,11 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
     };
     let baseline = match &args.trivial {
         Some(path) => Some(trivial_from_arrays(path)?),
-        None => training_scans(&estimator, kind),
+        None => trivial_from_training(estimator.config(), kind),
     };
     let protocol = args.protocol(crop);
     let mut progress = Progress::new("evaluating");
-    let see = |estimator: &mut DepthEstimator, dataset: &Dataset, frame: usize| {
+    let see = |estimator: &mut DepthEstimator, dataset: &Dataset, frame: usize| -> Result<_> {
         let image = dataset.load_image(frame)?;
         let camera = dataset.intrinsics(frame);
         let prediction = predict(estimator, &image, &camera, !args.no_focal_correction)?;
@@ -109,9 +111,11 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
         &mut |done, total| progress.set(done, total),
     )?;
     evaluated.report.expected = expected;
-    check_used(&options, &datasets, evaluated.report.n, args.strict)?;
+    if let Some(shortfall) = check_used(&options, &datasets, evaluated.report.n, args.strict)? {
+        remarks::warn_once(shortfall.to_string());
+    }
     if estimator.knows_uncertainty() && args.gt.is_none() {
-        uncertainty::measure(
+        let kept = intervals::measure(
             (&model, &mut estimator),
             &datasets,
             &mut truth,
@@ -119,6 +123,14 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
             (&protocol, !args.no_focal_correction),
             args.calibrate_uncertainty,
         )?;
+        if let Some((found, path)) = kept {
+            say(&format!(
+                "intervals calibrated on {} pixels of {} drives, kept as {}; what stands below is of the same pixels, measure on others",
+                found.pixels,
+                found.drives,
+                path.display()
+            ));
+        }
     }
     let saved = saved(args, &estimator, &model, &datasets, &evaluated)?;
     match model.folder().map(|folder| saved.write(folder)) {
@@ -138,7 +150,8 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
             &evaluated,
             !args.no_focal_correction,
             folder,
-        )?,
+        )?
+        .map(tell_calibrated),
         _ => None,
     };
     if let Some(path) = &args.report {
@@ -176,24 +189,40 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
     Ok((evaluated.report, checkpoint))
 }
 
-/// The disparity of an image, as the protocol wants it.
-pub fn predict(
-    estimator: &mut DepthEstimator,
-    image: &RgbImage,
-    camera: &Intrinsics,
-    focal_correction: bool,
-) -> Result<Prediction> {
-    let prediction = estimator.predict(image, Some(camera), focal_correction, false)?;
-    let grid = Grid::from_f32(prediction.width, prediction.height, &prediction.disparity)?;
-    Ok(Prediction::Disparity(grid))
+/// That a network's intervals can be calibrated at all, before anything is measured.
+fn check_calibration(model: &ModelSource, estimator: &DepthEstimator) -> Result<()> {
+    if !estimator.knows_uncertainty() {
+        return Err(CliError::NoUncertainty.into());
+    }
+    match model.folder() {
+        Some(_) => Ok(()),
+        None => Err(CliError::NoRunFolder {
+            option: "--calibrate-uncertainty",
+            model: model.name(),
+        }
+        .into()),
+    }
 }
 
-/// The trivial row from the recordings the model was trained on, where they are still there.
-fn training_scans(estimator: &DepthEstimator, kind: GtKind) -> Option<TrivialBaseline> {
-    let config = estimator.config();
-    let recordings = super::recordings::training_recordings(config).ok()?;
-    let datasets: Vec<_> = recordings.into_iter().map(|(_, dataset)| dataset).collect();
-    trivial_from_datasets(&datasets, kind).ok()
+/// Says what the confidence was learned from; gives how it holds.
+fn tell_calibrated(calibrated: Calibrated) -> Vec<Reliability> {
+    let Calibrated {
+        confidence,
+        path,
+        by_drive,
+        reliability,
+    } = calibrated;
+    let judged_by = match (confidence.held_out, by_drive) {
+        (0, _) => "none left to judge it by".to_owned(),
+        (n, true) => format!("judged by {n} of other drives"),
+        (n, false) => format!("judged by {n} of another part"),
+    };
+    say(&format!(
+        "confidence learned from {} frames, {judged_by}, kept as {}",
+        confidence.frames,
+        path.display()
+    ));
+    reliability
 }
 
 fn from_arrays(
@@ -210,29 +239,18 @@ fn from_arrays(
         .map(trivial_from_arrays)
         .transpose()?;
     let protocol = args.protocol(Crop::None);
-    let mut comparison = Comparison::new(&protocol, baseline)?;
-    let matched = match_names(&predicted, &known)?;
     let mut progress = Progress::new("evaluating");
     let of_kind = |grid| match kind {
         PredKind::Depth => Prediction::Depth(grid),
         PredKind::Disparity => Prediction::Disparity(grid),
     };
-    let mut places = Vec::new();
-    for (i, (name, prediction, depth)) in matched.iter().enumerate() {
-        let counted = comparison.add(&Sample {
-            name,
-            prediction: &of_kind(predicted.read(*prediction)?),
-            ground_truth: &known.read(*depth)?,
-            moving: None,
-            intrinsics: None,
-            dense: None,
-        })?;
-        if counted {
-            places.push(Place(*prediction, *depth));
-        }
-        progress.set(i + 1, matched.len());
-    }
-    let evaluated = comparison.evaluated(places)?;
+    let evaluated = evaluate_arrays(
+        (&mut predicted, &of_kind),
+        &mut known,
+        &protocol,
+        baseline,
+        &mut |done, total| progress.set(done, total),
+    )?;
     if let Some(path) = &args.report {
         let shown = shown(&evaluated, |Place(prediction, depth)| {
             Ok(Some(Seen {

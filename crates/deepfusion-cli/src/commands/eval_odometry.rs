@@ -10,7 +10,7 @@ use deepfusion_runtime::ModelSource;
 use deepfusion_train::PosePredictor;
 
 use super::device;
-use super::evaluate::open_recordings;
+use super::recordings::open_recordings;
 use crate::allocator;
 use crate::cli::EvalOdometryArgs;
 use crate::error::CliError;

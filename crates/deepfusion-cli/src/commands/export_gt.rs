@@ -1,6 +1,9 @@
 use deepfusion_data::{Dataset, OpenOptions, export_gt};
+use deepfusion_jobs::evaluation::{check_used, expected_frames};
+use deepfusion_jobs::recordings::read_split;
 
-use super::evaluate::{check_used, expected_frames, open_recordings, read_split};
+use super::recordings::open_recordings;
+use super::remarks;
 use crate::cli::ExportGtArgs;
 use crate::error::CliError;
 use crate::failure::Result;
@@ -45,7 +48,9 @@ pub fn run(args: &ExportGtArgs) -> Result<()> {
         progress.set(done, total)
     })?;
     drop(progress);
-    check_used(&options, &datasets, written, args.strict)?;
+    if let Some(shortfall) = check_used(&options, &datasets, written, args.strict)? {
+        remarks::warn_once(shortfall.to_string());
+    }
     if args.json {
         let file = &args.out;
         return output::print_json(&match expected {

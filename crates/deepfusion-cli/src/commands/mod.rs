@@ -5,25 +5,20 @@ mod ablate;
 mod bench;
 mod compare;
 mod completions;
-mod confidence;
 mod config;
 mod convert;
 #[cfg(feature = "train")]
 mod demo;
 pub mod device;
-mod division;
 mod doctor;
 mod eval;
 #[cfg(feature = "train")]
 mod eval_odometry;
 mod eval_targets;
-mod evaluate;
 #[cfg(feature = "train")]
 mod export;
 mod export_gt;
-mod held_out;
 mod inspect;
-mod known_pixels;
 mod live;
 #[cfg(feature = "train")]
 mod outlook;
@@ -37,13 +32,11 @@ mod remarks;
 #[cfg(feature = "train")]
 mod resume;
 mod run_report;
-mod scene;
 mod simulate;
 #[cfg(feature = "train")]
 mod start;
 #[cfg(feature = "train")]
 mod train;
-pub mod uncertainty;
 mod used_checkpoint;
 mod view;
 mod view_rerun;

@@ -1,113 +1,54 @@
-//! The recordings that a configuration names.
+//! Recordings opened, and what was noticed of them told.
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Camera, Cameras, Dataset, OpenOptions};
-use deepfusion_model::{DataSetConfig, Error as ModelError, TrainConfig};
-
-use super::evaluate::{open_quietly, open_recordings, read_split};
 use crate::failure::Result;
+use deepfusion_data::{Cameras, Dataset, OpenOptions};
+use deepfusion_jobs::evaluation::missing_frames;
+use deepfusion_jobs::recordings::{self, read_split};
+#[cfg(feature = "train")]
+use deepfusion_jobs::samples::{self, SampleWarning};
+#[cfg(feature = "train")]
+use deepfusion_model::TrainConfig;
+#[cfg(feature = "train")]
+use deepfusion_train::SampleSet;
 
-/// Cameras as configurations name them.
-pub fn camera_word(camera: Cameras) -> &'static str {
-    match camera.cameras() {
-        [Camera::Left] => "2",
-        [Camera::Right] => "3",
-        _ => "both",
-    }
-}
+use super::remarks;
+use crate::jobs;
 
-/// All recordings to train on, with the place of their set in `data.sets`. Nothing is told of them: training did.
-pub fn training_recordings(config: &TrainConfig) -> Result<Vec<(usize, Dataset)>> {
-    open_part(config, Part::Training, false)
-}
-
-/// What recordings are for.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// To learn from.
-    Training,
-    /// To judge by.
-    Validation,
-}
-
-/// Whether there are recordings or frames to validate on; else the end of each drive is held out.
-pub fn validates(config: &TrainConfig) -> bool {
-    let data = &config.data;
-    let own = !data.validation.is_empty() || data.validation_split.is_some();
-    own || data.sets.iter().any(DataSetConfig::validates)
-}
-
-/// The recordings of one part, with the place of their set in `data.sets`.
-pub fn open_part(config: &TrainConfig, part: Part, tell: bool) -> Result<Vec<(usize, Dataset)>> {
-    let data = &config.data;
-    if data.sets.is_empty() {
-        let validation = (&data.validation, &data.validation_split);
-        let (paths, split) = of_part(part, (&data.paths, &data.split), validation);
-        let datasets = recordings(paths, split, &data.camera, data.camera_ahead_s, tell)?;
-        return Ok(placed(0, datasets));
-    }
-    let mut all = Vec::new();
-    for (i, set) in data.sets.iter().enumerate() {
-        let validation = (&set.validation, &set.validation_split);
-        let (paths, split) = of_part(part, (&set.paths, &set.split), validation);
-        let camera = match set.camera.as_str() {
-            "" => &data.camera,
-            own => own,
-        };
-        let ahead_s = set.camera_ahead_s.or(data.camera_ahead_s);
-        all.extend(placed(i, recordings(paths, split, camera, ahead_s, tell)?));
-    }
-    Ok(all)
-}
-
-/// Paths and the split file that selects their frames.
-type Frames<'a> = (&'a Vec<PathBuf>, &'a Option<PathBuf>);
-
-/// Those of one part. A split of training frames says nothing about which to validate on, nor the other way round.
-fn of_part<'a>(
-    part: Part,
-    training: Frames<'a>,
-    validation: Frames<'a>,
-) -> (&'a [PathBuf], Option<&'a Path>) {
-    let (paths, split) = match part {
-        Part::Training => training,
-        Part::Validation if validation.0.is_empty() => (training.0, validation.1),
-        Part::Validation => validation,
-    };
-    (paths, split.as_deref())
-}
-
-/// Each with the place of its set.
-fn placed(set: usize, datasets: Vec<Dataset>) -> Vec<(usize, Dataset)> {
-    datasets.into_iter().map(|d| (set, d)).collect()
-}
-
-/// The recordings at `paths` of the cameras that a configuration names.
-fn recordings(
+/// Opens the recordings at several paths, each drive and camera a data set.
+pub fn open_datasets(
     paths: &[PathBuf],
     split: Option<&Path>,
-    camera: &str,
-    camera_ahead_s: Option<f64>,
-    tell: bool,
+    camera: Cameras,
 ) -> Result<Vec<Dataset>> {
-    let camera: Cameras = match camera {
-        "" => Cameras::default(),
-        text => text.parse().map_err(|_| ModelError::Config {
-            field: "data.camera",
-            expected: "2, 3 or both".into(),
-            found: text.into(),
-        })?,
-    };
     let options = OpenOptions {
         camera,
         split: read_split(split)?,
-        camera_ahead_s,
         ..OpenOptions::default()
     };
-    if tell {
-        open_recordings(paths, &options)
-    } else {
-        open_quietly(paths, &options)
+    open_recordings(paths, &options)
+}
+
+/// As [`open_datasets`], as the options say.
+pub fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
+    let datasets = recordings::open_recordings(paths, options).map_err(jobs::in_words)?;
+    tell(options, &datasets);
+    Ok(datasets)
+}
+
+/// The training and validation samples of a configuration; warns of drives that are skipped, of speeds that cannot be m/s and of
+/// validation frames that are seen in training.
+#[cfg(feature = "train")]
+pub fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
+    let mut warn = |warning: SampleWarning| remarks::warn_once(warning.to_string());
+    samples::open_samples(config, &mut tell, &mut warn).map_err(jobs::in_words)
+}
+
+/// What was noticed, and that frames of the split are missing.
+fn tell(options: &OpenOptions, datasets: &[Dataset]) {
+    remarks::tell(datasets);
+    if let Some(missing) = missing_frames(options, datasets) {
+        remarks::warn_once(missing.to_string());
     }
 }

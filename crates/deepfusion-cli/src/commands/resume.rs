@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use deepfusion_jobs::recordings::camera_word;
 use deepfusion_model::TrainConfig;
 
-use super::recordings::camera_word;
 use super::start;
 use crate::cli::TrainArgs;
 use crate::error::CliError;

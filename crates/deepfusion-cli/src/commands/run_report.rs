@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
+use deepfusion_jobs::evaluation::Evaluated;
 use deepfusion_perception::Reliability;
 use deepfusion_render::{HtmlReport, LearningLog, ReliabilityBin, ShownFrame};
 use serde::Deserialize;
 
-use super::evaluate::Evaluated;
 use crate::failure::Result;
-
 /// How many of the best and of the worst frames are shown.
 const BEST: usize = 2;
 const WORST: usize = 3;

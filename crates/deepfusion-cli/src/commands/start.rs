@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use burn::tensor::Device;
+use deepfusion_jobs::held_out::is_run;
 use deepfusion_model::weights::{Weights, read_bytes};
 use deepfusion_model::{
     CheckpointKind, DepthNetConfig, Error as ModelError, InputNormalisation, RunFolder, TrainConfig,
@@ -289,12 +290,6 @@ fn run_of(path: &Path) -> Result<Option<(RunFolder, CheckpointKind)>, ModelError
     let (folder, kind) = RunFolder::open(path)?;
     let kind = kind.unwrap_or_else(|| folder.preferred());
     Ok(Some((folder, kind)))
-}
-
-/// Whether a path is a run's folder, or in one.
-pub fn is_run(path: &Path) -> bool {
-    let in_a_run = |p: &Path| p.join("config.toml").exists();
-    path.is_dir() || path.parent().is_some_and(in_a_run)
 }
 
 #[cfg(test)]

@@ -1,16 +1,15 @@
-use std::collections::HashSet;
-
-use deepfusion_data::{Cameras, Dataset, speed_unit_warning};
+use deepfusion_data::Cameras;
+use deepfusion_jobs::recordings::camera_word;
 use deepfusion_model::{
     DataConfig, Error as ModelError, InputSize, Learn, Preset, RunFolder, TrainConfig,
 };
-use deepfusion_train::{SampleSet, TrainSummary, Trainer, shared_frames};
+use deepfusion_train::{TrainSummary, Trainer};
 
 use super::outlook::Outlook;
 use super::recorder::{Recorder, clock};
-use super::recordings::{Part, camera_word, open_part, validates};
+use super::recordings::open_samples;
 use super::start::Start;
-use super::{device, remarks, resume};
+use super::{device, resume};
 use crate::allocator;
 use crate::cli::TrainArgs;
 use crate::error::CliError;
@@ -219,45 +218,4 @@ fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), Mode
         });
     }
     Ok(())
-}
-
-/// The training and validation samples of a configuration; warns of drives that are skipped and of
-/// speeds that cannot be m/s.
-pub fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
-    let train = open_part(config, Part::Training, true)?;
-    let mut checked = HashSet::new();
-    for (_, dataset) in &train {
-        // Both cameras of a drive have one speed.
-        if checked.insert((dataset.folder().to_owned(), dataset.name().to_owned())) {
-            warn_of_speed(dataset);
-        }
-    }
-    let validation = if validates(config) {
-        Some(open_part(config, Part::Validation, true)?)
-    } else {
-        None
-    };
-    let apart = validation.is_some();
-    let (train, validation, skipped) = SampleSet::split_sets(config, train, validation)?;
-    for reason in skipped {
-        remarks::warn_once(format!("skipped: {reason}"));
-    }
-    if apart {
-        for shared in shared_frames(&train, &validation) {
-            remarks::warn_once(format!(
-                "{}: {} of its validation frames are neighbours of training frames, and were seen as such",
-                shared.drive, shared.sources
-            ));
-        }
-    }
-    Ok((train, validation))
-}
-
-fn warn_of_speed(dataset: &Dataset) {
-    match speed_unit_warning(dataset) {
-        Ok(Some(warning)) => remarks::warn_once(format!("{}: {warning}", dataset.name())),
-        Ok(None) => {}
-        // The check is a service: what is really wrong with the images, training will say.
-        Err(error) => tracing::debug!("speed check of {}: {error}", dataset.name()),
-    }
 }

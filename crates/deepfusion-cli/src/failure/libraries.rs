@@ -327,7 +327,6 @@ macro_rules! foreign {
 
 foreign!(
     clap::Error,
-    glob::PatternError,
     image::ImageError,
     ndarray::ShapeError,
     ndarray_npy::ReadNpyError,

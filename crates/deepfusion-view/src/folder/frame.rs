@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 
 use deepfusion_data::image_size;
 use deepfusion_geometry::Intrinsics;
+use deepfusion_records::PredictionRecord;
 use serde_json::{Value, json};
 
 use super::entry::Entry;
-use super::summary::{numbers, read_json};
+use super::small_files::SmallFiles;
 use crate::{Error, Result};
 
 /// Fields of the sidecar that the page shows as they are; `scale_trusted` is older programs', which had neither of the two
@@ -32,30 +33,26 @@ const PASSED_ON: [&str; 12] = [
 /// A frame as the page gets it: the camera, which parts there are, the targets, and what is wrong with any of them. Everything but
 /// `name` may be missing.
 pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
-    let mut problems = Vec::new();
-    let mut small = |file: &Option<super::entry::FrameFile>| {
-        let outcome = read_json(&folder.join(&file.as_ref()?.file));
-        outcome.map_err(|e| problems.push(e.to_string())).ok()
-    };
-    let sidecar = small(&entry.sidecar);
-    let targets = small(&entry.targets).map(|t| checked_targets(&t, &mut problems));
-    let said_size = sidecar.as_ref().and_then(|s| numbers::<2>(s.get("size")));
-    let said_size = said_size.map(|[w, h]| (w as u32, h as u32));
+    let SmallFiles {
+        sidecar,
+        targets,
+        mut problems,
+        ..
+    } = SmallFiles::read(folder, entry);
+    let record = sidecar.as_ref().map(|s| &s.record);
+    let said_size = record.and_then(|r| r.size).map(|[w, h]| (w, h));
     let mut frame = json!({
         "name": entry.name,
         "revision": entry.revision(),
         "depth": entry.depth.as_ref().map(|d| &d.file),
-        "targets": targets,
+        "targets": targets.map(|t| t.json),
     });
     for field in PASSED_ON {
-        if let Some(value) = sidecar.as_ref().and_then(|s| s.get(field)) {
+        if let Some(value) = sidecar.as_ref().and_then(|s| s.json.get(field)) {
             frame[field] = value.clone();
         }
     }
-    match sidecar
-        .as_ref()
-        .map(|s| (numbers::<4>(s.get("intrinsics")), said_size))
-    {
+    match record.map(|r| (r.intrinsics, said_size)) {
         Some((Some(k), Some((width, height)))) => {
             let camera = Intrinsics::from_numbers(k, (width, height));
             match camera.implausible() {
@@ -72,7 +69,7 @@ pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
         }
         None => {}
     }
-    match picture(folder, entry, sidecar.as_ref()) {
+    match picture(folder, entry, record) {
         Ok(picture) => {
             frame["picture"] =
                 json!({ "size": picture.size, "path": picture.path.display().to_string() });
@@ -106,38 +103,13 @@ pub(crate) fn frame_json(folder: &Path, entry: &Entry) -> Value {
     frame
 }
 
-/// Targets without a position or size are dropped: they cannot be drawn.
-fn checked_targets(frame: &Value, problems: &mut Vec<String>) -> Value {
-    let mut frame = frame.clone();
-    let Some(list) = frame.get_mut("targets").and_then(Value::as_array_mut) else {
-        problems.push("the targets' file has no list of targets".into());
-        return frame;
-    };
-    let all = list.len();
-    list.retain(|t| {
-        numbers::<3>(t.get("center_m")).is_some()
-            && numbers::<3>(t.get("size_m")).is_some_and(|s| s.iter().all(|side| *side > 0.0))
-    });
-    if list.len() < all {
-        let unusable = all - list.len();
-        let verb = if unusable == 1 { "has" } else { "have" };
-        problems.push(format!(
-            "{unusable} of {all} targets {verb} no position or size"
-        ));
-    }
-    frame
-}
-
 /// A frame's tracks, short: camera, and id, centre and state of each target; `None` where there are none.
 pub(crate) fn targets_of(folder: &Path, entry: &Entry) -> Option<Value> {
-    let frame = read_json(&folder.join(&entry.targets.as_ref()?.file)).ok()?;
-    let targets = frame.get("targets")?.as_array()?.iter().filter_map(|t| {
-        let centre = numbers::<3>(t.get("center_m"))?;
-        Some(json!([t.get("id")?, centre]))
-    });
+    let frame = SmallFiles::read(folder, entry).targets?.record;
+    let targets = frame.targets.iter().map(|t| json!([t.id, t.center_m]));
     Some(json!({
         "name": entry.name,
-        "world_from_cam": frame.get("camera_motion").filter(|m| !m.is_null()),
+        "world_from_cam": frame.camera_motion,
         "targets": targets.collect::<Vec<_>>(),
     }))
 }
@@ -156,17 +128,16 @@ pub(crate) struct Picture {
 
 /// The picture of a frame: the one its sidecar names, or `NAME_image.*` beside it.
 pub(crate) fn picture_of(folder: &Path, entry: &Entry) -> Result<Picture, String> {
-    let sidecar = entry
-        .sidecar
-        .as_ref()
-        .and_then(|s| read_json(&folder.join(&s.file)).ok());
-    picture(folder, entry, sidecar.as_ref())
+    let sidecar = SmallFiles::read(folder, entry).sidecar;
+    picture(folder, entry, sidecar.as_ref().map(|s| &s.record))
 }
 
-fn picture(folder: &Path, entry: &Entry, sidecar: Option<&Value>) -> Result<Picture, String> {
-    let named = sidecar
-        .and_then(|s| s.get("image")?.as_str())
-        .map(PathBuf::from);
+fn picture(
+    folder: &Path,
+    entry: &Entry,
+    sidecar: Option<&PredictionRecord>,
+) -> Result<Picture, String> {
+    let named = sidecar.and_then(|s| s.image.clone());
     // As it was given to `predict`, whose folder this may still be; or beside the results, which were moved together.
     let mut places: Vec<PathBuf> = named
         .iter()
@@ -184,7 +155,8 @@ fn picture(folder: &Path, entry: &Entry, sidecar: Option<&Value>) -> Result<Pict
             Ok(Some((content_type, size))) => {
                 let said = sidecar
                     .filter(|_| is_named)
-                    .and_then(|s| s.get("image_file")?.get("bytes")?.as_u64());
+                    .and_then(|s| s.image_file)
+                    .map(|file| file.bytes);
                 let bytes = std::fs::metadata(path).map(|m| m.len()).ok();
                 return Ok(Picture {
                     path: path.clone(),

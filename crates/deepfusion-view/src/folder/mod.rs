@@ -4,6 +4,7 @@ mod entry;
 mod frame;
 mod listing;
 mod order;
+mod small_files;
 mod summary;
 
 use std::path::{Path, PathBuf};
@@ -12,7 +13,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub(crate) use entry::{Entry, FrameFile};
 pub(crate) use frame::{frame_json, picture_of, targets_of};
 #[cfg(feature = "rerun")]
-pub(crate) use summary::{Summary, numbers};
+pub(crate) use small_files::SmallFiles;
+#[cfg(feature = "rerun")]
+pub(crate) use summary::Summary;
 
 use self::listing::Listing;
 use crate::training;

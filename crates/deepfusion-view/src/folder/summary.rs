@@ -2,15 +2,12 @@
 
 use std::path::Path;
 
-use serde_json::Value;
+use deepfusion_records::{FrameRecord, ScaleRecord, ScaleState};
 
 use super::entry::Entry;
-use crate::{Error, Result};
+use super::small_files::SmallFiles;
 
-/// No sidecar or list of targets is as large; what is, is another program's file.
-const MOST_JSON_BYTES: u64 = 16 << 20;
-
-/// What the time line says about a frame. Numbers are `None` where they are absent or not finite.
+/// What the time line says about a frame. Numbers are `None` where they are absent.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Summary {
     /// Whether this is a frame at all: other JSON files may lie in the folder.
@@ -24,87 +21,63 @@ pub(crate) struct Summary {
     pub speed_mps: Option<f64>,
     pub time_to_collision_s: Option<f64>,
     pub scale_ratio: Option<f64>,
-    pub scale_state: Option<String>,
+    pub scale_state: Option<ScaleState>,
     pub latency_ms: Option<f64>,
 }
 
 impl Summary {
     /// Reads the frame's sidecar and targets. What cannot be read becomes [`Summary::problem`].
     pub fn read(folder: &Path, entry: &Entry) -> Self {
+        let files = SmallFiles::read(folder, entry);
         let mut summary = Self {
-            is_frame: entry.depth.is_some() || entry.targets.is_some(),
+            // A sidecar that is being written is a frame that comes.
+            is_frame: entry.depth.is_some() || entry.targets.is_some() || files.unfinished,
             ..Self::default()
         };
-        let mut problems = Vec::new();
-        let mut small = |file: &Option<super::entry::FrameFile>| {
-            let outcome = read_json(&folder.join(&file.as_ref()?.file));
-            outcome.map_err(|e| problems.push(e.to_string())).ok()
-        };
-        let sidecar = small(&entry.sidecar);
-        let targets = small(&entry.targets);
-        if let Some(sidecar) = &sidecar {
-            summary.is_frame |= sidecar.get("image").is_some() && sidecar.get("size").is_some();
-            summary.depth_m = numbers(sidecar.get("depth_m"));
-            summary.add_scale(sidecar);
+        if let Some(sidecar) = &files.sidecar {
+            let record = &sidecar.record;
+            summary.is_frame |= record.image.is_some() && record.size.is_some();
+            summary.depth_m = record.depth_m.map(|d| d.map(as_written));
+            summary.add_scale(record.scale_monitor);
         }
-        // A sidecar that is being written is a frame that comes.
-        summary.is_frame |= !problems.is_empty();
-        if let Some(frame) = &targets {
-            summary.add_targets(frame);
+        if let Some(frame) = &files.targets {
+            summary.add_targets(&frame.record);
         }
-        summary.problem = (!problems.is_empty()).then(|| problems.join("; "));
+        summary.problem = (!files.problems.is_empty()).then(|| files.problems.join("; "));
         summary
     }
 
-    fn add_targets(&mut self, frame: &Value) {
-        let number = |key: &str| frame.get(key).and_then(Value::as_f64);
-        self.time_s = number("time_s");
-        self.speed_mps = number("speed_mps");
-        self.time_to_collision_s = number("time_to_collision_s");
-        self.latency_ms = number("latency_ms");
-        if let Some(list) = frame.get("targets").and_then(Value::as_array) {
-            self.targets = Some(list.len());
-            let distances = list.iter().filter_map(|t| t.get("distance_m")?.as_f64());
-            self.nearest_m = distances.min_by(f64::total_cmp);
-        }
-        self.add_scale(frame);
+    fn add_targets(&mut self, frame: &FrameRecord) {
+        self.time_s = frame.time_s;
+        self.speed_mps = frame.speed_mps;
+        self.time_to_collision_s = frame.time_to_collision_s;
+        self.latency_ms = frame.latency_ms;
+        self.targets = Some(frame.targets.len());
+        let distances = frame.targets.iter().map(|t| t.distance_m);
+        self.nearest_m = distances.min_by(f64::total_cmp);
+        self.add_scale(frame.scale_monitor);
     }
 
-    /// The scale fields of the sidecar of `predict` and `perceive`.
-    fn add_scale(&mut self, file: &Value) {
-        if let Some(monitor) = file.get("scale_monitor").filter(|m| m.is_object()) {
-            self.scale_ratio = monitor.get("ratio").and_then(Value::as_f64);
-            let state = monitor.get("state").and_then(Value::as_str);
-            self.scale_state = state.map(str::to_owned);
+    /// What `predict` and `perceive` say of the metres.
+    fn add_scale(&mut self, monitor: Option<ScaleRecord>) {
+        if let Some(monitor) = monitor {
+            self.scale_ratio = monitor.reading.ratio;
+            self.scale_state = Some(monitor.reading.state);
         }
     }
 }
 
-/// N finite numbers; JSON has no others.
-pub(crate) fn numbers<const N: usize>(value: Option<&Value>) -> Option<[f64; N]> {
-    let list: Option<Vec<f64>> = value?.as_array()?.iter().map(Value::as_f64).collect();
-    list?.try_into().ok()
+/// A number as its file has it: 5.9, not 5.900000095 as the f32 next to it is.
+fn as_written(number: f32) -> f64 {
+    number.to_string().parse().unwrap_or(f64::from(number))
 }
 
-/// A small JSON file.
-pub(super) fn read_json(path: &Path) -> Result<Value> {
-    let meta = std::fs::metadata(path).map_err(|e| Error::file(path, e))?;
-    if meta.len() > MOST_JSON_BYTES {
-        return Err(Error::content(
-            path,
-            format!(
-                "{} bytes are too many for a frame's description",
-                meta.len()
-            ),
-        ));
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_stay_as_they_are_written() {
+        assert_eq!([5.9_f32, 21.0, 0.1].map(as_written), [5.9, 21.0, 0.1]);
     }
-    let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
-    serde_json::from_slice(&bytes).map_err(|e| {
-        let what = if e.is_eof() {
-            "half-written, or cut off"
-        } else {
-            "no JSON"
-        };
-        Error::content(path, format!("{what}: {e}"))
-    })
 }

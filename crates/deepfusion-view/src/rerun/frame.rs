@@ -4,17 +4,17 @@ use std::io::Write;
 use std::path::Path;
 
 use deepfusion_geometry::Intrinsics;
+use deepfusion_records::FrameRecord;
 use re_log_types::{TimeInt, TimePoint, Timeline};
 use re_sdk_types::AsComponents;
 use re_sdk_types::archetypes::{DepthImage, EncodedImage, Pinhole, Scalars, TextLog, Transform3D};
 use re_sdk_types::components::{PinholeProjection, TextLogLevel};
 use re_sdk_types::datatypes::ChannelDatatype;
-use serde_json::Value;
 
 use super::recording::{Problem, Recording};
 use super::targets::{SeenTarget, boxes, ground, velocities};
 use super::tracks::Tracks;
-use crate::folder::{Entry, Summary, frame_json, numbers, picture_of};
+use crate::folder::{Entry, SmallFiles, Summary, frame_json, picture_of};
 use crate::{DepthCode, DepthFile};
 
 /// Logs frames in their order.
@@ -43,7 +43,9 @@ impl FrameLogger {
             .collect();
 
         let camera: Option<Intrinsics> = serde_json::from_value(frame["intrinsics"].clone()).ok();
-        let world_from_cam = numbers::<12>(frame["targets"].get("camera_motion"));
+        let targets = SmallFiles::read(folder, entry).targets;
+        let targets = targets.map_or_else(FrameRecord::default, |t| t.record);
+        let world_from_cam = targets.camera_motion;
         recording.log("world/camera", &time, &transform(world_from_cam))?;
         let pinhole = camera.map(|k| pinhole(&k));
         recording.log_or_clear("world/camera/image", &time, any(&pinhole))?;
@@ -54,7 +56,7 @@ impl FrameLogger {
         let depth = depth(folder, entry, size, &mut problems);
         recording.log_or_clear("world/camera/image/depth", &time, any(&depth))?;
 
-        self.log_targets(recording, &time, &frame["targets"], world_from_cam)?;
+        self.log_targets(recording, &time, &targets)?;
         for (entity, number) in [
             ("speed_mps", summary.speed_mps),
             ("time_to_collision_s", summary.time_to_collision_s),
@@ -73,23 +75,17 @@ impl FrameLogger {
         &mut self,
         recording: &mut Recording<W>,
         time: &TimePoint,
-        frame: &Value,
-        world_from_cam: Option<[f64; 12]>,
+        frame: &FrameRecord,
     ) -> Result<(), Problem> {
-        let list = frame.get("targets").and_then(Value::as_array);
-        let targets: Vec<SeenTarget> = list
-            .into_iter()
-            .flatten()
-            .filter_map(SeenTarget::of)
-            .collect();
+        let targets: Vec<SeenTarget> = frame.targets.iter().map(SeenTarget::of).collect();
         recording.log_or_clear("world/camera/targets", time, any(&boxes(&targets)))?;
         recording.log_or_clear("world/camera/velocities", time, any(&velocities(&targets)))?;
         recording.log_or_clear(
             "world/camera/ground",
             time,
-            any(&ground(frame.get("ground"))),
+            any(&frame.ground.and_then(ground)),
         )?;
-        let paths = self.tracks.add(&targets, world_from_cam);
+        let paths = self.tracks.add(&targets, frame.camera_motion);
         recording.log_or_clear("world/tracks", time, any(&paths))
     }
 }

@@ -1,12 +1,10 @@
 //! Targets and ground, in the camera's axes: x right, y down, z forward, metres.
 
+use deepfusion_records::{GroundPlane, Target};
 use deepfusion_render::colour_of;
 use re_sdk_types::archetypes::{Arrows3D, Boxes3D, LineStrips3D};
 use re_sdk_types::components::{Color, FillMode};
 use re_sdk_types::datatypes::Quaternion;
-use serde_json::Value;
-
-use crate::folder::numbers;
 
 /// What is drawn of a target.
 pub(super) struct SeenTarget {
@@ -22,31 +20,27 @@ pub(super) struct SeenTarget {
 }
 
 impl SeenTarget {
-    /// From `NAME_targets.json`; `None` without place, size or number.
-    pub fn of(target: &Value) -> Option<Self> {
-        let id = target.get("id")?.as_u64()?;
-        let number = |key: &str| target.get(key).and_then(Value::as_f64);
-        let velocity = numbers::<3>(target.get("velocity_mps"));
-        let moves = target.get("moving").and_then(Value::as_bool) == Some(true);
-        let velocity = velocity.filter(|_| moves);
-        let mut label = match target.get("class").and_then(Value::as_str) {
+    /// From `NAME_targets.json`.
+    pub fn of(target: &Target) -> Self {
+        let id = target.id;
+        let moves = target.moving == Some(true);
+        let velocity = target.velocity_mps.filter(|_| moves);
+        let mut label = match &target.class {
             Some(class) => format!("{class} {id}"),
             None => id.to_string(),
         };
-        if let Some(distance) = number("distance_m") {
-            label += &format!(" {distance:.1} m");
-        }
+        label += &format!(" {:.1} m", target.distance_m);
         if let Some(v) = velocity {
             label += &format!(" {:.1} m/s", length(v));
         }
-        Some(Self {
+        Self {
             id,
-            centre: numbers(target.get("center_m"))?,
-            size: numbers(target.get("size_m"))?,
-            yaw: number("yaw_rad").unwrap_or(0.0),
+            centre: target.center_m,
+            size: target.size_m,
+            yaw: target.yaw_rad,
             velocity,
             label,
-        })
+        }
     }
 
     /// The same as in the pictures that `perceive` writes.
@@ -95,10 +89,10 @@ pub(super) fn velocities(targets: &[SeenTarget]) -> Option<Arrows3D> {
 }
 
 /// A grid of 5 m on the plane normal·p + offset = 0, from before the camera to 50 m; `None` without a plane that one could drive on.
-pub(super) fn ground(plane: Option<&Value>) -> Option<LineStrips3D> {
+pub(super) fn ground(plane: GroundPlane) -> Option<LineStrips3D> {
     const GREY: [u8; 4] = [140, 140, 140, 120];
-    let [nx, ny, nz] = numbers::<3>(plane?.get("normal"))?;
-    let offset = plane?.get("offset_m")?.as_f64()?;
+    let [nx, ny, nz] = plane.normal.map(f64::from);
+    let offset = f64::from(plane.offset_m);
     if ny.abs() < 0.5 {
         return None;
     }

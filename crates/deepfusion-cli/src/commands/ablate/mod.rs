@@ -9,6 +9,10 @@ use std::time::Instant;
 use burn::tensor::Device;
 use deepfusion_data::{Cameras, GtKind};
 use deepfusion_eval::{GroundTruth, Protocol, Report};
+use deepfusion_jobs::evaluation::{
+    Truth, default_crop, evaluate_datasets, predict, trivial_from_datasets,
+};
+use deepfusion_jobs::recordings::{camera_word, training_recordings};
 use deepfusion_model::{CheckpointKind, Preset, RunFolder, TrainConfig, ViewMotion};
 use deepfusion_runtime::ModelSource;
 use deepfusion_train::Trainer;
@@ -16,11 +20,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use self::rows::Row;
 use self::table::RunResult;
-use super::eval::predict;
-use super::evaluate::{
-    Truth, default_crop, evaluate_datasets, open_datasets, trivial_from_datasets,
-};
-use super::recordings::{camera_word, training_recordings};
+use super::recordings::{open_datasets, open_samples};
 use super::{device, resume, train};
 use crate::cli::{AblateArgs, ComputeDevice, EngineArgs};
 use crate::error::CliError;
@@ -70,12 +70,9 @@ pub fn run(args: &AblateArgs) -> Result<()> {
     // Every row is looked at before the first trains for hours.
     let configs = plan.rows.iter().map(|row| row.config(&plan.config));
     let configs = configs.collect::<Result<Vec<_>, _>>()?;
-    train::open_samples(&configs[0]).map_err(|error| {
-        if args.resume {
-            resume::where_recordings_are(error, &configs[0], &out)
-        } else {
-            error
-        }
+    open_samples(&configs[0]).map_err(|error| match args.resume {
+        true => resume::where_recordings_are(error, &configs[0], &out),
+        false => error,
     })?;
     open_eval_data(&plan)?;
     write(&out.join(PLAN), &toml::to_string_pretty(&plan)?)?;
@@ -266,7 +263,7 @@ fn one_run(
 
 /// The run where its last checkpoint stands, or a new one.
 fn open_run(run: &Path, config: TrainConfig, device: &Device) -> Result<Trainer> {
-    let sets = train::open_samples(&config)?;
+    let sets = open_samples(&config)?;
     if let Ok((folder, _)) = RunFolder::open(run) {
         if folder.checkpoint_path(CheckpointKind::Last).exists() {
             let stored = folder.read_config()?;
@@ -304,14 +301,15 @@ fn measure(run: &Path, plan: &Plan, device: ComputeDevice) -> Result<Report> {
         ..Protocol::default()
     };
     let mut progress = Progress::new("evaluating");
-    let evaluated = evaluate_datasets(
+    let evaluated = evaluate_datasets::<crate::failure::Failure>(
         &eval_sets,
         &mut Truth::Scans(GtKind::Z),
         &protocol,
         Some(trivial_from_datasets(&train_sets, GtKind::Z)?),
         &mut |dataset, frame| {
             let image = dataset.load_image(frame)?;
-            predict(&mut estimator, &image, &dataset.intrinsics(frame), true)
+            let camera = dataset.intrinsics(frame);
+            Ok(predict(&mut estimator, &image, &camera, true)?)
         },
         &mut |done, total| progress.set(done, total),
     )?;

@@ -9,6 +9,7 @@ use std::time::Instant;
 use deepfusion_data::{RgbImage, decode_rgb, resize_rgb, to_network_input};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use deepfusion_jobs::bulk::pipeline::{self, Threads};
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{Preset, TrainConfig};
 use deepfusion_perception::{Perception, PerceptionConfig, Stamp};
@@ -24,7 +25,6 @@ use super::device;
 use crate::cli::BenchArgs;
 use crate::failure::Result;
 use crate::model;
-use crate::pipeline::{self, Threads};
 use crate::{engine, output};
 
 /// The picture that is decoded and resized, a simulated street: a KITTI frame's size.

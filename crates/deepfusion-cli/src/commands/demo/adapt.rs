@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use deepfusion_data::{Dataset, OpenOptions, Split};
+use deepfusion_jobs::evaluation::Evaluated;
 use deepfusion_model::{TrainConfig, ViewMotion};
 use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_render::{HtmlReport, PictureFormat};
@@ -15,7 +16,6 @@ use deepfusion_weights::{DEFAULT, Shipped};
 use super::page::{self, Shown};
 use super::{Demo, TEST_SEED, measure};
 use crate::cli::PerceiveArgs;
-use crate::commands::evaluate::Evaluated;
 use crate::commands::recorder::clock;
 use crate::commands::start::Start;
 use crate::commands::{device, perceive, run_report};

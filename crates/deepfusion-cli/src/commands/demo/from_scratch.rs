@@ -7,8 +7,8 @@ use deepfusion_sim::SimConfig;
 
 use super::page::{self, Shown};
 use super::{Demo, TEST_SEED, measure};
-use crate::commands::evaluate::open_datasets;
 use crate::commands::recorder::clock;
+use crate::commands::recordings::open_datasets;
 use crate::commands::run_report;
 use crate::failure::Result;
 use crate::progress::say;

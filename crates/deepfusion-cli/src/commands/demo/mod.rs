@@ -12,6 +12,9 @@ use std::time::Instant;
 use burn::tensor::Device;
 use deepfusion_data::{Dataset, GtKind};
 use deepfusion_eval::{Crop, GroundTruth, Protocol};
+use deepfusion_jobs::evaluation::{
+    Evaluated, Truth, evaluate_datasets, predict, trivial_from_datasets,
+};
 use deepfusion_model::{RunFolder, TrainConfig};
 use deepfusion_runtime::DepthEstimator;
 use deepfusion_runtime::ModelSource;
@@ -19,9 +22,8 @@ use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{Model, Trainer};
 use deepfusion_weights::DEFAULT;
 
-use super::eval::predict;
-use super::evaluate::{Evaluated, Truth, evaluate_datasets, trivial_from_datasets};
 use super::recorder::clock;
+use super::recordings::open_samples;
 use super::{device, train};
 use crate::cli::{DemoArgs, EngineArgs};
 use crate::failure::Result;
@@ -79,7 +81,7 @@ impl Demo<'_> {
         config: TrainConfig,
         initialise: impl FnOnce(Model) -> Result<Model, deepfusion_train::Error>,
     ) -> Result<ModelSource> {
-        let sets = train::open_samples(&config)?;
+        let sets = open_samples(&config)?;
         let folder = RunFolder::create(&self.model())?;
         let mut trainer = Trainer::create(config, folder, sets, &self.device, initialise)?;
         train::train(&mut trainer, None)?;
@@ -133,7 +135,8 @@ fn measure(
         &mut |dataset, frame| {
             interrupt::check(DEMO)?;
             let image = dataset.load_image(frame)?;
-            predict(estimator, &image, &dataset.intrinsics(frame), true)
+            let camera = dataset.intrinsics(frame);
+            Ok(predict(estimator, &image, &camera, true)?)
         },
         &mut |done, total| progress.set(done, total),
     )

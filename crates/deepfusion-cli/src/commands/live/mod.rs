@@ -8,12 +8,10 @@ pub use self::feed::{Feed, run};
 pub use self::folder::{VIDEO, make_room};
 
 use std::io::IsTerminal;
-use std::time::UNIX_EPOCH;
 
+use deepfusion_jobs::Input;
 use deepfusion_video::{Address, LiveFrame};
-use serde::{Deserialize, Serialize};
 
-use super::predict::inputs::Input;
 use crate::cli::LiveArgs;
 use crate::error::CliError;
 use crate::failure::Result;
@@ -31,29 +29,6 @@ pub fn source(inputs: &[String], args: &LiveArgs) -> Result<Option<Address>, Cli
         (Some(address), _) => Ok(Some(address)),
         (None, Some(option)) => Err(CliError::OnlyLive { option }),
         (None, None) => Ok(None),
-    }
-}
-
-/// What a frame has for having been live.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct LiveMark {
-    /// When it arrived, seconds since 1970.
-    pub arrived_unix_s: f64,
-    /// Frames of the source that were skipped so far.
-    pub dropped: u64,
-    /// From there to its depth (`predict`) or targets (`perceive`), milliseconds.
-    pub latency_ms: f64,
-}
-
-impl LiveMark {
-    /// Of a frame at which nobody has looked yet.
-    pub fn of(frame: &LiveFrame) -> Self {
-        let since_1970 = frame.arrived_at.duration_since(UNIX_EPOCH);
-        Self {
-            arrived_unix_s: since_1970.map_or(0.0, |d| d.as_secs_f64()),
-            dropped: frame.dropped,
-            latency_ms: 0.0,
-        }
     }
 }
 

@@ -3,21 +3,20 @@
 use std::time::Instant;
 
 use deepfusion_eval::IntervalFactors;
+use deepfusion_jobs::evaluation::confidence::Confidence;
+use deepfusion_jobs::scene::{Motion, ScaleWatch};
+use deepfusion_jobs::{Input, intervals};
 use deepfusion_perception::{
-    ConfidenceModel, Perception, PerceptionConfig, VehicleShape, time_to_collision,
+    ConfidenceModel, Perception, PerceptionConfig, VehicleShape, time_to_collision, working_depth,
 };
+use deepfusion_records::FrameRecord;
 use deepfusion_runtime::ModelSource;
 use deepfusion_runtime::{DepthEstimator, PreparedImage};
 
 use super::instances::Spotter;
 use super::pictures::{self, Picture};
-use super::record::FrameRecord;
 use crate::cli::{PerceiveArgs, PerceiveSave};
-use crate::commands::confidence::Confidence;
-use crate::commands::predict::inputs::Input;
-use crate::commands::predict::{Loaded, Seen};
-use crate::commands::scene::{Motion, ScaleWatch, working_depth};
-use crate::commands::uncertainty;
+use crate::commands::predict::{Loaded, Seen, tell_drift};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::model::ModelFacts;
@@ -36,6 +35,8 @@ pub struct Found {
     pub loaded: Loaded,
     pub seen: Seen,
     pub record: FrameRecord,
+    /// From opening the file, or from a live frame's arrival, to having the targets.
+    pub latency_ms: f64,
     pub pictures: Vec<(PerceiveSave, Picture)>,
 }
 
@@ -69,7 +70,7 @@ impl<'a> Eyes<'a> {
             args,
             estimator,
             perception: Perception::new(config),
-            watch: ScaleWatch::of(prediction),
+            watch: ScaleWatch::new(prediction.scale_config(), prediction.correct_scale),
             spotter: Spotter::of(&args.masks, prediction.engine.ort_lib.as_deref())?,
             confidence: confidence.map(|c| c.single),
             intervals: model.interval_factors()?,
@@ -93,7 +94,7 @@ impl<'a> Eyes<'a> {
             self.perception.reset();
         }
         let whole = prediction.depth();
-        let sigma = uncertainty::sigma(&prediction, &whole, &self.intervals);
+        let sigma = intervals::sigma(&prediction, &whole, &self.intervals);
         let (depth, k) = working_depth(&whole, &camera);
         let sigma = sigma.map(|sigma| working_depth(&sigma, &camera).0);
         let things = self.spotter.find(&loaded.image, &depth)?;
@@ -107,10 +108,19 @@ impl<'a> Eyes<'a> {
         let latency_ms = start.elapsed().as_secs_f64() * 1e3;
         // The targets need not wait for it.
         let (image, ground) = (&loaded.image, surroundings.ground.as_ref());
-        let scale = self.watch.add(&input.name, image, &camera, &motion, ground);
+        let scale = self.watch.add(image, &camera, &motion, ground);
+        if let Some(ratio) = self.watch.first_drift() {
+            tell_drift(&input.name, ratio);
+        }
         let record = FrameRecord {
             scale_monitor: scale,
-            ..FrameRecord::new(&input.name, &surroundings, &motion, collision, latency_ms)
+            ..FrameRecord::new(
+                &input.name,
+                &surroundings,
+                (motion.stamp, motion.speed_mps),
+                collision,
+                latency_ms,
+            )
         };
         let pictures = pictures::draw(
             &self.args.save,
@@ -130,6 +140,7 @@ impl<'a> Eyes<'a> {
                 scale,
             },
             record,
+            latency_ms,
             pictures,
         })
     }

@@ -3,14 +3,16 @@
 use std::time::Instant;
 
 use deepfusion_geometry::Se3;
+use deepfusion_jobs::bulk::record_line;
+use deepfusion_jobs::scene::Motion;
 use deepfusion_perception::Stamp;
+use deepfusion_records::LiveMark;
 use deepfusion_video::{Address, LiveFrame};
 use nalgebra::Vector3;
 
 use super::Work;
 use super::eyes::{Begun, Eyes, Found};
-use crate::commands::live::{self, Feed, LiveMark};
-use crate::commands::scene::Motion;
+use crate::commands::live::{self, Feed};
 use crate::failure::Result;
 use crate::output;
 use crate::progress::say;
@@ -22,7 +24,10 @@ impl Work<'_> {
         let mut feed = Feed::open(address, &self.args.prediction.live)?;
         let look = |frame: LiveFrame| {
             let input = live::input(address, &frame);
-            let (start, mark) = (frame.arrived, LiveMark::of(&frame));
+            let (start, mark) = (
+                frame.arrived,
+                LiveMark::of_arrival(frame.arrived_at, frame.dropped),
+            );
             let (loaded, prepared) = self.job.load_live(frame)?;
             let begun = Begun {
                 input,
@@ -32,13 +37,13 @@ impl Work<'_> {
             };
             let motion = way.at(start);
             let mut found = eyes.look(begun, motion)?;
-            let latency_ms = found.record.latency_ms;
+            let latency_ms = found.latency_ms;
             found.loaded.live = Some(LiveMark { latency_ms, ..mark });
             found.record.arrived_unix_s = Some(mark.arrived_unix_s);
             found.record.dropped = Some(mark.dropped);
             if self.args.json {
                 // Before its pictures are written: who acts on it need not wait for them.
-                output::print(&found.record.line()?)?;
+                output::print(&record_line(&found.record)?)?;
             }
             Ok((found, latency_ms))
         };

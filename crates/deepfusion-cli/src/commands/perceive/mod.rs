@@ -4,25 +4,24 @@ mod eyes;
 mod instances;
 mod live;
 pub(super) mod pictures;
-mod record;
 
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
 
+use deepfusion_jobs::Input;
+use deepfusion_jobs::bulk::pipeline::{self, Threads};
+use deepfusion_jobs::bulk::{RecordLines, record_line, write_record};
+use deepfusion_jobs::scene::MotionTracker;
 use deepfusion_perception::PerceptionConfig;
 
 use self::eyes::{Begun, Eyes, Found};
-use self::record::Lines;
 use super::live as sources;
-use super::predict::Job;
-use super::predict::inputs::{self, Input};
-use super::scene::{MotionTracker, ScaleWatch};
+use super::predict::{Job, check_watched, find_inputs};
 use crate::cli::{PerceiveArgs, PredictionArgs};
 use crate::error::CliError;
 use crate::failure::{Context, Failure, Result};
 use crate::model;
-use crate::pipeline::{self, Threads};
 use crate::progress::say;
 use crate::{engine, interrupt, output};
 
@@ -35,9 +34,9 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
     let all = match (&source, args.speed) {
         (Some(_), _) => Vec::new(),
         (None, Some(_)) => return Err(CliError::OnlyLive { option: "--speed" }.into()),
-        (None, None) => inputs::find(&prediction.inputs, &prediction.open_options())?,
+        (None, None) => find_inputs(prediction)?,
     };
-    ScaleWatch::check(prediction, source.as_ref(), &all)?;
+    check_watched(prediction, source.as_ref(), &all)?;
     let mut config = read_config(args.config.as_deref(), PerceptionConfig::predicted())?;
     if let Some(far) = args.max_depth {
         config.max_depth_m = far as f32;
@@ -60,7 +59,7 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
         args,
         job: &job,
         all: &all,
-        lines: Mutex::new(Lines::begin(&out.join("targets.jsonl"))?),
+        lines: Mutex::new(RecordLines::begin(&out.join("targets.jsonl"))?),
         outcome: Mutex::new(Outcome::default()),
     };
     match source {
@@ -118,7 +117,7 @@ struct Work<'a> {
     args: &'a PerceiveArgs,
     job: &'a Job<'a>,
     all: &'a [Input],
-    lines: Mutex<Lines>,
+    lines: Mutex<RecordLines>,
     outcome: Mutex<Outcome>,
 }
 
@@ -181,8 +180,8 @@ impl Work<'_> {
             )?;
         }
         self.job.write(input, &found.loaded, &found.seen)?;
-        found.record.write(&record_path(out, &input.name))?;
-        let line = found.record.line()?;
+        write_record(&found.record, &record_path(out, &input.name))?;
+        let line = record_line(&found.record)?;
         self.lines
             .lock()
             .unwrap_or_else(|e| e.into_inner())
@@ -195,7 +194,7 @@ impl Work<'_> {
         outcome.done += 1;
         outcome.targets += found.record.targets.len();
         if !live {
-            outcome.latency_ms.push(found.record.latency_ms);
+            outcome.latency_ms.extend(found.record.latency_ms);
         }
         Ok(())
     }

@@ -2,15 +2,14 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use deepfusion_jobs::bulk::{CameraSource, Lock, write_one_video};
+use deepfusion_records::LiveMark;
 use deepfusion_runtime::ModelSource;
 use deepfusion_video::{Address, LiveFrame, shown_for};
 
-use super::camera::CameraSource;
-use super::manifest::Lock;
-use super::{Job, video};
-use crate::cli::{PredictArgs, Shard};
-use crate::commands::live::{self, Feed, LiveMark};
-use crate::commands::scene::ScaleWatch;
+use super::{Job, check_watched, outputs, tell_videos};
+use crate::cli::{PredictArgs, Save, Shard};
+use crate::commands::live::{self, Feed};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::say;
@@ -22,7 +21,7 @@ pub fn run(args: &PredictArgs, model: &ModelSource, address: &Address) -> Result
     if args.shard != Shard::WHOLE {
         return Err(CliError::LiveShard.into());
     }
-    ScaleWatch::check(prediction, Some(address), &[])?;
+    check_watched(prediction, Some(address), &[])?;
     let mut estimator = engine::load(model, &prediction.engine)?;
     let job = Job::new(prediction, args.outputs(), model, &estimator)?;
     if args.save.iter().any(|save| save.is_cloud()) && matches!(job.camera, CameraSource::Unknown) {
@@ -34,7 +33,10 @@ pub fn run(args: &PredictArgs, model: &ModelSource, address: &Address) -> Result
     let mut feed = Feed::open(address, &prediction.live)?;
     let look = |frame: LiveFrame| {
         let input = live::input(address, &frame);
-        let (arrived, mark) = (frame.arrived, LiveMark::of(&frame));
+        let (arrived, mark) = (
+            frame.arrived,
+            LiveMark::of_arrival(frame.arrived_at, frame.dropped),
+        );
         let (mut loaded, prepared) = job.load_live(frame)?;
         let seen = job.see(&mut estimator, &prepared)?;
         let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
@@ -68,7 +70,10 @@ pub fn run(args: &PredictArgs, model: &ModelSource, address: &Address) -> Result
     if args.video() {
         let times: Vec<Option<f64>> = done.iter().map(|(_, time)| *time).collect();
         let shown = done.iter().map(|(name, _)| name.as_str());
-        filmed = video::write_one(out, shown.zip(shown_for(&times)), live::VIDEO);
+        let pictures = outputs::ending(Save::SideBySide);
+        filmed = write_one_video(out, shown.zip(shown_for(&times)), pictures, live::VIDEO)
+            .map(|video| tell_videos(video.as_slice()))
+            .map_err(Into::into);
     }
     // Why the source ended comes first: a full disk ends the video, too.
     ending.and(filmed)

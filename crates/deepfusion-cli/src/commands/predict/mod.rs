@@ -1,50 +1,42 @@
 //! `deepfusion predict`: images to metric depth, in bulk.
 
-pub(super) mod camera;
-mod committer;
 mod features;
-pub(super) mod inputs;
 mod inspection;
-mod ledger;
 mod live;
-mod manifest;
+mod made_with;
 mod outputs;
-mod resume;
-pub(super) mod sidecar;
-mod video;
-mod watcher;
 
+use std::fmt::Display;
+use std::path::PathBuf;
 use std::sync::Once;
 
 use deepfusion_data::{RgbImage, load_photo};
 use deepfusion_eval::IntervalFactors;
 use deepfusion_eval::compare::MetricScale;
 use deepfusion_geometry::Intrinsics;
+use deepfusion_jobs::bulk::pipeline::{self, Threads};
+use deepfusion_jobs::bulk::{
+    Begun, BulkJob, BulkProgress, CameraSource, Lock, PinholeImage, Summary, add_output, commit,
+    queue, write_unsynced, write_videos,
+};
+use deepfusion_jobs::scene::{DepthWatch, unwatched};
+use deepfusion_jobs::{Input, intervals};
+use deepfusion_records::{FileMark, LiveMark, MadeWith, PredictionRecord, ScaleRecord, Sidecar};
 use deepfusion_runtime::LayerMaps;
 use deepfusion_runtime::ModelSource;
 use deepfusion_runtime::{DepthEstimator, Prediction, PreparedImage, Preparer};
 use deepfusion_video::LiveFrame;
-use rayon::prelude::*;
+use deepfusion_video::{Address, can_write_video};
 
-use self::camera::{CameraSource, Taken};
-use self::inputs::Input;
-use self::ledger::Ledger;
-use self::manifest::{Lock, Manifest};
-use self::sidecar::{FileMark, MadeWith, Sidecar};
-use self::watcher::Watcher;
 use super::live as sources;
-use super::live::LiveMark;
 use super::perceive::pictures;
-use super::scene::{Scale, ScaleWatch};
-use super::uncertainty;
-use crate::cli::{Outputs, PredictArgs, PredictionArgs, Save, Shard};
-use crate::engine;
+use super::remarks;
+use crate::cli::{CameraIntrinsics, Outputs, PredictArgs, PredictionArgs, Save, Shard};
 use crate::error::CliError;
 use crate::failure::{Context, Result};
 use crate::model::{self, ModelFacts};
-use crate::pipeline::{self, Threads};
-use crate::progress::say;
-use crate::{interrupt, output};
+use crate::progress::{Progress, say};
+use crate::{engine, interrupt, jobs, output};
 
 /// What is the same for all images of a run.
 pub(super) struct Job<'a> {
@@ -82,7 +74,7 @@ pub(super) struct Seen {
     /// Empty where nobody asked for features.
     pub layers: Vec<LayerMaps>,
     /// Whether the metres hold, where that is watched.
-    pub scale: Option<Scale>,
+    pub scale: Option<ScaleRecord>,
 }
 
 /// `deepfusion predict`.
@@ -91,13 +83,13 @@ pub fn run(args: &PredictArgs) -> Result<()> {
         prediction, shard, ..
     } = args;
     let out = &prediction.out;
-    video::check(args)?;
+    check_videos(args)?;
     let model = model::chosen(prediction.model.as_deref())?;
     if let Some(address) = sources::source(&prediction.inputs, &prediction.live)? {
         return live::run(args, &model, &address);
     }
-    let all = inputs::find(&prediction.inputs, &prediction.open_options())?;
-    ScaleWatch::check(prediction, None, &all)?;
+    let all = find_inputs(prediction)?;
+    check_watched(prediction, None, &all)?;
     if prediction.correct_scale && *shard != Shard::WHOLE {
         return Err(CliError::CorrectShard.into());
     }
@@ -113,13 +105,25 @@ pub fn run(args: &PredictArgs) -> Result<()> {
     std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
     interrupt::catch("stopping after the images at work; the same command goes on from there");
     let _lock = Lock::take(out, *shard)?;
-    let (ledger, todo) = begin(&job, args, &all, &mine)?;
-    predict(&job, &mut estimator, &mine, &todo, &ledger);
-    let summary = ledger.finish()?;
-    let there = mine.len() - todo.len();
+    let begun = job.bulk(args).begin(&all, &mine, args.json);
+    let Begun {
+        manifest,
+        sidecars,
+        todo,
+    } = begun.map_err(jobs::in_words)?;
+    let mut shown = Progress::new("predicting");
+    let watcher = |done, total| shown.set(done, total);
+    let progress = BulkProgress::new(out, manifest, sidecars, watcher);
+    predict(&job, &mut estimator, &mine, &todo, &progress);
+    let mut summary = progress.finish();
+    drop(shown);
+    let sidecars = std::mem::take(&mut summary.sidecars);
+    let (there, done) = (mine.len() - todo.len(), summary.done);
+    // A full disk is told once, as the reason for stopping.
+    let outcome = outcome(summary)?;
     say(&format!(
         "{} images written to {}{}",
-        summary.done - there,
+        done - there,
         out.display(),
         if there > 0 {
             format!(", {there} were there already")
@@ -128,13 +132,110 @@ pub fn run(args: &PredictArgs) -> Result<()> {
         }
     ));
     if args.json {
-        output::print_json(&summary.sidecars)?;
+        output::print_json(&sidecars)?;
     }
-    summary.outcome?;
+    outcome?;
     if args.video() {
-        video::write(out, &all)
-    } else {
-        Ok(())
+        let written = write_videos(out, &all, outputs::ending(Save::SideBySide));
+        tell_videos(&written?);
+    }
+    Ok(())
+}
+
+/// Whether all images of a run are done, as an error for who started it; an error at once where the manifest could not be written.
+fn outcome(summary: Summary<crate::failure::Failure>) -> Result<Result<()>> {
+    let Summary {
+        done,
+        total,
+        mut failures,
+        stopped_by,
+        manifest,
+        ..
+    } = summary;
+    let failed = failures.len();
+    if let Some(error) = stopped_by {
+        return Ok(Err(error));
+    }
+    if failed == 1 && total == 1 {
+        return Ok(Err(failures.remove(0).1));
+    }
+    if failed > 0 {
+        let error = CliError::SomeFailed {
+            hint: failures.iter().find_map(|(_, error)| error.hint()),
+            failures: failures.iter().map(|(_, error)| error.one_line()).collect(),
+            total,
+            interrupted: interrupt::asked() && done + failed < total,
+        };
+        return Ok(Err(error.into()));
+    }
+    if done < total {
+        return Ok(Err(CliError::Interrupted { done, total }.into()));
+    }
+    manifest?;
+    Ok(Ok(()))
+}
+
+/// The images that the arguments mean; what was noticed of recordings among them is told.
+pub(super) fn find_inputs(args: &PredictionArgs) -> Result<Vec<Input>> {
+    let options = args.open_options();
+    Ok(deepfusion_jobs::find_inputs(
+        &args.inputs,
+        &options,
+        remarks::tell,
+    )?)
+}
+
+/// That the scale monitor's options are not given where it would never look: they would change nothing, silently.
+///
+/// # Errors
+/// [`CliError::Unwatched`].
+pub(super) fn check_watched(
+    args: &PredictionArgs,
+    source: Option<&Address>,
+    inputs: &[Input],
+) -> Result<(), CliError> {
+    let option = match args {
+        args if args.correct_scale => "--correct-scale",
+        args if args.camera_height.is_some() => "--camera-height",
+        _ => return Ok(()),
+    };
+    let unwatched_for = |input: &dyn Display, why: &dyn Display| CliError::Unwatched {
+        option,
+        input: input.to_string(),
+        why: why.to_string(),
+    };
+    if let Some(address) = source {
+        return Err(unwatched_for(address, &"a live source tells no motion"));
+    }
+    match unwatched(inputs) {
+        Some((input, why)) => Err(unwatched_for(&input, &why)),
+        None => Ok(()),
+    }
+}
+
+/// Says that the metres have changed.
+pub(super) fn tell_drift(frame: &str, ratio: f64) {
+    tracing::warn!(
+        "{frame}: the road says that metres are {ratio:.2} times what they were: were the images zoomed, the camera \
+         moved, or is the speed wrong? (scale_monitor in each frame's JSON; --correct-scale brings depth back)"
+    );
+}
+
+/// Whether videos can be written in the end, to know before the work begins.
+fn check_videos(args: &PredictArgs) -> Result<()> {
+    if !args.video() {
+        return Ok(());
+    }
+    if args.shard != Shard::WHOLE {
+        return Err(CliError::VideoShard.into());
+    }
+    Ok(can_write_video(&args.prediction.out)?)
+}
+
+/// Says which videos were written, and how many frames each has.
+fn tell_videos(videos: &[(PathBuf, usize)]) {
+    for (path, frames) in videos {
+        say(&format!("{}: {frames} frames", path.display()));
     }
 }
 
@@ -146,90 +247,46 @@ fn tell_assumed() {
     );
 }
 
-/// Looks at what is there and writes the manifest; gives the images that are left to do, by their place in `mine`.
-fn begin<'a>(
-    job: &Job<'a>,
-    command: &PredictArgs,
-    all: &[Input],
-    mine: &[&Input],
-) -> Result<(Ledger<'a>, Vec<usize>)> {
-    let args = job.args;
-    let mut manifest = Manifest::new(command.shard, all, mine, job.made_with.clone());
-    let before = Manifest::all(&args.out)?;
-    if !args.overwrite {
-        manifest.check_against(&before, &args.out)?;
-        if command.video() {
-            video::make_room(&args.out, all, &manifest, &before)?;
-        }
-    }
-    resume::remove_partial_files(job, mine)?;
-    let begun = manifest.begun(&before);
-    let mut todo = Vec::new();
-    let mut sidecars = vec![None; if command.json { mine.len() } else { 0 }];
-    // Whatever is there is read, to see that it still is what was written.
-    let found: Vec<Result<Option<Sidecar>>> = mine
-        .par_iter()
-        .map(|input| {
-            let known = begun.contains(&(input.path.as_path(), input.name.as_str()));
-            resume::finished(job, input, known)
-        })
-        .collect();
-    for (i, found) in found.into_iter().enumerate() {
-        match found? {
-            None => todo.push(i),
-            Some(sidecar) => {
-                manifest.images[i].state = manifest::State::Done;
-                if let Some(place) = sidecars.get_mut(i) {
-                    *place = Some(sidecar);
-                }
-            }
-        }
-    }
-    manifest.write(&args.out)?;
-    // Again, now that ours can be seen: of two shards of different jobs started at once, one notices.
-    let path = manifest.path(&args.out);
-    let others = Manifest::all(&args.out)?;
-    if !args.overwrite
-        && let Err(error) = manifest.check_against(&others, &args.out)
-    {
-        std::fs::remove_file(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
-        return Err(error.into());
-    }
-    Ok((Ledger::new(&args.out, manifest, sidecars), todo))
-}
-
 fn predict(
     job: &Job,
     estimator: &mut DepthEstimator,
     mine: &[&Input],
     todo: &[usize],
-    ledger: &Ledger,
+    progress: &BulkProgress<crate::failure::Failure>,
 ) {
     let load = |i: usize| {
         let loaded = job.load(mine[todo[i]]);
-        let loaded = loaded.map_err(|e| ledger.failed(todo[i], e)).ok();
+        let failed = |e: crate::failure::Failure| {
+            let why = e.one_line();
+            progress.failed(todo[i], e, why);
+        };
+        let loaded = loaded.map_err(failed).ok();
         loaded.map(|(loaded, prepared)| (i, loaded, prepared))
     };
-    let mut watcher = Watcher::of(job.args);
+    let mut watch = DepthWatch::new(job.args.scale_config(), job.args.correct_scale);
     let infer = |(i, loaded, prepared): (usize, Loaded, PreparedImage)| {
         let seen = job.see(estimator, &prepared).map(|mut seen| {
-            seen.scale = watcher.look(mine[todo[i]], &loaded, &mut seen.prediction);
+            let (input, image) = (mine[todo[i]], &loaded.image);
+            seen.scale = watch.look(input, image, loaded.camera, &mut seen.prediction);
+            if let Some(ratio) = watch.first_drift() {
+                tell_drift(&input.name, ratio);
+            }
             seen
         });
         (loaded, seen)
     };
-    let (to_disk, written) = committer::queue();
+    let (to_disk, written) = queue();
     let write = move |i: usize, (loaded, seen): (Loaded, Result<Seen>)| {
         match seen.and_then(|seen| job.write_outputs(mine[todo[i]], &loaded, &seen)) {
             // Fails only where the other thread has panicked, which ends the program below.
             Ok(sidecar) => drop(to_disk.send((todo[i], sidecar))),
-            Err(error) => ledger.stop(error),
+            Err(error) => progress.stop(error),
         }
     };
-    let stop = || interrupt::asked() || ledger.stopped();
+    let stop = || interrupt::asked() || progress.stopped();
     let threads = Threads::for_this_machine();
     std::thread::scope(|scope| {
-        scope.spawn(|| committer::commit(ledger, mine, &written));
+        scope.spawn(|| commit(progress, mine, &written));
         pipeline::run(todo.len(), threads, &stop, &load, infer, &write);
         // The committer ends with the last image written.
         drop(write);
@@ -248,12 +305,13 @@ impl<'a> Job<'a> {
         if wants_sigma && !estimator.knows_uncertainty() {
             return Err(CliError::NoUncertainty.into());
         }
-        let camera = CameraSource::new(args, estimator.training_camera())?;
+        let given = args.intrinsics.map(CameraIntrinsics::numbers);
+        let camera = CameraSource::new(given, args.calib.as_deref(), estimator.training_camera())?;
         let set = args.engine.set.as_deref();
         Ok(Self {
             args,
             model,
-            made_with: MadeWith::new(args, &outputs, model, estimator, &camera)?,
+            made_with: made_with::made_with(args, &outputs, model, estimator, &camera)?,
             camera,
             preparer: estimator.preparer(),
             step: estimator.step,
@@ -269,12 +327,26 @@ impl<'a> Job<'a> {
         })
     }
 
+    /// What there is of the job in its folder.
+    fn bulk<'b>(&'b self, command: &PredictArgs) -> BulkJob<'b> {
+        let save = self.outputs.save.iter();
+        BulkJob {
+            folder: &self.args.out,
+            endings: save.map(|save| outputs::ending(*save)).collect(),
+            made_with: &self.made_with,
+            overwrite: self.args.overwrite,
+            shard: command.shard,
+            videos: command.video(),
+        }
+    }
+
     /// Reads an image and makes it the network's input.
     pub fn load(&self, input: &Input) -> Result<(Loaded, PreparedImage)> {
         // Before it is read: a change in between is then noticed by the next run.
-        let mark = FileMark::of(&input.path)?;
+        let failed = |e| deepfusion_data::Error::file(&input.path, e);
+        let mark = FileMark::of(&input.path).map_err(failed)?;
         let taken = match &input.frame {
-            Some((dataset, index)) => Taken {
+            Some((dataset, index)) => PinholeImage {
                 image: dataset.load_image(*index)?,
                 camera: Some(dataset.intrinsics(*index)),
                 from: "recording",
@@ -293,13 +365,13 @@ impl<'a> Job<'a> {
 
     /// Makes a live source's frame the network's input.
     pub fn load_live(&self, frame: LiveFrame) -> Result<(Loaded, PreparedImage)> {
-        let mark = FileMark::of_frame(&frame);
+        let mark = FileMark::of_arrival(frame.image.as_raw().len() as u64, frame.arrived_at);
         let taken = self.camera.see(frame.image, None)?;
         Ok(self.prepare(mark, taken))
     }
 
-    fn prepare(&self, mark: FileMark, taken: Taken) -> (Loaded, PreparedImage) {
-        let Taken {
+    fn prepare(&self, mark: FileMark, taken: PinholeImage) -> (Loaded, PreparedImage) {
+        let PinholeImage {
             image,
             camera,
             from,
@@ -333,7 +405,7 @@ impl<'a> Job<'a> {
     /// Writes an image's outputs, then its sidecar, without waiting for the disk.
     pub fn write(&self, input: &Input, loaded: &Loaded, seen: &Seen) -> Result<Sidecar> {
         let sidecar = self.write_outputs(input, loaded, seen)?;
-        sidecar.write_unsynced(&self.args.out, &input.name)?;
+        write_unsynced(&sidecar, &self.args.out, &input.name)?;
         Ok(sidecar)
     }
 
@@ -342,14 +414,13 @@ impl<'a> Job<'a> {
         let (args, image, prediction) = (self.args, &loaded.image, &seen.prediction);
         let depth = prediction.depth();
         let has_sigma = |save: &Save| *save == Save::Sigma || save.is_cloud();
-        let sigma = if self.outputs.save.iter().any(has_sigma) {
-            uncertainty::sigma(prediction, &depth, &self.intervals)
-        } else {
-            None
+        let sigma = match self.outputs.save.iter().any(has_sigma) {
+            true => intervals::sigma(prediction, &depth, &self.intervals),
+            false => None,
         };
         let mut files = Vec::new();
         for save in &self.outputs.save {
-            let file = outputs::file_name(&input.name, *save);
+            let file = format!("{}{}", input.name, outputs::ending(*save));
             let path = args.out.join(&file);
             let maps = outputs::Maps {
                 prediction,
@@ -371,10 +442,10 @@ impl<'a> Job<'a> {
         let known = depth.data.iter().copied().filter(|d| *d > 0.0);
         let ends = |[low, high]: [f32; 2], d: f32| [low.min(d), high.max(d)];
         let camera_word = loaded.camera_from;
-        let mut sidecar = Sidecar {
-            image: input.path.clone(),
-            image_file: loaded.mark,
-            size: [image.width(), image.height()],
+        let record = PredictionRecord {
+            image: Some(input.path.clone()),
+            image_file: Some(loaded.mark),
+            size: Some([image.width(), image.height()]),
             unit: "metres along the camera's axis (z)".into(),
             model: self.model.given().to_owned(),
             model_sha256: self.model.packed_sha256().map(str::to_owned),
@@ -389,6 +460,9 @@ impl<'a> Job<'a> {
                 .map(|d| [d, d])
                 .reduce(|ends_so_far, [d, _]| ends(ends_so_far, d)),
             scale_monitor: seen.scale,
+        };
+        let mut sidecar = Sidecar {
+            prediction: record,
             files: Vec::new(),
             file_bytes: Vec::new(),
             file_crc32: Vec::new(),
@@ -396,7 +470,7 @@ impl<'a> Job<'a> {
             made_with: self.made_with.clone(),
         };
         for file in files {
-            sidecar.add(&args.out, file)?;
+            add_output(&mut sidecar, &args.out, file)?;
         }
         Ok(sidecar)
     }

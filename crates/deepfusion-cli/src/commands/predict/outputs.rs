@@ -5,19 +5,20 @@ use std::path::Path;
 use deepfusion_data::{RgbImage, save_png, write_depth_png};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_jobs::bulk::VIDEO_ENDING;
+use deepfusion_jobs::intervals;
 use deepfusion_render::{DepthScale, depth_picture, side_by_side, with_depth_legend};
 use deepfusion_runtime::{LayerMaps, Prediction};
 
 use super::features;
 use crate::cli::Save;
-use crate::commands::uncertainty;
 use crate::error::CliError;
 use crate::failure::{Failure, Result};
 use crate::output;
 
-/// The name of an output.
-pub fn file_name(name: &str, save: Save) -> String {
-    let ending = match save {
+/// What the name of an output ends with, after its image's.
+pub fn ending(save: Save) -> &'static str {
+    match save {
         Save::DepthPng => "_depth.png",
         Save::Npy => "_depth.npy",
         Save::Sigma => "_sigma.npy",
@@ -26,9 +27,8 @@ pub fn file_name(name: &str, save: Save) -> String {
         Save::Ply => ".ply",
         Save::Pcd => ".pcd",
         Save::Features => "_features.png",
-        Save::Video => "_video.mp4",
-    };
-    format!("{name}{ending}")
+        Save::Video => VIDEO_ENDING,
+    }
 }
 
 /// What the network says of an image.
@@ -82,7 +82,7 @@ pub fn write(
             let sure;
             let depth = match (sigma, max_sigma) {
                 (Some(sigma), Some(most)) => {
-                    sure = uncertainty::without_unsure(depth, sigma, most);
+                    sure = intervals::without_unsure(depth, sigma, most);
                     &sure
                 }
                 _ => *depth,

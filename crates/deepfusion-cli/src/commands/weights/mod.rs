@@ -1,6 +1,5 @@
 //! `deepfusion weights …`: what is embedded, what can be brought in, and how a run becomes a file to embed.
 
-mod figures;
 #[cfg(feature = "train")]
 pub mod import;
 pub mod list;

@@ -1,0 +1,51 @@
+//! What the outputs of a command depend on, beside the image.
+
+use crate::failure::Result;
+use clap::ValueEnum;
+use deepfusion_jobs::bulk::CameraSource;
+use deepfusion_records::MadeWith;
+use deepfusion_runtime::{DepthEstimator, ModelSource};
+
+use crate::cli::{Outputs, PredictionArgs, Save};
+use crate::commands::device;
+use crate::model::ModelFacts;
+
+/// For these arguments and this network.
+pub fn made_with(
+    args: &PredictionArgs,
+    outputs: &Outputs,
+    model: &ModelSource,
+    estimator: &DepthEstimator,
+    camera: &CameraSource,
+) -> Result<MadeWith> {
+    Ok(MadeWith {
+        version: env!("CARGO_PKG_VERSION").into(),
+        weights: model.content_sha256()?,
+        engine: format!(
+            "{} on {}",
+            estimator.engine(),
+            device::name(args.engine.device)
+        ),
+        save: outputs.save.iter().map(|s| word(*s)).collect(),
+        max_depth_m: outputs.max_depth_m,
+        max_sigma: outputs.max_sigma,
+        intrinsics: match camera {
+            CameraSource::Given(k) => Some(*k),
+            CameraSource::File(k) => Some([k.fx, k.fy, k.cx, k.cy]),
+            CameraSource::Lens(_) | CameraSource::Trained(_) | CameraSource::Unknown => None,
+        },
+        calibration_sha256: match camera {
+            CameraSource::Lens(file) => Some(file.sha256.clone()),
+            _ => None,
+        },
+        focal_correction: !args.no_focal_correction,
+        stretch: args.stretch,
+        correct_scale: args.correct_scale,
+        set: args.engine.set.clone(),
+    })
+}
+
+fn word(save: Save) -> String {
+    save.to_possible_value()
+        .map_or_else(String::new, |v| v.get_name().to_owned())
+}

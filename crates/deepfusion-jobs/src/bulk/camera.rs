@@ -1,0 +1,182 @@
+//! The camera of an input: given, read from a calibration file, or assumed.
+
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+
+use deepfusion_data::{Camera, CameraCalibration, Lens, RgbImage, kitti::Calibration};
+use deepfusion_geometry::Intrinsics;
+use sha2::{Digest, Sha256};
+
+use crate::{Error, Result};
+
+/// Where the inputs' camera comes from.
+#[derive(Debug, Clone)]
+pub enum CameraSource {
+    /// fx, fy, cx, cy that were given, in pixels, for images of any size.
+    Given([f64; 4]),
+    /// KITTI's calibration file, for images of its size.
+    File(Intrinsics),
+    /// A calibration tool's file, with the lens that is undone.
+    Lens(Arc<LensFile>),
+    /// The camera trained with: the inputs are taken to see what it saw.
+    Trained(Intrinsics),
+    /// Nothing is known.
+    Unknown,
+}
+
+impl CameraSource {
+    /// Numbers that were given (fx, fy, cx, cy), else a calibration file; `trained` where there is neither.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is no calibration.
+    pub fn new(
+        given: Option<[f64; 4]>,
+        file: Option<&Path>,
+        trained: Option<Intrinsics>,
+    ) -> Result<Self> {
+        if let Some(k) = given {
+            return Ok(Self::Given(k));
+        }
+        let Some(path) = file else {
+            return Ok(trained.map_or(Self::Unknown, Self::Trained));
+        };
+        if !(path.is_dir()
+            || path
+                .file_name()
+                .is_some_and(|name| name == Calibration::CAM_TO_CAM))
+        {
+            let bytes = std::fs::read(path).map_err(|e| deepfusion_data::Error::file(path, e))?;
+            return Ok(Self::Lens(Arc::new(LensFile {
+                path: path.to_owned(),
+                sha256: format!("{:x}", Sha256::digest(&bytes)),
+                lens: OnceLock::new(),
+            })));
+        }
+        let folder = if path.is_dir() {
+            path
+        } else {
+            path.parent().unwrap_or(Path::new("."))
+        };
+        Ok(Self::File(
+            Calibration::read(folder, Camera::Left)?.intrinsics,
+        ))
+    }
+
+    /// One word for the sidecar.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Given(_) | Self::File(_) | Self::Lens(_) => "given",
+            Self::Trained(_) => "assumed",
+            Self::Unknown => "unknown",
+        }
+    }
+
+    /// The image as a pinhole camera would have taken it, that camera, and where it comes from, in a word. What `exif` says
+    /// comes before what would only be assumed.
+    ///
+    /// # Errors
+    /// [`Error::Camera`] for a camera of other images.
+    pub fn see(&self, image: RgbImage, exif: Option<Intrinsics>) -> Result<PinholeImage> {
+        if let Self::Lens(file) = self {
+            let lens = file.lens_for(image.dimensions())?;
+            return Ok(PinholeImage {
+                image: lens.correct(image)?,
+                camera: Some(lens.intrinsics()),
+                from: self.word(),
+            });
+        }
+        let (camera, from) = match (self, exif) {
+            (Self::Trained(_) | Self::Unknown, Some(camera)) => (Some(camera), "exif"),
+            _ => (self.of(image.width(), image.height())?, self.word()),
+        };
+        Ok(PinholeImage {
+            image,
+            camera,
+            from,
+        })
+    }
+
+    /// The camera of an image of this size.
+    fn of(&self, width: u32, height: u32) -> Result<Option<Intrinsics>> {
+        match self {
+            Self::Given(k) => {
+                let k = Intrinsics::from_numbers(*k, (width, height));
+                match k.implausible() {
+                    Some(why) => Err(Error::Camera { why }),
+                    None => Ok(Some(k)),
+                }
+            }
+            Self::File(k) if (k.width, k.height) != (width, height) => Err(Error::Camera {
+                why: format!(
+                    "the calibration is for {}x{}, the image has {width}x{height}",
+                    k.width, k.height
+                ),
+            }),
+            Self::File(k) => Ok(Some(*k)),
+            Self::Lens(_) => Ok(None),
+            Self::Trained(k) => Ok(Some(with_the_view_of(k, width, height))),
+            Self::Unknown => Ok(None),
+        }
+    }
+}
+
+/// An image as a pinhole camera would have taken it.
+#[derive(Debug, Clone)]
+pub struct PinholeImage {
+    /// The pixels, without the lens.
+    pub image: RgbImage,
+    /// The camera, where it is known or assumed.
+    pub camera: Option<Intrinsics>,
+    /// `given`, `recording`, `exif`, `assumed` or `unknown`.
+    pub from: &'static str,
+}
+
+/// A calibration tool's file: OpenCV's, ROS's, Kalibr's, or four numbers.
+#[derive(Debug)]
+pub struct LensFile {
+    path: std::path::PathBuf,
+    /// Of the file: outputs made with another are others.
+    pub sha256: String,
+    /// Made for the first image's size.
+    lens: OnceLock<((u32, u32), Lens)>,
+}
+
+impl LensFile {
+    fn lens_for(&self, size: (u32, u32)) -> Result<&Lens> {
+        let (made_for, lens) = match self.lens.get() {
+            Some(made) => made,
+            None => {
+                let calibration = CameraCalibration::read(&self.path, size)?;
+                let k = &calibration.intrinsics;
+                let made = ((k.width, k.height), calibration.lens()?);
+                // Another thread may have been first: it made the same.
+                self.lens.get_or_init(|| made)
+            }
+        };
+        if *made_for == size {
+            return Ok(lens);
+        }
+        let ((width, height), (w, h)) = (*made_for, size);
+        let why = format!(
+            "{} is for images of {width}x{height}, this one has {w}x{h}",
+            self.path.display()
+        );
+        Err(Error::Camera { why })
+    }
+}
+
+/// A camera of the same field of view from left to right, square pixels, the same height of the horizon. Of an upright
+/// image the field of view is that from top to bottom: the camera was turned, not its lens changed.
+fn with_the_view_of(k: &Intrinsics, width: u32, height: u32) -> Intrinsics {
+    let f = k.fx * f64::from(width.max(height)) / f64::from(k.width);
+    let centre = |c: f64, from: u32, to: u32| (c + 0.5) * f64::from(to) / f64::from(from) - 0.5;
+    Intrinsics {
+        fx: f,
+        fy: f,
+        cx: centre(k.cx, k.width, width),
+        cy: centre(k.cy, k.height, height),
+        width,
+        height,
+    }
+}

@@ -1,0 +1,26 @@
+//! Many images in, their outputs exactly once: what is there is looked at, what is missing is made, on any number of machines.
+//!
+//! An image's sidecar is written last, when its outputs are on the disk, and is the mark of its being done. [`BulkJob::begin`] decides
+//! by it and the outputs' checksums alone; the [`Manifest`]s are for people and for telling jobs apart. [`pipeline::run`] overlaps
+//! reading, the network and writing; [`commit`] writes the sidecars; [`BulkProgress`] counts.
+
+mod camera;
+mod committer;
+mod manifest;
+pub mod pipeline;
+mod progress;
+mod records;
+mod resume;
+mod shard;
+mod sidecars;
+mod video;
+
+pub use camera::{CameraSource, LensFile, PinholeImage};
+pub use committer::{Written, commit, queue};
+pub use manifest::{Entry, Lock, Manifest, State};
+pub use progress::{BulkProgress, Summary};
+pub use records::{RecordLines, record_line, write_record};
+pub use resume::{Begun, BulkJob};
+pub use shard::Shard;
+pub use sidecars::{add_output, sidecar_path, write_json, write_unsynced};
+pub use video::{VIDEO_ENDING, write_one_video, write_videos};

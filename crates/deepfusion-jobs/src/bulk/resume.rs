@@ -1,0 +1,175 @@
+//! What of a job is there already, and whether it may stay.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use deepfusion_fs::Partial;
+use deepfusion_records::{FileMark, MadeWith, Sidecar};
+use rayon::prelude::*;
+use serde::de::IgnoredAny;
+
+use super::manifest::{Manifest, State};
+use super::sidecars::{is_complete, sidecar_path};
+use super::{Shard, video};
+use crate::{Error, Input, Result, StaleReason};
+
+/// What is made of images, and where.
+#[derive(Debug, Clone)]
+pub struct BulkJob<'a> {
+    /// Where the outputs lie.
+    pub folder: &'a Path,
+    /// What the names of an image's outputs end with, after the image's name.
+    pub endings: Vec<&'static str>,
+    /// What else the outputs depend on.
+    pub made_with: &'a MadeWith,
+    /// Whether what was made in another way, or of an image that has changed, is made again.
+    pub overwrite: bool,
+    /// Which part of the images is this run's.
+    pub shard: Shard,
+    /// Whether videos are made of the pictures in the end.
+    pub videos: bool,
+}
+
+/// A job that has begun.
+pub struct Begun {
+    /// What there is to do and what is done, written into the folder.
+    pub manifest: Manifest,
+    /// Sidecars of what is done, by place, where they were asked for.
+    pub sidecars: Vec<Option<Sidecar>>,
+    /// What is left to do, by place.
+    pub todo: Vec<usize>,
+}
+
+impl BulkJob<'_> {
+    /// Looks at what is there of the images (`mine` of `all`), and writes the manifest.
+    ///
+    /// # Errors
+    /// [`Error::OtherJob`], [`Error::Stale`], [`Error::Exists`], and what cannot be read or written.
+    pub fn begin(&self, all: &[Input], mine: &[&Input], keep_sidecars: bool) -> Result<Begun> {
+        let mut manifest = Manifest::new(self.shard, all, mine, self.made_with.clone());
+        let before = Manifest::all(self.folder)?;
+        if !self.overwrite {
+            manifest.check_against(&before, self.folder)?;
+            if self.videos {
+                video::make_room(self.folder, all, &manifest, &before)?;
+            }
+        }
+        self.remove_partial_files(mine)?;
+        let begun = manifest.begun(&before);
+        let mut todo = Vec::new();
+        let mut sidecars = vec![None; if keep_sidecars { mine.len() } else { 0 }];
+        // Whatever is there is read, to see that it still is what was written.
+        let found: Vec<Result<Option<Sidecar>>> = mine
+            .par_iter()
+            .map(|input| {
+                let known = begun.contains(&(input.path.as_path(), input.name.as_str()));
+                self.finished(input, known)
+            })
+            .collect();
+        for (i, found) in found.into_iter().enumerate() {
+            match found? {
+                None => todo.push(i),
+                Some(sidecar) => {
+                    manifest.images[i].state = State::Done;
+                    if let Some(place) = sidecars.get_mut(i) {
+                        *place = Some(sidecar);
+                    }
+                }
+            }
+        }
+        manifest.write(self.folder)?;
+        // Again, now that ours can be seen: of two shards of different jobs started at once, one notices.
+        let path = manifest.path(self.folder);
+        let others = Manifest::all(self.folder)?;
+        if !self.overwrite
+            && let Err(error) = manifest.check_against(&others, self.folder)
+        {
+            std::fs::remove_file(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+            return Err(error);
+        }
+        Ok(Begun {
+            manifest,
+            sidecars,
+            todo,
+        })
+    }
+
+    /// The sidecar of an image that is done; `None` where there is work to do.
+    ///
+    /// Files that this job did not make, or made of an image that has changed since, are an error, or with `--overwrite` work
+    /// to do. `begun` says that a run of this job had the image in its manifest: files without a sidecar are then what it left
+    /// when it was killed. Done means that every output's length and checksum are those in the sidecar.
+    fn finished(&self, input: &Input, begun: bool) -> Result<Option<Sidecar>> {
+        let path = sidecar_path(self.folder, &input.name);
+        let text = match std::fs::read(&path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+                if !(begun || self.overwrite) {
+                    self.refuse_files(input)?;
+                }
+                return Ok(None);
+            }
+            Err(e) => return Err(deepfusion_data::Error::file(&path, e).into()),
+        };
+        if text.iter().all(|byte| *byte == 0) {
+            // What a power cut leaves of a file: nothing of anybody's is lost with it.
+            return Ok(None);
+        }
+        let why = match serde_json::from_slice::<Sidecar>(&text) {
+            // Cut off or overwritten by other bytes, and ours.
+            Err(_) if begun && serde_json::from_slice::<IgnoredAny>(&text).is_err() => {
+                return Ok(None);
+            }
+            Err(_) => StaleReason::NoSidecar,
+            Ok(sidecar) if sidecar.prediction.image.as_ref() != Some(&input.path) => {
+                StaleReason::OtherImage(sidecar.prediction.image.unwrap_or_default())
+            }
+            Ok(sidecar) => match self.made_with.difference(&sidecar.made_with) {
+                Some(what) => StaleReason::MadeWith(what),
+                None if changed(input, &sidecar) => StaleReason::ImageChanged(input.path.clone()),
+                None if is_complete(&sidecar, self.folder) => return Ok(Some(sidecar)),
+                // Ours, but a file of it is gone or is not what was written.
+                None => return Ok(None),
+            },
+        };
+        if self.overwrite {
+            return Ok(None);
+        }
+        Err(Error::Stale { path, why })
+    }
+
+    /// Without a sidecar, nothing of the image's names may be there.
+    fn refuse_files(&self, input: &Input) -> Result<()> {
+        for ending in &self.endings {
+            let path = self.folder.join(format!("{}{ending}", input.name));
+            if path.exists() {
+                return Err(Error::Exists { path });
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes the half-written files that a killed run of this shard left.
+    fn remove_partial_files(&self, mine: &[&Input]) -> Result<()> {
+        let out = self.folder;
+        let files_of = |input: &&Input| {
+            let endings = self.endings.iter().copied().chain([".json"]);
+            let file = |ending| format!("{}{ending}", input.name);
+            endings.map(file).collect::<Vec<String>>()
+        };
+        let files: HashSet<String> = mine.iter().flat_map(files_of).collect();
+        let failed = |e| deepfusion_data::Error::file(out, e);
+        for entry in std::fs::read_dir(out).map_err(failed)? {
+            let path = entry.map_err(failed)?.path();
+            if Partial::target_of(&path).is_some_and(|file| files.contains(file)) {
+                std::fs::remove_file(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether an image is another one than its outputs were made of.
+fn changed(input: &Input, sidecar: &Sidecar) -> bool {
+    FileMark::of(&input.path).is_ok_and(|mark| Some(mark) != sidecar.prediction.image_file)
+}

@@ -1,0 +1,108 @@
+//! Sidecars on the disk. One is written last, so that it also says that its outputs are there.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use deepfusion_data::Error as DataError;
+use deepfusion_fs::Content;
+use deepfusion_records::Sidecar;
+use serde::Serialize;
+
+use crate::Result;
+
+/// Where the sidecar of a name lies.
+#[must_use]
+pub fn sidecar_path(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{name}.json"))
+}
+
+/// Adds an output that is there, as it is now.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn add_output(sidecar: &mut Sidecar, folder: &Path, file: String) -> Result<()> {
+    let path = folder.join(&file);
+    let content = Content::of(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+    sidecar.files.push(file);
+    sidecar.file_bytes.push(content.bytes);
+    sidecar.file_crc32.push(format!("{:08x}", content.crc32));
+    Ok(())
+}
+
+/// Writes sidecars into the folder, by their names, once all their outputs are on the disk: where one is, there are its
+/// outputs, whatever happens to the power. Returns when the sidecars are on the disk, too.
+///
+/// # Errors
+/// Where something cannot be written.
+pub fn write_all<'a>(
+    folder: &Path,
+    group: impl Iterator<Item = (&'a str, &'a Sidecar)>,
+) -> Result<()> {
+    let group: Vec<_> = group.collect();
+    let failed = |e| deepfusion_data::Error::file(folder, e);
+    let outputs = group.iter().flat_map(|(_, sidecar)| &sidecar.files);
+    let outputs: Vec<PathBuf> = outputs.map(|file| folder.join(file)).collect();
+    deepfusion_fs::sync_files(&outputs).map_err(failed)?;
+    deepfusion_fs::sync_folder(folder).map_err(failed)?;
+    let mut aside = Vec::new();
+    for (name, sidecar) in group {
+        let (path, text) = (sidecar_path(folder, name), as_json(sidecar)?);
+        let failed = |e| deepfusion_data::Error::file(&path, e);
+        let filled = deepfusion_fs::write_aside(&path, failed, |out| put(out, &text, &path));
+        aside.push(filled?);
+    }
+    Ok(deepfusion_fs::publish_all(aside).map_err(failed)?)
+}
+
+/// Writes it into the folder, whole or not at all, without waiting for the disk: where nothing goes on from it.
+///
+/// # Errors
+/// Where it cannot be written.
+pub fn write_unsynced(sidecar: &Sidecar, folder: &Path, name: &str) -> Result<()> {
+    let path = sidecar_path(folder, name);
+    let text = as_json(sidecar)?;
+    let failed = |e| DataError::file(&path, e);
+    Ok(deepfusion_fs::write_unsynced(&path, failed, |out| {
+        put(out, &text, &path)
+    })?)
+}
+
+/// Whether every output is there with the content that was written.
+#[must_use]
+pub fn is_complete(sidecar: &Sidecar, folder: &Path) -> bool {
+    let files = sidecar.files.len();
+    if (sidecar.file_bytes.len(), sidecar.file_crc32.len()) != (files, files) {
+        return false;
+    }
+    let contents = sidecar.file_bytes.iter().zip(&sidecar.file_crc32);
+    sidecar
+        .files
+        .iter()
+        .zip(contents)
+        .all(|(file, (bytes, crc32))| {
+            u32::from_str_radix(crc32, 16).is_ok_and(|crc32| {
+                let bytes = *bytes;
+                Content { bytes, crc32 }.is_of(&folder.join(file))
+            })
+        })
+}
+
+/// Writes a value as indented JSON, atomically.
+///
+/// # Errors
+/// Where it cannot be written.
+pub fn write_json<T: Serialize>(value: &T, path: &Path) -> Result<()> {
+    let text = as_json(value)?;
+    Ok(deepfusion_fs::write(path, text).map_err(|e| DataError::file(path, e))?)
+}
+
+fn as_json<T: Serialize>(value: &T) -> Result<Vec<u8>> {
+    let mut text = serde_json::to_vec_pretty(value)?;
+    text.push(b'\n');
+    Ok(text)
+}
+
+fn put(out: &mut impl Write, text: &[u8], path: &Path) -> Result<(), deepfusion_data::Error> {
+    out.write_all(text)
+        .map_err(|e| deepfusion_data::Error::file(path, e))
+}

@@ -1,0 +1,142 @@
+//! The pictures of a run as videos, one of each recording.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use deepfusion_video::{Shown, shown_for, write_video};
+
+use super::manifest::Manifest;
+use crate::{Error, Input, Result};
+
+/// What the name of a video ends with.
+pub const VIDEO_ENDING: &str = "_video.mp4";
+
+/// What the video of images that are of no recording is called.
+const IMAGES: &str = "images";
+
+/// Whether the videos of the inputs may be written: they replace no file but those that runs of the same inputs, as a
+/// manifest tells, left there.
+///
+/// # Errors
+/// [`Error::Exists`].
+pub fn make_room(
+    folder: &Path,
+    inputs: &[Input],
+    ours: &Manifest,
+    before: &[Manifest],
+) -> Result<()> {
+    if before.iter().any(|m| m.inputs_sha256 == ours.inputs_sha256) {
+        return Ok(());
+    }
+    for (name, _) in videos(inputs) {
+        let path = folder.join(name);
+        if path.exists() {
+            return Err(Error::Exists { path });
+        }
+    }
+    Ok(())
+}
+
+/// One video of each recording among the inputs, and one of the images that are of none, in the folder of their pictures, whose names
+/// end with `pictures`. Gives the videos, each with its frames.
+///
+/// # Errors
+/// What ffmpeg says.
+pub fn write_videos(
+    folder: &Path,
+    inputs: &[Input],
+    pictures: &str,
+) -> Result<Vec<(PathBuf, usize)>> {
+    let mut written = Vec::new();
+    for (name, same) in videos(inputs) {
+        let times: Vec<Option<f64>> = same.iter().map(time_s).collect();
+        let names = same.iter().map(|input| input.name.as_str());
+        let shown = names.zip(shown_for(&times));
+        written.extend(write_one_video(folder, shown, pictures, &name)?);
+    }
+    Ok(written)
+}
+
+/// The video of pictures, by the names of their images, each with the seconds that it is shown; none of no picture.
+///
+/// # Errors
+/// What ffmpeg says.
+pub fn write_one_video<'a>(
+    folder: &Path,
+    shown: impl Iterator<Item = (&'a str, f64)>,
+    pictures: &str,
+    name: &str,
+) -> Result<Option<(PathBuf, usize)>> {
+    let picture = |(name, seconds): (&str, f64)| Shown {
+        file: format!("{name}{pictures}"),
+        seconds,
+    };
+    let pictures: Vec<Shown> = shown.map(picture).collect();
+    if pictures.is_empty() {
+        return Ok(None);
+    }
+    write_video(folder, &pictures, name)?;
+    Ok(Some((folder.join(name), pictures.len())))
+}
+
+/// The name of a recording's video.
+fn video_name(of: &str) -> String {
+    format!("{}{VIDEO_ENDING}", of.replace(['/', '\\'], "-"))
+}
+
+/// The inputs of each video and its name, numbered where two recordings share one.
+fn videos(inputs: &[Input]) -> Vec<(String, &[Input])> {
+    let same = |a: &Input, b: &Input| match (&a.frame, &b.frame) {
+        (Some((a, _)), Some((b, _))) => Arc::ptr_eq(a, b),
+        (None, None) => true,
+        _ => false,
+    };
+    let mut named: Vec<(String, &[Input])> = Vec::new();
+    for inputs in inputs.chunk_by(same) {
+        let recording = inputs[0].frame.as_ref().map(|(dataset, _)| dataset.name());
+        let of = recording.unwrap_or(IMAGES);
+        let numbered = |n: usize| match n {
+            1 => video_name(of),
+            _ => video_name(&format!("{of}-{n}")),
+        };
+        let free = |name: &String| {
+            named
+                .iter()
+                .all(|(other, _)| !other.eq_ignore_ascii_case(name))
+        };
+        let name = (1..).map(numbered).find(free).unwrap_or_default();
+        named.push((name, inputs));
+    }
+    named
+}
+
+fn time_s(input: &Input) -> Option<f64> {
+    let (dataset, index) = input.frame.as_ref()?;
+    dataset.frames()[*index].time_s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(name: &str) -> Input {
+        Input {
+            path: name.into(),
+            name: name.into(),
+            frame: None,
+        }
+    }
+
+    #[test]
+    fn images_of_no_recording_are_one_video() {
+        let inputs = [image("a"), image("b")];
+        let found = videos(&inputs);
+        assert_eq!(found.len(), 1);
+        assert_eq!(
+            (found[0].0.as_str(), found[0].1.len()),
+            ("images_video.mp4", 2)
+        );
+        assert!(videos(&[]).is_empty());
+        assert_eq!(video_name("a/b"), "a-b_video.mp4");
+    }
+}

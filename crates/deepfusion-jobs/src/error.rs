@@ -1,0 +1,246 @@
+use std::path::PathBuf;
+
+use deepfusion_hint::Hint;
+use deepfusion_records::Difference;
+
+use crate::bulk::Shard;
+
+/// What can go wrong with work over recordings and folders.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A folder or pattern without images.
+    #[error("{input}: no image (.png, .jpg, .jpeg) there")]
+    NoImages {
+        /// What was given.
+        input: String,
+    },
+    /// A pattern of file names that is none.
+    #[error(transparent)]
+    Pattern(#[from] glob::PatternError),
+    /// Intrinsics that cannot be the image's.
+    #[error("the intrinsics do not fit the image: {why}")]
+    Camera {
+        /// Why.
+        why: String,
+    },
+    /// A split of which not everything could be used, where everything has to be.
+    #[error("{}: {found} of its {expected} frames {what}", split.display())]
+    Incomplete {
+        /// The split file.
+        split: PathBuf,
+        /// Frames that could be used.
+        found: usize,
+        /// Frames that the file lists.
+        expected: usize,
+        /// What those have that could be.
+        what: &'static str,
+    },
+    /// No frame of a recording has both labels and the depth asked for.
+    #[error("{}: no frame has the depth that was asked for", path.display())]
+    NothingToMeasure {
+        /// The recording.
+        path: PathBuf,
+    },
+    /// Something that would be overwritten.
+    #[error("{}: is there already", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// An output that another run made, or this one of another image.
+    #[error("{}: is there already, {why}", path.display())]
+    Stale {
+        /// The sidecar.
+        path: PathBuf,
+        /// In what it differs.
+        why: StaleReason,
+    },
+    /// A shard of a job beside shards of another.
+    #[error("{}: the shards of this folder were begun with {why}", path.display())]
+    OtherJob {
+        /// The other shard's manifest.
+        path: PathBuf,
+        /// In what it differs.
+        why: OtherJob,
+    },
+    /// A shard that another process works on.
+    #[error("{}: another run is at work on shard {shard} there", folder.display())]
+    Busy {
+        /// The output folder.
+        folder: PathBuf,
+        /// The shard.
+        shard: Shard,
+    },
+    /// What is kept beside a network cannot be read.
+    #[error("{}", path.display())]
+    Kept {
+        /// The file, or the network's name.
+        path: PathBuf,
+        /// Why not.
+        source: toml::de::Error,
+    },
+    /// Factors of intervals that are none.
+    #[error("{}", path.display())]
+    KeptFactors {
+        /// The file, or the network's name.
+        path: PathBuf,
+        /// Why not.
+        source: Box<deepfusion_eval::Error>,
+    },
+    /// Encoders without a depth network.
+    #[error("{}: only its encoders were ever trained: there is no depth to pack", path.display())]
+    NothingToPack {
+        /// The checkpoint.
+        path: PathBuf,
+    },
+    /// A packed network where a run is needed.
+    #[error("{}: is packed already", path.display())]
+    PackedAlready {
+        /// What was given.
+        path: PathBuf,
+    },
+    /// Something of a card that TOML has no form for.
+    #[error("{what}")]
+    NoTomlForm {
+        /// What, in a sentence.
+        what: &'static str,
+        /// Why not.
+        source: toml::ser::Error,
+    },
+    /// Something that has no TOML form.
+    #[error(transparent)]
+    Toml(#[from] toml::ser::Error),
+    /// Something that has no JSON form.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// A video.
+    #[error(transparent)]
+    Video(#[from] deepfusion_video::Error),
+    /// A recording, a picture, or another file.
+    #[error(transparent)]
+    Data(#[from] deepfusion_data::Error),
+    /// A scan.
+    #[error(transparent)]
+    Cloud(#[from] deepfusion_geometry::cloud::Error),
+    /// What was measured.
+    #[error(transparent)]
+    Eval(#[from] deepfusion_eval::Error),
+    /// An evaluation that is kept beside a run.
+    #[error(transparent)]
+    Compare(#[from] deepfusion_eval::compare::Error),
+    /// A configuration or a run's folder.
+    #[error(transparent)]
+    Model(#[from] deepfusion_model::Error),
+    /// A packed network.
+    #[error(transparent)]
+    Weights(#[from] deepfusion_weights::Error),
+    /// A simulated street.
+    #[error(transparent)]
+    Simulator(#[from] deepfusion_sim::Error),
+    /// A network, or what runs it.
+    #[error(transparent)]
+    Runtime(#[from] deepfusion_runtime::Error),
+    /// Samples that cannot be learned from.
+    #[cfg(feature = "train")]
+    #[error(transparent)]
+    Train(#[from] deepfusion_train::Error),
+    /// A depth image that nothing can be found in.
+    #[error(transparent)]
+    Perception(#[from] deepfusion_perception::Error),
+}
+
+/// A result of this crate.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Why what stands beside an image is not this job's.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum StaleReason {
+    /// It is no sidecar.
+    NoSidecar,
+    /// It is of another image.
+    OtherImage(PathBuf),
+    /// It was made in another way.
+    MadeWith(Difference),
+    /// The image is another one now.
+    ImageChanged(PathBuf),
+}
+
+impl std::fmt::Display for StaleReason {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NoSidecar => write!(f, "and does not say how it was made"),
+            Self::OtherImage(image) => write!(f, "made from {}", image.display()),
+            Self::MadeWith(what) => write!(f, "made with {what}"),
+            Self::ImageChanged(image) => write!(f, "and {} has changed since", image.display()),
+        }
+    }
+}
+
+/// In what another job differs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum OtherJob {
+    /// It has other images: so many, and this one so many.
+    Inputs(usize, usize),
+    /// It makes them in another way.
+    MadeWith(Difference),
+}
+
+impl std::fmt::Display for OtherJob {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Inputs(others, ours) => write!(f, "{others} other inputs, not these {ours}"),
+            Self::MadeWith(what) => write!(f, "{what}"),
+        }
+    }
+}
+
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::NoImages { .. } => Some(
+                "give images, a folder of them, or a pattern such as 'drive/*.png'; a recording is given by its own folder or file".into(),
+            ),
+            Self::Camera { .. } => {
+                Some("give fx,fy,cx,cy in pixels of the input image, at its own size".into())
+            }
+            Self::Incomplete { .. } => {
+                Some("give the folder that holds every drive that the split names".into())
+            }
+            Self::NothingToMeasure { .. } => Some(
+                "exact depth is the simulator's (proj_depth), scans are in velodyne_points; without either nothing says which boxes are seen".into(),
+            ),
+            Self::Exists { .. } | Self::Stale { .. } => {
+                Some("allow overwriting, or choose another folder".into())
+            }
+            Self::OtherJob { .. } => {
+                Some("start every shard with the same inputs and options, or choose another folder".into())
+            }
+            Self::Busy { .. } => Some("wait for it, or share the work among shards".into()),
+            Self::NothingToPack { .. } => Some("train from it first".into()),
+            Self::PackedAlready { .. } => {
+                Some("give the folder of the run that it was packed from".into())
+            }
+            Self::Pattern(_)
+            | Self::Kept { .. }
+            | Self::NoTomlForm { .. }
+            | Self::Toml(_)
+            | Self::Json(_) => None,
+            Self::KeptFactors { source, .. } => source.hint(),
+            Self::Video(error) => error.hint(),
+            Self::Data(error) => error.hint(),
+            Self::Cloud(error) => error.hint(),
+            Self::Eval(error) => error.hint(),
+            Self::Compare(error) => error.hint(),
+            Self::Model(error) => error.hint(),
+            Self::Runtime(error) => error.hint(),
+            Self::Weights(error) => error.hint(),
+            Self::Simulator(error) => error.hint(),
+            #[cfg(feature = "train")]
+            Self::Train(error) => error.hint(),
+            Self::Perception(error) => error.hint(),
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! What a run's depth is worth, pixel by pixel: learned from frames with ground truth, kept beside the run.
+
+use std::path::{Path, PathBuf};
+
+use deepfusion_data::Dataset;
+use deepfusion_perception::{ConfidenceModel, Evidence, Reliability};
+use deepfusion_runtime::DepthEstimator;
+use image::imageops::flip_horizontal;
+use serde::{Deserialize, Serialize};
+
+use super::division::divide;
+use super::known_pixels::known_pixels;
+use super::{Evaluated, Place, Truth};
+use crate::{Error, Result};
+
+/// The file in a run's folder.
+const FILE: &str = "confidence.toml";
+/// Depths that are compared, metres.
+const RANGE_M: std::ops::Range<f64> = 1e-3..80.0;
+/// Dots of the reliability plot.
+const BINS: usize = 10;
+
+/// What is kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Confidence {
+    /// From a single look at an image.
+    pub single: ConfidenceModel,
+    /// From the image and its mirror image.
+    pub mirrored: ConfidenceModel,
+    /// Frames it was learned from.
+    pub frames: usize,
+    /// Frames it was judged by: of other drives, or of another part of the one drive, none of them learned from.
+    #[serde(default)]
+    pub held_out: usize,
+    /// Pixels of them.
+    pub pixels: usize,
+}
+
+impl Confidence {
+    /// A run's, where it was calibrated.
+    ///
+    /// # Errors
+    /// A file that is none.
+    pub fn read(run: &Path) -> Result<Option<Self>> {
+        let path = run.join(FILE);
+        match std::fs::read_to_string(&path) {
+            Ok(text) => match toml::from_str(&text) {
+                Ok(confidence) => Ok(Some(confidence)),
+                Err(source) => Err(Error::Kept { path, source }),
+            },
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(e) => Err(deepfusion_data::Error::file(&path, e).into()),
+        }
+    }
+
+    fn write(&self, run: &Path) -> Result<PathBuf> {
+        let path = run.join(FILE);
+        let text = format!(
+            "# Expected relative error of a depth = constant + gradient * (local gradient of disparity) + flip * (disagreement\n\
+             # with the mirrored image); confidence = exp(-error). Written by `eval --calibrate-confidence`.\n{}",
+            toml::to_string(self)?
+        );
+        let failed = |e| deepfusion_data::Error::file(&path, e);
+        deepfusion_fs::write(&path, text).map_err(failed)?;
+        Ok(path)
+    }
+}
+
+/// What [`calibrate`] found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibrated {
+    /// What was learned.
+    pub confidence: Confidence,
+    /// Where it is kept.
+    pub path: PathBuf,
+    /// Whether it was judged by frames of other drives, and not of another part of the one drive.
+    pub by_drive: bool,
+    /// How it holds on the frames that it was judged by.
+    pub reliability: Vec<Reliability>,
+}
+
+/// Learns from one part of the evaluated frames, keeps the result beside the run, and finds how it holds on the other, which
+/// is of other drives or of another part of the drive. `None` where there is too little to learn from.
+///
+/// # Errors
+/// What cannot be read, predicted or written.
+pub fn calibrate(
+    estimator: &mut DepthEstimator,
+    datasets: &[Dataset],
+    truth: &mut Truth,
+    evaluated: &Evaluated,
+    correct_focal: bool,
+    run: &Path,
+) -> Result<Option<Calibrated>> {
+    let images: Vec<_> = evaluated
+        .places
+        .iter()
+        .map(|p| image(datasets, *p))
+        .collect();
+    let division = divide(&images);
+    let mut sampled = |part: &[usize]| -> Result<Vec<Sampled>> {
+        let mut samples = Vec::new();
+        for Place(set, frame) in part.iter().map(|i| evaluated.places[*i]) {
+            let dataset = &datasets[set];
+            samples.extend(of_frame(estimator, dataset, frame, truth, correct_focal)?);
+        }
+        Ok(samples)
+    };
+    let learned = sampled(&division.learned)?;
+    let held_out = sampled(&division.held_out)?;
+    let fit = |flip: bool| ConfidenceModel::fit(&told(&learned, flip));
+    let (Some(single), Some(mirrored)) = (fit(false), fit(true)) else {
+        return Ok(None);
+    };
+    let confidence = Confidence {
+        single,
+        mirrored,
+        frames: division.learned.len(),
+        held_out: division.held_out.len(),
+        pixels: learned.len(),
+    };
+    let path = confidence.write(run)?;
+    // One frame has no other half: it is told of itself.
+    let judged = if held_out.is_empty() {
+        &learned
+    } else {
+        &held_out
+    };
+    let reliability = mirrored.reliability(&told(judged, true), BINS);
+    Ok(Some(Calibrated {
+        confidence,
+        path,
+        by_drive: division.by_drive,
+        reliability,
+    }))
+}
+
+/// The drive that an image is of, and its frame's number. The drives of a folder of bags share the folder.
+fn image(datasets: &[Dataset], Place(set, frame): Place) -> ((&Path, &str), u64) {
+    let dataset = &datasets[set];
+    let drive = (dataset.folder(), dataset.split_name());
+    (drive, dataset.frames()[frame].number)
+}
+
+/// A pixel's evidence, and its relative error.
+type Sampled = (Evidence, f64);
+
+fn told(samples: &[Sampled], flip: bool) -> Vec<Sampled> {
+    let without = |e: Evidence| Evidence { flip: 0.0, ..e };
+    samples
+        .iter()
+        .map(|(e, error)| (if flip { *e } else { without(*e) }, *error))
+        .collect()
+}
+
+fn of_frame(
+    estimator: &mut DepthEstimator,
+    dataset: &Dataset,
+    frame: usize,
+    truth: &mut Truth,
+    correct_focal: bool,
+) -> Result<Vec<Sampled>> {
+    let Some(depth) = truth.of(dataset, frame, None)? else {
+        return Ok(Vec::new());
+    };
+    let image = dataset.load_image(frame)?;
+    let camera = dataset.intrinsics(frame);
+    let seen = estimator.predict(&image, Some(&camera), correct_focal, false)?;
+    let mirror = flip_horizontal(&image);
+    let mut mirrored = estimator
+        .predict(&mirror, Some(&camera.flipped()), correct_focal, false)?
+        .disparity;
+    for row in mirrored.chunks_exact_mut(seen.width.max(1)) {
+        row.reverse();
+    }
+    let evidence = Evidence::of(&seen.disparity, Some(&mirrored), seen.width);
+    Ok(known_pixels(&depth, &seen, &RANGE_M)
+        .into_iter()
+        .map(|(at, z)| {
+            let predicted = 1.0 / f64::from(seen.disparity[at]);
+            (evidence[at], (predicted - z).abs() / z)
+        })
+        .collect())
+}

@@ -1,0 +1,152 @@
+//! Which images are learned from and which are judged, so that none of the judged looks like one that was learned.
+
+/// Least share of the images on either side of a division by drives.
+const LEAST_SHARE: f64 = 0.2;
+/// Share of the images between the two parts of a drive that are in neither: what is seen from the end of one part is not
+/// seen from the beginning of the other.
+const GAP: f64 = 0.1;
+
+/// Images by index, in two parts.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Division {
+    /// Those to learn from.
+    pub learned: Vec<usize>,
+    /// Those to judge by.
+    pub held_out: Vec<usize>,
+    /// Whether the parts are of different drives, and not two parts of one.
+    pub by_drive: bool,
+}
+
+/// Divides images, each with its drive and its frame's number: by drives where there are several and neither side comes out
+/// small, else into the first and the last part of all, with a gap between them. Neighbouring frames are near copies of each
+/// other: with every second frame held out, what is judged would have been learned. A single image is learned from.
+#[must_use]
+pub fn divide<D: PartialEq>(images: &[(D, u64)]) -> Division {
+    by_drives(images).unwrap_or_else(|| by_parts(images))
+}
+
+fn by_drives<D: PartialEq>(images: &[(D, u64)]) -> Option<Division> {
+    let mut drives: Vec<(&D, Vec<usize>)> = Vec::new();
+    for (index, (drive, _)) in images.iter().enumerate() {
+        match drives.iter_mut().find(|(known, _)| *known == drive) {
+            Some((_, of_drive)) => of_drive.push(index),
+            None => drives.push((drive, vec![index])),
+        }
+    }
+    // The largest first, each to the smaller side: as even as it gets, and the same each time.
+    drives.sort_by_key(|(_, of_drive)| std::cmp::Reverse(of_drive.len()));
+    let (mut learned, mut held_out) = (Vec::new(), Vec::new());
+    for (_, of_drive) in drives {
+        if learned.len() <= held_out.len() {
+            learned.extend(of_drive)
+        } else {
+            held_out.extend(of_drive)
+        }
+    }
+    let least = LEAST_SHARE * images.len() as f64;
+    let even = learned.len().min(held_out.len()) as f64 >= least && !held_out.is_empty();
+    learned.sort_unstable();
+    held_out.sort_unstable();
+    even.then_some(Division {
+        learned,
+        held_out,
+        by_drive: true,
+    })
+}
+
+/// By place along the recording: both cameras' images of one moment are on one side.
+fn by_parts<D: PartialEq>(images: &[(D, u64)]) -> Division {
+    let mut drives: Vec<&D> = Vec::new();
+    let mut at = Vec::with_capacity(images.len());
+    for (drive, number) in images {
+        let known = drives.iter().position(|d| *d == drive);
+        let place = known.unwrap_or(drives.len());
+        if known.is_none() {
+            drives.push(drive);
+        }
+        at.push((place, *number));
+    }
+    let mut moments = at.clone();
+    moments.sort_unstable();
+    moments.dedup();
+    let gap = match moments.len() {
+        0..3 => 0,
+        n => ((GAP * n as f64).round() as usize).max(1),
+    };
+    let first = (moments.len() - gap).div_ceil(2);
+    let of = |range: &[(usize, u64)]| {
+        let inside = |i: &usize| range.binary_search(&at[*i]).is_ok();
+        (0..images.len()).filter(inside).collect()
+    };
+    Division {
+        learned: of(&moments[..first]),
+        held_out: of(&moments[first + gap..]),
+        by_drive: false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn images(drives: &[(&'static str, std::ops::Range<u64>)]) -> Vec<(&'static str, u64)> {
+        let of = |(drive, numbers): &(&'static str, std::ops::Range<u64>)| {
+            let drive = *drive;
+            numbers.clone().map(move |n| (drive, n))
+        };
+        drives.iter().flat_map(of).collect()
+    }
+
+    #[test]
+    fn of_several_drives_whole_ones_are_held_out() {
+        let images = images(&[("a", 0..30), ("b", 0..50), ("c", 0..15)]);
+        let division = divide(&images);
+        assert!(division.by_drive);
+        let drives = |part: &[usize]| -> std::collections::BTreeSet<&str> {
+            part.iter().map(|i| images[*i].0).collect()
+        };
+        let (learned, held_out) = (drives(&division.learned), drives(&division.held_out));
+        assert!(learned.is_disjoint(&held_out), "{learned:?} {held_out:?}");
+        assert_eq!(division.learned.len() + division.held_out.len(), 95);
+        assert_eq!((learned.len(), held_out.len()), (1, 2));
+    }
+
+    #[test]
+    fn of_one_drive_a_part_is_held_out_that_no_learned_frame_is_next_to() {
+        // Both cameras, camera 3 after camera 2.
+        let images = images(&[("a", 0..40), ("a", 0..40)]);
+        let Division {
+            learned,
+            held_out,
+            by_drive,
+        } = divide(&images);
+        assert!(!by_drive);
+        let numbers = |part: &[usize]| -> Vec<u64> { part.iter().map(|i| images[*i].1).collect() };
+        let last = numbers(&learned).into_iter().max().unwrap();
+        let first = numbers(&held_out).into_iter().min().unwrap();
+        assert_eq!((last, first), (17, 22), "four of forty between them");
+        assert_eq!((learned.len(), held_out.len()), (36, 36));
+    }
+
+    #[test]
+    fn a_drive_too_small_to_judge_by_is_no_other_side() {
+        let division = divide(&images(&[("a", 0..98), ("b", 0..2)]));
+        assert!(!division.by_drive);
+        assert!(division.held_out.len() > 40);
+    }
+
+    #[test]
+    fn few_images_are_divided_as_far_as_they_go() {
+        for (n, sizes) in [
+            (0, (0, 0)),
+            (1, (1, 0)),
+            (2, (1, 1)),
+            (3, (1, 1)),
+            (4, (2, 1)),
+        ] {
+            let division = divide(&images(&[("a", 0..n)]));
+            let found = (division.learned.len(), division.held_out.len());
+            assert_eq!(found, sizes, "{n} images");
+        }
+    }
+}

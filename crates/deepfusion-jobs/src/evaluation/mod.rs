@@ -1,0 +1,173 @@
+//! Evaluating predictions on recordings with ground truth, or on files of arrays.
+
+mod comparison;
+pub mod confidence;
+mod coverage;
+mod division;
+mod known_pixels;
+mod truth;
+
+use std::collections::HashMap;
+
+use deepfusion_data::{Dataset, DatasetKind, GtKind, RgbImage, ground_truth_names};
+use deepfusion_eval::{
+    ArraySet, Crop, DrawnPoint, Grid, GroundTruth, ImageScore, Prediction, Protocol, Report,
+    Sample, TrivialBaseline, match_names,
+};
+use deepfusion_geometry::Intrinsics;
+use deepfusion_runtime::DepthEstimator;
+
+use crate::{Error, Result};
+
+pub use self::comparison::Comparison;
+pub use self::coverage::{Shortfall, Why, check_used, expected_frames, missing_frames};
+pub use self::division::{Division, divide};
+pub use self::known_pixels::known_pixels;
+pub use self::truth::{
+    Truth, array_places, depth_map, trivial_from_arrays, trivial_from_datasets,
+    trivial_from_training,
+};
+
+/// The crop of the recordings' field: Garg's where all of them are KITTI raw, which its tables use; else the whole image.
+#[must_use]
+pub fn default_crop(datasets: &[Dataset]) -> Crop {
+    let kitti = |d: &Dataset| d.kind() == DatasetKind::KittiRaw;
+    match datasets.iter().all(kitti) {
+        true => Crop::Garg,
+        false => Crop::None,
+    }
+}
+
+/// Where an evaluated image is: the data set and its frame, or the place of its prediction and truth in array files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place(pub usize, pub usize);
+
+/// What an evaluation found.
+pub struct Evaluated {
+    /// The result.
+    pub report: Report,
+    /// Each image's scores.
+    pub images: Vec<ImageScore>,
+    /// The points that were drawn.
+    pub points: Vec<DrawnPoint>,
+    /// Where each image is.
+    pub places: Vec<Place>,
+}
+
+/// The disparity of an image, as the protocol wants it. An image of another aspect ratio is stretched, so that all of its ground
+/// truth counts.
+///
+/// # Errors
+/// What the network's engine says.
+pub fn predict(
+    estimator: &mut DepthEstimator,
+    image: &RgbImage,
+    camera: &Intrinsics,
+    focal_correction: bool,
+) -> Result<Prediction> {
+    let prediction = estimator.predict(image, Some(camera), focal_correction, false)?;
+    let grid = Grid::from_f32(prediction.width, prediction.height, &prediction.disparity)?;
+    Ok(Prediction::Disparity(grid))
+}
+
+/// Evaluates `predict` (data set, frame, its image's prediction) on every selected frame that has ground truth; `progress` takes the frames done
+/// and in all.
+///
+/// # Errors
+/// What `predict` says, and what cannot be read or compared.
+pub fn evaluate_datasets<E: From<Error>>(
+    datasets: &[Dataset],
+    truth: &mut Truth,
+    protocol: &Protocol,
+    baseline: Option<TrivialBaseline>,
+    predict: &mut dyn FnMut(&Dataset, usize) -> Result<Prediction, E>,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Evaluated, E> {
+    let mut comparison = Comparison::new(protocol, baseline)?;
+    let names = ground_truth_names(datasets);
+    let total = names.iter().map(Vec::len).sum();
+    let arrays = match truth {
+        Truth::Scans(_) => HashMap::new(),
+        Truth::Arrays(arrays) => array_places(arrays, &names),
+    };
+    let (mut done, mut places) = (0, Vec::new());
+    for (number, (dataset, names)) in datasets.iter().zip(&names).enumerate() {
+        let labels = dataset.moving_labels().map_err(Error::from)?;
+        for (&frame, name) in dataset.selected().iter().zip(names) {
+            let known = truth.of(dataset, frame, arrays.get(name).copied())?;
+            if let Some(ground_truth) = known {
+                let prediction = predict(dataset, frame)?;
+                let dense = dataset.dense_depth(frame).map_err(Error::from)?;
+                let dense = dense.map(|depth| Grid::from(&depth));
+                let k = dataset.intrinsics(frame);
+                let same_size = (k.width as usize, k.height as usize)
+                    == (ground_truth.width(), ground_truth.height());
+                let moving = match &labels {
+                    Some(labels) if same_size => {
+                        let of = dataset.frames()[frame].number;
+                        let depth = depth_map(&ground_truth);
+                        let pixels = labels.pixels(of, &depth, gt_kind(protocol));
+                        pixels.map_err(Error::from)?
+                    }
+                    _ => None,
+                };
+                let sample = Sample {
+                    name,
+                    prediction: &prediction,
+                    ground_truth: &ground_truth,
+                    moving: moving.as_deref(),
+                    intrinsics: same_size.then_some(&k),
+                    dense: dense.as_ref(),
+                };
+                if comparison.add(&sample)? {
+                    places.push(Place(number, frame));
+                }
+                if let Some(scenario) = dataset.scenario() {
+                    comparison.add_to_scenario(scenario, &sample)?;
+                }
+            }
+            done += 1;
+            progress(done, total);
+        }
+    }
+    Ok(comparison.evaluated(places)?)
+}
+
+/// Which depth the ground truth holds, in the recordings' words.
+fn gt_kind(protocol: &Protocol) -> GtKind {
+    match protocol.gt {
+        GroundTruth::Z => GtKind::Z,
+        GroundTruth::Velodyne => GtKind::Velodyne,
+    }
+}
+
+/// Evaluates the arrays of one file against those of another; `of_kind` says what the first file's are.
+///
+/// # Errors
+/// Files that hold no arrays, arrays without counterpart, and what cannot be compared.
+pub fn evaluate_arrays(
+    (predicted, of_kind): (&mut ArraySet, &dyn Fn(Grid) -> Prediction),
+    known: &mut ArraySet,
+    protocol: &Protocol,
+    baseline: Option<TrivialBaseline>,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Evaluated> {
+    let mut comparison = Comparison::new(protocol, baseline)?;
+    let matched = match_names(predicted, known)?;
+    let mut places = Vec::new();
+    for (i, (name, prediction, depth)) in matched.iter().enumerate() {
+        let counted = comparison.add(&Sample {
+            name,
+            prediction: &of_kind(predicted.read(*prediction)?),
+            ground_truth: &known.read(*depth)?,
+            moving: None,
+            intrinsics: None,
+            dense: None,
+        })?;
+        if counted {
+            places.push(Place(*prediction, *depth));
+        }
+        progress(i + 1, matched.len());
+    }
+    comparison.evaluated(places)
+}

@@ -1,0 +1,102 @@
+//! Where the true depth comes from, and the mean depth of scans as a baseline.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use deepfusion_data::{Dataset, GtKind};
+use deepfusion_eval::{ArraySet, Grid, TrivialBaseline};
+use deepfusion_geometry::DepthMap;
+use deepfusion_model::TrainConfig;
+
+use crate::Result;
+use crate::recordings::training_recordings;
+
+/// Where the truth comes from.
+pub enum Truth {
+    /// The recordings' scans.
+    Scans(GtKind),
+    /// A file of arrays that are named as `data export-gt` names them.
+    Arrays(Box<ArraySet>),
+}
+
+impl Truth {
+    /// Of a frame; `place` is where an array file has it. `None` where nothing is known of the frame.
+    ///
+    /// # Errors
+    /// A scan or an array that cannot be read.
+    pub fn of(
+        &mut self,
+        dataset: &Dataset,
+        frame: usize,
+        place: Option<usize>,
+    ) -> Result<Option<Grid>> {
+        Ok(match self {
+            Self::Scans(kind) => {
+                let depth = dataset.ground_truth(frame, *kind)?;
+                depth.map(|depth| Grid::from(&depth))
+            }
+            Self::Arrays(arrays) => place.map(|place| arrays.read(place)).transpose()?,
+        })
+    }
+}
+
+/// The trivial row's scans: all of the given (training) recordings'.
+///
+/// # Errors
+/// A scan that cannot be read.
+pub fn trivial_from_datasets(datasets: &[Dataset], kind: GtKind) -> Result<TrivialBaseline> {
+    let mut baseline = TrivialBaseline::new();
+    for dataset in datasets {
+        for &frame in dataset.selected() {
+            if let Some(depth) = dataset.ground_truth(frame, kind)? {
+                baseline.add_scan(&Grid::from(&depth));
+            }
+        }
+    }
+    Ok(baseline)
+}
+
+/// The trivial row's scans, from an array file.
+///
+/// # Errors
+/// A file that holds no arrays.
+pub fn trivial_from_arrays(path: &Path) -> Result<TrivialBaseline> {
+    let mut scans = ArraySet::open(path)?;
+    let mut baseline = TrivialBaseline::new();
+    for index in 0..scans.len() {
+        baseline.add_scan(&scans.read(index)?);
+    }
+    Ok(baseline)
+}
+
+/// The trivial row from the recordings a model was trained on, where they are still there.
+#[must_use]
+pub fn trivial_from_training(config: &TrainConfig, kind: GtKind) -> Option<TrivialBaseline> {
+    let recordings = training_recordings(config).ok()?;
+    let datasets: Vec<_> = recordings.into_iter().map(|(_, dataset)| dataset).collect();
+    trivial_from_datasets(&datasets, kind).ok()
+}
+
+/// Ground truth as the recordings take it.
+#[must_use]
+pub fn depth_map(truth: &Grid) -> DepthMap {
+    DepthMap {
+        width: truth.width(),
+        height: truth.height(),
+        data: truth.values().iter().map(|d| *d as f32).collect(),
+    }
+}
+
+/// Frame names to places in the file: by name, or, for a stack without names, in the frames' order.
+#[must_use]
+pub fn array_places(arrays: &ArraySet, frames: &[Vec<String>]) -> HashMap<String, usize> {
+    match arrays.names() {
+        Some(names) => names.iter().cloned().zip(0..).collect(),
+        None => frames
+            .iter()
+            .flatten()
+            .cloned()
+            .zip(0..arrays.len())
+            .collect(),
+    }
+}

@@ -1,0 +1,42 @@
+//! Whether training saw what is measured on.
+
+#[cfg(feature = "train")]
+mod of_run;
+
+use std::path::Path;
+
+use deepfusion_data::{Dataset, DatasetKind};
+use deepfusion_weights::Card;
+
+#[cfg(feature = "train")]
+pub use of_run::held_out;
+
+/// Whether a path is a run's folder, or in one.
+#[must_use]
+pub fn is_run(path: &Path) -> bool {
+    let in_a_run = |p: &Path| p.join("config.toml").exists();
+    path.is_dir() || path.parent().is_some_and(in_a_run)
+}
+
+/// Whether a packed network cannot have seen these recordings. What it saw is gone, but for its kind: one that saw simulated drives
+/// alone saw no recording that is surely real.
+#[must_use]
+pub fn unseen(card: &Card, datasets: &[Dataset]) -> bool {
+    /// Exact poses, which no real drive has.
+    const SIMULATED: &str = "poses.txt";
+    let surely_real = |dataset: &Dataset| {
+        dataset.kind() != DatasetKind::Bag && !dataset.folder().join(SIMULATED).exists()
+    };
+    card.simulated_only && datasets.iter().all(surely_real)
+}
+
+/// What training took of a run's recordings is not known to a build without it.
+#[cfg(not(feature = "train"))]
+#[must_use]
+pub fn held_out(
+    _: &deepfusion_model::TrainConfig,
+    _: &[Dataset],
+    _: &[crate::evaluation::Place],
+) -> Option<bool> {
+    None
+}

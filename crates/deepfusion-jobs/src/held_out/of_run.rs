@@ -1,0 +1,94 @@
+//! What a run saw, and those it began from.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use deepfusion_data::{Dataset, Frame};
+use deepfusion_model::{RunFolder, TrainConfig};
+use deepfusion_runtime::embedded;
+use deepfusion_train::SampleSet;
+use deepfusion_weights::Shipped;
+
+use super::{is_run, unseen};
+use crate::evaluation::Place;
+use crate::recordings::{training_recordings, validates};
+
+/// A frame, wherever a copy of its drive lies: the drive's name, the frame's number and the size of its image's file.
+type Seen = (String, u64, u64);
+
+/// Whether none of the frames measured was a target or a source in training, of this run and of those it began from. `None` where
+/// that cannot be told: recordings that are not there any more, or a network that was learned elsewhere.
+#[must_use]
+pub fn held_out(config: &TrainConfig, datasets: &[Dataset], places: &[Place]) -> Option<bool> {
+    let seen = seen_by(config, datasets, &mut HashSet::new())?;
+    let mut measured = places
+        .iter()
+        .map(|Place(number, frame)| &datasets[*number].frames()[*frame]);
+    Some(measured.all(|frame| !seen.contains(&key(frame))))
+}
+
+/// What a run saw, and those it began from; `datasets` are what is measured on.
+fn seen_by(
+    config: &TrainConfig,
+    datasets: &[Dataset],
+    runs: &mut HashSet<std::path::PathBuf>,
+) -> Option<HashSet<Seen>> {
+    let mut config = config.clone();
+    if validates(&config) {
+        // Nothing of the training recordings was left out.
+        config.validation_share = 0.0;
+    }
+    let recordings = training_recordings(&config).ok()?;
+    let (train, _, _) = SampleSet::split_sets(&config, recordings, None).ok()?;
+    let mut seen = HashSet::new();
+    for sample in &train.samples {
+        let frames = train.datasets[sample.dataset].frames();
+        seen.insert(key(&frames[sample.snippet.target]));
+        seen.extend(sample.snippet.sources.iter().map(|s| key(&frames[s.frame])));
+    }
+    for frame in &train.depth.frames {
+        seen.insert(key(&train.datasets[frame.dataset].frames()[frame.frame]));
+    }
+    if let Some(init) = &config.init {
+        let packed = match &config.init_sha256 {
+            Some(sha256) => {
+                let network = embedded(init).ok()??;
+                // Another one of the name tells nothing of the one it began from.
+                (network.card.sha256 == *sha256).then_some(())?;
+                Some(*network)
+            }
+            None if Shipped::is_at(init) => Some(Shipped::read(init).ok()?),
+            None => None,
+        };
+        match packed {
+            Some(network) if unseen(&network.card, datasets) => {}
+            Some(_) => return None,
+            None => seen.extend(seen_before(init, datasets, runs)?),
+        }
+    }
+    Some(seen)
+}
+
+/// What the weights that a run began from have seen; weights that are no run's are of other pictures (ImageNet's).
+fn seen_before(
+    init: &Path,
+    datasets: &[Dataset],
+    runs: &mut HashSet<std::path::PathBuf>,
+) -> Option<HashSet<Seen>> {
+    if !init.exists() {
+        return None;
+    }
+    if !is_run(init) {
+        return Some(HashSet::new());
+    }
+    let (folder, _) = RunFolder::open(init).ok()?;
+    if !runs.insert(folder.path().to_owned()) {
+        return Some(HashSet::new());
+    }
+    seen_by(&folder.read_config().ok()?, datasets, runs)
+}
+
+fn key(frame: &Frame) -> Seen {
+    let size = std::fs::metadata(frame.image.path()).map_or(0, |meta| meta.len());
+    (frame.drive.clone(), frame.number, size)
+}

@@ -1,0 +1,231 @@
+//! The images that the arguments mean, each with the name of its outputs.
+
+use std::collections::HashSet;
+use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
+
+use deepfusion_data::{Dataset, DatasetKind, OpenOptions};
+
+use crate::{Error, Result};
+
+/// The endings of images.
+const IMAGES: [&str; 3] = ["png", "jpg", "jpeg"];
+
+/// An image, and what its outputs are called.
+#[derive(Debug, Clone)]
+pub struct Input {
+    /// The image, or the file it is in.
+    pub path: PathBuf,
+    /// What the names of its outputs begin with.
+    pub name: String,
+    /// The recording it is a frame of, and which.
+    pub frame: Option<(Arc<Dataset>, usize)>,
+}
+
+impl PartialEq for Input {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.path, &self.name) == (&other.path, &other.name)
+    }
+}
+
+/// Endings of files that hold many images.
+const RECORDINGS: [&str; 8] = ["bag", "mcap", "db3", "mp4", "mkv", "mov", "avi", "hevc"];
+
+/// The images that files, folders, patterns and recordings mean: in the order of their paths, each once, then the frames of
+/// recordings in their order. Neither order nor names depend on the order of the arguments, so that shards started
+/// apart agree on both.
+///
+/// A folder with images in it (neither `dataset.toml` nor depth beside colour) is a folder of images; any other that
+/// [`Dataset::open`] takes is a recording, whose cameras are `options`' and its own. `opened` sees the recordings.
+///
+/// # Errors
+/// [`Error::NoImages`], a pattern that is none, and what cannot be opened.
+pub fn find_inputs(
+    arguments: &[String],
+    options: &OpenOptions,
+    opened: impl FnOnce(&[Dataset]),
+) -> Result<Vec<Input>> {
+    let mut found = Vec::new();
+    let mut recordings = Vec::new();
+    for argument in arguments {
+        let path = PathBuf::from(argument);
+        if path.is_dir() {
+            let entries =
+                std::fs::read_dir(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+            let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+            let images: Vec<_> = paths.filter(|p| is_image(p)).collect();
+            if images.is_empty() || path.join("dataset.toml").exists() || is_rgbd(&path) {
+                recordings.extend(open(&path, argument, options)?);
+            } else {
+                found.extend(images);
+            }
+        } else if path.exists() && has_ending(&path, &RECORDINGS) {
+            recordings.extend(open(&path, argument, options)?);
+        } else if path.exists() || !argument.contains(['*', '?', '[']) {
+            // A file that is not there is told by whoever opens it.
+            found.push(path);
+        } else {
+            let paths = glob::glob(argument)?.filter_map(Result::ok);
+            found.extend(images_among(paths, argument)?);
+        }
+    }
+    opened(&recordings);
+    let mut inputs = named(found);
+    let used: HashSet<String> = inputs.iter().map(|i| i.name.to_lowercase()).collect();
+    inputs.extend(frames_of(recordings, &used));
+    Ok(inputs)
+}
+
+/// Whether the images of a folder are colour and depth, of which only the colour is to be looked at.
+fn is_rgbd(folder: &Path) -> bool {
+    // What is wrong with the folder as a recording says nothing of its images.
+    Dataset::kind_at(folder).is_ok_and(|kind| kind == DatasetKind::RgbD)
+}
+
+/// Opens a recording; that it is none is an error that names the argument.
+fn open(path: &Path, argument: &str, options: &OpenOptions) -> Result<Vec<Dataset>> {
+    match Dataset::open(path, options) {
+        Ok(datasets) => Ok(datasets),
+        // A folder of ROS 2 bags has a remedy of its own.
+        Err(deepfusion_data::Error::UnknownLayout { found, .. })
+            if path.is_dir() && !found.contains("ROS 2") =>
+        {
+            let input = argument.to_owned();
+            Err(Error::NoImages { input })
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The selected frames of recordings. They are named by their numbers, after the recording's name where there are others.
+fn frames_of(mut recordings: Vec<Dataset>, used: &HashSet<String>) -> Vec<Input> {
+    recordings.sort_by(|a, b| a.folder().cmp(b.folder()).then(a.name().cmp(b.name())));
+    let alone = recordings.len() == 1 && used.is_empty();
+    let mut inputs = Vec::new();
+    for dataset in recordings {
+        let dataset = Arc::new(dataset);
+        for index in dataset.selected() {
+            let frame = &dataset.frames()[*index];
+            let name = if alone {
+                format!("{:010}", frame.number)
+            } else {
+                format!("{}-{:010}", dataset.name(), frame.number)
+            };
+            inputs.push(Input {
+                path: frame.image.path().to_owned(),
+                name,
+                frame: Some((dataset.clone(), *index)),
+            });
+        }
+    }
+    inputs
+}
+
+/// The images among the paths; that there is none is an error that names the argument.
+fn images_among(paths: impl Iterator<Item = PathBuf>, argument: &str) -> Result<Vec<PathBuf>> {
+    let images: Vec<_> = paths.filter(|p| is_image(p)).collect();
+    if images.is_empty() {
+        let input = argument.to_owned();
+        return Err(Error::NoImages { input });
+    }
+    Ok(images)
+}
+
+fn is_image(path: &Path) -> bool {
+    has_ending(path, &IMAGES)
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    path.extension()
+        .and_then(|e| e.to_str())
+        .is_some_and(|e| endings.contains(&e.to_ascii_lowercase().as_str()))
+}
+
+/// Sorts the paths, drops those given twice, and names each after its file, numbered where two files share a name.
+fn named(paths: Vec<PathBuf>) -> Vec<Input> {
+    let mut paths: Vec<PathBuf> = paths.iter().map(|p| without_dots(p)).collect();
+    paths.sort();
+    let mut seen = HashSet::new();
+    paths.retain(|p| seen.insert(std::path::absolute(p).unwrap_or_else(|_| p.clone())));
+    let mut used = HashSet::new();
+    let name = |path: &PathBuf| {
+        let stem = path
+            .file_stem()
+            .map_or("image".into(), |s| s.to_string_lossy().into_owned());
+        let mut name = stem.clone();
+        let mut number = 1;
+        // In small letters: to some file systems `A` and `a` are the same.
+        while !used.insert(name.to_lowercase()) {
+            number += 1;
+            name = format!("{stem}-{number}");
+        }
+        name
+    };
+    let names: Vec<String> = paths.iter().map(name).collect();
+    let both = paths.into_iter().zip(names);
+    both.map(|(path, name)| Input {
+        path,
+        name,
+        frame: None,
+    })
+    .collect()
+}
+
+/// `./a/./b` is `a/b`.
+fn without_dots(path: &Path) -> PathBuf {
+    path.components()
+        .filter(|c| *c != Component::CurDir)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn names(paths: &[&str]) -> Vec<String> {
+        let inputs = named(paths.iter().map(PathBuf::from).collect());
+        inputs.into_iter().map(|i| i.name).collect()
+    }
+
+    #[test]
+    fn inputs_of_the_same_name_do_not_overwrite_each_other() {
+        assert_eq!(names(&["a/0.png", "b/0.png", "b/1.jpg"]), ["0", "0-2", "1"]);
+        // Not even where the number makes the name of another.
+        assert_eq!(
+            names(&["a/0.png", "b/0.png", "c/0-2.png", "d/A.png", "e/a.png"]),
+            ["0", "0-2", "0-2-2", "A", "a-2"]
+        );
+    }
+
+    #[test]
+    fn an_image_given_twice_is_one() {
+        let absolute = std::path::absolute("a/0.png").unwrap();
+        let twice = ["./a/0.png", "a/0.png", absolute.to_str().unwrap()];
+        assert_eq!(names(&twice), ["0"]);
+    }
+
+    #[test]
+    fn a_pattern_without_images_is_an_error() {
+        let error =
+            find_inputs(&["/nowhere/*.png".into()], &OpenOptions::default(), |_| ()).unwrap_err();
+        assert!(error.to_string().contains("/nowhere/*.png"), "{error}");
+    }
+
+    proptest! {
+        #[test]
+        fn names_are_unique_and_independent_of_the_order(
+            mut paths in proptest::collection::vec("[ab]/[aA0](-[23])?\\.(png|jpg)", 1..30),
+            turn in 0usize..30,
+        ) {
+            let inputs = |p: &[String]| named(p.iter().map(PathBuf::from).collect());
+            let first = inputs(&paths);
+            let unique: HashSet<_> = first.iter().map(|i| i.name.to_lowercase()).collect();
+            prop_assert_eq!(unique.len(), first.len());
+            let places = paths.len();
+            paths.rotate_left(turn % places);
+            paths.reverse();
+            prop_assert_eq!(inputs(&paths), first);
+        }
+    }
+}

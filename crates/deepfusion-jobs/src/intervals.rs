@@ -1,0 +1,128 @@
+//! How sure a network is: whether its intervals hold, and by how much they must be stretched so that they do.
+
+use std::path::{Path, PathBuf};
+
+use deepfusion_data::Dataset;
+use deepfusion_eval::{IntervalFactors, IntervalSample, Protocol};
+use deepfusion_geometry::DepthMap;
+use deepfusion_runtime::{DepthEstimator, ModelSource, Prediction};
+
+use crate::evaluation::{Evaluated, Place, Truth, known_pixels};
+use crate::{Error, ModelFacts, Result};
+
+/// The file in a run's folder.
+const FILE: &str = "uncertainty.toml";
+
+/// A run's factors, where they were found.
+///
+/// # Errors
+/// A file that holds none.
+pub fn read(run: &Path) -> Result<Option<IntervalFactors>> {
+    let path = run.join(FILE);
+    match std::fs::read_to_string(&path) {
+        Ok(text) => match toml::from_str(&text) {
+            Ok(factors) => Ok(Some(validated(factors, &path)?)),
+            Err(source) => Err(Error::Kept { path, source }),
+        },
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(deepfusion_data::Error::file(&path, e).into()),
+    }
+}
+
+/// Factors that can be used; `path` names where they come from.
+pub(crate) fn validated(factors: IntervalFactors, path: &Path) -> Result<IntervalFactors> {
+    match factors.validate() {
+        Ok(()) => Ok(factors),
+        Err(error) => Err(Error::KeptFactors {
+            path: path.to_owned(),
+            source: Box::new(error),
+        }),
+    }
+}
+
+fn write(factors: &IntervalFactors, run: &Path) -> Result<PathBuf> {
+    let path = run.join(FILE);
+    let text = format!(
+        "# The interval of a depth is depth * exp(-q * b) to depth * exp(q * b); b is what the network says, and q stands here for\n\
+         # each level and range of predicted depth. Written by `eval --calibrate-uncertainty`.\n{}",
+        toml::to_string(factors)?
+    );
+    deepfusion_fs::write(&path, text).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+    Ok(path)
+}
+
+/// Standard deviation of a prediction's depth (`depth`, at the image's size), metres, stretched as the intervals of 80 % are;
+/// `None` of a network that does not say how sure it is.
+#[must_use]
+pub fn sigma(
+    prediction: &Prediction,
+    depth: &DepthMap,
+    factors: &IntervalFactors,
+) -> Option<DepthMap> {
+    let mut sigma = prediction.sigma_of(depth)?;
+    for (sigma, depth) in sigma.data.iter_mut().zip(&depth.data) {
+        *sigma *= factors.stretch(f64::from(*depth)) as f32;
+    }
+    Some(sigma)
+}
+
+/// A depth without the pixels whose standard deviation is above a share of it.
+#[must_use]
+pub fn without_unsure(depth: &DepthMap, sigma: &DepthMap, most: f64) -> DepthMap {
+    let mut sure = depth.clone();
+    for (depth, sigma) in sure.data.iter_mut().zip(&sigma.data) {
+        if *sigma > *depth * most as f32 {
+            *depth = 0.0;
+        }
+    }
+    sure
+}
+
+/// Adds to an evaluation whether the network's intervals hold on its frames; with `calibrate` finds new factors on them, keeps
+/// those beside the run, and gives them with their file.
+///
+/// # Errors
+/// What cannot be read, predicted or written.
+pub fn measure(
+    (model, estimator): (&ModelSource, &mut DepthEstimator),
+    datasets: &[Dataset],
+    truth: &mut Truth,
+    evaluated: &mut Evaluated,
+    (protocol, correct_focal): (&Protocol, bool),
+    calibrate: bool,
+) -> Result<Option<(IntervalFactors, PathBuf)>> {
+    let mut samples = Vec::new();
+    for Place(set, frame) in &evaluated.places {
+        let dataset = &datasets[*set];
+        let Some(depth) = truth.of(dataset, *frame, None)? else {
+            continue;
+        };
+        let image = dataset.load_image(*frame)?;
+        let camera = dataset.intrinsics(*frame);
+        let seen = estimator.predict(&image, Some(&camera), correct_focal, false)?;
+        let Some(log_scale) = &seen.log_scale else {
+            return Ok(None);
+        };
+        let range = protocol.min_m..protocol.cap_m;
+        for (at, z) in known_pixels(&depth, &seen, &range) {
+            let predicted = 1.0 / f64::from(seen.disparity[at]);
+            samples.push(IntervalSample {
+                depth_m: predicted,
+                scale: f64::from(log_scale[at]).exp(),
+                error: (predicted / z).ln().abs(),
+                drive: *set,
+            });
+        }
+    }
+    let mut factors = model.interval_factors()?;
+    let mut kept = None;
+    if calibrate
+        && let Some(found) = IntervalFactors::calibrate(&samples)
+        && let Some(run) = model.folder()
+    {
+        kept = Some((found.clone(), write(&found, run)?));
+        factors = found;
+    }
+    evaluated.report.intervals = factors.measure(&samples);
+    Ok(kept)
+}

@@ -1,0 +1,194 @@
+//! 3D targets against labelled boxes: drives with tracklets, and KITTI's object frames.
+
+mod lidar;
+mod object_frames;
+mod source;
+mod tracklets;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use deepfusion_data::{Dataset, RgbImage, kitti::GtKind, read_depth_png};
+use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_perception::{
+    Label, Perception, PerceptionConfig, Scorer, ScoringRules, Target, TargetScore,
+};
+
+pub use self::lidar::gathered;
+pub use self::object_frames::{ObjectFrame, is_folder_of, read as read_object_frames};
+pub use self::source::DepthSource;
+pub use self::tracklets::{Labels, pixels_within};
+use crate::scene::MotionTracker;
+use crate::{Error, Result};
+
+/// Exact depth of simulated drives.
+const EXACT_DEPTH: &str = "proj_depth/groundtruth/image_02";
+
+/// Looks at labelled frames, and scores the targets that it finds.
+pub struct TargetEvaluation {
+    source: DepthSource,
+    perception: Perception,
+    scorer: Scorer,
+}
+
+/// A frame that was looked at.
+pub struct LookedAt<'a> {
+    /// What a picture of it is called.
+    pub name: String,
+    /// What was found.
+    pub targets: &'a [Target],
+    /// Of the image.
+    pub camera: Intrinsics,
+    /// Loads the image.
+    pub image: &'a dyn Fn() -> deepfusion_data::Result<RgbImage>,
+    /// Frames of the recording that were looked at before it, and all of them.
+    pub progress: (usize, usize),
+}
+
+impl TargetEvaluation {
+    /// Nothing looked at yet.
+    #[must_use]
+    pub fn new(source: DepthSource, config: PerceptionConfig) -> Self {
+        Self {
+            source,
+            perception: Perception::new(config),
+            scorer: Scorer::new(ScoringRules::default()),
+        }
+    }
+
+    /// Where the depth comes from.
+    #[must_use]
+    pub fn source(&self) -> &DepthSource {
+        &self.source
+    }
+
+    /// The score so far.
+    #[must_use]
+    pub fn score(&self) -> TargetScore {
+        self.scorer.score()
+    }
+
+    /// Looks at a labelled drive; `each` sees every frame that was measured.
+    ///
+    /// # Errors
+    /// [`Error::NothingToMeasure`], what cannot be read or predicted, and what `each` says.
+    pub fn drive<E: From<Error>>(
+        &mut self,
+        dataset: &Arc<Dataset>,
+        each: &mut dyn FnMut(LookedAt) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let labels = Labels::read(dataset)?;
+        let mut motions = MotionTracker::default();
+        let before = self.score().frames;
+        self.scorer.begin_drive();
+        let frames = dataset.selected();
+        for (done, index) in frames.iter().enumerate() {
+            let witness = witness(dataset, *index)?;
+            let seen = self.source.of_frame(dataset, *index, witness.as_ref())?;
+            let Some(measured) = seen else {
+                continue;
+            };
+            let motion = motions.of(dataset, *index);
+            if !motion.goes_on {
+                self.perception.reset();
+            }
+            let targets = measured.targets(&mut self.perception, motion.stamp)?;
+            // Without a witness nothing says which boxes are seen: such a frame is followed, but not scored.
+            if let Some(witness) = &witness {
+                let labels = labels.of(dataset, *index, witness);
+                let time_s = motion.stamp.map_or(0.0, |stamp| stamp.time_s);
+                self.scorer.add(time_s, &targets, &labels);
+            }
+            let number = dataset.frames()[*index].number;
+            each(LookedAt {
+                name: format!("{}-{number:010}.png", dataset.name()),
+                targets: &targets,
+                camera: dataset.intrinsics(*index),
+                image: &|| dataset.load_image(*index),
+                progress: (done, frames.len()),
+            })?;
+        }
+        Ok(self.some_frames_since(before, dataset.folder())?)
+    }
+
+    /// Looks at the labelled frames of a folder ([`is_folder_of`]), each for itself; `each` sees every frame.
+    ///
+    /// # Errors
+    /// As [`Self::drive`].
+    pub fn object_frames<E: From<Error>>(
+        &mut self,
+        folder: &Path,
+        each: &mut dyn FnMut(LookedAt) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let before = self.score().frames;
+        let frames = read_object_frames(folder)?;
+        let total = frames.len();
+        for (done, frame) in frames.into_iter().enumerate() {
+            self.scorer.begin_drive();
+            self.perception.reset();
+            let Some(measured) = self.source.of_object_frame(&frame)? else {
+                continue;
+            };
+            let targets = measured.targets(&mut self.perception, None)?;
+            self.scorer.add(0.0, &targets, &frame.labels);
+            let name = frame.image.with_extension("png");
+            let name = name.file_name().unwrap_or_default().to_string_lossy();
+            each(LookedAt {
+                name: name.into_owned(),
+                targets: &targets,
+                camera: frame.camera,
+                image: &|| deepfusion_data::load_rgb(&frame.image),
+                progress: (done, total),
+            })?;
+        }
+        Ok(self.some_frames_since(before, folder)?)
+    }
+
+    fn some_frames_since(&self, before: usize, path: &Path) -> Result<()> {
+        if self.score().frames > before {
+            return Ok(());
+        }
+        Err(Error::NothingToMeasure {
+            path: path.to_owned(),
+        })
+    }
+}
+
+/// Depth that says how much of a box is seen.
+pub struct Witness {
+    /// At the image's size.
+    pub depth: DepthMap,
+    /// Every pixel, or a scan's points only.
+    pub dense: bool,
+}
+
+/// The exact depth of a simulated frame, else its scan; `None` where there is neither.
+fn witness(dataset: &Dataset, index: usize) -> Result<Option<Witness>> {
+    let frame = &dataset.frames()[index];
+    let exact = dataset
+        .folder()
+        .join(EXACT_DEPTH)
+        .join(format!("{:010}.png", frame.number));
+    if exact.is_file() {
+        let depth = read_depth_png(&exact)?;
+        return Ok(Some(Witness { depth, dense: true }));
+    }
+    let scan = dataset.ground_truth(index, GtKind::Z)?;
+    Ok(scan.map(|depth| Witness {
+        depth,
+        dense: false,
+    }))
+}
+
+/// Whether a label is to be found: a free-standing thing of a target's size of which enough is seen.
+#[must_use]
+pub fn counts(label: &Label, class: &str, witnesses: usize, least: usize) -> bool {
+    /// The simulator's things that are no targets, and KITTI's regions without labels.
+    const NEITHER: [&str; 5] = ["Pole", "Tree", "Building", "Fence", "DontCare"];
+    let [length, width, height] = label.size_m;
+    !NEITHER.contains(&class)
+        && (0.4..=4.5).contains(&height)
+        && length <= 13.0
+        && width <= 3.5
+        && witnesses >= least
+}

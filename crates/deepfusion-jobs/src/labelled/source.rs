@@ -1,0 +1,119 @@
+//! Where the depth comes from that targets are found in.
+
+use deepfusion_data::{Dataset, RgbImage, kitti::GtKind};
+use deepfusion_eval::IntervalFactors;
+use deepfusion_geometry::{DepthMap, Intrinsics};
+use deepfusion_perception::{Perception, PerceptionConfig, Stamp, Target, working_depth};
+use deepfusion_runtime::DepthEstimator;
+
+use super::{ObjectFrame, Witness, gathered};
+use crate::{Result, intervals};
+
+/// Where the measured depth comes from.
+pub enum DepthSource {
+    /// The simulator's exact depth.
+    Truth,
+    /// The scans.
+    Lidar,
+    /// A network, of every frame: targets need more than one to be confirmed. Its intervals are stretched by the factors.
+    Network(Box<DepthEstimator>, IntervalFactors),
+}
+
+impl DepthSource {
+    /// One word for a report: `truth`, `lidar` or `predicted`.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Truth => "truth",
+            Self::Lidar => "lidar",
+            Self::Network(..) => "predicted",
+        }
+    }
+
+    /// How depth of this kind is looked at.
+    #[must_use]
+    pub fn settings(&self) -> PerceptionConfig {
+        match self {
+            Self::Truth | Self::Lidar => PerceptionConfig::default(),
+            Self::Network(..) => PerceptionConfig::predicted(),
+        }
+    }
+
+    /// What is seen of a recording's frame; `None` where it is not measured.
+    pub(super) fn of_frame(
+        &mut self,
+        dataset: &Dataset,
+        index: usize,
+        witness: Option<&Witness>,
+    ) -> Result<Option<Measured>> {
+        let camera = dataset.intrinsics(index);
+        Ok(match self {
+            Self::Truth => witness
+                .filter(|witness| witness.dense)
+                .map(|witness| Measured::exact(working_depth(&witness.depth, &camera))),
+            Self::Lidar => dataset
+                .ground_truth(index, GtKind::Z)?
+                .map(|scan| Measured::exact(gathered(&scan, &camera))),
+            Self::Network(estimator, intervals) => {
+                let image = dataset.load_image(index)?;
+                Some(predicted((estimator, intervals), &image, &camera)?)
+            }
+        })
+    }
+
+    /// What is seen of a labelled frame; it has no exact depth.
+    pub(super) fn of_object_frame(&mut self, frame: &ObjectFrame) -> Result<Option<Measured>> {
+        Ok(match self {
+            Self::Truth => None,
+            Self::Lidar => Some(Measured::exact(gathered(&frame.scan, &frame.camera))),
+            Self::Network(estimator, intervals) => {
+                let image = deepfusion_data::load_rgb(&frame.image)?;
+                Some(predicted((estimator, intervals), &image, &frame.camera)?)
+            }
+        })
+    }
+}
+
+fn predicted(
+    (estimator, factors): (&mut DepthEstimator, &IntervalFactors),
+    image: &RgbImage,
+    camera: &Intrinsics,
+) -> Result<Measured> {
+    let prediction = estimator.predict(image, Some(camera), true, true)?;
+    let whole = prediction.depth();
+    let sigma = intervals::sigma(&prediction, &whole, factors);
+    let (depth, camera_of_depth) = working_depth(&whole, camera);
+    Ok(Measured {
+        depth,
+        sigma: sigma.map(|sigma| working_depth(&sigma, camera).0),
+        camera: camera_of_depth,
+    })
+}
+
+/// Depth of a frame, and what it is worth where its source says so.
+pub(super) struct Measured {
+    depth: DepthMap,
+    sigma: Option<DepthMap>,
+    camera: Intrinsics,
+}
+
+impl Measured {
+    fn exact((depth, camera): (DepthMap, Intrinsics)) -> Self {
+        Self {
+            depth,
+            sigma: None,
+            camera,
+        }
+    }
+
+    /// What stands there.
+    pub(super) fn targets(
+        &self,
+        perception: &mut Perception,
+        stamp: Option<Stamp>,
+    ) -> Result<Vec<Target>> {
+        let sigma = self.sigma.as_ref();
+        let seen = perception.detect_with_sigma(&self.depth, sigma, &self.camera, stamp, &[])?;
+        Ok(seen.targets)
+    }
+}

@@ -1,0 +1,37 @@
+//! A network over whole recordings and folders.
+//!
+//! | Module | What it does |
+//! |---|---|
+//! | [`evaluation`] | predictions against ground truth, beside the trivial baseline; how far a pixel can be trusted |
+//! | [`intervals`] | whether the intervals hold of a network that says how sure it is, and by how much they are stretched |
+//! | [`labelled`] | 3D targets against labelled boxes |
+//! | [`bulk`] | images in, outputs exactly once, on any number of machines |
+//! | [`scene`] | how the camera moved from frame to frame, and whether metres still are what they were |
+//! | [`packing`] | a run's network as a file of its own, with its card |
+//! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training saw what is measured on |
+#![cfg_attr(
+    feature = "train",
+    doc = "| [`samples`] | the samples that a configuration is trained and validated with |"
+)]
+//!
+//! Nothing here prints. What a person should know is returned, or told to a callback.
+
+pub mod bulk;
+pub mod dates;
+mod error;
+pub mod evaluation;
+mod figures;
+pub mod held_out;
+mod inputs;
+pub mod intervals;
+pub mod labelled;
+mod model_facts;
+pub mod packing;
+pub mod recordings;
+#[cfg(feature = "train")]
+pub mod samples;
+pub mod scene;
+
+pub use error::{Error, OtherJob, Result, StaleReason};
+pub use inputs::{Input, find_inputs};
+pub use model_facts::{ModelFacts, name_of};

@@ -1,0 +1,127 @@
+//! What there is to say of a network beside what it predicts.
+
+use std::path::{Path, PathBuf};
+
+use deepfusion_eval::IntervalFactors;
+use deepfusion_eval::compare::{MetricScale, sha256_of_file};
+use deepfusion_runtime::ModelSource;
+use sha2::{Digest, Sha256};
+
+use crate::{Error, Result, intervals};
+
+/// The last part of a path, for people: a folder given as `.` by its own name.
+#[must_use]
+pub fn name_of(path: &Path) -> String {
+    let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let name = whole.file_name().unwrap_or(whole.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// What else there is to say of a network.
+pub trait ModelFacts {
+    /// Its name, for people.
+    fn name(&self) -> String;
+
+    /// SHA-256 of the weights' file, in hexadecimal.
+    ///
+    /// # Errors
+    /// Where it cannot be read.
+    fn sha256(&self) -> Result<String>;
+
+    /// SHA-256 of configuration, weights and the factors of the intervals: all that what it predicts depends on.
+    ///
+    /// # Errors
+    /// Where they cannot be read.
+    fn content_sha256(&self) -> Result<String>;
+
+    /// The factors of the intervals of a network that says how sure it is: those found for it, else it is taken at its word.
+    ///
+    /// # Errors
+    /// For a file or a card that holds none.
+    fn interval_factors(&self) -> Result<IntervalFactors>;
+
+    /// What evaluations that the run's folder keeps say of this checkpoint's metres, with the metres of a data set, for a network that
+    /// has learned for `steps`. A packed network keeps none.
+    ///
+    /// # Errors
+    /// As [`Self::sha256`].
+    fn scale(&self, set: Option<&str>, focal_correction: bool, steps: usize)
+    -> Result<MetricScale>;
+}
+
+impl ModelFacts for ModelSource {
+    fn name(&self) -> String {
+        match self {
+            Self::Run { folder, .. } => name_of(folder.path()),
+            Self::Packed { network, .. } => network.card.name.clone(),
+        }
+    }
+
+    fn sha256(&self) -> Result<String> {
+        Ok(match self {
+            Self::Run { folder, kind, .. } => sha256_of_file(&folder.checkpoint_path(*kind))?,
+            Self::Packed { network, .. } => network.card.sha256.clone(),
+        })
+    }
+
+    fn content_sha256(&self) -> Result<String> {
+        let mut hash = Sha256::new();
+        match self {
+            Self::Run { folder, kind, .. } => {
+                for path in [folder.config_path(), folder.checkpoint_path(*kind)] {
+                    let failed = |e| deepfusion_data::Error::file(&path, e);
+                    // In pieces: a checkpoint may be larger than what predicting takes.
+                    let mut file = std::fs::File::open(&path).map_err(failed)?;
+                    std::io::copy(&mut file, &mut hash).map_err(failed)?;
+                }
+            }
+            Self::Packed { network, .. } => {
+                hash.update(network.card.config.to_string());
+                hash.update(&network.card.sha256);
+            }
+        }
+        let factors = self.interval_factors()?;
+        if factors.is_calibrated() {
+            hash.update(toml::to_string(&factors)?);
+        }
+        Ok(format!("{:x}", hash.finalize()))
+    }
+
+    fn interval_factors(&self) -> Result<IntervalFactors> {
+        let found = match self {
+            Self::Run { folder, .. } => intervals::read(folder.path())?,
+            Self::Packed { network, .. } => {
+                let named = || PathBuf::from(&network.card.name);
+                let table = network.card.uncertainty.clone();
+                let factors: Result<Option<IntervalFactors>, _> =
+                    table.map(toml::Table::try_into).transpose();
+                let factors = factors.map_err(|source| Error::Kept {
+                    path: named(),
+                    source,
+                })?;
+                let checked = |factors| intervals::validated(factors, &named());
+                factors.map(checked).transpose()?
+            }
+        };
+        Ok(found.unwrap_or_else(IntervalFactors::uncalibrated))
+    }
+
+    fn scale(
+        &self,
+        set: Option<&str>,
+        focal_correction: bool,
+        steps: usize,
+    ) -> Result<MetricScale> {
+        let Some(folder) = self.folder() else {
+            return Ok(MetricScale::default());
+        };
+        let sha256 = self.sha256()?;
+        Ok(MetricScale::measured(
+            folder,
+            &sha256,
+            set,
+            focal_correction,
+            steps,
+        ))
+    }
+}

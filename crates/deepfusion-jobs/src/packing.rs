@@ -1,0 +1,158 @@
+//! A run's depth network as a file of its own, with a card that says what it is.
+
+use std::path::Path;
+
+use deepfusion_data::to_network_input;
+use deepfusion_eval::compare::sha256_of_file;
+use deepfusion_model::weights::read_bytes;
+use deepfusion_model::{
+    CheckpointKind, Error as ModelError, RunFolder, StoredNetwork, TrainConfig,
+    depth_graph_with_uncertainty,
+};
+use deepfusion_runtime::{DepthRunner, FusedRunner, Precision};
+use deepfusion_sim::{SimConfig, Simulation};
+use deepfusion_weights::{Card, FORMAT_VERSION, NUMBERS, Shipped, Tensor, pack};
+
+use crate::figures::{figures, names};
+use crate::{Error, Result, dates, intervals};
+
+/// What a card says that the run does not know.
+#[derive(Debug, Clone, Default)]
+pub struct PackOptions {
+    /// Which checkpoint; the one that was named with the run, or the one that the folder prefers.
+    pub checkpoint: Option<CheckpointKind>,
+    /// What the network is called: letters a to z, digits and dashes.
+    pub name: String,
+    /// What else there is to say of it.
+    pub note: Option<String>,
+    /// How to make it again.
+    pub recipe: Option<String>,
+    /// Under which terms it may be used.
+    pub licence: String,
+    /// Whether it learned from no real image.
+    pub simulated_only: bool,
+}
+
+/// Packs the depth network of a run (its folder, or a checkpoint in it): kernels rounded to bf16, vectors in f32.
+///
+/// # Errors
+/// [`Error::PackedAlready`], [`Error::NothingToPack`], and a run that cannot be read.
+pub fn pack_run(model: &Path, options: PackOptions) -> Result<Shipped> {
+    if Shipped::is_at(model) {
+        let path = model.to_owned();
+        return Err(Error::PackedAlready { path });
+    }
+    let (folder, given) = RunFolder::open(model)?;
+    let kind = options.checkpoint.or(given);
+    let kind = kind.unwrap_or_else(|| folder.preferred());
+    let file = folder.checkpoint_path(kind);
+    if folder.read_state(kind)?.encoders_only {
+        return Err(Error::NothingToPack { path: file });
+    }
+    let (config, findings) = (folder.read_config()?, folder.read_findings()?);
+    let (weights, state) = folder.load_depth_weights(kind)?;
+    let network = StoredNetwork {
+        config: config.clone(),
+        camera: findings.camera,
+        weights,
+        step: state.step,
+    };
+    // All of it, and nothing else.
+    depth_graph_with_uncertainty(&network.config.depth_net, network.weights.clone())
+        .map_err(ModelError::from)?;
+    let tensors = network.weights.tensors.iter();
+    let tensors: Vec<Tensor> = tensors
+        .map(|(name, tensor)| Tensor {
+            name,
+            shape: &tensor.shape,
+            values: &tensor.values,
+        })
+        .collect();
+    let bytes = pack(&tensors)?;
+    let modified = std::fs::metadata(&file).and_then(|meta| meta.modified());
+    let modified = modified.map_err(|e| deepfusion_data::Error::file(&file, e))?;
+    let parts = config.depth_net.costs(config.size);
+    let no_form = |what| move |source| Error::NoTomlForm { what, source };
+    let card = Card {
+        format_version: FORMAT_VERSION,
+        name: options.name,
+        // Filled in with the bytes.
+        sha256: String::new(),
+        bytes: 0,
+        parameters: parts.iter().map(|part| part.parameters).sum(),
+        steps: state.step,
+        checkpoint: kind.name().into(),
+        date: dates::day(modified),
+        data: learned_from(&config),
+        simulated_only: options.simulated_only,
+        recipe: options.recipe,
+        licence: options.licence,
+        numbers: NUMBERS.into(),
+        depth_difference: rounded(difference(&network, &bytes)?),
+        note: options.note,
+        figures: figures(folder.path(), &sha256_of_file(&file)?),
+        uncertainty: intervals::read(folder.path())?
+            .map(toml::Table::try_from)
+            .transpose()
+            .map_err(no_form("the factors of its intervals have no TOML form"))?,
+        config: config
+            .without_places()
+            .to_run_table(&findings)
+            .map_err(no_form("the run's configuration has no TOML form"))?,
+    };
+    Ok(Shipped::new(card, bytes)?)
+}
+
+/// The names of the recordings that a run learned from.
+fn learned_from(config: &TrainConfig) -> Vec<String> {
+    let sets = config.data.sets.iter();
+    let recorded = sets.clone().flat_map(|set| &set.paths);
+    let simulated = sets.filter(|set| set.simulated.is_some());
+    let simulated = simulated.map(|set| format!("{} (simulated views)", set.name));
+    let mut names = names(config.data.paths.iter().chain(recorded));
+    names.extend(simulated);
+    names
+}
+
+/// Largest |packed − original| / original over the depths of a simulated picture, both computed in f32.
+fn difference(network: &StoredNetwork, bytes: &[u8]) -> Result<f64> {
+    let config = &network.config;
+    let (width, height) = (config.size.width as u32, config.size.height as u32);
+    let street = Simulation::new(&SimConfig {
+        frames: 1,
+        width,
+        height,
+        ..SimConfig::default()
+    })?;
+    let picture = street.frame(0).rgb;
+    let input = to_network_input(&picture, [0, 0, width, height], width, height);
+    let depth = |weights| -> Result<Vec<f64>> {
+        let mut runner = FusedRunner::new(config, weights, Precision::F32)?;
+        let disparity = runner.disparity(&input)?;
+        Ok(disparity
+            .into_iter()
+            .map(|d| f64::from(d).recip())
+            .collect())
+    };
+    let original = depth(network.weights.clone())?;
+    let packed = read_bytes("the packed network", bytes).map_err(ModelError::from)?;
+    let packed = depth(packed)?;
+    let relative = original.iter().zip(&packed).map(|(a, b)| (b - a).abs() / a);
+    Ok(relative.fold(0.0, f64::max))
+}
+
+/// To three digits: the last ones depend on the processor.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_digits_are_kept() {
+        assert_eq!(rounded(0.001_234_5), 0.001_23);
+        assert_eq!(rounded(0.0), 0.0);
+    }
+}

@@ -1,0 +1,85 @@
+//! The samples that a configuration is trained and validated with.
+
+use std::collections::HashSet;
+use std::fmt;
+
+use deepfusion_data::{Dataset, OpenOptions, SpeedWarning, speed_unit_warning};
+use deepfusion_model::TrainConfig;
+use deepfusion_train::{SampleSet, SharedFrames, shared_frames};
+
+use crate::Result;
+use crate::recordings::{Part, open_part, validates};
+
+/// Something that training goes on with, and that may not be meant.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum SampleWarning {
+    /// The speeds of a drive, by its name, do not fit its images.
+    Speed(String, SpeedWarning),
+    /// A drive that gives no samples, and why.
+    Skipped(String),
+    /// Validation frames that are sources of training samples.
+    Neighbours(SharedFrames),
+}
+
+impl fmt::Display for SampleWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Speed(drive, warning) => write!(f, "{drive}: {warning}"),
+            Self::Skipped(reason) => write!(f, "skipped: {reason}"),
+            Self::Neighbours(shared) => write!(
+                f,
+                "{}: {} of its validation frames are neighbours of training frames, and were seen as such",
+                shared.drive, shared.sources
+            ),
+        }
+    }
+}
+
+/// The training and validation samples of a configuration; `opened` sees the recordings of each set, with how they were opened,
+/// `warn` what should be known before training.
+///
+/// # Errors
+/// Recordings that cannot be opened, and what [`SampleSet::split_sets`] says.
+pub fn open_samples(
+    config: &TrainConfig,
+    opened: &mut dyn FnMut(&OpenOptions, &[Dataset]),
+    warn: &mut dyn FnMut(SampleWarning),
+) -> Result<(SampleSet, SampleSet)> {
+    let train = open_part(config, Part::Training, opened)?;
+    let mut checked = HashSet::new();
+    for (_, dataset) in &train {
+        // Both cameras of a drive have one speed.
+        if checked.insert((dataset.folder().to_owned(), dataset.name().to_owned()))
+            && let Some(warning) = speed_warning(dataset)
+        {
+            warn(SampleWarning::Speed(dataset.name().to_owned(), warning));
+        }
+    }
+    let validation = match validates(config) {
+        true => Some(open_part(config, Part::Validation, opened)?),
+        false => None,
+    };
+    let apart = validation.is_some();
+    let (train, validation, skipped) = SampleSet::split_sets(config, train, validation)?;
+    skipped
+        .into_iter()
+        .map(SampleWarning::Skipped)
+        .for_each(&mut *warn);
+    if apart {
+        let shared = shared_frames(&train, &validation);
+        shared
+            .into_iter()
+            .map(SampleWarning::Neighbours)
+            .for_each(warn);
+    }
+    Ok((train, validation))
+}
+
+fn speed_warning(dataset: &Dataset) -> Option<SpeedWarning> {
+    speed_unit_warning(dataset).unwrap_or_else(|error| {
+        // The check is a service: what is really wrong with the images, training will say.
+        tracing::debug!("speed check of {}: {error}", dataset.name());
+        None
+    })
+}

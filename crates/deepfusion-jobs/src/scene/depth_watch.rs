@@ -1,0 +1,67 @@
+//! The watch over a recording's metres while it is predicted.
+
+use deepfusion_data::RgbImage;
+use deepfusion_geometry::Intrinsics;
+use deepfusion_motion::ScaleMonitorConfig;
+use deepfusion_perception::{Ground, PerceptionConfig, Rays};
+use deepfusion_records::ScaleRecord;
+use deepfusion_runtime::Prediction;
+
+use super::{MotionTracker, ScaleWatch};
+use crate::Input;
+
+/// Follows the frames in their order, with the ground that their depth shows.
+pub struct DepthWatch {
+    motions: MotionTracker,
+    watch: ScaleWatch,
+    config: PerceptionConfig,
+    rays: Option<(Intrinsics, Rays)>,
+    ground: Option<Ground>,
+}
+
+impl DepthWatch {
+    /// From the first frame on; with `correct` depth is brought back to the metres that were learned.
+    #[must_use]
+    pub fn new(config: ScaleMonitorConfig, correct: bool) -> Self {
+        Self {
+            motions: MotionTracker::default(),
+            watch: ScaleWatch::new(config, correct),
+            config: PerceptionConfig::predicted(),
+            rays: None,
+            ground: None,
+        }
+    }
+
+    /// Brings the frame's depth back to the metres that were learned, where that was asked for, and says whether they
+    /// hold; `None` where nothing is known of how the camera moved.
+    pub fn look(
+        &mut self,
+        input: &Input,
+        image: &RgbImage,
+        camera: Option<Intrinsics>,
+        prediction: &mut Prediction,
+    ) -> Option<ScaleRecord> {
+        let motion = self.motions.next(input);
+        if let Some(factor) = self.watch.correction() {
+            prediction.scale_depth(factor);
+        }
+        motion.stamp?;
+        let camera = camera?;
+        let (depth, k) = prediction.network_depth(&camera);
+        if self.rays.as_ref().is_none_or(|(before, _)| *before != k) {
+            self.rays = Some((k, Rays::of(&k)));
+            self.ground = None;
+        }
+        let (_, rays) = self.rays.as_ref()?;
+        // The last ground is a guess for this one only while the camera goes on.
+        let before = self.ground.take().filter(|_| motion.goes_on);
+        self.ground = Ground::find(&depth.data, rays, before.as_ref(), &self.config);
+        let ground = self.ground.as_ref();
+        self.watch.add(image, &camera, &motion, ground)
+    }
+
+    /// As [`ScaleWatch::first_drift`].
+    pub fn first_drift(&mut self) -> Option<f64> {
+        self.watch.first_drift()
+    }
+}

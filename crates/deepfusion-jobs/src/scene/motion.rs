@@ -1,0 +1,87 @@
+//! How the camera moved from frame to frame of a recording.
+
+use std::sync::Arc;
+
+use deepfusion_data::Dataset;
+use deepfusion_geometry::Se3;
+use deepfusion_perception::Stamp;
+use nalgebra::Vector3;
+
+use crate::Input;
+
+/// When and from where a frame was taken, and how the vehicle went then.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Motion {
+    /// `None` for a frame that stands for itself.
+    pub stamp: Option<Stamp>,
+    /// m/s.
+    pub speed_mps: Option<f64>,
+    /// rad/s, positive to the left.
+    pub yaw_rate: f64,
+    /// Time since the last frame, seconds, where this frame goes on from it.
+    pub seconds: Option<f64>,
+    /// The camera in the last frame's camera, where this frame goes on from it.
+    pub last_from_this: Option<Se3>,
+    /// Whether the frame goes on from the last one, so that what was followed there still means something.
+    pub goes_on: bool,
+    /// Which way is down in the camera, where its mount is known.
+    pub down_in_cam: Option<Vector3<f64>>,
+}
+
+/// Whether a recording tells how its camera moved.
+#[must_use]
+pub fn motion_known(dataset: &Dataset) -> bool {
+    dataset.track().is_some() && dataset.yaw_known()
+}
+
+/// Adds up the camera's way over the frames of a recording.
+#[derive(Debug, Default)]
+pub struct MotionTracker {
+    last: Option<(Arc<Dataset>, usize, Se3)>,
+}
+
+impl MotionTracker {
+    /// The motion of the next frame.
+    pub fn next(&mut self, input: &Input) -> Motion {
+        let Some((dataset, index)) = &input.frame else {
+            self.last = None;
+            return Motion::default();
+        };
+        self.of(dataset, *index)
+    }
+
+    /// As [`Self::next`], of a recording's frame.
+    pub fn of(&mut self, dataset: &Arc<Dataset>, index: usize) -> Motion {
+        let frame = &dataset.frames()[index];
+        let step = self.last.take().and_then(|(before, last, world_from_cam)| {
+            let same = Arc::ptr_eq(&before, dataset) && index > last;
+            let motion = same.then(|| dataset.camera_motion(last, index))??;
+            let dt = frame.time_s? - dataset.frames()[last].time_s?;
+            Some((world_from_cam * motion, motion, dt))
+        });
+        // The first frame of a recording whose motion is known begins a way.
+        let begun = motion_known(dataset).then(Se3::identity);
+        let world_from_cam = step.map(|(pose, ..)| pose).or(begun);
+        let stamp = world_from_cam
+            .zip(frame.time_s)
+            .map(|(world_from_cam, time_s)| Stamp {
+                time_s,
+                world_from_cam,
+            });
+        if let Some(stamp) = stamp {
+            self.last = Some((dataset.clone(), index, stamp.world_from_cam));
+        }
+        Motion {
+            stamp,
+            speed_mps: frame.speed_mps,
+            // The camera's y points down: a turn to the left is a negative one about it.
+            yaw_rate: step.map_or(0.0, |(_, motion, dt)| -motion.axis_angle().y / dt),
+            last_from_this: step.map(|(_, motion, _)| motion),
+            seconds: step.map(|(.., dt)| dt),
+            goes_on: step.is_some(),
+            down_in_cam: dataset
+                .cam_from_vehicle()
+                .map(|cam| -cam.rotate(&Vector3::z())),
+        }
+    }
+}

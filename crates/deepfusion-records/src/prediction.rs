@@ -1,0 +1,153 @@
+//! What stands beside every prediction.
+
+use std::path::PathBuf;
+
+use deepfusion_eval::compare::MetricScale;
+use serde::{Deserialize, Serialize};
+
+use crate::{FileMark, LiveMark, MadeWith, ScaleRecord};
+
+/// What is known of an image's depth: its camera, and what its metres are worth. What a file does not hold takes its default, so
+/// that other programs' and older ones' can be shown.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PredictionRecord {
+    /// The input.
+    pub image: Option<PathBuf>,
+    /// The input's file, to notice that it changed; of a live source's frame its pixels, and when they arrived.
+    pub image_file: Option<FileMark>,
+    /// The input's width and height.
+    pub size: Option<[u32; 2]>,
+    /// What the depths are.
+    pub unit: String,
+    /// The run or checkpoint given, or the embedded network's name.
+    pub model: PathBuf,
+    /// SHA-256 of an embedded or packed network's weights: a name alone does not say which version of it this was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model_sha256: Option<String>,
+    /// Steps the checkpoint was trained for.
+    pub checkpoint_step: usize,
+    /// fx, fy, cx, cy in pixels of the input.
+    pub intrinsics: Option<[f64; 4]>,
+    /// `given`, `recording` (its own calibration), `exif` (the lens's nominal focal length), `assumed` or `unknown`.
+    pub intrinsics_from: String,
+    /// Whether the camera is known, so that depth is right for its focal length: given, the recording's own, or EXIF's.
+    pub camera_known: bool,
+    /// What was measured of this checkpoint's metres on recordings that it has not learned from.
+    pub scale: MetricScale,
+    /// What depth was multiplied by for another focal length than the one trained with.
+    pub focal_factor: f64,
+    /// x, y, width and height of the part that was looked at; depth is 0 outside.
+    pub window: [u32; 4],
+    /// Smallest and largest depth, in metres; none where no pixel has one.
+    pub depth_m: Option<[f32; 2]>,
+    /// Whether the recording's metres still are what they were, where that is watched.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scale_monitor: Option<ScaleRecord>,
+}
+
+/// A prediction's description. It is written last, so that it also says that its outputs are there.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Sidecar {
+    /// The image and its depth.
+    #[serde(flatten)]
+    pub prediction: PredictionRecord,
+    /// The outputs, in the sidecar's folder.
+    pub files: Vec<String>,
+    /// The outputs' sizes in bytes, to notice a file that was cut off.
+    pub file_bytes: Vec<u64>,
+    /// The outputs' CRC-32 as eight hexadecimal digits, to notice one that a power cut left as zeros. A sidecar of an older
+    /// version has none: what it stands for is made again.
+    #[serde(default)]
+    pub file_crc32: Vec<String>,
+    /// Of a live source's frame: when it arrived, and how late its depth was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub live: Option<LiveMark>,
+    /// What else the outputs depend on.
+    pub made_with: MadeWith,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_motion::{ScaleReading, ScaleState};
+
+    fn sidecar() -> Sidecar {
+        Sidecar {
+            prediction: PredictionRecord {
+                image: Some("street/5.png".into()),
+                image_file: Some(FileMark {
+                    bytes: 1234,
+                    modified_ns: Some(1_767_225_600_123_456_789),
+                }),
+                size: Some([1242, 375]),
+                unit: "metres".into(),
+                model: "street".into(),
+                model_sha256: Some("ab".into()),
+                checkpoint_step: 500,
+                intrinsics: Some([721.5, 721.5, 609.6, 172.9]),
+                intrinsics_from: "given".into(),
+                camera_known: true,
+                scale: MetricScale::default(),
+                focal_factor: 1.0,
+                window: [0, 1, 1242, 373],
+                depth_m: Some([5.9, 80.0]),
+                scale_monitor: Some(ScaleRecord {
+                    reading: ScaleReading {
+                        ratio: Some(1.1),
+                        ci95: None,
+                        height_m: Some(1.65),
+                        depth_ratio: None,
+                        state: ScaleState::Drift,
+                    },
+                    correction: Some(0.9),
+                }),
+            },
+            files: vec!["5_depth.png".into()],
+            file_bytes: vec![99],
+            file_crc32: vec!["0badcafe".into()],
+            live: None,
+            made_with: MadeWith {
+                version: "0.1.0".into(),
+                weights: "cd".into(),
+                engine: "fused on cpu".into(),
+                save: vec!["depth-png".into()],
+                max_depth_m: 80.0,
+                max_sigma: None,
+                intrinsics: None,
+                calibration_sha256: None,
+                focal_correction: true,
+                stretch: false,
+                correct_scale: false,
+                set: None,
+            },
+        }
+    }
+
+    #[test]
+    fn a_sidecar_is_written_as_scripts_read_it_and_read_back() {
+        let text = serde_json::to_string(&sidecar()).unwrap();
+        assert_eq!(
+            text,
+            concat!(
+                r#"{"image":"street/5.png","image_file":{"bytes":1234,"modified_ns":1767225600123456789},"size":[1242,375],"#,
+                r#""unit":"metres","model":"street","model_sha256":"ab","checkpoint_step":500,"#,
+                r#""intrinsics":[721.5,721.5,609.6,172.9],"intrinsics_from":"given","camera_known":true,"#,
+                r#""scale":{"bias":null,"ci95":null,"verdict":"open"},"focal_factor":1.0,"window":[0,1,1242,373],"#,
+                r#""depth_m":[5.9,80.0],"scale_monitor":{"ratio":1.1,"ci95":null,"height_m":1.65,"depth_ratio":null,"#,
+                r#""state":"drift","correction":0.9},"files":["5_depth.png"],"file_bytes":[99],"file_crc32":["0badcafe"],"#,
+                r#""made_with":{"version":"0.1.0","weights":"cd","engine":"fused on cpu","save":["depth-png"],"#,
+                r#""max_depth_m":80.0,"intrinsics":null,"focal_correction":true,"stretch":false}}"#,
+            )
+        );
+        assert_eq!(serde_json::from_str::<Sidecar>(&text).unwrap(), sidecar());
+    }
+
+    #[test]
+    fn a_part_can_be_shown_and_is_no_sidecar() {
+        let text = r#"{"image": "x.png", "size": [4, 2], "scale_trusted": true}"#;
+        let shown: PredictionRecord = serde_json::from_str(text).unwrap();
+        assert_eq!((shown.size, shown.intrinsics), (Some([4, 2]), None));
+        assert!(serde_json::from_str::<Sidecar>(text).is_err());
+    }
+}

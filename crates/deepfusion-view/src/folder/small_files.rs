@@ -1,0 +1,131 @@
+//! A frame's small files, as `predict` and `perceive` write them.
+
+use std::path::Path;
+
+use deepfusion_records::{FrameRecord, PredictionRecord, Target};
+use serde::Deserialize;
+use serde_json::Value;
+
+use super::entry::{Entry, FrameFile};
+use crate::{Error, Result};
+
+/// No sidecar or list of targets is as large; what is, is another program's file.
+const MOST_JSON_BYTES: u64 = 16 << 20;
+
+/// What the small files of a frame say, and what is wrong with them.
+#[derive(Default)]
+pub(crate) struct SmallFiles {
+    pub sidecar: Option<Small<PredictionRecord>>,
+    /// Without the targets that cannot be drawn.
+    pub targets: Option<Small<FrameRecord>>,
+    pub problems: Vec<String>,
+    /// Whether a file is not whole: a frame that comes.
+    pub unfinished: bool,
+}
+
+/// A file as it stands, for the page, and what it says.
+pub(crate) struct Small<T> {
+    pub json: Value,
+    pub record: T,
+}
+
+impl SmallFiles {
+    /// Reads what there is of them.
+    pub fn read(folder: &Path, entry: &Entry) -> Self {
+        let mut files = Self::default();
+        files.sidecar = files.json(folder, entry.sidecar.as_ref()).map(|json| {
+            let record = files.record(entry.sidecar.as_ref(), &json);
+            Small { json, record }
+        });
+        files.targets = files.json(folder, entry.targets.as_ref()).map(|mut json| {
+            files.without_undrawable(&mut json);
+            let record = files.record(entry.targets.as_ref(), &json);
+            Small { json, record }
+        });
+        files
+    }
+
+    fn json(&mut self, folder: &Path, file: Option<&FrameFile>) -> Option<Value> {
+        let outcome = read_json(&folder.join(&file?.file));
+        outcome
+            .map_err(|e| {
+                self.problems.push(e.to_string());
+                self.unfinished = true;
+            })
+            .ok()
+    }
+
+    /// What a file says; nothing where it is none of ours.
+    fn record<'de, T: Deserialize<'de> + Default>(
+        &mut self,
+        file: Option<&FrameFile>,
+        json: &'de Value,
+    ) -> T {
+        T::deserialize(json).unwrap_or_else(|e| {
+            let name = file.map_or("", |f| f.file.as_str());
+            self.problems
+                .push(format!("{name}: not as this program writes it: {e}"));
+            T::default()
+        })
+    }
+
+    /// Takes out the targets that have no place or size: nothing of them can be drawn.
+    fn without_undrawable(&mut self, frame: &mut Value) {
+        let Some(list) = frame.get_mut("targets").and_then(Value::as_array_mut) else {
+            self.problems
+                .push("the targets' file has no list of targets".into());
+            return;
+        };
+        let all = list.len();
+        list.retain(|target| {
+            Target::deserialize(target).is_ok_and(|t| t.size_m.iter().all(|side| *side > 0.0))
+        });
+        if list.len() < all {
+            self.problems.push(format!(
+                "{} of {all} targets have no place or size",
+                all - list.len()
+            ));
+        }
+    }
+}
+
+/// A small JSON file.
+fn read_json(path: &Path) -> Result<Value> {
+    let meta = std::fs::metadata(path).map_err(|e| Error::file(path, e))?;
+    if meta.len() > MOST_JSON_BYTES {
+        return Err(Error::content(
+            path,
+            format!(
+                "{} bytes are too many for a frame's description",
+                meta.len()
+            ),
+        ));
+    }
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+    serde_json::from_slice(&bytes).map_err(|e| {
+        let what = if e.is_eof() {
+            "half-written, or cut off"
+        } else {
+            "no JSON"
+        };
+        Error::content(path, format!("{what}: {e}"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_ours_says_nothing_and_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        std::fs::write(&path, r#"{"image": "x.png", "size": "large"}"#).unwrap();
+        let meta = std::fs::metadata(&path).unwrap();
+        let mut entry = Entry::new("a");
+        entry.sidecar = Some(FrameFile::new("a.json".into(), &meta));
+        let files = SmallFiles::read(folder.path(), &entry);
+        assert!(files.sidecar.unwrap().record.size.is_none() && !files.unfinished);
+        assert!(files.problems[0].starts_with("a.json: not as this program writes it"));
+    }
+}
