@@ -22,6 +22,7 @@ mod evaluate;
 mod export;
 mod export_gt;
 mod held_out;
+mod import;
 mod inspect;
 mod known_pixels;
 mod live;
@@ -65,6 +66,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Data(DataCommand::Inspect(args)) => inspect::run(&args),
         Command::Data(DataCommand::ExportGt(args)) => export_gt::run(&args),
         Command::Data(DataCommand::Convert(args)) => convert::run(&args),
+        Command::Data(DataCommand::Import(args)) => import::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         #[cfg(feature = "train")]
         Command::Train(args) => train::run(&args),
