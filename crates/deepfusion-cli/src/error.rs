@@ -31,6 +31,21 @@ pub enum CliError {
         /// What was given.
         input: String,
     },
+    /// A moment that is none on a log's clock.
+    #[error("--start {word}: not a moment on the log's clock")]
+    NotOnClock {
+        /// What was given.
+        word: String,
+    },
+    /// Logs whose clocks have nothing to do with each other.
+    #[error("{}: its clock is of another kind than the first log's", path.display())]
+    OtherClock {
+        /// The second log.
+        path: PathBuf,
+    },
+    /// A log without anything that saw the drive.
+    #[error("neither a video nor images are given for the log")]
+    NoMedia,
     /// No network named, and none embedded.
     #[error("no `--model` is given, and this build has no embedded network to take instead")]
     NoModelGiven,
@@ -323,6 +338,9 @@ impl Reportable for CliError {
             Self::VideoShard => {
                 Some("save side-by-side in the shards, then run once more with --save video and without --shard".into())
             }
+            Self::NotOnClock { .. } => Some("give seconds, a time of day or a date, as the log has them".into()),
+            Self::OtherClock { .. } => Some("give the log that has both speeds and turns, or the first alone".into()),
+            Self::NoMedia => Some("give --video FILE or --images DIR".into()),
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
             Self::NoUncertainty => Some(
                 "leave out sigma of --save and --max-sigma, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"

@@ -24,7 +24,8 @@ fn arrows() -> Arrows {
         let text = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
         let manifest: toml::Table = text.parse().unwrap();
         let name = folder.file_name().unwrap().to_str().unwrap().to_owned();
-        let uses = manifest["dependencies"].as_table().unwrap().keys();
+        let uses = manifest.get("dependencies").and_then(toml::Value::as_table);
+        let uses = uses.into_iter().flat_map(toml::Table::keys);
         let ours = uses.filter(|used| used.starts_with("deepfusion")).cloned();
         arrows.insert(name, ours.collect());
     }

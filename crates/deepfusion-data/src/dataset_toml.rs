@@ -22,6 +22,12 @@ pub(crate) struct FolderConfig {
     pub(crate) cache: Option<PathBuf>,
     /// The table of speeds.
     pub(crate) speed: Option<PathBuf>,
+    /// The column of times of another program's table, by its header.
+    pub(crate) time_column: Option<String>,
+    /// The column of speeds of another program's table; the signal of a CAN trace.
+    pub(crate) speed_column: Option<String>,
+    /// What the frames of a CAN trace hold.
+    pub(crate) dbc: Option<PathBuf>,
     /// Longest time between two speeds that is bridged, in seconds.
     pub(crate) max_gap_s: Option<f64>,
     /// The table of the IMU.
@@ -223,6 +229,11 @@ impl FolderConfig {
             path: self.path.clone(),
             problem,
         }
+    }
+
+    /// The folder that it lies in.
+    pub(crate) fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new("."))
     }
 
     /// A file that is named here, or is there under a usual name. A named one must be there.

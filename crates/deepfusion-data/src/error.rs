@@ -138,18 +138,9 @@ pub enum Error {
         /// What is wrong with the value.
         problem: String,
     },
-    /// A log of a vehicle's or receiver's cannot be used.
-    #[error("{}:{line}: {field}: {problem}", path.display())]
-    Log {
-        /// The file.
-        path: PathBuf,
-        /// The line, counted from 1.
-        line: u64,
-        /// The element or sentence.
-        field: String,
-        /// What is wrong with it.
-        problem: String,
-    },
+    /// A log of a vehicle's, a receiver's or an app's cannot be used.
+    #[error(transparent)]
+    Log(#[from] deepfusion_logs::Error),
     /// A table lacks a column, or nothing says its unit.
     #[error("{}: {problem}", path.display())]
     Columns {
@@ -507,6 +498,7 @@ impl Hint for Error {
             Self::NoTimes { .. } => "give the frames times: timestamps.txt, or fps in dataset.toml",
             Self::Bag(error) => return error.hint(),
             Self::Video(error) => return error.hint(),
+            Self::Log(error) => return error.hint(),
             Self::Motion { source, .. } => return source.hint(),
             Self::OneCamera { .. } => "ask for camera 2",
             Self::NoCameraFile {
@@ -541,7 +533,6 @@ impl Hint for Error {
             | Self::NoFrames { remedy, .. } => remedy,
             Self::Config { .. } => "docs/reference/ lists every key of dataset.toml and bag.toml",
             Self::Table { .. } => "correct the row or delete it",
-            Self::Log { .. } => "correct the line or delete it, or export the track anew",
             Self::Clocks { .. } => {
                 "both must count from the same moment; start_s in dataset.toml is the first frame's time on the speeds' clock"
             }

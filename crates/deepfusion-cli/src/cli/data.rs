@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use deepfusion_data::{Cameras, GtKind};
+use deepfusion_logs::SpeedUnit;
 use deepfusion_rosbag::Compression;
 
 use super::values::milliseconds;
@@ -16,6 +17,8 @@ pub enum DataCommand {
     ExportGt(ExportGtArgs),
     /// Write a recording in another layout: a KITTI drive, or a ROS 1 bag.
     Convert(ConvertArgs),
+    /// Put a log of speeds beside its video: GPS tracks, OBD apps, phones, GoPro, CAN traces, any table.
+    Import(ImportArgs),
 }
 
 /// `deepfusion data inspect`.
@@ -74,6 +77,73 @@ pub struct ConvertArgs {
     /// Print what was written as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// `deepfusion data import`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Writes speed.csv, imu.csv where the log has turns, and dataset.toml; the video stays where it is. A speed without a unit \
+    is an error, never a guess.\n\n\
+    Examples:\n  deepfusion data import track.gpx --video drive.mp4 --out my-drive\n  \
+    deepfusion data import GX010042.MP4 --out my-drive   # a GoPro's own GPS and gyroscope\n  \
+    deepfusion data import trackLog.csv --zone +02:00 --video drive.mp4 --out my-drive   # Torque\n  \
+    deepfusion data import table.csv --time Zeit --speed Tempo --unit km/h --start 12:00:03 --video drive.mp4 --out my-drive\n  \
+    deepfusion data import can.asc --dbc car.dbc --speed Wheels.Speed --start 1.5 --video drive.mp4 --out my-drive"
+)]
+pub struct ImportArgs {
+    /// The log: a file, or a phone app's export folder. Of several the first that has speeds gives them, the first that has turns the turns.
+    #[arg(required = true, value_name = "LOG")]
+    pub logs: Vec<PathBuf>,
+    /// The video [default: the log itself where it is a GoPro's].
+    #[arg(long, value_name = "FILE", conflicts_with = "images")]
+    pub video: Option<PathBuf>,
+    /// The folder of images, in place of a video.
+    #[arg(long, value_name = "DIR")]
+    pub images: Option<PathBuf>,
+    /// A new folder, or one without speed.csv, imu.csv and dataset.toml.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// The column of times [default: by its name].
+    #[arg(long, value_name = "COLUMN")]
+    pub time: Option<String>,
+    /// The column of speeds, or the signal of a CAN trace [default: by its name].
+    #[arg(long, value_name = "COLUMN")]
+    pub speed: Option<String>,
+    /// The unit of speeds that do not say it: m/s, km/h, mph, knots.
+    #[arg(long, value_name = "UNIT")]
+    pub unit: Option<SpeedUnit>,
+    /// What the frames of a CAN trace hold.
+    #[arg(long, value_name = "FILE")]
+    pub dbc: Option<PathBuf>,
+    /// When the first frame was taken, on the log's clock: seconds, a date or a time of day [default: as the video's recorder says].
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    pub start: Option<String>,
+    /// How far dates without a zone are ahead of UTC, such as +02:00 [default: not at all].
+    #[arg(long, value_name = "HH:MM", value_parser = zone, allow_hyphen_values = true)]
+    pub zone: Option<i64>,
+    /// The camera's calibration file.
+    #[arg(long, value_name = "FILE", conflicts_with = "intrinsics")]
+    pub calibration: Option<PathBuf>,
+    /// The camera in pixels of its images.
+    #[arg(long, value_name = "fx,fy,cx,cy")]
+    pub intrinsics: Option<CameraIntrinsics>,
+    /// Print what was understood as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// "+02:00", "-5" as seconds.
+fn zone(word: &str) -> Result<i64, String> {
+    let (sign, digits) = match word.strip_prefix('-') {
+        Some(rest) => (-1, rest),
+        None => (1, word.strip_prefix('+').unwrap_or(word)),
+    };
+    let (hours, minutes) = digits.split_once(':').unwrap_or((digits, "0"));
+    let numbers = (hours.parse::<i64>(), minutes.parse::<i64>());
+    match numbers {
+        (Ok(hours @ 0..=14), Ok(minutes @ 0..60)) => Ok(sign * (hours * 3600 + minutes * 60)),
+        _ => Err("expected a zone such as +02:00 or -5".into()),
+    }
 }
 
 /// `deepfusion data export-gt`.

@@ -32,7 +32,7 @@ pub use ablate::AblateArgs;
 pub use compare::{CompareArgs, TableFormat};
 pub use completions::{CompletionsArgs, CompletionsKind};
 pub use config::{ConfigCommand, ShowArgs};
-pub use data::{ConvertArgs, DataCommand, ExportGtArgs, InspectArgs};
+pub use data::{ConvertArgs, DataCommand, ExportGtArgs, ImportArgs, InspectArgs};
 pub use doctor::DoctorArgs;
 pub use engine::{Engine, EngineArgs};
 pub use eval::{EvalArgs, PredKind};

@@ -18,6 +18,7 @@ mod eval_targets;
 #[cfg(feature = "train")]
 mod export;
 mod export_gt;
+mod import;
 mod inspect;
 mod live;
 #[cfg(feature = "train")]
@@ -57,6 +58,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Data(DataCommand::Inspect(args)) => inspect::run(&args),
         Command::Data(DataCommand::ExportGt(args)) => export_gt::run(&args),
         Command::Data(DataCommand::Convert(args)) => convert::run(&args),
+        Command::Data(DataCommand::Import(args)) => import::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         #[cfg(feature = "train")]
         Command::Train(args) => train::run(&args),

@@ -32,6 +32,28 @@ as_the_library_says!(
     deepfusion_sim::Error,
 );
 
+impl Reportable for deepfusion_logs::Error {
+    fn remedy(&self) -> Option<String> {
+        use deepfusion_logs::ColumnProblem as Problem;
+        Some(match self {
+            Self::Column { problem, .. } => match problem {
+                Problem::NoSpeedUnit(_) => {
+                    "say it: --unit km/h (or m/s, mph, knots; speed_unit in dataset.toml); a wrong one would scale every depth".into()
+                }
+                _ => return self.hint().map(|hint| {
+                    format!("{hint}: --time COLUMN --speed COLUMN (time_column, speed_column in dataset.toml)")
+                }),
+            },
+            Self::Signal { .. } => "give --dbc FILE and --speed Message.Signal".into(),
+            Self::NoStart { .. } => {
+                "say when the first frame was taken on the log's clock: --start 12:00:03, or in seconds".into()
+            }
+            Self::Exists { .. } => "choose another --out, or take the file away".into(),
+            _ => return self.hint(),
+        })
+    }
+}
+
 impl Reportable for deepfusion_video::Error {
     fn remedy(&self) -> Option<String> {
         match self {
@@ -69,6 +91,7 @@ impl Reportable for deepfusion_data::Error {
             Self::OneCamera { .. } => Some("leave --camera out, or give 2".into()),
             Self::DepthKind { .. } => Some("leave --gt-depth out, or give z".into()),
             Self::Video(error) => error.remedy(),
+            Self::Log(error) => error.remedy(),
             _ => hint,
         }
     }

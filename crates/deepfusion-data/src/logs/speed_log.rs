@@ -1,13 +1,13 @@
 //! `speed.csv`, and the turns from it or from `imu.csv`: a yaw rate, or a whole inertial unit.
 
 use super::clock::seconds;
-use super::gps_log::{self, GpsLog};
 use super::samples::Samples;
 use super::table::{Column, Table};
-use super::times::times;
+use super::times::{TIMES, times};
 use super::vehicle_log::{VehicleLog, imu_readings};
 use crate::dataset_toml::FolderConfig;
 use crate::{Error, MotionModel, Result, Stream, VehicleTrack};
+use deepfusion_logs::{Clock, DriveLog, ReadOptions, is_gps_track};
 use deepfusion_motion::ImuMount;
 use std::path::{Path, PathBuf};
 
@@ -39,31 +39,34 @@ impl SpeedLog {
     /// `None` without speeds.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] where a named table is absent, [`crate::Error::Log`] for a track that cannot be read, [`crate::Error::Columns`] where a column is
+    /// [`crate::Error::Config`] where a named table is absent, [`crate::Error::Log`] for another program's log that cannot be read, [`crate::Error::Columns`] where a column is
     /// missing or its unit is not said, [`crate::Error::Table`] for a bad value or a time that goes back.
     pub(crate) fn read(folder: &Path, config: &FolderConfig) -> Result<Option<Self>> {
         let speed = config.find(folder, "speed", config.speed.as_ref(), &["speed.csv"])?;
         let imu = config.find(folder, "imu", config.imu.as_ref(), &["imu.csv"])?;
         let speed = match speed {
-            None => gps_log::in_folder(folder, config)?,
+            None => only_track(folder, config)?,
             named => named,
         };
         let Some(path) = speed else {
             return Ok(None);
         };
         let mut remarks = Vec::new();
-        let (measured, table) = if gps_log::is_gps(&path) {
-            (of_track(&path, config, &mut remarks)?, None)
-        } else {
-            let table = Table::read(&path)?;
-            let ns = times(&table, config, &mut remarks, &name(&path))?;
-            let column = table.require(&SPEEDS, "time_s,speed_mps")?;
-            let factor = speed_factor(&table, column, config)? * config.speed_scale();
-            let values = scaled(table.numbers(column)?, factor);
-            (Samples { ns, values }, Some(table))
+        let (mut yaw_rates_radps, mut vehicle) = (None, None);
+        let (measured, table) = match own_or_foreign(&path, config)? {
+            Either::Own(table) => {
+                let ns = times(&table, config, &mut remarks, &name(&path))?;
+                let column = table.require(&SPEEDS, "time_s,speed_mps")?;
+                let factor = speed_factor(&table, column, config)? * config.speed_scale();
+                let values = scaled(table.numbers(column)?, factor);
+                (Samples { ns, values }, Some(table))
+            }
+            Either::Foreign(log) => {
+                yaw_rates_radps = turns(&log);
+                (speeds(&path, &log, config, &mut remarks), None)
+            }
         };
         let mut streams = vec![stream(&path, "speed", &measured.ns)];
-        let (mut yaw_rates_radps, mut vehicle) = (None, None);
         let mut yaw_table = None;
         if let Some(table) = &table
             && let Some(column) = table.column(&YAW_RATES)
@@ -93,6 +96,8 @@ impl SpeedLog {
                 let values = scaled(table.numbers(column)?, factor);
                 yaw_rates_radps = Some(Samples { ns, values });
             }
+        } else if let Some(turns) = &yaw_rates_radps {
+            streams.push(stream(&path, "imu", &turns.ns));
         } else {
             remarks.push(format!(
                 "{}: no yaw rate, here or in imu.csv: how the car turned is unknown, which \
@@ -149,31 +154,89 @@ impl SpeedLog {
     }
 }
 
-/// The speeds of a receiver's track.
-fn of_track(path: &Path, config: &FolderConfig, remarks: &mut Vec<String>) -> Result<Samples> {
-    let log = GpsLog::read(path)?;
-    let (name, scale) = (name(path), config.speed_scale());
-    if log.speeds.len() < log.fixes {
-        let lost = log.fixes - log.speeds.len();
+/// A table of this program's kind, or what another program wrote.
+enum Either {
+    Own(Table),
+    Foreign(DriveLog),
+}
+
+/// Reads a table whose columns have the names that are asked for here; anything else as `deepfusion-logs` does. Where that cannot make
+/// anything of a table either, the error is this program's own, which says what a table of its kind looks like.
+fn own_or_foreign(path: &Path, config: &FolderConfig) -> Result<Either> {
+    let options = ReadOptions {
+        time: config.time_column.clone(),
+        speed: config.speed_column.clone(),
+        unit: config
+            .speed_unit
+            .as_deref()
+            .and_then(|unit| unit.parse().ok()),
+        dbc: config.dbc.as_ref().map(|file| config.folder().join(file)),
+    };
+    let foreign = || deepfusion_logs::read(path, &options).map(Either::Foreign);
+    let is_table = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("csv"));
+    let said = options.time.is_some() || options.speed.is_some() || options.dbc.is_some();
+    if said || path.is_dir() || !is_table {
+        return Ok(foreign()?);
+    }
+    let own = Table::read(path).and_then(|table| {
+        table.require(&TIMES, "time_s,speed_mps")?;
+        table.require(&SPEEDS, "time_s,speed_mps")?;
+        Ok(table)
+    });
+    own.map(Either::Own)
+        .or_else(|error| foreign().map_err(|_| error))
+}
+
+/// The only GPS track of a folder.
+///
+/// # Errors
+/// [`Error::Config`] where there are several, [`Error::File`].
+fn only_track(folder: &Path, config: &FolderConfig) -> Result<Option<PathBuf>> {
+    let mut tracks = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
+        let path = entry.map_err(|e| Error::file(folder, e))?.path();
+        if path.is_file() && is_gps_track(&path) {
+            tracks.push(path);
+        }
+    }
+    match tracks.len() {
+        0 | 1 => Ok(tracks.pop()),
+        n => Err(config.error(format!(
+            "{n} tracks are there (.gpx, .nmea): name one, speed = \"…\""
+        ))),
+    }
+}
+
+/// The speeds of another program's log; how it was understood is added to the remarks.
+fn speeds(
+    path: &Path,
+    log: &DriveLog,
+    config: &FolderConfig,
+    remarks: &mut Vec<String>,
+) -> Samples {
+    let name = name(path);
+    remarks.extend(log.notes.iter().map(|note| format!("{name}: {note}")));
+    if log.clock == Clock::LocalDate {
         remarks.push(format!(
-            "{name}: {lost} of {} fixes stand alone or go back in time and are left out",
-            log.fixes
+            "{name}: its dates have no zone and are taken for UTC (start_s in dataset.toml moves the frames)"
         ));
     }
-    let mut sigmas: Vec<f64> = log.speeds.iter().map(|s| s.sigma_mps).collect();
-    sigmas.sort_by(f64::total_cmp);
-    let from = if log.measured {
-        "as the receiver measured them"
-    } else {
-        "from its positions, smoothed"
-    };
-    remarks.push(format!(
-        "{name}: speeds {from}, sure to {:.2} m/s in the middle",
-        sigmas[sigmas.len() / 2]
-    ));
-    Ok(Samples {
-        ns: log.ns,
-        values: scaled(log.speeds.iter().map(|s| s.speed_mps).collect(), scale),
+    Samples {
+        ns: log.speeds.iter().map(|s| s.ns).collect(),
+        values: scaled(
+            log.speeds.iter().map(|s| s.mps).collect(),
+            config.speed_scale(),
+        ),
+    }
+}
+
+/// The turns of another program's log, where it has some.
+fn turns(log: &DriveLog) -> Option<Samples> {
+    (!log.yaw_rates.is_empty()).then(|| Samples {
+        ns: log.yaw_rates.iter().map(|y| y.ns).collect(),
+        values: log.yaw_rates.iter().map(|y| y.radps).collect(),
     })
 }
 

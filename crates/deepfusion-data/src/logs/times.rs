@@ -5,7 +5,7 @@ use super::table::{Table, describe};
 use crate::Result;
 use crate::dataset_toml::FolderConfig;
 
-const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timestamps"];
+pub(super) const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timestamps"];
 
 /// The table's times in nanoseconds, which must rise; equal ones are told once.
 pub(crate) fn times(

@@ -1,0 +1,104 @@
+use deepfusion_logs::{
+    Camera, Clock, DriveFolder, DriveLog, Media, ReadOptions, read, time_on_clock,
+};
+
+use crate::cli::{CameraIntrinsics, ImportArgs};
+use crate::error::CliError;
+use crate::failure::Result;
+use crate::output;
+use crate::progress::say;
+
+/// `deepfusion data import`.
+pub fn run(args: &ImportArgs) -> Result<()> {
+    let log = merged(args)?;
+    let start_ns = match &args.start {
+        None => None,
+        Some(word) => {
+            let first = log.speeds.first().map_or(0, |s| s.ns);
+            let ns = time_on_clock(word, log.clock, first);
+            Some(ns.ok_or_else(|| CliError::NotOnClock { word: word.clone() })?)
+        }
+    };
+    let folder = DriveFolder {
+        log: &log,
+        media: media(args, log.clock)?,
+        camera: match (&args.calibration, args.intrinsics) {
+            (Some(file), _) => Some(Camera::File(file.clone())),
+            (None, Some(numbers)) => Some(Camera::Intrinsics(CameraIntrinsics::numbers(numbers))),
+            (None, None) => None,
+        },
+        start_ns,
+    };
+    let notes = folder.write(&args.out)?;
+    let (first, last) = (log.speeds.first(), log.speeds.last());
+    let duration_s = first
+        .zip(last)
+        .map_or(0.0, |(a, b)| (b.ns - a.ns) as f64 * 1e-9);
+    let fastest_mps = log.speeds.iter().map(|s| s.mps).fold(0.0, f64::max);
+    if args.json {
+        return output::print_json(&serde_json::json!({
+            "format": log.format.to_string(),
+            "speeds": log.speeds.len(),
+            "yaw_rates": log.yaw_rates.len(),
+            "duration_s": duration_s,
+            "fastest_mps": fastest_mps,
+            "notes": log.notes.iter().chain(&notes).collect::<Vec<_>>(),
+            "written": args.out,
+        }));
+    }
+    say(&format!(
+        "{}: {} speeds in {duration_s:.1} s, at most {fastest_mps:.1} m/s ({:.0} km/h); {}",
+        log.format,
+        log.speeds.len(),
+        fastest_mps * 3.6,
+        match log.yaw_rates.len() {
+            0 => "no turns".to_owned(),
+            n => format!("{n} yaw rates"),
+        }
+    ));
+    for note in log.notes.iter().chain(&notes) {
+        say(&format!("note: {note}"));
+    }
+    output::print(&format!("{}\n", args.out.display()))?;
+    say(&format!(
+        "look at it: deepfusion data inspect {}",
+        args.out.display()
+    ));
+    Ok(())
+}
+
+/// The speeds of the first log that has some, with the turns of the first that has some.
+fn merged(args: &ImportArgs) -> Result<DriveLog> {
+    let options = ReadOptions {
+        time: args.time.clone(),
+        speed: args.speed.clone(),
+        unit: args.unit,
+        dbc: args.dbc.clone(),
+    };
+    let mut merged: Option<DriveLog> = None;
+    for path in &args.logs {
+        let log = read(path, &options)?.in_zone(args.zone.unwrap_or(0));
+        match &mut merged {
+            None => merged = Some(log),
+            Some(first) if first.yaw_rates.is_empty() && !log.yaw_rates.is_empty() => {
+                if first.clock != log.clock {
+                    return Err(CliError::OtherClock { path: path.clone() }.into());
+                }
+                first.yaw_rates = log.yaw_rates;
+                first.notes.extend(log.notes);
+            }
+            Some(_) => {}
+        }
+    }
+    // clap asks for one log at least.
+    merged.ok_or_else(|| CliError::NoMedia.into())
+}
+
+fn media(args: &ImportArgs, clock: Clock) -> Result<Media> {
+    match (&args.video, &args.images) {
+        (Some(video), _) => Ok(Media::Video(video.clone())),
+        (None, Some(images)) => Ok(Media::Images(images.clone())),
+        (None, None) if clock == Clock::Video => Ok(Media::Video(args.logs[0].clone())),
+        (None, None) => Err(CliError::NoMedia.into()),
+    }
+}

@@ -1,0 +1,296 @@
+//! CAN frames as text: `candump -l` and `candump -L`, Vector's ASC. A DBC file says what is in them.
+
+use crate::error::{BadLine, Error, Result};
+use crate::log::{Clock, DriveLog, Format, Speed};
+use crate::read::{ReadOptions, enough, text_of};
+use crate::units::SpeedUnit;
+use deepfusion_motion::can::{CanId, Dbc};
+use std::path::Path;
+
+/// A frame of a trace.
+struct Frame {
+    ns: i64,
+    id: CanId,
+    data: Vec<u8>,
+}
+
+/// Whether a line is one of candump's log: `(1436509052.249713) can0 1A2#DEADBEEF`.
+pub(crate) fn is_candump(line: &str) -> bool {
+    candump(line).is_some_and(|frame| frame.is_ok())
+}
+
+/// The signal over the trace.
+pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
+    let missing = |problem: &str| Error::Signal {
+        path: path.to_owned(),
+        problem: problem.to_owned(),
+    };
+    let dbc = options
+        .dbc
+        .as_deref()
+        .ok_or_else(|| missing("nothing says what its frames hold: a DBC file does"))?;
+    let dbc = Dbc::open(dbc)?;
+    let name = options.speed.as_deref().ok_or_else(|| {
+        let names: Vec<String> = dbc
+            .names()
+            .filter(|n| n.to_lowercase().contains("speed"))
+            .take(12)
+            .collect();
+        missing(&match names.is_empty() {
+            true => "nothing says which signal is the speed".to_owned(),
+            false => format!(
+                "nothing says which signal is the speed; by their names: {}",
+                names.join(", ")
+            ),
+        })
+    })?;
+    let signal = dbc.signal(name)?;
+    let written = dbc.unit(name).unwrap_or("");
+    let unit = written
+        .parse::<SpeedUnit>()
+        .ok()
+        .or(options.unit)
+        .ok_or_else(|| {
+            missing(&format!(
+                "the DBC file's unit of {name}, '{written}', is not one of speed"
+            ))
+        })?;
+    let (frames, clock) = frames(path, &text_of(path)?)?;
+    let (mut speeds, mut of_signal, mut repeated) = (Vec::<Speed>::new(), 0, 0);
+    for frame in frames.iter().filter(|f| f.id == signal.id) {
+        let Some(value) = signal.decode(&frame.data) else {
+            continue;
+        };
+        of_signal += 1;
+        if speeds.last().is_some_and(|last| frame.ns <= last.ns) {
+            repeated += 1;
+            continue;
+        }
+        speeds.push(Speed {
+            ns: frame.ns,
+            mps: value * unit.mps(),
+            sigma_mps: None,
+        });
+    }
+    if of_signal == 0 {
+        return Err(Error::NoSpeed {
+            path: path.to_owned(),
+            problem: format!("none of its {} frames carries {name}", frames.len()),
+        });
+    }
+    enough(path, &speeds)?;
+    let mut notes = vec![format!(
+        "speed from the signal {name} in {unit}: {} of {} frames",
+        speeds.len(),
+        frames.len()
+    )];
+    if repeated > 0 {
+        notes.push(format!(
+            "{repeated} frames are not later than the one before and are left out"
+        ));
+    }
+    Ok(DriveLog {
+        format: Format::CanTrace,
+        clock,
+        speeds,
+        yaw_rates: Vec::new(),
+        notes,
+    })
+}
+
+fn frames(path: &Path, text: &str) -> Result<(Vec<Frame>, Clock)> {
+    let is_asc = text.lines().take(200).any(|l| {
+        let l = l.trim().to_ascii_lowercase();
+        l.starts_with("base hex")
+            || l.starts_with("base dec")
+            || l.starts_with("begin triggerblock")
+    });
+    let mut frames = Vec::new();
+    let mut decimal = false;
+    for (index, line) in text.lines().enumerate() {
+        let parsed = match is_asc {
+            true => {
+                decimal |= line.trim().to_ascii_lowercase().starts_with("base dec");
+                asc(line, decimal)
+            }
+            false => candump(line),
+        };
+        match parsed {
+            None => {}
+            Some(Ok(frame)) => frames.push(frame),
+            Some(Err(problem)) => {
+                return Err(BadLine::new(index as u64 + 1, "frame", problem).of(path));
+            }
+        }
+    }
+    let is_date = frames
+        .first()
+        .is_some_and(|f| f.ns > 946_000_000_000_000_000);
+    Ok((frames, if is_date { Clock::Date } else { Clock::Free }))
+}
+
+/// `None` for a line without a frame, such as an empty one, or a frame without data.
+fn candump(line: &str) -> Option<std::result::Result<Frame, String>> {
+    let rest = line.trim().strip_prefix('(')?;
+    let (time, rest) = rest.split_once(')')?;
+    let mut words = rest.split_whitespace();
+    let (_, frame) = (words.next()?, words.next()?);
+    let (id, data) = frame.split_once('#')?;
+    // A remote request carries nothing; `##` and a digit of flags is CAN FD.
+    let data = match data.strip_prefix('#') {
+        Some(fd) => fd.get(1..)?,
+        None if data.starts_with(['R', 'r']) => return None,
+        None => data,
+    };
+    let parsed = || {
+        let ns = seconds(time)?;
+        let number =
+            u32::from_str_radix(id, 16).map_err(|_| format!("'{id}' is not an identifier"))?;
+        // The tool writes 3 digits of a standard identifier, 8 of an extended one; the top bit marks errors.
+        let id = can_id(number, id.len() > 3)?;
+        Ok(Frame {
+            ns,
+            id,
+            data: hex(data)?,
+        })
+    };
+    Some(parsed())
+}
+
+/// `   0.012345 1  1A2x  Rx   d 8 00 01 …`: time, channel, identifier (x: extended), direction, `d`, length, data; CAN FD has other words.
+fn asc(line: &str, decimal: bool) -> Option<std::result::Result<Frame, String>> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let time = *words.first()?;
+    if !time.starts_with(|c: char| c.is_ascii_digit()) {
+        return None;
+    }
+    let radix = if decimal { 10 } else { 16 };
+    let (id, length, data) = if words.get(1) == Some(&"CANFD") {
+        // CANFD channel direction identifier [name] brs esi dlc length data…
+        let named = words.get(5)?.parse::<u8>().is_err() || words.get(5)?.len() > 1;
+        let shift = usize::from(named);
+        (
+            *words.get(4)?,
+            words.get(8 + shift)?.parse::<usize>().ok()?,
+            words.get(9 + shift..)?,
+        )
+    } else {
+        if !matches!(words.get(3), Some(&("Rx" | "Tx"))) || words.get(4) != Some(&"d") {
+            return None;
+        }
+        let length = usize::from_str_radix(words.get(5)?, radix).ok()?;
+        (*words.get(2)?, length, words.get(6..)?)
+    };
+    let parsed = || {
+        let (digits, extended) = match id.strip_suffix(['x', 'X']) {
+            Some(digits) => (digits, true),
+            None => (id, false),
+        };
+        let number = u32::from_str_radix(digits, radix)
+            .map_err(|_| format!("'{id}' is not an identifier"))?;
+        let bytes = data
+            .get(..length)
+            .ok_or_else(|| format!("{} bytes, its length says {length}", data.len()))?;
+        let byte = |word: &&str| {
+            u8::from_str_radix(word, radix).map_err(|_| format!("'{word}' is not a byte"))
+        };
+        Ok(Frame {
+            ns: seconds(time)?,
+            id: can_id(number, extended)?,
+            data: bytes
+                .iter()
+                .map(byte)
+                .collect::<std::result::Result<_, _>>()?,
+        })
+    };
+    Some(parsed())
+}
+
+fn can_id(number: u32, extended: bool) -> std::result::Result<CanId, String> {
+    match (extended, u16::try_from(number)) {
+        (true, _) => Ok(CanId::Extended {
+            extended: number & 0x1fff_ffff,
+        }),
+        (false, Ok(standard)) if standard < 0x800 => Ok(CanId::Standard(standard)),
+        _ => Err(format!("identifier {number:X} has more than 11 bits")),
+    }
+}
+
+fn seconds(word: &str) -> std::result::Result<i64, String> {
+    let style = crate::dates::TimeStyle::Number(1_000_000_000);
+    crate::dates::nanoseconds(word, style, None)
+        .ok_or_else(|| format!("'{word}' is not a time in seconds"))
+}
+
+fn hex(digits: &str) -> std::result::Result<Vec<u8>, String> {
+    let bad = || format!("'{digits}' are not bytes");
+    if !digits.is_ascii() || !digits.len().is_multiple_of(2) {
+        return Err(bad());
+    }
+    let byte = |at: usize| u8::from_str_radix(&digits[at..at + 2], 16).map_err(|_| bad());
+    (0..digits.len()).step_by(2).map(byte).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn frames_of_both_kinds() {
+        let frame = candump("(1436509052.249713) vcan0 123#0102FF")
+            .unwrap()
+            .unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(
+            (frame.ns, frame.id, frame.data),
+            (
+                1_436_509_052_249_713_000,
+                CanId::Standard(0x123),
+                vec![1, 2, 255]
+            )
+        );
+        let frame = candump("(0.5) can0 18FEF100#AA")
+            .unwrap()
+            .unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(
+            frame.id,
+            CanId::Extended {
+                extended: 0x18FE_F100
+            }
+        );
+        let frame = candump("(0.5) can0 123##1AABB")
+            .unwrap()
+            .unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(frame.data, [0xaa, 0xbb]);
+        assert!(candump("(0.5) can0 123#R").is_none());
+        assert!(candump("(0.5) can0 123#A").unwrap().is_err());
+        let frame = asc(
+            "   0.500000 1  18FEF100x       Rx   d 2 01 FF  Length = 0",
+            false,
+        )
+        .unwrap();
+        let frame = frame.unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(
+            (frame.ns, frame.id, frame.data),
+            (
+                500_000_000,
+                CanId::Extended {
+                    extended: 0x18FE_F100
+                },
+                vec![1, 255]
+            )
+        );
+        assert!(asc("   0.5 1  123 Rx d 8 01 02", false).unwrap().is_err());
+        assert!(asc("// a comment", false).is_none());
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_never_panics(text in ".{0,60}") {
+            let _ = candump(&text);
+            let _ = candump(&format!("(0.1) can0 {text}"));
+            let _ = asc(&text, false);
+            let _ = asc(&format!("0.1 CANFD {text}"), true);
+        }
+    }
+}

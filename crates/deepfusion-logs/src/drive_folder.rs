@@ -1,0 +1,232 @@
+//! A log beside its video or images, as a folder that every command reads: `speed.csv`, `imu.csv`, `dataset.toml`.
+
+use crate::error::{Error, Result};
+use crate::log::{Clock, DriveLog};
+use deepfusion_fs::write_atomically;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// What a drive's folder is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveFolder<'a> {
+    /// Its speeds, and its turns where it has some.
+    pub log: &'a DriveLog,
+    /// What saw it.
+    pub media: Media,
+    /// The camera's calibration file, or its numbers.
+    pub camera: Option<Camera>,
+    /// The moment of the first frame on the log's clock, in nanoseconds; without it the video's recorder or the frames' own times say it.
+    pub start_ns: Option<i64>,
+}
+
+/// What saw a drive; the folder names it by its whole path, nothing is copied.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Media {
+    /// A video.
+    Video(PathBuf),
+    /// A folder of images.
+    Images(PathBuf),
+}
+
+/// What says how the camera sees.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Camera {
+    /// A calibration file.
+    File(PathBuf),
+    /// fx, fy, cx, cy in pixels.
+    Intrinsics([f64; 4]),
+}
+
+/// Longest time from a log's beginning to its zero for which its zero is the first frame's.
+const NEAR_START_NS: i64 = 5_000_000_000;
+
+impl DriveFolder<'_> {
+    /// Writes the folder, which is made where it is not there; the files in it, `dataset.toml` the last. Gives notes on what was taken for
+    /// granted.
+    ///
+    /// # Errors
+    /// [`Error::NoStart`] where nothing connects the log's clock with the video's; [`Error::Exists`] for a folder with files of these
+    /// names; [`Error::File`].
+    pub fn write(&self, out: &Path) -> Result<Vec<String>> {
+        let (start_ns, notes) = self.start()?;
+        let files = ["speed.csv", "imu.csv", "dataset.toml"].map(|name| out.join(name));
+        if let Some(path) = files.iter().find(|p| p.exists()) {
+            return Err(Error::Exists { path: path.clone() });
+        }
+        std::fs::create_dir_all(out).map_err(|e| Error::file(out, e))?;
+        let [speed, imu, config] = &files;
+        let mut text = String::from("time_s,speed_mps\n");
+        for reading in &self.log.speeds {
+            let _ = writeln!(text, "{},{:.6}", seconds(reading.ns), reading.mps);
+        }
+        save(speed, &text)?;
+        if !self.log.yaw_rates.is_empty() {
+            let mut text = String::from("time_s,yaw_rate_radps\n");
+            for reading in &self.log.yaw_rates {
+                let _ = writeln!(text, "{},{:.7}", seconds(reading.ns), reading.radps);
+            }
+            save(imu, &text)?;
+        }
+        save(config, &self.config(out, start_ns)?)?;
+        Ok(notes)
+    }
+
+    /// When the first frame was taken, where the log's clock or the user says it.
+    fn start(&self) -> Result<(Option<i64>, Vec<String>)> {
+        if self.start_ns.is_some() {
+            return Ok((self.start_ns, Vec::new()));
+        }
+        let first = self.log.speeds.first().map_or(0, |s| s.ns);
+        match (self.log.clock, &self.media) {
+            (Clock::Video, _) | (Clock::Date, _) | (_, Media::Images(_)) => Ok((None, Vec::new())),
+            (Clock::LocalDate, Media::Video(_)) => Ok((
+                None,
+                vec![
+                    "the log's dates have no zone and are taken for UTC, as the video's are".into(),
+                ],
+            )),
+            (Clock::Free, Media::Video(_)) if (0..NEAR_START_NS).contains(&first) => Ok((
+                None,
+                vec![
+                    "the log counts from its own start, which is taken for the video's first frame"
+                        .into(),
+                ],
+            )),
+            (Clock::Free | Clock::TimeOfDay, Media::Video(_)) => {
+                Err(Error::NoStart { first_ns: first })
+            }
+        }
+    }
+
+    fn config(&self, out: &Path, start_ns: Option<i64>) -> Result<String> {
+        let whole = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
+        let mut text =
+            String::from("# Written from a log; every key is in docs/reference/dataset-toml.md.\n");
+        match &self.media {
+            Media::Video(video) => {
+                let _ = writeln!(text, "video = {}", quoted(&whole(video)?));
+                // The frames that are decoded from it belong to this folder, not beside somebody's video.
+                let _ = writeln!(text, "cache = {}", quoted(&whole(out)?));
+            }
+            Media::Images(images) => {
+                let _ = writeln!(text, "images = {}", quoted(&whole(images)?));
+            }
+        }
+        match &self.camera {
+            Some(Camera::File(file)) => {
+                let _ = writeln!(text, "calibration = {}", quoted(&whole(file)?));
+            }
+            Some(Camera::Intrinsics(numbers)) => {
+                let _ = writeln!(text, "intrinsics = {numbers:?}");
+            }
+            None => {}
+        }
+        if let Some(ns) = start_ns {
+            let _ = writeln!(text, "start_s = {}", seconds(ns));
+        }
+        Ok(text)
+    }
+}
+
+/// A TOML string.
+fn quoted(path: &Path) -> String {
+    let mut text = String::from("\"");
+    for character in path.to_string_lossy().chars() {
+        match character {
+            '"' | '\\' => text.extend(['\\', character]),
+            c if c.is_control() => {
+                let _ = write!(text, "\\u{:04X}", u32::from(c));
+            }
+            c => text.push(c),
+        }
+    }
+    text + "\""
+}
+
+/// Nanoseconds as seconds, to the last digit.
+fn seconds(ns: i64) -> String {
+    let (sign, ns) = (if ns < 0 { "-" } else { "" }, ns.unsigned_abs());
+    format!("{sign}{}.{:09}", ns / 1_000_000_000, ns % 1_000_000_000)
+}
+
+fn save(path: &Path, text: &str) -> Result<()> {
+    let failed = |source| Error::file(path, source);
+    write_atomically(path, failed, |file| {
+        file.write_all(text.as_bytes()).map_err(failed)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Format, Speed};
+
+    fn log(clock: Clock, first_ns: i64) -> DriveLog {
+        let speed = |i: i64| Speed {
+            ns: first_ns + i * 500_000_000,
+            mps: 8.0,
+            sigma_mps: None,
+        };
+        DriveLog {
+            format: Format::Table,
+            clock,
+            speeds: (0..4).map(speed).collect(),
+            yaw_rates: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    fn folder(log: &DriveLog, start_ns: Option<i64>) -> DriveFolder<'_> {
+        DriveFolder {
+            log,
+            media: Media::Video("a \"b\".mp4".into()),
+            camera: Some(Camera::Intrinsics([500.0, 500.0, 320.0, 240.0])),
+            start_ns,
+        }
+    }
+
+    #[test]
+    fn a_clock_that_nothing_connects_with_the_video_is_refused() {
+        let out = tempfile::tempdir().unwrap();
+        for (clock, first_ns, fine) in [
+            (Clock::Free, 200_000_000, true),
+            (Clock::Free, 43_200_000_000_000, false),
+            (Clock::TimeOfDay, 1_000_000_000, false),
+            (Clock::Date, 1_777_636_800_000_000_000, true),
+            (Clock::Video, 0, true),
+        ] {
+            let log = log(clock, first_ns);
+            let target = out.path().join(format!("{clock:?}-{first_ns}"));
+            let written = folder(&log, None).write(&target);
+            assert_eq!(written.is_ok(), fine, "{clock:?} {written:?}");
+            assert_eq!(target.exists(), fine, "nothing is left of a refused one");
+            let target = target.with_extension("said");
+            folder(&log, Some(first_ns)).write(&target).unwrap();
+        }
+    }
+
+    #[test]
+    fn files_hold_every_digit_and_are_not_written_over() {
+        let out = tempfile::tempdir().unwrap();
+        let log = log(Clock::Date, 1_777_636_800_123_456_789);
+        let notes = folder(&log, Some(-1_500_000_000))
+            .write(out.path())
+            .unwrap();
+        assert!(notes.is_empty());
+        let speeds = std::fs::read_to_string(out.path().join("speed.csv")).unwrap();
+        assert!(
+            speeds.starts_with("time_s,speed_mps\n1777636800.123456789,8.000000\n"),
+            "{speeds}"
+        );
+        assert!(!out.path().join("imu.csv").exists());
+        let config = std::fs::read_to_string(out.path().join("dataset.toml")).unwrap();
+        assert!(config.contains("a \\\"b\\\".mp4\"\n"), "{config}");
+        assert!(config.contains("start_s = -1.500000000\n"), "{config}");
+        let again = folder(&log, None).write(out.path()).unwrap_err();
+        assert!(
+            again.to_string().contains("speed.csv: is there already"),
+            "{again}"
+        );
+    }
+}

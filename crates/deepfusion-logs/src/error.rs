@@ -1,0 +1,172 @@
+use deepfusion_hint::Hint;
+use std::path::{Path, PathBuf};
+
+/// What can be wrong with a log.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file could not be opened or read.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A line cannot be read.
+    #[error("{}:{line}: {field}: {problem}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: u64,
+        /// The column, element or sentence.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// Bytes of a binary log cannot be read.
+    #[error("{}: byte {offset}: {field}: {problem}", path.display())]
+    Bytes {
+        /// The file.
+        path: PathBuf,
+        /// Where, counted from 0.
+        offset: u64,
+        /// The box or key.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// Nothing says which column is meant, or none is there.
+    #[error("{}: {problem}; its columns: {}", path.display(), columns.join(", "))]
+    Column {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: ColumnProblem,
+        /// The header.
+        columns: Vec<String>,
+    },
+    /// The log is of a kind that holds no speed, or of none that is known.
+    #[error("{}: {problem}", path.display())]
+    NoSpeed {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was looked for.
+        problem: String,
+    },
+    /// A CAN trace without a signal to decode.
+    #[error("{}: a CAN trace, and {problem}", path.display())]
+    Signal {
+        /// The trace.
+        path: PathBuf,
+        /// What is missing.
+        problem: String,
+    },
+    /// Nothing connects the log's clock with the video's.
+    #[error(
+        "the log's times begin at {} s of a clock of their own, and nothing says when on it the video began",
+        *first_ns as f64 * 1e-9
+    )]
+    NoStart {
+        /// The log's first time.
+        first_ns: i64,
+    },
+    /// A file would be written over.
+    #[error("{}: is there already", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A DBC file or a signal of it cannot be used.
+    #[error(transparent)]
+    Motion(#[from] deepfusion_motion::Error),
+}
+
+/// What is wrong with the choice of a column.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ColumnProblem {
+    /// A column that was asked for by name is not there.
+    #[error("no column '{0}'")]
+    Missing(String),
+    /// No column looks like a time.
+    #[error("no column looks like a time")]
+    NoTime,
+    /// No column looks like a speed, and there are no positions.
+    #[error("no column looks like a speed, and none like latitude and longitude")]
+    NoSpeed,
+    /// The speed's unit is not said.
+    #[error("nothing says the unit of the speed in column '{0}'")]
+    NoSpeedUnit(String),
+    /// The time's unit is not said.
+    #[error("nothing says the unit of the time in column '{0}'")]
+    NoTimeUnit(String),
+}
+
+impl Hint for Error {
+    fn hint(&self) -> Option<String> {
+        let text = match self {
+            Self::File { .. } => return None,
+            Self::Motion(error) => return error.hint(),
+            Self::Line { .. } => "correct the line or delete it, or export the log anew",
+            Self::Bytes { .. } => "copy the file again from where it was recorded",
+            Self::Column { problem, .. } => match problem {
+                ColumnProblem::NoSpeedUnit(_) => {
+                    "say the unit of speed (m/s, km/h, mph, knots): a wrong one would scale every depth"
+                }
+                ColumnProblem::NoTimeUnit(_) => {
+                    "name the column time_s, time_ms, time_us or time_ns"
+                }
+                _ => {
+                    "say which column is the time and which the speed, by their names in the header"
+                }
+            },
+            Self::NoSpeed { .. } => {
+                "GPX, NMEA, tables with a header, phones' export folders, GoPro's videos and CAN traces are read"
+            }
+            Self::Signal { .. } => "give the DBC file, and the speed's signal as Message.Signal",
+            Self::NoStart { .. } => "say when the first frame was taken, on the log's clock",
+            Self::Exists { .. } => "choose another folder, or take the file away",
+        };
+        Some(text.to_owned())
+    }
+}
+
+/// What the crate's functions give back.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
+        Self::File {
+            path: path.to_owned(),
+            source,
+        }
+    }
+}
+
+/// What is wrong in a text, before the file's name is known.
+pub(crate) struct BadLine {
+    pub(crate) line: u64,
+    pub(crate) field: String,
+    pub(crate) problem: String,
+}
+
+impl BadLine {
+    pub(crate) fn new(line: u64, field: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self {
+            line,
+            field: field.into(),
+            problem: problem.into(),
+        }
+    }
+
+    pub(crate) fn of(self, path: &Path) -> Error {
+        Error::Line {
+            path: path.to_owned(),
+            line: self.line,
+            field: self.field,
+            problem: self.problem,
+        }
+    }
+}

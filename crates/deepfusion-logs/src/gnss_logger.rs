@@ -1,0 +1,113 @@
+//! The text of Google's GnssLogger: rows of several kinds, each kind's columns in a comment; `Fix` rows hold the speed.
+
+use crate::error::{BadLine, Error, Result};
+use crate::log::{Clock, DriveLog, Format, Speed};
+use crate::numbers::{Cell, cell};
+use crate::read::{enough, left_out};
+use std::path::Path;
+
+const HEADER: &str = "# Fix,";
+
+/// Whether a text is one.
+pub(crate) fn is_one(text: &str) -> bool {
+    let mut lines = text.lines().take(1000);
+    lines.any(|l| l.starts_with(HEADER) || l.starts_with("Fix,"))
+}
+
+/// The speeds of the `Fix` rows, those of satellites alone where there are some: others are mixed from networks.
+pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
+    let header = text.lines().find_map(|l| l.strip_prefix(HEADER));
+    let columns: Vec<String> = header
+        .unwrap_or("Provider,LatitudeDegrees,LongitudeDegrees,AltitudeMeters,SpeedMps,AccuracyMeters,BearingDegrees,UnixTimeMillis")
+        .split(',')
+        .map(|c| c.trim().to_lowercase())
+        .collect();
+    // Older versions wrote other names.
+    let find = |names: [&str; 2]| {
+        let place = columns.iter().position(|c| names.contains(&c.as_str()));
+        place.ok_or_else(|| Error::NoSpeed {
+            path: path.to_owned(),
+            problem: format!("the Fix rows have no column {}", names[0]),
+        })
+    };
+    let (provider, speed) = (
+        find(["provider", "provider"])?,
+        find(["speedmps", "speed"])?,
+    );
+    let time = find(["unixtimemillis", "(utc)timeinms"])?;
+    let accuracy = columns.iter().position(|c| c == "speedaccuracymps");
+    let fixes = || {
+        let rows = text.lines().enumerate();
+        rows.filter_map(|(i, l)| {
+            Some((
+                i as u64 + 1,
+                l.strip_prefix("Fix,")?
+                    .split(',')
+                    .map(str::trim)
+                    .collect::<Vec<_>>(),
+            ))
+        })
+    };
+    let is_satellite = |row: &[&str]| {
+        row.get(provider)
+            .is_some_and(|p| p.eq_ignore_ascii_case("gps"))
+    };
+    let satellites = fixes().any(|(_, row)| is_satellite(&row));
+    let (mut speeds, mut rows, mut absent, mut repeated) = (Vec::<Speed>::new(), 0, 0, 0);
+    for (line, row) in fixes() {
+        if satellites && !is_satellite(&row) {
+            continue;
+        }
+        rows += 1;
+        let number = |index: usize| {
+            let word = row.get(index).copied().unwrap_or("");
+            match cell(word, false) {
+                Cell::Absent => Ok(None),
+                Cell::Number(n) => Ok(Some(n)),
+                Cell::Other => {
+                    let problem = format!("'{}' is not a number", crate::table::short(word));
+                    Err(BadLine::new(line, format!("Fix, {}", columns[index]), problem).of(path))
+                }
+            }
+        };
+        let (Some(mps), Some(ms)) = (number(speed)?, number(time)?) else {
+            absent += 1;
+            continue;
+        };
+        let ns = (ms * 1e6).round() as i64;
+        match speeds.last() {
+            Some(last) if ns < last.ns => {
+                let problem = format!("{} s before the fix above", (last.ns - ns) as f64 * 1e-9);
+                return Err(BadLine::new(line, "Fix, UnixTimeMillis", problem).of(path));
+            }
+            Some(last) if ns == last.ns => {
+                repeated += 1;
+                continue;
+            }
+            _ => {}
+        }
+        let sigma = accuracy.map(number).transpose()?.flatten();
+        speeds.push(Speed {
+            ns,
+            mps,
+            sigma_mps: sigma.filter(|s| *s > 0.0),
+        });
+    }
+    let mut notes = vec![format!(
+        "speeds of the Fix rows of {}",
+        if satellites {
+            "satellites alone (GPS)"
+        } else {
+            "any provider: none is of satellites alone"
+        }
+    )];
+    left_out(&mut notes, rows, absent, repeated);
+    enough(path, &speeds)?;
+    Ok(DriveLog {
+        format: Format::GnssLogger,
+        clock: Clock::Date,
+        speeds,
+        yaw_rates: Vec::new(),
+        notes,
+    })
+}

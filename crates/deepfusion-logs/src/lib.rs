@@ -1,0 +1,43 @@
+//! A vehicle's speed over time, from the log that happens to be there.
+//!
+//! [`read`] takes a file or an app's export folder, finds out what it is by what stands in it, and gives a [`DriveLog`]: speeds
+//! in m/s at times in nanoseconds, yaw rates where the log has a gyroscope, and [notes](DriveLog::notes) that say how it was
+//! understood. What would change the scale is never guessed: a speed without a unit is an error that lists the columns.
+//!
+//! | Log | Read by |
+//! |---|---|
+//! | GPX, NMEA | Doppler speed where every fix has one, else positions, smoothed |
+//! | Tables (`.csv`, `.tsv`, `.txt`): Torque, Sensor Logger, phyphox, any other | names and units of the columns |
+//! | Car Scanner (one value a row) | the rows of the vehicle's speed |
+//! | Google's GnssLogger | its `Fix` rows |
+//! | GoPro's MP4 | the `gpmd` track: GPS5 or GPS9, gyroscope and gravity |
+//! | `candump`, Vector ASC | a signal of a DBC file |
+//!
+//! [`DriveFolder`] writes a log beside its video as a folder that every command reads. Nothing here knows of images.
+
+mod can_trace;
+mod columns;
+mod dates;
+mod drive_folder;
+mod error;
+mod export_folder;
+mod gnss_logger;
+mod gpmf;
+mod gpx;
+mod log;
+mod mp4;
+mod numbers;
+mod read;
+mod receiver;
+mod table;
+mod tall_table;
+mod track;
+mod turns;
+mod units;
+
+pub use dates::time_on_clock;
+pub use drive_folder::{Camera, DriveFolder, Media};
+pub use error::{ColumnProblem, Error, Result};
+pub use log::{Clock, DriveLog, Format, Speed, YawRate};
+pub use read::{ReadOptions, is_gps_track, read};
+pub use units::{SpeedUnit, UnknownUnit};

@@ -1,0 +1,101 @@
+use std::fmt;
+
+/// What a log says of how its vehicle moved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveLog {
+    /// What kind of log it was.
+    pub format: Format,
+    /// From when its times count.
+    pub clock: Clock,
+    /// In the order of their times, no two at one time.
+    pub speeds: Vec<Speed>,
+    /// In the order of their times; empty where nothing measured them. They have times of their own.
+    pub yaw_rates: Vec<YawRate>,
+    /// How the log was understood, and what of it was left out: sentences to be printed.
+    pub notes: Vec<String>,
+}
+
+impl DriveLog {
+    /// The same with the zone of its local dates said: `ahead_s` seconds ahead of UTC. Logs of another clock stay as they are.
+    #[must_use]
+    pub fn in_zone(mut self, ahead_s: i64) -> Self {
+        if self.clock == Clock::LocalDate {
+            let ahead_ns = ahead_s * 1_000_000_000;
+            self.speeds.iter_mut().for_each(|s| s.ns -= ahead_ns);
+            self.yaw_rates.iter_mut().for_each(|y| y.ns -= ahead_ns);
+            self.clock = Clock::Date;
+        }
+        self
+    }
+}
+
+/// A speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Speed {
+    /// On the log's clock, in nanoseconds.
+    pub ns: i64,
+    /// In m/s; negative backwards, where the log knows.
+    pub mps: f64,
+    /// Its standard deviation in m/s, where something tells it.
+    pub sigma_mps: Option<f64>,
+}
+
+/// A rate of turning about the axis that points up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct YawRate {
+    /// On the log's clock, in nanoseconds.
+    pub ns: i64,
+    /// In rad/s, positive to the left.
+    pub radps: f64,
+}
+
+/// From when times count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Clock {
+    /// From the beginning of 1970, UTC.
+    Date,
+    /// From the beginning of 1970 of a local clock: hours may be added to UTC.
+    LocalDate,
+    /// From a midnight.
+    TimeOfDay,
+    /// From some moment of the recorder's own.
+    Free,
+    /// From the first frame of the video that the log was taken out of.
+    Video,
+}
+
+/// Kinds of logs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// A GPS track as XML.
+    Gpx,
+    /// A receiver's sentences.
+    Nmea,
+    /// A table with a column for each quantity.
+    Table,
+    /// A table with one value a row, as Car Scanner writes it.
+    TallTable,
+    /// A phone's export: a folder of tables, one for each sensor.
+    ExportFolder,
+    /// The text of Google's GnssLogger.
+    GnssLogger,
+    /// The metadata track of a GoPro's video.
+    Gpmf,
+    /// CAN frames as text, and a DBC file.
+    CanTrace,
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Gpx => "GPX track",
+            Self::Nmea => "NMEA sentences",
+            Self::Table => "table",
+            Self::TallTable => "table of one value a row (Car Scanner)",
+            Self::ExportFolder => "phone's export folder",
+            Self::GnssLogger => "GnssLogger text",
+            Self::Gpmf => "GoPro video",
+            Self::CanTrace => "CAN trace",
+        })
+    }
+}

@@ -1,0 +1,241 @@
+//! As much of MP4 as it takes to get at a track of metadata: where its samples lie, and when each begins.
+
+use std::ops::Range;
+
+/// A sample of a track.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Sample {
+    /// Its bytes in the file.
+    pub(crate) bytes: Range<usize>,
+    /// When it begins and ends, in nanoseconds from the track's beginning.
+    pub(crate) ns: Range<i64>,
+}
+
+/// What is wrong, and at which byte.
+pub(crate) struct Broken {
+    pub(crate) offset: usize,
+    pub(crate) field: &'static str,
+    pub(crate) problem: String,
+}
+
+/// A box: what stands in it, as a range of the file.
+struct Inside<'a> {
+    file: &'a [u8],
+    range: Range<usize>,
+}
+
+/// The samples of the first track whose format is `format`; `None` where there is no such track.
+pub(crate) fn samples(file: &[u8], format: &[u8; 4]) -> Result<Option<Vec<Sample>>, Broken> {
+    let whole = Inside {
+        file,
+        range: 0..file.len(),
+    };
+    let Some(movie) = whole.first(b"moov")? else {
+        return Err(Broken {
+            offset: file.len(),
+            field: "moov",
+            problem: "no such box: the recording was cut off, or this is no MP4 file".into(),
+        });
+    };
+    for track in movie.all(b"trak")? {
+        let Some(media) = track.first(b"mdia")? else {
+            continue;
+        };
+        let Some(table) = media.path(&[b"minf", b"stbl"])? else {
+            continue;
+        };
+        let Some(description) = table.first(b"stsd")? else {
+            continue;
+        };
+        // Version and flags, how many, the size of the first, its format.
+        if description.bytes(12, 4)? != format {
+            continue;
+        }
+        let scale = match media.first(b"mdhd")? {
+            Some(header) => header.timescale()?,
+            None => return Err(track.broken("mdhd", "no such box")),
+        };
+        return table.samples(scale).map(Some);
+    }
+    Ok(None)
+}
+
+impl Inside<'_> {
+    fn broken(&self, field: &'static str, problem: &str) -> Broken {
+        Broken {
+            offset: self.range.start,
+            field,
+            problem: problem.into(),
+        }
+    }
+
+    /// `length` bytes from `at`, counted from the box's contents.
+    fn bytes(&self, at: usize, length: usize) -> Result<&[u8], Broken> {
+        let start = self.range.start.checked_add(at);
+        let bytes = start
+            .and_then(|s| s.checked_add(length).map(|e| s..e))
+            .filter(|r| r.end <= self.range.end);
+        bytes
+            .and_then(|r| self.file.get(r))
+            .ok_or_else(|| self.broken("box", "it ends early"))
+    }
+
+    fn u32(&self, at: usize) -> Result<u32, Broken> {
+        let bytes = self.bytes(at, 4)?;
+        Ok(bytes.iter().fold(0, |n, b| n << 8 | u32::from(*b)))
+    }
+
+    fn u64(&self, at: usize) -> Result<u64, Broken> {
+        Ok(u64::from(self.u32(at)?) << 32 | u64::from(self.u32(at + 4)?))
+    }
+
+    /// The boxes in this one of a kind.
+    fn all(&self, kind: &[u8; 4]) -> Result<Vec<Inside<'_>>, Broken> {
+        let (mut found, mut at) = (Vec::new(), 0);
+        let length = self.range.len();
+        while at + 8 <= length {
+            let (mut size, mut header) = (self.u32(at)? as u64, 8);
+            if size == 1 {
+                (size, header) = (self.u64(at + 8)?, 16);
+            } else if size == 0 {
+                size = (length - at) as u64;
+            }
+            let end = usize::try_from(size).ok().and_then(|s| at.checked_add(s));
+            let Some(end) = end.filter(|end| *end <= length && size >= header as u64) else {
+                let offset = self.range.start + at;
+                let name = String::from_utf8_lossy(self.bytes(at + 4, 4)?).into_owned();
+                let problem = format!("{name}: {size} bytes, where {} are left", length - at);
+                return Err(Broken {
+                    offset,
+                    field: "box",
+                    problem,
+                });
+            };
+            if self.bytes(at + 4, 4)? == kind {
+                let range = self.range.start + at + header..self.range.start + end;
+                found.push(Inside {
+                    file: self.file,
+                    range,
+                });
+            }
+            at = end;
+        }
+        Ok(found)
+    }
+
+    fn first(&self, kind: &[u8; 4]) -> Result<Option<Inside<'_>>, Broken> {
+        let all = self.all(kind)?;
+        Ok(all.into_iter().next().map(|found| Inside {
+            file: self.file,
+            range: found.range,
+        }))
+    }
+
+    fn path(&self, kinds: &[&[u8; 4]]) -> Result<Option<Inside<'_>>, Broken> {
+        let mut at = Inside {
+            file: self.file,
+            range: self.range.clone(),
+        };
+        for kind in kinds {
+            let next = at.first(kind)?.map(|found| found.range);
+            let Some(range) = next else { return Ok(None) };
+            at = Inside {
+                file: self.file,
+                range,
+            };
+        }
+        Ok(Some(at))
+    }
+
+    /// Ticks a second of a media header.
+    fn timescale(&self) -> Result<u32, Broken> {
+        let at = if self.bytes(0, 1)?[0] == 1 { 20 } else { 12 };
+        match self.u32(at)? {
+            0 => Err(self.broken("mdhd", "a timescale of 0")),
+            scale => Ok(scale),
+        }
+    }
+
+    /// The samples of a sample table: their sizes, the chunks they lie in, how long each lasts.
+    fn samples(&self, scale: u32) -> Result<Vec<Sample>, Broken> {
+        let needed = |kind: &'static [u8; 4], name| {
+            self.first(kind)?
+                .ok_or_else(|| self.broken(name, "no such box"))
+        };
+        let (sizes, durations, runs) = (
+            needed(b"stsz", "stsz")?,
+            needed(b"stts", "stts")?,
+            needed(b"stsc", "stsc")?,
+        );
+        let count = sizes.u32(8)? as usize;
+        let one_size = sizes.u32(4)?;
+        // Each sample takes a byte of the file at least, so a count cannot ask for more memory than the file has.
+        if count > self.file.len() {
+            return Err(sizes.broken("stsz", "more samples than bytes"));
+        }
+        let size = |i: usize| match one_size {
+            0 => sizes.u32(12 + 4 * i),
+            size => Ok(size),
+        };
+        let (offsets, wide) = match self.first(b"stco")? {
+            Some(offsets) => (offsets, false),
+            None => (needed(b"co64", "stco")?, true),
+        };
+        let offset = |chunk: usize| match wide {
+            true => offsets.u64(8 + 8 * chunk),
+            false => offsets.u32(8 + 4 * chunk).map(u64::from),
+        };
+        let chunks = offsets.u32(4)? as usize;
+        let mut begins = durations.starts(count, scale)?;
+        let (mut samples, mut run) = (Vec::with_capacity(count), 0);
+        let runs_count = runs.u32(4)? as usize;
+        for chunk in 0..chunks {
+            // A run says from which chunk on (counted from 1) a chunk has so many samples.
+            while run + 1 < runs_count && runs.u32(8 + 12 * (run + 1))? as usize <= chunk + 1 {
+                run += 1;
+            }
+            let mut at = offset(chunk)?;
+            for _ in 0..runs.u32(8 + 12 * run + 4)? {
+                let index = samples.len();
+                if index == count {
+                    break;
+                }
+                let end = at + u64::from(size(index)?);
+                let bytes = usize::try_from(at).ok().zip(usize::try_from(end).ok());
+                let Some((from, to)) = bytes.filter(|(_, to)| *to <= self.file.len()) else {
+                    return Err(self.broken(
+                        "stco",
+                        "a sample lies beyond the file's end: it was cut off",
+                    ));
+                };
+                let ns = begins
+                    .next()
+                    .ok_or_else(|| durations.broken("stts", "fewer samples than stsz"))?;
+                samples.push(Sample {
+                    bytes: from..to,
+                    ns,
+                });
+                at = end;
+            }
+        }
+        Ok(samples)
+    }
+
+    /// When each sample begins and ends.
+    fn starts(&self, count: usize, scale: u32) -> Result<std::vec::IntoIter<Range<i64>>, Broken> {
+        let (mut all, mut ticks) = (Vec::with_capacity(count), 0_u64);
+        let ns = |ticks: u64| (ticks as f64 / f64::from(scale) * 1e9).round() as i64;
+        for entry in 0..self.u32(4)? as usize {
+            let (repeats, ticks_each) = (self.u32(8 + 8 * entry)?, self.u32(12 + 8 * entry)?);
+            for _ in 0..repeats {
+                if all.len() == count {
+                    break;
+                }
+                let next = ticks + u64::from(ticks_each);
+                all.push(ns(ticks)..ns(next));
+                ticks = next;
+            }
+        }
+        Ok(all.into_iter())
+    }
+}

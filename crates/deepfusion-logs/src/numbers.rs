@@ -1,0 +1,53 @@
+//! Numbers as apps write them: with a point or a comma, and words for "not measured".
+
+/// What stands in a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Cell {
+    /// Nothing was measured.
+    Absent,
+    Number(f64),
+    /// Something else.
+    Other,
+}
+
+/// Reads a cell. `decimal_comma` says that values are not parted by commas, so that a comma is the decimal point of "12,5".
+pub(crate) fn cell(word: &str, decimal_comma: bool) -> Cell {
+    let word = word.trim().trim_matches('"').trim();
+    let lower = word.to_ascii_lowercase();
+    if matches!(
+        lower.as_str(),
+        "" | "-" | "--" | "—" | "null" | "none" | "nan" | "n/a" | "na" | "no data" | "nodata" | "∞"
+    ) {
+        return Cell::Absent;
+    }
+    let text = match decimal_comma && word.contains(',') {
+        // 1.234,5: points part the thousands.
+        true => word.replace('.', "").replacen(',', ".", 1),
+        false => word.to_owned(),
+    };
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Cell::Number(value),
+        _ => Cell::Other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_commas_and_words_for_nothing() {
+        assert_eq!(cell(" 12.5 ", false), Cell::Number(12.5));
+        assert_eq!(cell("\"12,5\"", true), Cell::Number(12.5));
+        assert_eq!(cell("1.234,5", true), Cell::Number(1234.5));
+        assert_eq!(cell("1.234", true), Cell::Number(1.234));
+        assert_eq!(cell("-0,5", true), Cell::Number(-0.5));
+        for absent in ["", "-", "NaN", "null", "NO DATA"] {
+            assert_eq!(cell(absent, true), Cell::Absent, "{absent}");
+        }
+        for other in ["12,5", "fast", "1,2,3", "inf", "0x10"] {
+            assert_eq!(cell(other, false), Cell::Other, "{other}");
+        }
+        assert_eq!(cell("1,2,3", true), Cell::Other);
+    }
+}

@@ -1,0 +1,345 @@
+//! What a file is, by its name and what stands in it; and a table with a column for each quantity.
+
+use crate::columns::{Column, TIMES};
+use crate::dates::{TimeStyle, clock_of, nanoseconds, style_of};
+use crate::error::{ColumnProblem, Error, Result};
+use crate::export_folder;
+use crate::log::{Clock, DriveLog, Format, Speed};
+use crate::table::{Table, short};
+use crate::track::{self, TimedFix};
+use crate::{SpeedUnit, can_trace, gnss_logger, gpmf, gpx, receiver, tall_table};
+use deepfusion_motion::Fix;
+use std::path::{Path, PathBuf};
+
+/// What a user says of a log, where it does not say it itself.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// The column of times, by its header.
+    pub time: Option<String>,
+    /// The column of speeds by its header; of a tall table the name of its rows; of a CAN trace the signal, "Message.Signal".
+    pub speed: Option<String>,
+    /// The speeds' unit, where nothing else says it; what the log says counts before it.
+    pub unit: Option<SpeedUnit>,
+    /// A DBC file, for CAN traces.
+    pub dbc: Option<PathBuf>,
+}
+
+/// Whether a file is named like a GPS track: `.gpx` or `.nmea`.
+#[must_use]
+pub fn is_gps_track(path: &Path) -> bool {
+    ["gpx", "nmea"].contains(&extension(path).as_str())
+}
+
+/// Reads a log.
+///
+/// # Errors
+/// [`Error::File`]; [`Error::Column`] where nothing says which column is meant or what its unit is; [`Error::Line`] and
+/// [`Error::Bytes`] for what cannot be read; [`Error::NoSpeed`] for a file of no known kind, or without a speed;
+/// [`Error::Signal`] and [`Error::Motion`] for a CAN trace.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
+    if path.is_dir() {
+        return export_folder::read(path, options);
+    }
+    match extension(path).as_str() {
+        "mp4" | "mov" | "360" | "lrv" => return gpmf::read(path),
+        "gpx" => return gpx::read(path),
+        "nmea" => return receiver::read(path),
+        "asc" => return can_trace::read(path, options),
+        _ => {}
+    }
+    let text = text_of(path)?;
+    let first = text
+        .lines()
+        .find(|l| !l.trim().is_empty())
+        .unwrap_or("")
+        .trim();
+    let first = first.trim_start_matches('\u{feff}');
+    if first.starts_with('$') {
+        receiver::read(path)
+    } else if first.starts_with("<?xml") || first.starts_with("<gpx") {
+        gpx::read(path)
+    } else if can_trace::is_candump(first) {
+        can_trace::read(path, options)
+    } else if gnss_logger::is_one(&text) {
+        gnss_logger::read(path, &text)
+    } else {
+        let table = Table::parse(path, &text, 1)?;
+        match tall_table::is_one(&table) {
+            true => tall_table::read(&table, options),
+            false => of_table(&table, options),
+        }
+    }
+}
+
+/// A file's text: UTF-8, with a byte order mark or without.
+pub(crate) fn text_of(path: &Path) -> Result<String> {
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+    String::from_utf8(bytes).map_err(|e| {
+        let before = &e.as_bytes()[..e.utf8_error().valid_up_to()];
+        let line = memchr::memchr_iter(b'\n', before).count() as u64 + 1;
+        let utf16 = [&b"\xff\xfe"[..], b"\xfe\xff"]
+            .iter()
+            .any(|mark| e.as_bytes().starts_with(mark));
+        Error::Line {
+            path: path.to_owned(),
+            line,
+            field: "any".into(),
+            problem: if utf16 {
+                "UTF-16 text, save it as UTF-8"
+            } else {
+                "not UTF-8 text, and no binary log that is known"
+            }
+            .into(),
+        }
+    })
+}
+
+fn extension(path: &Path) -> String {
+    path.extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_ascii_lowercase()
+}
+
+/// The times of a table's rows.
+pub(crate) struct Times<'a> {
+    pub(crate) column: &'a Column,
+    style: TimeStyle,
+    pub(crate) clock: Clock,
+}
+
+impl<'a> Times<'a> {
+    /// Finds the column, and how its times are written.
+    pub(crate) fn of(table: &'a Table, options: &ReadOptions) -> Result<Self> {
+        let column = match &options.time {
+            Some(name) => table.asked_for(name)?,
+            None => table
+                .named(&TIMES)
+                .ok_or_else(|| table.lacks(ColumnProblem::NoTime))?,
+        };
+        let words: Vec<String> = (0..table.len().min(1000))
+            .map(|row| table.plain_word(row, column))
+            .collect();
+        let words: Vec<&str> = words
+            .iter()
+            .map(String::as_str)
+            .filter(|w| !w.is_empty())
+            .collect();
+        let Some(first) = words.first() else {
+            return Err(Error::NoSpeed {
+                path: table.path.clone(),
+                problem: "no row below the header has a time".into(),
+            });
+        };
+        // A number's column may be named for its unit: "seconds", "UnixTimeMillis".
+        let unit = column.unit.as_deref().or(match column.name.as_str() {
+            "seconds" | "seconds elapsed" => Some("s"),
+            "unixtimemillis" => Some("ms"),
+            _ => None,
+        });
+        let style = style_of(&words, unit).ok_or_else(|| match first.parse::<f64>() {
+            Ok(_) => table.lacks(ColumnProblem::NoTimeUnit(column.header.clone())),
+            Err(_) => table.bad(0, column, &format!("'{}' is not a time", short(first))),
+        })?;
+        Ok(Self {
+            column,
+            style,
+            clock: clock_of(first, style),
+        })
+    }
+
+    /// The time of a row, which may not be before `after`.
+    pub(crate) fn ns(&self, table: &Table, row: usize, after: Option<i64>) -> Result<i64> {
+        let word = table.plain_word(row, self.column);
+        let ns = nanoseconds(&word, self.style, after).ok_or_else(|| {
+            table.bad(
+                row,
+                self.column,
+                &format!("'{}' is not a time", short(&word)),
+            )
+        })?;
+        match after {
+            Some(after) if ns < after => {
+                let back = (after - ns) as f64 * 1e-9;
+                Err(table.bad(
+                    row,
+                    self.column,
+                    &format!("'{}' is {back} s before the row above", short(&word)),
+                ))
+            }
+            _ => Ok(ns),
+        }
+    }
+}
+
+/// A table with a column for each quantity.
+pub(crate) fn of_table(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
+    let times = Times::of(table, options)?;
+    let speed = match &options.speed {
+        Some(name) => Some(table.asked_for(name)?),
+        None => best_speed(table, options.unit),
+    };
+    let mut notes = Vec::new();
+    if table.repeated_headers > 0 {
+        notes.push(format!(
+            "the header stands {} times more among the rows",
+            table.repeated_headers
+        ));
+    }
+    let Some(column) = speed else {
+        return positions(table, &times, notes);
+    };
+    let phone_export = table.named(&["seconds elapsed"]).is_some();
+    let unit = match column.speed_unit().or(options.unit) {
+        Some(unit) => unit,
+        // Sensor Logger's documentation: metres a second.
+        None if phone_export || column.name == "speedmps" => SpeedUnit::MetresPerSecond,
+        None => return Err(table.lacks(ColumnProblem::NoSpeedUnit(column.header.clone()))),
+    };
+    notes.insert(
+        0,
+        format!(
+            "time from column '{}', speed from column '{}' in {unit}",
+            times.column.header.trim(),
+            column.header.trim()
+        ),
+    );
+    let accuracy = table.named(&["speedaccuracy", "speed accuracy"]);
+    let (mut speeds, mut last, mut absent, mut repeated) = (Vec::<Speed>::new(), None, 0, 0);
+    for row in 0..table.len() {
+        let value = table.number(row, column)?;
+        // A phone without a fix writes -1.
+        let value = value.filter(|v| !(phone_export && *v < 0.0));
+        let Some(value) = value else {
+            absent += 1;
+            continue;
+        };
+        if times_absent(table, &times, row) {
+            absent += 1;
+            continue;
+        }
+        let ns = times.ns(table, row, last)?;
+        if last == Some(ns) {
+            repeated += 1;
+            continue;
+        }
+        last = Some(ns);
+        let sigma = accuracy
+            .map(|c| table.number(row, c))
+            .transpose()?
+            .flatten();
+        speeds.push(Speed {
+            ns,
+            mps: value * unit.mps(),
+            sigma_mps: sigma.filter(|s| *s > 0.0),
+        });
+    }
+    left_out(&mut notes, table.len(), absent, repeated);
+    enough(&table.path, &speeds)?;
+    Ok(DriveLog {
+        format: Format::Table,
+        clock: times.clock,
+        speeds,
+        yaw_rates: Vec::new(),
+        notes,
+    })
+}
+
+/// Says what of the rows was not used.
+pub(crate) fn left_out(notes: &mut Vec<String>, rows: usize, absent: usize, repeated: usize) {
+    if absent > 0 {
+        notes.push(format!(
+            "{absent} of {rows} rows hold no speed and are left out"
+        ));
+    }
+    if repeated > 0 {
+        notes.push(format!(
+            "{repeated} of {rows} rows repeat the time of the row above and are left out"
+        ));
+    }
+}
+
+/// An error where there are not two speeds.
+pub(crate) fn enough(path: &Path, speeds: &[Speed]) -> Result<()> {
+    match speeds.len() {
+        0 | 1 => Err(Error::NoSpeed {
+            path: path.to_owned(),
+            problem: format!(
+                "{} rows with a time and a speed, at least two are needed",
+                speeds.len()
+            ),
+        }),
+        _ => Ok(()),
+    }
+}
+
+fn times_absent(table: &Table, times: &Times, row: usize) -> bool {
+    ["", "-"].contains(&table.word(row, times.column))
+}
+
+/// The column that fits a vehicle's speed best; of equal ones that whose unit is known, then the first.
+fn best_speed(table: &Table, unit: Option<SpeedUnit>) -> Option<&Column> {
+    let ranked = table
+        .columns
+        .iter()
+        .filter_map(|c| Some((c.speed_rank()?, c)));
+    // A column in which nothing stands is none: OBD apps list what the vehicle never answered.
+    let filled =
+        |c: &Column| (0..table.len()).any(|row| matches!(table.number(row, c), Ok(Some(_))));
+    let with_unit = |c: &Column| c.speed_unit().or(unit).is_some();
+    ranked
+        .filter(|(_, c)| filled(c))
+        .min_by_key(|(rank, c)| (!with_unit(c), *rank, c.index))
+        .map(|(_, c)| c)
+}
+
+/// Speeds from a table's latitudes and longitudes.
+fn positions(table: &Table, times: &Times, mut notes: Vec<String>) -> Result<DriveLog> {
+    let degrees = (
+        table.named(&["latitude", "lat", "latitudedegrees"]),
+        table.named(&[
+            "longitude",
+            "lon",
+            "lng",
+            "long",
+            "longtitude",
+            "longitudedegrees",
+        ]),
+    );
+    let (Some(latitude), Some(longitude)) = degrees else {
+        return Err(table.lacks(ColumnProblem::NoSpeed));
+    };
+    let (mut fixes, mut last) = (Vec::new(), None);
+    for row in 0..table.len() {
+        let place = (table.number(row, latitude)?, table.number(row, longitude)?);
+        let (Some(latitude_deg), Some(longitude_deg)) = place else {
+            continue;
+        };
+        // Before its first fix an app writes 0, 0.
+        if times_absent(table, times, row) || (latitude_deg == 0.0 && longitude_deg == 0.0) {
+            continue;
+        }
+        let ns = times.ns(table, row, last)?;
+        last = Some(ns);
+        let fix = Fix {
+            time_s: 0.0,
+            latitude_deg,
+            longitude_deg,
+            speed_mps: None,
+        };
+        fixes.push(TimedFix { ns, fix });
+    }
+    notes.push(format!(
+        "time from column '{}', positions from '{}' and '{}'",
+        times.column.header.trim(),
+        latitude.header.trim(),
+        longitude.header.trim()
+    ));
+    let mut log = track::log_of_fixes(&table.path, Format::Table, &fixes)?;
+    notes.append(&mut log.notes);
+    Ok(DriveLog {
+        clock: times.clock,
+        notes,
+        ..log
+    })
+}

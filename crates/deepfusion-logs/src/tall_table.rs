@@ -1,0 +1,103 @@
+//! Tables with one value a row: time, what was measured, its value, its unit. Car Scanner writes these.
+
+use crate::columns::{Column, speed_rank};
+use crate::error::{ColumnProblem, Error, Result};
+use crate::log::{DriveLog, Format, Speed};
+use crate::read::{ReadOptions, Times, enough, left_out};
+use crate::table::Table;
+use crate::units::SpeedUnit;
+use std::collections::BTreeMap;
+
+const QUANTITIES: [&str; 4] = ["pid", "sensor", "parameter", "signal"];
+const VALUES: [&str; 1] = ["value"];
+const UNITS: [&str; 2] = ["units", "unit"];
+
+/// Whether a table is a tall one.
+pub(crate) fn is_one(table: &Table) -> bool {
+    table.named(&QUANTITIES).is_some() && table.named(&VALUES).is_some()
+}
+
+/// The rows of the vehicle's speed.
+pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
+    let times = Times::of(table, options)?;
+    let (Some(quantity), Some(value)) = (table.named(&QUANTITIES), table.named(&VALUES)) else {
+        return Err(table.lacks(ColumnProblem::NoSpeed));
+    };
+    let unit = table.named(&UNITS);
+    let (name, own_unit) = chosen(table, quantity, unit, options)?;
+    let factor = match own_unit.or(options.unit) {
+        Some(unit) => unit,
+        None => return Err(table.lacks(ColumnProblem::NoSpeedUnit(name))),
+    };
+    let mut notes = vec![format!(
+        "time from column '{}', speed from the rows of '{name}' in {factor}",
+        times.column.header.trim()
+    )];
+    let (mut speeds, mut last, mut of_speed, mut absent, mut repeated) =
+        (Vec::<Speed>::new(), None, 0, 0, 0);
+    for row in 0..table.len() {
+        if table.word(row, quantity) != name {
+            continue;
+        }
+        of_speed += 1;
+        let Some(number) = table.number(row, value)? else {
+            absent += 1;
+            continue;
+        };
+        let ns = times.ns(table, row, last)?;
+        if last == Some(ns) {
+            repeated += 1;
+            continue;
+        }
+        last = Some(ns);
+        speeds.push(Speed {
+            ns,
+            mps: number * factor.mps(),
+            sigma_mps: None,
+        });
+    }
+    left_out(&mut notes, of_speed, absent, repeated);
+    enough(&table.path, &speeds)?;
+    Ok(DriveLog {
+        format: Format::TallTable,
+        clock: times.clock,
+        speeds,
+        yaw_rates: Vec::new(),
+        notes,
+    })
+}
+
+/// The quantity that is the vehicle's speed, and its unit.
+fn chosen(
+    table: &Table,
+    quantity: &Column,
+    unit: Option<&Column>,
+    options: &ReadOptions,
+) -> Result<(String, Option<SpeedUnit>)> {
+    let mut found: BTreeMap<&str, Option<SpeedUnit>> = BTreeMap::new();
+    for row in 0..table.len() {
+        let own = unit.and_then(|c| table.word(row, c).parse().ok());
+        found.entry(table.word(row, quantity)).or_insert(own);
+    }
+    let named = |name: &str| found.get(name).map(|unit| (name.to_owned(), *unit));
+    let missing = |problem: String| Error::NoSpeed {
+        path: table.path.clone(),
+        problem: format!(
+            "{problem}; measured are: {}",
+            found.keys().copied().collect::<Vec<_>>().join(", ")
+        ),
+    };
+    if let Some(name) = &options.speed {
+        return named(name).ok_or_else(|| missing(format!("nothing is called '{name}'")));
+    }
+    // A speed in another language is known by its unit alone, if it is the only one.
+    let ranked = found.iter().filter_map(|(name, unit)| {
+        Some((unit.is_none(), speed_rank(&name.to_lowercase())?, *name))
+    });
+    match ranked.min() {
+        Some((_, _, name)) => named(name).ok_or_else(|| missing("no speed".into())),
+        None => Err(missing(
+            "nothing measured looks like the vehicle's speed".into(),
+        )),
+    }
+}

@@ -1,0 +1,67 @@
+//! Speeds from a receiver's fixes.
+
+use crate::error::{Error, Result};
+use crate::log::{Clock, DriveLog, Format, Speed};
+use deepfusion_motion::{Fix, speeds_of_fixes};
+use std::path::Path;
+
+/// A fix and its time in nanoseconds; the fix's own time is not set.
+pub(crate) struct TimedFix {
+    pub(crate) ns: i64,
+    pub(crate) fix: Fix,
+}
+
+/// The speeds of fixes with dates: as the receiver measured them where every fix has one, else from the smoothed positions.
+///
+/// # Errors
+/// [`Error::NoSpeed`] where fewer than two fixes have a neighbour.
+pub(crate) fn log_of_fixes(path: &Path, format: Format, timed: &[TimedFix]) -> Result<DriveLog> {
+    let origin = timed.first().map_or(0, |t| t.ns);
+    let fixes = timed.iter().map(|t| Fix {
+        time_s: (i128::from(t.ns) - i128::from(origin)) as f64 * 1e-9,
+        ..t.fix
+    });
+    let fixes: Vec<Fix> = fixes.collect();
+    let smoothed = speeds_of_fixes(&fixes);
+    if smoothed.len() < 2 {
+        return Err(Error::NoSpeed {
+            path: path.to_owned(),
+            problem: format!(
+                "{} fixes with a time, at least two in ten seconds are needed",
+                fixes.len()
+            ),
+        });
+    }
+    let measured = fixes.iter().all(|f| f.speed_mps.is_some());
+    let mut notes = Vec::new();
+    if smoothed.len() < fixes.len() {
+        let lost = fixes.len() - smoothed.len();
+        notes.push(format!(
+            "{lost} of {} fixes stand alone or go back in time and are left out",
+            fixes.len()
+        ));
+    }
+    let mut sigmas: Vec<f64> = smoothed.iter().map(|s| s.sigma_mps).collect();
+    sigmas.sort_by(f64::total_cmp);
+    let from = if measured {
+        "as the receiver measured them"
+    } else {
+        "from its positions, smoothed"
+    };
+    notes.push(format!(
+        "speeds {from}, sure to {:.2} m/s in the middle",
+        sigmas[sigmas.len() / 2]
+    ));
+    let speeds = smoothed.iter().map(|s| Speed {
+        ns: origin + (s.time_s * 1e9).round() as i64,
+        mps: s.speed_mps,
+        sigma_mps: Some(s.sigma_mps),
+    });
+    Ok(DriveLog {
+        format,
+        clock: Clock::Date,
+        speeds: speeds.collect(),
+        yaw_rates: Vec::new(),
+        notes,
+    })
+}

@@ -1,0 +1,311 @@
+//! One log of each kind, of one drive whose speeds and turns are known (`reference/make_logs.py`), read back; and damaged ones.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+use deepfusion_logs::{Clock, DriveLog, Format, ReadOptions, SpeedUnit, read};
+use std::path::{Path, PathBuf};
+
+/// 2026-05-01 12:00:00 UTC.
+const NOON_NS: i64 = 1_777_636_800_000_000_000;
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/reference")
+        .join(name)
+}
+
+fn plain(name: &str) -> DriveLog {
+    read(&fixture(name), &ReadOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+fn true_speed(t: f64) -> f64 {
+    8.0 + 3.0 * (0.4 * t).sin()
+}
+
+fn true_yaw_rate(t: f64) -> f64 {
+    0.3 * (0.5 * t).sin()
+}
+
+/// Seconds of the drive, whose first moment is `origin_ns` on the log's clock.
+fn seconds(ns: i64, origin_ns: i64) -> f64 {
+    (ns - origin_ns) as f64 * 1e-9
+}
+
+#[track_caller]
+fn speeds_are_true(log: &DriveLog, origin_ns: i64, count: usize, tolerance: f64) {
+    assert_eq!(log.speeds.len(), count, "{:?}", log.notes);
+    for pair in log.speeds.windows(2) {
+        assert!(pair[0].ns < pair[1].ns);
+    }
+    for speed in &log.speeds {
+        let expected = true_speed(seconds(speed.ns, origin_ns));
+        assert!(
+            (speed.mps - expected).abs() <= tolerance,
+            "{speed:?}, truly {expected}"
+        );
+    }
+}
+
+#[test]
+fn a_track_without_speeds_is_smoothed() {
+    let log = plain("phone.gpx");
+    assert_eq!((log.format, log.clock), (Format::Gpx, Clock::Date));
+    assert_eq!(log.speeds.len(), 13);
+    // One position a second of a speed that swings by 3 m/s in 16 s: the ends have neighbours on one side only.
+    for (i, speed) in log.speeds.iter().enumerate() {
+        let error = (speed.mps - true_speed(seconds(speed.ns, NOON_NS))).abs();
+        let sigma = speed.sigma_mps.unwrap();
+        assert!(error < 1.5 * sigma, "{i}: {error}, sigma {sigma}");
+        assert!(error < 0.6 || !(2..11).contains(&i), "{i}: {error}");
+    }
+}
+
+#[test]
+fn torque_has_the_vehicles_speed_and_a_receivers() {
+    let log = plain("torque.csv");
+    assert_eq!((log.format, log.clock), (Format::Table, Clock::LocalDate));
+    // Five of the 25 rows have no answer of the vehicle; the receiver's speed, a metre a second more, is not taken.
+    speeds_are_true(&log, NOON_NS, 20, 1e-3);
+    let notes = log.notes.join("\n");
+    for said in [
+        "'Device Time'",
+        "'Speed (OBD)(km/h)' in km/h",
+        "5 of 25 rows hold no speed",
+        "the header stands 1 times more",
+    ] {
+        assert!(notes.contains(said), "{said}: {notes}");
+    }
+    let receiver = ReadOptions {
+        speed: Some("GPS Speed (Meters/second)".into()),
+        ..ReadOptions::default()
+    };
+    let log = read(&fixture("torque.csv"), &receiver).unwrap();
+    assert!((log.speeds[0].mps - 9.0).abs() < 1e-9);
+}
+
+#[test]
+fn car_scanner_has_a_value_a_row_and_decimal_commas() {
+    let log = plain("car_scanner.csv");
+    assert_eq!((log.format, log.clock), (Format::TallTable, Clock::Free));
+    speeds_are_true(&log, 43_200_250_000_000, 49, 1e-4);
+    assert!(
+        log.notes[0].contains("'Vehicle speed' in mph"),
+        "{:?}",
+        log.notes
+    );
+}
+
+#[test]
+fn sensor_logger_has_turns_too() {
+    let log = plain("sensor_logger");
+    assert_eq!((log.format, log.clock), (Format::ExportFolder, Clock::Date));
+    speeds_are_true(&log, NOON_NS, 13, 1e-3);
+    assert_eq!(log.speeds[0].sigma_mps, Some(0.3));
+    assert_eq!(log.yaw_rates.len(), 301);
+    for turn in &log.yaw_rates {
+        let expected = true_yaw_rate(seconds(turn.ns, NOON_NS));
+        assert!(
+            (turn.radps - expected).abs() < 1e-4,
+            "{turn:?}, truly {expected}"
+        );
+    }
+    assert!(
+        log.notes.iter().any(|n| n.contains("turned round")),
+        "gravity points down there: {:?}",
+        log.notes
+    );
+}
+
+#[test]
+fn phyphox_counts_from_its_start() {
+    let log = plain("phyphox.csv");
+    assert_eq!(log.clock, Clock::Free);
+    speeds_are_true(&log, 0, 13, 1e-6);
+}
+
+#[test]
+fn gnss_logger_is_read_from_its_satellites_alone() {
+    let log = plain("gnss_log.txt");
+    assert_eq!((log.format, log.clock), (Format::GnssLogger, Clock::Date));
+    speeds_are_true(&log, NOON_NS, 13, 1e-4);
+    assert_eq!(log.speeds[3].sigma_mps, Some(0.2));
+}
+
+#[test]
+fn a_table_of_anybodys_needs_to_be_told_its_columns() {
+    let path = fixture("german.csv");
+    let error = read(&path, &ReadOptions::default())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("no column looks like a time; its columns: Zeitpunkt, Fahrt, Bemerkung"),
+        "{error}"
+    );
+    let mut options = ReadOptions {
+        time: Some("zeitpunkt".into()),
+        ..ReadOptions::default()
+    };
+    let error = read(&path, &options).unwrap_err().to_string();
+    assert!(error.contains("no column looks like a speed"), "{error}");
+    options.speed = Some("Fahrt".into());
+    let error = read(&path, &options).unwrap_err().to_string();
+    assert!(
+        error.contains("nothing says the unit of the speed in column 'Fahrt'"),
+        "{error}"
+    );
+    options.unit = Some(SpeedUnit::Knots);
+    let log = read(&path, &options).unwrap();
+    assert_eq!(log.clock, Clock::LocalDate);
+    speeds_are_true(&log, NOON_NS, 61, 1e-4);
+    options.speed = Some("Tempo".into());
+    let error = read(&path, &options).unwrap_err().to_string();
+    assert!(error.contains("no column 'Tempo'"), "{error}");
+}
+
+#[test]
+fn can_traces_of_both_kinds_are_the_same() {
+    let mut options = ReadOptions {
+        dbc: Some(fixture("vehicle.dbc")),
+        ..ReadOptions::default()
+    };
+    let error = read(&fixture("candump.log"), &options)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("WheelSpeeds.VehicleSpeed"), "{error}");
+    options.speed = Some("WheelSpeeds.VehicleSpeed".into());
+    let candump = read(&fixture("candump.log"), &options).unwrap();
+    assert_eq!(
+        (candump.format, candump.clock),
+        (Format::CanTrace, Clock::Date)
+    );
+    // Half of the signal's step of 0.01 km/h.
+    speeds_are_true(&candump, NOON_NS, 121, 0.0015);
+    let vector = read(&fixture("vector.asc"), &options).unwrap();
+    assert_eq!(vector.clock, Clock::Free);
+    speeds_are_true(&vector, vector.speeds[0].ns, 121, 0.0015);
+    let error = read(&fixture("candump.log"), &ReadOptions::default())
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("a DBC file does"), "{error}");
+}
+
+#[test]
+fn a_gopros_video_holds_its_own_log() {
+    let log = plain("gopro.mp4");
+    assert_eq!((log.format, log.clock), (Format::Gpmf, Clock::Video));
+    // The first of twelve seconds has no fix. GPS5 counts speed in millimetres a second.
+    speeds_are_true(&log, 0, 110, 6e-4);
+    assert_eq!(log.yaw_rates.len(), 600);
+    for turn in &log.yaw_rates {
+        let expected = true_yaw_rate(seconds(turn.ns, 0));
+        assert!(
+            (turn.radps - expected).abs() < 5e-4,
+            "{turn:?}, truly {expected}"
+        );
+    }
+}
+
+/// A copy of a fixture with its text changed.
+fn changed(name: &str, change: impl Fn(&str) -> String) -> String {
+    let text = std::fs::read_to_string(fixture(name)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, change(&text)).unwrap();
+    read(&path, &ReadOptions::default())
+        .unwrap_err()
+        .to_string()
+}
+
+#[test]
+fn damaged_logs_are_named_by_line_and_column() {
+    for (name, from, to, expected) in [
+        (
+            "torque.csv",
+            ",30.946,",
+            ",fast,",
+            "torque.csv:3: column Speed (OBD)(km/h): 'fast' is not a number",
+        ),
+        (
+            "torque.csv",
+            "01-May-2026 12:00:01.000",
+            "sometime",
+            "torque.csv:4: column Device Time: 'sometime' is not a time",
+        ),
+        (
+            "torque.csv",
+            "01-May-2026 12:00:01.000",
+            "01-May-2026 11:59:59.000",
+            "torque.csv:4: column Device Time: '01-May-2026 11:59:59.000' is 1.5 s before",
+        ),
+        (
+            "torque.csv",
+            ",30.946,1800",
+            "",
+            "torque.csv:3: any: 7 values, the header has 9",
+        ),
+        (
+            "torque.csv",
+            "Speed (OBD)(km/h)",
+            "Speed (OBD)",
+            "GPS Speed",
+        ),
+        (
+            "phyphox.csv",
+            "1.000000000E+00,",
+            "one,",
+            "phyphox.csv:3: column Time (s): 'one' is not a time",
+        ),
+        (
+            "gnss_log.txt",
+            "9.16826",
+            "9.1x",
+            "gnss_log.txt:9: Fix, speedmps: '9.1x' is not a number",
+        ),
+        (
+            "car_scanner.csv",
+            "Vehicle speed",
+            "Wheel turns",
+            "nothing measured looks like the vehicle's speed; measured are: Average speed, Engine RPM, Wheel turns",
+        ),
+    ] {
+        if name == "torque.csv" && from == "Speed (OBD)(km/h)" {
+            // Without its unit the vehicle's speed gives way to the receiver's, and the note says so.
+            let text = std::fs::read_to_string(fixture(name))
+                .unwrap()
+                .replace(from, to);
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            let log = read(&path, &ReadOptions::default()).unwrap();
+            assert!(log.notes[0].contains(expected), "{:?}", log.notes);
+            continue;
+        }
+        let error = changed(name, |text| text.replace(from, to));
+        assert!(error.contains(expected), "{error}, not {expected}");
+    }
+}
+
+#[test]
+fn a_video_that_was_cut_off_says_where() {
+    let bytes = std::fs::read(fixture("gopro.mp4")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cut.mp4");
+    for length in (0..bytes.len()).step_by(97) {
+        std::fs::write(&path, &bytes[..length]).unwrap();
+        let error = read(&path, &ReadOptions::default())
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("cut.mp4"), "{length}: {error}");
+    }
+    // Bytes spoilt anywhere are an error or another number, never a panic.
+    for at in (0..bytes.len()).step_by(13) {
+        let mut spoilt = bytes.clone();
+        spoilt[at] ^= 0xa5;
+        std::fs::write(&path, &spoilt).unwrap();
+        let _ = read(&path, &ReadOptions::default());
+    }
+}
