@@ -420,9 +420,10 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// Why a ROS 2 bag is no recording here.
-pub(crate) const WITHOUT_ROS2: &str = match cfg!(feature = "ros2") {
-    true => "",
-    false => ", and this program was built without the feature `ros2`",
+pub(crate) const WITHOUT_ROS2: &str = if cfg!(feature = "ros2") {
+    ""
+} else {
+    ", and this program was built without the feature `ros2`"
 };
 
 /// The layouts that are told apart, in the order in which they are looked for.

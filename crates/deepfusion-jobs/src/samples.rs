@@ -56,9 +56,10 @@ pub fn open_samples(
             warn(SampleWarning::Speed(dataset.name().to_owned(), warning));
         }
     }
-    let validation = match validates(config) {
-        true => Some(open_part(config, Part::Validation, opened)?),
-        false => None,
+    let validation = if validates(config) {
+        Some(open_part(config, Part::Validation, opened)?)
+    } else {
+        None
     };
     let apart = validation.is_some();
     let (train, validation, skipped) = SampleSet::split_sets(config, train, validation)?;

@@ -36,12 +36,13 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
             .filter(|n| n.to_lowercase().contains("speed"))
             .take(12)
             .collect();
-        missing(&match names.is_empty() {
-            true => "nothing says which signal is the speed".to_owned(),
-            false => format!(
+        missing(&if names.is_empty() {
+            "nothing says which signal is the speed".to_owned()
+        } else {
+            format!(
                 "nothing says which signal is the speed; by their names: {}",
                 names.join(", ")
-            ),
+            )
         })
     })?;
     let signal = dbc.signal(name)?;
@@ -108,12 +109,11 @@ fn frames(path: &Path, text: &str) -> Result<(Vec<Frame>, Clock)> {
     let mut frames = Vec::new();
     let mut decimal = false;
     for (index, line) in text.lines().enumerate() {
-        let parsed = match is_asc {
-            true => {
-                decimal |= line.trim().to_ascii_lowercase().starts_with("base dec");
-                asc(line, decimal)
-            }
-            false => candump(line),
+        let parsed = if is_asc {
+            decimal |= line.trim().to_ascii_lowercase().starts_with("base dec");
+            asc(line, decimal)
+        } else {
+            candump(line)
         };
         match parsed {
             None => {}

@@ -92,9 +92,10 @@ pub(crate) fn clock_of(word: &str, style: TimeStyle) -> Clock {
         TimeStyle::Date => Clock::LocalDate,
         TimeStyle::Number(unit_ns) => {
             let seconds = word.parse::<f64>().unwrap_or(0.0) * unit_ns as f64 * 1e-9;
-            match EPOCH_S.contains(&seconds) {
-                true => Clock::Date,
-                false => Clock::Free,
+            if EPOCH_S.contains(&seconds) {
+                Clock::Date
+            } else {
+                Clock::Free
             }
         }
     }
@@ -132,9 +133,10 @@ fn number_ns(word: &str, unit_ns: i64) -> Option<i64> {
         return (value.abs() < 9e18).then_some(value.round() as i64);
     }
     let whole = whole.parse::<i64>().ok()?.checked_mul(unit_ns)?;
-    let part = match fraction.is_empty() {
-        true => 0.0,
-        false => format!("0.{fraction}").parse::<f64>().ok()? * unit_ns as f64,
+    let part = if fraction.is_empty() {
+        0.0
+    } else {
+        format!("0.{fraction}").parse::<f64>().ok()? * unit_ns as f64
     };
     let value = whole.checked_add(part.round() as i64)?;
     Some(if negative { -value } else { value })

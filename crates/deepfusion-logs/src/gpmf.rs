@@ -80,19 +80,16 @@ pub(crate) fn read(path: &Path) -> Result<DriveLog> {
     } else {
         &found.accelerations
     };
-    let yaw_rates = match found.rates.is_empty() || up.is_empty() {
-        true => {
-            notes.push(
-                "no gyroscope with an accelerometer beside it: how the vehicle turned is unknown"
-                    .into(),
-            );
-            Vec::new()
-        }
-        false => {
-            let (turns, note) = yaw_rates(&found.rates, up, &courses(&found.places, &found.speeds));
-            notes.push(note);
-            turns
-        }
+    let yaw_rates = if found.rates.is_empty() || up.is_empty() {
+        notes.push(
+            "no gyroscope with an accelerometer beside it: how the vehicle turned is unknown"
+                .into(),
+        );
+        Vec::new()
+    } else {
+        let (turns, note) = yaw_rates(&found.rates, up, &courses(&found.places, &found.speeds));
+        notes.push(note);
+        turns
     };
     Ok(DriveLog {
         format: Format::Gpmf,

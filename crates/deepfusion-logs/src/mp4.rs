@@ -181,9 +181,12 @@ impl Inside<'_> {
             Some(offsets) => (offsets, false),
             None => (needed(b"co64", "stco")?, true),
         };
-        let offset = |chunk: usize| match wide {
-            true => offsets.u64(8 + 8 * chunk),
-            false => offsets.u32(8 + 4 * chunk).map(u64::from),
+        let offset = |chunk: usize| {
+            if wide {
+                offsets.u64(8 + 8 * chunk)
+            } else {
+                offsets.u32(8 + 4 * chunk).map(u64::from)
+            }
         };
         let chunks = offsets.u32(4)? as usize;
         let mut begins = durations.starts(count, scale)?;

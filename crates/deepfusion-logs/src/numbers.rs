@@ -20,10 +20,11 @@ pub(crate) fn cell(word: &str, decimal_comma: bool) -> Cell {
     ) {
         return Cell::Absent;
     }
-    let text = match decimal_comma && word.contains(',') {
+    let text = if decimal_comma && word.contains(',') {
         // 1.234,5: points part the thousands.
-        true => word.replace('.', "").replacen(',', ".", 1),
-        false => word.to_owned(),
+        word.replace('.', "").replacen(',', ".", 1)
+    } else {
+        word.to_owned()
     };
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Cell::Number(value),

@@ -64,9 +64,10 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
         gnss_logger::read(path, &text)
     } else {
         let table = Table::parse(path, &text, 1)?;
-        match tall_table::is_one(&table) {
-            true => tall_table::read(&table, options),
-            false => of_table(&table, options),
+        if tall_table::is_one(&table) {
+            tall_table::read(&table, options)
+        } else {
+            of_table(&table, options)
         }
     }
 }

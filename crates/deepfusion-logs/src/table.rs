@@ -112,9 +112,10 @@ impl Table {
     pub(crate) fn plain_word(&self, row: usize, column: &Column) -> String {
         let word = self.word(row, column).trim_matches('"').trim();
         let is_number = |b: u8| b.is_ascii_digit() || b"+-.,".contains(&b);
-        match self.decimal_comma && word.contains(',') && word.bytes().all(is_number) {
-            true => word.replace('.', "").replacen(',', ".", 1),
-            false => word.to_owned(),
+        if self.decimal_comma && word.contains(',') && word.bytes().all(is_number) {
+            word.replace('.', "").replacen(',', ".", 1)
+        } else {
+            word.to_owned()
         }
     }
 

@@ -31,10 +31,10 @@ fn library_is_here() -> bool {
             true
         }
         Err(error) => {
-            let error = error.hint().unwrap();
+            let hint = error.hint().unwrap();
             assert!(
-                error.contains("ORT_DYLIB_PATH") || error.contains("1.17"),
-                "{error}"
+                hint.contains("ORT_DYLIB_PATH") || hint.contains("1.17"),
+                "{hint}"
             );
             let loaded = OrtEngine::load(None, &write(&model(1)).unwrap(), 1);
             assert_eq!(loaded.unwrap_err().to_string(), error.to_string());

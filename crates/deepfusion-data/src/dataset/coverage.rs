@@ -48,11 +48,10 @@ impl Split {
             if of_kinds.contains(&place) || !listed.insert(place) {
                 continue;
             }
-            match here.contains(&place) {
-                true => found += 1,
-                false => {
-                    missing.get_or_insert_with(|| entry.to_string());
-                }
+            if here.contains(&place) {
+                found += 1
+            } else {
+                missing.get_or_insert_with(|| entry.to_string());
             }
         }
         let absent = |name: &&String| datasets.iter().all(|d| d.scenario() != Some(name.as_str()));

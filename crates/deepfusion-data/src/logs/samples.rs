@@ -30,9 +30,10 @@ impl Samples {
         let mut steps: Vec<f64> = steps.collect();
         steps.sort_by(f64::total_cmp);
         let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-        let most = most.unwrap_or(match usual > SLOW_S {
-            true => (3.0 * usual).min(MOST_BRIDGED_S),
-            false => MAX_GAP_S,
+        let most = most.unwrap_or(if usual > SLOW_S {
+            (3.0 * usual).min(MOST_BRIDGED_S)
+        } else {
+            MAX_GAP_S
         });
         let (mut ns, mut values) = (Vec::new(), Vec::new());
         let (mut filled, mut longest, mut left) = (0, 0.0_f64, 0);

@@ -74,14 +74,15 @@ pub fn expected_frames(
         return Ok(None);
     };
     let coverage = split.coverage(datasets);
-    match strict && !coverage.is_complete() {
-        true => Err(Error::Incomplete {
+    if strict && !coverage.is_complete() {
+        Err(Error::Incomplete {
             split: split.path.clone(),
             found: coverage.found,
             expected: coverage.expected,
             what: "are in the recordings given",
-        }),
-        false => Ok(Some(coverage.expected)),
+        })
+    } else {
+        Ok(Some(coverage.expected))
     }
 }
 

@@ -32,9 +32,10 @@ pub use self::truth::{
 #[must_use]
 pub fn default_crop(datasets: &[Dataset]) -> Crop {
     let kitti = |d: &Dataset| d.kind() == DatasetKind::KittiRaw;
-    match datasets.iter().all(kitti) {
-        true => Crop::Garg,
-        false => Crop::None,
+    if datasets.iter().all(kitti) {
+        Crop::Garg
+    } else {
+        Crop::None
     }
 }
 

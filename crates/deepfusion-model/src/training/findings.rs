@@ -80,9 +80,10 @@ impl TrainFindings {
     pub(crate) fn to_toml(&self) -> Result<String, toml::ser::Error> {
         let mut table = Table::new();
         self.put_into(&mut table)?;
-        match table.is_empty() {
-            true => Ok(String::new()),
-            false => Ok(format!("\n{}", toml::to_string_pretty(&table)?)),
+        if table.is_empty() {
+            Ok(String::new())
+        } else {
+            Ok(format!("\n{}", toml::to_string_pretty(&table)?))
         }
     }
 

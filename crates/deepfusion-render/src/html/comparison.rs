@@ -55,9 +55,10 @@ fn add_table(page: HtmlReport, table: &Table) -> HtmlReport {
     if !table.notes.is_empty() {
         page = page.note(&table.notes.join(" "));
     }
-    match footnotes.is_empty() {
-        true => page,
-        false => page.list(&footnotes),
+    if footnotes.is_empty() {
+        page
+    } else {
+        page.list(&footnotes)
     }
 }
 

@@ -70,9 +70,12 @@ pub fn run(args: &AblateArgs) -> Result<()> {
     // Every row is looked at before the first trains for hours.
     let configs = plan.rows.iter().map(|row| row.config(&plan.config));
     let configs = configs.collect::<Result<Vec<_>, _>>()?;
-    open_samples(&configs[0]).map_err(|error| match args.resume {
-        true => resume::where_recordings_are(error, &configs[0], &out),
-        false => error,
+    open_samples(&configs[0]).map_err(|error| {
+        if args.resume {
+            resume::where_recordings_are(error, &configs[0], &out)
+        } else {
+            error
+        }
     })?;
     open_eval_data(&plan)?;
     write(&out.join(PLAN), &toml::to_string_pretty(&plan)?)?;

@@ -414,9 +414,10 @@ impl<'a> Job<'a> {
         let (args, image, prediction) = (self.args, &loaded.image, &seen.prediction);
         let depth = prediction.depth();
         let has_sigma = |save: &Save| *save == Save::Sigma || save.is_cloud();
-        let sigma = match self.outputs.save.iter().any(has_sigma) {
-            true => intervals::sigma(prediction, &depth, &self.intervals),
-            false => None,
+        let sigma = if self.outputs.save.iter().any(has_sigma) {
+            intervals::sigma(prediction, &depth, &self.intervals)
+        } else {
+            None
         };
         let mut files = Vec::new();
         for save in &self.outputs.save {

@@ -10,7 +10,7 @@ use crate::progress::say;
 /// `deepfusion weights pack`.
 pub fn run(args: &PackArgs) -> Result<()> {
     let options = PackOptions {
-        checkpoint: args.checkpoint.map(Into::into),
+        checkpoint: args.checkpoint,
         name: args.name.clone(),
         note: args.note.clone(),
         recipe: args.recipe.clone(),

@@ -83,9 +83,10 @@ impl<'de> Deserialize<'de> for SignalConfig {
                 self,
                 name: &str,
             ) -> std::result::Result<Self::Value, E> {
-                match name.is_empty() {
-                    true => Err(E::invalid_length(0, &self)),
-                    false => Ok(SignalConfig::Named(name.to_owned())),
+                if name.is_empty() {
+                    Err(E::invalid_length(0, &self))
+                } else {
+                    Ok(SignalConfig::Named(name.to_owned()))
                 }
             }
 

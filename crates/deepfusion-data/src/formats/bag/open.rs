@@ -115,9 +115,10 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
     };
     let recording = BagRecording {
         streams: streams(bag.as_ref(), &topics, &index)?,
-        folder: match path.is_dir() {
-            true => path.to_owned(),
-            false => path.parent().unwrap_or(path).to_owned(),
+        folder: if path.is_dir() {
+            path.to_owned()
+        } else {
+            path.parent().unwrap_or(path).to_owned()
         },
         bag: Arc::clone(&bag),
         topics,

@@ -157,12 +157,13 @@ impl Recording for BagRecording {
                 });
             }
         }
-        match paths.is_empty() {
-            true => Err(Error::NoPath {
+        if paths.is_empty() {
+            Err(Error::NoPath {
                 drive: dataset.name().to_owned(),
                 layout: self.kind().label(),
-            }),
-            false => Ok(paths),
+            })
+        } else {
+            Ok(paths)
         }
     }
 }

@@ -85,9 +85,10 @@ impl BagScans {
             return Se3::identity();
         };
         let earlier_from_later = motion.camera0_from_camera1(&self.cam_from_vehicle);
-        match frame_s <= scan_s {
-            true => earlier_from_later,
-            false => earlier_from_later.inverse(),
+        if frame_s <= scan_s {
+            earlier_from_later
+        } else {
+            earlier_from_later.inverse()
         }
     }
 
