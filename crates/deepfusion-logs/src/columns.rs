@@ -73,23 +73,19 @@ const SPEED_WORDS: [&str; 7] = [
     "velocità",
     "скорость",
 ];
-const OTHER_QUANTITIES: [&str; 15] = [
+const OTHER_QUANTITIES: [&str; 9] = [
     "average",
-    "avg",
-    "mean",
-    "max",
-    "min",
+    "maximum",
+    "minimum",
     "limit",
-    "wind",
-    "fan",
     "engine",
-    "rpm",
     "accuracy",
-    "turbine",
     "vertical",
     "durchschnitt",
     "средн",
 ];
+/// The same where they are words of their own: "Geschwindigkeit" has wind in it.
+const OTHER_WORDS: [&str; 8] = ["avg", "mean", "max", "min", "wind", "fan", "rpm", "turbine"];
 
 impl Column {
     pub(crate) fn parse(index: usize, header: &str) -> Self {
@@ -135,7 +131,9 @@ pub(crate) fn speed_rank(name: &str) -> Option<usize> {
         return Some(100 + rank);
     }
     let speaks_of_speed = SPEED_WORDS.iter().any(|w| name.contains(w));
-    let of_another = OTHER_QUANTITIES.iter().any(|w| name.contains(w));
+    let words = || name.split(|c: char| !c.is_alphanumeric());
+    let of_another = OTHER_QUANTITIES.iter().any(|w| name.contains(w))
+        || OTHER_WORDS.iter().any(|w| words().any(|word| word == *w));
     let of_receiver = name.contains("gps") || name.contains("gnss");
     (speaks_of_speed && !of_another).then_some(if of_receiver { 150 } else { 50 })
 }

@@ -182,10 +182,11 @@ pub(crate) fn of_table(table: &Table, options: &ReadOptions) -> Result<DriveLog>
     };
     let mut notes = Vec::new();
     if table.repeated_headers > 0 {
-        notes.push(format!(
-            "the header stands {} times more among the rows",
-            table.repeated_headers
-        ));
+        let times = match table.repeated_headers {
+            1 => "once".to_owned(),
+            n => format!("{n} times"),
+        };
+        notes.push(format!("the header stands {times} more among the rows"));
     }
     let Some(column) = speed else {
         return positions(table, &times, notes);

@@ -75,7 +75,7 @@ fn torque_has_the_vehicles_speed_and_a_receivers() {
         "'Device Time'",
         "'Speed (OBD)(km/h)' in km/h",
         "5 of 25 rows hold no speed",
-        "the header stands 1 times more",
+        "the header stands once more",
     ] {
         assert!(notes.contains(said), "{said}: {notes}");
     }

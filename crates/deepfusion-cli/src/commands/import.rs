@@ -10,6 +10,11 @@ use crate::progress::say;
 
 /// `deepfusion data import`.
 pub fn run(args: &ImportArgs) -> Result<()> {
+    let named = [&args.video, &args.images, &args.calibration];
+    if let Some(path) = named.into_iter().flatten().find(|path| !path.exists()) {
+        let path = path.clone();
+        return Err(deepfusion_data::Error::NoSuchPath { path }.into());
+    }
     let log = merged(args)?;
     let start_ns = match &args.start {
         None => None,

@@ -1,0 +1,114 @@
+//! A drive whose speeds an app has logged: through `data import`, and read where it lies.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use support::{fails, json, ok};
+
+const DRIVE: &str = "sim/2026_01_01/2026_01_01_drive_0003_sync";
+
+/// A simulated drive's images, when they were taken, and its speeds as Torque writes them: the log's lines, and what the drive itself
+/// says.
+fn write_drive(at: &Path) -> (Vec<String>, Value) {
+    ok(
+        at,
+        "simulate --out sim --frames 24 --seed 3 --size 160x96 --scan-every 12",
+    );
+    let truth = json(at, "data inspect sim --json");
+    let drive = at.join(DRIVE);
+    fs::rename(drive.join("image_02/data"), at.join("images")).unwrap();
+    let stamps = fs::read_to_string(drive.join("image_02/timestamps.txt")).unwrap();
+    let seconds = |stamp: &str| {
+        // "2026-01-01 12:00:00.100245935"; noon is 1767268800.
+        let clock: Vec<f64> = stamp[11..]
+            .split(':')
+            .map(|part| part.parse().unwrap())
+            .collect();
+        1_767_225_600.0 + clock[0] * 3600.0 + clock[1] * 60.0 + clock[2]
+    };
+    let mut frames = "time_s,file\n".to_owned();
+    let mut log = vec!["GPS Time,Device Time, Longitude,Speed (OBD)(km/h)".to_owned()];
+    for (i, stamp) in stamps.lines().enumerate() {
+        frames += &format!("{:.6},{i:010}.png\n", seconds(stamp));
+        let oxts = fs::read_to_string(drive.join(format!("oxts/data/{i:010}.txt"))).unwrap();
+        let mps: f64 = oxts.split_whitespace().nth(8).unwrap().parse().unwrap();
+        // The phone's clock is an hour ahead of UTC; every fifth answer of the car is missing.
+        let clock = stamp[11..23].replacen("12:", "13:", 1);
+        let speed = if i % 5 == 4 {
+            "-".to_owned()
+        } else {
+            format!("{:.4}", mps * 3.6)
+        };
+        log.push(format!(
+            "Thu Jan 01 12:00:00 GMT+00:00 2026,01-Jan-2026 {clock},8.4,{speed}"
+        ));
+    }
+    fs::write(at.join("frames.csv"), frames).unwrap();
+    fs::write(at.join("torque.csv"), log.join("\n")).unwrap();
+    (log, truth)
+}
+
+#[test]
+fn a_log_beside_its_images_is_a_drive() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (log, truth) = write_drive(at);
+    let import = "data import torque.csv --zone +01:00 --images images --intrinsics 92.95,184.71,78.09,43.88";
+    let said = ok(at, &format!("{import} --out drive"));
+    assert!(
+        said.stderr
+            .contains("speed from column 'Speed (OBD)(km/h)' in km/h"),
+        "{}",
+        said.stderr
+    );
+    fs::copy(at.join("frames.csv"), at.join("drive/frames.csv")).unwrap();
+    let imported = json(at, "data inspect drive --json");
+    let mean = |inspection: &Value| inspection["speed_mps"]["mean"].as_f64().unwrap();
+    assert!(
+        (mean(&imported) - mean(&truth)).abs() < 0.02,
+        "{} {}",
+        mean(&imported),
+        mean(&truth)
+    );
+    let pairs = imported["drives"][0]["usable_pairs"].as_u64().unwrap();
+    assert!(pairs >= 20, "{imported}");
+
+    // The same log in the place of speed.csv, by dataset.toml alone; its clock is taken for UTC, so the frames are moved.
+    fs::create_dir(at.join("beside")).unwrap();
+    fs::copy(at.join("frames.csv"), at.join("beside/frames.csv")).unwrap();
+    let config = "images = \"../images\"\nspeed = \"../torque.csv\"\nintrinsics = [92.95, 184.71, 78.09, 43.88]\nstart_s = 1767272400.0\n";
+    fs::write(at.join("beside/dataset.toml"), config).unwrap();
+    let beside = json(at, "data inspect beside --json");
+    assert!((mean(&beside) - mean(&imported)).abs() < 1e-4);
+    let remarks = beside["drives"][0]["remarks"].to_string();
+    assert!(remarks.contains("taken for UTC"), "{remarks}");
+
+    fails(at, &format!("{import} --out drive"), &["speed.csv"]);
+    fails(
+        at,
+        "data import torque.csv --video none.mp4 --out x",
+        &["none.mp4"],
+    );
+    fails(at, "data import torque.csv --out x", &["neither a video"]);
+    fs::write(at.join("torque.csv"), log.join("\n").replace("(km/h)", "")).unwrap();
+    fails(
+        at,
+        "data import torque.csv --images images --out x",
+        &["nothing says the unit", "Speed (OBD)"],
+    );
+    fails(
+        at,
+        "data import torque.csv --time when --images images --out x",
+        &["no column 'when'", "Device Time"],
+    );
+    assert!(!at.join("x").exists());
+}
