@@ -1,6 +1,6 @@
 //! Errors of the library as Python's.
 
-use deepfusion::{data, eval, geometry, model, runtime, sim};
+use deepfusion::{data, eval, geometry, model, perception, runtime, sim, train};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
@@ -31,9 +31,32 @@ hinted!(
     eval::Error,
     geometry::cloud::Error,
     model::Error,
+    perception::Error,
     runtime::Error,
     sim::Error,
+    train::Error,
 );
+
+/// What went wrong and what to do about it, before the interpreter is at hand.
+pub struct Failure {
+    pub message: String,
+    pub hint: Option<String>,
+}
+
+impl<E: Hinted> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self {
+            message: error.to_string(),
+            hint: error.remedy(),
+        }
+    }
+}
+
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> Self {
+        with_hint(failure.message, failure.hint)
+    }
+}
 
 /// A library's error as an exception: its message, and its remedy as `hint` and as a note.
 pub fn raise(error: impl Hinted) -> PyErr {
