@@ -1,6 +1,6 @@
 //! Errors of the library as Python's.
 
-use deepfusion::{Hint, perception, train};
+use deepfusion::Hint;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 

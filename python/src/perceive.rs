@@ -54,6 +54,11 @@ impl Perception {
             true => PerceptionConfig::default(),
             false => PerceptionConfig::predicted(),
         };
+        // As the command does.
+        let base = PerceptionConfig {
+            parking_rows: true,
+            ..base
+        };
         let config = over(&base, settings)?;
         config.validate().map_err(raise)?;
         Ok(Self {
@@ -65,7 +70,7 @@ impl Perception {
         self.inner
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
-            .forget();
+            .reset();
     }
 
     #[pyo3(signature = (depth, intrinsics, sigma, time_s, world_from_cam, speed_mps, yaw_rate_radps))]
@@ -102,7 +107,7 @@ impl Perception {
             let (small, k) = working(&depth, &camera);
             let sigma = sigma.map(|sigma| working(&sigma, &camera).0);
             let mut perceiver = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-            perceiver.look_with_sigma(&small, sigma.as_ref(), &k, stamp, &[])
+            perceiver.detect_with_sigma(&small, sigma.as_ref(), &k, stamp, &[])
         });
         told(&found.map_err(raise)?, speed_mps, yaw_rate_radps)
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use deepfusion::data::{CameraChoice, Dataset, OpenOptions, Split};
+use deepfusion::data::{Cameras, Dataset, OpenOptions, Split};
 use deepfusion::model::{Compute, DepthNetConfig, Preset, RunFolder, TrainConfig};
 use deepfusion::runtime::{ModelSource, embedded_names};
 use deepfusion::train::log::{CsvLog, CsvRecord};
@@ -81,14 +81,14 @@ fn opened(asked: &Asked) -> Result<(Trainer, Vec<String>), Failure> {
     let device = Device::flex();
     if asked.resume {
         let folder = RunFolder::open(&asked.out)?.0;
-        let mut config = folder.read_config()?;
+        let mut config = folder.read_settings()?;
         for assignment in &asked.settings {
             config.set(assignment)?;
         }
         choose_data(&mut config, asked)?;
         config.validate()?;
         let (train, validation, skipped) = samples(&config)?;
-        folder.write_config(&config)?;
+        folder.write_config(&config, &folder.read_findings()?)?;
         let trainer = Trainer::resume(config, folder, (train, validation), &device)?;
         return Ok((trainer, skipped));
     }
@@ -107,11 +107,11 @@ fn opened(asked: &Asked) -> Result<(Trainer, Vec<String>), Failure> {
 fn configuration(asked: &Asked) -> Result<TrainConfig, Failure> {
     let preset = Preset::ALL
         .into_iter()
-        .find(|(_, name)| Path::new(name) == asked.config);
+        .find(|preset| Path::new(preset.name()) == asked.config);
     let mut config = match preset {
-        Some((preset, _)) => preset.config_on(Compute::Processor),
+        Some(preset) => preset.config_on(Compute::Processor),
         None if asked.config.extension().is_none() && !asked.config.exists() => {
-            let names: Vec<&str> = Preset::ALL.iter().map(|(_, name)| *name).collect();
+            let names: Vec<&str> = Preset::ALL.iter().map(|preset| preset.name()).collect();
             return Err(Failure {
                 message: format!("config: no preset `{}`", asked.config.display()),
                 hint: Some(format!(
@@ -206,8 +206,8 @@ fn recordings(
     camera_ahead_s: Option<f64>,
     set: usize,
 ) -> Result<Vec<(usize, Dataset)>, Failure> {
-    let camera: Result<CameraChoice, Failure> = match camera {
-        "" => Ok(CameraChoice::default()),
+    let camera: Result<Cameras, Failure> = match camera {
+        "" => Ok(Cameras::default()),
         text => text.parse().map_err(|_| Failure {
             message: format!("camera: `{text}`"),
             hint: Some("\"2\", \"3\" or \"both\"".into()),
@@ -246,7 +246,7 @@ impl Start {
         }
         if Preset::ALL
             .iter()
-            .all(|(_, name)| Path::new(name) != asked.config)
+            .all(|preset| Path::new(preset.name()) != asked.config)
         {
             return Ok(Self::Nothing);
         }
