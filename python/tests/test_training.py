@@ -166,8 +166,8 @@ def test_ctrl_c_ends_other_long_calls(street, tmp_path):
     out = tmp_path / "drive"
     code = """
         import sys, deepfusion
-        print("begun", flush=True)
         try:
+            print("begun", flush=True)
             deepfusion.simulate(sys.argv[1], frames=3000, size=(320, 96))
         except KeyboardInterrupt:
             print("interrupted", flush=True)
