@@ -1,35 +1,57 @@
 """Metric depth from one camera and a speed signal.
 
-Arrays are NumPy's. Depth is camera z in metres, 0 where there is none; images are H x W x 3, uint8, RGB.
+Arrays are NumPy's. Depth is camera z in metres, 0 where there is none; images are H x W x 3, uint8, RGB. A camera's axes are x right,
+y down, z ahead, in metres. Intrinsics are fx, fy, cx, cy in pixels of the image they are given with, (0, 0) the centre of the first one.
+A transform is named `target_from_source`.
+
+What the library cannot do raises `DeepFusionError`, whose `hint` says what to do about it. Long calls release the interpreter, and
+Ctrl-C ends them with KeyboardInterrupt.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from . import _native
-from ._native import Dataset, DeepFusionError, Frame, Model, Prediction, __version__
+from ._native import Dataset, DeepFusionError, Frame, Model, Prediction, Predictions, __version__
+from ._perceive import Collision, Ground, Perception, Surroundings, Target, perceive
+from ._snippets import Snippets
+from ._train import Run, TrainEvent, train
 
 __all__ = [
+    "Collision",
     "Dataset",
     "DeepFusionError",
     "Frame",
+    "Ground",
     "Model",
+    "Perception",
     "Prediction",
+    "Predictions",
+    "Run",
+    "Snippets",
+    "Surroundings",
+    "Target",
+    "TrainEvent",
     "doctor",
     "evaluate",
     "load",
     "networks",
+    "perceive",
     "simulate",
+    "train",
     "__version__",
 ]
 
 
-def load(model: Any = "street", *, precision: str = "f32", data_set: str | None = None) -> Model:
+def load(
+    model: str | PathLike[str] = "street", *, precision: str = "f32", data_set: str | None = None
+) -> Model:
     """A trained network: a run's folder, a checkpoint in it, a packed file, or the name of an embedded one (`networks()`).
 
     `precision` is "f32", or "bf16" on processors with AMX or AVX512-BF16. `data_set` names one of the data sets that a run
@@ -56,7 +78,8 @@ def evaluate(
     """The field's seven metrics, unscaled and median-scaled: what `deepfusion eval --json` prints.
 
     `predictions` are H x W arrays of metres (`kind="depth"`) or of 1/m (`kind="disparity"`), of any size; `ground_truth`
-    H x W arrays of metres, 0 where nothing was measured. `crop` is "none" or "garg".
+    H x W arrays of metres, 0 where nothing was measured. `crop` is "none" or "garg"; what is measured lies between `min_depth`
+    and `cap` metres.
     """
     if len(predictions) != len(ground_truth):
         raise ValueError(f"{len(predictions)} predictions for {len(ground_truth)} images of ground truth")
@@ -72,7 +95,7 @@ def evaluate(
 
 
 def simulate(
-    out: Any,
+    out: str | PathLike[str],
     *,
     frames: int = 100,
     seed: int = 1,
@@ -81,11 +104,14 @@ def simulate(
     size: tuple[int, int] = (640, 192),
     scan_every: int = 1,
 ) -> str:
-    """Writes a simulated drive with exact depth in KITTI's layout into `out`, and gives the drive's folder."""
+    """Writes a simulated drive with exact depth in KITTI's layout into `out`, new or empty, and gives the drive's folder.
+
+    `size` is width and height in pixels; `scan_every` says which frames have a LiDAR scan, 0 none. Ctrl-C leaves `out` as it was.
+    """
     width, height = size
     return _native.simulate(out, frames, seed, scene, moving_cars, width, height, scan_every)
 
 
-def doctor(path: Any) -> dict[str, Any]:
-    """Every reason why training on a recording would fail or give a wrong scale: `deepfusion doctor PATH`."""
+def doctor(path: str | PathLike[str]) -> dict[str, Any]:
+    """Every reason why training on a recording would fail or give a wrong scale: what `deepfusion doctor PATH --json` prints."""
     return json.loads(_native.doctor(path))

@@ -1,4 +1,4 @@
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from os import PathLike
 from typing import Any
 
@@ -29,6 +29,9 @@ class Prediction:
     @property
     def intrinsics(self) -> Intrinsics | None:
         """fx, fy, cx, cy of the image, where they are known."""
+    def __dlpack__(self, **options: Any) -> Any:
+        """`depth`'s: `torch.from_dlpack(prediction)` shares its memory."""
+    def __dlpack_device__(self) -> tuple[int, int]: ...
     def cloud(self, max_depth: float = 80.0) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
         """Points N x 3 in metres (x right, y down, z ahead) and their colours N x 3; needs `intrinsics`."""
 
@@ -43,8 +46,22 @@ class Model:
         focal_correction: bool = True,
         stretch: bool = False,
     ) -> Prediction:
-        """Depth of an H x W x 3 array (uint8, RGB), a PIL image, or a file. Without `intrinsics` a file's EXIF is asked, then
-        the lens of the training camera is assumed, and the metres are as right as that."""
+        """Depth of an H x W x 3 array (uint8, RGB; NumPy's, or another's on the processor by DLPack), a PIL image, or a file. Without
+        `intrinsics` a file's EXIF is asked, then the lens of the training camera is assumed, and the metres are as right as that.
+
+        `focal_correction` multiplies depth for a focal length other than the one trained with; `stretch` shows the network the whole
+        image where it would be cut to the aspect ratio trained with."""
+    def predict_many(
+        self,
+        images: Iterable[NDArray[np.uint8] | str | PathLike[str] | Any],
+        intrinsics: Intrinsics | None = None,
+        *,
+        focal_correction: bool = True,
+        stretch: bool = False,
+    ) -> Predictions:
+        """The predictions of images of one camera, in their order, as `predict` gives them. While the network looks at one, the next
+        are read and prepared on other threads: as fast as `deepfusion predict`. What is wrong with an image is raised at its turn;
+        going on with `next` gives those behind it."""
     def another(self) -> Model:
         """The same network for another thread: it shares the weights."""
     @property
@@ -54,7 +71,14 @@ class Model:
     def step(self) -> int:
         """Steps it was trained for."""
     @property
-    def engine(self) -> str: ...
+    def engine(self) -> str:
+        """What runs it: "fused"."""
+
+class Predictions(Iterator[Prediction]):
+    """Of `Model.predict_many`."""
+
+    def __iter__(self) -> Predictions: ...
+    def __next__(self) -> Prediction: ...
 
 class Frame:
     """One frame of a recording."""
@@ -63,27 +87,34 @@ class Frame:
     def image(self) -> NDArray[np.uint8]:
         """H x W x 3, RGB, free of the lens's distortion. Read when asked for."""
     @property
-    def number(self) -> int: ...
+    def number(self) -> int:
+        """Its number in the recording's files."""
     @property
-    def time_s(self) -> float | None: ...
+    def time_s(self) -> float | None:
+        """When it was taken, seconds from the recording's first stamp."""
     @property
-    def speed_mps(self) -> float | None: ...
+    def speed_mps(self) -> float | None:
+        """The vehicle's."""
     @property
-    def intrinsics(self) -> Intrinsics: ...
+    def intrinsics(self) -> Intrinsics:
+        """fx, fy, cx, cy in pixels of `image`."""
     def ground_truth(self, kind: str = "z") -> NDArray[np.float32] | None:
         """H x W metres, 0 where nothing was measured; None where the frame has none. `kind`: "z" or "velodyne"."""
 
 class Dataset:
-    """A recording of any known layout: one drive, one camera."""
+    """A recording of any known layout: one drive, one camera. `recording[i]` reads nothing but what is known of the frame."""
 
-    def __init__(self, path: str | PathLike[str], *, camera: str = "2", drive: int = 0) -> None: ...
+    def __init__(self, path: str | PathLike[str], *, camera: str = "2", drive: int = 0) -> None:
+        """`camera` is "2" (left) or "3" (right) where there are two; `drive` says which of several below `path`, from 0."""
     def __len__(self) -> int: ...
     def __getitem__(self, index: int) -> Frame: ...
     def __iter__(self) -> Iterator[Frame]: ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The drive's."""
     @property
-    def layout(self) -> str: ...
+    def layout(self) -> str:
+        """Such as "KITTI raw"."""
     def motion(self, source: int, target: int) -> NDArray[np.float64] | None:
         """4 x 4, target_from_source: takes a point of the camera at frame `source` to the camera at frame `target`; None where
         the vehicle's motion is not known."""
@@ -95,3 +126,19 @@ def simulate(
     out: Any, frames: int, seed: int, scene: str, moving_cars: int, width: int, height: int, scan_every: int
 ) -> str: ...
 def doctor(path: Any) -> str: ...
+def train(asked: dict[str, Any], callback: Callable[[dict[str, Any]], bool | None] | None) -> dict[str, Any]: ...
+def command(arguments: Sequence[str]) -> int: ...
+
+class Perception:
+    def __init__(self, settings: str, exact: bool) -> None: ...
+    def forget(self) -> None: ...
+    def look(
+        self,
+        depth: NDArray[np.float32],
+        intrinsics: Intrinsics,
+        sigma: NDArray[np.float32] | None,
+        time_s: float | None,
+        world_from_cam: NDArray[np.float64] | None,
+        speed_mps: float | None,
+        yaw_rate_radps: float,
+    ) -> str: ...

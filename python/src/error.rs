@@ -11,6 +11,27 @@ pyo3::create_exception!(
     "What went wrong, with the file, frame or field; `hint` says what to do about it."
 );
 
+/// What went wrong and what to do about it, before the interpreter is at hand.
+pub struct Failure {
+    pub message: String,
+    pub hint: Option<String>,
+}
+
+impl<E: Hint> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self {
+            message: error.to_string(),
+            hint: error.hint(),
+        }
+    }
+}
+
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> Self {
+        with_hint(failure.message, failure.hint)
+    }
+}
+
 /// A library's error as an exception: its message, and its remedy as `hint` and as a note.
 pub fn raise(error: impl Hint) -> PyErr {
     with_hint(error.to_string(), error.hint())

@@ -1,14 +1,23 @@
 //! The Python module `deepfusion._native`. `deepfusion/__init__.py` is what people import; `_native.pyi` has the types.
 
+mod bulk;
+mod command;
 mod dataset;
 mod error;
+mod interrupt;
 mod measure;
 mod model;
+mod perceive;
+mod train;
 
 use pyo3::prelude::*;
 
 #[pymodule]
 mod _native {
+    #[pymodule_export]
+    use super::bulk::Predictions;
+    #[pymodule_export]
+    use super::command::command;
     #[pymodule_export]
     use super::dataset::{Dataset, Frame};
     #[pymodule_export]
@@ -17,6 +26,11 @@ mod _native {
     use super::measure::{doctor, evaluate, simulate};
     #[pymodule_export]
     use super::model::{Model, Prediction, load, networks};
+
+    #[pymodule_export]
+    use super::perceive::Perception;
+    #[pymodule_export]
+    use super::train::train;
 
     use pyo3::prelude::*;
 

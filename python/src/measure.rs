@@ -10,6 +10,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::error::{raise, with_hint};
+use crate::interrupt::{Stop, abandonable, interruptible};
 
 /// A name, a prediction and its ground truth.
 type Pair<'py> = (
@@ -97,13 +98,16 @@ pub fn simulate(
         scan_every,
         ..SimConfig::default()
     };
-    let write = || write_kitti(&Simulation::new(&config)?, &out, &mut |_, _| ());
-    py.detach(write).map_err(raise)
+    let write = |stop: &Stop| {
+        let simulation = Simulation::new(&config)?;
+        write_kitti(&simulation, &out, &mut |_, _| stop.unwind_if_asked())
+    };
+    interruptible(py, write)?.map_err(raise)
 }
 
 /// What `deepfusion doctor PATH` finds, as JSON.
 #[pyfunction]
 pub fn doctor(py: Python<'_>, path: PathBuf) -> PyResult<String> {
-    let diagnosis = py.detach(|| checks::doctor(&path, None));
+    let diagnosis = abandonable(py, move || checks::doctor(&path, None))?;
     serde_json::to_string(&diagnosis).map_err(|e| PyValueError::new_err(e.to_string()))
 }

@@ -1,11 +1,11 @@
 //! Trained networks and what they say of an image.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use deepfusion::data::{RgbImage, load_photo};
-use deepfusion::geometry::Intrinsics;
 use deepfusion::geometry::cloud::PointCloud;
+use deepfusion::geometry::{DepthMap, Intrinsics};
 use deepfusion::model::TrainConfig;
 use deepfusion::model::weights::Weights;
 use deepfusion::runtime::{
@@ -16,8 +16,10 @@ use numpy::{IntoPyArray, PyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
+use pyo3::types::PyDict;
 
-use crate::error::{raise, with_hint};
+use crate::bulk::{Many, Predictions};
+use crate::error::{Failure, raise, with_hint};
 
 /// The names of the networks inside the package.
 #[pyfunction]
@@ -87,24 +89,39 @@ impl Model {
         focal_correction: bool,
         stretch: bool,
     ) -> PyResult<Prediction> {
-        let (image, from_file) = image_of(image)?;
-        let size = image.dimensions();
-        let given = intrinsics
-            .map(|numbers| checked(numbers, size))
-            .transpose()?;
-        let camera = given.or(from_file);
+        let source = Source::of(image)?;
+        let work = || -> Result<_, Failure> {
+            let (image, camera) = source.read(intrinsics)?;
+            // Inside, so that its many small parallel parts begin at once.
+            let prediction = deepfusion_cli::in_pool(|| {
+                self.with(|estimator| {
+                    estimator.predict(&image, camera.as_ref(), focal_correction, !stretch)
+                })
+            })?;
+            Ok((prediction, image, camera))
+        };
         // The lock is taken without the interpreter's: another thread that holds it may be waiting for that.
-        let prediction = py.detach(|| {
-            self.with(|estimator| {
-                estimator.predict(&image, camera.as_ref(), focal_correction, !stretch)
-            })
-        });
-        Ok(Prediction {
-            prediction: prediction.map_err(raise)?,
-            image,
-            camera,
-            depth: PyOnceLock::new(),
-        })
+        let (prediction, image, camera) = py.detach(work)?;
+        Ok(Prediction::new(prediction, image, camera))
+    }
+
+    #[pyo3(signature = (images, intrinsics=None, *, focal_correction=true, stretch=false))]
+    fn predict_many(
+        &self,
+        py: Python<'_>,
+        images: &Bound<'_, PyAny>,
+        intrinsics: Option<[f64; 4]>,
+        focal_correction: bool,
+        stretch: bool,
+    ) -> PyResult<Predictions> {
+        let many = Many {
+            images: images.try_iter()?.unbind(),
+            intrinsics,
+            focal_correction,
+            crop: !stretch,
+        };
+        let own = py.detach(|| self.with(|estimator| estimator.another()));
+        Predictions::begin(many, own.map_err(raise)?)
     }
 
     fn another(&self, py: Python<'_>) -> PyResult<Self> {
@@ -130,36 +147,67 @@ impl Model {
 }
 
 /// A camera that can be one, of an image of this size.
-fn checked([fx, fy, cx, cy]: [f64; 4], size: (u32, u32)) -> PyResult<Intrinsics> {
+pub fn checked([fx, fy, cx, cy]: [f64; 4], size: (u32, u32)) -> Result<Intrinsics, Failure> {
     let finite = [fx, fy, cx, cy].iter().all(|v| v.is_finite());
     if !(finite && fx > 0.0 && fy > 0.0) {
-        let found = format!("intrinsics: {:?} is no camera", (fx, fy, cx, cy));
-        let hint = "fx, fy, cx, cy in pixels of this image; fx and fy above 0".to_owned();
-        return Err(with_hint(found, Some(hint)));
+        return Err(Failure {
+            message: format!("intrinsics: {:?} is no camera", (fx, fy, cx, cy)),
+            hint: Some("fx, fy, cx, cy in pixels of this image; fx and fy above 0".into()),
+        });
     }
     Ok(Intrinsics::from_numbers([fx, fy, cx, cy], size))
 }
 
-/// An image from an array, a PIL image, or a file; of a file with what its EXIF says of the lens.
-fn image_of(image: &Bound<'_, PyAny>) -> PyResult<(RgbImage, Option<Intrinsics>)> {
-    if let Ok(array) = image.extract::<PyReadonlyArray3<'_, u8>>() {
-        return Ok((of_array(&array)?, None));
+/// Where an image is.
+pub enum Source {
+    /// Here.
+    Pixels(RgbImage),
+    /// In a file.
+    File(PathBuf),
+}
+
+impl Source {
+    /// From an array (NumPy's, or another's by DLPack), a PIL image, or a path.
+    pub fn of(image: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if let Ok(array) = image.extract::<PyReadonlyArray3<'_, u8>>() {
+            return of_array(&array).map(Self::Pixels);
+        }
+        if let Ok(path) = image.extract::<PathBuf>() {
+            return Ok(Self::File(path));
+        }
+        let numpy = image.py().import("numpy")?;
+        let array = if image.hasattr("__dlpack__")? {
+            numpy.call_method1("from_dlpack", (image,))?
+        } else if image.hasattr("convert")? {
+            // PIL's way, which others have as well.
+            let rgb = image.call_method1("convert", ("RGB",))?;
+            numpy.call_method1("asarray", (rgb,))?
+        } else {
+            numpy.call_method1("asarray", (image,))?
+        };
+        match array.extract::<PyReadonlyArray3<'_, u8>>() {
+            Ok(array) => of_array(&array).map(Self::Pixels),
+            Err(_) => Err(PyTypeError::new_err(
+                "image: expected an H x W x 3 array of uint8, a PIL image, or a path",
+            )),
+        }
     }
-    if let Ok(path) = image.extract::<PathBuf>() {
-        return of_file(image.py(), &path);
-    }
-    // PIL's way, which others have as well.
-    let py = image.py();
-    let rgb = match image.hasattr("convert")? {
-        true => image.call_method1("convert", ("RGB",))?,
-        false => image.clone(),
-    };
-    let array = py.import("numpy")?.call_method1("asarray", (rgb,))?;
-    match array.extract::<PyReadonlyArray3<'_, u8>>() {
-        Ok(array) => Ok((of_array(&array)?, None)),
-        Err(_) => Err(PyTypeError::new_err(
-            "image: expected an H x W x 3 array of uint8, a PIL image, or a path",
-        )),
+
+    /// The pixels, and the camera: the one given, else what a file's EXIF says of the lens.
+    pub fn read(
+        self,
+        intrinsics: Option<[f64; 4]>,
+    ) -> Result<(RgbImage, Option<Intrinsics>), Failure> {
+        let (image, from_file) = match self {
+            Self::Pixels(image) => (image, None),
+            Self::File(path) => {
+                let photo = load_photo(&path)?;
+                (photo.image, photo.intrinsics)
+            }
+        };
+        let size = image.dimensions();
+        let given = intrinsics.map(|numbers| checked(numbers, size));
+        Ok((image, given.transpose()?.or(from_file)))
     }
 }
 
@@ -179,17 +227,14 @@ fn of_array(array: &PyReadonlyArray3<'_, u8>) -> PyResult<RgbImage> {
         .ok_or_else(|| PyValueError::new_err("image: its size is not that of its bytes"))
 }
 
-fn of_file(py: Python<'_>, path: &Path) -> PyResult<(RgbImage, Option<Intrinsics>)> {
-    let photo = py.detach(|| load_photo(path)).map_err(raise)?;
-    Ok((photo.image, photo.intrinsics))
-}
-
 /// Positions and colours, N×3 each.
 type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 
 /// The metric depth of an image.
 #[pyclass(frozen, module = "deepfusion")]
 pub struct Prediction {
+    /// Where it was made ahead of whoever asks.
+    made: Mutex<Option<DepthMap>>,
     prediction: deepfusion::Prediction,
     image: RgbImage,
     camera: Option<Intrinsics>,
@@ -197,12 +242,39 @@ pub struct Prediction {
     depth: PyOnceLock<Py<PyArray2<f32>>>,
 }
 
+impl Prediction {
+    pub fn new(
+        prediction: deepfusion::Prediction,
+        image: RgbImage,
+        camera: Option<Intrinsics>,
+    ) -> Self {
+        Self {
+            made: Mutex::new(None),
+            prediction,
+            image,
+            camera,
+            depth: PyOnceLock::new(),
+        }
+    }
+
+    /// With its depth made already.
+    pub fn with_depth(self) -> Self {
+        let made = Mutex::new(Some(self.prediction.depth()));
+        Self { made, ..self }
+    }
+}
+
 #[pymethods]
 impl Prediction {
     #[getter]
     fn depth(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f32>>> {
         let array = self.depth.get_or_try_init(py, || {
-            let depth = py.detach(|| self.prediction.depth());
+            let made = self
+                .made
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .take();
+            let depth = made.unwrap_or_else(|| py.detach(|| self.prediction.depth()));
             image_array(py, depth.height, depth.width, depth.data)
         })?;
         Ok(array.clone_ref(py))
@@ -225,6 +297,22 @@ impl Prediction {
     #[getter]
     fn intrinsics(&self) -> Option<(f64, f64, f64, f64)> {
         self.camera.map(|k| (k.fx, k.fy, k.cx, k.cy))
+    }
+
+    /// `depth`'s.
+    #[pyo3(signature = (**options))]
+    fn __dlpack__<'py>(
+        &self,
+        py: Python<'py>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.depth(py)?
+            .bind(py)
+            .call_method("__dlpack__", (), options)
+    }
+
+    fn __dlpack_device__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.depth(py)?.bind(py).call_method0("__dlpack_device__")
     }
 
     #[pyo3(signature = (max_depth=80.0))]

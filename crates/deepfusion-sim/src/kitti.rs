@@ -38,21 +38,32 @@ pub fn write_kitti(
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<PathBuf> {
     let existed = prepare(out)?;
-    let staging = out.join(format!(".{DATE}.partial"));
-    let written = write_all(simulation, &staging, progress).and_then(|drive| {
-        let date = out.join(DATE);
-        let moved = deepfusion_fs::publish_folder(&staging, &date);
-        moved.map_err(io(&date, "move the finished drive here"))?;
-        Ok(date.join(drive))
-    });
-    if written.is_err() {
-        // Best effort: the first error is the one to report.
-        let _ = fs::remove_dir_all(&staging);
-        if !existed {
-            let _ = fs::remove_dir(out);
+    let staging = Staging {
+        folder: out.join(format!(".{DATE}.partial")),
+        made: (!existed).then_some(out),
+    };
+    let drive = write_all(simulation, &staging.folder, progress)?;
+    let date = out.join(DATE);
+    let moved = deepfusion_fs::publish_folder(&staging.folder, &date);
+    moved.map_err(io(&date, "move the finished drive here"))?;
+    Ok(date.join(drive))
+}
+
+/// Where a drive is written before it is whole. What is left of it goes with it, also when `progress` unwinds.
+struct Staging<'a> {
+    folder: PathBuf,
+    /// The folder around it, where it was made for this drive.
+    made: Option<&'a Path>,
+}
+
+impl Drop for Staging<'_> {
+    fn drop(&mut self) {
+        // Best effort: what went wrong is told by the error; after a success there is nothing here, and `made` is not empty.
+        let _ = fs::remove_dir_all(&self.folder);
+        if let Some(made) = self.made {
+            let _ = fs::remove_dir(made);
         }
     }
-    written
 }
 
 /// Makes the output folder; whether it was there before.

@@ -143,7 +143,7 @@ pub fn command() -> String {
             format!("'{}'", word.replace('\'', r"'\''"))
         }
     };
-    let words = std::env::args().skip(1).map(quoted);
+    let words = crate::arguments().map(quoted);
     ["deepfusion".to_owned()]
         .into_iter()
         .chain(words)

@@ -1,0 +1,77 @@
+//! The `deepfusion` command, for the program of that name and for the Python package.
+
+#![cfg_attr(
+    not(feature = "train"),
+    allow(
+        dead_code,
+        unused_imports,
+        reason = "a build without training leaves out commands, not what they share"
+    )
+)]
+
+mod allocator;
+mod cli;
+mod commands;
+mod engine;
+mod error;
+mod failure;
+mod interrupt;
+mod jobs;
+mod model;
+mod output;
+mod progress;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+use std::sync::{Once, OnceLock};
+
+use clap::Parser;
+
+pub use allocator::keep_memory;
+
+/// The command line that is run, for reports: in Python the process has another one.
+static ARGUMENTS: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// Runs a command line, the program's name first, as the program would: data on stdout, warnings and progress on stderr. Commands that
+/// can be interrupted take over Ctrl-C. It is meant to be all that its process does.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    static LOGGING: Once = Once::new();
+    LOGGING.call_once(output::init_logging);
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let parsed = cli::Cli::try_parse_from(&arguments);
+    ARGUMENTS.get_or_init(|| arguments);
+    let cli = match parsed {
+        Ok(cli) => cli,
+        // Wrong arguments end here, as help does: clap says which, suggests the near one and gives 2.
+        Err(answer) => {
+            // Whom it cannot be told to, nobody reads.
+            let _ = answer.print();
+            let code = u8::try_from(answer.exit_code());
+            return code.map_or(ExitCode::FAILURE, ExitCode::from);
+        }
+    };
+    progress::set_quiet(cli.quiet);
+    match in_pool(|| commands::run(cli.command)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}
+
+/// Runs `work` on one of rayon's threads: its parallel operations then start at once, where the main
+/// thread would hand each of them over and sleep. A training step has a great many of them.
+pub fn in_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    /// As large as the main thread's: the graph of a backward pass is deep.
+    const STACK_BYTES: usize = 8 << 20;
+    let pool = rayon::ThreadPoolBuilder::new().stack_size(STACK_BYTES);
+    // A pool that exists already has the default stack, which release builds do not need.
+    pool.build_global().ok();
+    rayon::scope(|_| work())
+}
+
+/// The words after the program's name.
+fn arguments() -> impl Iterator<Item = String> {
+    let all = ARGUMENTS.get().map_or(&[][..], Vec::as_slice);
+    all.iter()
+        .skip(1)
+        .map(|word| word.to_string_lossy().into_owned())
+}

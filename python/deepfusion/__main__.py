@@ -1,0 +1,21 @@
+"""The command line: `deepfusion …` and `python -m deepfusion …`."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Sequence
+
+from . import _native
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command line with these words, or the process's own, and gives its exit code. It is meant to be all that a process does:
+    Ctrl-C is the command's from then on."""
+    # Python would keep it for itself until the command is through.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    return _native.command(list(sys.argv[1:] if arguments is None else arguments))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,84 @@
+"""Samples to learn from, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._native import Dataset
+
+
+class Snippets:
+    """A recording's frames, each with its neighbours in time and how the camera came there.
+
+    A sample is a dict: `image` H x W x 3 (uint8), `sources` N x H x W x 3 (uint8), `source_from_target` N x 4 x 4 (float64, metres:
+    takes a point of the camera at the image to the camera at the source), `intrinsics` 3 x 3 (float32, pixels), `depth` H x W (float32,
+    metres, 0 where nothing was measured), `speed_mps` (NaN where it is not known), `number` of the frame.
+
+    `offsets` say which neighbours, in frames. Frames without all of them, or whose motion is not known, are left out.
+    `depth_kind` is "z" or "velodyne".
+    """
+
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        *,
+        offsets: Sequence[int] = (-1, 1),
+        camera: str = "2",
+        drive: int = 0,
+        depth_kind: str = "z",
+    ) -> None:
+        self._arguments: dict[str, Any] = {"path": path, "camera": camera, "drive": drive}
+        self.offsets = tuple(offsets)
+        self.depth_kind = depth_kind
+        self._opened: Dataset | None = None
+        recording, count = self.recording, len(self.recording)
+
+        def has_all(i: int) -> bool:
+            sources = [i + offset for offset in self.offsets]
+            inside = all(0 <= source < count for source in sources)
+            return inside and all(recording.motion(i, source) is not None for source in sources)
+
+        self.frames = [i for i in range(count) if has_all(i)]
+
+    @property
+    def recording(self) -> Dataset:
+        """The recording; opened again in another process."""
+        if self._opened is None:
+            self._opened = Dataset(**self._arguments)
+        return self._opened
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_opened": None}
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        return (self[i] for i in range(len(self)))
+
+    def __getitem__(self, index: int) -> dict[str, Any]:
+        place = self.frames[index]
+        frame = self.recording[place]
+        image = frame.image
+        sources = [place + offset for offset in self.offsets]
+        depth = frame.ground_truth(self.depth_kind)
+        fx, fy, cx, cy = frame.intrinsics
+        return {
+            "image": image,
+            "sources": np.stack([self.recording[source].image for source in sources]),
+            "source_from_target": np.stack([self._motion(place, source) for source in sources]),
+            "intrinsics": np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], np.float32),
+            "depth": np.zeros(image.shape[:2], np.float32) if depth is None else depth,
+            "speed_mps": np.float32(np.nan if frame.speed_mps is None else frame.speed_mps),
+            "number": frame.number,
+        }
+
+    def _motion(self, target: int, source: int) -> NDArray[np.float64]:
+        motion = self.recording.motion(target, source)
+        assert motion is not None, "frames without a motion are left out"
+        return motion

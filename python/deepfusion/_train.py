@@ -1,0 +1,148 @@
+"""Training."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from . import _native
+from ._native import DeepFusionError, Model
+
+TrainEvent = dict[str, Any]
+"""What the trainer reports. `event["event"]` says which it is:
+
+- "started": from_step, steps, samples, validation_samples, mean_displacement_m (of a pair of frames, metres)
+- "step": step (from 1), steps, losses (name to value, as in log.csv; the mean of the step's samples), learning_rate,
+  images_per_second, remaining_s, scale_ratio (1 where the scale is metric), gradient_norm
+- "validated": step, losses, selection (what `best` is chosen by), scale_ratio, best (whether this is the best so far)
+- "saved": step, path of the checkpoint
+- "panel": step, name, image (3 x H x W, 0 to 1), disparity (H x W)
+- "warning": step, message
+"""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that has ended, or was stopped. `load()` gives its network."""
+
+    path: Path
+    """The folder: config.toml, checkpoints, log.csv."""
+    step: int
+    """Steps done."""
+    steps: int
+    """Steps of the whole run."""
+    stopped: bool
+    """Whether the callback ended it; `train(..., out=run.path, resume=True)` goes on."""
+    seconds: float
+    """Wall time of this call."""
+    losses: dict[str, float] | None
+    """The last step's, as in log.csv."""
+    validation: dict[str, float] | None
+    """Those of the held-out samples, when they were last looked at."""
+    best_validation: float | None
+    """The lowest value that `best` is chosen by."""
+    scale_ratio: float | None
+    """Displacement by the vehicle's speed over displacement by PoseNet at the end: 1 where the scale is metric."""
+    skipped_steps: int
+    """Steps skipped for a gradient that was not finite."""
+    skipped_drives: list[str]
+    """Drives that were left out, with the reason."""
+
+    def load(self, **options: Any) -> Model:
+        """The trained network; options as `deepfusion.load`."""
+        from . import load
+
+        return load(self.path, **options)
+
+
+def _toml(value: Any) -> str:
+    """As TOML writes a value."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, (str, PathLike)):
+        return json.dumps(os.fspath(value), ensure_ascii=False)
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_toml(v)}" for key, v in value.items()) + "}"
+    if isinstance(value, Sequence):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    raise TypeError(f"config: {value!r} is nothing that a configuration can hold")
+
+
+def _settings(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """A table's values, one `key=value` each with dots between tables."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _settings(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}={'none' if value is None else _toml(value)}"
+
+
+def _paths(given: str | PathLike[str] | Sequence[str | PathLike[str]] | None) -> list[str]:
+    if given is None:
+        return []
+    if isinstance(given, (str, PathLike)):
+        given = [given]
+    return [os.fspath(path) for path in given]
+
+
+def train(
+    config: str | PathLike[str] | Mapping[str, Any] = "tiny",
+    data: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
+    callback: Callable[[TrainEvent], bool | None] | None = None,
+    *,
+    out: str | PathLike[str] | None = None,
+    init: str | PathLike[str] | None = None,
+    validation: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
+    camera: str | None = None,
+    resume: bool = False,
+) -> Run:
+    """Learns metric depth from recordings, without depth labels, on this machine's processor.
+
+    `config` is a preset ("tiny", "light", "resnet50", "paper", "monodepth2"), the path of a TOML file, or a dict over a preset:
+    `{"preset": "light", "steps": 500, "loss": {"smoothness": 0.01}}` (tables in tables or dots in keys; None takes an optional key
+    away; the keys are those of docs/reference/configuration.md). `data` are recordings of any known layout, and `validation` some to
+    validate on, else the end of each drive is held out; `camera` is "2", "3" or "both".
+
+    The run goes to `out`, new or empty (by default runs/train-TIME), and starts from `init`: a run, a checkpoint, the name of an
+    embedded network or "none"; by default the embedded network that is built as the preset is, if there is one. With `resume=True` the
+    run in `out` goes on; `config` as a dict may then change what it says, and is left out otherwise.
+
+    `callback` gets each `TrainEvent`; where it returns False, training stops after the step and the run is saved. What it raises
+    stops it as well, and is raised here. Ctrl-C saves the run and raises KeyboardInterrupt.
+    """
+    settings: list[str] = []
+    if isinstance(config, Mapping):
+        table = dict(config)
+        config = table.pop("preset", "tiny")
+        settings = list(_settings(table))
+    if out is None:
+        if resume:
+            raise ValueError("resume: out is the run that goes on")
+        out = Path("runs") / time.strftime("train-%Y%m%d-%H%M%S", time.gmtime())
+    out = Path(out)
+    if not resume and out.exists() and any(out.iterdir()):
+        error = DeepFusionError(f"{out}: is not empty")
+        error.hint = "choose another folder, empty this one first, or go on with the run in it (resume=True)"
+        raise error
+    asked = {
+        "config": config,
+        "settings": settings,
+        "data": _paths(data),
+        "validation": _paths(validation),
+        "camera": camera,
+        "out": out,
+        "init": init,
+        "resume": resume,
+    }
+    figures = _native.train(asked, callback)
+    return Run(**figures)

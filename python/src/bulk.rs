@@ -1,0 +1,183 @@
+//! Many images: while the network looks at one, the next are read and the last is made depth.
+
+use std::collections::VecDeque;
+use std::num::NonZero;
+use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+
+use deepfusion::DepthEstimator;
+use deepfusion::data::RgbImage;
+use deepfusion::geometry::Intrinsics;
+use deepfusion::runtime::{PreparedImage, Preparer};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::types::PyIterator;
+
+use crate::error::Failure;
+use crate::model::{Prediction, Source};
+
+/// What is asked of the network.
+pub struct Many {
+    pub images: Py<PyIterator>,
+    pub intrinsics: Option<[f64; 4]>,
+    pub focal_correction: bool,
+    pub crop: bool,
+}
+
+/// Where an image's prediction is waited for.
+type Answer = Sender<Result<Prediction, Failure>>;
+
+/// An image that is read, on its way to the network.
+struct Read {
+    image: RgbImage,
+    camera: Option<Intrinsics>,
+    prepared: PreparedImage,
+    answer: Answer,
+}
+
+/// The predictions of many images, in their order.
+#[pyclass(module = "deepfusion")]
+pub struct Predictions {
+    many: Many,
+    /// None once the images have ended.
+    to_read: Option<Sender<(Source, Answer)>>,
+    /// In the images' order. Nobody waits for the lock: it makes what may be used by one thread a part of what Python may share.
+    waiting: Mutex<VecDeque<Receiver<Result<Prediction, Failure>>>>,
+    /// How many images may be on their way.
+    ahead: usize,
+}
+
+impl Predictions {
+    /// The threads end when this goes.
+    pub fn begin(many: Many, estimator: DepthEstimator) -> PyResult<Self> {
+        let cores = thread::available_parallelism().map_or(1, NonZero::get);
+        let readers = (cores / 4).clamp(1, 8);
+        let (to_read, images) = channel::<(Source, Answer)>();
+        let (to_network, read) = sync_channel::<Read>(readers);
+        let (to_finish, seen) = sync_channel(2);
+        let images = Arc::new(Mutex::new(images));
+        let settings = (many.intrinsics, many.focal_correction, many.crop);
+        for _ in 0..readers {
+            let (images, to_network) = (Arc::clone(&images), to_network.clone());
+            let preparer = estimator.preparer();
+            spawn(move || read_images(&images, &to_network, preparer, settings))?;
+        }
+        spawn(move || see(estimator, &read, &to_finish))?;
+        spawn(move || {
+            for (prediction, answer) in seen {
+                let prediction: Prediction = prediction;
+                let answer: Answer = answer;
+                // Nobody waits where the iterator is gone.
+                drop(answer.send(Ok(prediction.with_depth())));
+            }
+        })?;
+        Ok(Self {
+            many,
+            to_read: Some(to_read),
+            waiting: Mutex::default(),
+            ahead: 2 * readers + 4,
+        })
+    }
+
+    /// Sends images on their way.
+    fn fill(&mut self, py: Python<'_>) -> PyResult<()> {
+        let waiting = self.waiting.get_mut();
+        let waiting = waiting.unwrap_or_else(PoisonError::into_inner);
+        while let Some(to_read) = &self.to_read
+            && waiting.len() < self.ahead
+        {
+            let Some(image) = self.many.images.bind(py).clone().next() else {
+                self.to_read = None;
+                break;
+            };
+            let source = Source::of(&image?)?;
+            let (answer, prediction) = channel();
+            if to_read.send((source, answer)).is_err() {
+                return Err(PyRuntimeError::new_err("the threads that read have ended"));
+            }
+            waiting.push_back(prediction);
+        }
+        Ok(())
+    }
+}
+
+#[pymethods]
+impl Predictions {
+    fn __iter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+
+    fn __next__(&mut self, py: Python<'_>) -> PyResult<Option<Prediction>> {
+        self.fill(py)?;
+        let waiting = self.waiting.get_mut();
+        let waiting = waiting.unwrap_or_else(PoisonError::into_inner);
+        let Some(next) = waiting.pop_front() else {
+            return Ok(None);
+        };
+        let prediction = py.detach(move || next.recv());
+        py.check_signals()?;
+        match prediction {
+            Ok(prediction) => Ok(Some(prediction?)),
+            Err(_) => Err(PyRuntimeError::new_err(
+                "the thread of the network has ended",
+            )),
+        }
+    }
+}
+
+fn spawn(work: impl FnOnce() + Send + 'static) -> PyResult<()> {
+    thread::Builder::new().spawn(work)?;
+    Ok(())
+}
+
+fn read_images(
+    images: &Mutex<Receiver<(Source, Answer)>>,
+    to_network: &SyncSender<Read>,
+    preparer: Preparer,
+    (intrinsics, focal_correction, crop): (Option<[f64; 4]>, bool, bool),
+) {
+    loop {
+        let next = images.lock().unwrap_or_else(PoisonError::into_inner).recv();
+        let Ok((source, answer)) = next else { return };
+        match source.read(intrinsics) {
+            Err(failure) => drop(answer.send(Err(failure))),
+            Ok((image, camera)) => {
+                let prepared = preparer.prepare(&image, camera.as_ref(), focal_correction, crop);
+                let read = Read {
+                    image,
+                    camera,
+                    prepared,
+                    answer,
+                };
+                if to_network.send(read).is_err() {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+fn see(
+    mut estimator: DepthEstimator,
+    read: &Receiver<Read>,
+    to_finish: &SyncSender<(Prediction, Answer)>,
+) {
+    for Read {
+        image,
+        camera,
+        prepared,
+        answer,
+    } in read
+    {
+        match deepfusion_cli::in_pool(|| estimator.infer(&prepared)) {
+            Err(error) => drop(answer.send(Err(error.into()))),
+            Ok(prediction) => {
+                let prediction = Prediction::new(prediction, image, camera);
+                if to_finish.send((prediction, answer)).is_err() {
+                    return;
+                }
+            }
+        }
+    }
+}

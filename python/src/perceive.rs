@@ -1,0 +1,188 @@
+//! From depth to 3D targets.
+
+use deepfusion::geometry::{DepthMap, Intrinsics, Se3};
+use deepfusion::perception::{
+    Collision, Perception as Perceiver, PerceptionConfig, Stamp, Surroundings, Target,
+    VehicleShape, time_to_collision,
+};
+use nalgebra::{Matrix3, Vector3};
+use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use serde::Serialize;
+use std::sync::{Mutex, PoisonError};
+
+use crate::error::{raise, with_hint};
+use crate::model::checked;
+
+/// Widest depth image that is looked at, as the command does: more pixels cost time and say no more than a network knew.
+const WIDTH: usize = 640;
+
+/// Follows targets from image to image.
+#[pyclass(frozen, module = "deepfusion._native")]
+pub struct Perception {
+    inner: Mutex<Perceiver>,
+}
+
+/// What was found, for Python's dataclasses.
+#[derive(Serialize)]
+struct Found<'a> {
+    targets: Vec<FoundTarget<'a>>,
+    ground: Option<Ground>,
+    collision: Option<Collision>,
+}
+
+#[derive(Serialize)]
+struct FoundTarget<'a> {
+    #[serde(flatten)]
+    target: &'a Target,
+    corners_m: [[f64; 3]; 8],
+}
+
+#[derive(Serialize)]
+struct Ground {
+    normal: [f32; 3],
+    offset_m: f32,
+}
+
+#[pymethods]
+impl Perception {
+    /// `settings`: a JSON object over those for predicted depth, or for `exact` depth.
+    #[new]
+    fn new(settings: &str, exact: bool) -> PyResult<Self> {
+        let base = match exact {
+            true => PerceptionConfig::default(),
+            false => PerceptionConfig::predicted(),
+        };
+        // As the command does.
+        let base = PerceptionConfig {
+            parking_rows: true,
+            ..base
+        };
+        let config = over(&base, settings)?;
+        config.validate().map_err(raise)?;
+        Ok(Self {
+            inner: Mutex::new(Perceiver::new(config)),
+        })
+    }
+
+    fn forget(&self) {
+        self.inner
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .reset();
+    }
+
+    #[pyo3(signature = (depth, intrinsics, sigma, time_s, world_from_cam, speed_mps, yaw_rate_radps))]
+    #[expect(clippy::too_many_arguments, reason = "by name in Python")]
+    fn look(
+        &self,
+        py: Python<'_>,
+        depth: PyReadonlyArray2<'_, f32>,
+        intrinsics: [f64; 4],
+        sigma: Option<PyReadonlyArray2<'_, f32>>,
+        time_s: Option<f64>,
+        world_from_cam: Option<PyReadonlyArray2<'_, f64>>,
+        speed_mps: Option<f64>,
+        yaw_rate_radps: f64,
+    ) -> PyResult<String> {
+        let depth = map(&depth);
+        let sigma = sigma.map(|sigma| map(&sigma));
+        let size = |n: usize| u32::try_from(n).map_err(|e| PyValueError::new_err(e.to_string()));
+        let camera = checked(intrinsics, (size(depth.width)?, size(depth.height)?))?;
+        let pose = world_from_cam.map(|pose| transform(&pose)).transpose()?;
+        let stamp = match (time_s, pose) {
+            (Some(time_s), Some(world_from_cam)) => Some(Stamp {
+                time_s,
+                world_from_cam,
+            }),
+            (None, None) => None,
+            _ => {
+                let message = "following targets needs the time and the camera's pose".to_owned();
+                let hint = "give both time_s and world_from_cam, or neither".to_owned();
+                return Err(with_hint(message, Some(hint)));
+            }
+        };
+        let found = py.detach(|| {
+            let (small, k) = working(&depth, &camera);
+            let sigma = sigma.map(|sigma| working(&sigma, &camera).0);
+            let mut perceiver = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+            perceiver.detect_with_sigma(&small, sigma.as_ref(), &k, stamp, &[])
+        });
+        told(&found.map_err(raise)?, speed_mps, yaw_rate_radps)
+    }
+}
+
+fn told(found: &Surroundings, speed_mps: Option<f64>, yaw_rate: f64) -> PyResult<String> {
+    let targets = found.targets.iter();
+    let found = Found {
+        targets: targets
+            .map(|target| FoundTarget {
+                target,
+                corners_m: target.corners(),
+            })
+            .collect(),
+        ground: found.ground.as_ref().map(|ground| Ground {
+            normal: ground.up,
+            offset_m: ground.camera_height_m,
+        }),
+        collision: speed_mps.and_then(|speed| {
+            time_to_collision(&found.targets, speed, yaw_rate, &VehicleShape::default())
+        }),
+    };
+    serde_json::to_string(&found).map_err(|e| PyValueError::new_err(e.to_string()))
+}
+
+/// Settings over others.
+fn over(base: &PerceptionConfig, settings: &str) -> PyResult<PerceptionConfig> {
+    let wrong = |e: serde_json::Error| {
+        let known = serde_json::to_value(base).ok();
+        let known = known.and_then(|known| Some(known.as_object()?.keys().cloned().collect()));
+        let known: Vec<String> = known.unwrap_or_default();
+        let hint = format!("the settings are {}", known.join(", "));
+        with_hint(format!("settings: {e}"), Some(hint))
+    };
+    let mut all = serde_json::to_value(base).map_err(wrong)?;
+    let given: serde_json::Map<String, serde_json::Value> =
+        serde_json::from_str(settings).map_err(wrong)?;
+    if let Some(all) = all.as_object_mut() {
+        all.extend(given);
+    }
+    serde_json::from_value(all).map_err(wrong)
+}
+
+fn map(array: &PyReadonlyArray2<'_, f32>) -> DepthMap {
+    DepthMap {
+        width: array.shape()[1],
+        height: array.shape()[0],
+        data: array.as_array().iter().copied().collect(),
+    }
+}
+
+/// The nearest pixel of each: a mean would put points between near and far.
+fn working(depth: &DepthMap, k: &Intrinsics) -> (DepthMap, Intrinsics) {
+    if depth.width <= WIDTH {
+        return (depth.clone(), *k);
+    }
+    let height = (depth.height * WIDTH).div_ceil(depth.width).max(1);
+    let k = k.resized(WIDTH as u32, height as u32);
+    (depth.nearest(WIDTH, height), k)
+}
+
+/// A rigid transform of a 4×4 matrix.
+fn transform(matrix: &PyReadonlyArray2<'_, f64>) -> PyResult<Se3> {
+    let m = matrix.as_array();
+    if m.shape() != [4, 4] {
+        let message = format!("world_from_cam: expected 4 x 4, found {:?}", m.shape());
+        return Err(PyValueError::new_err(message));
+    }
+    let at = |row, column| m[(row, column)];
+    let rotation = Matrix3::from_fn(at);
+    let identity = rotation * rotation.transpose() - Matrix3::identity();
+    if !(identity.norm() < 1e-3 && rotation.determinant() > 0.0) {
+        let message = "world_from_cam: its upper left 3 x 3 is no rotation";
+        return Err(PyValueError::new_err(message));
+    }
+    let translation = Vector3::from_fn(|row, _| at(row, 3));
+    Ok(Se3::from_parts(&rotation, translation))
+}

@@ -1,0 +1,190 @@
+"""Learning from a simulated street, seen from Python."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+
+import deepfusion
+import numpy as np
+import pytest
+
+SMALL = {"preset": "tiny", "steps": 3, "batch": 2, "size.width": 64, "size": {"height": 64}, "seed": 4, "validation_share": 0.2}
+
+
+@pytest.fixture(scope="session")
+def street(tmp_path_factory):
+    out = tmp_path_factory.mktemp("to-learn-from")
+    return deepfusion.simulate(out, frames=12, seed=3, size=(320, 96))
+
+
+@pytest.fixture(scope="session")
+def run(street, tmp_path_factory):
+    """A run, with what was told of it."""
+    events = []
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    run = deepfusion.train(SMALL, street, events.append, out=folder, init="none")
+    return run, events
+
+
+def test_a_run_is_trained_and_can_be_loaded(run, street):
+    run, events = run
+    assert (run.step, run.steps, run.stopped) == (3, 3, False)
+    assert np.isfinite(run.losses["total"]) and run.losses["reprojection"] > 0
+    assert {"config.toml", "last.safetensors", "log.csv"} <= set(os.listdir(run.path))
+    kinds = [event["event"] for event in events]
+    assert kinds[0] == "started" and kinds.count("step") == 3 and "saved" in kinds
+    assert events[0]["steps"] == 3 and events[0]["samples"] > 0
+    steps = [event for event in events if event["event"] == "step"]
+    assert [event["step"] for event in steps] == [1, 2, 3]
+    assert steps[-1]["losses"] == run.losses
+    # As the command's log.
+    lines = (run.path / "log.csv").read_text().splitlines()
+    columns = lines[0].split(",")
+    last = dict(zip(columns, [line for line in lines if ",train," in line][-1].split(",")))
+    assert float(last["total"]) == pytest.approx(run.losses["total"], abs=1e-8)
+    model = run.load()
+    assert model.size == (64, 64) and model.step == 3
+    frame = deepfusion.Dataset(street)[0]
+    assert np.isfinite(model.predict(frame.image, frame.intrinsics).depth).all()
+
+
+def test_the_same_seed_is_the_same_run(run, street, tmp_path):
+    again = deepfusion.train(SMALL, [street], out=tmp_path / "again", init="none")
+    assert again.losses == run[0].losses
+    other = deepfusion.train({**SMALL, "seed": 5}, street, out=tmp_path / "other", init="none")
+    assert other.losses != run[0].losses
+
+
+def test_a_callback_stops_and_the_run_goes_on(run, street, tmp_path):
+    out = tmp_path / "stopped"
+    stopped = deepfusion.train(
+        SMALL, street, lambda e: not (e["event"] == "step" and e["step"] == 2), out=out, init="none"
+    )
+    assert stopped.stopped and stopped.step == 2
+    finished = deepfusion.train(out=out, resume=True)
+    assert finished.step == 3 and not finished.stopped
+    # As if it had never been interrupted.
+    assert finished.losses["total"] == pytest.approx(run[0].losses["total"], rel=1e-5)
+
+
+def test_what_a_callback_raises_is_raised(street, tmp_path):
+    class Mine(Exception):
+        pass
+
+    def listen(event):
+        if event["event"] == "step":
+            raise Mine("enough")
+
+    out = tmp_path / "raised"
+    with pytest.raises(Mine, match="enough"):
+        deepfusion.train(SMALL, street, listen, out=out, init="none")
+    assert deepfusion.load(out).step == 1, "and the run is saved"
+
+
+def test_the_interpreter_is_free_meanwhile(street, tmp_path):
+    counted = []
+    done = threading.Event()
+
+    def count():
+        while not done.is_set():
+            counted.append(time.monotonic())
+            time.sleep(0.01)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    try:
+        deepfusion.train(SMALL, street, out=tmp_path / "run", init="none")
+    finally:
+        done.set()
+        thread.join()
+    assert len(counted) > 10
+
+
+def test_wrong_configurations_say_what_is_wrong(run, street, tmp_path):
+    def wrong(*arguments, **options):
+        with pytest.raises(deepfusion.DeepFusionError) as caught:
+            deepfusion.train(*arguments, **{"out": tmp_path / "none", **options})
+        assert caught.value.hint, caught.value
+        return str(caught.value) + caught.value.hint
+
+    assert "light" in wrong("lihgt", street)
+    assert "batsch" in wrong({"batsch": 3}, street)
+    assert "many" in wrong({"batch": "many"}, street)
+    assert "nothing to learn" in wrong("tiny")
+    assert "nowhere" in wrong("tiny", tmp_path / "nowhere")
+    assert "no-such-network" in wrong(SMALL, street, init="no-such-network")
+    assert "not empty" in wrong(SMALL, street, out=run[0].path)
+    with pytest.raises(TypeError, match="configuration"):
+        deepfusion.train({"batch": object()}, street, out=tmp_path / "none")
+    assert not (tmp_path / "none").exists()
+
+
+def interrupted(code, when, *arguments):
+    """Runs a program and sends Ctrl-C once it has printed `when`; gives how it ended, and how long it took from there."""
+    program = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    for line in program.stdout:
+        if line.strip() == when:
+            break
+    start = time.monotonic()
+    program.send_signal(signal.SIGINT)
+    rest = program.stdout.read()
+    return program.wait(timeout=120), rest, time.monotonic() - start
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
+def test_ctrl_c_ends_training_and_keeps_it(street, tmp_path):
+    out = tmp_path / "interrupted"
+    code = """
+        import sys, deepfusion
+        config = {"preset": "tiny", "steps": 100000, "batch": 2, "size": {"width": 64, "height": 64}, "validation_share": 0.2}
+        def listen(event):
+            if event["event"] == "step" and event["step"] == 2:
+                print("two", flush=True)
+        try:
+            deepfusion.train(config, sys.argv[1], listen, out=sys.argv[2], init="none")
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+    """
+    code, rest, seconds = interrupted(code, "two", street, out)
+    assert code == 0 and "interrupted" in rest
+    assert seconds < 60
+    assert deepfusion.load(out).step >= 2
+    more = deepfusion.train({"steps": deepfusion.load(out).step + 1}, out=out, resume=True)
+    assert more.step == more.steps
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
+def test_ctrl_c_ends_other_long_calls(street, tmp_path):
+    out = tmp_path / "drive"
+    code = """
+        import sys, deepfusion
+        try:
+            print("begun", flush=True)
+            deepfusion.simulate(sys.argv[1], frames=3000, size=(320, 96))
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+    """
+    code, rest, seconds = interrupted(code, "begun", out)
+    assert code == 0 and "interrupted" in rest and seconds < 60
+    assert not out.exists(), "nothing half is left"
+    code = """
+        import itertools, sys, deepfusion
+        frame = deepfusion.Dataset(sys.argv[1])[0]
+        model = deepfusion.load("tiny")
+        print("begun", flush=True)
+        try:
+            for prediction in model.predict_many(itertools.repeat(frame.image), frame.intrinsics):
+                pass
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+    """
+    code, rest, seconds = interrupted(code, "begun", street)
+    assert code == 0 and "interrupted" in rest and seconds < 20
