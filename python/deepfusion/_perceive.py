@@ -115,7 +115,7 @@ class Perception:
     def __init__(self, *, exact: bool = False, **settings: Any) -> None:
         self._native = _native.Perception(json.dumps(settings), exact)
 
-    def look(
+    def detect(
         self,
         depth: ArrayLike,
         intrinsics: tuple[float, float, float, float],
@@ -136,12 +136,12 @@ class Perception:
         pose = None if world_from_cam is None else np.ascontiguousarray(world_from_cam, dtype=np.float64)
         sigma = None if sigma is None else as_f32(sigma)
         return _surroundings(
-            self._native.look(as_f32(depth), intrinsics, sigma, time_s, pose, speed_mps, yaw_rate_radps)
+            self._native.detect(as_f32(depth), intrinsics, sigma, time_s, pose, speed_mps, yaw_rate_radps)
         )
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """What comes next does not go on from what was."""
-        self._native.forget()
+        self._native.reset()
 
 
 def perceive(
@@ -152,5 +152,5 @@ def perceive(
     exact: bool = False,
     **settings: Any,
 ) -> Surroundings:
-    """The targets in one depth image: what `deepfusion perceive` finds in a single picture. As `Perception.look`, without a past."""
-    return Perception(exact=exact, **settings).look(depth, intrinsics, sigma=sigma)
+    """The targets in one depth image: what `deepfusion perceive` finds in a single picture. As `Perception.detect`, without a past."""
+    return Perception(exact=exact, **settings).detect(depth, intrinsics, sigma=sigma)

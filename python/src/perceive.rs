@@ -66,7 +66,7 @@ impl Perception {
         })
     }
 
-    fn forget(&self) {
+    fn reset(&self) {
         self.inner
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -75,7 +75,7 @@ impl Perception {
 
     #[pyo3(signature = (depth, intrinsics, sigma, time_s, world_from_cam, speed_mps, yaw_rate_radps))]
     #[expect(clippy::too_many_arguments, reason = "by name in Python")]
-    fn look(
+    fn detect(
         &self,
         py: Python<'_>,
         depth: PyReadonlyArray2<'_, f32>,

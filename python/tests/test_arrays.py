@@ -102,7 +102,7 @@ def test_targets_of_exact_depth(drive):
         assert target.velocity_mps is None
     near = deepfusion.perceive(frame_depth(drive, 0), frame.intrinsics, exact=True, max_depth_m=15)
     assert all(target.center_m[2] < 17 for target in near.targets)
-    met = deepfusion.Perception(exact=True).look(
+    met = deepfusion.Perception(exact=True).detect(
         frame_depth(drive, 0), frame.intrinsics, speed_mps=8.0, yaw_rate_radps=0.4
     )
     assert met.collision is not None and met.collision.id in {t.id for t in met.targets}
@@ -130,7 +130,7 @@ def test_targets_are_the_commands(drive, model, tmp_path):
         if i > 0:
             pose = pose @ recording.motion(i, i - 1)
         prediction = model.predict(frame.image, frame.intrinsics)
-        ours = perception.look(
+        ours = perception.detect(
             prediction.depth, frame.intrinsics, sigma=prediction.sigma, time_s=frame.time_s, world_from_cam=pose
         )
         assert [t.id for t in ours.targets] == [t["id"] for t in theirs["targets"]]
@@ -155,9 +155,9 @@ def test_perception_says_what_is_wrong():
     with pytest.raises(deepfusion.DeepFusionError, match="camera"):
         deepfusion.perceive(depth, (0.0, 1.0, 1.0, 1.0))
     with pytest.raises(deepfusion.DeepFusionError, match="pose"):
-        deepfusion.Perception().look(depth, camera, time_s=0.0)
+        deepfusion.Perception().detect(depth, camera, time_s=0.0)
     with pytest.raises(ValueError, match="rotation"):
-        deepfusion.Perception().look(depth, camera, time_s=0.0, world_from_cam=np.ones((4, 4)))
+        deepfusion.Perception().detect(depth, camera, time_s=0.0, world_from_cam=np.ones((4, 4)))
 
 
 def test_snippets(drive):
