@@ -92,9 +92,10 @@ impl Model {
         let source = Source::of(image)?;
         let work = || -> Result<_, Failure> {
             let (image, camera) = source.read(intrinsics)?;
-            // Inside, so that its many small parallel parts begin at once.
-            let prediction = deepfusion_cli::in_pool(|| {
-                self.with(|estimator| {
+            // Inside the pool, so that its many small parallel parts begin at once. The lock is taken outside: a thread of the pool that
+            // waits for its parts takes up other work meanwhile, and another prediction would then wait for the lock below it, for ever.
+            let prediction = self.with(|estimator| {
+                deepfusion_cli::in_pool(|| {
                     estimator.predict(&image, camera.as_ref(), focal_correction, !stretch)
                 })
             })?;

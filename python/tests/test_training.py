@@ -179,8 +179,8 @@ def test_ctrl_c_ends_other_long_calls(street, tmp_path):
         import itertools, sys, deepfusion
         frame = deepfusion.Dataset(sys.argv[1])[0]
         model = deepfusion.load("tiny")
-        print("begun", flush=True)
         try:
+            print("begun", flush=True)
             for prediction in model.predict_many(itertools.repeat(frame.image), frame.intrinsics):
                 pass
         except KeyboardInterrupt:
