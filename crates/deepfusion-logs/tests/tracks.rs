@@ -18,7 +18,7 @@ fn read(name: &str, text: &str) -> Result<DriveLog, Error> {
 }
 
 fn refusal(name: &str, text: &str) -> String {
-    let error = read(name, text).err().expect("it is refused");
+    let error = read(name, text).expect_err("it is refused");
     assert!(error.hint().is_some());
     error.to_string()
 }
