@@ -2,6 +2,7 @@
 # Builds the package into a fresh virtual environment, as `pip install .` does for a user, and runs its tests there.
 #
 #   python/test.sh [FOLDER]     default: a temporary one
+#   EXTRAS=test,test-ray python/test.sh     the tests of deepfusion.ray too, which are skipped without Ray
 set -euo pipefail
 # From where the caller stands.
 if [ -n "${DEEPFUSION:-}" ]; then
@@ -12,7 +13,7 @@ venv=$(realpath -m "${1:-$(mktemp -d)}")
 cd "$(dirname "$0")"
 python3 -m venv "$venv"
 "$venv/bin/pip" install --quiet --upgrade pip
-"$venv/bin/pip" install --quiet '.[test]'
+"$venv/bin/pip" install --quiet ".[${EXTRAS:-test}]"
 # Not from this folder: its sources hold no extension module.
 tests=$PWD/tests
 cd "$venv"

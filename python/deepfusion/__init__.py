@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -103,7 +104,7 @@ def simulate(
     moving_cars: int = 0,
     size: tuple[int, int] = (640, 192),
     scan_every: int = 1,
-) -> str:
+) -> Path:
     """Writes a simulated drive with exact depth in KITTI's layout into `out`, new or empty, and gives the drive's folder.
 
     `size` is width and height in pixels; `scan_every` says which frames have a LiDAR scan, 0 none. Ctrl-C leaves `out` as it was.

@@ -109,5 +109,5 @@ pub fn simulate(
 #[pyfunction]
 pub fn doctor(py: Python<'_>, path: PathBuf) -> PyResult<String> {
     let diagnosis = abandonable(py, move || checks::doctor(&path, None))?;
-    serde_json::to_string(&diagnosis).map_err(|e| PyValueError::new_err(e.to_string()))
+    serde_json::to_string(&diagnosis.record()).map_err(|e| PyValueError::new_err(e.to_string()))
 }

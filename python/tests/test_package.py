@@ -3,6 +3,7 @@
 import json
 import os
 import subprocess
+import sys
 import sysconfig
 import threading
 from pathlib import Path
@@ -136,6 +137,8 @@ def test_threads(drive, model):
 def test_doctor(drive, tmp_path):
     report = deepfusion.doctor(drive)
     assert report["drives"][0]["frames"] == 3
+    said = subprocess.run([sys.executable, "-m", "deepfusion", "doctor", str(drive), "--json"], capture_output=True, check=False)
+    assert report == json.loads(said.stdout), "what the command prints"
     assert deepfusion.doctor(tmp_path)["recording"]
 
 

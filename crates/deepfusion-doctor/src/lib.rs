@@ -21,6 +21,7 @@ mod look;
 mod opening;
 mod parallax;
 mod plots;
+mod record;
 mod speed;
 mod standing;
 mod steering;
@@ -31,6 +32,7 @@ mod turn;
 
 pub use finding::{Figure, Finding, Limit, Outcome, Severity, Status};
 pub use plots::{DrivePlots, Line};
+pub use record::{CheckRecord, DiagnosisRecord, FindingRecord};
 
 use deepfusion_data::{
     Cameras, ClockOffset, Dataset, DatasetKind, Error, Inspection, OpenOptions, Result,

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use deepfusion_data::{DatasetKind, OpenOptions};
-use deepfusion_doctor::{Diagnosis, Outcome, Severity, doctor_with};
+use deepfusion_doctor::{Diagnosis, Severity, doctor_with};
 
 use crate::cli::{CameraIntrinsics, DoctorArgs};
 use crate::error::CliError;
@@ -29,7 +29,7 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     let diagnosis = doctor_with(path, &options)
         .unwrap_or_else(|error| Diagnosis::unopened(error.message(), error.remedy()));
     if args.json {
-        output::print_json(&as_json(&diagnosis))?;
+        output::print_json(&serde_json::json!(diagnosis.record()))?;
     } else {
         output::print(&told(&diagnosis, args.verbose))?;
     }
@@ -37,7 +37,7 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
         report::write(path, &options, &diagnosis, file)?;
         say(&format!("report: {}", file.display()));
     }
-    let errors = count(&diagnosis, Severity::Error);
+    let errors = diagnosis.count(Severity::Error);
     match errors {
         0 => Ok(()),
         _ => Err(unfit(path, errors).into()),
@@ -49,48 +49,6 @@ fn unfit(path: &Path, errors: usize) -> CliError {
         path: path.to_owned(),
         errors,
     }
-}
-
-fn count(diagnosis: &Diagnosis, severity: Severity) -> usize {
-    let findings = diagnosis.findings();
-    findings
-        .iter()
-        .filter(|(_, f)| f.severity == severity)
-        .count()
-}
-
-fn as_json(diagnosis: &Diagnosis) -> serde_json::Value {
-    let findings = diagnosis.findings();
-    let findings: Vec<_> = findings
-        .iter()
-        .map(|(drive, finding)| serde_json::json!({ "drive": drive, "finding": finding }))
-        .collect();
-    let lines: Vec<_> = outcomes(diagnosis)
-        .map(|(drive, outcome)| {
-            serde_json::json!({
-                "drive": drive,
-                "check": outcome.check,
-                "status": outcome.status(),
-                "findings": outcome.findings.len(),
-                "why": outcome.skipped,
-            })
-        })
-        .collect();
-    serde_json::json!({
-        "checks": lines,
-        "errors": count(diagnosis, Severity::Error),
-        "warnings": count(diagnosis, Severity::Warning),
-        "findings": findings,
-        "recording": diagnosis.recording,
-        "drives": diagnosis.drives,
-    })
-}
-
-/// Every check that was made or could not be, each drive's and then the whole recording's, with the drive it is about.
-fn outcomes(diagnosis: &Diagnosis) -> impl Iterator<Item = (Option<&str>, &Outcome)> {
-    let drives = diagnosis.drives.iter();
-    let drives = drives.flat_map(|d| d.outcomes.iter().map(move |o| (Some(d.name.as_str()), o)));
-    drives.chain(diagnosis.recording.iter().map(|o| (None, o)))
 }
 
 /// A line for each check, the findings, the worst first; then what was measured, if asked for.
@@ -111,7 +69,7 @@ fn told(diagnosis: &Diagnosis, verbose: bool) -> String {
     if !text.is_empty() {
         text.push('\n');
     }
-    text += &lines::of(&outcomes(diagnosis).collect::<Vec<_>>());
+    text += &lines::of(&diagnosis.outcomes().collect::<Vec<_>>());
     let findings = diagnosis.findings();
     for (drive, finding) in &findings {
         let _ = write!(text, "\n{} [{}]", finding.severity, finding.check);
@@ -129,7 +87,7 @@ fn told(diagnosis: &Diagnosis, verbose: bool) -> String {
         }
         let _ = writeln!(text, "  remedy: {}", finding.remedy);
     }
-    let number = |severity| count(diagnosis, severity);
+    let number = |severity| diagnosis.count(severity);
     let _ = writeln!(
         text,
         "\n{} errors, {} warnings, {} notes",
@@ -146,7 +104,7 @@ fn told(diagnosis: &Diagnosis, verbose: bool) -> String {
 /// Every figure.
 fn figures(diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
-    for (_, outcome) in outcomes(diagnosis) {
+    for (_, outcome) in diagnosis.outcomes() {
         for figure in &outcome.measured {
             let _ = writeln!(text, "  {:12} {figure}", outcome.check);
         }

@@ -32,7 +32,7 @@ pub fn write(path: &Path, options: &OpenOptions, diagnosis: &Diagnosis, file: &P
     } else {
         report.table(&["finding", "measured", "remedy", "drive", "frame"], &rows)
     };
-    let checks: Vec<_> = super::outcomes(diagnosis).collect();
+    let checks: Vec<_> = diagnosis.outcomes().collect();
     let rows = lines::rows(&checks).into_iter();
     let rows: Vec<Vec<String>> = rows
         .map(|(check, how)| vec![check.to_owned(), how])

@@ -1,0 +1,14 @@
+"""Many machines, by Ray: bulk prediction, the doctor of a fleet's recordings, and trials of configurations.
+
+Needs Ray (`pip install "deepfusion[ray]"`). Everything runs on the cluster that `ray.init()` has joined, or on this machine where
+none was joined. Inputs and outputs are paths or URLs of any file system that fsspec knows: a folder that all machines see,
+`s3://bucket/folder` (with s3fs), `gs://…` (with gcsfs).
+"""
+
+from __future__ import annotations
+
+from ._fleet import doctor, inspect, table
+from ._predict import PredictSummary, predict
+from ._tune import Trial, ablate, tune
+
+__all__ = ["PredictSummary", "Trial", "ablate", "doctor", "inspect", "predict", "table", "tune"]

@@ -1,0 +1,319 @@
+"""Bulk prediction on a cluster: every image once, whatever dies."""
+
+from __future__ import annotations
+
+import io
+import json
+import logging
+import os
+import time
+import uuid
+import zlib
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import ray
+import ray.data
+from ray.util import metrics
+
+import deepfusion
+
+from ._storage import Folder, Sources, images, urls, weights_mark
+
+_LOG = logging.getLogger(__name__)
+
+_ENDINGS = {"depth-png": "_depth.png", "npy": "_depth.npy", "sigma": "_sigma.npy"}
+
+# Images that a worker takes at once: enough that reading, network and writing overlap, few enough that little is done again
+# where a worker dies.
+_BATCH = 16
+
+# Ray's plan of a job grows with its blocks.
+_MOST_BLOCKS = 4000
+
+
+@dataclass(frozen=True)
+class PredictSummary:
+    """What a job did."""
+
+    images: int
+    """Images that the inputs mean."""
+    done: int
+    """Made by this job."""
+    kept: int
+    """Already there, from an earlier job with the same network and options."""
+    failed: list[tuple[str, str]]
+    """Images that could not be done, and why. Mend them and start the same job again."""
+    seconds: float
+    """Wall time."""
+
+    @property
+    def images_per_second(self) -> float:
+        """Of those made by this job."""
+        return self.done / self.seconds
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What every worker needs to know."""
+
+    id: str
+    model: str
+    precision: str
+    data_set: str | None
+    intrinsics: tuple[float, float, float, float] | None
+    focal_correction: bool
+    stretch: bool
+    output: str
+    save: tuple[str, ...]
+    overwrite: bool
+    threads: int
+    options: dict[str, Any]
+    weights: str | None
+
+    def made_with(self) -> dict[str, Any]:
+        """What the outputs depend on beside the image."""
+        asked = asdict(self)
+        named = ("precision", "data_set", "focal_correction", "stretch", "weights")
+        made = {name: asked[name] for name in named}
+        made["version"] = deepfusion.__version__
+        # A run may be mounted elsewhere: its weights tell it.
+        made["model"] = self.model if self.weights is None else None
+        made["intrinsics"] = None if self.intrinsics is None else list(self.intrinsics)
+        made["save"] = list(self.save)
+        return made
+
+
+class _Worker:
+    """One network in one process."""
+
+    def __init__(self, job: _Job) -> None:
+        # Read by the pool of threads when it is first used, that is below.
+        os.environ["RAYON_NUM_THREADS"] = str(job.threads)
+        self.job = job
+        self.made_with = job.made_with()
+        self.sources = Sources(job.options)
+        self.folder = Folder(job.output, job.options)
+        with ExitStack() as stack:
+            model = job.model
+            if "://" in model:
+                model = stack.enter_context(self.sources.local_tree(model))
+            self.model = deepfusion.load(model, precision=job.precision, data_set=job.data_set)
+        self.counted = metrics.Counter("deepfusion_images", "Images by outcome", ("outcome",))
+        self.took = metrics.Histogram("deepfusion_image_seconds", "Wall time of an image", [0.01, 0.03, 0.1, 0.3, 1, 3, 10])
+
+    def __call__(self, batch: dict[str, np.ndarray]) -> dict[str, Any]:
+        rows = list(zip(map(str, batch["image"]), map(str, batch["name"])))
+        outcomes: dict[int, tuple[str, str]] = {}
+        todo: list[tuple[int, dict[str, Any]]] = []
+        for i, (url, name) in enumerate(rows):
+            try:
+                # Before it is read: a change in between is then noticed by the next job.
+                mark = self.sources.mark(url)
+                there = self.there(url, name, mark)
+                if self.job.overwrite and there != ("done", ""):
+                    there = None
+            except Exception as error:  # Whatever a file system raises is that image's failure alone.
+                outcomes[i] = ("failed", _told(error))
+                continue
+            if there is None:
+                todo.append((i, mark))
+            else:
+                outcomes[i] = there
+        with self.sources.local([rows[i][0] for i, _ in todo]) as paths:
+            readable = [(i, mark, path) for (i, mark), path in zip(todo, paths) if isinstance(path, str)]
+            outcomes |= {i: ("failed", _told(path)) for (i, _), path in zip(todo, paths) if not isinstance(path, str)}
+            predictions = self.model.predict_many(
+                [path for _, _, path in readable],
+                self.job.intrinsics,
+                focal_correction=self.job.focal_correction,
+                stretch=self.job.stretch,
+            )
+            for i, mark, _ in readable:
+                begun = time.monotonic()
+                try:
+                    prediction = next(predictions)
+                    self.write(*rows[i], mark, prediction)
+                    outcomes[i] = ("done", "")
+                except Exception as error:
+                    outcomes[i] = ("failed", _told(error))
+                self.took.observe(time.monotonic() - begun)
+        for outcome, _ in outcomes.values():
+            self.counted.inc(1, {"outcome": outcome})
+        ordered = [outcomes[i] for i in range(len(rows))]
+        return {
+            "image": [url for url, _ in rows],
+            "outcome": [outcome for outcome, _ in ordered],
+            "why": [why for _, why in ordered],
+        }
+
+    def there(self, url: str, name: str, mark: dict[str, Any]) -> tuple[str, str] | None:
+        """What is in the folder of an image: `done` where this job made it before a worker died, `kept` where an earlier one did,
+        `failed` where it is of something else, None where it is not there whole."""
+        written = self.folder.read(f"{name}.json")
+        if written is None:
+            return None
+        try:
+            sidecar = json.loads(written)
+            files = list(zip(sidecar["files"], sidecar["file_bytes"], sidecar["file_crc32"], strict=True))
+            of, when, made_with = sidecar["image"], sidecar["image_file"], sidecar["made_with"]
+        except (ValueError, KeyError, TypeError):
+            return "failed", f"{name}.json: not a sidecar of such a job; overwrite=True replaces it"
+        if of != url:
+            return "failed", f"{name}.json: is of another image, {of}; choose another output, or overwrite=True"
+        if when != mark:
+            return "failed", "the image has changed since its depth was made; overwrite=True makes it anew"
+        if made_with != self.made_with:
+            differs = [key for key in self.made_with if made_with.get(key) != self.made_with[key]]
+            return "failed", f"its depth was made with another {', '.join(differs)}; overwrite=True makes it anew"
+        parent = name.rpartition("/")[0]
+        for file, size, crc32 in files:
+            file = f"{parent}/{file}" if parent else file
+            if self.folder.size(file) != size:
+                return None
+            # An object store keeps no half of an upload; a disk may have zeros after a power cut.
+            if not self.folder.atomic_put and f"{zlib.crc32(self.folder.read(file) or b''):08x}" != crc32:
+                return None
+        return ("done" if sidecar.get("job") == self.job.id else "kept"), ""
+
+    def write(self, url: str, name: str, mark: dict[str, Any], prediction: deepfusion.Prediction) -> None:
+        """Writes the outputs, then the sidecar, which is the mark of the image's being done."""
+        depth = prediction.depth
+        outputs = {f"{name}{_ENDINGS[kind]}": _encoded(kind, prediction) for kind in self.job.save}
+        for file, data in outputs.items():
+            self.folder.write(file, data)
+        known = depth[depth > 0]
+        sidecar = {
+            "image": url,
+            "image_file": mark,
+            "size": [depth.shape[1], depth.shape[0]],
+            "unit": "metres along the camera's axis (z)",
+            "model": self.job.model,
+            "checkpoint_step": self.model.step,
+            "intrinsics": prediction.intrinsics,
+            "camera_known": prediction.intrinsics is not None,
+            "depth_m": [float(known.min()), float(known.max())] if known.size else None,
+            "files": [file.rpartition("/")[2] for file in outputs],
+            "file_bytes": [len(data) for data in outputs.values()],
+            "file_crc32": [f"{zlib.crc32(data):08x}" for data in outputs.values()],
+            "made_with": self.made_with,
+            "job": self.job.id,
+        }
+        self.folder.write(f"{name}.json", json.dumps(sidecar, indent=2).encode())
+
+
+def _told(error: BaseException) -> str:
+    hint = getattr(error, "hint", None)
+    return f"{error}" + (f" (hint: {hint})" if hint else "") or type(error).__name__
+
+
+def _encoded(kind: str, prediction: deepfusion.Prediction) -> bytes:
+    if kind == "depth-png":
+        return _depth_png(prediction.depth)
+    array = prediction.depth if kind == "npy" else prediction.sigma
+    if array is None:
+        raise ValueError("the network does not say how sure it is: save no sigma")
+    file = io.BytesIO()
+    np.save(file, np.ascontiguousarray(array))
+    return file.getvalue()
+
+
+def _depth_png(depth: np.ndarray) -> bytes:
+    """KITTI's: 16-bit grey, steps of 1/256 m, 0 where there is none."""
+    from PIL import Image
+
+    # Half a step goes up, as in the program's own files.
+    steps = np.clip(np.floor(depth.astype(np.float64) * 256 + 0.5), 1, 65535)
+    file = io.BytesIO()
+    Image.fromarray(np.where(depth > 0, steps, 0).astype(np.uint16)).save(file, "png")
+    return file.getvalue()
+
+
+def predict(
+    paths: str | PathLike[str] | Sequence[str | PathLike[str]],
+    model: str | PathLike[str] = "street",
+    output: str | PathLike[str] = "depth",
+    *,
+    intrinsics: tuple[float, float, float, float] | None = None,
+    save: Sequence[str] = ("depth-png",),
+    workers: int | None = None,
+    cpus_per_worker: int = 1,
+    precision: str = "f32",
+    data_set: str | None = None,
+    focal_correction: bool = True,
+    stretch: bool = False,
+    overwrite: bool = False,
+    storage_options: Mapping[str, Any] | None = None,
+) -> PredictSummary:
+    """Depth of many images on a cluster, each exactly once.
+
+    `paths` are images, folders (with all below them) and globs; `output` is a folder. Both, and `model`, where it is no embedded
+    network, are paths that all machines see, or URLs; `storage_options` are those of their file system (fsspec's). The images are
+    of one camera: `intrinsics` are fx, fy, cx, cy in its pixels; without them each file's EXIF is asked, then the lens of the
+    training camera is assumed. `save` names what is written: "depth-png" (`NAME_depth.png`, KITTI's 16-bit PNG), "npy"
+    (`NAME_depth.npy`, f32 metres), "sigma" (`NAME_sigma.npy`, of a network that says how sure it is).
+
+    Each of up to `workers` processes (default: as many as the cluster has room for) has one network and `cpus_per_worker` threads. An
+    image's `NAME.json` is written last and marks it as done: what is there whole, of the same image, network and options, is kept.
+    So a job goes on where it was stopped, by the same call. A worker that dies is replaced, and what it had not finished is done
+    again. An image that cannot be read, or whose outputs are of something else, is in the summary's `failed`; the others are done.
+    """
+    unknown = [kind for kind in save if kind not in _ENDINGS]
+    if unknown or not save:
+        raise ValueError(f"save: expected some of {', '.join(_ENDINGS)}, found {list(save)}")
+    for name, number in [("workers", workers), ("cpus_per_worker", cpus_per_worker)]:
+        if number is not None and number < 1:
+            raise ValueError(f"{name}: expected at least 1, found {number}")
+    options = dict(storage_options or {})
+    model = os.fspath(model)
+    if "://" not in model and os.path.exists(model):
+        model = os.path.abspath(model)
+    if "://" not in model:
+        # Here rather than in each worker: a wrong name or a run without weights is one error, at once.
+        network = deepfusion.load(model, precision=precision, data_set=data_set)
+        grey = np.full((64, 64, 3), 128, np.uint8)
+        if "sigma" in save and network.predict(grey).sigma is None:
+            raise ValueError("save: the network does not say how sure it is, so that there is no sigma to save")
+    job = _Job(
+        id=uuid.uuid4().hex,
+        model=model,
+        precision=precision,
+        data_set=data_set,
+        intrinsics=None if intrinsics is None else tuple(map(float, intrinsics)),
+        focal_correction=focal_correction,
+        stretch=stretch,
+        output=urls(output)[0],
+        save=tuple(dict.fromkeys(save)),
+        overwrite=overwrite,
+        threads=cpus_per_worker,
+        options=options,
+        weights=weights_mark(model, options),
+    )
+    named = images(urls(paths), options)
+    if not ray.is_initialized():
+        ray.init()
+    if workers is None:
+        workers = max(1, int(ray.cluster_resources().get("CPU", 1)) // cpus_per_worker)
+    blocks = min(-(-len(named) // _BATCH), _MOST_BLOCKS)
+    begun = time.monotonic()
+    rows = ray.data.from_items([{"image": url, "name": name} for url, name in named], override_num_blocks=blocks)
+    outcomes = rows.map_batches(
+        _Worker,
+        fn_constructor_args=(job,),
+        batch_size=_BATCH,
+        compute=ray.data.ActorPoolStrategy(min_size=1, max_size=min(workers, blocks)),
+        num_cpus=cpus_per_worker,
+    )
+    counts = {"done": 0, "kept": 0, "failed": 0}
+    failed = []
+    for row in outcomes.iter_rows():
+        counts[row["outcome"]] += 1
+        if row["outcome"] == "failed":
+            failed.append((row["image"], row["why"]))
+            _LOG.warning("%s: %s", row["image"], row["why"])
+    seconds = time.monotonic() - begun
+    return PredictSummary(len(named), counts["done"], counts["kept"], sorted(failed), seconds)

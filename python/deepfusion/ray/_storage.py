@@ -1,0 +1,189 @@
+"""Files on any file system that fsspec knows, written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import fsspec
+
+# What is put there is there whole or not at all; a rename would be a copy.
+_OBJECT_STORES = {"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az", "adl", "oss", "memory"}
+
+_IMAGES = {".png", ".jpg", ".jpeg"}
+
+
+def is_local(fs: Any) -> bool:
+    """Whether it is the machine's own tree of files (mounts included)."""
+    return "file" in _protocols(fs)
+
+
+def _protocols(fs: Any) -> set[str]:
+    named = fs.protocol
+    return {named} if isinstance(named, str) else set(named)
+
+
+class Folder:
+    """A folder of outputs, made when the first file is written."""
+
+    def __init__(self, url: str, options: Mapping[str, Any]) -> None:
+        self.fs, self.root = fsspec.core.url_to_fs(url, **options)
+        self.atomic_put = not _OBJECT_STORES.isdisjoint(_protocols(self.fs))
+        self.made: set[str] = set()
+
+    def path(self, name: str) -> str:
+        return f"{self.root.rstrip('/')}/{name}"
+
+    def read(self, name: str) -> bytes | None:
+        """What the file holds; None where there is none."""
+        try:
+            return self.fs.cat_file(self.path(name))
+        except FileNotFoundError:
+            return None
+
+    def size(self, name: str) -> int | None:
+        try:
+            return self.fs.info(self.path(name))["size"]
+        except FileNotFoundError:
+            return None
+
+    def write(self, name: str, data: bytes) -> None:
+        """Writes it so that a reader, or the next run after a power cut, finds the whole file or none."""
+        path = self.path(name)
+        parent = path.rpartition("/")[0]
+        if self.atomic_put:
+            self.fs.pipe_file(path, data)
+            return
+        if parent not in self.made:
+            self.fs.makedirs(parent, exist_ok=True)
+            self.made.add(parent)
+        # Of this writer alone: two workers may be at the same image where one of them is thought dead.
+        temporary = f"{path}.{uuid.uuid4().hex}.tmp"
+        try:
+            if is_local(self.fs):
+                with open(temporary, "wb") as file:
+                    file.write(data)
+                    file.flush()
+                    os.fsync(file.fileno())
+                os.replace(temporary, path)
+            else:
+                self.fs.pipe_file(temporary, data)
+                self.fs.mv(temporary, path)
+        except BaseException:
+            if self.fs.exists(temporary):
+                self.fs.rm_file(temporary)
+            raise
+
+
+class Sources:
+    """Inputs, read where they are."""
+
+    def __init__(self, options: Mapping[str, Any]) -> None:
+        self.options = options
+
+    def mark(self, url: str) -> dict[str, Any]:
+        """Size and version of a file, to notice that it changed."""
+        fs, path = fsspec.core.url_to_fs(url, **self.options)
+        info = fs.info(path)
+        if is_local(fs):
+            return {"bytes": info["size"], "modified_ns": os.stat(path).st_mtime_ns}
+        version = next((info[key] for key in ("ETag", "etag", "md5Hash", "LastModified", "mtime", "created") if key in info), None)
+        return {"bytes": info["size"], "version": None if version is None else str(version)}
+
+    @contextmanager
+    def local(self, urls: Sequence[str]) -> Iterator[list[str | Exception]]:
+        """Paths on this machine with what the files hold, in their order, for as long as the block lasts; why, where one cannot be read."""
+        with tempfile.TemporaryDirectory(prefix="deepfusion-") as folder:
+            paths: list[str | Exception] = []
+            for i, url in enumerate(urls):
+                fs, path = fsspec.core.url_to_fs(url, **self.options)
+                if is_local(fs):
+                    paths.append(path)
+                    continue
+                here = os.path.join(folder, f"{i}{PurePosixPath(path).suffix}")
+                try:
+                    fs.get_file(path, here)
+                    paths.append(here)
+                except OSError as error:
+                    paths.append(error)
+            yield paths
+
+    @contextmanager
+    def local_tree(self, url: str) -> Iterator[str]:
+        """A path on this machine with what the file or folder holds, for as long as the block lasts."""
+        fs, path = fsspec.core.url_to_fs(url, **self.options)
+        if is_local(fs):
+            yield path
+            return
+        with tempfile.TemporaryDirectory(prefix="deepfusion-") as folder:
+            here = os.path.join(folder, PurePosixPath(path.rstrip("/")).name)
+            fs.get(path, here, recursive=True)
+            yield here
+
+
+def urls(given: str | PathLike[str] | Sequence[str | PathLike[str]]) -> list[str]:
+    """Paths become absolute: a worker stands elsewhere."""
+    if isinstance(given, (str, PathLike)):
+        given = [given]
+    found = []
+    for one in given:
+        one = os.fspath(one)
+        found.append(one if "://" in one else os.path.abspath(one))
+    return found
+
+
+def images(given: Sequence[str], options: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Every image that files, folders (with those below them) and globs mean, once, with the name of its outputs: the path
+    below the folder or the glob's fixed part, without its ending; where two would have the same, the second gets `-2`."""
+    found: dict[str, str] = {}
+    for url in given:
+        fs, path = fsspec.core.url_to_fs(url, **options)
+        if any(sign in path for sign in "*?["):
+            fixed = path[: min(path.index(sign) for sign in "*?[" if sign in path)].rpartition("/")[0]
+            below, paths = fixed, fs.glob(path)
+        elif fs.isdir(path):
+            below, paths = path.rstrip("/"), fs.find(path)
+        elif fs.exists(path):
+            below, paths = path.rpartition("/")[0], [path]
+        else:
+            raise FileNotFoundError(f"{url}: there is no such file or folder")
+        taken = [one for one in paths if PurePosixPath(one).suffix.lower() in _IMAGES]
+        if not taken:
+            raise FileNotFoundError(f"{url}: holds no image (.png, .jpg or .jpeg)")
+        for one in taken:
+            whole = one if is_local(fs) else fs.unstrip_protocol(one)
+            found.setdefault(whole, one[len(below) :].lstrip("/"))
+    named: list[tuple[str, str]] = []
+    used: set[str] = set()
+    # In the order of their paths, so that the same inputs always get the same names.
+    for url, relative in sorted(found.items()):
+        stem = str(PurePosixPath(relative).with_suffix(""))
+        name, number = stem, 1
+        while name in used:
+            number += 1
+            name = f"{stem}-{number}"
+        used.add(name)
+        named.append((url, name))
+    return named
+
+
+def weights_mark(model: str, options: Mapping[str, Any]) -> str | None:
+    """SHA-256 over a run's configuration and weights; None of an embedded network, which the program's version tells."""
+    import hashlib
+
+    if "://" not in model and not Path(model).exists():
+        return None
+    fs, path = fsspec.core.url_to_fs(model, **options)
+    files = [one for one in sorted(fs.find(path)) if one.endswith((".toml", ".safetensors"))] if fs.isdir(path) else [path]
+    whole = hashlib.sha256()
+    for one in files:
+        data = fs.cat_file(one)
+        whole.update(f"{PurePosixPath(one).name}\0{len(data)}\0".encode())
+        whole.update(data)
+    return whole.hexdigest()

@@ -1,0 +1,168 @@
+"""Trials of configurations, by Ray Tune."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from ray import tune as ray_tune
+
+import deepfusion
+
+from ._storage import urls
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A configuration that was tried."""
+
+    settings: dict[str, Any]
+    """What was set, keys as in the configuration."""
+    path: Path | None
+    """The run's folder, on the machine that trained it."""
+    step: int | None
+    """The last step that was reported."""
+    selection: float | None
+    """The lowest value that `best` is chosen by: a loss on held-out samples."""
+    metrics: dict[str, Any]
+    """What was reported last: `step`, `selection`, `scale_ratio`, and the held-out losses by their names in log.csv."""
+    error: str | None
+    """Why it failed; None where it did not."""
+
+
+def tune(
+    space: Mapping[str, Any],
+    data: str | PathLike[str] | Sequence[str | PathLike[str]],
+    *,
+    config: str | Mapping[str, Any] = "tiny",
+    out: str | PathLike[str] = "runs/tune",
+    trials: int = 1,
+    init: str | PathLike[str] | None = None,
+    cpus_per_trial: int = 1,
+    metric: str = "selection",
+    mode: str = "min",
+    scheduler: Any | None = None,
+    search: Any | None = None,
+) -> list[Trial]:
+    """Trains one run for each draw from `space`, and gives them all, the best first.
+
+    `space` maps keys of the configuration (dots between tables: `"loss.smoothness"`, `"learning_rate"`) to Ray Tune's ranges
+    (`ray.tune.loguniform(1e-5, 1e-3)`, `ray.tune.grid_search([...])`) or to fixed values; `trials` is how often it is drawn from
+    (grids: as often each of their points). `config` is a preset, or a dict over one. Each validation reports, so that a `scheduler`
+    (`ASHAScheduler`) can stop what lags behind; `search` proposes values (Optuna's, for example). Each trial's run lies in a folder
+    of its own below `out`, which all machines see.
+    """
+    fixed = {"preset": config} if isinstance(config, str) else dict(config)
+    data = urls(data)
+    folder = Path(out).absolute()
+
+    def settings(drawn: Mapping[str, Any]) -> dict[str, Any]:
+        return dict(drawn)
+
+    return _run(settings, space, fixed, data, folder, trials, init, cpus_per_trial, metric, mode, scheduler, search)
+
+
+def ablate(
+    rows: Mapping[str, Mapping[str, Any]],
+    data: str | PathLike[str] | Sequence[str | PathLike[str]],
+    *,
+    seeds: Sequence[int] = (1, 2, 3),
+    config: str | Mapping[str, Any] = "tiny",
+    out: str | PathLike[str] = "runs/ablation",
+    init: str | PathLike[str] | None = None,
+    cpus_per_trial: int = 1,
+) -> dict[str, list[Trial]]:
+    """Trains every row, settings over `config`, with every seed, and gives the trials by row, in the order of `seeds`.
+
+    `{"all": {}, "no smoothness": {"loss.smoothness": 0.0}}`; otherwise as `tune`.
+    """
+    fixed = {"preset": config} if isinstance(config, str) else dict(config)
+    named = {name: dict(row) for name, row in rows.items()}
+
+    def settings(drawn: Mapping[str, Any]) -> dict[str, Any]:
+        return {**named[drawn["row"]], "seed": drawn["seed"]}
+
+    space = {"row": ray_tune.grid_search(list(named)), "seed": ray_tune.grid_search(list(seeds))}
+    folder = Path(out).absolute()
+    tried = _run(settings, space, fixed, urls(data), folder, 1, init, cpus_per_trial, "selection", "min", None, None)
+    by_seed = sorted(tried, key=lambda trial: list(seeds).index(trial.settings["seed"]))
+    return {name: [trial for trial in by_seed if trial.settings["row"] == name] for name in named}
+
+
+def _run(
+    settings: Callable[[Mapping[str, Any]], dict[str, Any]],
+    space: Mapping[str, Any],
+    fixed: dict[str, Any],
+    data: list[str],
+    folder: Path,
+    samples: int,
+    init: Any,
+    cpus: int,
+    metric: str,
+    mode: str,
+    scheduler: Any,
+    search: Any,
+) -> list[Trial]:
+    def trial(drawn: dict[str, Any]) -> None:
+        import os
+
+        os.environ["RAYON_NUM_THREADS"] = str(cpus)
+        out = folder / ray_tune.get_context().get_trial_id()
+        best: float | None = None
+
+        def report(event: deepfusion.TrainEvent) -> None:
+            nonlocal best
+            if event["event"] == "validated":
+                value = event["selection"]
+                best = value if best is None else min(best, value)
+                told = {"step": event["step"], "selection": best, "scale_ratio": event["scale_ratio"], "path": str(out)}
+                ray_tune.report(told | dict(event["losses"] or {}))
+
+        deepfusion.train({**fixed, **settings(drawn)}, data, report, out=out, init=init)
+
+    if init is not None and str(init) not in {*deepfusion.networks(), "none"}:
+        init = urls(init)[0]
+    folder.mkdir(parents=True, exist_ok=True)
+    tuner = ray_tune.Tuner(
+        ray_tune.with_resources(trial, {"cpu": cpus}),
+        param_space=dict(space),
+        tune_config=ray_tune.TuneConfig(
+            metric=metric, mode=mode, num_samples=samples, scheduler=scheduler, search_alg=search
+        ),
+        run_config=ray_tune.RunConfig(name="trials", storage_path=str(folder)),
+    )
+    tried = []
+    for result in tuner.fit():
+        metrics = result.metrics or {}
+        ours = {key: value for key, value in metrics.items() if isinstance(value, (int, float)) and key not in _RAYS_OWN}
+        tried.append(
+            Trial(
+                settings=dict(result.config or {}),
+                path=Path(metrics["path"]) if "path" in metrics else None,
+                step=metrics.get("step"),
+                selection=metrics.get("selection"),
+                metrics=ours,
+                error=None if result.error is None else str(result.error),
+            )
+        )
+    worst = float("inf")
+    sign = 1 if mode == "min" else -1
+    return sorted(tried, key=lambda one: sign * one.metrics[metric] if metric in one.metrics else worst)
+
+
+# What Ray Tune adds to each report.
+_RAYS_OWN = {
+    "timestamp",
+    "done",
+    "training_iteration",
+    "pid",
+    "time_this_iter_s",
+    "time_total_s",
+    "time_since_restore",
+    "iterations_since_restore",
+    "should_checkpoint",
+    "checkpoint_dir_name",
+}
