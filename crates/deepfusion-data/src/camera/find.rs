@@ -1,6 +1,7 @@
 //! Where a recording's camera is looked for.
 
 use super::calibration::CameraCalibration;
+use crate::dataset::numbers_of_hfov;
 use crate::dataset_toml::FolderConfig;
 use crate::{DatasetKind, Error, OpenOptions, Result};
 use std::path::Path;
@@ -17,8 +18,8 @@ const NAMES: [&str; 8] = [
     "calibration.txt",
 ];
 
-/// What errors name in the place of a calibration's file or field where the caller gave the intrinsics
-/// ([`OpenOptions::intrinsics`]).
+/// What errors name in the place of a calibration's file or field where the caller gave the camera
+/// ([`OpenOptions::intrinsics`], [`OpenOptions::hfov_deg`]).
 pub const GIVEN_INTRINSICS: &str = "given intrinsics";
 
 /// The camera of images of a size: given by the caller or in `dataset.toml`, or read from a file beside
@@ -33,10 +34,14 @@ pub(crate) fn find_camera(
     size: (u32, u32),
     layout: DatasetKind,
 ) -> Result<CameraCalibration> {
-    if let Some(given) = options.intrinsics {
+    if let Some(given) = options.given_camera(size) {
         return CameraCalibration::given(given, size, Path::new(GIVEN_INTRINSICS));
     }
     if let Some(given) = config.intrinsics {
+        return CameraCalibration::given(given, size, &config.path);
+    }
+    if let Some(hfov_deg) = config.hfov_deg {
+        let given = numbers_of_hfov(hfov_deg, size);
         return CameraCalibration::given(given, size, &config.path);
     }
     let named = config.calibration.as_ref();

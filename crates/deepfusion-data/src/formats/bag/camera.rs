@@ -35,7 +35,7 @@ pub(super) fn find(
         field,
     };
     let pinhole = |intrinsics: Intrinsics| Lens::new(intrinsics, &Distortion::default());
-    let (lens, place) = if let Some(numbers) = options.intrinsics {
+    let (lens, place) = if let Some(numbers) = options.given_camera((width, height)) {
         let given = Intrinsics::from_numbers(numbers, (width, height));
         (pinhole(given), place(bag, GIVEN_INTRINSICS))
     } else if let Some(camera) = config.camera {
