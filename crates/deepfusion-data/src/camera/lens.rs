@@ -153,9 +153,8 @@ fn largest_valid(
     let [left_x, top_y, right_x, bottom_y] = if distortion.fisheye.is_some() {
         // A border without a ray is 90 degrees from the axis or more, where the widest image ends long before.
         let limit = |side: Option<f64>, widest: f64| {
-            Some(side.map_or(widest, |side| {
-                widest.signum() * (side * widest.signum()).min(WIDEST)
-            }))
+            let side = side.unwrap_or(widest);
+            Some(if side.abs() > WIDEST { widest } else { side })
         };
         [
             limit(left_x, -WIDEST),
