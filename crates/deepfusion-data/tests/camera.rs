@@ -227,3 +227,19 @@ fn photographs_that_say_nothing_or_too_much_are_no_camera() {
         "{error}"
     );
 }
+
+#[test]
+fn a_fisheye_calibration_is_undone() {
+    let root = tempfile::tempdir().unwrap();
+    photographs(root.path(), &[vec![]]);
+    let camchain = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [0.05, -0.02, 0.01, -0.003]\n  \
+        distortion_model: equidistant\n  intrinsics: [40.0, 40.0, 32.0, 24.0]\n  resolution: [64, 48]\n";
+    fs::write(root.path().join("camchain.yaml"), camchain).unwrap();
+    let dataset = open(root.path(), &OpenOptions::default()).unwrap();
+    // The left edge's middle is 32 pixels of 40 from the axis: 0.8 = θ(1 + 0.05θ² - 0.02θ⁴ + 0.01θ⁶ - 0.003θ⁸) at θ = 0.7806,
+    // and the right one's 31 of 40, 0.775, at θ = 0.7571; a pinhole image from -tan to tan of them has 63 steps.
+    let span = 0.7806_f64.tan() + 0.7571_f64.tan();
+    let k = dataset.intrinsics(0);
+    assert!((k.fx - 63.0 / span).abs() < 0.02, "{k:?}");
+    assert_eq!(dataset.load_image(0).unwrap().dimensions(), SIZE);
+}
