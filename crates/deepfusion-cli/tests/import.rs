@@ -92,6 +92,17 @@ fn a_log_beside_its_images_is_a_drive() {
     let remarks = beside["drives"][0]["remarks"].to_string();
     assert!(remarks.contains("taken for UTC"), "{remarks}");
 
+    // The camera by its field of view, 160 pixels of 90 degrees; as an option, too.
+    let import_by_view = "data import torque.csv --zone +01:00 --images images";
+    ok(at, &format!("{import_by_view} --hfov 90 --out seen"));
+    fs::copy(at.join("frames.csv"), at.join("seen/frames.csv")).unwrap();
+    let config = fs::read_to_string(at.join("seen/dataset.toml")).unwrap();
+    assert!(config.contains("hfov_deg = 90.0\n"), "{config}");
+    let told = ok(at, "data inspect seen").stdout;
+    assert!(told.contains("fx 80.0"), "{told}");
+    let told = ok(at, "data inspect beside --hfov 120").stdout;
+    assert!(told.contains("fx 46.19"), "{told}");
+
     fails(at, &format!("{import} --out drive"), &["speed.csv"]);
     fails(
         at,

@@ -91,6 +91,16 @@ fn depth_images_are_not_taken_for_pictures() {
         "predict --model run pictures --intrinsics 90,91,47.5,31.5 --out plain --json",
     );
     assert_eq!(told.as_array().unwrap().len(), 2, "{told}");
+    // By the field of view: 96 pixels that see 90 degrees.
+    let told = json(
+        at,
+        "predict --model run pictures --hfov 90 --out wide --json",
+    );
+    let k: Vec<f64> = serde_json::from_value(told[0]["intrinsics"].clone()).unwrap();
+    assert!((k[0] - 48.0).abs() < 1e-9 && k[0] == k[1], "{told}");
+    assert_eq!(k[2..], [47.5, 31.5]);
+    assert_eq!(told[0]["intrinsics_from"], "given");
+    assert_eq!(told[0]["made_with"]["hfov_deg"], 90.0);
 }
 
 #[test]

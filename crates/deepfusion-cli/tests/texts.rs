@@ -124,6 +124,19 @@ fn wrong_arguments_end_with_2_and_suggest_the_near_one() {
             ],
             "fx,fy,cx,cy",
         ),
+        (&["data", "inspect", "d", "--hfov", "180"], "below 170"),
+        (
+            &[
+                "eval",
+                "--data",
+                "d",
+                "--hfov",
+                "60",
+                "--intrinsics",
+                "1,2,3,4",
+            ],
+            "cannot be used with",
+        ),
         (
             &[
                 "predict", "--model", "m", "i.png", "--out", "o", "--save", "plyy",

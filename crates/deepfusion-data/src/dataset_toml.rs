@@ -1,7 +1,7 @@
 //! `dataset.toml`: what a recording's own files do not say.
 
 use crate::{Error, OpenOptions, Result};
-use deepfusion_geometry::Se3;
+use deepfusion_geometry::{HFOV_DEG, Se3};
 use deepfusion_motion::{Bicycle, ImuConfig, ImuMount, MotionConfig, SPEED_SCALES};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::Deserialize;
@@ -36,6 +36,8 @@ pub(crate) struct FolderConfig {
     pub(crate) calibration: Option<PathBuf>,
     /// fx, fy, cx, cy of a camera without distortion.
     pub(crate) intrinsics: Option<[f64; 4]>,
+    /// The field of view from left to right of a camera without distortion, in degrees.
+    pub(crate) hfov_deg: Option<f64>,
     /// Frames a second, where nothing says the frames' times.
     pub(crate) fps: Option<f64>,
     /// The first frame's time on the speeds' clock, in seconds, for frames whose times count from 0.
@@ -176,6 +178,16 @@ impl FolderConfig {
         if let Some(bad) = config.max_gap_s.filter(|v| *v > MOST_GAP_S) {
             return Err(config.error(format!(
                 "max_gap_s is {bad}, at most {MOST_GAP_S} s can be bridged"
+            )));
+        }
+        if config.intrinsics.is_some() && config.hfov_deg.is_some() {
+            return Err(config
+                .error("both intrinsics and hfov_deg say what the camera is: keep one".into()));
+        }
+        let (least, most) = HFOV_DEG;
+        if let Some(bad) = config.hfov_deg.filter(|v| !(*v > least && *v < most)) {
+            return Err(config.error(format!(
+                "hfov_deg is {bad}, it must be above {least} and below {most} degrees"
             )));
         }
         let place = config.vehicle_from_imu.unwrap_or_default();

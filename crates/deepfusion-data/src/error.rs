@@ -518,7 +518,8 @@ impl Hint for Error {
             }
             Self::NoCameraFile { .. } => {
                 "put calibration.yaml (OpenCV, ROS or Kalibr) or intrinsics.txt (fx, fy, cx, cy) there, or set \
-                 intrinsics = [fx, fy, cx, cy] in dataset.toml"
+                 intrinsics = [fx, fy, cx, cy] or hfov_deg = DEGREES (from left to right) in dataset.toml; photographs \
+                 with EXIF's focal length in 35 mm need none of these"
             }
             Self::NoBagCamera { config, .. } => {
                 return Some(format!(

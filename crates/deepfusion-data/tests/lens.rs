@@ -1,5 +1,11 @@
 //! Correction of a lens against OpenCV and SciPy, by `reference/lens_opencv.py`.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 use deepfusion_data::{Lens, load_rgb};
 use deepfusion_geometry::{Distortion, Intrinsics};
 use std::path::Path;
@@ -40,18 +46,49 @@ fn corrected_images_equal_opencvs() {
         for (a, b) in found.iter().zip(numbers(block[2], 1)) {
             assert!((a - b).abs() < 0.05, "{name}: {found:?} {b}");
         }
-        let corrected = lens.correct(source.clone()).unwrap();
-        let expected = load_rgb(&folder.join(format!("lens_{name}.png"))).unwrap();
-        let differences = corrected
-            .iter()
-            .zip(expected.iter())
-            .map(|(a, b)| a.abs_diff(*b));
-        // Coordinates of single precision may round a value that lies between two the other way.
-        assert!(differences.clone().max().unwrap() <= 1, "{name}");
-        let other = differences.filter(|d| *d > 0).count();
-        assert!(
-            other < corrected.len() / 200,
-            "{name}: {other} values differ"
-        );
+        assert_looks_like(&lens, &source, &folder, name);
     }
+}
+
+/// The same of fisheye lenses, one of which sees farther than a pinhole image can.
+#[test]
+fn corrected_fisheye_images_equal_opencvs() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference");
+    let text = std::fs::read_to_string(folder.join("lens_fisheye_opencv.txt")).unwrap();
+    let source = load_rgb(&folder.join("lens_source.png")).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines.len(), 4);
+    for block in lines.chunks(2) {
+        let words: Vec<&str> = block[0].split_whitespace().skip(1).collect();
+        let numbers =
+            |words: &[&str]| -> Vec<f64> { words.iter().map(|w| w.parse().unwrap()).collect() };
+        let (name, given) = (words[0], numbers(&words[1..]));
+        let bent = Distortion::from_fisheye(&given[4..]).unwrap();
+        let lens = Lens::new(intrinsics(&given[..4]), &bent).unwrap();
+        let k = lens.intrinsics();
+        let found = [k.fx, k.fy, k.cx, k.cy];
+        let expected = numbers(&block[1].split_whitespace().skip(1).collect::<Vec<_>>());
+        // OpenCV's iteration ends at 1e-8 of the angle, times a focal length of some tens and tan's slope at 60 degrees, 4.
+        for (a, b) in found.iter().zip(expected) {
+            assert!((a - b).abs() < 1e-4, "{name}: {found:?} {b}");
+        }
+        assert_looks_like(&lens, &source, &folder, name);
+    }
+}
+
+/// That the corrected image is `lens_<name>.png`.
+fn assert_looks_like(lens: &Lens, source: &image::RgbImage, folder: &Path, name: &str) {
+    let corrected = lens.correct(source.clone()).unwrap();
+    let expected = load_rgb(&folder.join(format!("lens_{name}.png"))).unwrap();
+    let differences = corrected
+        .iter()
+        .zip(expected.iter())
+        .map(|(a, b)| a.abs_diff(*b));
+    // Coordinates of single precision may round a value that lies between two the other way.
+    assert!(differences.clone().max().unwrap() <= 1, "{name}");
+    let other = differences.filter(|d| *d > 0).count();
+    assert!(
+        other < corrected.len() / 200,
+        "{name}: {other} values differ"
+    );
 }

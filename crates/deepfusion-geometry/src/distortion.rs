@@ -1,3 +1,5 @@
+mod fisheye;
+
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +17,7 @@ const TOLERANCE: f64 = 1e-10;
 /// - x' = g·x + 2p₁xy + p₂(r² + 2x²)
 /// - y' = g·y + p₁(r² + 2y²) + 2p₂xy
 ///
-/// and its pixel is (fx·x' + cx, fy·y' + cy).
+/// and its pixel is (fx·x' + cx, fy·y' + cy). Of a fisheye lens, [`Self::fisheye`] holds instead.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Distortion {
     /// Radial, of r², r⁴ and r⁶ above the fraction bar: k₁, k₂, k₃.
@@ -24,6 +26,11 @@ pub struct Distortion {
     pub tangential: [f64; 2],
     /// Radial, below the fraction bar: k₄, k₅, k₆.
     pub rational: [f64; 3],
+    /// k₁, k₂, k₃, k₄ of a fisheye lens after Kannala and Brandt ("equidistant"; `cv::fisheye`, Kalibr's `equidistant`): a ray at the angle
+    /// θ = atan(r) from the axis appears at θ_d = θ(1 + k₁θ² + k₂θ⁴ + k₃θ⁶ + k₄θ⁸), so x' = θ_d/r·x and y' = θ_d/r·y. The other
+    /// coefficients then are not used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fisheye: Option<[f64; 4]>,
 }
 
 impl Distortion {
@@ -51,7 +58,29 @@ impl Distortion {
             radial: [at(0), at(1), at(4)],
             tangential: [at(2), at(3)],
             rational: [at(5), at(6), at(7)],
+            fisheye: None,
         })
+    }
+
+    /// A fisheye lens by its coefficients k₁, k₂, k₃, k₄, as `cv::fisheye` and Kalibr's `equidistant` name them. All zero is a lens, too:
+    /// r' = θ.
+    ///
+    /// # Errors
+    /// A sentence that says why they are invalid.
+    pub fn from_fisheye(coefficients: &[f64]) -> Result<Self, String> {
+        let Ok(k) = <[f64; 4]>::try_from(coefficients) else {
+            return Err(format!(
+                "{} coefficients, a fisheye lens has k1, k2, k3, k4",
+                coefficients.len()
+            ));
+        };
+        match k.iter().find(|c| !c.is_finite()) {
+            Some(bad) => Err(format!("a coefficient is {bad}")),
+            None => Ok(Self {
+                fisheye: Some(k),
+                ..Self::default()
+            }),
+        }
     }
 
     /// Whether all coefficients leave points unchanged.
@@ -63,13 +92,19 @@ impl Distortion {
     /// The distorted position of an undistorted point; both in normalised coordinates (x = X/Z).
     #[must_use]
     pub fn distort(&self, ideal: &Vector2<f64>) -> Vector2<f64> {
-        self.with_slope(ideal).0
+        match &self.fisheye {
+            Some(k) => fisheye::distort(k, ideal),
+            None => self.with_slope(ideal).0,
+        }
     }
 
     /// The undistorted point whose distorted position is `seen`; `None` if there is none near it:
     /// outside the image it was fitted to, the polynomial is not invertible.
     #[must_use]
     pub fn undistort(&self, seen: &Vector2<f64>) -> Option<Vector2<f64>> {
+        if let Some(k) = &self.fisheye {
+            return fisheye::undistort(k, seen);
+        }
         let mut ideal = *seen;
         for _ in 0..MAX_STEPS {
             let (shown, slope) = self.with_slope(&ideal);
@@ -147,6 +182,23 @@ mod tests {
         let fold = Distortion::from_opencv(&[-1.0, 0.0, 0.0, 0.0]).unwrap();
         assert!(fold.undistort(&Vector2::new(0.3, 0.0)).is_some());
         assert_eq!(fold.undistort(&Vector2::new(0.5, 0.0)), None);
+    }
+
+    #[test]
+    fn a_fisheye_lens_has_four_coefficients() {
+        let lens = Distortion::from_fisheye(&[0.1, 0.0, 0.0, 0.0]).unwrap();
+        assert!(!lens.is_none());
+        // Without coefficients it still bends: an angle of 45 degrees is pi/4, not tan(pi/4) = 1.
+        let plain = Distortion::from_fisheye(&[0.0; 4]).unwrap();
+        assert!(!plain.is_none());
+        let seen = plain.distort(&Vector2::new(0.6, 0.8));
+        assert!((seen.norm() - std::f64::consts::FRAC_PI_4).abs() < 1e-15);
+        assert!(
+            Distortion::from_fisheye(&[0.1; 5])
+                .unwrap_err()
+                .contains("5 coefficients")
+        );
+        assert!(Distortion::from_fisheye(&[0.1, 0.1, 0.1, f64::INFINITY]).is_err());
     }
 
     proptest! {

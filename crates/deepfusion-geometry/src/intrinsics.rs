@@ -1,6 +1,10 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
+/// Horizontal fields of view that a camera can be given by, in degrees, both ends left out: beyond them no pinhole camera is
+/// usable, and a wider lens needs its distortion known.
+pub const HFOV_DEG: (f64, f64) = (0.0, 170.0);
+
 /// A pinhole camera without distortion, in pixels of the image it belongs to.
 ///
 /// The size of that image is part of the type, so that a matrix of one image size cannot silently
@@ -42,6 +46,14 @@ impl Intrinsics {
         let middle = |side: u32| (f64::from(side) - 1.0) / 2.0;
         let numbers = [focal_px, focal_px, middle(width), middle(height)];
         Self::from_numbers(numbers, (width, height))
+    }
+
+    /// Square pixels, the principal point in the middle, and the field of view from the image's left edge to its right:
+    /// f = W/2 / tan(hfov/2), with `hfov_deg` in degrees. It is not checked; see [`HFOV_DEG`].
+    #[must_use]
+    pub fn from_hfov(hfov_deg: f64, size: (u32, u32)) -> Self {
+        let half = (hfov_deg / 2.0).to_radians();
+        Self::centred(f64::from(size.0) / 2.0 / half.tan(), size)
     }
 
     /// The same camera after its image was resized to `width` × `height` with half-pixel centres
@@ -172,6 +184,16 @@ mod tests {
     fn a_point_behind_the_camera_has_no_pixel() {
         assert!(kitti().project(&Vector3::new(0.0, 0.0, -1.0)).is_none());
         assert!(kitti().project(&Vector3::new(0.0, 0.0, 1e-4)).is_none());
+    }
+
+    #[test]
+    fn a_field_of_view_is_a_focal_length() {
+        let k = Intrinsics::from_hfov(90.0, (1280, 720));
+        assert_relative_eq!(k.fx, 640.0, epsilon = 1e-9);
+        assert_eq!((k.fx, k.cx, k.cy), (k.fy, 639.5, 359.5));
+        // The image's edges lie half a pixel outside the outermost centres.
+        let edge = k.back_project(-0.5, k.cy, 1.0);
+        assert_relative_eq!(edge.x, -1.0, epsilon = 1e-12);
     }
 
     #[test]

@@ -36,6 +36,8 @@ pub enum Camera {
     File(PathBuf),
     /// fx, fy, cx, cy in pixels.
     Intrinsics([f64; 4]),
+    /// The field of view from left to right, in degrees.
+    Hfov(f64),
 }
 
 /// Longest time from a log's beginning to its zero for which its zero is the first frame's.
@@ -119,6 +121,9 @@ impl DriveFolder<'_> {
             }
             Some(Camera::Intrinsics(numbers)) => {
                 let _ = writeln!(text, "intrinsics = {numbers:?}");
+            }
+            Some(Camera::Hfov(degrees)) => {
+                let _ = writeln!(text, "hfov_deg = {degrees:?}");
             }
             None => {}
         }

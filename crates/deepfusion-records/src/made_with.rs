@@ -21,6 +21,9 @@ pub struct MadeWith {
     pub max_sigma: Option<f64>,
     /// fx, fy, cx, cy that were given for all images.
     pub intrinsics: Option<[f64; 4]>,
+    /// The field of view from left to right that was given for all images, in degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hfov_deg: Option<f64>,
     /// SHA-256 of a calibration tool's file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration_sha256: Option<String>,
@@ -117,7 +120,15 @@ impl MadeWith {
     fn same_camera(&self, other: &Self) -> bool {
         match (self.intrinsics, other.intrinsics) {
             (Some(a), Some(b)) => a.iter().zip(b).all(|(a, b)| equal(*a, b)),
-            (a, b) => a.is_none() && b.is_none(),
+            (a, b) => {
+                let views = (self.hfov_deg, other.hfov_deg);
+                a.is_none()
+                    && b.is_none()
+                    && match views {
+                        (Some(a), Some(b)) => equal(a, b),
+                        (a, b) => a.is_none() && b.is_none(),
+                    }
+            }
         }
     }
 }

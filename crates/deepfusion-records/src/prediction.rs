@@ -115,6 +115,7 @@ mod tests {
                 max_depth_m: 80.0,
                 max_sigma: None,
                 intrinsics: None,
+                hfov_deg: None,
                 calibration_sha256: None,
                 focal_correction: true,
                 stretch: false,

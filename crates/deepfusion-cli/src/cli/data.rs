@@ -5,7 +5,7 @@ use deepfusion_data::{Cameras, GtKind};
 use deepfusion_logs::SpeedUnit;
 use deepfusion_rosbag::Compression;
 
-use super::values::milliseconds;
+use super::values::{hfov, milliseconds};
 use super::{CameraIntrinsics, names};
 
 /// `deepfusion data …`.
@@ -34,6 +34,9 @@ pub struct InspectArgs {
     /// The camera, where the recording has no calibration, in pixels.
     #[arg(long, value_name = "fx,fy,cx,cy")]
     pub intrinsics: Option<CameraIntrinsics>,
+    /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
+    #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with = "intrinsics")]
+    pub hfov: Option<f64>,
     /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
     #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
     pub camera_ahead_s: Option<f64>,
@@ -65,6 +68,9 @@ pub struct ConvertArgs {
     /// The camera of a recording without a calibration, in pixels of its images.
     #[arg(long, value_name = "fx,fy,cx,cy")]
     pub intrinsics: Option<CameraIntrinsics>,
+    /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
+    #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with = "intrinsics")]
+    pub hfov: Option<f64>,
     /// Which camera.
     #[arg(long, value_name = "2|3", default_value = "2")]
     pub camera: Cameras,
@@ -127,6 +133,9 @@ pub struct ImportArgs {
     /// The camera in pixels of its images.
     #[arg(long, value_name = "fx,fy,cx,cy")]
     pub intrinsics: Option<CameraIntrinsics>,
+    /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
+    #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with_all = ["intrinsics", "calibration"])]
+    pub hfov: Option<f64>,
     /// Print what was understood as JSON.
     #[arg(long)]
     pub json: bool,

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::CameraIntrinsics;
-use super::values::milliseconds;
+use super::values::{hfov, milliseconds};
 
 /// `deepfusion doctor`.
 #[derive(Debug, Args)]
@@ -19,6 +19,9 @@ pub struct DoctorArgs {
     /// The camera of a recording without a calibration, in pixels of its images.
     #[arg(long, value_name = "fx,fy,cx,cy", requires = "path")]
     pub intrinsics: Option<CameraIntrinsics>,
+    /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
+    #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with = "intrinsics", requires = "path")]
+    pub hfov: Option<f64>,
     /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
     #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true, requires = "path")]
     pub camera_ahead_s: Option<f64>,

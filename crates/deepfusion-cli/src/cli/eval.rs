@@ -4,7 +4,7 @@ use clap::{ArgGroup, Args, ValueEnum};
 use deepfusion_data::{Cameras, GtKind};
 use deepfusion_eval::{Crop, GroundTruth, Holes, Protocol, Scaling};
 
-use super::values::{milliseconds, positive, scaling};
+use super::values::{hfov, milliseconds, positive, scaling};
 use super::{CameraIntrinsics, EngineArgs, names};
 
 /// `deepfusion eval`.
@@ -40,6 +40,9 @@ pub struct EvalArgs {
     /// The camera of recordings without a calibration, in pixels of their images.
     #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "pred")]
     pub intrinsics: Option<CameraIntrinsics>,
+    /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
+    #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with_all = ["intrinsics", "pred"])]
+    pub hfov: Option<f64>,
     /// Fail unless every frame of --split is there and has ground truth.
     #[arg(long, requires = "split")]
     pub strict: bool,

@@ -4,7 +4,7 @@ use clap::Args;
 use deepfusion_data::OpenOptions;
 use deepfusion_motion::ScaleMonitorConfig;
 
-use super::values::positive;
+use super::values::{hfov, positive};
 use super::{CameraIntrinsics, EngineArgs, LiveArgs, Save};
 
 /// Which images, through which network, to where: what `predict` and `perceive` have in common.
@@ -21,6 +21,9 @@ pub struct PredictionArgs {
     /// assumed].
     #[arg(long, value_name = "fx,fy,cx,cy", conflicts_with = "calib")]
     pub intrinsics: Option<CameraIntrinsics>,
+    /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
+    #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with_all = ["intrinsics", "calib"])]
+    pub hfov: Option<f64>,
     /// A calibration file: KITTI's calib_cam_to_cam.txt, OpenCV's, ROS's or Kalibr's YAML, or four numbers; lenses are undone.
     #[arg(long, value_name = "FILE")]
     pub calib: Option<PathBuf>,
@@ -58,6 +61,7 @@ impl PredictionArgs {
     pub fn open_options(&self) -> OpenOptions {
         OpenOptions {
             intrinsics: self.intrinsics.map(|k| k.numbers()),
+            hfov_deg: self.hfov,
             ..OpenOptions::default()
         }
     }

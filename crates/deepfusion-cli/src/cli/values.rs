@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use deepfusion_eval::Scaling;
+use deepfusion_geometry::HFOV_DEG;
 pub use deepfusion_jobs::bulk::Shard;
 
 /// Width and height in pixels, written `640x192`.
@@ -94,6 +95,17 @@ pub fn milliseconds(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected milliseconds, such as -60".into())
 }
 
+/// A field of view from left to right, in degrees.
+pub fn hfov(text: &str) -> Result<f64, String> {
+    let (least, most) = HFOV_DEG;
+    text.parse()
+        .ok()
+        .filter(|degrees: &f64| *degrees > least && *degrees < most)
+        .ok_or_else(|| {
+            format!("expected degrees above {least} and below {most}, such as 69; a wider lens needs a calibration file")
+        })
+}
+
 /// A number from 0 to 1.
 pub fn share(text: &str) -> Result<f64, String> {
     text.parse()
@@ -152,6 +164,14 @@ mod tests {
             "nan,1,2,3",
         ] {
             assert!(bad.parse::<CameraIntrinsics>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn fields_of_view() {
+        assert_eq!(hfov("69.5"), Ok(69.5));
+        for bad in ["0", "-60", "170", "nan", "69deg", ""] {
+            assert!(hfov(bad).unwrap_err().contains("below 170"), "{bad}");
         }
     }
 

@@ -22,6 +22,7 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
     let options = OpenOptions {
         camera: args.camera,
         intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
+        hfov_deg: args.hfov,
         camera_ahead_s: args.camera_ahead_s,
         ..OpenOptions::default()
     };

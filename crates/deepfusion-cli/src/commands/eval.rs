@@ -80,6 +80,7 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
         camera: args.camera,
         split: read_split(args.split.as_deref())?,
         intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
+        hfov_deg: args.hfov,
         camera_ahead_s: args.camera_ahead_s,
     };
     let datasets = open_recordings(&args.data, &options)?;

@@ -27,10 +27,11 @@ pub fn run(args: &ImportArgs) -> Result<()> {
     let folder = DriveFolder {
         log: &log,
         media: media(args, log.clock)?,
-        camera: match (&args.calibration, args.intrinsics) {
-            (Some(file), _) => Some(Camera::File(file.clone())),
-            (None, Some(numbers)) => Some(Camera::Intrinsics(CameraIntrinsics::numbers(numbers))),
-            (None, None) => None,
+        camera: match (&args.calibration, args.intrinsics, args.hfov) {
+            (Some(file), _, _) => Some(Camera::File(file.clone())),
+            (None, Some(k), _) => Some(Camera::Intrinsics(CameraIntrinsics::numbers(k))),
+            (None, None, Some(degrees)) => Some(Camera::Hfov(degrees)),
+            (None, None, None) => None,
         },
         start_ns,
     };

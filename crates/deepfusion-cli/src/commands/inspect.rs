@@ -12,6 +12,7 @@ use crate::progress::{Progress, say};
 pub fn run(args: &InspectArgs) -> Result<()> {
     let options = OpenOptions {
         intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
+        hfov_deg: args.hfov,
         camera_ahead_s: args.camera_ahead_s,
         ..OpenOptions::default()
     };

@@ -86,8 +86,9 @@ impl Reportable for deepfusion_data::Error {
                 layout: DatasetKind::RgbD,
                 ..
             } => or("--intrinsics 585,585,320,240"),
-            Self::NoBagCamera { .. } => or("--intrinsics fx,fy,cx,cy"),
-            Self::OwnCalibration { .. } => Some("leave --intrinsics out".into()),
+            Self::NoCameraFile { .. } => or("--hfov DEGREES"),
+            Self::NoBagCamera { .. } => or("--intrinsics fx,fy,cx,cy, or --hfov DEGREES"),
+            Self::OwnCalibration { .. } => Some("leave --intrinsics and --hfov out".into()),
             Self::OneCamera { .. } => Some("leave --camera out, or give 2".into()),
             Self::DepthKind { .. } => Some("leave --gt-depth out, or give z".into()),
             Self::Video(error) => error.remedy(),

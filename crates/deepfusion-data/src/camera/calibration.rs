@@ -28,7 +28,7 @@ impl CameraCalibration {
     ///
     /// # Errors
     /// [`Error::NoSuchPath`], [`Error::File`], [`Error::CameraFile`] for a file of another kind, a lens model
-    /// other than Brown and Conrady's, or numbers that make no camera.
+    /// other than Brown and Conrady's and the fisheye model of Kannala and Brandt, or numbers that make no camera.
     pub fn read(path: &Path, image_size: (u32, u32)) -> Result<Self> {
         let text = std::fs::read(path).map_err(|e| Error::file(path, e))?;
         let text = String::from_utf8_lossy(&text);

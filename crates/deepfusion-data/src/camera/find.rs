@@ -1,9 +1,11 @@
 //! Where a recording's camera is looked for.
 
 use super::calibration::CameraCalibration;
+use crate::dataset::numbers_of_hfov;
 use crate::dataset_toml::FolderConfig;
+use crate::pictures::{ExifCamera, exif_camera};
 use crate::{DatasetKind, Error, OpenOptions, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Names under which a calibration is looked for beside the images, in this order.
 const NAMES: [&str; 8] = [
@@ -17,12 +19,12 @@ const NAMES: [&str; 8] = [
     "calibration.txt",
 ];
 
-/// What errors name in the place of a calibration's file or field where the caller gave the intrinsics
-/// ([`OpenOptions::intrinsics`]).
+/// What errors name in the place of a calibration's file or field where the caller gave the camera
+/// ([`OpenOptions::intrinsics`], [`OpenOptions::hfov_deg`]).
 pub const GIVEN_INTRINSICS: &str = "given intrinsics";
 
 /// The camera of images of a size: given by the caller or in `dataset.toml`, or read from a file beside
-/// them, or in the folder above.
+/// them, or in the folder above, or what EXIF says in `images`, which becomes one of the `remarks`.
 ///
 /// # Errors
 /// [`Error::NoCameraFile`] where nothing says it; [`Error::CameraFile`], [`Error::Config`].
@@ -32,11 +34,17 @@ pub(crate) fn find_camera(
     options: &OpenOptions,
     size: (u32, u32),
     layout: DatasetKind,
+    images: &[PathBuf],
+    remarks: &mut Vec<String>,
 ) -> Result<CameraCalibration> {
-    if let Some(given) = options.intrinsics {
+    if let Some(given) = options.given_camera(size) {
         return CameraCalibration::given(given, size, Path::new(GIVEN_INTRINSICS));
     }
     if let Some(given) = config.intrinsics {
+        return CameraCalibration::given(given, size, &config.path);
+    }
+    if let Some(hfov_deg) = config.hfov_deg {
+        let given = numbers_of_hfov(hfov_deg, size);
         return CameraCalibration::given(given, size, &config.path);
     }
     let named = config.calibration.as_ref();
@@ -46,11 +54,64 @@ pub(crate) fn find_camera(
     {
         file = config.find(above, "calibration", None, &NAMES)?;
     }
-    match file {
-        Some(file) => CameraCalibration::read(&file, size),
+    if let Some(file) = file {
+        return CameraCalibration::read(&file, size);
+    }
+    match by_exif(images, size)? {
+        Some((calibration, remark)) => {
+            remarks.push(remark);
+            Ok(calibration)
+        }
         None => Err(Error::NoCameraFile {
             path: folder.join(NAMES[0]),
             layout,
         }),
     }
+}
+
+/// How many images of a recording are asked whether the camera stayed as it was.
+const ASKED: usize = 9;
+
+/// The camera that the images' EXIF blocks say, and a sentence that tells so; `None` where the first says nothing.
+///
+/// # Errors
+/// [`Error::CameraFile`] where another image, of those asked, was taken with another focal length.
+fn by_exif(images: &[PathBuf], size: (u32, u32)) -> Result<Option<(CameraCalibration, String)>> {
+    let said = |path: &PathBuf| exif_camera(path, size);
+    let Some((path, first)) = images.first().and_then(|path| Some((path, said(path)?))) else {
+        return Ok(None);
+    };
+    let asked = (1..ASKED).map(|i| &images[i * (images.len() - 1) / (ASKED - 1)]);
+    for (other, camera) in asked.filter_map(|path| Some((path, said(path)?))) {
+        // A focal length in 35 mm film is of whole millimetres.
+        if (camera.intrinsics.fx / first.intrinsics.fx - 1.0).abs() > 1e-6 {
+            let was = name(path);
+            let problem = format!("EXIF says {}, but {} in {was}", camera.by, first.by);
+            return Err(Error::CameraFile {
+                path: other.clone(),
+                problem,
+                remedy: "a recording has one camera: keep apart what was taken with another lens or zoom, or give a calibration".into(),
+            });
+        }
+    }
+    let ExifCamera {
+        intrinsics: k,
+        by,
+        turned,
+    } = first;
+    let mut remark = format!(
+        "the camera is taken from EXIF in {}: {by}, so fx = fy = {:.1}, the principal point in the middle; a calibration is better",
+        name(path),
+        k.fx
+    );
+    if turned {
+        remark += "; the images are used as they are stored, not turned as EXIF's orientation says";
+    }
+    let calibration = CameraCalibration::given([k.fx, k.fy, k.cx, k.cy], size, path)?;
+    Ok(Some((calibration, remark)))
+}
+
+fn name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
 }

@@ -9,7 +9,8 @@ use std::sync::Arc;
 ///
 /// The pinhole camera is the one that sees the largest upright rectangle whose every ray is in the image,
 /// stretched to the image's size, as OpenCV's `getOptimalNewCameraMatrix` with `alpha = 0` does (fx and fy
-/// may then differ). Nothing black can appear at a border, where training would take it for the world.
+/// may then differ). Nothing black can appear at a border, where training would take it for the world. Of a fisheye lens that sees
+/// more, only what lies within 60 degrees of the axis to each side is kept: towards 90 degrees a pinhole camera's image has no end.
 #[derive(Debug, Clone)]
 pub struct Lens {
     /// Of the image after correction.
@@ -129,6 +130,9 @@ impl Lens {
     }
 }
 
+/// How far to each side a pinhole image of a fisheye lens reaches at most: tan 60°.
+const WIDEST: f64 = 1.732_050_807_568_877_2;
+
 /// The pinhole camera of the largest rectangle of rays that are all in the image.
 fn largest_valid(
     camera: &Intrinsics,
@@ -146,6 +150,21 @@ fn largest_valid(
     let bottom_y = columns().filter_map(|u| ray(u, bottom)).map(|p| p.y);
     let [left_x, top_y] = [left_x.reduce(f64::max), top_y.reduce(f64::max)];
     let [right_x, bottom_y] = [right_x.reduce(f64::min), bottom_y.reduce(f64::min)];
+    let [left_x, top_y, right_x, bottom_y] = if distortion.fisheye.is_some() {
+        // A border without a ray is 90 degrees from the axis or more, where the widest image ends long before.
+        let limit = |side: Option<f64>, widest: f64| {
+            let side = side.unwrap_or(widest);
+            Some(if side.abs() > WIDEST { widest } else { side })
+        };
+        [
+            limit(left_x, -WIDEST),
+            limit(top_y, -WIDEST),
+            limit(right_x, WIDEST),
+            limit(bottom_y, WIDEST),
+        ]
+    } else {
+        [left_x, top_y, right_x, bottom_y]
+    };
     let folds = || {
         "the distortion folds over within the image: it does not fit this camera matrix".to_owned()
     };

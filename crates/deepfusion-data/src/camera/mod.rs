@@ -10,3 +10,4 @@ pub use calibration::CameraCalibration;
 pub use find::GIVEN_INTRINSICS;
 pub(crate) use find::find_camera;
 pub use lens::Lens;
+pub(crate) use yaml::FISHEYE;

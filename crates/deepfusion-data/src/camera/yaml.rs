@@ -8,6 +8,9 @@ use std::collections::BTreeMap;
 /// Longest file that is looked at, in bytes: calibrations have some hundred.
 const LONGEST: usize = 1 << 20;
 
+/// Names of the fisheye model after Kannala and Brandt: ROS's and Kalibr's, OpenCV's.
+pub(crate) const FISHEYE: [&str; 2] = ["equidistant", "fisheye"];
+
 /// Keys of OpenCV's and ROS's files, in the spellings that their tools use.
 #[derive(Debug, Default, Deserialize)]
 struct Flat {
@@ -93,6 +96,7 @@ fn plain(text: &str) -> String {
 
 fn flat(file: Flat) -> Result<Numbers, Refusal> {
     let model = file.distortion_model.as_deref().unwrap_or("plumb_bob");
+    let fisheye = FISHEYE.contains(&model) || file.fisheye_model == Some(1);
     let known = [
         "plumb_bob",
         "rational_polynomial",
@@ -101,11 +105,8 @@ fn flat(file: Flat) -> Result<Numbers, Refusal> {
         "none",
         "",
     ];
-    if !known.contains(&model) {
+    if !(fisheye || known.contains(&model)) {
         return Err(model_refused(model));
-    }
-    if file.fisheye_model == Some(1) {
-        return Err(model_refused("fisheye"));
     }
     if let Some(other) = file.camera_model.as_deref().filter(|m| *m != "pinhole") {
         return Err(model_refused(other));
@@ -128,19 +129,21 @@ fn flat(file: Flat) -> Result<Numbers, Refusal> {
     };
     let size = file.image_width.zip(file.image_height);
     // A message of a camera that does not know its size says 0.
-    numbers(
+    Ok(numbers(
         [fx, fy, cx, cy],
-        &coefficients,
+        lens(&coefficients, fisheye)?,
         size.filter(|s| s.0 > 0 && s.1 > 0),
-    )
+    ))
 }
 
 fn kalibr(camera: Kalibr) -> Result<Numbers, Refusal> {
     if camera.camera_model != "pinhole" {
         return Err(model_refused(&camera.camera_model));
     }
-    if !["radtan", "none"].contains(&camera.distortion_model.as_str()) {
-        return Err(model_refused(&camera.distortion_model));
+    let model = camera.distortion_model.as_str();
+    let fisheye = FISHEYE.contains(&model);
+    if !(fisheye || ["radtan", "none"].contains(&model)) {
+        return Err(model_refused(model));
     }
     let [fx, fy, cx, cy] = camera.intrinsics[..] else {
         return Err(Refusal::new(format!(
@@ -149,21 +152,25 @@ fn kalibr(camera: Kalibr) -> Result<Numbers, Refusal> {
         )));
     };
     let size = camera.resolution.map(|[w, h]| (w, h));
-    numbers([fx, fy, cx, cy], &camera.distortion_coeffs, size)
+    let lens = lens(&camera.distortion_coeffs, fisheye)?;
+    Ok(numbers([fx, fy, cx, cy], lens, size))
 }
 
-fn numbers(
-    pinhole: [f64; 4],
-    coefficients: &[f64],
-    size: Option<(u32, u32)>,
-) -> Result<Numbers, Refusal> {
-    let distortion = Distortion::from_opencv(coefficients)
-        .map_err(|why| Refusal::new(format!("distortion coefficients: {why}")))?;
-    Ok(Numbers {
+fn lens(coefficients: &[f64], fisheye: bool) -> Result<Distortion, Refusal> {
+    let lens = if fisheye {
+        Distortion::from_fisheye(coefficients)
+    } else {
+        Distortion::from_opencv(coefficients)
+    };
+    lens.map_err(|why| Refusal::new(format!("distortion coefficients: {why}")))
+}
+
+fn numbers(pinhole: [f64; 4], distortion: Distortion, size: Option<(u32, u32)>) -> Numbers {
+    Numbers {
         pinhole,
         distortion,
         size,
-    })
+    }
 }
 
 fn model_refused(model: &str) -> Refusal {
@@ -171,7 +178,8 @@ fn model_refused(model: &str) -> Refusal {
     Refusal {
         problem: format!("the lens model '{model}' is not supported"),
         remedy: "calibrate with Brown and Conrady's model (OpenCV's default, ROS plumb_bob or \
-                 rational_polynomial, Kalibr pinhole-radtan), or undistort the images first"
+                 rational_polynomial, Kalibr pinhole-radtan), of a fisheye lens with Kannala and Brandt's (cv::fisheye, \
+                 Kalibr pinhole-equi), or undistort the images first"
             .into(),
     }
 }

@@ -22,6 +22,23 @@ distortion_coefficients: !!opencv-matrix
 avg_reprojection_error: 3.9259109564815858e-01
 ";
 
+const FISHEYE_OPENCV: &str = "%YAML:1.0
+---
+fisheye_model: 1
+image_width: 640
+image_height: 480
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 350., 0., 3.205e+02, 0., 351., 2.405e+02, 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 4
+   cols: 1
+   dt: d
+   data: [ 1.0e-02, -2.0e-02, 3.0e-02, -4.0e-03 ]
+";
+
 /// As ROS's camera_calibration writes it.
 const ROS: &str = "image_width: 2448
 image_height: 2050
@@ -97,11 +114,41 @@ fn kalibrs_first_camera_is_read() {
 }
 
 #[test]
+fn fisheye_lenses_are_read() {
+    let kalibr = parse(&KALIBR.replacen("radtan", "equidistant", 1)).unwrap();
+    assert_eq!(
+        kalibr.distortion.fisheye,
+        Some([-0.2834, 0.0739, 0.00019, 1.76e-05])
+    );
+    assert_eq!(kalibr.distortion.radial, [0.0; 3]);
+    // As OpenCV's sample program for calibrations writes it with fisheye lenses.
+    let opencv = parse(FISHEYE_OPENCV).unwrap();
+    assert_eq!(opencv.distortion.fisheye, Some([0.01, -0.02, 0.03, -0.004]));
+    assert_eq!(opencv.pinhole, [350.0, 351.0, 320.5, 240.5]);
+    let ros = ROS.replace("plumb_bob", "equidistant");
+    let ros = ros
+        .replace("cols: 5", "cols: 4")
+        .replace(", 0.00071, 0]", ", 0.00071]");
+    let ros = parse(&ros).unwrap();
+    assert_eq!(
+        ros.distortion.fisheye,
+        Some([-0.41527, 0.31874, -0.00197, 0.00071])
+    );
+    // Five coefficients are another lens'.
+    let refusal = parse(&ROS.replace("plumb_bob", "fisheye")).unwrap_err();
+    assert!(
+        refusal.problem.contains("5 coefficients"),
+        "{}",
+        refusal.problem
+    );
+}
+
+#[test]
 fn other_lenses_are_named() {
     for (text, model) in [
-        (KALIBR.replacen("radtan", "equidistant", 1), "equidistant"),
+        (KALIBR.replacen("radtan", "fov", 1), "fov"),
         (KALIBR.replacen("pinhole", "omni", 1), "omni"),
-        (ROS.replace("plumb_bob", "fisheye"), "fisheye"),
+        (ROS.replace("plumb_bob", "division"), "division"),
     ] {
         let refusal = parse(&text).unwrap_err();
         assert_eq!(

@@ -28,6 +28,7 @@ pub use inspection::{
 };
 pub use kind::DatasetKind;
 pub use options::OpenOptions;
+pub(crate) use options::numbers_of_hfov;
 pub use recording::{CalibrationPlace, CameraPath, Recording};
 pub use snippet::{Snippet, Source, hold_out};
 pub use speed_check::{

@@ -2,6 +2,7 @@
 
 use super::camera::Cameras;
 use super::split::Split;
+use deepfusion_geometry::{HFOV_DEG, Intrinsics};
 
 /// How to open a recording.
 #[derive(Debug, Clone, Default)]
@@ -13,8 +14,38 @@ pub struct OpenOptions {
     /// fx, fy, cx, cy in pixels of an undistorted image, instead of the recording's own. Not for KITTI
     /// raw, which brings its calibration and refuses it.
     pub intrinsics: Option<[f64; 4]>,
+    /// The images' field of view from left to right in degrees, above 0 and below 170: a pinhole camera with square pixels and
+    /// the principal point in the middle ([`Intrinsics::from_hfov`]). Where [`Self::intrinsics`] is given too, that holds.
+    pub hfov_deg: Option<f64>,
     /// How far the clock of camera and LiDAR is ahead of the vehicle's, in seconds, instead of what the recording's own
     /// file says (`clock.camera_ahead_s`). It is taken off the images' times, once, when a recording is opened: every time of
     /// a [`crate::Dataset`] is one of the vehicle's clock.
     pub camera_ahead_s: Option<f64>,
+}
+
+impl OpenOptions {
+    /// Whether the caller says what the camera is.
+    #[must_use]
+    pub fn gives_camera(&self) -> bool {
+        self.intrinsics.is_some() || self.hfov_deg.is_some()
+    }
+
+    /// fx, fy, cx, cy of the camera that the caller gives, of images of a size in pixels; `None` where nothing is given.
+    pub(crate) fn given_camera(&self, size: (u32, u32)) -> Option<[f64; 4]> {
+        let by_view = |hfov_deg| numbers_of_hfov(hfov_deg, size);
+        self.intrinsics.or_else(|| self.hfov_deg.map(by_view))
+    }
+}
+
+/// fx, fy, cx, cy of images of a size that see `hfov_deg` degrees from left to right. An angle that is none gives numbers that
+/// are no camera, which [`crate::CameraCalibration::given`] refuses.
+pub(crate) fn numbers_of_hfov(hfov_deg: f64, size: (u32, u32)) -> [f64; 4] {
+    let (least, most) = HFOV_DEG;
+    let k = Intrinsics::from_hfov(hfov_deg, size);
+    let focal = if hfov_deg > least && hfov_deg < most {
+        k.fx
+    } else {
+        f64::NAN
+    };
+    [focal, focal, k.cx, k.cy]
 }

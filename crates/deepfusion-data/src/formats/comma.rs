@@ -52,15 +52,17 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     }
     let config = FolderConfig::read(folder)?;
     let video = frames_of(&folder.join(VIDEO), &config)?;
+    let mut remarks = Vec::new();
     let calibration = find_camera(
         folder,
         &config,
         options,
         video.size(),
         DatasetKind::Comma2k19,
+        &[],
+        &mut remarks,
     )?;
     let times = frame_times(folder)?;
-    let mut remarks = Vec::new();
     if times.len() != video.count() {
         remarks.push(format!(
             "{FRAME_TIMES} has {} times, {VIDEO} {} frames: the first {} are taken",

@@ -35,7 +35,15 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         });
     };
     let size = image_size(first)?;
-    let calibration = find_camera(folder, &config, options, size, DatasetKind::Folder)?;
+    let calibration = find_camera(
+        folder,
+        &config,
+        options,
+        size,
+        DatasetKind::Folder,
+        &images,
+        &mut remarks,
+    )?;
     let images = timed_images(folder, images, &config, &mut remarks)?;
     let stems = images
         .iter()

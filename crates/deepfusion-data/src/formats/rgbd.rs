@@ -62,7 +62,15 @@ fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         });
     };
     let size = image_size(first)?;
-    let calibration = find_camera(folder, &config, options, size, DatasetKind::RgbD)?;
+    let calibration = find_camera(
+        folder,
+        &config,
+        options,
+        size,
+        DatasetKind::RgbD,
+        &[],
+        &mut Vec::new(),
+    )?;
     let (mut depth, mut world_from_cam) = (BTreeMap::new(), BTreeMap::new());
     for &number in colour.keys() {
         let part = |ending: &str| folder.join(format!("frame-{number:06}.{ending}"));

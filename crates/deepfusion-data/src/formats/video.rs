@@ -70,8 +70,16 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     let folder = file.parent().unwrap_or(Path::new(".")).to_owned();
     let config = FolderConfig::read(&folder)?;
     let video = frames_of(&file, &config)?;
-    let calibration = find_camera(&folder, &config, options, video.size(), DatasetKind::Video)?;
     let mut remarks = Vec::new();
+    let calibration = find_camera(
+        &folder,
+        &config,
+        options,
+        video.size(),
+        DatasetKind::Video,
+        &[],
+        &mut remarks,
+    )?;
     let times = match (video.times_ns(), config.fps) {
         (_, Some(fps)) => {
             let ns = |i: usize| Some((i as f64 / fps * 1e9).round() as i64);

@@ -1,28 +1,22 @@
 //! A single picture as a camera or a telephone wrote it.
 
+use super::exif_camera::{block, camera_of, number};
 use super::files::decode_bytes;
 use crate::{Error, Result};
 use deepfusion_geometry::Intrinsics;
-use exif::{Exif, In, Tag};
+use exif::Tag;
 use image::RgbImage;
 use image::metadata::Orientation;
 use std::io::Cursor;
-use std::ops::RangeInclusive;
 use std::path::Path;
-
-/// Diagonal of a frame of 35 mm film, 36 mm by 24 mm, which EXIF's equivalent focal lengths refer to (CIPA DC-008).
-const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
-
-/// Equivalent focal lengths of lenses there are, mm.
-const FOCAL_LENGTHS_MM: RangeInclusive<u32> = 5..=2000;
 
 /// A picture, and what its EXIF block says of how it was taken.
 #[derive(Debug, Clone)]
 pub struct Photo {
     /// Upright: turned as EXIF's orientation says.
     pub image: RgbImage,
-    /// The camera by EXIF's focal length in 35 mm film, with square pixels and the principal point in the middle; `None` where
-    /// nothing is said. It is the lens's nominal focal length: of a picture that was cut since it is wrong.
+    /// The camera by EXIF's focal length in 35 mm film, or by the telephone's model and lens where their view is known, with square
+    /// pixels and the principal point in the middle; `None` where nothing is said. It is the lens's nominal focal length: of a picture that was cut since it is wrong.
     pub intrinsics: Option<Intrinsics>,
 }
 
@@ -34,37 +28,23 @@ pub struct Photo {
 pub fn load_photo(path: &Path) -> Result<Photo> {
     let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
     let mut image = decode_bytes(&bytes, path)?;
-    let exif = exif::Reader::new()
-        .read_from_container(&mut Cursor::new(&bytes))
-        .ok();
+    let exif = block(Cursor::new(&bytes));
     let exif = exif.as_ref();
     let turn = exif.and_then(|exif| number(exif, Tag::Orientation));
     if let Some(turn) = turn.and_then(|n| Orientation::from_exif(u8::try_from(n).ok()?)) {
         image.apply_orientation(turn);
     }
     let image = image.into_rgb8();
-    let focal_mm = exif.and_then(|exif| number(exif, Tag::FocalLengthIn35mmFilm));
-    let intrinsics = focal_mm
-        .filter(|mm| FOCAL_LENGTHS_MM.contains(mm))
-        .map(|mm| of_film(f64::from(mm), image.dimensions()));
+    let camera = exif.and_then(|exif| camera_of(exif, image.dimensions()));
+    let intrinsics = camera.map(|camera| camera.intrinsics);
     Ok(Photo { image, intrinsics })
-}
-
-fn number(exif: &Exif, tag: Tag) -> Option<u32> {
-    exif.get_field(tag, In::PRIMARY)?.value.get_uint(0)
-}
-
-/// The pinhole camera of a lens that is `focal_mm` long for film.
-fn of_film(focal_mm: f64, (width, height): (u32, u32)) -> Intrinsics {
-    let diagonal = f64::from(width).hypot(f64::from(height));
-    Intrinsics::centred(focal_mm / FILM_DIAGONAL_MM * diagonal, (width, height))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use exif::experimental::Writer;
-    use exif::{Field, Value};
+    use exif::{Field, In, Value};
     use image::Rgb;
 
     /// A JPEG of 64×48, left half red and right half blue, with these fields.

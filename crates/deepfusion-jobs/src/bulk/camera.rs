@@ -14,6 +14,8 @@ use crate::{Error, Result};
 pub enum CameraSource {
     /// fx, fy, cx, cy that were given, in pixels, for images of any size.
     Given([f64; 4]),
+    /// The field of view from left to right that was given, in degrees, for images of any size.
+    Hfov(f64),
     /// KITTI's calibration file, for images of its size.
     File(Intrinsics),
     /// A calibration tool's file, with the lens that is undone.
@@ -66,7 +68,7 @@ impl CameraSource {
     #[must_use]
     pub fn word(&self) -> &'static str {
         match self {
-            Self::Given(_) | Self::File(_) | Self::Lens(_) => "given",
+            Self::Given(_) | Self::Hfov(_) | Self::File(_) | Self::Lens(_) => "given",
             Self::Trained(_) => "assumed",
             Self::Unknown => "unknown",
         }
@@ -107,6 +109,7 @@ impl CameraSource {
                     None => Ok(Some(k)),
                 }
             }
+            Self::Hfov(degrees) => Ok(Some(Intrinsics::from_hfov(*degrees, (width, height)))),
             Self::File(k) if (k.width, k.height) != (width, height) => Err(Error::Camera {
                 why: format!(
                     "the calibration is for {}x{}, the image has {width}x{height}",

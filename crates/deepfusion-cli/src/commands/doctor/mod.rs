@@ -23,6 +23,7 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     };
     let options = OpenOptions {
         intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
+        hfov_deg: args.hfov,
         camera_ahead_s: args.camera_ahead_s,
         ..OpenOptions::default()
     };

@@ -32,7 +32,14 @@ pub fn made_with(
         intrinsics: match camera {
             CameraSource::Given(k) => Some(*k),
             CameraSource::File(k) => Some([k.fx, k.fy, k.cx, k.cy]),
-            CameraSource::Lens(_) | CameraSource::Trained(_) | CameraSource::Unknown => None,
+            CameraSource::Hfov(_)
+            | CameraSource::Lens(_)
+            | CameraSource::Trained(_)
+            | CameraSource::Unknown => None,
+        },
+        hfov_deg: match camera {
+            CameraSource::Hfov(degrees) => Some(*degrees),
+            _ => None,
         },
         calibration_sha256: match camera {
             CameraSource::Lens(file) => Some(file.sha256.clone()),

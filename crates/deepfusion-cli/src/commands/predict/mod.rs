@@ -243,7 +243,7 @@ fn tell_videos(videos: &[(PathBuf, usize)]) {
 fn tell_assumed() {
     tracing::warn!(
         "no intrinsics given, and none in the image's EXIF: the training camera's field of view is assumed, so the metres are \
-         only as right as that is (camera_known: false; give --intrinsics or --calib)"
+         only as right as that is (camera_known: false; give --intrinsics, --hfov or --calib)"
     );
 }
 
@@ -306,7 +306,10 @@ impl<'a> Job<'a> {
             return Err(CliError::NoUncertainty.into());
         }
         let given = args.intrinsics.map(CameraIntrinsics::numbers);
-        let camera = CameraSource::new(given, args.calib.as_deref(), estimator.training_camera())?;
+        let camera = match args.hfov {
+            Some(degrees) => CameraSource::Hfov(degrees),
+            None => CameraSource::new(given, args.calib.as_deref(), estimator.training_camera())?,
+        };
         let set = args.engine.set.as_deref();
         Ok(Self {
             args,

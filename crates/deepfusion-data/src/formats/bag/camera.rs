@@ -4,7 +4,7 @@ use super::config::BagConfig;
 use super::index::{Index, Place};
 use super::topics::{Role, Topics};
 use super::{image, source};
-use crate::camera::GIVEN_INTRINSICS;
+use crate::camera::{FISHEYE, GIVEN_INTRINSICS};
 use crate::{CalibrationPlace, CameraCalibration, Error, Lens, OpenOptions, Result};
 use deepfusion_geometry::{Distortion, Intrinsics, Se3};
 use deepfusion_rosbag::MessageSource;
@@ -35,7 +35,7 @@ pub(super) fn find(
         field,
     };
     let pinhole = |intrinsics: Intrinsics| Lens::new(intrinsics, &Distortion::default());
-    let (lens, place) = if let Some(numbers) = options.intrinsics {
+    let (lens, place) = if let Some(numbers) = options.given_camera((width, height)) {
         let given = Intrinsics::from_numbers(numbers, (width, height));
         (pinhole(given), place(bag, GIVEN_INTRINSICS))
     } else if let Some(camera) = config.camera {
@@ -108,13 +108,15 @@ fn of_camera_info(info: &CameraInfo, rectified: bool) -> std::result::Result<Len
         return Lens::new(of(p[0], p[5], p[2], p[6]), &Distortion::default());
     }
     let known = ["plumb_bob", "rational_polynomial", ""];
-    if !known.contains(&info.distortion_model.as_str()) && info.d.iter().any(|d| *d != 0.0) {
-        let model = &info.distortion_model;
+    let model = info.distortion_model.as_str();
+    let fisheye = FISHEYE.contains(&model);
+    if !(fisheye || known.contains(&model)) && info.d.iter().any(|d| *d != 0.0) {
         return Err(format!(
-            "distortion_model {model} is not known: plumb_bob and rational_polynomial are"
+            "distortion_model {model} is not known: plumb_bob, rational_polynomial and equidistant are"
         ));
     }
     let distortion = match info.d.as_slice() {
+        d if fisheye => Distortion::from_fisheye(d)?,
         [] => Distortion::default(),
         d => Distortion::from_opencv(d)?,
     };

@@ -38,7 +38,7 @@ struct KittiRecording {
 
 /// Opens the cameras of the drives found at `path`.
 pub(crate) fn open(path: &Path, drives: &[Drive], options: &OpenOptions) -> Result<Vec<Dataset>> {
-    if options.intrinsics.is_some() {
+    if options.gives_camera() {
         return Err(Error::OwnCalibration {
             path: path.to_owned(),
         });

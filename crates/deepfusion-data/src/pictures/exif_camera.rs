@@ -1,0 +1,92 @@
+//! A picture's camera by its EXIF block.
+
+use super::known_cameras::KnownCamera;
+use deepfusion_geometry::Intrinsics;
+use exif::{Exif, In, Tag, Value};
+use std::io::{BufRead, Seek};
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+/// Diagonal of a frame of 35 mm film, 36 mm by 24 mm, which EXIF's equivalent focal lengths refer to (CIPA DC-008).
+pub(super) const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
+
+/// Equivalent focal lengths of lenses there are, mm.
+const FOCAL_LENGTHS_MM: RangeInclusive<u32> = 5..=2000;
+
+/// A pinhole camera that a picture's EXIF block says, and by what.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ExifCamera {
+    /// Square pixels, the principal point in the middle, in pixels of the picture as it is stored or turned by quarters.
+    pub(crate) intrinsics: Intrinsics,
+    /// What it was taken from, for people.
+    pub(crate) by: String,
+    /// Whether the picture is to be turned or mirrored to be upright.
+    pub(crate) turned: bool,
+}
+
+/// The block of a PNG or JPEG; one that is damaged says nothing.
+pub(super) fn block(mut bytes: impl BufRead + Seek) -> Option<Exif> {
+    exif::Reader::new().read_from_container(&mut bytes).ok()
+}
+
+/// What the block of a file says of the camera of its picture, which is `size` pixels wide and high.
+pub(crate) fn exif_camera(path: &Path, size: (u32, u32)) -> Option<ExifCamera> {
+    let file = std::fs::File::open(path).ok()?;
+    camera_of(&block(std::io::BufReader::new(file))?, size)
+}
+
+/// By the focal length in 35 mm film, else by the make, the model and the lens.
+pub(super) fn camera_of(exif: &Exif, size: (u32, u32)) -> Option<ExifCamera> {
+    let (intrinsics, by) = of_film(exif, size).or_else(|| of_model(exif, size))?;
+    Some(ExifCamera {
+        intrinsics,
+        by,
+        turned: number(exif, Tag::Orientation).is_some_and(|turn| turn > 1),
+    })
+}
+
+pub(super) fn number(exif: &Exif, tag: Tag) -> Option<u32> {
+    exif.get_field(tag, In::PRIMARY)?.value.get_uint(0)
+}
+
+fn of_film(exif: &Exif, (width, height): (u32, u32)) -> Option<(Intrinsics, String)> {
+    let mm = number(exif, Tag::FocalLengthIn35mmFilm).filter(|mm| FOCAL_LENGTHS_MM.contains(mm))?;
+    let diagonal = f64::from(width).hypot(f64::from(height));
+    let focal_px = f64::from(mm) / FILM_DIAGONAL_MM * diagonal;
+    let camera = Intrinsics::centred(focal_px, (width, height));
+    Some((camera, format!("{mm} mm in 35 mm film")))
+}
+
+fn of_model(exif: &Exif, size: (u32, u32)) -> Option<(Intrinsics, String)> {
+    // 0 is EXIF's word for "not used".
+    let zoomed = ratio(exif, Tag::DigitalZoomRatio).is_some_and(|zoom| zoom > 0.0 && zoom != 1.0);
+    let lens_mm = ratio(exif, Tag::FocalLength)?;
+    let (make, model) = (text(exif, Tag::Make)?, text(exif, Tag::Model)?);
+    let known = KnownCamera::find(&make, &model, lens_mm).filter(|_| !zoomed)?;
+    let camera = Intrinsics::centred(known.focal_px(size), size);
+    let by = format!(
+        "the main camera of {make} {model}, {:.1} mm in 35 mm film",
+        known.film_mm()
+    );
+    Some((camera, by))
+}
+
+fn ratio(exif: &Exif, tag: Tag) -> Option<f64> {
+    match &exif.get_field(tag, In::PRIMARY)?.value {
+        Value::Rational(numbers) => numbers
+            .first()
+            .map(exif::Rational::to_f64)
+            .filter(|n| n.is_finite()),
+        _ => None,
+    }
+}
+
+fn text(exif: &Exif, tag: Tag) -> Option<String> {
+    match &exif.get_field(tag, In::PRIMARY)?.value {
+        Value::Ascii(lines) => {
+            let line = String::from_utf8_lossy(lines.first()?).into_owned();
+            Some(line.trim_matches(['\0', ' ']).to_owned())
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,245 @@
+//! Where a recording's camera comes from when nobody calibrated it: a field of view, or what the photographs say.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+use deepfusion_data::{Dataset, Error, OpenOptions, load_photo};
+use deepfusion_hint::Hint;
+use exif::experimental::Writer;
+use exif::{Field, In, Rational, Tag, Value};
+use image::{ImageFormat, Rgb, RgbImage};
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+
+/// The photographs' size: 4:3, with a diagonal of 80 pixels.
+const SIZE: (u32, u32) = (64, 48);
+/// Diagonal of 36 mm by 24 mm film.
+const FILM_MM: f64 = 43.266_615_305_567_87;
+
+fn short(tag: Tag, value: u16) -> Field {
+    field(tag, Value::Short(vec![value]))
+}
+
+fn field(tag: Tag, value: Value) -> Field {
+    Field {
+        tag,
+        ifd_num: In::PRIMARY,
+        value,
+    }
+}
+
+/// What a telephone says of its lens, but for the focal length in 35 mm film.
+fn telephone(make: &str, model: &str, lens_um: u32) -> Vec<Field> {
+    let text = |text: &str| Value::Ascii(vec![text.as_bytes().to_vec()]);
+    let lens = Rational {
+        num: lens_um,
+        denom: 1000,
+    };
+    vec![
+        field(Tag::Make, text(make)),
+        field(Tag::Model, text(model)),
+        field(Tag::FocalLength, Value::Rational(vec![lens])),
+    ]
+}
+
+/// Writes a JPEG with an EXIF block of these fields.
+fn write_photo(path: &Path, fields: &[Field]) {
+    let mut plain = Vec::new();
+    let image = RgbImage::from_fn(SIZE.0, SIZE.1, |x, y| Rgb([x as u8, y as u8, 9]));
+    image
+        .write_to(&mut Cursor::new(&mut plain), ImageFormat::Jpeg)
+        .unwrap();
+    let mut bytes = plain[..2].to_vec();
+    if !fields.is_empty() {
+        let mut writer = Writer::new();
+        fields.iter().for_each(|field| writer.push_field(field));
+        let mut block = Cursor::new(Vec::new());
+        writer.write(&mut block, true).unwrap();
+        let block = block.into_inner();
+        // APP1, its length with these two bytes, its name, the block.
+        let length = u16::try_from(block.len() + 8).unwrap().to_be_bytes();
+        bytes.extend([&[0xFF, 0xE1], &length[..], b"Exif\0\0", &block[..]].concat());
+    }
+    bytes.extend(&plain[2..]);
+    fs::write(path, bytes).unwrap();
+}
+
+/// A folder of photographs with these blocks, ten in a second; without any calibration.
+fn photographs(folder: &Path, blocks: &[Vec<Field>]) {
+    fs::create_dir_all(folder.join("images")).unwrap();
+    for (n, fields) in blocks.iter().enumerate() {
+        write_photo(&folder.join(format!("images/{n:03}.jpg")), fields);
+    }
+    fs::write(folder.join("dataset.toml"), "fps = 10\n").unwrap();
+}
+
+fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset, Error> {
+    Dataset::open(folder, options).map(|mut all| all.remove(0))
+}
+
+#[test]
+fn a_field_of_view_is_a_camera() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path();
+    photographs(folder, &[vec![], vec![]]);
+    let given = OpenOptions {
+        hfov_deg: Some(60.0),
+        ..OpenOptions::default()
+    };
+    // 32 / tan(30°).
+    let focal = 32.0 * 3_f64.sqrt();
+    let by_caller = open(folder, &given).unwrap().intrinsics(0);
+    assert!((by_caller.fx - focal).abs() < 1e-9 && by_caller.fx == by_caller.fy);
+    assert_eq!((by_caller.cx, by_caller.cy), (31.5, 23.5));
+    fs::write(folder.join("dataset.toml"), "fps = 10\nhfov_deg = 60\n").unwrap();
+    let by_file = open(folder, &OpenOptions::default()).unwrap();
+    assert_eq!(by_file.intrinsics(0), by_caller);
+    // What the caller says comes first, and four numbers before an angle.
+    let both = OpenOptions {
+        intrinsics: Some([70.0, 70.0, 30.0, 20.0]),
+        ..given
+    };
+    assert_eq!(open(folder, &both).unwrap().intrinsics(0).fx, 70.0);
+}
+
+#[test]
+fn angles_that_are_none_are_refused() {
+    let root = tempfile::tempdir().unwrap();
+    photographs(root.path(), &[vec![]]);
+    for (toml, why) in [
+        (
+            "hfov_deg = 170",
+            "hfov_deg is 170, it must be above 0 and below 170 degrees",
+        ),
+        ("hfov_deg = 0", "hfov_deg is 0"),
+        ("hfov_deg = nan", "hfov_deg is NaN"),
+        ("hfov_deg = 60\nintrinsics = [60, 60, 32, 24]", "keep one"),
+    ] {
+        fs::write(root.path().join("dataset.toml"), toml).unwrap();
+        let error = open(root.path(), &OpenOptions::default()).unwrap_err();
+        assert!(error.to_string().contains(why), "{error}");
+        assert!(error.hint().is_some());
+    }
+    fs::write(root.path().join("dataset.toml"), "").unwrap();
+    let options = OpenOptions {
+        hfov_deg: Some(200.0),
+        ..OpenOptions::default()
+    };
+    let error = open(root.path(), &options).unwrap_err();
+    assert!(matches!(error, Error::CameraFile { .. }), "{error}");
+}
+
+#[test]
+fn photographs_say_what_their_camera_is() {
+    let root = tempfile::tempdir().unwrap();
+    let film = vec![short(Tag::FocalLengthIn35mmFilm, 26)];
+    let turned = vec![
+        short(Tag::FocalLengthIn35mmFilm, 26),
+        short(Tag::Orientation, 6),
+    ];
+    for (name, block, film_mm, told) in [
+        ("film", film, 26.0, "000.jpg: 26 mm in 35 mm film"),
+        (
+            "turned",
+            turned,
+            26.0,
+            "not turned as EXIF's orientation says",
+        ),
+        (
+            "apple",
+            telephone("Apple", "iPhone 14 Pro", 6860),
+            24.0,
+            "the main camera of Apple iPhone 14 Pro, 24.0 mm",
+        ),
+        (
+            "google",
+            telephone("Google", "Pixel 7", 6810),
+            // 82° from corner to corner.
+            FILM_MM / 2.0 / 41_f64.to_radians().tan(),
+            "the main camera of Google Pixel 7, 24.9 mm",
+        ),
+    ] {
+        let folder = root.path().join(name);
+        photographs(&folder, &[block.clone(), block.clone(), block]);
+        let dataset = open(&folder, &OpenOptions::default()).unwrap();
+        let k = dataset.intrinsics(0);
+        assert!(
+            (k.fx - film_mm / FILM_MM * 80.0).abs() < 1e-6,
+            "{name} {k:?}"
+        );
+        assert_eq!((k.fx, k.cx, k.cy), (k.fy, 31.5, 23.5));
+        let remarks = dataset.remarks();
+        let remark = remarks.iter().find(|r| r.contains("EXIF")).unwrap();
+        assert!(remark.contains(told), "{remark}");
+        // A single picture knows the same.
+        let photo = load_photo(&folder.join("images/000.jpg")).unwrap();
+        assert_eq!(photo.intrinsics.unwrap().fx, k.fx);
+    }
+}
+
+#[test]
+fn a_calibration_comes_before_what_photographs_say() {
+    let root = tempfile::tempdir().unwrap();
+    photographs(root.path(), &[vec![short(Tag::FocalLengthIn35mmFilm, 26)]]);
+    fs::write(root.path().join("intrinsics.txt"), "50 50 31 23").unwrap();
+    let dataset = open(root.path(), &OpenOptions::default()).unwrap();
+    assert_eq!(dataset.intrinsics(0).fx, 50.0);
+}
+
+#[test]
+fn photographs_that_say_nothing_or_too_much_are_no_camera() {
+    let root = tempfile::tempdir().unwrap();
+    for (name, block) in [
+        ("nothing", vec![]),
+        // Its ultra-wide camera, whose view is not in the table.
+        ("other-lens", telephone("Apple", "iPhone 14 Pro", 2220)),
+        ("unknown", telephone("Nobody", "Telephone 1", 4200)),
+        ("zoomed", {
+            let mut block = telephone("Apple", "iPhone 14 Pro", 6860);
+            let twice = Rational { num: 2, denom: 1 };
+            block.push(field(Tag::DigitalZoomRatio, Value::Rational(vec![twice])));
+            block
+        }),
+    ] {
+        let folder = root.path().join(name);
+        photographs(&folder, &[block]);
+        let error = open(&folder, &OpenOptions::default()).unwrap_err();
+        assert!(
+            matches!(error, Error::NoCameraFile { .. }),
+            "{name}: {error}"
+        );
+        let hint = error.hint().unwrap();
+        assert!(hint.contains("hfov_deg") && hint.contains("EXIF"), "{hint}");
+    }
+    // A zoom that moved, or a second telephone, in one folder.
+    let folder = root.path().join("mixed");
+    let film = |mm| vec![short(Tag::FocalLengthIn35mmFilm, mm)];
+    photographs(&folder, &[film(26), film(26), film(52)]);
+    let error = open(&folder, &OpenOptions::default())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("002.jpg: EXIF says 52 mm in 35 mm film, but 26 mm"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_fisheye_calibration_is_undone() {
+    let root = tempfile::tempdir().unwrap();
+    photographs(root.path(), &[vec![]]);
+    let camchain = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [0.05, -0.02, 0.01, -0.003]\n  \
+        distortion_model: equidistant\n  intrinsics: [40.0, 40.0, 32.0, 24.0]\n  resolution: [64, 48]\n";
+    fs::write(root.path().join("camchain.yaml"), camchain).unwrap();
+    let dataset = open(root.path(), &OpenOptions::default()).unwrap();
+    // The left edge's middle is 32 pixels of 40 from the axis: 0.8 = θ(1 + 0.05θ² - 0.02θ⁴ + 0.01θ⁶ - 0.003θ⁸) at θ = 0.7806,
+    // and the right one's 31 of 40, 0.775, at θ = 0.7571; a pinhole image from -tan to tan of them has 63 steps.
+    let span = 0.7806_f64.tan() + 0.7571_f64.tan();
+    let k = dataset.intrinsics(0);
+    assert!((k.fx - 63.0 / span).abs() < 0.02, "{k:?}");
+    assert_eq!(dataset.load_image(0).unwrap().dimensions(), SIZE);
+}
