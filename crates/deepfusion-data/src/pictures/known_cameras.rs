@@ -59,7 +59,8 @@ const fn samsung(models: &'static [&'static str], lens_mm: f64, diagonal_deg: f6
 
 /// Views as the makers publish them: Apple's technical specifications ("26 mm, ƒ/1.6"; support.apple.com/specs), Google's
 /// ("82° field of view"; support.google.com/pixelphone/answer/7158570), Samsung's ("FOV 85°"; the models' specifications on
-/// samsung.com). The lenses' own focal lengths are those that the telephones write into EXIF. Left out: the Galaxy S21 and S21+,
+/// samsung.com). The lenses' own focal lengths are those that the telephones write into EXIF. No picture of each was at hand to try
+/// them: where EXIF's lens is not the one here, the table is not used, so that a wrong row is an unused one. Left out: the Galaxy S21 and S21+,
 /// whose two longer lenses are too alike to tell them apart, and action cameras, whose EXIF block does not say which of their
 /// digital lenses (wide, linear) was chosen.
 const KNOWN: &[KnownCamera] = &[
