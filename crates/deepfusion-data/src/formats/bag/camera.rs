@@ -140,3 +140,48 @@ fn looking_ahead() -> Se3 {
     let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
     Se3::from_parts(&axes, Vector3::zeros())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn info(model: &str, d: &[f64]) -> CameraInfo {
+        CameraInfo {
+            width: 64,
+            height: 48,
+            distortion_model: model.into(),
+            d: d.to_vec(),
+            k: [40.0, 0.0, 31.5, 0.0, 41.0, 23.5, 0.0, 0.0, 1.0],
+            header: deepfusion_rosbag::msg::Header::default(),
+            r: [0.0; 9],
+            p: [0.0; 12],
+            binning_x: 0,
+            binning_y: 0,
+            roi: deepfusion_rosbag::msg::RegionOfInterest::default(),
+        }
+    }
+
+    #[test]
+    fn the_model_says_what_the_coefficients_are() {
+        let d = [0.1, -0.02, 0.003, -0.0004];
+        let k = Intrinsics::from_numbers([40.0, 41.0, 31.5, 23.5], (64, 48));
+        let by = |distortion| Lens::new(k, &distortion).unwrap().intrinsics();
+        let fisheye = by(Distortion::from_fisheye(&d).unwrap());
+        let brown = by(Distortion::from_opencv(&d).unwrap());
+        assert_ne!(fisheye, brown);
+        let read = |model, d: &[f64]| of_camera_info(&info(model, d), false);
+        assert_eq!(read("equidistant", &d).unwrap().intrinsics(), fisheye);
+        assert_eq!(read("plumb_bob", &d).unwrap().intrinsics(), brown);
+        // An equidistant lens without coefficients is still one; without distortion a camera is a pinhole.
+        assert!(read("equidistant", &[0.0; 4]).unwrap().distorts());
+        assert!(!read("plumb_bob", &[]).unwrap().distorts());
+        for (model, d, why) in [
+            ("equidistant", &d[..0], "k1, k2, k3, k4"),
+            ("equidistant", &[f64::NAN; 4], "NaN"),
+            ("division", &d, "division is not known"),
+        ] {
+            let error = read(model, d).unwrap_err();
+            assert!(error.contains(why), "{error}");
+        }
+    }
+}
