@@ -13,6 +13,7 @@ from typing import Any
 
 from . import _native
 from ._native import DeepFusionError, Model
+from .distributed import Workers
 
 TrainEvent = dict[str, Any]
 """What the trainer reports. `event["event"]` says which it is:
@@ -23,6 +24,7 @@ TrainEvent = dict[str, Any]
 - "validated": step, losses, selection (what `best` is chosen by), scale_ratio, best (whether this is the best so far)
 - "saved": step, path of the checkpoint
 - "panel": step, name, image (3 x H x W, 0 to 1), disparity (H x W)
+- "camera": step, size (width, height), focal_px (fx, fy), sigma_px (of each, or None), at the end of a run that learns its camera
 - "warning": step, message
 """
 
@@ -105,10 +107,11 @@ def train(
     validation: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
     camera: str | None = None,
     resume: bool = False,
+    workers: Workers | None = None,
 ) -> Run:
     """Learns metric depth from recordings, without depth labels, on this machine's processor.
 
-    `config` is a preset ("tiny", "light", "resnet50", "paper", "monodepth2"), the path of a TOML file, or a dict over a preset:
+    `config` is a preset ("tiny", "light", "resnet50", "paper", "monodepth2", "lite-mono", "lite-mono-small", "lite-mono-tiny", "lite-mono-8m"), the path of a TOML file, or a dict over a preset:
     `{"preset": "light", "steps": 500, "loss": {"smoothness": 0.01}}` (tables in tables or dots in keys; None takes an optional key
     away; the keys are those of docs/reference/configuration.md). `data` are recordings of any known layout, and `validation` some to
     validate on, else the end of each drive is held out; `camera` is "2", "3" or "both".
@@ -116,6 +119,10 @@ def train(
     The run goes to `out`, new or empty (by default runs/train-TIME), and starts from `init`: a run, a checkpoint, the name of an
     embedded network or "none"; by default the embedded network that is built as the preset is, if there is one. With `resume=True` the
     run in `out` goes on; `config` as a dict may then change what it says, and is left out otherwise.
+
+    `workers` are several processes that learn one network together, as `deepfusion.distributed` connects them: each calls `train` with
+    the same arguments, `batch` and `accumulate` are each one's own, and worker 0 validates and writes the run. K workers learn what one
+    learns with `accumulate` K times as large.
 
     `callback` gets each `TrainEvent`; where it returns False, training stops after the step and the run is saved. What it raises
     stops it as well, and is raised here. Ctrl-C saves the run and raises KeyboardInterrupt.
@@ -126,11 +133,14 @@ def train(
         config = table.pop("preset", "tiny")
         settings = list(_settings(table))
     if out is None:
+        if workers is not None:
+            raise ValueError("workers: out is the run that all of them learn")
         if resume:
             raise ValueError("resume: out is the run that goes on")
         out = Path("runs") / time.strftime("train-%Y%m%d-%H%M%S", time.gmtime())
     out = Path(out)
-    if not resume and out.exists() and any(out.iterdir()):
+    leads = workers is None or workers.rank == 0
+    if leads and not resume and out.exists() and any(out.iterdir()):
         error = DeepFusionError(f"{out}: is not empty")
         error.hint = "choose another folder, empty this one first, or go on with the run in it (resume=True)"
         raise error
@@ -143,6 +153,7 @@ def train(
         "out": out,
         "init": init,
         "resume": resume,
+        "workers": workers,
     }
     figures = _native.train(asked, callback)
     return Run(**figures)

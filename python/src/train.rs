@@ -8,10 +8,11 @@ use deepfusion::model::{Compute, DepthNetConfig, Preset, RunFolder, TrainConfig}
 use deepfusion::runtime::{ModelSource, embedded_names};
 use deepfusion::train::log::{CsvLog, CsvRecord};
 use deepfusion::train::{
-    Checkpoints, Control, Device, Error, LossTerms, Model, SampleSet, TrainEvent, Trainer,
+    Alone, Checkpoints, Control, Device, Error, LossTerms, Model, SampleSet, TrainEvent, Trainer,
+    Workers,
 };
-use numpy::IntoPyArray;
 use numpy::ndarray::{Array2, Array3};
+use numpy::{IntoPyArray, PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -33,6 +34,45 @@ struct Asked {
     out: PathBuf,
     init: Option<PathBuf>,
     resume: bool,
+    workers: Option<Others>,
+}
+
+/// The other workers, as an object of Python's connects them: `rank`, `count` and `sum(array)`.
+#[derive(FromPyObject)]
+struct Others {
+    rank: usize,
+    count: usize,
+    #[pyo3(attribute)]
+    sum: Py<PyAny>,
+}
+
+impl Others {
+    fn another(&self) -> Box<dyn Workers> {
+        Box::new(Self {
+            rank: self.rank,
+            count: self.count,
+            sum: Python::attach(|py| self.sum.clone_ref(py)),
+        })
+    }
+}
+
+impl Workers for Others {
+    fn rank(&self) -> usize {
+        self.rank
+    }
+
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn sum(&mut self, values: &mut [f32]) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+        Python::attach(|py| {
+            let array = PyArray1::from_slice(py, values);
+            self.sum.call1(py, (&array,))?;
+            values.copy_from_slice(array.try_readonly()?.as_slice()?);
+            Ok(())
+        })
+    }
 }
 
 /// Trains; gives the run's figures as a dict.
@@ -48,10 +88,11 @@ pub fn train<'py>(
     deepfusion_cli::keep_memory();
     let outcome = interruptible(py, |stop| -> Result<_, Failure> {
         let (mut trainer, skipped) = opened(&asked)?;
-        listener.log = Some(CsvLog::open(
-            &trainer.folder().join("log.csv"),
-            trainer.step(),
-        )?);
+        // The first worker's log is of all of them.
+        if asked.workers.as_ref().is_none_or(|w| w.rank == 0) {
+            let path = trainer.folder().join("log.csv");
+            listener.log = Some(CsvLog::open(&path, trainer.step())?);
+        }
         let listen = &mut |event| listener.hear(event, stop);
         let summary = trainer.run(listen)?;
         Ok((summary, skipped))
@@ -79,6 +120,11 @@ pub fn train<'py>(
 /// The trainer that is asked for, and why drives were left out.
 fn opened(asked: &Asked) -> Result<(Trainer, Vec<String>), Failure> {
     let device = Device::flex();
+    let workers: Box<dyn Workers> = match &asked.workers {
+        Some(others) => others.another(),
+        None => Box::new(Alone),
+    };
+    let leads = workers.rank() == 0;
     if asked.resume {
         let folder = RunFolder::open(&asked.out)?.0;
         let mut config = folder.read_settings()?;
@@ -88,8 +134,11 @@ fn opened(asked: &Asked) -> Result<(Trainer, Vec<String>), Failure> {
         choose_data(&mut config, asked)?;
         config.validate()?;
         let (train, validation, skipped) = samples(&config)?;
-        folder.write_config(&config, &folder.read_findings()?)?;
-        let trainer = Trainer::resume(config, folder, (train, validation), &device)?;
+        if leads {
+            folder.write_config(&config, &folder.read_findings()?)?;
+        }
+        let sets = (train, validation);
+        let trainer = Trainer::resume_among(workers, config, folder, sets, &device)?;
         return Ok((trainer, skipped));
     }
     let mut config = configuration(asked)?;
@@ -97,8 +146,13 @@ fn opened(asked: &Asked) -> Result<(Trainer, Vec<String>), Failure> {
     start.record_in(&mut config)?;
     config.validate()?;
     let (train, validation, skipped) = samples(&config)?;
-    let folder = RunFolder::create(&asked.out)?;
-    let trainer = Trainer::create(config, folder, (train, validation), &device, |model| {
+    let folder = if leads {
+        RunFolder::create(&asked.out)?
+    } else {
+        RunFolder::of_another(&asked.out)
+    };
+    let sets = (train, validation);
+    let trainer = Trainer::create_among(workers, config, folder, sets, &device, |model| {
         start.initialise(model, &device)
     })?;
     Ok((trainer, skipped))
@@ -166,8 +220,9 @@ fn samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet, Vec<String>), 
     let (mut train, mut validation) = (Vec::new(), Vec::new());
     let data = &config.data;
     if data.sets.is_empty() {
-        let clock = data.camera_ahead_s;
-        let open = |paths: &[PathBuf], split| recordings(paths, split, &data.camera, clock, 0);
+        let (clock, topics) = (data.camera_ahead_s, &data.topics);
+        let open =
+            |paths: &[PathBuf], split| recordings(paths, split, &data.camera, (clock, topics), 0);
         train = open(&data.paths, data.split.as_deref())?;
         if !data.validation.is_empty() || data.validation_split.is_some() {
             let own = own_or(&data.validation, &data.paths);
@@ -180,7 +235,11 @@ fn samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet, Vec<String>), 
             own => own,
         };
         let clock = set.camera_ahead_s.or(data.camera_ahead_s);
-        let open = |paths: &[PathBuf], split| recordings(paths, split, camera, clock, i);
+        let topics = match set.topics.as_slice() {
+            [] => &data.topics,
+            own => own,
+        };
+        let open = |paths: &[PathBuf], split| recordings(paths, split, camera, (clock, topics), i);
         train.extend(open(&set.paths, set.split.as_deref())?);
         if set.validates() {
             let own = own_or(&set.validation, &set.paths);
@@ -203,7 +262,7 @@ fn recordings(
     paths: &[PathBuf],
     split: Option<&Path>,
     camera: &str,
-    camera_ahead_s: Option<f64>,
+    (camera_ahead_s, topics): (Option<f64>, &[String]),
     set: usize,
 ) -> Result<Vec<(usize, Dataset)>, Failure> {
     let camera: Result<Cameras, Failure> = match camera {
@@ -213,10 +272,17 @@ fn recordings(
             hint: Some("\"2\", \"3\" or \"both\"".into()),
         }),
     };
+    let topics = topics.iter().map(|text| {
+        text.parse().map_err(|hint| Failure {
+            message: format!("topics: `{text}`"),
+            hint: Some(hint),
+        })
+    });
     let options = OpenOptions {
         camera: camera?,
         split: split.map(Split::read).transpose()?,
         camera_ahead_s,
+        topics: topics.collect::<Result<_, Failure>>()?,
         ..OpenOptions::default()
     };
     let mut all = Vec::new();
@@ -490,6 +556,13 @@ fn as_dict(py: Python<'_>, event: TrainEvent) -> PyResult<Bound<'_, PyDict>> {
             dict.set_item("image", image.into_pyarray(py))?;
             dict.set_item("disparity", disparity.into_pyarray(py))?;
             "panel"
+        }
+        TrainEvent::Camera { camera, learned } => {
+            dict.set_item("step", learned.step)?;
+            dict.set_item("size", (camera.width, camera.height))?;
+            dict.set_item("focal_px", learned.focal_px)?;
+            dict.set_item("sigma_px", learned.sigma_px)?;
+            "camera"
         }
         TrainEvent::Saved { step, path } => {
             dict.set_item("step", step)?;

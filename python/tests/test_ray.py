@@ -220,3 +220,45 @@ def test_trials_of_a_setting(tmp_path):
 
     rows = cluster.ablate({"all": {}, "no smoothness": {"loss.smoothness": 0.0}}, drive, seeds=[1], config=SMALL, out=tmp_path / "rows", init="none")
     assert list(rows) == ["all", "no smoothness"] and all(len(tried) == 1 for tried in rows.values())
+
+
+def training_workers():
+    """The processes of Ray Train's workers."""
+    found = []
+    for pid in filter(str.isdigit, os.listdir("/proc")):
+        try:
+            with open(f"/proc/{pid}/cmdline", "rb") as file:
+                name = file.read()
+        except OSError:
+            continue
+        if b"TrainWorker" in name or b"_RayTrainWorker" in name:
+            found.append(int(pid))
+    return found
+
+
+def test_a_network_is_learned_by_two_workers_though_one_is_killed(tmp_path):
+    pytest.importorskip("torch")
+    pytest.importorskip("ray.train.torch")
+    street = deepfusion.simulate(tmp_path / "street", frames=16, seed=3, size=(320, 96))
+    config = {"preset": "tiny", "steps": 40, "batch": 1, "size": {"width": 64, "height": 64}, "seed": 4, "validation_share": 0.2,
+              "validate_every": 4, "depth_net.encoder.frozen_statistics": True}  # fmt: skip
+    alone = deepfusion.train({**config, "accumulate": 2}, street, out=tmp_path / "alone", init="none")
+    out = tmp_path / "shared"
+    killed = []
+
+    def kill_one():
+        while not killed:
+            workers = training_workers() if (out / "last.safetensors").exists() else []
+            if workers:
+                os.kill(workers[-1], signal.SIGKILL)
+                killed.append(workers[-1])
+            time.sleep(0.02)
+
+    killer = threading.Thread(target=kill_one, daemon=True)
+    killer.start()
+    run = cluster.train(config, street, out=out, workers=2, init="none")
+    assert killed and run.step == 40
+    lines = [line.split(",") for line in (out / "log.csv").read_text().splitlines()]
+    steps = [int(line[0]) for line in lines if line[1] == "train"]
+    assert steps[-1] == 40
+    assert run.losses["total"] == pytest.approx(alone.losses["total"], rel=1e-3)

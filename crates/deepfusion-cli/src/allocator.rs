@@ -22,7 +22,7 @@ pub fn keep_memory() {
 
 /// Gives freed memory back at once while `work` runs: packing a network frees its weights one by one, and the peak
 /// would hold them all twice.
-pub fn without_hoarding<T>(work: impl FnOnce() -> T) -> T {
+pub(crate) fn without_hoarding<T>(work: impl FnOnce() -> T) -> T {
     // SAFETY: reading a documented option has no precondition.
     let usual = unsafe { libmimalloc_sys::mi_option_get(PURGE_DELAY) };
     set_purge_delay(0);

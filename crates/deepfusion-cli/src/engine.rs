@@ -11,7 +11,7 @@ use crate::error::CliError;
 use crate::failure::Result;
 
 /// Loads a network with the engine asked for.
-pub fn load(model: &ModelSource, args: &EngineArgs) -> Result<DepthEstimator> {
+pub(crate) fn load(model: &ModelSource, args: &EngineArgs) -> Result<DepthEstimator> {
     let network = model.load(args.set.as_deref())?;
     let args = args.clone();
     DepthEstimator::of(network, move |config, weights| {
@@ -20,7 +20,7 @@ pub fn load(model: &ModelSource, args: &EngineArgs) -> Result<DepthEstimator> {
 }
 
 /// The engine asked for, with a network of this configuration and these weights.
-pub fn runner(
+pub(crate) fn runner(
     args: &EngineArgs,
     config: &TrainConfig,
     weights: Weights,

@@ -6,7 +6,7 @@ use crate::failure::{Exit, Reportable};
 
 /// Failures that only the command line knows.
 #[derive(Debug, thiserror::Error)]
-pub enum CliError {
+pub(crate) enum CliError {
     /// Something that would be overwritten.
     #[error("{}: is there already", path.display())]
     Exists {
@@ -202,6 +202,31 @@ pub enum CliError {
         /// The option that says where it is now; none for a data set's.
         option: Option<&'static str>,
     },
+    /// Drives that a network cannot be judged on, and so not adapted to.
+    #[cfg(feature = "train")]
+    #[error("{frames} of the frames that are held out can tell how good a network is, too few to adapt by{}", because(*why))]
+    NotJudged {
+        /// How many.
+        frames: usize,
+        /// Why there are none.
+        why: Option<deepfusion_eval::verdict::NoCertificate>,
+    },
+    /// An adapted network that is worse than the one it began from.
+    #[cfg(feature = "train")]
+    #[error("not kept: on the frames that are held out it became worse: {worse}; laid aside as {}", path.display())]
+    Refused {
+        /// Where it lies.
+        path: PathBuf,
+        /// In what.
+        worse: String,
+    },
+    /// A folder without a network to go back to.
+    #[cfg(feature = "train")]
+    #[error("{}: `adapt` wrote no run there, or it is undone already", path.display())]
+    NotAdapted {
+        /// The folder.
+        path: PathBuf,
+    },
     /// Work that was stopped and has nothing to go on with.
     #[error("{what} was stopped before it was done")]
     Ended {
@@ -326,6 +351,16 @@ impl Reportable for CliError {
                 "if it was moved, correct its path in {}",
                 run.join("config.toml").display()
             )),
+            #[cfg(feature = "train")]
+            Self::NotJudged { .. } => Some(
+                "give longer drives with speed and yaw rate, or more of them with --held-out SHARE; or learn without this check: deepfusion train --data DRIVE --init NETWORK".into(),
+            ),
+            #[cfg(feature = "train")]
+            Self::Refused { .. } => Some(
+                "the given network is the better one here; more drives, fewer --steps or a smaller --learning-rate may change that".into(),
+            ),
+            #[cfg(feature = "train")]
+            Self::NotAdapted { .. } => Some("give the folder that `adapt --out` named".into()),
             Self::Ended { .. } => Some("start it again, into another folder".into()),
             Self::LiveAlone { .. } => Some("start one run for each source, each with a folder of its own".into()),
             Self::Terminal => Some("… | deepfusion … -, or give a camera or an address instead of -".into()),
@@ -348,6 +383,11 @@ impl Reportable for CliError {
             ),
         }
     }
+}
+
+#[cfg(feature = "train")]
+fn because(why: Option<deepfusion_eval::verdict::NoCertificate>) -> String {
+    why.map_or_else(String::new, |why| format!(": {why}"))
 }
 
 /// The failures of a run, a line each, as many as a person reads; the manifest has them all.

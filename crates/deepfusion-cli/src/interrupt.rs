@@ -9,12 +9,12 @@ use crate::error::CliError;
 use crate::failure::Result;
 
 /// The exit code of work that was asked to stop before it was done: what shells give for a program that Ctrl-C ended.
-pub const EXIT_CODE: u8 = 130;
+pub(crate) const EXIT_CODE: u8 = 130;
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 
 /// From now on these signals set [`asked`] and say `notice`.
-pub fn catch(notice: &'static str) {
+pub(crate) fn catch(notice: &'static str) {
     static SET: OnceLock<()> = OnceLock::new();
     SET.get_or_init(|| {
         let caught = leaving_an_ignored_hangup(|| {
@@ -33,12 +33,12 @@ pub fn catch(notice: &'static str) {
 }
 
 /// Whether the work was asked to stop.
-pub fn asked() -> bool {
+pub(crate) fn asked() -> bool {
     ASKED.load(Ordering::SeqCst)
 }
 
 /// Ends what cannot be gone on with, where the work was asked to stop.
-pub fn check(what: &'static str) -> Result<()> {
+pub(crate) fn check(what: &'static str) -> Result<()> {
     if asked() {
         Err(CliError::Ended { what }.into())
     } else {

@@ -10,7 +10,7 @@ use crate::error::CliError;
 use crate::failure::{Exit, Failure, Reportable};
 
 /// An error whose message speaks of options here.
-pub fn in_words(error: Error) -> Failure {
+pub(crate) fn in_words(error: Error) -> Failure {
     let made_with = |what| options_of(what).to_owned();
     match error {
         Error::Stale {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-pub use deepfusion_jobs::ModelFacts;
+pub(crate) use deepfusion_jobs::ModelFacts;
 use deepfusion_runtime::ModelSource;
 
 use crate::error::CliError;
@@ -13,7 +13,7 @@ use crate::progress::say;
 ///
 /// # Errors
 /// As [`ModelSource::named`]; [`CliError::NoModelGiven`] without `--model` where no network is embedded.
-pub fn chosen(asked: Option<&Path>) -> Result<ModelSource> {
+pub(crate) fn chosen(asked: Option<&Path>) -> Result<ModelSource> {
     match asked {
         Some(model) => Ok(ModelSource::named(model)?),
         None => embedded_default()?.ok_or_else(|| CliError::NoModelGiven.into()),
@@ -24,7 +24,7 @@ pub fn chosen(asked: Option<&Path>) -> Result<ModelSource> {
 ///
 /// # Errors
 /// As [`ModelSource::embedded_default`].
-pub fn embedded_default() -> Result<Option<ModelSource>> {
+pub(crate) fn embedded_default() -> Result<Option<ModelSource>> {
     let source = ModelSource::embedded_default()?;
     if let Some(ModelSource::Packed { network, .. }) = &source {
         say(&format!(

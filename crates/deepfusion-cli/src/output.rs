@@ -4,11 +4,11 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use crate::failure::{Context, Result};
-pub use deepfusion_jobs::dates::now;
-pub use deepfusion_jobs::name_of;
+pub(crate) use deepfusion_jobs::dates::now;
+pub(crate) use deepfusion_jobs::name_of;
 
 /// Warnings of all crates on stderr.
-pub fn init_logging() {
+pub(crate) fn init_logging() {
     tracing_subscriber::fmt()
         .with_max_level(tracing_subscriber::filter::LevelFilter::WARN)
         .with_writer(std::io::stderr)
@@ -26,7 +26,7 @@ fn colours_on_stderr() -> bool {
 }
 
 /// Prints data on stdout. A reader that has gone away (`… | head`) is no failure.
-pub fn print(text: &str) -> Result<()> {
+pub(crate) fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
@@ -37,20 +37,20 @@ pub fn print(text: &str) -> Result<()> {
 }
 
 /// Prints a value as JSON on stdout.
-pub fn print_json<T: serde::Serialize + ?Sized>(value: &T) -> Result<()> {
+pub(crate) fn print_json<T: serde::Serialize + ?Sized>(value: &T) -> Result<()> {
     let text =
         serde_json::to_string_pretty(value).context("the result cannot be written as JSON")?;
     print(&format!("{text}\n"))
 }
 
 /// Writes a file, whole or not at all.
-pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
+pub(crate) fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
     let written = deepfusion_fs::write(path, bytes);
     Ok(written.map_err(|e| deepfusion_data::Error::file(path, e))?)
 }
 
 /// The same without waiting for the disk: one of many files that something written later calls done.
-pub fn write_unsynced(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
+pub(crate) fn write_unsynced(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
     let failed = |e| deepfusion_data::Error::file(path, e);
     Ok(deepfusion_fs::write_unsynced(path, failed, |out| {
         out.write_all(bytes.as_ref()).map_err(failed)
@@ -59,7 +59,7 @@ pub fn write_unsynced(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
 
 /// The folder a command writes to: the one asked for, or a new `runs/<command>-<time>`. It is made; a folder that holds
 /// something already is refused.
-pub fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf> {
+pub(crate) fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf> {
     let folder = match asked {
         Some(folder) => folder.to_owned(),
         None => unused(&PathBuf::from("runs").join(format!("{command}-{}", now()))),
@@ -77,7 +77,7 @@ pub fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf> {
 }
 
 /// `path`, or `path-2`, `path-3` … where that is taken.
-fn unused(path: &Path) -> PathBuf {
+pub(crate) fn unused(path: &Path) -> PathBuf {
     let numbered = |n: u32| {
         if n == 1 {
             path.to_owned()
@@ -92,7 +92,7 @@ fn unused(path: &Path) -> PathBuf {
 }
 
 /// Fails where a file could not be written for want of its folder: told before long work, not after it.
-pub fn require_folder_of(file: &Path) -> Result<()> {
+pub(crate) fn require_folder_of(file: &Path) -> Result<()> {
     match file.parent() {
         Some(folder) if folder != Path::new("") && !folder.is_dir() => {
             let missing = std::io::Error::from(ErrorKind::NotFound);

@@ -12,12 +12,12 @@ static QUIET: AtomicBool = AtomicBool::new(false);
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// Turns all progress off (`--quiet`).
-pub fn set_quiet(quiet: bool) {
+pub(crate) fn set_quiet(quiet: bool) {
     QUIET.store(quiet, Ordering::Relaxed);
 }
 
 /// A line of information on stderr, unless quiet.
-pub fn say(text: &str) {
+pub(crate) fn say(text: &str) {
     if !QUIET.load(Ordering::Relaxed) {
         tell(text);
     }
@@ -29,7 +29,7 @@ fn tell(text: &str) {
 }
 
 /// Progress of one piece of work.
-pub struct Progress {
+pub(crate) struct Progress {
     what: String,
     bar: Option<ProgressBar>,
     last_line: Instant,
@@ -40,7 +40,7 @@ pub struct Progress {
 
 impl Progress {
     /// Begins; `what` is told beside the numbers.
-    pub fn new(what: &str) -> Self {
+    pub(crate) fn new(what: &str) -> Self {
         let quiet = QUIET.load(Ordering::Relaxed);
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
@@ -63,19 +63,19 @@ impl Progress {
     }
 
     /// Whether a bar is shown (else lines).
-    pub fn is_bar(&self) -> bool {
+    pub(crate) fn is_bar(&self) -> bool {
         self.bar.is_some()
     }
 
     /// Words beside the bar; nothing where there is none.
-    pub fn note(&self, text: &str) {
+    pub(crate) fn note(&self, text: &str) {
         if let Some(bar) = &self.bar {
             bar.set_message(text.to_owned());
         }
     }
 
     /// `done` of `total` are done.
-    pub fn set(&mut self, done: usize, total: usize) {
+    pub(crate) fn set(&mut self, done: usize, total: usize) {
         if let Some(bar) = &self.bar {
             bar.set_length(total as u64);
             bar.set_position(done as u64);

@@ -234,6 +234,24 @@ fn bags_of_ros_2_are_not_written() {
     }
 }
 
+#[cfg(feature = "ros2")]
+#[test]
+fn a_bag_of_ros_2_is_read_like_one_of_ros_1() {
+    let bags = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../deepfusion-data/tests/reference/ros"
+    );
+    let at = Path::new(bags);
+    let [one, two] =
+        ["drive.bag", "drive_ros2"].map(|name| json(at, &format!("data inspect {name} --json")));
+    // Its script writes fewer images and scans of it.
+    assert_eq!((&one["frames"], &two["frames"]), (&51.into(), &11.into()));
+    for key in ["kind", "size", "intrinsics"] {
+        assert!(!one[key].is_null(), "{key}");
+        assert_eq!(one[key], two[key], "{key}");
+    }
+}
+
 #[cfg(not(feature = "ros2"))]
 #[test]
 fn a_build_without_ros_2_says_how_to_build_one_with() {
@@ -314,5 +332,125 @@ fn what_is_wrong_with_a_bag_is_said() {
         letter.stderr.contains("not a ROS bag") && letter.stderr.contains("hint:"),
         "{}",
         letter.stderr
+    );
+}
+
+/// Frames on /tf_static, CameraInfo and satellite positions at 1 Hz (`deepfusion-data/tests/reference/ros_drive.py`).
+#[test]
+fn a_bag_as_ros_records_it_is_trained_on_without_a_file_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let reference = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../deepfusion-data/tests/reference/ros/drive.bag");
+    std::fs::copy(reference, at.join("drive.bag")).unwrap();
+    let seen = json(at, "data inspect drive.bag --json");
+    let drive = &seen["drives"][0];
+    let mounts = drive["mounts"].as_array().unwrap();
+    let names: Vec<&str> = mounts.iter().map(|m| m["name"].as_str().unwrap()).collect();
+    assert_eq!(
+        names,
+        ["cam_from_vehicle", "cam_from_lidar", "vehicle_from_imu"]
+    );
+    assert!(drive["usable_pairs"].as_u64().unwrap() > 40, "{drive}");
+    assert!(seen["speed_mps"]["mean"].as_f64().unwrap() > 3.0);
+
+    ok(
+        at,
+        "train --data drive.bag --preset tiny --size 64x64 --batch 2 --steps 2 --init none --view-motion vehicle --out run",
+    );
+    assert_eq!(std::fs::read_dir(at).unwrap().count(), 2, "drive.bag, run");
+    let config = std::fs::read_to_string(at.join("run/config.toml")).unwrap();
+    assert!(!config.contains("topics"), "{config}");
+
+    // The file that says the same; what is read is what was read without it.
+    let wrote = ok(at, "data inspect drive.bag --write-config");
+    assert!(
+        wrote.stderr.contains("drive.toml written"),
+        "{}",
+        wrote.stderr
+    );
+    fails(
+        at,
+        "data inspect drive.bag --write-config",
+        &["drive.toml: is there already", "--overwrite"],
+    );
+    let again = json(at, "data inspect drive.bag --json");
+    assert_eq!(again["speed_mps"], seen["speed_mps"]);
+    let place = |seen: &Value| {
+        seen["drives"][0]["mounts"][0]["translation"][2]
+            .as_f64()
+            .unwrap()
+    };
+    assert!((place(&again) - place(&seen)).abs() < 1e-12);
+    assert!((place(&seen) + 1.6).abs() < 1e-9, "1.6 m ahead of the axle");
+    ok(at, "data inspect drive.bag --write-config --overwrite");
+}
+
+#[test]
+fn a_topic_is_named_by_an_option() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let reference = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../deepfusion-data/tests/reference/ros/drive.bag");
+    std::fs::copy(reference, at.join("drive.bag")).unwrap();
+    let small = "--preset tiny --size 64x64 --batch 2 --steps 1 --init none";
+    let image = "image=/camera/front/image_raw/compressed";
+    for command in [
+        "data inspect drive.bag".to_owned(),
+        "doctor drive.bag".into(),
+        "data convert drive.bag kitti".into(),
+        "data export-gt drive.bag --out gt.npz".into(),
+        "predict --model tiny drive.bag --out depth".into(),
+        "perceive --model tiny drive.bag --out targets".into(),
+        "eval --model tiny --data drive.bag".into(),
+        format!("train --data drive.bag {small} --out run"),
+    ] {
+        let wrong = run(at, &format!("{command} --topic image=/gnss/fix"));
+        let text = format!("{}{}", wrong.stdout, wrong.stderr);
+        assert_eq!(wrong.code, 1, "{command}: {text}");
+        assert!(
+            text.contains("/gnss/fix holds sensor_msgs/NavSatFix"),
+            "{command}: {text}"
+        );
+    }
+    ok(
+        at,
+        &format!("train --data drive.bag {small} --out run --topic {image}"),
+    );
+    let config = std::fs::read_to_string(at.join("run/config.toml")).unwrap();
+    assert!(
+        config.contains(&format!("topics = [\"{image}\"]")),
+        "{config}"
+    );
+    fails(
+        at,
+        "eval-odometry --model run --data drive.bag --topic image=/gnss/fix",
+        &["/gnss/fix holds"],
+    );
+    let resume = "train --out run --resume --steps 2";
+    fails(
+        at,
+        &format!("{resume} --topic image=/other"),
+        &["--topic", "image=/other", image],
+    );
+    ok(at, &format!("{resume} --topic {image}"));
+    let wrong = run(at, "data inspect drive.bag --topic picture=/a");
+    assert_eq!(wrong.code, 2);
+    assert!(
+        wrong.stderr.contains("`picture` is no role"),
+        "{}",
+        wrong.stderr
+    );
+    // What has no topics is refused, not read as if nothing had been said.
+    ok(at, "simulate --out street --frames 4 --size 64x48");
+    fails(
+        at,
+        "data inspect street --topic speed=/gnss/fix",
+        &["speed=/gnss/fix", "KITTI raw", "--topic"],
+    );
+    fails(
+        at,
+        "data inspect street --write-config",
+        &["KITTI raw", "dataset.toml"],
     );
 }

@@ -1,5 +1,11 @@
 //! What `doctor` prints: a line for each check, whatever came of it.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
 mod support;
 
 use std::fs;
@@ -168,4 +174,98 @@ fn a_drive_that_cannot_train_does_not_fail_its_folder() {
         &format!("train --data all/2026_01_01/{single}"),
         &[single],
     );
+}
+
+/// What `doctor` says of a log by itself: its findings' checks, texts and remedies.
+fn of_log(at: &std::path::Path, arguments: &str) -> Vec<(String, String, String)> {
+    let text = run(at, &format!("doctor {arguments} --json")).stdout;
+    let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let word = |finding: &serde_json::Value, key: &str| {
+        finding["finding"][key].as_str().unwrap().to_owned()
+    };
+    let findings = report["findings"].as_array().unwrap().iter();
+    findings
+        .map(|f| (word(f, "check"), word(f, "what"), word(f, "remedy")))
+        .collect()
+}
+
+#[test]
+fn a_log_by_itself_is_told_with_what_to_do() {
+    let at =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../deepfusion-logs/tests/reference");
+    let can = "--dbc vehicle.dbc --speed WheelSpeeds.VehicleSpeed";
+    let says = |arguments: &str, check: &str, what: &str, remedy: &str| {
+        let found = of_log(&at, arguments);
+        let fits = |f: &&(String, String, String)| {
+            f.0 == check && f.1.contains(what) && f.2.contains(remedy)
+        };
+        assert!(
+            found.iter().any(|f| fits(&f)),
+            "{arguments}: {check}: {found:#?}"
+        );
+    };
+    let import = "deepfusion data import";
+    says("phone.gpx", "log", "GPX track with 13 speeds", import);
+    says("phone.gpx", "log-sure", "expect distances", "--dbc FILE");
+    says(
+        "phone.gpx",
+        "log-turns",
+        "from positions alone",
+        "gyroscope",
+    );
+    says(
+        "phone.gpx",
+        "log-clock",
+        "dates in UTC",
+        "--clock-offset auto",
+    );
+    says("torque.csv", "log", "speed from column", import);
+    says("torque.csv", "log-clock", "without a zone", "--zone");
+    says("phyphox.csv", "log-clock", "no dates", "--start");
+    says("sensor_logger", "log", "301 yaw rates", import);
+    for trace in ["candump.log", "vector.asc", "vector.blf"] {
+        says(
+            &format!("{trace} {can}"),
+            "log",
+            "CAN trace with 121 speeds",
+            import,
+        );
+        says(trace, "opening", "a DBC file does", "--dbc FILE");
+    }
+    says(
+        "german.csv",
+        "opening",
+        "no column looks like",
+        "--speed COLUMN",
+    );
+    // A camera's own log, in a file that is no whole video.
+    says(
+        "gopro.mp4",
+        "log",
+        "GoPro video with 110 speeds",
+        "gopro.mp4 --out DRIVE",
+    );
+    let told = run(&at, &format!("doctor vector.blf {can}"));
+    assert_eq!(told.code, 0, "{}", told.stderr);
+    assert_eq!(run(&at, "doctor vector.blf").code, 1);
+}
+
+#[test]
+fn speeds_in_another_unit_are_an_error_of_the_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut table = "time_s,speed\n".to_owned();
+    for i in 0..20 {
+        table += &format!("{i},{}\n", 80 + i);
+    }
+    fs::write(at.join("log.csv"), table).unwrap();
+    let found = of_log(at, "log.csv --unit m/s");
+    assert!(
+        found
+            .iter()
+            .any(|f| f.0 == "log-speed" && f.2.contains("--unit km/h")),
+        "{found:#?}"
+    );
+    let found = of_log(at, "log.csv --unit km/h");
+    assert!(!found.iter().any(|f| f.0 == "log-speed"), "{found:#?}");
 }

@@ -102,7 +102,7 @@ fn a_simulated_drive_is_inspected_exported_and_scored() {
         "unscaled",
         "median-scaled",
         "scaled by 0.9",
-        "trivial",
+        "mean-depth baseline",
         "50 points drawn",
     ] {
         assert!(table.stdout.contains(row), "{row}: {}", table.stdout);

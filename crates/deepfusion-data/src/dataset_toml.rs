@@ -8,7 +8,7 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// Longest gap between speeds that can be asked to be bridged, in seconds: nobody knows how a car drove for longer.
-const MOST_GAP_S: f64 = 60.0;
+pub(crate) const MOST_GAP_S: f64 = 60.0;
 
 /// A recording's `dataset.toml`. Every key is optional; docs/reference/dataset-toml.md lists them.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -272,7 +272,7 @@ impl FolderConfig {
     }
 
     /// A point of the vehicle in the camera; looking straight ahead at the vehicle's origin where nothing
-    /// is said (SPEC 3.4: the camera then moves as the vehicle does).
+    /// is said (the camera then moves as the vehicle does).
     pub(crate) fn cam_from_vehicle(&self) -> Se3 {
         self.mount.unwrap_or_default().cam_from_vehicle()
     }

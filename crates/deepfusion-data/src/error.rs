@@ -1,4 +1,4 @@
-use crate::DatasetKind;
+use crate::{DatasetKind, NamedTopic};
 use deepfusion_hint::Hint;
 use std::path::{Path, PathBuf};
 
@@ -113,10 +113,44 @@ pub enum Error {
         config: PathBuf,
     },
     /// Intrinsics given for a layout that has its own.
-    #[error("{}: KITTI raw brings its own calibration", path.display())]
+    #[error("{}: {layout} brings its own calibration", path.display())]
     OwnCalibration {
         /// The recording.
         path: PathBuf,
+        /// Its layout.
+        layout: &'static str,
+    },
+    /// A table of JSON cannot be read, or names a row that another table has not.
+    #[error("{}:{line}: {field}: {problem}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// The field.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A root holds several sets of tables, of which some tell of the same drives.
+    #[error("{}: holds {}", path.display(), versions.join(", "))]
+    SeveralVersions {
+        /// The root.
+        path: PathBuf,
+        /// The folders of tables.
+        versions: Vec<String>,
+    },
+    /// A line of a file of poses cannot be read.
+    #[error("{}:{line}: {field}: {problem}", path.display())]
+    Pose {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// Which number of the line, or `pose`.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
     },
     /// A `dataset.toml` cannot be used.
     #[error("{}: {problem}", path.display())]
@@ -197,6 +231,36 @@ pub enum Error {
         /// The bag.
         path: PathBuf,
         /// The topic and what is wrong with it.
+        problem: String,
+        /// What to do.
+        remedy: String,
+        /// A role and a topic that it could be named for, as a caller may too ([`crate::OpenOptions::topics`]).
+        choice: Option<NamedTopic>,
+    },
+    /// A topic was named for a recording that has none.
+    #[error("{}: {topic}: {layout} has no topics", path.display())]
+    NoTopics {
+        /// The recording.
+        path: PathBuf,
+        /// Its layout.
+        layout: &'static str,
+        /// The topic.
+        topic: NamedTopic,
+    },
+    /// A bag was needed.
+    #[error("{}: it is no ROS bag but of the layout {layout}", path.display())]
+    NotABag {
+        /// The recording.
+        path: PathBuf,
+        /// Its layout.
+        layout: &'static str,
+    },
+    /// The transforms of a bag's frames do not say where a sensor is, and contradict each other.
+    #[error("{}: {problem}", path.display())]
+    Frames {
+        /// The bag.
+        path: PathBuf,
+        /// What contradicts what.
         problem: String,
         /// What to do.
         remedy: String,
@@ -423,13 +487,16 @@ pub type Result<T> = std::result::Result<T, Error>;
 pub(crate) const WITHOUT_ROS2: &str = if cfg!(feature = "ros2") {
     ""
 } else {
-    ", and this program was built without the feature `ros2`"
+    ", and this program was built without the feature `ros2` (`ros2-sqlite` for .db3)"
 };
 
 /// The layouts that are told apart, in the order in which they are looked for.
 const LOOKED_FOR: &str = "  KITTI raw          image_02/ or image_03/ with data/0000000000.png, here or up to two folders below
+  KITTI odometry     sequences/00/ with image_2/000000.png, calib.txt and times.txt, or such a sequence
+  KITTI-360          data_2d_raw/<drive>/image_00/data_rect/0000000000.png, or such a drive
+  nuScenes           v1.0-mini/ (or -trainval, -test) with sample_data.json, samples/CAM_FRONT beside it
   comma2k19 segment  processed_log/CAN/speed/t or global_pose/frame_times
-  ROS 1 bag          a file .bag, given or here
+  ROS bag            a file .bag, .mcap or .db3, or a folder with metadata.yaml, given or here
   RGB-D folder       frame-000000.color.png or .jpg with .depth.png, here or in folders seq-01, …
   video              a file .mp4, .mkv, .mov, .avi or .hevc, given or the only one here
   image folder       .png or .jpg files here, in images/, or where dataset.toml says";
@@ -489,7 +556,7 @@ impl Hint for Error {
                 _ => return None,
             },
             Self::UnknownLayout { .. } if self.needs_ros2() => {
-                "build with the feature `ros2` to read the bags of ROS 2"
+                "build with the feature `ros2` to read the bags of ROS 2, with `ros2-sqlite` those with .db3 files"
             }
             Self::UnknownLayout { .. } => {
                 "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
@@ -501,6 +568,10 @@ impl Hint for Error {
             Self::Video(error) => return error.hint(),
             Self::Log(error) => return error.hint(),
             Self::Motion { source, .. } => return source.hint(),
+            Self::NotABag { .. } => {
+                "only bags have such a file; folders and videos have dataset.toml: docs/reference/dataset-toml.md"
+            }
+            Self::NoTopics { .. } => "name topics for bags alone",
             Self::OneCamera { .. } => "ask for camera 2",
             Self::NoCameraFile {
                 layout: DatasetKind::RgbD,
@@ -532,13 +603,16 @@ impl Hint for Error {
             | Self::Columns { remedy, .. }
             | Self::NoTrack { remedy, .. }
             | Self::Topic { remedy, .. }
+            | Self::Frames { remedy, .. }
             | Self::NoFrames { remedy, .. } => remedy,
             Self::Config { .. } => "docs/reference/ lists every key of dataset.toml and bag.toml",
             Self::Table { .. } => "correct the row or delete it",
             Self::Clocks { .. } => {
                 "both must count from the same moment; start_s in dataset.toml is the first frame's time on the speeds' clock"
             }
-            Self::NoPath { .. } => "KITTI raw with oxts and RGB-D folders with poses have one",
+            Self::NoPath { .. } => {
+                "KITTI raw with oxts, and what has poses (KITTI odometry, KITTI-360, nuScenes, RGB-D folders) have one"
+            }
             Self::DepthKind { .. } => "take camera z from them",
             Self::Program { remedy, .. } => remedy,
             Self::Missing { remedy, .. } => remedy,
@@ -554,9 +628,17 @@ impl Hint for Error {
             Self::FrameSize { .. } => {
                 "use the images and the calibration of one recording; resized images need their own calibration"
             }
-            Self::Calibration { .. } => "take the calibration files of the drive's own date",
+            Self::Calibration { .. } => {
+                "take the calibration files that belong to the recording (KITTI raw: those of the drive's own date)"
+            }
+            Self::Json { .. } => "unpack the data set's metadata (v1.0-*_meta.tgz) again",
+            Self::SeveralVersions { .. } => "give the folder of one of them",
+            Self::Pose { .. } => {
+                "a line has the upper three rows of world_from_camera or world_from_vehicle, 12 numbers, in KITTI-360 after the \
+                 frame's number: fetch the poses again"
+            }
             Self::TimeStamp { .. } => {
-                "lines look like 2011-09-26 13:04:32.345808896 (or, outside of KITTI, like 12.345), one for each frame"
+                "lines look like 2011-09-26 13:04:32.345808896 (or, outside of KITTI raw, like 12.345), one for each frame"
             }
             Self::NoTimeStamp { .. } => {
                 "the file lists the whole drive, a frame's number being its line counted from 0: fetch it again"

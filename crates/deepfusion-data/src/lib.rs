@@ -1,7 +1,8 @@
 //! Recordings of vehicles as frames, snippets and ground-truth depth.
 //!
-//! [`Dataset::open`] takes a recording of any layout: KITTI raw, a folder of images or a video with tables
-//! beside it, a comma2k19 segment, an RGB-D folder, a ROS 1 bag, with the feature `ros2` a ROS 2 bag. [`Dataset::snippets`] gives the training samples with
+//! [`Dataset::open`] takes a recording of any layout: KITTI raw, odometry and 360, nuScenes, a folder of images or a video with tables
+//! beside it, a comma2k19 segment, an RGB-D folder, a ROS 1 bag, with the feature `ros2` (on by default) a ROS 2 bag as MCAP, with
+//! `ros2-sqlite` as SQLite. [`Dataset::snippets`] gives the training samples with
 //! the camera's ego-motion, [`Dataset::ground_truth`] the measured depth. Another layout is another
 //! [`Recording`]. Nothing here knows of tensors.
 //!
@@ -18,21 +19,23 @@ mod logs;
 mod pictures;
 mod truth;
 
-pub use camera::{CameraCalibration, GIVEN_INTRINSICS, Lens};
+pub use camera::{CameraCalibration, GIVEN_INTRINSICS, Lens, camera_info_yaml};
 pub use convert::{
     Converted, VELOCITY, convert_to_bag, convert_to_kitti, export_gt, ground_truth_names,
 };
 pub use dataset::{
     CalibrationPlace, Camera, CameraPath, Cameras, ClockOffset, Dataset, DatasetKind, DatasetParts,
-    DriveInspection, Ego, EgoMotion, Frame, FrameImage, Inspection, IntrinsicsSummary, NoMotion,
-    OpenOptions, PLAUSIBLE_HEIGHT_M, Recording, Snippet, Source, SpeedRange, SpeedWarning, Split,
-    SplitCoverage, SplitEntry, Stream, grey_image, hold_out, road_camera_height,
-    speed_unit_warning,
+    DriveInspection, Ego, EgoMotion, Frame, FrameImage, Inspection, IntrinsicsSummary, Mount,
+    NamedTopic, NoMotion, OpenOptions, PLAUSIBLE_HEIGHT_M, Receiver, Recording, Snippet, Source,
+    SpeedRange, SpeedWarning, Split, SplitCoverage, SplitEntry, Stream, TopicRole, grey_image,
+    hold_out, road_camera_height, speed_unit_warning,
 };
 pub use deepfusion_motion::{MotionModel, VehicleMotion, VehicleTrack};
 pub use error::{Error, Result};
 pub use formats::kitti;
-pub use formats::{DopplerEgo, ego_velocity, ground_radial, inspect, inspect_with};
+pub use formats::{
+    DopplerEgo, ego_velocity, ground_radial, inspect, inspect_with, write_bag_config,
+};
 pub use image::RgbImage;
 pub use pictures::{
     Photo, decode_rgb, image_size, load_photo, load_rgb, overlay, read_depth_png, resize_rgb,

@@ -48,21 +48,27 @@ fn telephone(make: &str, model: &str, lens_um: u32) -> Vec<Field> {
 
 /// Writes a JPEG with an EXIF block of these fields.
 fn write_photo(path: &Path, fields: &[Field]) {
+    let mut block = Cursor::new(Vec::new());
+    if !fields.is_empty() {
+        let mut writer = Writer::new();
+        fields.iter().for_each(|field| writer.push_field(field));
+        writer.write(&mut block, true).unwrap();
+    }
+    write_photo_with(path, &block.into_inner());
+}
+
+/// Writes a JPEG with an EXIF block; an empty one is left out.
+fn write_photo_with(path: &Path, block: &[u8]) {
     let mut plain = Vec::new();
     let image = RgbImage::from_fn(SIZE.0, SIZE.1, |x, y| Rgb([x as u8, y as u8, 9]));
     image
         .write_to(&mut Cursor::new(&mut plain), ImageFormat::Jpeg)
         .unwrap();
     let mut bytes = plain[..2].to_vec();
-    if !fields.is_empty() {
-        let mut writer = Writer::new();
-        fields.iter().for_each(|field| writer.push_field(field));
-        let mut block = Cursor::new(Vec::new());
-        writer.write(&mut block, true).unwrap();
-        let block = block.into_inner();
+    if !block.is_empty() {
         // APP1, its length with these two bytes, its name, the block.
         let length = u16::try_from(block.len() + 8).unwrap().to_be_bytes();
-        bytes.extend([&[0xFF, 0xE1], &length[..], b"Exif\0\0", &block[..]].concat());
+        bytes.extend([&[0xFF, 0xE1], &length[..], b"Exif\0\0", block].concat());
     }
     bytes.extend(&plain[2..]);
     fs::write(path, bytes).unwrap();
@@ -131,6 +137,20 @@ fn angles_that_are_none_are_refused() {
     };
     let error = open(root.path(), &options).unwrap_err();
     assert!(matches!(error, Error::CameraFile { .. }), "{error}");
+}
+
+/// As piexif 1.1.3 writes {FocalLengthIn35mmFilm: 21}: its last directory has no end.
+#[test]
+fn a_block_without_its_end_says_what_it_holds() {
+    let block = b"MM\0*\0\0\0\x08\0\x01\x87\x69\0\x04\0\0\0\x01\0\0\0\x1a\0\0\0\0\0\x01\xa4\x05\0\x03\0\0\0\x01\0\x15\0\0";
+    let root = tempfile::tempdir().unwrap();
+    let path = root.path().join("photo.jpg");
+    write_photo_with(&path, block);
+    let focal = load_photo(&path).unwrap().intrinsics.unwrap().fx;
+    assert!((focal - 21.0 / FILM_MM * 80.0).abs() < 1e-6, "{focal}");
+    // Of one that is cut within a field nothing is left.
+    write_photo_with(&path, &block[..30]);
+    assert_eq!(load_photo(&path).unwrap().intrinsics, None);
 }
 
 #[test]

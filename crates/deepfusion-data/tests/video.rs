@@ -259,3 +259,26 @@ fn pictures_become_a_video_at_their_own_times() {
     let mut names = names.map(|n| n.into_string().unwrap());
     assert!(names.all(|n| !n.contains("partial") && n != "other.mp4"));
 }
+
+/// As `data import` leaves it: the video stays where it was, the tables lie in a folder of their own.
+#[test]
+fn a_folder_has_its_own_tables_for_a_video_elsewhere() {
+    let root = tempfile::tempdir().unwrap();
+    let Some(video) = write_video(root.path(), "drive.mp4") else {
+        return;
+    };
+    let folder = root.path().join("my-drive");
+    fs::create_dir(&folder).unwrap();
+    write_tables(&folder);
+    let named = format!("video = {video:?}\ncache = {folder:?}\n");
+    fs::write(folder.join("dataset.toml"), named).unwrap();
+    let dataset = Dataset::open(&folder, &OpenOptions::default())
+        .unwrap()
+        .remove(0);
+    assert_eq!(dataset.frames().len(), 10);
+    assert_eq!(dataset.intrinsics(0).fx, 50.0);
+    assert!((dataset.frames()[3].speed_mps.unwrap() - 10.0).abs() < 1e-9);
+    dataset.load_image(3).unwrap();
+    assert!(folder.join("drive.mp4.frames").is_dir());
+    assert!(!root.path().join("drive.mp4.frames").exists());
+}

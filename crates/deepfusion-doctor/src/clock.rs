@@ -4,7 +4,10 @@ use super::epipolar::EpipolarPair;
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::survey::Survey;
 use super::turn::picture_turn;
-use deepfusion_motion::{ImageMotion, OffsetConfig, Signal, TimeOffset, VehicleRates, time_offset};
+use deepfusion_data::{Dataset, Ego};
+use deepfusion_motion::{
+    ImageMotion, NoTimeOffset, OffsetConfig, Signal, TimeOffset, VehicleRates, time_offset,
+};
 use rayon::prelude::*;
 
 /// Offset that matters, in seconds: at 10 m/s² of braking 20 ms are 0.2 m/s.
@@ -45,8 +48,8 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
                 1e3 * error
             ),
             format!(
-                "clock.camera_ahead_s = {camera_ahead_s:.3} in the file beside the recording, or a clock offset of {:.0} ms given. Better: one \
-                 clock for all (PTP, trigger)",
+                "clock.camera_ahead_s = {camera_ahead_s:.3} in the file beside the recording, or a clock offset of {:.0} ms given (--clock-offset auto measures it again on opening). \
+                 Better: one clock for all (PTP, trigger)",
                 1e3 * camera_ahead_s
             ),
         )
@@ -62,12 +65,10 @@ pub(super) struct Estimate {
 
 /// The offset of the clocks; else why there is none.
 pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Estimate, String> {
-    let dataset = survey.dataset;
-    let Some(track) = dataset.track().filter(|_| dataset.yaw_known()) else {
-        return Err("no speed and yaw rate to compare the picture with".into());
-    };
-    let rates = VehicleRates::from(track);
-    let offset = settled(survey, pairs, &rates)?;
+    let rates = rates(survey.dataset).filter(|rates| rates.yaw_rate_radps.is_some());
+    let rates = rates.ok_or("no speed and yaw rate to compare the picture with")?;
+    let offset = settled(survey, pairs, &rates, &OffsetConfig::default());
+    let offset = offset.map_err(|why| why.to_string())?;
     let (value, error) = (offset.vehicle_minus_camera_s, offset.std_error_s);
     if error.is_nan() || error >= SURE_S {
         Err(format!(
@@ -78,20 +79,30 @@ pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Es
     }
 }
 
+/// What the vehicle measured of its motion: without a yaw rate the turns of its course, where a receiver shows them. `None` without
+/// speeds.
+pub(super) fn rates(dataset: &Dataset) -> Option<VehicleRates> {
+    let mut rates = VehicleRates::from(dataset.track()?);
+    if !dataset.yaw_known() {
+        rates.yaw_rate_radps = dataset.receiver().course_rate_radps.clone();
+    }
+    Some(rates)
+}
+
 /// The offset, and with it which way the camera headed: that is taken from the vehicle, whose times are known once the offset
 /// is. Taken at another time it adds a part of that time's turn to the picture's, and a tenth to the offset. By how much it
 /// still changes in the end is in the standard error.
-fn settled(
+pub(super) fn settled(
     survey: &Survey<'_>,
     pairs: &[EpipolarPair],
     rates: &VehicleRates,
-) -> Result<TimeOffset, String> {
-    let measure = |pairs: &[EpipolarPair]| {
-        let offset = time_offset(&pictures(survey, pairs), rates, &OffsetConfig::default());
-        offset.map_err(|why| why.to_string())
-    };
+    config: &OffsetConfig,
+) -> Result<TimeOffset, NoTimeOffset> {
+    let measure = |pairs: &[EpipolarPair]| time_offset(&pictures(survey, pairs), rates, config);
     let mut offset = measure(pairs)?;
-    let ego = survey.dataset.ego().map_err(|why| why.to_string())?.level();
+    let Ok(ego) = survey.dataset.ego().map(Ego::level) else {
+        return Ok(offset);
+    };
     for _ in 0..ROUNDS {
         let before = offset.vehicle_minus_camera_s;
         let headed = |pair: &EpipolarPair| pair.with_clock(&ego, before);

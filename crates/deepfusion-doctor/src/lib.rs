@@ -6,6 +6,7 @@
 
 mod blur;
 mod bonnet;
+mod camera_ahead;
 mod clock;
 mod duplicates;
 mod dynamic_points;
@@ -17,6 +18,7 @@ mod ground;
 mod heading;
 mod intrinsics;
 mod lidar_speed;
+mod log;
 mod look;
 mod opening;
 mod parallax;
@@ -30,7 +32,12 @@ mod survey;
 mod timing;
 mod turn;
 
+pub use camera_ahead::{
+    CameraAhead, LEAST_CORRELATION, MOST_STD_ERROR_S, MOST_TRACK_STD_ERROR_S, NoCameraAhead,
+    camera_ahead, common_camera_ahead,
+};
 pub use finding::{Figure, Finding, Limit, Outcome, Severity, Status};
+pub use log::{doctor_log, is_log};
 pub use plots::{DrivePlots, Line};
 pub use record::{CheckRecord, DiagnosisRecord, FindingRecord};
 
@@ -84,6 +91,13 @@ impl Diagnosis {
             recording: failed.chain(others.map(skipped)).collect(),
             drives: Vec::new(),
         }
+    }
+
+    /// With what a file that cannot be opened as a recording holds beside its pictures: a GoPro's own log.
+    #[must_use]
+    pub fn with_log_within(mut self, path: &Path) -> Self {
+        self.recording.extend(log::within(path));
+        self
     }
 
     /// All findings with the drive they are about, the worst first.
@@ -164,7 +178,9 @@ pub fn doctor_with(path: &Path, options: &OpenOptions) -> Result<Diagnosis> {
     let drives = datasets.iter().map(|d| examine_among(d, trains));
     Ok(Diagnosis {
         drives: drives.collect(),
-        recording: vec![stereo::check(path, options)],
+        recording: std::iter::once(stereo::check(path, options))
+            .chain(log::within(path))
+            .collect(),
     })
 }
 
@@ -213,7 +229,7 @@ fn examine_among(dataset: &Dataset, others_train: bool) -> DriveDiagnosis {
 #[must_use]
 pub fn time_offset(dataset: &Dataset) -> Option<TimeOffset> {
     // Without them no picture need be read.
-    dataset.track().filter(|_| dataset.yaw_known())?;
+    clock::rates(dataset)?.yaw_rate_radps?;
     let survey = Survey::of(dataset);
     let pairs = epipolar::pairs(&survey);
     let estimate = clock::estimate(&survey, &pairs).ok()?;

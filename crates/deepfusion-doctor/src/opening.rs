@@ -6,7 +6,7 @@ use deepfusion_data::{Dataset, Error, Result};
 use deepfusion_hint::Hint;
 
 pub(super) const CHECK: &str = "opening";
-/// Pairs slower than this do not train (SPEC 3.5).
+/// Pairs slower than this do not train.
 const MIN_SPEED_MPS: f64 = 0.5;
 
 /// How many pairs of a drive can train.
@@ -56,9 +56,14 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
         outcome.find(
             Severity::Note,
             None,
-            "no yaw rate was recorded: clock, turns and the camera's direction cannot be checked, and only \
-             configurations that do not read turns can train"
-                .into(),
+            if survey.dataset.receiver().course_rate_radps.is_some() {
+                "no yaw rate was recorded, but a track of positions: the clock can be checked, turns and the camera's direction cannot, and only \
+                 configurations that do not read turns can train"
+            } else {
+                "no yaw rate was recorded: clock, turns and the camera's direction cannot be checked, and only \
+                 configurations that do not read turns can train"
+            }
+            .into(),
             "record an inertial unit or the steering angle",
         );
     }

@@ -3,7 +3,7 @@
 use super::finding::{Figure, Limit, Outcome, Severity};
 use deepfusion_data::Dataset;
 
-/// Slower pairs do not train (SPEC 3.5), m/s.
+/// Slower pairs do not train, m/s.
 const STANDING_MPS: f64 = 0.5;
 /// Share of the pairs that may stand, percent. Above, most of the reading and all counts of epochs mislead.
 const MOST: f64 = 25.0;

@@ -63,8 +63,13 @@ pub(crate) struct SeenPair {
 impl<'a> Survey<'a> {
     /// Reads the sample.
     pub(crate) fn of(dataset: &'a Dataset) -> Self {
+        Self::times(dataset, 1)
+    }
+
+    /// Reads one of up to so many times the usual size.
+    pub(crate) fn times(dataset: &'a Dataset, factor: usize) -> Self {
         let stride = stride(dataset);
-        let wanted = sample(dataset.frames().len(), stride);
+        let wanted = sample(dataset.frames().len(), stride, factor * MOST_FRAMES);
         let k = dataset.intrinsics(0);
         let width = WIDTH.min(k.width).max(1);
         let height = (k.height * width).div_ceil(k.width).max(1);
@@ -87,7 +92,7 @@ impl<'a> Survey<'a> {
             intrinsics: k.resized(width, height),
             unreadable,
         };
-        survey.pairs = survey.compare();
+        survey.pairs = survey.compare(factor * MOST_FLOWS);
         survey
     }
 
@@ -104,7 +109,7 @@ impl<'a> Survey<'a> {
         Some(motion.speed_mps)
     }
 
-    fn compare(&self) -> Vec<SeenPair> {
+    fn compare(&self, most_flows: usize) -> Vec<SeenPair> {
         let stride = self.stride as u64;
         let mut found = Vec::new();
         let mut from = 0;
@@ -117,7 +122,7 @@ impl<'a> Survey<'a> {
                 from += 1;
             }
         }
-        let thin = found.len().div_ceil(MOST_FLOWS).max(1);
+        let thin = found.len().div_ceil(most_flows).max(1);
         let pair = |(i, (earlier, later)): (usize, (usize, usize))| {
             let (a, b) = (&self.frames[earlier], &self.frames[later]);
             let ego = self.dataset.ego().ok().map(Ego::level);
@@ -182,12 +187,12 @@ fn stride(dataset: &Dataset) -> usize {
 }
 
 /// The indices that are read: all, or runs of `stride + 1`, evenly over the drive.
-fn sample(frames: usize, stride: usize) -> Vec<usize> {
-    if frames <= MOST_FRAMES {
+fn sample(frames: usize, stride: usize, most: usize) -> Vec<usize> {
+    if frames <= most {
         return (0..frames).collect();
     }
     let run = stride + 1;
-    let runs = MOST_FRAMES / run;
+    let runs = most / run;
     let start = |i: usize| i * (frames - run) / (runs - 1);
     let mut indices: Vec<usize> = (0..runs).flat_map(|i| start(i)..start(i) + run).collect();
     indices.dedup();
@@ -202,12 +207,12 @@ mod tests {
 
     #[test]
     fn a_long_drive_is_sampled_in_runs() {
-        assert_eq!(sample(5, 1), [0, 1, 2, 3, 4]);
-        let indices = sample(10_000, 2);
+        assert_eq!(sample(5, 1, 240), [0, 1, 2, 3, 4]);
+        let indices = sample(10_000, 2, 240);
         assert_eq!(indices.len(), 240);
         assert_eq!(&indices[..3], [0, 1, 2]);
         assert_eq!(indices.last(), Some(&9_999));
         assert!(indices.windows(2).all(|w| w[0] < w[1]));
-        assert!(sample(241, 5).windows(2).all(|w| w[0] < w[1]));
+        assert!(sample(241, 5, 240).windows(2).all(|w| w[0] < w[1]));
     }
 }

@@ -10,7 +10,7 @@ use crate::resample::{Axis, sample};
 use crate::statistics::{Reservoir, bootstrap_mean_ci95, mean, median, standard_deviation};
 use crate::{Error, Grid, Holes, ImageSharpness, Prediction, Protocol, Result, Scaling, Sharpness};
 
-/// Borders of the range bins, in metres (SPEC 5).
+/// Borders of the range bins, in metres.
 const RANGES_M: [u32; 5] = [0, 10, 20, 40, 80];
 
 /// An image to evaluate, with what is only known for some.
@@ -337,7 +337,7 @@ impl Evaluator {
         }
     }
 
-    /// Steps 1 and 2 of SPEC 5: the pixels inside the mask, with the prediction resized as disparity and inverted. Only
+    /// The first two steps of the protocol (docs/concepts/evaluation.md): the pixels inside the mask, with the prediction resized as disparity and inverted. Only
     /// these are resized: ground truth is sparse.
     fn compared_pixels(&mut self, image: &Sample<'_>, disparities: &[Option<f64>]) -> Vec<Pixel> {
         let (truth, grid) = (image.ground_truth, image.prediction.grid());

@@ -73,7 +73,7 @@ impl From<&DepthMap> for Grid {
     }
 }
 
-/// What a method predicts for an image, at any size: both kinds score the same (SPEC 5, step 1).
+/// What a method predicts for an image, at any size: both kinds score the same.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Prediction {
     /// Camera z in metres.

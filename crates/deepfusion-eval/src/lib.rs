@@ -2,9 +2,9 @@
 //!
 //! The way of an image: a [`Prediction`] (depth or disparity, any size) and a ground truth [`Grid`] go into
 //! [`Evaluator::add`]; [`Evaluator::report`] gives the [`Report`], whose JSON is the one scripts rely on and whose
-//! `Display` is the table for people. [`TrivialBaseline`] makes the row that any useful network must beat: the mean
+//! `Display` is the table for people. [`MeanDepthBaseline`] makes the row that any useful network must beat: the mean
 //! depth of each pixel over the training scans. Where truth is dense, [`Sharpness`] says how sharp boundaries are. Paths of
-//! the camera are compared in [`odometry`]; [`compare`] puts evaluations side by side, and beside the field's published tables.
+//! the camera are compared in [`odometry`]; what a drive says without any truth is in [`verdict`]; [`compare`] puts evaluations side by side, and beside the field's published tables.
 //!
 //! # Conventions
 //! Depth is camera z in metres; ground truth 0 (or NaN, or negative) means none, infinity what is
@@ -18,6 +18,7 @@ mod evaluator;
 mod grid;
 mod holes;
 mod intervals;
+mod mean_depth_baseline;
 mod metrics;
 pub mod odometry;
 mod points;
@@ -27,7 +28,7 @@ mod resample;
 mod sharpness;
 mod statistics;
 mod table;
-mod trivial;
+pub mod verdict;
 
 pub use array_set::{ArraySet, match_names};
 pub use error::{Error, Result};
@@ -36,10 +37,12 @@ pub use grid::{Grid, Prediction};
 pub use intervals::{
     FactorRange, IntervalFactors, IntervalRange, IntervalRow, IntervalSample, Intervals, LEVELS,
 };
+pub use mean_depth_baseline::MeanDepthBaseline;
 pub use metrics::Metrics;
 pub use points::{DrawnPoint, PointErrors, PointRange, Points};
 pub use protocol::{Crop, GroundTruth, Holes, Protocol, Scaling};
-pub use report::{FixedScaled, ProtocolSummary, RangeBin, Report, Scale, ScenarioRow, TrivialRow};
+pub use report::{
+    FixedScaled, MeanDepthRow, ProtocolSummary, RangeBin, Report, Scale, ScenarioRow,
+};
 pub use sharpness::{BoundaryError, ImageSharpness, Sharpness};
 pub use statistics::median;
-pub use trivial::TrivialBaseline;

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-/// The field's seven numbers (SPEC 5, step 5). Errors: lower is better; accuracies a1…a3: higher is.
+/// The field's seven numbers. Errors: lower is better; accuracies a1…a3: higher is.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Metrics {
     /// mean |gt − pred| / gt.

@@ -23,7 +23,7 @@ pub struct DrawnPoint {
 }
 
 impl DrawnPoint {
-    /// At pixel (`u`, `v`), from depths in metres: P = D·K⁻¹·(u, v, 1)ᵀ (SPEC 2, equation 3).
+    /// At pixel (`u`, `v`), from depths in metres: P = D·K⁻¹·(u, v, 1)ᵀ (the paper's Eq. 3).
     pub(crate) fn new(
         image: usize,
         camera: Option<&Intrinsics>,

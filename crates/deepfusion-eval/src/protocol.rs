@@ -77,7 +77,7 @@ pub enum GroundTruth {
     Velodyne,
 }
 
-/// How predictions are compared with ground truth (SPEC 5).
+/// How predictions are compared with ground truth (docs/concepts/evaluation.md).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Protocol {
     /// The part of the image that is compared.

@@ -55,7 +55,7 @@ pub struct Report {
     pub points: Option<Points>,
     /// The mean depth of each pixel over the training scans, on the same images: what a useful network must beat.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub trivial: Option<TrivialRow>,
+    pub trivial: Option<MeanDepthRow>,
     /// The same of each kind of drive, where the recordings say theirs and there is more than one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub scenarios: Vec<ScenarioRow>,
@@ -74,12 +74,12 @@ fn none(count: &usize) -> bool {
 }
 
 impl Report {
-    /// Puts the trivial row beside the method's: `trivial` is the report of the baseline's predictions on the same images.
+    /// Puts the mean-depth baseline beside the method's: `baseline` is the report of its predictions on the same images.
     #[must_use]
-    pub fn with_trivial(mut self, trivial: &Report) -> Self {
-        self.trivial = Some(TrivialRow {
-            unscaled: trivial.unscaled,
-            median_scaled: trivial.median_scaled,
+    pub fn with_mean_depth_baseline(mut self, baseline: &Report) -> Self {
+        self.trivial = Some(MeanDepthRow {
+            unscaled: baseline.unscaled,
+            median_scaled: baseline.median_scaled,
         });
         self
     }
@@ -176,9 +176,9 @@ pub struct RangeBin {
     pub rmse: Option<f64>,
 }
 
-/// The trivial baseline's scores on the same images.
+/// The mean-depth baseline's scores on the same images.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct TrivialRow {
+pub struct MeanDepthRow {
     /// As it is.
     pub unscaled: Metrics,
     /// After median scaling.

@@ -78,8 +78,8 @@ impl Report {
             )?;
         }
         if let Some(trivial) = &self.trivial {
-            row(f, "trivial", &trivial.unscaled)?;
-            row(f, "trivial, median-scaled", &trivial.median_scaled)?;
+            row(f, "mean-depth baseline", &trivial.unscaled)?;
+            row(f, "  median-scaled", &trivial.median_scaled)?;
         }
         for scenario in &self.scenarios {
             let label = format!("{}, scale {:.3}", scenario.name, scenario.scale.median);

@@ -27,10 +27,10 @@ fn report(factor: f64, shift: f64, protocol: Protocol) -> (Report, Vec<FrameScor
     }
     let mut report = evaluator.report().unwrap();
     let flat = Prediction::Depth(Grid::new(1, 1, vec![20.0]).unwrap());
-    let mut trivial = Evaluator::new(Protocol::default()).unwrap();
+    let mut baseline = Evaluator::new(Protocol::default()).unwrap();
     let truth = Grid::new(2, 2, vec![5.0, 15.0, 30.0, 60.0]).unwrap();
-    trivial.add("a", &flat, &truth).unwrap();
-    report = report.with_trivial(&trivial.report().unwrap());
+    baseline.add("a", &flat, &truth).unwrap();
+    report = report.with_mean_depth_baseline(&baseline.report().unwrap());
     (
         report,
         evaluator.images().iter().map(FrameScore::from).collect(),

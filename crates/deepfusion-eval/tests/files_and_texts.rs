@@ -34,12 +34,12 @@ fn report() -> Report {
         evaluator.add(name, &prediction, &truth).unwrap();
     }
     let flat = Prediction::Depth(Grid::new(1, 1, vec![15.0]).unwrap());
-    let mut trivial = Evaluator::new(Protocol::default()).unwrap();
-    trivial.add("a", &flat, &truth).unwrap();
+    let mut baseline = Evaluator::new(Protocol::default()).unwrap();
+    baseline.add("a", &flat, &truth).unwrap();
     evaluator
         .report()
         .unwrap()
-        .with_trivial(&trivial.report().unwrap())
+        .with_mean_depth_baseline(&baseline.report().unwrap())
 }
 
 #[test]

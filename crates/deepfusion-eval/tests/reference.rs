@@ -13,7 +13,7 @@
 use std::path::{Path, PathBuf};
 
 use deepfusion_eval::{
-    ArraySet, Crop, Evaluator, Metrics, Prediction, Protocol, Report, Scaling, TrivialBaseline,
+    ArraySet, Crop, Evaluator, MeanDepthBaseline, Metrics, Prediction, Protocol, Report, Scaling,
     match_names,
 };
 use serde_json::Value;
@@ -134,10 +134,10 @@ fn every_case_equals_numpy() {
 }
 
 #[test]
-fn the_trivial_row_equals_numpy() {
+fn the_mean_depth_baseline_equals_numpy() {
     let expected = expected();
     let mut scans = ArraySet::open(&folder().join("stack_gt.npy")).unwrap();
-    let mut baseline = TrivialBaseline::new();
+    let mut baseline = MeanDepthBaseline::new();
     for index in 0..scans.len() {
         baseline.add_scan(&scans.read(index).unwrap());
     }

@@ -56,6 +56,17 @@ impl Intrinsics {
         Self::centred(f64::from(size.0) / 2.0 / half.tan(), size)
     }
 
+    /// A camera of images of another size that sees as much along their longer side, with pixels of the same shape and the principal
+    /// point in the middle.
+    #[must_use]
+    pub fn centred_at(&self, (width, height): (u32, u32)) -> Self {
+        let scale = f64::from(width.max(height)) / f64::from(self.width.max(self.height));
+        Self {
+            fy: self.fy * scale,
+            ..Self::centred(self.fx * scale, (width, height))
+        }
+    }
+
     /// The same camera after its image was resized to `width` × `height` with half-pixel centres
     /// (OpenCV, PIL): f' = s·f, c' = s(c + ½) − ½ on each axis.
     #[must_use]

@@ -3,6 +3,7 @@
 use pulp::Simd;
 
 use crate::Activation;
+use deepfusion_kernels::{GELU_END, GELU_SERIES};
 
 /// eᵛ for v ≤ 0, to 2 units in the last place: 2ⁿ·p(r), v = n·ln2 + r.
 #[inline(always)]
@@ -35,6 +36,19 @@ impl Activation {
             Self::Elu => {
                 let negative = exp_negative(simd, simd.min_f32s(zero, v));
                 simd.add_f32s(simd.max_f32s(zero, v), simd.sub_f32s(negative, one))
+            }
+            Self::Gelu => {
+                // Constants first: x86 then keeps NaN.
+                let end = simd.splat_f32s(GELU_END);
+                let near = simd.min_f32s(end, simd.max_f32s(simd.neg_f32s(end), v));
+                let scale = simd.splat_f32s(2.0 / (GELU_END * GELU_END));
+                let u = simd.mul_add_f32s(simd.mul_f32s(near, near), scale, simd.neg_f32s(one));
+                let mut series = zero;
+                for factor in GELU_SERIES.iter().rev() {
+                    series = simd.mul_add_f32s(series, u, simd.splat_f32s(*factor));
+                }
+                let below = simd.mul_add_f32s(near, series, simd.splat_f32s(0.5));
+                simd.mul_f32s(v, below)
             }
             Self::Sigmoid => {
                 // e^−|x| never overflows.
@@ -110,6 +124,8 @@ mod tests {
             3e-7,
         );
         check(Activation::Sigmoid, |x| 1.0 / (1.0 + (-x).exp()), 2e-7);
+        // Values of up to 100, rounded to f32.
+        check(Activation::Gelu, deepfusion_kernels::gelu_exact, 6e-6);
     }
 
     #[test]
@@ -119,6 +135,7 @@ mod tests {
             Activation::Relu,
             Activation::Elu,
             Activation::Sigmoid,
+            Activation::Gelu,
         ] {
             let mut y = [f32::NAN; 16];
             Arch::new().dispatch(Apply(activation, &mut y));

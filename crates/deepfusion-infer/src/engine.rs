@@ -12,7 +12,7 @@ use crate::movement::{self, Normalisation};
 use crate::plan::{Plan, Step};
 use crate::view::Shared;
 use crate::{Border, Error, Graph};
-use crate::{masks, means};
+use crate::{channel_norm, enlarge, masks, means};
 
 /// The precision of the network's arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -221,6 +221,16 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
                     }
                     Step::Gate(gate) => gate.run(arena),
                     Step::AddPixel(from, pixel, to) => masks::add_pixel(arena, from, pixel, to),
+                    Step::Depthwise(step) => step.run(arena),
+                    Step::Enlarge(from, to) => enlarge::enlarge(arena, from, to),
+                    Step::ChannelNorm {
+                        from,
+                        channels,
+                        epsilon,
+                        to,
+                    } => channel_norm::channel_norm(arena, from, channels, *epsilon, to),
+                    Step::CrossCovariance(step) => step.run(arena),
+                    Step::Constants(values, to) => enlarge::constants(arena, values, to),
                 }
             }
             let kind = match step {
@@ -234,6 +244,11 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
                 Step::ChannelExtent(..) => "extent",
                 Step::Gate(_) => "gate",
                 Step::AddPixel(..) => "add",
+                Step::Depthwise(_) => "depthwise",
+                Step::Enlarge(..) => "enlarge",
+                Step::ChannelNorm { .. } => "norm",
+                Step::CrossCovariance(_) => "attention",
+                Step::Constants(..) => "constants",
             };
             after(name, kind);
         }

@@ -99,6 +99,7 @@ impl Graph {
             Op::Conv(conv) => [conv.residual, None],
             Op::Gate { input, channel, .. } => [Some(*input), Some(*channel)],
             Op::AddPixel { input, pixel } => [Some(*input), Some(*pixel)],
+            Op::CrossCovariance { input, .. } => [Some(*input), None],
             _ => [None; 2],
         };
         let gappy = |node: &Node| {
@@ -118,10 +119,14 @@ impl Graph {
     /// Whether a value's channels lie as a convolution's.
     fn is_plain(&self, value: ValueId) -> bool {
         match value.0.checked_sub(1).map(|i| &self.nodes[i].op) {
-            Some(Op::Conv(_)) => true,
+            Some(Op::Conv(_) | Op::CrossCovariance { .. } | Op::Position { .. }) => true,
+            Some(Op::Depthwise(op)) => self.is_plain(op.input),
+            // A single channel is not filled up.
+            Some(Op::Enlarge { input }) => self.shape(*input).channels > 1 && self.is_plain(*input),
             Some(
                 Op::MaxPool { input }
                 | Op::GlobalMean { input }
+                | Op::ChannelNorm { input, .. }
                 | Op::Gate { input, .. }
                 | Op::AddPixel { input, .. },
             ) => self.is_plain(*input),
@@ -174,20 +179,23 @@ impl Graph {
         self.shapes[value.0]
     }
 
-    /// Multiplications with addition in each node's convolution for an image of this size, taps that only see a
-    /// border of zeros included.
+    /// Multiplications with addition in each node's convolution, or its products of channels, for an image of this size; taps
+    /// that only see a border of zeros included.
     #[must_use]
     pub fn multiply_adds(&self, width: usize, height: usize) -> Vec<u64> {
-        let of = |(i, node): (usize, &Node)| match &node.op {
-            Op::Conv(conv) => {
-                let (w, h) = self.shapes[i + 1].size(width, height);
-                [w, h]
-                    .into_iter()
-                    .fold(conv.weight.len() as u64, |all, side| {
-                        all.saturating_mul(side as u64)
-                    })
-            }
-            _ => 0,
+        let of = |(i, node): (usize, &Node)| {
+            let shape = self.shapes[i + 1];
+            let a_pixel = match &node.op {
+                Op::Conv(conv) => conv.weight.len(),
+                Op::Depthwise(op) => op.weight.len(),
+                Op::CrossCovariance { temperature, .. } => {
+                    2 * shape.channels * (shape.channels / temperature.len())
+                }
+                _ => 0,
+            };
+            let (w, h) = shape.size(width, height);
+            let times = |all: u64, side: usize| all.saturating_mul(side as u64);
+            [w, h].into_iter().fold(a_pixel as u64, times)
         };
         self.nodes.iter().enumerate().map(of).collect()
     }

@@ -190,7 +190,7 @@ fn channels(graph: &Graph, slots: usize) -> Vec<Vec<Option<usize>>> {
         let value = ValueId(index + 1);
         let count = graph.shape(value).channels;
         let of = match &node.op {
-            Op::Conv(_) => {
+            Op::Conv(_) | Op::CrossCovariance { .. } | Op::Position { .. } => {
                 let physical = if is_result(graph, value) {
                     slots
                 } else {
@@ -198,7 +198,11 @@ fn channels(graph: &Graph, slots: usize) -> Vec<Vec<Option<usize>>> {
                 };
                 (0..physical).map(|c| (c < count).then_some(c)).collect()
             }
+            Op::Enlarge { .. } if count == 1 => vec![Some(0)],
+            Op::Depthwise(op) => all[op.input.0].clone(),
             Op::MaxPool { input }
+            | Op::Enlarge { input }
+            | Op::ChannelNorm { input, .. }
             | Op::GlobalMean { input }
             | Op::Gate { input, .. }
             | Op::AddPixel { input, .. } => all[input.0].clone(),

@@ -13,6 +13,8 @@ pub enum Activation {
     Elu,
     /// y = 1 / (1 + e⁻ˣ).
     Sigmoid,
+    /// y = x·Φ(x), Φ the normal distribution.
+    Gelu,
 }
 
 /// The border of a convolution's input.
@@ -52,11 +54,31 @@ pub struct Conv {
     pub activation: Activation,
 }
 
+/// A depthwise convolution, each channel with a kernel of its own and a border of zeros, that keeps the size or halves it
+/// (`stride` 2): y = w ⋆ x + b.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Depthwise {
+    /// Its input.
+    pub input: ValueId,
+    /// Channels × kernel × kernel, row-major; batch normalisation folded in.
+    pub weight: Vec<f32>,
+    /// One value per channel.
+    pub bias: Vec<f32>,
+    /// Side of the kernels in pixels, odd.
+    pub kernel: usize,
+    /// 1 or 2.
+    pub stride: usize,
+    /// Distance of the kernels' taps in pixels, at least 1.
+    pub dilation: usize,
+}
+
 /// One operation.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Op {
     /// A convolution.
     Conv(Box<Conv>),
+    /// A depthwise convolution.
+    Depthwise(Box<Depthwise>),
     /// The maximum over 3×3 pixels at stride 2, padded by one.
     MaxPool {
         /// Its input.
@@ -102,6 +124,40 @@ pub enum Op {
         /// v, a single pixel.
         pixel: ValueId,
     },
+    /// Twice the size, bilinearly with half-pixel centres; a pixel at the border is its own neighbour.
+    Enlarge {
+        /// Its input.
+        input: ValueId,
+    },
+    /// y = (x − μ) / √(σ² + ε), μ and σ² over each pixel's channels: layer normalisation without its factors.
+    ChannelNorm {
+        /// x.
+        input: ValueId,
+        /// ε, above 0.
+        epsilon: f32,
+    },
+    /// y = softmax(τ·q̂·k̂ᵀ)·v of each head, rows channels and columns pixels, q̂ and k̂ of length 1: cross-covariance attention.
+    CrossCovariance {
+        /// Queries, keys and values: three times the output's channels, in each the heads one after the other.
+        input: ValueId,
+        /// τ of each head.
+        temperature: Vec<f32>,
+    },
+    /// Where each pixel is, in sines and cosines ([`deepfusion_kernels::position_code`]): depends on no other value.
+    Position {
+        /// Channels for each axis.
+        per_axis: usize,
+        /// The image's width and height are divided by 2 this many times.
+        halvings: u32,
+    },
+}
+
+impl Depthwise {
+    /// Reach of the kernels from their centre, in pixels.
+    #[must_use]
+    pub fn reach(&self) -> usize {
+        (self.kernel / 2).saturating_mul(self.dilation)
+    }
 }
 
 impl Conv {
@@ -127,7 +183,12 @@ impl Op {
         let mut several: &[ValueId] = &[];
         let few = match self {
             Self::Conv(conv) => [Some(conv.input), conv.residual, None],
+            Self::Depthwise(op) => [Some(op.input), None, None],
+            Self::Position { .. } => [None; 3],
             Self::MaxPool { input }
+            | Self::Enlarge { input }
+            | Self::ChannelNorm { input, .. }
+            | Self::CrossCovariance { input, .. }
             | Self::GlobalMean { input }
             | Self::ChannelExtent { input } => [Some(*input), None, None],
             Self::UpsampleConcat { input, skip } => [Some(*input), *skip, None],

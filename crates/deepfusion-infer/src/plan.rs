@@ -5,12 +5,15 @@ use std::ops::Range;
 use crate::aligned::Aligned;
 use crate::conv::Geometry;
 use crate::conv_form::ConvForm;
+use crate::cross_covariance::CrossCovarianceStep;
+use crate::depthwise::DepthwiseStep;
 use crate::element::Element;
 use crate::layout::{Layout, parts};
 use crate::masks::Gate;
 use crate::stale::stale;
 use crate::view::View;
 use crate::{Border, Error, Graph, Node, Op, ValueId};
+use deepfusion_kernels::position_code;
 
 /// What a step does; the engine gives each convolution its form.
 #[derive(Debug)]
@@ -24,6 +27,7 @@ pub(crate) enum Step<C> {
         kind: Border,
     },
     Conv(C),
+    Depthwise(DepthwiseStep),
     MaxPool(View, View),
     Upsample(View, View),
     Copy(View, View),
@@ -33,6 +37,18 @@ pub(crate) enum Step<C> {
     Gate(Gate),
     /// Added to the first, into the last.
     AddPixel(View, View, View),
+    /// Bilinearly.
+    Enlarge(View, View),
+    ChannelNorm {
+        from: View,
+        /// The places of the channels that count.
+        channels: Vec<Range<usize>>,
+        epsilon: f32,
+        to: View,
+    },
+    CrossCovariance(CrossCovarianceStep),
+    /// The same for every image, a pixel's channels after the other's.
+    Constants(Vec<f32>, View),
 }
 
 /// A graph laid out for one image size.
@@ -113,6 +129,43 @@ impl<C> Plan<C> {
                 })
             }
             Outline::AddPixel(from, pixel, to) => Step::AddPixel(view(from), view(pixel), view(to)),
+            Outline::Enlarge(from, to) => {
+                let mut from = view(from);
+                // A single channel is not filled up.
+                from.channels = from.channels.min(view(to).channels);
+                Step::Enlarge(from, view(to))
+            }
+            Outline::ChannelNorm(from, epsilon, to) => Step::ChannelNorm {
+                from: view(from),
+                channels: runs_of(&layout.places(from)),
+                epsilon,
+                to: view(to),
+            },
+            Outline::Position(per_axis, to) => {
+                let channels = layout.places(to);
+                let to = view(to);
+                Step::Constants(position(per_axis, &channels, &to), to)
+            }
+            Outline::CrossCovariance(node) => {
+                let Some(Op::CrossCovariance { input, temperature }) = nodes[node].take() else {
+                    unreachable!("the outline names each attention once")
+                };
+                let value = ValueId(node + 1);
+                Step::CrossCovariance(CrossCovarianceStep {
+                    input: view(input),
+                    out: view(value),
+                    channels: layout.places(value).len(),
+                    temperature,
+                })
+            }
+            Outline::Depthwise(node) => {
+                let Some(Op::Depthwise(op)) = nodes[node].take() else {
+                    unreachable!("the outline names each convolution once")
+                };
+                let channels = &layout.homes[op.input.0].channel_of;
+                let (input, out) = (view(op.input), view(ValueId(node + 1)));
+                Step::Depthwise(DepthwiseStep::new(&op, input, out, channels))
+            }
             Outline::Conv(node) => {
                 let Some(Op::Conv(conv)) = nodes[node].take() else {
                     unreachable!("the outline names each convolution once")
@@ -162,6 +215,12 @@ enum Outline {
     ChannelExtent(ValueId, ValueId),
     Gate(usize),
     AddPixel(ValueId, ValueId, ValueId),
+    Depthwise(usize),
+    Enlarge(ValueId, ValueId),
+    ChannelNorm(ValueId, f32, ValueId),
+    CrossCovariance(usize),
+    /// With its channels for each axis.
+    Position(usize, ValueId),
 }
 
 impl Outline {
@@ -170,13 +229,19 @@ impl Outline {
         match self {
             Self::Image => ValueId::IMAGE,
             Self::Border(value, ..) => *value,
-            Self::Conv(node) | Self::Gate(node) => ValueId(node + 1),
+            Self::Conv(node)
+            | Self::Gate(node)
+            | Self::Depthwise(node)
+            | Self::CrossCovariance(node) => ValueId(node + 1),
             Self::MaxPool(_, to)
             | Self::Upsample(_, to)
             | Self::Copy(_, to, _)
             | Self::GlobalMean(_, to)
             | Self::ChannelExtent(_, to)
-            | Self::AddPixel(_, _, to) => *to,
+            | Self::AddPixel(_, _, to)
+            | Self::Enlarge(_, to)
+            | Self::ChannelNorm(_, _, to)
+            | Self::Position(_, to) => *to,
         }
     }
 }
@@ -189,27 +254,34 @@ fn outline(layout: &mut Layout, graph: &Graph) -> Vec<Outline> {
     let mut borders: Vec<Option<(usize, Border)>> = vec![None; layout.homes.len()];
     for (index, node) in graph.nodes().iter().enumerate() {
         let value = ValueId(index + 1);
-        match &node.op {
-            Op::Conv(conv) => {
-                let home = layout.homes[conv.input.0].buffer;
-                let there = borders[conv.input.0];
-                let enough = there.is_some_and(|(r, b)| b == conv.border && r >= conv.reach());
-                if conv.reach() > 0 && !enough {
-                    // The parts of a concatenation share its border.
-                    for other in 0..borders.len() {
-                        if layout.homes[other].buffer == home {
-                            borders[other] = None;
-                        }
+        if let Some((input, reach, border)) = window(&node.op) {
+            let home = layout.homes[input.0].buffer;
+            let there = borders[input.0];
+            let enough = there.is_some_and(|(r, b)| b == border && r >= reach);
+            if reach > 0 && !enough {
+                // The parts of a concatenation share its border.
+                for other in 0..borders.len() {
+                    if layout.homes[other].buffer == home {
+                        borders[other] = None;
                     }
-                    // Once for all that read it.
-                    let reach = widest(graph, conv.input, conv.border);
-                    borders[conv.input.0] = Some((reach, conv.border));
-                    steps.push(Outline::Border(conv.input, reach, conv.border));
-                    let buffer = &mut layout.buffers[home];
-                    buffer.border = buffer.border.max(reach);
                 }
-                steps.push(Outline::Conv(index));
+                // Once for all that read it.
+                let reach = widest(graph, input, border);
+                borders[input.0] = Some((reach, border));
+                steps.push(Outline::Border(input, reach, border));
+                let buffer = &mut layout.buffers[home];
+                buffer.border = buffer.border.max(reach);
             }
+        }
+        match &node.op {
+            Op::Conv(_) => steps.push(Outline::Conv(index)),
+            Op::Depthwise(_) => steps.push(Outline::Depthwise(index)),
+            Op::Enlarge { input } => steps.push(Outline::Enlarge(*input, value)),
+            Op::ChannelNorm { input, epsilon } => {
+                steps.push(Outline::ChannelNorm(*input, *epsilon, value));
+            }
+            Op::CrossCovariance { .. } => steps.push(Outline::CrossCovariance(index)),
+            Op::Position { per_axis, .. } => steps.push(Outline::Position(*per_axis, value)),
             Op::MaxPool { input } => steps.push(Outline::MaxPool(*input, value)),
             Op::GlobalMean { input } => steps.push(Outline::GlobalMean(*input, value)),
             Op::ChannelExtent { input } => steps.push(Outline::ChannelExtent(*input, value)),
@@ -242,11 +314,32 @@ fn outline(layout: &mut Layout, graph: &Graph) -> Vec<Outline> {
 
 /// The widest border of a kind that any convolution wants around a value.
 fn widest(graph: &Graph, value: ValueId, border: Border) -> usize {
-    let reach = |node: &Node| match &node.op {
-        Op::Conv(conv) if conv.input == value && conv.border == border => conv.reach(),
+    let reach = |node: &Node| match window(&node.op) {
+        Some((input, reach, kind)) if input == value && kind == border => reach,
         _ => 0,
     };
     graph.nodes().iter().map(reach).max().unwrap_or(0)
+}
+
+/// What a convolution reads, how far beyond the pixel itself, and over which border.
+fn window(op: &Op) -> Option<(ValueId, usize, Border)> {
+    match op {
+        Op::Conv(conv) => Some((conv.input, conv.reach(), conv.border)),
+        Op::Depthwise(op) => Some((op.input, op.reach(), Border::Zero)),
+        _ => None,
+    }
+}
+
+/// The position's code, a pixel's channels after the other's, at the places `channels` of a view's; zeros elsewhere.
+fn position(per_axis: usize, channels: &[usize], to: &View) -> Vec<f32> {
+    let code = position_code(per_axis, to.height, to.width);
+    let mut values = vec![0.0; to.pixels() * to.channels];
+    for (plane, place) in code.chunks_exact(to.pixels()).zip(channels) {
+        for (pixel, value) in values.chunks_exact_mut(to.channels).zip(plane) {
+            pixel[*place] = *value;
+        }
+    }
+    values
 }
 
 /// Increasing places as runs without gaps.

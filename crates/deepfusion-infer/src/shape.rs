@@ -1,6 +1,6 @@
 //! The output shape of an operation, and checks of its inputs.
 
-use crate::{Conv, Op, ValueId, ValueShape};
+use crate::{Conv, Depthwise, Op, ValueId, ValueShape};
 
 /// The shape that `op` gives where these are the values before it; else why it does not fit them.
 pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, String> {
@@ -12,6 +12,41 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, 
         Op::Conv(conv) => {
             let residual = conv.residual.map(shape).transpose()?;
             after_conv(conv, shape(conv.input)?, residual)
+        }
+        Op::Depthwise(op) => after_depthwise(op, shape(op.input)?),
+        Op::Enlarge { input } => {
+            let input = image(shape(*input)?)?;
+            let halvings = input.halvings.checked_sub(1);
+            let halvings = halvings.ok_or("larger than the image")?;
+            Ok(ValueShape { halvings, ..input })
+        }
+        Op::ChannelNorm { input, epsilon } => {
+            if !(*epsilon > 0.0 && epsilon.is_finite()) {
+                return Err(format!("an epsilon of {epsilon}, expected above 0"));
+            }
+            image(shape(*input)?)
+        }
+        Op::CrossCovariance { input, temperature } => {
+            let (input, heads) = (image(shape(*input)?)?, temperature.len());
+            if heads == 0 || !input.channels.is_multiple_of(3 * heads) {
+                let channels = input.channels;
+                return Err(format!("{channels} channels for 3 times {heads} heads"));
+            }
+            Ok(ValueShape {
+                channels: input.channels / 3,
+                ..input
+            })
+        }
+        Op::Position { per_axis, halvings } => {
+            // More channels are no network's, and would not fit in memory.
+            if !(1..=1024).contains(per_axis) {
+                return Err(format!("{per_axis} channels an axis, expected 1 to 1024"));
+            }
+            Ok(ValueShape {
+                channels: 2 * per_axis,
+                halvings: halved(*halvings, false)?,
+                pooled: false,
+            })
         }
         Op::MaxPool { input } => {
             let input = image(shape(*input)?)?;
@@ -66,6 +101,40 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, 
     }
 }
 
+fn after_depthwise(op: &Depthwise, input: ValueShape) -> Result<ValueShape, String> {
+    let input = image(input)?;
+    let area = op.kernel.checked_mul(op.kernel);
+    let weights = area.and_then(|area| area.checked_mul(input.channels));
+    let weights = weights.ok_or("more weights than any memory holds")?;
+    if op.weight.len() != weights || op.bias.len() != input.channels {
+        return Err(format!(
+            "{weights} weights and {} biases expected, {} and {} given",
+            input.channels,
+            op.weight.len(),
+            op.bias.len()
+        ));
+    }
+    check_window(op.kernel, op.stride, op.dilation)?;
+    Ok(ValueShape {
+        halvings: halved(input.halvings, op.stride == 2)?,
+        ..input
+    })
+}
+
+fn check_window(kernel: usize, stride: usize, dilation: usize) -> Result<(), String> {
+    if kernel.is_multiple_of(2) {
+        return Err("kernels are odd, and there is at least one output".into());
+    }
+    if !matches!(stride, 1 | 2) {
+        return Err(format!("stride {stride}, expected 1 or 2"));
+    }
+    // A border as wide as this is no network's; wider ones would not fit in memory.
+    if dilation == 0 || dilation > 256 {
+        return Err(format!("dilation {dilation}, expected 1 to 256"));
+    }
+    Ok(())
+}
+
 fn after_conv(
     conv: &Conv,
     input: ValueShape,
@@ -91,16 +160,10 @@ fn after_conv(
             conv.bias.len()
         ));
     }
-    if conv.kernel.is_multiple_of(2) || conv.channels_out == 0 {
+    if conv.channels_out == 0 {
         return Err("kernels are odd, and there is at least one output".into());
     }
-    if !matches!(conv.stride, 1 | 2) {
-        return Err(format!("stride {}, expected 1 or 2", conv.stride));
-    }
-    // A border as wide as this is no network's; wider ones would not fit in memory.
-    if conv.dilation == 0 || conv.dilation > 256 {
-        return Err(format!("dilation {}, expected 1 to 256", conv.dilation));
-    }
+    check_window(conv.kernel, conv.stride, conv.dilation)?;
     if input.pooled && (conv.kernel > 1 || conv.stride > 1) {
         return Err("a single pixel takes a 1×1 kernel at stride 1".into());
     }

@@ -98,6 +98,11 @@ fn written<E: Element, C: ConvForm<E>>(step: &Step<C>, mut write: impl FnMut(usi
         }
         Step::Upsample(from, to) | Step::Copy(from, to) => all(to, from.channels),
         Step::ChannelExtent(_, _, to) => all(to, 2),
+        Step::Depthwise(step) => all(&step.out, step.out.channels),
+        Step::CrossCovariance(step) => all(&step.out, step.out.channels),
+        Step::Enlarge(_, to) | Step::ChannelNorm { to, .. } | Step::Constants(_, to) => {
+            all(to, to.channels);
+        }
         Step::Gate(gate) => all(&gate.out, gate.out.channels),
     }
 }

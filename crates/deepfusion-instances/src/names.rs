@@ -9,7 +9,7 @@ table,toilet,tv,laptop,mouse,remote,keyboard,cell phone,microwave,oven,toaster,s
 teddy bear,hair drier,toothbrush";
 
 /// The names in a model's metadata, `{0: 'car', 1: "driver's cab"}`, in the order of their numbers; `None` for other texts.
-pub fn of_note(note: &str) -> Option<Vec<String>> {
+pub(crate) fn of_note(note: &str) -> Option<Vec<String>> {
     let mut rest = note.trim().strip_prefix('{')?.strip_suffix('}')?.trim();
     let mut names: Vec<String> = Vec::new();
     while !rest.is_empty() {
@@ -31,7 +31,7 @@ pub fn of_note(note: &str) -> Option<Vec<String>> {
 }
 
 /// The name of class `number` out of `classes`: the model's own, COCO's if there are eighty, else its number.
-pub fn name_of(own: &[String], classes: usize, number: usize) -> String {
+pub(crate) fn name_of(own: &[String], classes: usize, number: usize) -> String {
     let own = own.get(number).filter(|name| !name.is_empty()).cloned();
     let coco = || (classes == 80).then(|| COCO.split(',').nth(number).map(str::to_owned));
     own.or_else(|| coco().flatten())

@@ -8,7 +8,7 @@ use deepfusion_weights::Figure;
 /// The evaluations of the checkpoint with this SHA-256, in the order of their files' names. A file that cannot be read, or is of another
 /// checkpoint, says nothing.
 #[must_use]
-pub fn figures(run: &Path, sha256: &str) -> Vec<Figure> {
+pub(crate) fn figures(run: &Path, sha256: &str) -> Vec<Figure> {
     let Ok(entries) = std::fs::read_dir(run.join("eval")) else {
         return Vec::new();
     };
@@ -34,7 +34,7 @@ pub fn figures(run: &Path, sha256: &str) -> Vec<Figure> {
 
 /// The last part of each path, once: where the recordings lay on a machine is nobody's matter elsewhere.
 #[must_use]
-pub fn names<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Vec<String> {
+pub(crate) fn names<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Vec<String> {
     let mut names = Vec::new();
     for path in paths {
         let name = path.file_name().unwrap_or(path.as_os_str());

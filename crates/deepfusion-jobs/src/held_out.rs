@@ -9,7 +9,7 @@ use deepfusion_data::{Dataset, DatasetKind};
 use deepfusion_weights::Card;
 
 #[cfg(feature = "train")]
-pub use of_run::held_out;
+pub use of_run::{held_out, unseen_frames};
 
 /// Whether a path is a run's folder, or in one.
 #[must_use]
@@ -39,4 +39,11 @@ pub fn held_out(
     _: &[crate::evaluation::Place],
 ) -> Option<bool> {
     None
+}
+
+/// As [`held_out`], frame by frame.
+#[cfg(not(feature = "train"))]
+#[must_use]
+pub fn unseen_frames(_: &deepfusion_model::TrainConfig, _: &[Dataset]) -> crate::verdict::Unseen {
+    crate::verdict::Unseen::NotKnown
 }

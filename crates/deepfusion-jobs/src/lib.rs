@@ -2,11 +2,12 @@
 //!
 //! | Module | What it does |
 //! |---|---|
-//! | [`evaluation`] | predictions against ground truth, beside the trivial baseline; how far a pixel can be trusted |
+//! | [`evaluation`] | predictions against ground truth, beside the mean-depth baseline; how far a pixel can be trusted |
 //! | [`intervals`] | whether the intervals hold of a network that says how sure it is, and by how much they are stretched |
 //! | [`labelled`] | 3D targets against labelled boxes |
 //! | [`bulk`] | images in, outputs exactly once, on any number of machines |
 //! | [`scene`] | how the camera moved from frame to frame, and whether metres still are what they were |
+//! | [`verdict`] | what a drive with speeds says of a network's depth, without ground truth |
 //! | [`packing`] | a run's network as a file of its own, with its card |
 //! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training saw what is measured on |
 #![cfg_attr(
@@ -31,6 +32,7 @@ pub mod recordings;
 #[cfg(feature = "train")]
 pub mod samples;
 pub mod scene;
+pub mod verdict;
 
 pub use error::{Error, OtherJob, Result, StaleReason};
 pub use inputs::{Input, find_inputs};

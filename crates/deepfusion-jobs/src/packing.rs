@@ -49,8 +49,15 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<Shipped> {
     if folder.read_state(kind)?.encoders_only {
         return Err(Error::NothingToPack { path: file });
     }
-    let (config, findings) = (folder.read_config()?, folder.read_findings()?);
+    let (config, mut findings) = (folder.read_config()?, folder.read_findings()?);
     let (weights, state) = folder.load_depth_weights(kind)?;
+    if state.focal_ratio.is_some()
+        && let Some(camera) = folder.camera_of(&state, None)?
+    {
+        // That of this step, and no spread of another's.
+        findings.learn_camera(&config, camera);
+        findings.learned_camera = findings.learned_camera.filter(|l| l.step == state.step);
+    }
     let network = StoredNetwork {
         config: config.clone(),
         camera: findings.camera,

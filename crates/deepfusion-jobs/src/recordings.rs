@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Camera, Cameras, Dataset, OpenOptions, Split};
+use deepfusion_data::{Camera, Cameras, Dataset, NamedTopic, OpenOptions, Split};
 use deepfusion_model::{DataSetConfig, Error as ModelError, TrainConfig};
 
 use crate::Result;
@@ -76,7 +76,15 @@ pub fn open_part(
     if data.sets.is_empty() {
         let validation = (&data.validation, &data.validation_split);
         let (paths, split) = of_part(part, (&data.paths, &data.split), validation);
-        let datasets = recordings(paths, split, &data.camera, data.camera_ahead_s, opened)?;
+        let options = open_options(
+            config,
+            split,
+            &data.camera,
+            data.camera_ahead_s,
+            &data.topics,
+        )?;
+        let datasets = open_recordings(paths, &options)?;
+        opened(&options, &datasets);
         return Ok(placed(0, datasets));
     }
     let mut all = Vec::new();
@@ -88,10 +96,14 @@ pub fn open_part(
             own => own,
         };
         let ahead_s = set.camera_ahead_s.or(data.camera_ahead_s);
-        all.extend(placed(
-            i,
-            recordings(paths, split, camera, ahead_s, opened)?,
-        ));
+        let topics = match set.topics.as_slice() {
+            [] => &data.topics,
+            _ => &set.topics,
+        };
+        let options = open_options(config, split, camera, ahead_s, topics)?;
+        let datasets = open_recordings(paths, &options)?;
+        opened(&options, &datasets);
+        all.extend(placed(i, datasets));
     }
     Ok(all)
 }
@@ -118,14 +130,32 @@ fn placed(set: usize, datasets: Vec<Dataset>) -> Vec<(usize, Dataset)> {
     datasets.into_iter().map(|d| (set, d)).collect()
 }
 
-/// The recordings at `paths` of the cameras that a configuration names.
-fn recordings(
-    paths: &[PathBuf],
+/// Topics as configurations name them.
+///
+/// # Errors
+/// One that is not written as [`NamedTopic`].
+pub fn named_topics(topics: &[String]) -> Result<Vec<NamedTopic>> {
+    let read = |text: &String| {
+        text.parse().map_err(|expected| {
+            ModelError::Config {
+                field: "data.topics",
+                expected,
+                found: text.clone(),
+            }
+            .into()
+        })
+    };
+    topics.iter().map(read).collect()
+}
+
+/// How a configuration wants recordings opened: by its words for cameras and topics.
+fn open_options(
+    config: &TrainConfig,
     split: Option<&Path>,
     camera: &str,
     camera_ahead_s: Option<f64>,
-    opened: &mut dyn FnMut(&OpenOptions, &[Dataset]),
-) -> Result<Vec<Dataset>> {
+    topics: &[String],
+) -> Result<OpenOptions> {
     let camera: Cameras = match camera {
         "" => Cameras::default(),
         text => text.parse().map_err(|_| ModelError::Config {
@@ -134,13 +164,12 @@ fn recordings(
             found: text.into(),
         })?,
     };
-    let options = OpenOptions {
+    Ok(OpenOptions {
         camera,
         split: read_split(split)?,
         camera_ahead_s,
+        topics: named_topics(topics)?,
+        assumed_camera: config.assumed_camera.map(|camera| camera.intrinsics()),
         ..OpenOptions::default()
-    };
-    let datasets = open_recordings(paths, &options)?;
-    opened(&options, &datasets);
-    Ok(datasets)
+    })
 }

@@ -1,5 +1,5 @@
 //! Numeric kernels of the networks on plain slices, forward and backward: convolution, bilinear
-//! warp, local correlation, photometric error, batch normalisation, activations.
+//! warp, local correlation, photometric error, batch normalisation, activations, depthwise convolution.
 //!
 //! Nothing here knows Burn. Images are N×C×H×W, contiguous; work is distributed over rayon's
 //! threads, and every result is independent of their number.
@@ -10,10 +10,13 @@ mod batch_norm;
 mod box_filter;
 mod conv;
 mod correlation;
+mod depthwise;
+mod gelu;
 mod lanes;
 #[cfg(target_arch = "x86_64")]
 pub mod matrix_unit;
 mod photometric;
+mod position;
 mod project;
 mod scratch;
 mod send_ptr;
@@ -36,7 +39,12 @@ pub use correlation::{
     CorrelationShape, local_correlation, local_correlation_backward_first,
     local_correlation_backward_second,
 };
+pub use depthwise::{
+    DepthwiseShape, depthwise, depthwise_backward_input, depthwise_backward_weight,
+};
+pub use gelu::{GELU_END, GELU_SERIES, gelu, gelu_backward, gelu_exact};
 pub use photometric::{PhotometricShape, photometric_error, photometric_error_backward};
+pub use position::position_code;
 pub use project::{MIN_DEPTH_M, NOWHERE, ProjectGradients, in_view, project, project_backward};
 pub use slot::Slot;
 pub use smoothness::{SmoothnessShape, smoothness, smoothness_backward};

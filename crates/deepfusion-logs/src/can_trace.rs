@@ -1,10 +1,12 @@
-//! CAN frames as text: `candump -l` and `candump -L`, Vector's ASC. A DBC file says what is in them.
+//! CAN frames, as text (`candump -l` and `candump -L`, Vector's ASC) or binary ([`blf`]). A DBC file says what is in them.
 
+use crate::blf;
 use crate::error::{BadLine, Error, Result};
 use crate::log::{Clock, DriveLog, Format, Speed};
 use crate::read::{ReadOptions, enough, text_of};
 use crate::units::SpeedUnit;
 use deepfusion_motion::can::{CanId, Dbc};
+use std::io::Read;
 use std::path::Path;
 
 /// A frame of a trace.
@@ -56,9 +58,9 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
                 "the DBC file's unit of {name}, '{written}', is not one of speed"
             ))
         })?;
-    let (frames, clock) = frames(path, &text_of(path)?)?;
+    let Trace { frames, all, clock } = trace(path, signal.id)?;
     let (mut speeds, mut of_signal, mut repeated) = (Vec::<Speed>::new(), 0, 0);
-    for frame in frames.iter().filter(|f| f.id == signal.id) {
+    for frame in &frames {
         let Some(value) = signal.decode(&frame.data) else {
             continue;
         };
@@ -76,14 +78,13 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
     if of_signal == 0 {
         return Err(Error::NoSpeed {
             path: path.to_owned(),
-            problem: format!("none of its {} frames carries {name}", frames.len()),
+            problem: format!("none of its {all} frames carries {name}"),
         });
     }
     enough(path, &speeds)?;
     let mut notes = vec![format!(
-        "speed from the signal {name} in {unit}: {} of {} frames",
-        speeds.len(),
-        frames.len()
+        "speed from the signal {name} in {unit}: {} of {all} frames",
+        speeds.len()
     )];
     if repeated > 0 {
         notes.push(format!(
@@ -95,8 +96,63 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
         clock,
         speeds,
         yaw_rates: Vec::new(),
+        course_rates: Vec::new(),
         notes,
     })
+}
+
+/// What of a trace is used.
+struct Trace {
+    /// Those of one identifier.
+    frames: Vec<Frame>,
+    /// How many frames with data of any identifier there are.
+    all: usize,
+    clock: Clock,
+}
+
+/// The frames of one identifier.
+fn trace(path: &Path, id: CanId) -> Result<Trace> {
+    if !is_blf(path)? {
+        let (mut frames, clock) = frames(path, &text_of(path)?)?;
+        let all = frames.len();
+        frames.retain(|frame| frame.id == id);
+        return Ok(Trace { frames, all, clock });
+    }
+    let (mut frames, mut all) = (Vec::new(), 0);
+    let start_ns = blf::read(path, |frame| {
+        all += 1;
+        if frame.id == id {
+            frames.push(Frame {
+                ns: frame.ns,
+                id,
+                data: frame.data.to_vec(),
+            });
+        }
+    })?;
+    for frame in &mut frames {
+        frame.ns = frame.ns.saturating_add(start_ns.unwrap_or(0));
+    }
+    Ok(Trace {
+        frames,
+        all,
+        clock: start_ns.map_or(Clock::Free, |_| Clock::LocalDate),
+    })
+}
+
+/// Whether a file is named or begins as a binary log of Vector's.
+pub(crate) fn is_blf(path: &Path) -> Result<bool> {
+    if path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("blf"))
+    {
+        return Ok(true);
+    }
+    let file = std::fs::File::open(path).map_err(|e| Error::file(path, e))?;
+    let mut first = Vec::new();
+    file.take(blf::MARK.len() as u64)
+        .read_to_end(&mut first)
+        .map_err(|e| Error::file(path, e))?;
+    Ok(first == blf::MARK)
 }
 
 fn frames(path: &Path, text: &str) -> Result<(Vec<Frame>, Clock)> {

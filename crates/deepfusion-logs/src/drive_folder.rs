@@ -1,7 +1,7 @@
-//! A log beside its video or images, as a folder that every command reads: `speed.csv`, `imu.csv`, `dataset.toml`.
+//! A log beside its video or images, as a folder that every command reads: `speed.csv`, `imu.csv` or `course.csv`, `dataset.toml`.
 
 use crate::error::{Error, Result};
-use crate::log::{Clock, DriveLog};
+use crate::log::{Clock, DriveLog, Speed};
 use deepfusion_fs::write_atomically;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -18,6 +18,8 @@ pub struct DriveFolder<'a> {
     pub camera: Option<Camera>,
     /// The moment of the first frame on the log's clock, in nanoseconds; without it the video's recorder or the frames' own times say it.
     pub start_ns: Option<i64>,
+    /// How far the camera's clock is ahead of the log's, in seconds, where it is known.
+    pub camera_ahead_s: Option<f64>,
 }
 
 /// What saw a drive; the folder names it by its whole path, nothing is copied.
@@ -44,6 +46,9 @@ pub enum Camera {
 const NEAR_START_NS: i64 = 5_000_000_000;
 
 impl DriveFolder<'_> {
+    /// What a folder may be made of, `dataset.toml` the last.
+    pub const FILES: [&'static str; 4] = ["speed.csv", "imu.csv", "course.csv", "dataset.toml"];
+
     /// Writes the folder, which is made where it is not there; the files in it, `dataset.toml` the last. Gives notes on what was taken for
     /// granted.
     ///
@@ -52,23 +57,25 @@ impl DriveFolder<'_> {
     /// names; [`Error::File`].
     pub fn write(&self, out: &Path) -> Result<Vec<String>> {
         let (start_ns, notes) = self.start()?;
-        let files = ["speed.csv", "imu.csv", "dataset.toml"].map(|name| out.join(name));
+        let files = Self::FILES.map(|name| out.join(name));
         if let Some(path) = files.iter().find(|p| p.exists()) {
             return Err(Error::Exists { path: path.clone() });
         }
         std::fs::create_dir_all(out).map_err(|e| Error::file(out, e))?;
-        let [speed, imu, config] = &files;
-        let mut text = String::from("time_s,speed_mps\n");
-        for reading in &self.log.speeds {
-            let _ = writeln!(text, "{},{:.6}", seconds(reading.ns), reading.mps);
-        }
-        save(speed, &text)?;
+        let [speed, imu, course, config] = &files;
+        save(speed, &speeds(&self.log.speeds))?;
         if !self.log.yaw_rates.is_empty() {
             let mut text = String::from("time_s,yaw_rate_radps\n");
             for reading in &self.log.yaw_rates {
                 let _ = writeln!(text, "{},{:.7}", seconds(reading.ns), reading.radps);
             }
             save(imu, &text)?;
+        } else if !self.log.course_rates.is_empty() {
+            let mut text = String::from("time_s,course_rate_radps\n");
+            for reading in &self.log.course_rates {
+                let _ = writeln!(text, "{},{:.7}", seconds(reading.ns), reading.radps);
+            }
+            save(course, &text)?;
         }
         save(config, &self.config(out, start_ns)?)?;
         Ok(notes)
@@ -130,8 +137,26 @@ impl DriveFolder<'_> {
         if let Some(ns) = start_ns {
             let _ = writeln!(text, "start_s = {}", seconds(ns));
         }
+        if let Some(ahead_s) = self.camera_ahead_s {
+            let _ = writeln!(text, "\n[clock]\ncamera_ahead_s = {ahead_s:?}");
+        }
         Ok(text)
     }
+}
+
+/// The table of speeds; with their standard deviations where every one has one.
+fn speeds(readings: &[Speed]) -> String {
+    let sure = readings.iter().all(|reading| reading.sigma_mps.is_some());
+    let mut text = String::from("time_s,speed_mps");
+    text += if sure { ",speed_sigma_mps\n" } else { "\n" };
+    for reading in readings {
+        let _ = write!(text, "{},{:.6}", seconds(reading.ns), reading.mps);
+        if let Some(sigma) = reading.sigma_mps.filter(|_| sure) {
+            let _ = write!(text, ",{sigma:.4}");
+        }
+        text.push('\n');
+    }
+    text
 }
 
 /// A TOML string.
@@ -165,7 +190,7 @@ fn save(path: &Path, text: &str) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Format, Speed};
+    use crate::Format;
 
     fn log(clock: Clock, first_ns: i64) -> DriveLog {
         let speed = |i: i64| Speed {
@@ -178,6 +203,7 @@ mod tests {
             clock,
             speeds: (0..4).map(speed).collect(),
             yaw_rates: Vec::new(),
+            course_rates: Vec::new(),
             notes: Vec::new(),
         }
     }
@@ -188,6 +214,7 @@ mod tests {
             media: Media::Video("a \"b\".mp4".into()),
             camera: Some(Camera::Intrinsics([500.0, 500.0, 320.0, 240.0])),
             start_ns,
+            camera_ahead_s: None,
         }
     }
 

@@ -32,7 +32,7 @@ pub enum Error {
         path: PathBuf,
         /// Where, counted from 0.
         offset: u64,
-        /// The box or key.
+        /// The box, key or object.
         field: String,
         /// What is wrong with it.
         problem: String,

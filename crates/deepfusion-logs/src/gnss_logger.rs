@@ -108,6 +108,7 @@ pub(crate) fn read(path: &Path, text: &str) -> Result<DriveLog> {
         clock: Clock::Date,
         speeds,
         yaw_rates: Vec::new(),
+        course_rates: Vec::new(),
         notes,
     })
 }

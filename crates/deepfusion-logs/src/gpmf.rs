@@ -96,6 +96,7 @@ pub(crate) fn read(path: &Path) -> Result<DriveLog> {
         clock: Clock::Video,
         speeds: found.speeds,
         yaw_rates,
+        course_rates: Vec::new(),
         notes,
     })
 }

@@ -11,10 +11,11 @@
 //! | Car Scanner (one value a row) | the rows of the vehicle's speed |
 //! | Google's GnssLogger | its `Fix` rows |
 //! | GoPro's MP4 | the `gpmd` track: GPS5 or GPS9, gyroscope and gravity |
-//! | `candump`, Vector ASC | a signal of a DBC file |
+//! | `candump`, Vector ASC and BLF | a signal of a DBC file |
 //!
 //! [`DriveFolder`] writes a log beside its video as a folder that every command reads. Nothing here knows of images.
 
+mod blf;
 mod can_trace;
 mod columns;
 mod dates;

@@ -11,6 +11,9 @@ pub struct DriveLog {
     pub speeds: Vec<Speed>,
     /// In the order of their times; empty where nothing measured them. They have times of their own.
     pub yaw_rates: Vec<YawRate>,
+    /// How the course over ground turned, by positions, where the vehicle moved; in the order of their times, spread over a
+    /// second or so. Enough to tell how far two clocks are apart, not how a camera turned from one image to the next.
+    pub course_rates: Vec<YawRate>,
     /// How the log was understood, and what of it was left out: sentences to be printed.
     pub notes: Vec<String>,
 }
@@ -22,7 +25,8 @@ impl DriveLog {
         if self.clock == Clock::LocalDate {
             let ahead_ns = ahead_s * 1_000_000_000;
             self.speeds.iter_mut().for_each(|s| s.ns -= ahead_ns);
-            self.yaw_rates.iter_mut().for_each(|y| y.ns -= ahead_ns);
+            let turns = self.yaw_rates.iter_mut().chain(&mut self.course_rates);
+            turns.for_each(|turn| turn.ns -= ahead_ns);
             self.clock = Clock::Date;
         }
         self
@@ -81,7 +85,7 @@ pub enum Format {
     GnssLogger,
     /// The metadata track of a GoPro's video.
     Gpmf,
-    /// CAN frames as text, and a DBC file.
+    /// CAN frames, and a DBC file.
     CanTrace,
 }
 

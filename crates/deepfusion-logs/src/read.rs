@@ -45,6 +45,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
         "gpx" => return gpx::read(path),
         "nmea" => return receiver::read(path),
         "asc" => return can_trace::read(path, options),
+        _ if can_trace::is_blf(path)? => return can_trace::read(path, options),
         _ => {}
     }
     let text = text_of(path)?;
@@ -243,6 +244,7 @@ pub(crate) fn of_table(table: &Table, options: &ReadOptions) -> Result<DriveLog>
         clock: times.clock,
         speeds,
         yaw_rates: Vec::new(),
+        course_rates: Vec::new(),
         notes,
     })
 }

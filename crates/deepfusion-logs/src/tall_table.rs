@@ -63,6 +63,7 @@ pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
         clock: times.clock,
         speeds,
         yaw_rates: Vec::new(),
+        course_rates: Vec::new(),
         notes,
     })
 }

@@ -1,8 +1,8 @@
 //! Speeds from a receiver's fixes.
 
 use crate::error::{Error, Result};
-use crate::log::{Clock, DriveLog, Format, Speed};
-use deepfusion_motion::{Fix, speeds_of_fixes};
+use crate::log::{Clock, DriveLog, Format, Speed, YawRate};
+use deepfusion_motion::{Fix, course_rates, speeds_of_fixes};
 use std::path::Path;
 
 /// A fix and its time in nanoseconds; the fix's own time is not set.
@@ -52,8 +52,15 @@ pub(crate) fn log_of_fixes(path: &Path, format: Format, timed: &[TimedFix]) -> R
         "speeds {from}, sure to {:.2} m/s in the middle",
         sigmas[sigmas.len() / 2]
     ));
+    let time = |s: f64| origin + (s * 1e9).round() as i64;
+    let course_rates = course_rates(&smoothed);
+    let course_rates = course_rates.iter().map(|(time_s, radps)| YawRate {
+        ns: time(*time_s),
+        radps: *radps,
+    });
+    let course_rates = course_rates.collect();
     let speeds = smoothed.iter().map(|s| Speed {
-        ns: origin + (s.time_s * 1e9).round() as i64,
+        ns: time(s.time_s),
         mps: s.speed_mps,
         sigma_mps: Some(s.sigma_mps),
     });
@@ -62,6 +69,7 @@ pub(crate) fn log_of_fixes(path: &Path, format: Format, timed: &[TimedFix]) -> R
         clock: Clock::Date,
         speeds: speeds.collect(),
         yaw_rates: Vec::new(),
+        course_rates,
         notes,
     })
 }

@@ -194,6 +194,20 @@ fn can_traces_of_both_kinds_are_the_same() {
 }
 
 #[test]
+fn a_track_shows_how_its_course_turned() {
+    let log = plain("phone.gpx");
+    assert!(log.yaw_rates.is_empty());
+    assert_eq!(log.course_rates.len(), 12);
+    let off = log.course_rates.iter().map(|turn| {
+        let t = seconds(turn.ns, NOON_NS);
+        (turn.radps - true_yaw_rate(t)).powi(2)
+    });
+    // Positions a second apart, smoothed as if sure to a metre: the turns themselves have 0.2 rad/s.
+    let rms = (off.sum::<f64>() / 12.0).sqrt();
+    assert!(rms < 0.08, "{rms}");
+}
+
+#[test]
 fn a_gopros_video_holds_its_own_log() {
     let log = plain("gopro.mp4");
     assert_eq!((log.format, log.clock), (Format::Gpmf, Clock::Video));

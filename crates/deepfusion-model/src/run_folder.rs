@@ -1,6 +1,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use deepfusion_geometry::Intrinsics;
+
 use crate::weights::{Weights, read_safetensors_under};
 use crate::{Error, TrainConfig, TrainFindings};
 
@@ -13,6 +15,8 @@ const BEST: &str = "best_selection";
 /// Metadata: what of the networks was ever trained, where that is not all.
 const TRAINED: &str = "trained";
 const ENCODERS: &str = "encoders";
+/// Metadata: the learned camera.
+const FOCAL: &str = "focal_ratio";
 
 /// Which checkpoint of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +56,8 @@ pub struct Checkpoint {
     pub skipped: usize,
     /// Whether only the encoders were ever trained: imported ImageNet weights.
     pub encoders_only: bool,
+    /// f/f₀, by which a learned camera differs from the assumed one ([`TrainConfig::camera_learned`]).
+    pub focal_ratio: Option<f64>,
 }
 
 /// A run's folder: `config.toml`, `last.safetensors`, `best.safetensors`, logs and panels.
@@ -75,6 +81,14 @@ impl RunFolder {
         Ok(Self {
             path: path.to_owned(),
         })
+    }
+
+    /// The folder of a run that another process makes, neither looked at nor written to.
+    #[must_use]
+    pub fn of_another(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+        }
     }
 
     /// A folder that holds a run, or a checkpoint file in one; the latter also says which checkpoint.
@@ -193,6 +207,25 @@ impl RunFolder {
         Checkpoint::of(&path, &read_safetensors_under(&path, "no tensor's name")?)
     }
 
+    /// The camera that a checkpoint's network learned with, at the size of its images; `set` as for [`TrainConfig::for_set`]. Of a run
+    /// that learns its camera, the one of that step.
+    ///
+    /// # Errors
+    /// As [`Self::read_config`].
+    pub fn camera_of(
+        &self,
+        state: &Checkpoint,
+        set: Option<&str>,
+    ) -> Result<Option<Intrinsics>, Error> {
+        let config = self.read_config()?;
+        let found = self.read_findings()?.camera_of(&config, set);
+        let learned = state
+            .focal_ratio
+            .zip(found)
+            .and_then(|(ratio, k)| config.camera_learned(ratio, (k.width, k.height)));
+        Ok(learned.or(found))
+    }
+
     /// The depth network's weights alone, and where training stood: nothing else of the file is read.
     ///
     /// # Errors
@@ -222,6 +255,9 @@ impl Checkpoint {
         if self.encoders_only {
             note(TRAINED, ENCODERS.into());
         }
+        if let Some(ratio) = self.focal_ratio {
+            note(FOCAL, ratio.to_string());
+        }
         all
     }
 
@@ -249,6 +285,7 @@ impl Checkpoint {
                 .and_then(|t| u64::from_str_radix(t, 16).ok())
                 .map(f64::from_bits),
             encoders_only: file.metadata.get(TRAINED).is_some_and(|t| t == ENCODERS),
+            focal_ratio: file.metadata.get(FOCAL).and_then(|t| t.parse().ok()),
         })
     }
 

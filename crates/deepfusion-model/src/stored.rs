@@ -38,13 +38,11 @@ impl StoredNetwork {
         kind: CheckpointKind,
         set: Option<&str>,
     ) -> Result<Self, Error> {
-        let config = folder.read_config()?;
-        let camera = folder.read_findings()?.camera_of(&config, set);
-        let config = config.for_set(set)?;
+        let config = folder.read_config()?.for_set(set)?;
         let (weights, state) = folder.load_depth_weights(kind)?;
         Ok(Self {
             config,
-            camera,
+            camera: folder.camera_of(&state, set)?,
             weights,
             step: state.step,
         })

@@ -50,6 +50,7 @@ mod positions;
 mod road_height;
 mod scale_correction;
 mod scale_monitor;
+mod scene_scale;
 mod signal;
 mod time_offset;
 mod vehicle_motion;
@@ -67,12 +68,13 @@ pub use imu::{
     ImuConfig, ImuMount, ImuSample, ImuTrack, Standstill, StandstillConfig, standstills,
 };
 pub use motion_model::MotionModel;
-pub use positions::{Fix, FixSpeed, speeds_of_fixes};
+pub use positions::{COURSE_MPS, Fix, FixSpeed, course_rates, speeds_of_fixes};
 pub use road_height::{
     GreyImage, GroundPair, RoadTexture, SWEEP_M, SWEEP_RATIO, implied_camera_height,
 };
 pub use scale_correction::ScaleCorrection;
 pub use scale_monitor::{ScaleMonitor, ScaleMonitorConfig, ScaleReading, ScaleState};
+pub use scene_scale::{Alignment, DepthImage, GreyPyramid, SceneFactor, View, align, scene_points};
 pub use signal::Signal;
 pub use time_offset::{NoTimeOffset, OffsetConfig, TimeOffset, VehicleRates, time_offset};
 pub use vehicle_motion::VehicleMotion;

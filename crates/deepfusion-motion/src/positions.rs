@@ -6,6 +6,7 @@
 //! Tung, Striebel).
 
 use nalgebra::{Matrix2, Vector2};
+use std::f64::consts::PI;
 
 /// Standard deviation of a measured position on an axis, in metres. Receivers claim larger errors, but most of that is
 /// constant from second to second and does not affect the speed.
@@ -18,6 +19,8 @@ const ACCELERATION_DENSITY: f64 = 1.5;
 const FREEDOM: f64 = 4.0;
 /// Number of rounds of reweighting.
 const ROUNDS: usize = 5;
+/// Longest time between two fixes from which a turn is taken, in seconds.
+const COURSE_GAP_S: f64 = 3.0;
 /// Longest gap within a track, in seconds.
 const MAX_GAP_S: f64 = 10.0;
 /// The ellipsoid of WGS 84: its equator's radius in metres, and its eccentricity squared.
@@ -47,6 +50,26 @@ pub struct FixSpeed {
     pub speed_mps: f64,
     /// Its standard deviation.
     pub sigma_mps: f64,
+    /// Where it was going, in radians from east to the left, by the smoothed positions; `None` below [`COURSE_MPS`], where
+    /// positions do not say it.
+    pub course_rad: Option<f64>,
+}
+
+/// Least speed at which positions show a course, m/s: their smoothed velocity is sure to some tenths.
+pub const COURSE_MPS: f64 = 2.0;
+
+/// How fast the course turned between neighbouring fixes that both have one and are at most three seconds apart: time in the
+/// middle in seconds, rate in rad/s, positive to the left. Smoothing spreads a turn to both sides alike.
+#[must_use]
+pub fn course_rates(speeds: &[FixSpeed]) -> Vec<(f64, f64)> {
+    let rate = |pair: &[FixSpeed]| {
+        let dt_s = pair[1].time_s - pair[0].time_s;
+        let turn = pair[1].course_rad? - pair[0].course_rad?;
+        let turn = (turn + PI).rem_euclid(2.0 * PI) - PI;
+        let middle_s = 0.5 * (pair[0].time_s + pair[1].time_s);
+        (dt_s > 0.0 && dt_s <= COURSE_GAP_S).then(|| (middle_s, turn / dt_s))
+    };
+    speeds.windows(2).filter_map(rate).collect()
 }
 
 /// The speed at every fix. Fixes that are not finite, or not later than the one before, are left out; a fix more than ten seconds
@@ -70,14 +93,7 @@ pub fn speeds_of_fixes(fixes: &[Fix]) -> Vec<FixSpeed> {
 
 /// The speeds of a track without gaps.
 fn speeds(fixes: &[Fix]) -> Vec<FixSpeed> {
-    if fixes.iter().all(|fix| fix.speed_mps.is_some()) {
-        let of = |fix: &Fix| FixSpeed {
-            time_s: fix.time_s,
-            speed_mps: fix.speed_mps.unwrap_or_default().max(0.0),
-            sigma_mps: SPEED_SIGMA_MPS,
-        };
-        return fixes.iter().map(of).collect();
-    }
+    let measured = fixes.iter().all(|fix| fix.speed_mps.is_some());
     let places = metres(fixes);
     let mut weights = vec![1.0; fixes.len()];
     let mut tracks = [Vec::new(), Vec::new()];
@@ -104,10 +120,20 @@ fn speeds(fixes: &[Fix]) -> Vec<FixSpeed> {
         } else {
             var_x.max(var_y)
         };
-        FixSpeed {
-            time_s: fix.time_s,
-            speed_mps: speed,
-            sigma_mps: variance.sqrt(),
+        let course_rad = (speed >= COURSE_MPS).then(|| y.atan2(x));
+        match fix.speed_mps.filter(|_| measured) {
+            Some(measured) => FixSpeed {
+                time_s: fix.time_s,
+                speed_mps: measured.max(0.0),
+                sigma_mps: SPEED_SIGMA_MPS,
+                course_rad,
+            },
+            None => FixSpeed {
+                time_s: fix.time_s,
+                speed_mps: speed,
+                sigma_mps: variance.sqrt(),
+                course_rad,
+            },
         }
     })
     .collect()
@@ -244,6 +270,21 @@ mod tests {
             .map(|(f, t)| (f.speed_mps - t).powi(2));
         let ratio = found.iter().map(|f| f.speed_mps).sum::<f64>() / truth.iter().sum::<f64>();
         ((squares.sum::<f64>() / truth.len() as f64).sqrt(), ratio)
+    }
+
+    #[test]
+    fn a_track_gives_its_turns() {
+        for (jitter, most) in [(0.0, 0.02), (1.0, 0.06)] {
+            let (fixes, _) = drive(jitter);
+            let rates = course_rates(&speeds_of_fixes(&fixes));
+            assert_eq!(rates.len(), fixes.len() - 1);
+            let squares = rates
+                .iter()
+                .map(|(t, rate)| (rate - 0.15 * (t / 9.0).sin()).powi(2));
+            let rms = (squares.sum::<f64>() / rates.len() as f64).sqrt();
+            // The turns themselves have 0.1 rad/s.
+            assert!(rms < most, "{jitter}: {rms}");
+        }
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! DepthNet: an encoder, context and attention on its skip paths, the disparity decoder (docs/concepts/network.md).
+//! DepthNet: an encoder, context and attention on its skip paths, the disparity decoder; or Lite-Mono
+//! (docs/concepts/network.md).
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
@@ -8,6 +9,8 @@ use crate::decoder::DisparityDecoder;
 use crate::hce::HierarchicalContext;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig, freeze_statistics};
+use crate::lite_mono::LiteMono;
+use crate::resample::doubled;
 use crate::resnet::ResNet;
 use crate::weights::{self, Weights};
 use crate::{DepthNetConfig, Error};
@@ -15,11 +18,13 @@ use crate::{DepthNetConfig, Error};
 /// Initial output of the uncertainty head: the expected error of ln depth, the same at every pixel.
 const FIRST_SCALE: f32 = 0.2;
 
-/// Disparity of a single image, at four scales.
+/// Disparity of a single image: a ResNet and its decoder at four scales, or Lite-Mono at three.
 #[derive(Module, Debug)]
 pub struct DepthNet {
+    /// Lite-Mono. Where there is one, there is nothing else but the uncertainty head.
+    pub lite_mono: Option<LiteMono>,
     /// The backbone.
-    pub encoder: ResNet,
+    pub encoder: Option<ResNet>,
     /// Context encoding of the features of `layer1`…`layer4`; empty where there is none.
     pub hce: Vec<HierarchicalContext>,
     /// Attention on the same; empty where there is none.
@@ -27,8 +32,9 @@ pub struct DepthNet {
     /// Global aggregation of the coarsest feature.
     pub aggregation: Option<GlobalAggregation>,
     /// The decoder.
-    pub decoder: DisparityDecoder,
-    /// 3×3 from the decoder's finest feature to ln b, b the Laplace scale of the error of ln depth.
+    pub decoder: Option<DisparityDecoder>,
+    /// 3×3 from the decoder's finest feature to ln b, b the Laplace scale of the error of ln depth. Lite-Mono's feature has half of
+    /// the image's size; ln b is then enlarged.
     pub uncertainty: Option<Conv2d>,
 }
 
@@ -47,10 +53,10 @@ pub struct DepthOutput {
 /// What a [`DepthNet`] computes on the way from features to disparities: the paper's Fig. 5.
 #[derive(Debug, Clone)]
 pub struct Inspection {
-    /// The encoder's features, fine to coarse.
-    pub features: [Tensor<4>; 5],
+    /// The encoder's features, fine to coarse: five of a ResNet, three of Lite-Mono.
+    pub features: Vec<Tensor<4>>,
     /// What the decoder reads: the same with context, under their masks, aggregated.
-    pub refined: [Tensor<4>; 5],
+    pub refined: Vec<Tensor<4>>,
     /// The masks on the features of `layer1`…`layer4`; empty without attention.
     pub masks: Vec<AttentionMasks>,
 }
@@ -71,55 +77,79 @@ impl DepthNet {
     pub fn with_seed(config: &DepthNetConfig, seed: u64, device: &Device) -> Result<Self, Error> {
         config.validate()?;
         let mut rng = WeightRng::new(seed);
-        let encoder = ResNet::new(&config.encoder, &mut rng, device)?;
         let head_bias = config
             .initial_depth_m
             .map(|m| config.range.logit_of(m) as f32);
+        let mut net = match &config.lite_mono {
+            None => Self::with_resnet(config, head_bias, &mut rng, device)?,
+            Some(lite_mono) => {
+                let normalisation = config.encoder.normalisation;
+                let body = LiteMono::new(lite_mono, normalisation, head_bias, &mut rng, device)?;
+                Self {
+                    lite_mono: Some(body),
+                    encoder: None,
+                    hce: Vec::new(),
+                    attention: Vec::new(),
+                    aggregation: None,
+                    decoder: None,
+                    uncertainty: None,
+                }
+            }
+        };
+        let finest = match &config.lite_mono {
+            Some(lite_mono) => lite_mono.decoder_widths()[0],
+            None => config.decoder.widths[4],
+        };
+        // Drawn last: the other weights are those of the same seed without it.
+        net.uncertainty = config.uncertainty.then(|| {
+            let head = Conv2dConfig::new(finest, 1, 3).reflected();
+            let mut head = head.init(&mut rng, device);
+            head.bias = Some(Param::from_data([FIRST_SCALE.ln()], device));
+            head
+        });
+        // A ResNet has seen to its own; others have batch norms, too.
+        Ok(if config.encoder.frozen_statistics {
+            freeze_statistics(net, true)
+        } else {
+            net
+        })
+    }
+
+    /// A ResNet and its decoder, without the uncertainty head.
+    fn with_resnet(
+        config: &DepthNetConfig,
+        head_bias: Option<f32>,
+        rng: &mut WeightRng,
+        device: &Device,
+    ) -> Result<Self, Error> {
+        let encoder = ResNet::new(&config.encoder, rng, device)?;
         let raw = config.encoder.channels();
         let refined = config.decoder_channels();
         let mut hce = Vec::new();
         let mut attention = Vec::new();
         for level in 1..5 {
             if let Some(config) = &config.hce {
-                let context = HierarchicalContext::new(config, raw[level], &mut rng, device)?;
+                let context = HierarchicalContext::new(config, raw[level], rng, device)?;
                 hce.push(context);
             }
             if let Some(config) = &config.attention {
-                attention.push(Attention::new(config, refined[level], &mut rng, device)?);
+                attention.push(Attention::new(config, refined[level], rng, device)?);
             }
         }
         let aggregation = config
             .aggregation
-            .then(|| GlobalAggregation::new(refined[4], &mut rng, device));
+            .then(|| GlobalAggregation::new(refined[4], rng, device));
         let stride = config.encoder.output_stride;
-        let decoder = DisparityDecoder::new(
-            &config.decoder,
-            refined,
-            stride,
-            head_bias,
-            &mut rng,
-            device,
-        )?;
-        // Drawn last: the other weights are those of the same seed without it.
-        let uncertainty = config.uncertainty.then(|| {
-            let head = Conv2dConfig::new(config.decoder.widths[4], 1, 3).reflected();
-            let mut head = head.init(&mut rng, device);
-            head.bias = Some(Param::from_data([FIRST_SCALE.ln()], device));
-            head
-        });
-        let net = Self {
-            encoder,
+        let decoder =
+            DisparityDecoder::new(&config.decoder, refined, stride, head_bias, rng, device)?;
+        Ok(Self {
+            lite_mono: None,
+            encoder: Some(encoder),
             hce,
             attention,
             aggregation,
-            decoder,
-            uncertainty,
-        };
-        // The encoder has seen to its own; the context encoding has batch norms, too.
-        Ok(if config.encoder.frozen_statistics {
-            freeze_statistics(net, true)
-        } else {
-            net
+            decoder: Some(decoder),
+            uncertainty: None,
         })
     }
 
@@ -128,12 +158,42 @@ impl DepthNet {
     ///
     /// # Shapes
     /// - `images`: `[batch, 3, height, width]`, RGB in [0, 1], of an [`InputSize`](crate::InputSize)
-    /// - output: `[batch, 1, height / 2ˢ, width / 2ˢ]` in (0, 1) for scales s = 0…3, finest first
+    /// - output: `[batch, 1, height / 2ˢ, width / 2ˢ]` in (0, 1) for scales s = 0…3 (of Lite-Mono 0…2), finest first
     ///
     /// # Panics
     /// If the images' size is not a valid [`InputSize`](crate::InputSize); check it where it enters the program.
     pub fn forward(&self, images: Tensor<4>) -> Vec<Tensor<4>> {
-        self.decode(self.encoder.forward(images))
+        self.forward_with_feature(images).0
+    }
+
+    /// Disparities, and the feature that the finest head reads.
+    fn forward_with_feature(&self, images: Tensor<4>) -> (Vec<Tensor<4>>, Tensor<4>) {
+        match &self.lite_mono {
+            Some(net) => {
+                let features = net.encoder.forward(images);
+                net.decoder.forward_with_feature(features)
+            }
+            None => {
+                let (encoder, decoder) = self.resnet();
+                decoder.forward_with_feature(self.refine(encoder.forward(images), |_| ()))
+            }
+        }
+    }
+
+    #[expect(clippy::expect_used, reason = "what is not Lite-Mono has both")]
+    fn resnet(&self) -> (&ResNet, &DisparityDecoder) {
+        let (encoder, decoder) = (self.encoder.as_ref(), self.decoder.as_ref());
+        let both = encoder.zip(decoder);
+        both.expect("a network has a ResNet and its decoder, or is Lite-Mono")
+    }
+
+    /// ln b of the finest feature.
+    fn log_scale(&self, finest: Tensor<4>) -> Option<Tensor<4>> {
+        let small = self.uncertainty.as_ref()?.forward(finest);
+        Some(match &self.lite_mono {
+            Some(_) => doubled(small),
+            None => small,
+        })
     }
 
     /// As [`Self::forward`], with the uncertainty ln b: b is the expected absolute error of ln depth. No gradient passes
@@ -142,12 +202,10 @@ impl DepthNet {
     /// # Shapes
     /// - `images`: as for [`Self::forward`]
     pub fn forward_with_uncertainty(&self, images: Tensor<4>) -> DepthOutput {
-        let features = self.refine(self.encoder.forward(images), |_| ());
-        let (disparities, finest) = self.decoder.forward_with_feature(features);
-        let head = self.uncertainty.as_ref();
+        let (disparities, finest) = self.forward_with_feature(images);
         DepthOutput {
             disparities,
-            log_scale: head.map(|head| head.forward(finest.detach())),
+            log_scale: self.log_scale(finest.detach()),
         }
     }
 
@@ -158,12 +216,10 @@ impl DepthNet {
     /// - `images`: as for [`Self::forward`]
     pub fn forward_for_uncertainty(&self, images: Tensor<4>) -> DepthOutput {
         let fixed = self.clone().no_grad();
-        let features = fixed.refine(fixed.encoder.forward(images), |_| ());
-        let (disparities, finest) = fixed.decoder.forward_with_feature(features);
-        let head = self.uncertainty.as_ref();
+        let (disparities, finest) = fixed.forward_with_feature(images);
         DepthOutput {
             disparities,
-            log_scale: head.map(|head| head.forward(finest)),
+            log_scale: self.log_scale(finest),
         }
     }
 
@@ -190,13 +246,44 @@ impl DepthNet {
         Ok((weights::apply(self, &weights)?, is_new))
     }
 
-    /// As [`Self::forward`], from the encoder's features, for callers that share the encoder with another decoder.
+    /// The features of a ResNet, for callers that share the encoder with another decoder.
     ///
     /// # Shapes
-    /// - `features`: those of [`ResNet::forward`]
+    /// - `images`: as for [`Self::forward`]
+    /// - output: as of [`ResNet::forward`]
+    ///
+    /// # Panics
+    /// If the network is Lite-Mono, as [`Self::forward`] else.
+    pub fn encode(&self, images: Tensor<4>) -> [Tensor<4>; 5] {
+        self.resnet().0.forward(images)
+    }
+
+    /// As [`Self::forward`], from [`Self::encode`]'s features.
+    ///
+    /// # Shapes
+    /// - `features`: those of [`Self::encode`]
     /// - output: as [`Self::forward`]
+    ///
+    /// # Panics
+    /// If the network is Lite-Mono.
     pub fn decode(&self, features: [Tensor<4>; 5]) -> Vec<Tensor<4>> {
-        self.decoder.forward(self.refine(features, |_| ()))
+        self.resnet().1.forward(self.refine(features, |_| ()))
+    }
+
+    /// The network with weights of torchvision's ResNet in its encoder.
+    ///
+    /// # Errors
+    /// As [`weights::load_torchvision_resnet`]; [`Error::UnknownArchitecture`] if the network is Lite-Mono.
+    pub fn with_torchvision_encoder(mut self, path: &std::path::Path) -> Result<Self, Error> {
+        let encoder = self
+            .encoder
+            .take()
+            .ok_or_else(|| Error::UnknownArchitecture {
+                origin: path.display().to_string(),
+                reason: "its weights are a ResNet's, and the network to start is Lite-Mono".into(),
+            })?;
+        self.encoder = Some(weights::load_torchvision_resnet(encoder, path)?);
+        Ok(self)
     }
 
     /// The features of images and the attention masks on them.
@@ -204,9 +291,18 @@ impl DepthNet {
     /// # Shapes
     /// - `images`: as for [`Self::forward`]
     pub fn inspect(&self, images: Tensor<4>) -> Inspection {
-        let features = self.encoder.forward(images);
         let mut masks = Vec::new();
-        let refined = self.refine(features.clone(), |mask| masks.push(mask.clone()));
+        let (features, refined) = match &self.lite_mono {
+            Some(net) => {
+                let features = net.encoder.forward(images);
+                (features.clone(), features)
+            }
+            None => {
+                let features = self.encode(images);
+                let refined = self.refine(features.clone(), |mask| masks.push(mask.clone()));
+                (features.to_vec(), refined.to_vec())
+            }
+        };
         Inspection {
             features,
             refined,

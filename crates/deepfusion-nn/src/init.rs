@@ -51,6 +51,8 @@ pub enum WeightInit {
     KaimingNormalFanOut,
     /// Uniform in ±1/√fan_in, the bias too: PyTorch's default for a convolution.
     UniformFanIn,
+    /// Normal with standard deviation 0.02, the bias 0: Lite-Mono's decoder.
+    Normal2Percent,
     /// Zero, the bias too: the initial output is zero.
     Zeros,
 }

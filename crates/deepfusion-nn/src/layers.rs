@@ -1,6 +1,13 @@
 //! The layers every network here is made of: convolution, batch normalisation, and the small
 //! operations without weights between them.
 
+mod channels;
+mod depthwise;
+
+pub use channels::{Bottleneck, ChannelNorm};
+pub(crate) use channels::{layer_scale, scaled};
+pub use depthwise::DepthwiseConv2d;
+
 use burn::module::{Flag, Module, ModuleMapper, Param, RunningState};
 use burn::tensor::activation::relu;
 use burn::tensor::ops::MaxPoolOptions;
@@ -98,6 +105,7 @@ impl Conv2dConfig {
                 let weight = rng.uniform(count, bound);
                 (weight, rng.uniform(self.channels_out, bound))
             }
+            WeightInit::Normal2Percent => (rng.normal(count, 0.02), vec![0.0; self.channels_out]),
             WeightInit::Zeros => (vec![0.0; count], vec![0.0; self.channels_out]),
         };
         let shape = [

@@ -13,6 +13,7 @@ mod flow_decoder;
 mod hce;
 mod init;
 pub mod layers;
+pub mod lite_mono;
 pub mod ops;
 mod pose_net;
 mod resample;
@@ -24,13 +25,15 @@ pub use attention::{Attention, AttentionMasks, GlobalAggregation};
 pub use decoder::{DecoderStage, DisparityDecoder, SCALES};
 pub use deepfusion_model::{
     AttentionConfig, AttentionForm, DecoderConfig, DepthNetConfig, FlowDecoderConfig, HceConfig,
-    InputNormalisation, InputSize, NetworkError as Error, PoseNetConfig, ResNetConfig, ResNetDepth,
+    InputNormalisation, InputSize, LiteMonoConfig, LiteMonoSize, NetworkError as Error,
+    PoseNetConfig, ResNetConfig, ResNetDepth,
 };
 pub use depth_net::{DepthNet, DepthOutput, Inspection};
 pub use flow_decoder::{FLOW_LEVELS, FlowDecoder, FlowLevel, FlowOutput};
 pub use hce::HierarchicalContext;
 pub use init::{WeightInit, WeightRng};
+pub use lite_mono::LiteMono;
 pub use pose_net::{PoseDecoder, PoseNet, PoseOutput, RADIANS_PER_UNIT};
-pub use resample::BilinearResize;
+pub use resample::{BilinearResize, doubled};
 pub use residual_block::ResidualBlock;
 pub use resnet::ResNet;

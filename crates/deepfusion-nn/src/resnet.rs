@@ -98,7 +98,7 @@ fn run(layer: &[ResidualBlock], x: Tensor<4>) -> Tensor<4> {
 ///
 /// # Shapes
 /// - `images`, output: `[batch, 3·frames, height, width]`
-fn normalised(normalisation: InputNormalisation, images: Tensor<4>) -> Tensor<4> {
+pub(crate) fn normalised(normalisation: InputNormalisation, images: Tensor<4>) -> Tensor<4> {
     let channels = images.dims()[1];
     let device = images.device();
     let per_channel = |values: [f32; 3]| {

@@ -10,7 +10,8 @@ use burn::tensor::Device;
 use deepfusion_infer::Op;
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{
-    DepthNetConfig, HceConfig, InputSize, ModuleCost, PoseNetConfig, ResNetDepth, depth_graph,
+    DepthNetConfig, HceConfig, InputSize, LiteMonoSize, ModuleCost, PoseNetConfig, ResNetDepth,
+    depth_graph_with_uncertainty,
 };
 use deepfusion_nn::weights::collect;
 use deepfusion_nn::{DepthNet, PoseNet};
@@ -29,7 +30,7 @@ fn learned(weights: &Weights, prefix: &str) -> u64 {
 
 fn check(config: &DepthNetConfig) {
     let weights = collect(&DepthNet::new(config, &Device::flex()).unwrap());
-    let graph = depth_graph(config, weights.clone()).unwrap();
+    let graph = depth_graph_with_uncertainty(config, weights.clone()).unwrap();
     let products = graph.multiply_adds(SIZE.width, SIZE.height);
     let values = |index: usize, op: &Op| {
         let shape = graph.shape(deepfusion_infer::ValueId(index + 1));
@@ -47,13 +48,14 @@ fn check(config: &DepthNetConfig) {
         let stem = ["encoder.conv1", "encoder.bn1", "encoder.maxpool"];
         let prefixes: Vec<String> = match cost.name.as_str() {
             "encoder.stem" => stem.map(str::to_owned).to_vec(),
-            name => vec![format!("{name}.")],
+            name => vec![format!("{name}."), format!("{name}|")],
         };
         let parameters: u64 = prefixes.iter().map(|p| learned(&weights, p)).sum();
         assert_eq!(cost.parameters, parameters, "{}", cost.name);
         let (mut multiply_adds, mut given) = (0, 0);
         for (i, node) in graph.nodes().iter().enumerate() {
-            if prefixes.iter().any(|p| node.name.starts_with(p)) {
+            let name = format!("{}|", node.name);
+            if prefixes.iter().any(|p| name.starts_with(p)) {
                 multiply_adds += products[i];
                 given += values(i, &node.op);
             }
@@ -79,6 +81,14 @@ fn costs_are_those_of_the_graph_and_the_weights() {
         global_pool: false,
         ..HceConfig::default()
     });
+    check(&config);
+}
+
+#[test]
+fn lite_monos_costs_are_those_of_its_graph_and_its_weights() {
+    let mut config = DepthNetConfig::lite_mono(LiteMonoSize::Tiny);
+    check(&config);
+    config.uncertainty = true;
     check(&config);
 }
 

@@ -11,7 +11,8 @@ use deepfusion_infer::{Engine, Precision};
 use deepfusion_model::{depth_graph, depth_graph_with_uncertainty};
 use deepfusion_nn::weights::{self, Weights};
 use deepfusion_nn::{
-    AttentionConfig, AttentionForm, DepthNet, DepthNetConfig, Error, HceConfig, ResNetDepth,
+    AttentionConfig, AttentionForm, DepthNet, DepthNetConfig, Error, HceConfig, LiteMonoSize,
+    ResNetDepth,
 };
 
 /// Weights as after some training: batch norms with statistics and factors of their own.
@@ -25,8 +26,14 @@ fn trained(config: &DepthNetConfig) -> Weights {
                 *value = spread(i) - 0.5;
             } else if name.ends_with("running_var") {
                 *value = 0.5 + spread(i);
-            } else if name.contains(".bn") {
+            } else if name.contains(".bn") || name.ends_with("norm.weight") {
                 *value += 0.4 * (spread(i) - 0.5);
+            } else if name.ends_with("norm.bias") || name.ends_with("scale") {
+                *value = 0.5 * (spread(i) - 0.5);
+            } else if name.ends_with("temperature") {
+                *value = 4.0 * spread(i);
+            } else if name.starts_with("lite_mono.decoder.") && name.ends_with("weight") {
+                *value *= 3.0;
             } else if name == "decoder.heads.0.weight" {
                 // New weights give an answer that is the same everywhere.
                 *value *= 40.0;
@@ -43,8 +50,49 @@ fn image(width: usize, height: usize) -> Vec<f32> {
     (0..3 * width * height).map(value).collect()
 }
 
+/// Lite-Mono's finest head set so that the answer for an image is neither flat nor at the sigmoid's ends.
+fn with_centred_head(
+    config: &DepthNetConfig,
+    mut weights: Weights,
+    image: &[f32],
+    width: usize,
+) -> Weights {
+    if config.lite_mono.is_none() {
+        return weights;
+    }
+    let names = ["weight", "bias"].map(|part| format!("lite_mono.decoder.heads.0.{part}"));
+    let mut head = |factor: f32, bias: f32| {
+        for (name, part) in names.iter().zip([factor, 0.0]) {
+            let tensor = weights.tensors.get_mut(name).unwrap();
+            tensor
+                .values
+                .iter_mut()
+                .for_each(|v| *v = *v * part + if part == 0.0 { bias } else { 0.0 });
+        }
+        weights.clone()
+    };
+    // So small that the sigmoid is straight.
+    let small = 1e-3;
+    let device = Device::flex();
+    let net = weights::apply(DepthNet::new(config, &device).unwrap(), &head(small, 0.0)).unwrap();
+    let input = TensorData::new(image.to_vec(), [1, 3, image.len() / 3 / width, width]);
+    let seen = net
+        .forward(Tensor::from_data(input, &device))
+        .swap_remove(0);
+    let logits: Vec<f32> = seen
+        .into_data()
+        .iter::<f32>()
+        .map(|p| (p / (1.0 - p)).ln())
+        .collect();
+    let n = logits.len() as f32;
+    let mean = logits.iter().sum::<f32>() / n;
+    let sd = (logits.iter().map(|l| (l - mean).powi(2)).sum::<f32>() / n).sqrt();
+    head(1.0 / sd, -mean / sd)
+}
+
 fn check(config: &DepthNetConfig, width: usize, height: usize) {
-    let (weights, image) = (trained(config), image(width, height));
+    let image = image(width, height);
+    let weights = with_centred_head(config, trained(config), &image, width);
     let device = Device::flex();
     let net = weights::apply(DepthNet::new(config, &device).unwrap(), &weights).unwrap();
     let input = TensorData::new(image.clone(), [1, 3, height, width]);
@@ -133,6 +181,41 @@ fn a_network_that_says_how_sure_it_is() {
 #[test]
 fn a_bottleneck_network() {
     check(&DepthNetConfig::monodepth2(ResNetDepth::ResNet50), 128, 96);
+}
+
+#[test]
+fn lite_mono() {
+    for size in LiteMonoSize::ALL {
+        check(&DepthNetConfig::lite_mono(size), 128, 64);
+    }
+    let mut large = DepthNetConfig::lite_mono(LiteMonoSize::Tiny);
+    large.lite_mono = large.lite_mono.map(|c| c.for_large_images());
+    check(&large, 192, 96);
+}
+
+#[test]
+fn lite_mono_that_says_how_sure_it_is() {
+    let config = DepthNetConfig {
+        uncertainty: true,
+        ..DepthNetConfig::lite_mono(LiteMonoSize::Tiny)
+    };
+    check(&config, 96, 64);
+    let (weights, image) = (trained(&config), image(96, 64));
+    let device = Device::flex();
+    let (net, _) = DepthNet::new(&config, &device)
+        .unwrap()
+        .with_weights(&weights)
+        .unwrap();
+    let input = TensorData::new(image.clone(), [1, 3, 64, 96]);
+    let seen = net.forward_with_uncertainty(Tensor::from_data(input, &device));
+    let expected: Vec<f32> = seen.log_scale.unwrap().into_data().iter().collect();
+    let graph = depth_graph_with_uncertainty(&config, weights).unwrap();
+    let mut engine = Engine::new(graph, 96, 64, Precision::F32).unwrap();
+    engine.run(&image);
+    let output = engine.output(1);
+    assert_eq!(output.len(), expected.len());
+    let off = output.iter().zip(&expected).map(|(a, b)| (a - b).abs());
+    assert!(off.fold(0.0, f32::max) < 1e-4);
 }
 
 #[test]

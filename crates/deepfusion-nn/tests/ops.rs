@@ -147,6 +147,54 @@ fn convolutions_within_autocast() {
 }
 
 #[test]
+fn depthwise_convolution() {
+    let device = Device::flex().autodiff();
+    for (size, kernel, dilation) in [
+        ([2, 5, 7, 9], 3, 1),
+        ([1, 3, 12, 10], 3, 3),
+        ([2, 4, 4, 6], 3, 6),
+        ([1, 2, 9, 5], 5, 2),
+    ] {
+        let (x, w) = (
+            random(size, &device),
+            random([size[1], 1, kernel, kernel], &device),
+        );
+        let run = |ours: bool| {
+            let (x, w) = (leaf(&x), leaf(&w));
+            let f = if ours {
+                ops::depthwise
+            } else {
+                ops::composed_depthwise
+            };
+            let y = f(x.clone(), w.clone(), dilation);
+            let gradients = weigh(y.clone()).backward();
+            let (gx, gw) = (x.grad(&gradients).unwrap(), w.grad(&gradients).unwrap());
+            (y.inner(), gx, gw)
+        };
+        let (a, b) = (run(true), run(false));
+        let name = format!("{size:?} {kernel} {dilation}");
+        assert_close(&name, a.0, b.0);
+        assert_close(&format!("{name} x"), a.1, b.1);
+        assert_close(&format!("{name} weight"), a.2, b.2);
+    }
+}
+
+#[test]
+fn gelu() {
+    let device = Device::flex().autodiff();
+    let x = random([2, 3, 40, 50], &device).mul_scalar(6.0);
+    let run = |f: fn(Tensor<4>) -> Tensor<4>| {
+        let x = leaf(&x);
+        let y = f(x.clone());
+        let gradients = weigh(y.clone()).backward();
+        (y.inner(), x.grad(&gradients).unwrap())
+    };
+    let (a, b) = (run(ops::gelu), run(ops::composed_gelu));
+    assert_close("gelu", a.0, b.0);
+    assert_close("gelu x", a.1, b.1);
+}
+
+#[test]
 fn batch_normalisation() {
     let device = Device::flex().autodiff();
     let x = random([3, 4, 5, 6], &device);

@@ -4,15 +4,15 @@
 //! numbers are not packed.
 
 /// Element type of 32-bit floating-point numbers.
-pub const FLOAT: i32 = 1;
+pub(crate) const FLOAT: i32 = 1;
 /// Element type of bytes.
-pub const UINT8: i32 = 2;
+pub(crate) const UINT8: i32 = 2;
 /// Element type of 64-bit integers.
-pub const INT64: i32 = 7;
+pub(crate) const INT64: i32 = 7;
 
 /// The file.
 #[derive(Clone, PartialEq, prost::Message)]
-pub struct ModelProto {
+pub(crate) struct ModelProto {
     #[prost(int64, tag = "1")]
     pub ir_version: i64,
     #[prost(message, repeated, tag = "8")]
@@ -31,7 +31,7 @@ pub struct ModelProto {
 
 /// A version of a set of operators.
 #[derive(Clone, PartialEq, prost::Message)]
-pub struct OperatorSetIdProto {
+pub(crate) struct OperatorSetIdProto {
     #[prost(string, tag = "1")]
     pub domain: String,
     #[prost(int64, tag = "2")]
@@ -40,7 +40,7 @@ pub struct OperatorSetIdProto {
 
 /// An entry of the metadata.
 #[derive(Clone, PartialEq, prost::Message)]
-pub struct StringStringEntryProto {
+pub(crate) struct StringStringEntryProto {
     #[prost(string, tag = "1")]
     pub key: String,
     #[prost(string, tag = "2")]
@@ -49,7 +49,7 @@ pub struct StringStringEntryProto {
 
 /// The network.
 #[derive(Clone, PartialEq, prost::Message)]
-pub struct GraphProto {
+pub(crate) struct GraphProto {
     #[prost(message, repeated, tag = "1")]
     pub node: Vec<NodeProto>,
     #[prost(string, tag = "2")]
@@ -64,7 +64,7 @@ pub struct GraphProto {
 
 /// An operation.
 #[derive(Clone, PartialEq, prost::Message)]
-pub struct NodeProto {
+pub(crate) struct NodeProto {
     #[prost(string, repeated, tag = "1")]
     pub input: Vec<String>,
     #[prost(string, repeated, tag = "2")]
@@ -81,7 +81,7 @@ pub struct NodeProto {
 
 /// A setting of an operation.
 #[derive(Clone, PartialEq, prost::Message)]
-pub struct AttributeProto {
+pub(crate) struct AttributeProto {
     #[prost(string, tag = "1")]
     pub name: String,
     #[prost(float, optional, tag = "2")]
@@ -98,7 +98,7 @@ pub struct AttributeProto {
 
 impl AttributeProto {
     /// A 64-bit integer.
-    pub fn int(name: &str, value: i64) -> Self {
+    pub(crate) fn int(name: &str, value: i64) -> Self {
         Self {
             name: name.into(),
             i: Some(value),
@@ -108,7 +108,7 @@ impl AttributeProto {
     }
 
     /// A 32-bit floating-point number.
-    pub fn float(name: &str, value: f32) -> Self {
+    pub(crate) fn float(name: &str, value: f32) -> Self {
         Self {
             name: name.into(),
             f: Some(value),
@@ -118,7 +118,7 @@ impl AttributeProto {
     }
 
     /// A string.
-    pub fn text(name: &str, value: &str) -> Self {
+    pub(crate) fn text(name: &str, value: &str) -> Self {
         Self {
             name: name.into(),
             s: Some(value.as_bytes().to_vec()),
@@ -128,7 +128,7 @@ impl AttributeProto {
     }
 
     /// 64-bit integers.
-    pub fn ints(name: &str, values: &[i64]) -> Self {
+    pub(crate) fn ints(name: &str, values: &[i64]) -> Self {
         Self {
             name: name.into(),
             ints: values.to_vec(),
@@ -140,7 +140,7 @@ impl AttributeProto {
 
 /// Constants.
 #[derive(Clone, PartialEq, prost::Message)]
-pub struct TensorProto {
+pub(crate) struct TensorProto {
     #[prost(int64, repeated, packed = "false", tag = "1")]
     pub dims: Vec<i64>,
     #[prost(int32, tag = "2")]
@@ -154,7 +154,7 @@ pub struct TensorProto {
 
 impl TensorProto {
     /// 32-bit floating-point numbers; without dimensions a scalar.
-    pub fn floats(name: &str, dims: &[usize], values: &[f32]) -> Self {
+    pub(crate) fn floats(name: &str, dims: &[usize], values: &[f32]) -> Self {
         Self {
             dims: dims.iter().map(|d| *d as i64).collect(),
             data_type: FLOAT,
@@ -164,7 +164,7 @@ impl TensorProto {
     }
 
     /// A list of 64-bit integers.
-    pub fn ints(name: &str, values: &[i64]) -> Self {
+    pub(crate) fn ints(name: &str, values: &[i64]) -> Self {
         Self {
             dims: vec![values.len() as i64],
             data_type: INT64,
@@ -174,7 +174,7 @@ impl TensorProto {
     }
 
     /// The numbers, if they are 32-bit floats and their count matches the dimensions.
-    pub fn as_floats(&self) -> Option<Vec<f32>> {
+    pub(crate) fn as_floats(&self) -> Option<Vec<f32>> {
         let wanted = self.dims.iter().try_fold(4_usize, |product, d| {
             product.checked_mul(usize::try_from(*d).ok()?)
         });
@@ -188,7 +188,7 @@ impl TensorProto {
 
 /// An input or an output.
 #[derive(Clone, PartialEq, prost::Message)]
-pub struct ValueInfoProto {
+pub(crate) struct ValueInfoProto {
     #[prost(string, tag = "1")]
     pub name: String,
     #[prost(message, optional, tag = "2")]
@@ -199,7 +199,7 @@ pub struct ValueInfoProto {
 
 impl ValueInfoProto {
     /// An array of fixed dimensions.
-    pub fn array(name: &str, element: i32, dims: [usize; 4], doc: &str) -> Self {
+    pub(crate) fn array(name: &str, element: i32, dims: [usize; 4], doc: &str) -> Self {
         let dim = dims.map(|d| Dimension {
             dim_value: Some(d as i64),
             dim_param: None,
@@ -218,7 +218,7 @@ impl ValueInfoProto {
     }
 
     /// Its dimensions, if it is an array and all of them are fixed.
-    pub fn dims(&self) -> Option<Vec<i64>> {
+    pub(crate) fn dims(&self) -> Option<Vec<i64>> {
         let shape = self.r#type.as_ref()?.tensor_type.as_ref()?.shape.as_ref()?;
         shape.dim.iter().map(|d| d.dim_value).collect()
     }
@@ -226,14 +226,14 @@ impl ValueInfoProto {
 
 /// A type; only arrays are supported.
 #[derive(Clone, PartialEq, prost::Message)]
-pub struct TypeProto {
+pub(crate) struct TypeProto {
     #[prost(message, optional, tag = "1")]
     pub tensor_type: Option<TensorTypeProto>,
 }
 
 /// The type of an array.
 #[derive(Clone, PartialEq, prost::Message)]
-pub struct TensorTypeProto {
+pub(crate) struct TensorTypeProto {
     #[prost(int32, tag = "1")]
     pub elem_type: i32,
     #[prost(message, optional, tag = "2")]
@@ -242,14 +242,14 @@ pub struct TensorTypeProto {
 
 /// Dimensions.
 #[derive(Clone, PartialEq, prost::Message)]
-pub struct TensorShapeProto {
+pub(crate) struct TensorShapeProto {
     #[prost(message, repeated, tag = "1")]
     pub dim: Vec<Dimension>,
 }
 
 /// A dimension: a number or a name.
 #[derive(Clone, PartialEq, prost::Message)]
-pub struct Dimension {
+pub(crate) struct Dimension {
     #[prost(int64, optional, tag = "1")]
     pub dim_value: Option<i64>,
     #[prost(string, optional, tag = "2")]

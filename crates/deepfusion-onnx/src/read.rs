@@ -5,7 +5,7 @@ use std::iter::Peekable;
 use std::slice::Iter;
 
 use deepfusion_geometry::DepthRange;
-use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
+use deepfusion_infer::{Activation, Border, Conv, Depthwise, Graph, Op, ValueId};
 use prost::Message;
 
 use crate::proto::{GraphProto, ModelProto, NodeProto, TensorProto};
@@ -25,13 +25,14 @@ pub fn read(bytes: &[u8]) -> Result<DepthModel, Error> {
         .graph
         .as_ref()
         .ok_or_else(|| part("graph", "missing"))?;
+    let width = side(graph, 2)?;
     let model = DepthModel {
-        graph: Reader::new(graph).network()?,
+        graph: Reader::new(graph).network(width)?,
         range: DepthRange {
             min_m: number(&proto, "depth_min_m")?,
             max_m: number(&proto, "depth_max_m")?,
         },
-        width: side(graph, 2)?,
+        width,
         height: side(graph, 1)?,
         trained_with: focal_length(&proto)?,
     };
@@ -146,7 +147,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn network(mut self) -> Result<Graph, Error> {
+    /// The network, for images of this width.
+    fn network(mut self, width: usize) -> Result<Graph, Error> {
         for op in ["Transpose", "Cast", "Div"] {
             self.expect(op)?;
         }
@@ -166,10 +168,20 @@ impl<'a> Reader<'a> {
                     return Ok(graph);
                 }
                 "Mul" => self.gate(node)?,
+                "Conv" if node.attribute.iter().any(|a| a.name == "group") => {
+                    self.depthwise(node)?
+                }
                 "Conv" | "Pad" => self.conv(node)?,
+                "Identity" => self.position(node, width)?,
+                "Reshape" => self.cross_covariance(node)?,
+                "ReduceMean" if self.next_is("Sub") => self.channel_norm(node)?,
                 "MaxPool" => {
                     let input = self.input(node, 0)?;
                     (&node.name, Op::MaxPool { input }, node)
+                }
+                "Resize" if is_linear(node) => {
+                    let input = self.input(node, 0)?;
+                    (&node.name, Op::Enlarge { input }, node)
                 }
                 "Resize" => self.upsample(node)?,
                 "Concat" => {
@@ -227,11 +239,17 @@ impl<'a> Reader<'a> {
             None => None,
         };
         let mut activation = Activation::Identity;
-        if let Some(node) = self.after(last, &["Relu", "Elu", "Neg"]) {
+        if let Some(node) = self.after(last, &["Relu", "Elu", "Neg", "Div"]) {
             last = node;
             activation = match node.op_type.as_str() {
                 "Relu" => Activation::Relu,
                 "Elu" => Activation::Elu,
+                "Div" => {
+                    for op in ["Erf", "Add", "Mul", "Mul"] {
+                        last = self.expect(op)?;
+                    }
+                    Activation::Gelu
+                }
                 _ => {
                     for op in ["Exp", "Add", "Reciprocal"] {
                         last = self.expect(op)?;
@@ -254,6 +272,92 @@ impl<'a> Reader<'a> {
             activation,
         };
         Ok((&node.name, Op::Conv(Box::new(conv)), last))
+    }
+
+    fn depthwise(&self, node: &'a NodeProto) -> Result<(&'a String, Op, &'a NodeProto), Error> {
+        let weight = self.constant(node, 1)?;
+        let [_, _, kernel, _] = weight.dims[..] else {
+            return Err(node_error(node, "weights that have not four dimensions"));
+        };
+        let first = |name: &str| {
+            let found = node.attribute.iter().find(|a| a.name == name);
+            let first = found.and_then(|a| a.ints.first().copied());
+            usize::try_from(first.unwrap_or(1)).unwrap_or(0)
+        };
+        let op = Depthwise {
+            input: self.input(node, 0)?,
+            weight: floats(node, weight)?,
+            bias: floats(node, self.constant(node, 2)?)?,
+            kernel: usize::try_from(kernel).unwrap_or(0),
+            stride: first("strides"),
+            dilation: first("dilations"),
+        };
+        Ok((&node.name, Op::Depthwise(Box::new(op)), node))
+    }
+
+    /// Its channels and its size tell what it is; that its values are the position's is seen when it is written again.
+    fn position(
+        &self,
+        node: &'a NodeProto,
+        width: usize,
+    ) -> Result<(&'a String, Op, &'a NodeProto), Error> {
+        let code = self.constant(node, 0)?;
+        let side = |axis: usize| {
+            let side = code.dims.get(axis).copied();
+            side.and_then(|side| usize::try_from(side).ok())
+                .filter(|side| *side > 0)
+                .ok_or_else(|| node_error(node, "no 1×C×H×W array of constants"))
+        };
+        let op = Op::Position {
+            per_axis: side(1)? / 2,
+            halvings: (width / side(3)?).max(1).ilog2(),
+        };
+        Ok((&node.name, op, node))
+    }
+
+    /// `ReduceMean → Sub → Mul → ReduceMean → Add → Sqrt → Div`: name, operation, last node.
+    fn channel_norm(
+        &mut self,
+        node: &'a NodeProto,
+    ) -> Result<(&'a String, Op, &'a NodeProto), Error> {
+        let input = self.input(node, 0)?;
+        for op in ["Sub", "Mul", "ReduceMean"] {
+            self.expect(op)?;
+        }
+        let add = self.expect("Add")?;
+        let epsilon = floats(add, self.constant(add, 1)?)?;
+        let epsilon = epsilon.first().copied();
+        let epsilon = epsilon.ok_or_else(|| node_error(add, "expected a number"))?;
+        self.expect("Sqrt")?;
+        let last = self.expect("Div")?;
+        Ok((&last.name, Op::ChannelNorm { input, epsilon }, last))
+    }
+
+    /// From one `Reshape` to the next: name, operation, last node.
+    fn cross_covariance(
+        &mut self,
+        node: &'a NodeProto,
+    ) -> Result<(&'a String, Op, &'a NodeProto), Error> {
+        let input = self.input(node, 0)?;
+        for op in ["Gather", "Gather", "Gather"] {
+            self.expect(op)?;
+        }
+        for _ in ["queries", "keys"] {
+            for op in ["Mul", "ReduceSum", "Add", "Sqrt", "Div"] {
+                self.expect(op)?;
+            }
+        }
+        for op in ["Transpose", "MatMul"] {
+            self.expect(op)?;
+        }
+        let factor = self.expect("Mul")?;
+        let temperature = floats(factor, self.constant(factor, 1)?)?;
+        for op in ["Softmax", "MatMul"] {
+            self.expect(op)?;
+        }
+        let last = self.expect("Reshape")?;
+        let op = Op::CrossCovariance { input, temperature };
+        Ok((&last.name, op, last))
     }
 
     /// `Resize [→ Concat]`: name, operation, last node.
@@ -280,6 +384,10 @@ impl<'a> Reader<'a> {
             residual: pass.is_some(),
         };
         Ok((&last.name, gate, last))
+    }
+
+    fn next_is(&mut self, op: &str) -> bool {
+        self.nodes.peek().is_some_and(|node| node.op_type == op)
     }
 
     fn next(&mut self) -> Result<&'a NodeProto, Error> {
@@ -338,6 +446,12 @@ fn floats(node: &NodeProto, tensor: &TensorProto) -> Result<Vec<f32>, Error> {
         let reason = format!("`{}` does not hold the f32 values it says", tensor.name);
         node_error(node, reason)
     })
+}
+
+/// Whether a `Resize` blends pixels.
+fn is_linear(node: &NodeProto) -> bool {
+    let mode = node.attribute.iter().find(|a| a.name == "mode");
+    mode.is_some_and(|a| a.s.as_deref() == Some(b"linear".as_slice()))
 }
 
 fn output(node: &NodeProto) -> Result<&String, Error> {

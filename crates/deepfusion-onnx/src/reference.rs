@@ -1,7 +1,7 @@
 //! Runs a graph in a simple way, one operation after another, as a reference for faster engines.
 
-use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
-use deepfusion_kernels::{ConvShape, conv2d};
+use deepfusion_infer::{Activation, Border, Conv, Depthwise, Graph, Op, ValueId};
+use deepfusion_kernels::{ConvShape, conv2d, gelu_exact, position_code};
 
 use crate::{DepthMaps, DepthModel, Error};
 
@@ -139,6 +139,17 @@ impl Plan<'_> {
                 gated.collect()
             }
             Op::AddPixel { input, pixel } => with_pixel(&values[input.0], &values[pixel.0]),
+            Op::Depthwise(op) => depthwise(op, &values[op.input.0], self.shape(op.input)),
+            Op::Enlarge { input } => enlarged(&values[input.0], self.shape(*input)),
+            Op::ChannelNorm { input, epsilon } => {
+                channel_norm(&values[input.0], self.shape(*input), *epsilon)
+            }
+            Op::CrossCovariance { input, temperature } => {
+                cross_covariance(&values[input.0], self.shape(*input), temperature)
+            }
+            Op::Position { per_axis, halvings } => {
+                position_code(*per_axis, self.height >> halvings, self.width >> halvings)
+            }
         }
     }
 
@@ -180,10 +191,123 @@ impl Plan<'_> {
             Activation::Elu if x > 0.0 => x,
             Activation::Elu => x.exp_m1(),
             Activation::Sigmoid => (1.0 + (-x).exp()).recip(),
+            Activation::Gelu => gelu_exact(f64::from(x)) as f32,
         };
         y.iter_mut().for_each(|y| *y = activate(*y));
         y
     }
+}
+
+/// Each channel by its own kernel.
+fn depthwise(op: &Depthwise, x: &[f32], [_, height, width]: [usize; 3]) -> Vec<f32> {
+    let taps = op.kernel * op.kernel;
+    let within = |i: usize, k: usize, n: usize| {
+        let i = (i * op.stride + k * op.dilation).checked_sub(op.reach())?;
+        (i < n).then_some(i)
+    };
+    let mut y = Vec::with_capacity(x.len() / (op.stride * op.stride));
+    let planes = x.chunks_exact(height * width);
+    for ((plane, weight), bias) in planes.zip(op.weight.chunks_exact(taps)).zip(&op.bias) {
+        for row in 0..height / op.stride {
+            for column in 0..width / op.stride {
+                let mut sum = f64::from(*bias);
+                for (tap, weight) in weight.iter().enumerate() {
+                    let down = within(row, tap / op.kernel, height);
+                    let across = within(column, tap % op.kernel, width);
+                    if let (Some(i), Some(j)) = (down, across) {
+                        sum += f64::from(*weight) * f64::from(plane[i * width + j]);
+                    }
+                }
+                y.push(sum as f32);
+            }
+        }
+    }
+    y
+}
+
+/// Bilinear ×2: three quarters of the nearest pixel and a quarter of the next, along each axis.
+fn enlarged(x: &[f32], [_, height, width]: [usize; 3]) -> Vec<f32> {
+    let pair = |i: usize, n: usize| {
+        let next = if i.is_multiple_of(2) {
+            (i / 2).saturating_sub(1)
+        } else {
+            (i / 2 + 1).min(n - 1)
+        };
+        (i / 2, next)
+    };
+    let mut y = Vec::with_capacity(4 * x.len());
+    for plane in x.chunks_exact(height * width) {
+        for row in 0..2 * height {
+            let (near, next) = pair(row, height);
+            let along = |column: usize| {
+                let (nearest, other) = pair(column, width);
+                move |row: usize| {
+                    let row = &plane[row * width..][..width];
+                    0.75 * f64::from(row[nearest]) + 0.25 * f64::from(row[other])
+                }
+            };
+            y.extend((0..2 * width).map(|column| {
+                let of = along(column);
+                (0.75 * of(near) + 0.25 * of(next)) as f32
+            }));
+        }
+    }
+    y
+}
+
+/// Each pixel's channels to mean 0 and variance 1.
+fn channel_norm(x: &[f32], [channels, height, width]: [usize; 3], epsilon: f32) -> Vec<f32> {
+    let area = height * width;
+    let along = |p: usize| x[p..].iter().step_by(area).take(channels);
+    let statistics = (0..area).map(|p| {
+        let mean = sum(along(p)) / channels as f64;
+        let squares = along(p).map(|v| (f64::from(*v) - mean).powi(2));
+        let variance = squares.sum::<f64>() / channels as f64;
+        (mean, (variance + f64::from(epsilon)).sqrt())
+    });
+    let statistics: Vec<_> = statistics.collect();
+    let normalised =
+        |(v, (mean, deviation)): (&f32, &(f64, f64))| ((f64::from(*v) - mean) / deviation) as f32;
+    let planes = x.chunks_exact(area);
+    planes
+        .flat_map(|plane| plane.iter().zip(&statistics).map(normalised))
+        .collect()
+}
+
+/// Each channel's mixture of its head's values.
+fn cross_covariance(
+    x: &[f32],
+    [channels, height, width]: [usize; 3],
+    temperature: &[f32],
+) -> Vec<f32> {
+    let (area, channels) = (height * width, channels / 3);
+    let each = channels / temperature.len();
+    let plane = |c: usize| &x[c * area..][..area];
+    let dot = |a: usize, b: usize| {
+        let products = plane(a).iter().zip(plane(b));
+        products
+            .map(|(a, b)| f64::from(*a) * f64::from(*b))
+            .sum::<f64>()
+    };
+    let length = |c: usize| (dot(c, c) + 1e-24).sqrt();
+    let mut y = Vec::with_capacity(channels * area);
+    for c in 0..channels {
+        let head = c / each;
+        let first = head * each;
+        let similar: Vec<f64> = (channels + first..channels + first + each)
+            .map(|key| f64::from(temperature[head]) * dot(c, key) / (length(c) * length(key)))
+            .collect();
+        let most = similar.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let shares: Vec<f64> = similar.iter().map(|s| (s - most).exp()).collect();
+        let whole: f64 = shares.iter().sum();
+        let values = 2 * channels + first;
+        y.extend((0..area).map(|p| {
+            let mixed = shares.iter().enumerate();
+            let mixed = mixed.map(|(k, share)| share * f64::from(plane(values + k)[p]));
+            (mixed.sum::<f64>() / whole) as f32
+        }));
+    }
+    y
 }
 
 /// In double precision: the order of many summands then does not show.

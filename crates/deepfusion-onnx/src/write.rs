@@ -2,7 +2,8 @@
 
 use std::collections::HashSet;
 
-use deepfusion_infer::{Activation, Border, Conv, Node, Op, ValueId};
+use deepfusion_infer::{Activation, Border, Conv, Depthwise, Node, Op, ValueId};
+use deepfusion_kernels::position_code;
 use prost::Message;
 
 use crate::proto::{
@@ -50,13 +51,25 @@ pub(crate) fn encode(model: &DepthModel) -> Result<ModelProto, Error> {
     // Before the weights are copied.
     let weights = model.graph.nodes().iter().map(|node| match &node.op {
         Op::Conv(conv) => 4 * (conv.weight.len() + conv.bias.len()),
+        Op::Depthwise(op) => 4 * (op.weight.len() + op.bias.len()),
+        Op::Position { per_axis, halvings } => {
+            8 * per_axis * (model.width >> halvings) * (model.height >> halvings)
+        }
         _ => 0,
     });
-    let bytes = weights.sum();
+    let bytes = weights.fold(0, usize::saturating_add);
     if bytes > MOST_BYTES {
         return Err(too_large(bytes));
     }
-    let mut writer = Writer::default();
+    let shapes = (0..=model.graph.nodes().len()).map(|value| {
+        let shape = model.graph.shape(ValueId(value));
+        let (width, height) = shape.size(model.width, model.height);
+        [shape.channels, height, width]
+    });
+    let mut writer = Writer {
+        shapes: shapes.collect(),
+        ..Writer::default()
+    };
     writer.taken.insert("image".into());
     writer.image(model)?;
     for node in model.graph.nodes() {
@@ -122,6 +135,8 @@ fn along_channels() -> Vec<AttributeProto> {
 
 #[derive(Default)]
 struct Writer {
+    /// Channels, height and width of each value of the graph.
+    shapes: Vec<[usize; 3]>,
     nodes: Vec<NodeProto>,
     initializers: Vec<TensorProto>,
     /// All names in use, of node outputs and constants.
@@ -221,6 +236,32 @@ impl Writer {
         let name = node.name.as_str();
         let value = match &node.op {
             Op::Conv(conv) => self.conv(name, conv)?,
+            Op::Depthwise(op) => self.depthwise(name, op)?,
+            Op::Enlarge { input } => {
+                let attributes = vec![
+                    AttributeProto::text("coordinate_transformation_mode", "half_pixel"),
+                    AttributeProto::text("mode", "linear"),
+                ];
+                let scales = self.doubling()?;
+                self.emit(
+                    "Resize",
+                    name,
+                    &[&self.value(*input), "", &scales],
+                    attributes,
+                )?
+            }
+            Op::ChannelNorm { input, epsilon } => self.channel_norm(name, *input, *epsilon)?,
+            Op::CrossCovariance { input, temperature } => {
+                self.cross_covariance(name, *input, temperature)?
+            }
+            Op::Position { per_axis, .. } => {
+                let [channels, height, width] = self.shapes[self.values.len()];
+                let code = position_code(*per_axis, height, width);
+                let dims = [1, channels, height, width];
+                let code = TensorProto::floats(&format!("{name}.code"), &dims, &code);
+                let code = self.constant(name, code)?;
+                self.emit("Identity", name, &[&code], vec![])?
+            }
             Op::MaxPool { input } => {
                 let attributes = vec![
                     AttributeProto::ints("kernel_shape", &[3, 3]),
@@ -279,8 +320,7 @@ impl Writer {
         input: ValueId,
         skip: Option<ValueId>,
     ) -> Result<String, Error> {
-        let scales = TensorProto::floats("resize.scales", &[4], &[1.0, 1.0, 2.0, 2.0]);
-        let scales = self.shared(scales)?;
+        let scales = self.doubling()?;
         let attributes = vec![
             AttributeProto::text("coordinate_transformation_mode", "asymmetric"),
             AttributeProto::text("mode", "nearest"),
@@ -299,6 +339,125 @@ impl Writer {
             &[&large, &self.value(skip)],
             along_channels(),
         )
+    }
+
+    /// The factors of a Resize that doubles width and height.
+    fn doubling(&mut self) -> Result<String, Error> {
+        let scales = TensorProto::floats("resize.scales", &[4], &[1.0, 1.0, 2.0, 2.0]);
+        self.shared(scales)
+    }
+
+    fn depthwise(&mut self, name: &str, op: &Depthwise) -> Result<String, Error> {
+        let channels = op.bias.len();
+        let dims = [channels, 1, op.kernel, op.kernel];
+        let weight = TensorProto::floats(&format!("{name}.weight"), &dims, &op.weight);
+        let weight = self.constant(name, weight)?;
+        let bias = TensorProto::floats(&format!("{name}.bias"), &dims[..1], &op.bias);
+        let bias = self.constant(name, bias)?;
+        let attributes = vec![
+            AttributeProto::ints("kernel_shape", &[op.kernel as i64; 2]),
+            AttributeProto::ints("pads", &[op.reach() as i64; 4]),
+            AttributeProto::ints("strides", &[op.stride as i64; 2]),
+            AttributeProto::ints("dilations", &[op.dilation as i64; 2]),
+            AttributeProto::int("group", channels as i64),
+        ];
+        self.emit(
+            "Conv",
+            name,
+            &[&self.value(op.input), &weight, &bias],
+            attributes,
+        )
+    }
+
+    /// Spelt out: `LayerNormalization` knows the last axes alone.
+    fn channel_norm(&mut self, name: &str, input: ValueId, epsilon: f32) -> Result<String, Error> {
+        let x = self.value(input);
+        let over_channels = || {
+            let axes = AttributeProto::ints("axes", &[1]);
+            vec![axes, AttributeProto::int("keepdims", 1)]
+        };
+        let mean = self.emit(
+            "ReduceMean",
+            &format!("{name}.mean"),
+            &[&x],
+            over_channels(),
+        )?;
+        let centred = self.emit("Sub", &format!("{name}.centred"), &[&x, &mean], vec![])?;
+        let square = format!("{name}.square");
+        let square = self.emit("Mul", &square, &[&centred, &centred], vec![])?;
+        let variance = format!("{name}.variance");
+        let variance = self.emit("ReduceMean", &variance, &[&square], over_channels())?;
+        let small = TensorProto::floats(&format!("{name}.epsilon"), &[], &[epsilon]);
+        let small = self.constant(name, small)?;
+        let above = format!("{name}.above");
+        let above = self.emit("Add", &above, &[&variance, &small], vec![])?;
+        let deviation = self.emit("Sqrt", &format!("{name}.deviation"), &[&above], vec![])?;
+        self.emit("Div", name, &[&centred, &deviation], vec![])
+    }
+
+    fn cross_covariance(
+        &mut self,
+        name: &str,
+        input: ValueId,
+        temperature: &[f32],
+    ) -> Result<String, Error> {
+        let heads = temperature.len();
+        let x = self.value(input);
+        let [channels, height, width] = self.shapes[input.0].map(|side| side as i64);
+        let shape = [3, heads as i64, -1, height * width];
+        let shape = TensorProto::ints(&format!("{name}.shape"), &shape);
+        let shape = self.constant(name, shape)?;
+        let apart = self.emit("Reshape", &format!("{name}.heads"), &[&x, &shape], vec![])?;
+        let mut part = |index: i64, what: &str| {
+            let at = TensorProto::ints(&format!("at.{index}"), &[index]);
+            let at = self.shared(at)?;
+            let axis = vec![AttributeProto::int("axis", 0)];
+            self.emit("Gather", &format!("{name}.{what}"), &[&apart, &at], axis)
+        };
+        let (queries, keys) = (part(0, "queries")?, part(1, "keys")?);
+        let values = part(2, "values")?;
+        let queries = self.unit(&queries)?;
+        let keys = self.unit(&keys)?;
+        let perm = vec![AttributeProto::ints("perm", &[0, 1, 3, 2])];
+        let turned = self.emit("Transpose", &format!("{name}.turned"), &[&keys], perm)?;
+        let similar = format!("{name}.similar");
+        let similar = self.emit("MatMul", &similar, &[&queries, &turned], vec![])?;
+        let factor = TensorProto::floats(
+            &format!("{name}.temperature"),
+            &[1, heads, 1, 1],
+            temperature,
+        );
+        let factor = self.constant(name, factor)?;
+        let scaled = self.emit(
+            "Mul",
+            &format!("{name}.scaled"),
+            &[&similar, &factor],
+            vec![],
+        )?;
+        let last = vec![AttributeProto::int("axis", -1)];
+        let shares = self.emit("Softmax", &format!("{name}.shares"), &[&scaled], last)?;
+        let mixed = self.emit(
+            "MatMul",
+            &format!("{name}.mixed"),
+            &[&shares, &values],
+            vec![],
+        )?;
+        let whole = [1, channels / 3, height, width];
+        let whole = TensorProto::ints(&format!("{name}.whole"), &whole);
+        let whole = self.constant(name, whole)?;
+        self.emit("Reshape", name, &[&mixed, &whole], vec![])
+    }
+
+    /// Rows to length 1.
+    fn unit(&mut self, x: &str) -> Result<String, Error> {
+        let squares = self.emit("Mul", &format!("{x}.square"), &[x, x], vec![])?;
+        let axis = self.shared(TensorProto::ints("last", &[-1]))?;
+        let keep = vec![AttributeProto::int("keepdims", 1)];
+        let sum = self.emit("ReduceSum", &format!("{x}.sum"), &[&squares, &axis], keep)?;
+        let least = self.shared(TensorProto::floats("least", &[], &[1e-24]))?;
+        let above = self.emit("Add", &format!("{x}.above"), &[&sum, &least], vec![])?;
+        let length = self.emit("Sqrt", &format!("{x}.length"), &[&above], vec![])?;
+        self.emit("Div", &format!("{x}.unit"), &[x, &length], vec![])
     }
 
     fn conv(&mut self, name: &str, conv: &Conv) -> Result<String, Error> {
@@ -340,11 +499,25 @@ impl Writer {
             Activation::Identity => Ok(x),
             Activation::Relu => self.emit("Relu", &format!("{name}.relu"), &[&x], vec![]),
             Activation::Sigmoid => self.sigmoid(name, &x),
+            Activation::Gelu => self.gelu(name, &x),
             Activation::Elu => {
                 let alpha = vec![AttributeProto::float("alpha", 1.0)];
                 self.emit("Elu", &format!("{name}.elu"), &[&x], alpha)
             }
         }
+    }
+
+    /// x·½·(1 + erf(x/√2)), spelt out: this operator set has no `Gelu`, and ONNX Runtime makes one operation of it.
+    fn gelu(&mut self, name: &str, x: &str) -> Result<String, Error> {
+        let root = TensorProto::floats("root", &[], &[std::f32::consts::SQRT_2]);
+        let (root, one) = (self.shared(root)?, TensorProto::floats("one", &[], &[1.0]));
+        let (one, half) = (self.shared(one)?, TensorProto::floats("half", &[], &[0.5]));
+        let half = self.shared(half)?;
+        let y = self.emit("Div", &format!("{name}.over_root"), &[x, &root], vec![])?;
+        let y = self.emit("Erf", &format!("{name}.erf"), &[&y], vec![])?;
+        let y = self.emit("Add", &format!("{name}.erf_plus_one"), &[&y, &one], vec![])?;
+        let y = self.emit("Mul", &format!("{name}.twice"), &[x, &y], vec![])?;
+        self.emit("Mul", &format!("{name}.gelu"), &[&y, &half], vec![])
     }
 
     /// 1 / (1 + e⁻ˣ), spelt out: ONNX Runtime's `Sigmoid` is off by up to 1.4e-7 where it should be 0, which

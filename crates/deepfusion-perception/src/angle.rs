@@ -4,7 +4,7 @@ use crate::ground_box::axes;
 use crate::lanes::{LANES, Points};
 
 /// Distance within which a point of the contour belongs to a face, metres.
-pub const FACE: f32 = 0.25;
+pub(crate) const FACE: f32 = 0.25;
 /// Number of angles of the coarse search, over a quarter of a turn.
 const COARSE: usize = 30;
 /// Weight of the expected orientation, per point of the contour.
@@ -12,7 +12,7 @@ const EXPECTED: f32 = 0.03;
 
 /// The angle at which most of the contour lies on the two faces towards the camera (after the closeness
 /// criterion of Zhang et al., "Efficient L-shape fitting for vehicle detection using laser scanners", 2017).
-pub fn best_angle(contour: &[[f32; 2]], along: f32) -> f32 {
+pub(crate) fn best_angle(contour: &[[f32; 2]], along: f32) -> f32 {
     let contour = Points::new(contour.iter().copied());
     let step = std::f32::consts::FRAC_PI_2 / COARSE as f32;
     let score = |angle: f32| {

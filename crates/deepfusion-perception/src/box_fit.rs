@@ -7,11 +7,11 @@ use crate::rows::{Turn, Vote};
 use crate::silhouette::{FOOT_M, Silhouette};
 
 /// Length and width of a typical car, metres.
-pub const CAR: [f32; 2] = [4.4, 1.8];
+pub(crate) const CAR: [f32; 2] = [4.4, 1.8];
 /// Length and width of the smallest car, metres.
 const SHORTEST: [f32; 2] = [3.2, 1.45];
 /// Up to this extent, in metres, something counts as a person or a thing of that size, even if partly hidden.
-pub const SMALL: f32 = 1.0;
+pub(crate) const SMALL: f32 = 1.0;
 /// Least visible extent of a side that counts as a measurement of its length, metres.
 const MEASURED: f32 = 0.6;
 /// A visible part smaller than this, in metres, says nothing about the rest.
@@ -24,7 +24,7 @@ const THIN: f32 = 0.3;
 /// Fits a box to a silhouette. `expected` is the expected orientation, which decides only between fits of about equal
 /// quality. The box comes with its vote on the orientation of its neighbours.
 #[must_use]
-pub fn fit(silhouette: &Silhouette, expected: Turn) -> Option<Vote> {
+pub(crate) fn fit(silhouette: &Silhouette, expected: Turn) -> Option<Vote> {
     let angle = best_angle(&silhouette.contour, expected.angle());
     let axes = axes(angle);
     let span = axes.map(|axis| extent(&silhouette.points, axis));

@@ -24,7 +24,7 @@ impl Run {
 
 /// Obstacle pixels that belong together.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Cluster {
+pub(crate) struct Cluster {
     /// Its runs, from the top row down.
     pub runs: Vec<Run>,
     /// Number of pixels.
@@ -34,7 +34,7 @@ pub struct Cluster {
 impl Cluster {
     /// Left, top, right and bottom pixel (the last two included).
     #[must_use]
-    pub fn bounds(&self) -> [u32; 4] {
+    pub(crate) fn bounds(&self) -> [u32; 4] {
         self.runs.iter().fold(
             [u32::MAX, u32::MAX, 0, 0],
             |[left, top, right, bottom], run| {
@@ -50,7 +50,7 @@ impl Cluster {
 
     /// Splits it in two: the pixels for whose point in the camera's frame `beyond` is false, and those for which it is
     /// true; `None` if one part would be empty.
-    pub fn divided(
+    pub(crate) fn divided(
         &self,
         depth: &[f32],
         rays: &Rays,
@@ -88,14 +88,14 @@ impl Cluster {
 /// On an upright surface seen at a grazing angle, as the side of a car ahead is, depth grows by z²·δ/|x| from
 /// one column to the next (δ: the angle between them, x: the surface's distance to the side); on a level one by
 /// z²·δ/|y| from row to row. The depth's own error grows with z² in metres, thus with z relative to it.
-pub struct Gaps {
+pub(crate) struct Gaps {
     error: f32,
     step: [f32; 2],
 }
 
 impl Gaps {
     /// The gaps for a camera.
-    pub fn of(rays: &Rays, config: &PerceptionConfig) -> Self {
+    pub(crate) fn of(rays: &Rays, config: &PerceptionConfig) -> Self {
         Self {
             error: config.relative_error,
             step: rays.step,
@@ -103,7 +103,7 @@ impl Gaps {
     }
 
     /// From one column to the next, for a surface at `x` to the side and `z` ahead, metres.
-    pub fn across(&self, x: f32, z: f32) -> f32 {
+    pub(crate) fn across(&self, x: f32, z: f32) -> f32 {
         0.12 + self.limit(x.abs(), z, self.step[0])
     }
 
@@ -127,7 +127,7 @@ const EDGE_ON: f32 = 0.4;
 
 /// Joins the obstacle pixels of a depth image into clusters of at least `min_pixels`.
 #[must_use]
-pub fn clusters(
+pub(crate) fn clusters(
     depth: &[f32],
     obstacles: &Obstacles,
     rays: &Rays,

@@ -3,7 +3,7 @@
 use crate::clusters::Cluster;
 
 /// The pixels of a cluster, column by column from left to right and in each from the top down: (depth, row).
-pub struct Columns {
+pub(crate) struct Columns {
     /// Leftmost column in the image.
     left: u32,
     /// The index after each column's last pixel.
@@ -13,7 +13,7 @@ pub struct Columns {
 
 impl Columns {
     /// The columns of a cluster in a depth image of this width.
-    pub fn of(cluster: &Cluster, depth: &[f32], width: usize) -> Self {
+    pub(crate) fn of(cluster: &Cluster, depth: &[f32], width: usize) -> Self {
         let [left, _, right, _] = cluster.bounds();
         let mut ends = vec![0; (right - left + 1) as usize];
         for run in &cluster.runs {
@@ -39,7 +39,7 @@ impl Columns {
     }
 
     /// Calls `each` with every column that has pixels, and with those pixels.
-    pub fn for_each(&mut self, mut each: impl FnMut(usize, &mut [(f32, u32)])) {
+    pub(crate) fn for_each(&mut self, mut each: impl FnMut(usize, &mut [(f32, u32)])) {
         let mut start = 0;
         for (column, end) in self.ends.iter().enumerate() {
             if *end > start {

@@ -13,7 +13,7 @@ const FEWEST: usize = 30;
 const BELOW: f32 = -2.5;
 
 /// The best of the last frame's plane and some through three level samples each, `None` where it has no support.
-pub fn consensus(
+pub(crate) fn consensus(
     samples: &[Sample],
     level: &[Sample],
     before: Option<&Ground>,

@@ -228,7 +228,7 @@ impl Sample {
     }
 
     /// Tolerance of its height above or below the plane, metres.
-    pub fn tolerance(&self) -> f32 {
+    pub(crate) fn tolerance(&self) -> f32 {
         TOLERANCE.0 + TOLERANCE.1 * self.depth
     }
 }

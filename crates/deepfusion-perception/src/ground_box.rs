@@ -93,7 +93,7 @@ fn polygon_area(polygon: &[[f32; 2]]) -> f32 {
 }
 
 /// Unit vectors along and across an angle.
-pub fn axes(angle: f32) -> [[f32; 2]; 2] {
+pub(crate) fn axes(angle: f32) -> [[f32; 2]; 2] {
     let (sin, cos) = angle.sin_cos();
     [[cos, sin], [-sin, cos]]
 }

@@ -1,10 +1,10 @@
 //! Points on the ground in SIMD lanes.
 
 /// Number of lanes.
-pub const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// Points in blocks of lanes; the last block is padded with the last point.
-pub struct Points {
+pub(crate) struct Points {
     /// Right and forward of each, metres.
     pub blocks: Vec<[[f32; LANES]; 2]>,
     /// Number of points.
@@ -13,7 +13,7 @@ pub struct Points {
 
 impl Points {
     /// Packs the points.
-    pub fn new(points: impl IntoIterator<Item = [f32; 2]>) -> Self {
+    pub(crate) fn new(points: impl IntoIterator<Item = [f32; 2]>) -> Self {
         let mut blocks: Vec<[[f32; LANES]; 2]> = Vec::new();
         let mut count = 0;
         for point in points {
@@ -32,7 +32,7 @@ impl Points {
     }
 
     /// Squared distance of a point from the nearest of them, infinite without any.
-    pub fn nearest(&self, [x, y]: [f32; 2]) -> f32 {
+    pub(crate) fn nearest(&self, [x, y]: [f32; 2]) -> f32 {
         let mut nearest = [f32::INFINITY; LANES];
         for [right, forward] in &self.blocks {
             for i in 0..LANES {
@@ -44,7 +44,7 @@ impl Points {
     }
 
     /// Their extent along an axis.
-    pub fn extent(&self, axis: [f32; 2]) -> [f32; 2] {
+    pub(crate) fn extent(&self, axis: [f32; 2]) -> [f32; 2] {
         let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
         for [right, forward] in &self.blocks {
             for i in 0..LANES {

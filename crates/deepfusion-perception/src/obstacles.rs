@@ -16,7 +16,7 @@ pub struct Obstacles {
 const ROWS: usize = 16;
 
 /// Not an obstacle.
-pub const NONE: f32 = -1.0;
+pub(crate) const NONE: f32 = -1.0;
 
 impl Obstacles {
     /// The obstacles without the pixels of these clusters.

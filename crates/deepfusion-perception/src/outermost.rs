@@ -2,7 +2,7 @@
 
 /// The least and the largest of some values after dropping one in `stray` at both ends; `None` without values. Changes their
 /// order.
-pub fn ends(values: &mut [f32], stray: usize) -> Option<[f32; 2]> {
+pub(crate) fn ends(values: &mut [f32], stray: usize) -> Option<[f32; 2]> {
     let stray = values.len() / stray;
     let last = values.len().checked_sub(1 + stray)?;
     Some([stray, last].map(|place| *values.select_nth_unstable_by(place, f32::total_cmp).1))

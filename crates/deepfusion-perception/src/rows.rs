@@ -4,7 +4,7 @@ use crate::GroundBox;
 
 /// An orientation, up to half a turn, and its weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Turn {
+pub(crate) struct Turn {
     /// Cosine and sine of twice the angle (as [`crate::GroundBox::angle`]), times the weight.
     doubled: [f32; 2],
 }
@@ -20,7 +20,7 @@ const BESIDE_M: f32 = 0.3;
 
 impl Turn {
     /// From an angle in radians and a weight; the road has weight 1.
-    pub fn new(angle: f32, weight: f32) -> Self {
+    pub(crate) fn new(angle: f32, weight: f32) -> Self {
         let (sin, cos) = (2.0 * angle).sin_cos();
         Self {
             doubled: [weight * cos, weight * sin],
@@ -28,12 +28,12 @@ impl Turn {
     }
 
     /// Along the road.
-    pub fn ahead() -> Self {
+    pub(crate) fn ahead() -> Self {
         Self::new(std::f32::consts::FRAC_PI_2, 1.0)
     }
 
     /// The angle, in radians.
-    pub fn angle(self) -> f32 {
+    pub(crate) fn angle(self) -> f32 {
         0.5 * self.doubled[1].atan2(self.doubled[0])
     }
 
@@ -42,7 +42,7 @@ impl Turn {
     }
 
     /// The cost of an angle.
-    pub fn against(self, angle: f32) -> f32 {
+    pub(crate) fn against(self, angle: f32) -> f32 {
         let (sin, cos) = (2.0 * angle).sin_cos();
         COST * (self.weight() - self.doubled[0] * cos - self.doubled[1] * sin)
     }
@@ -63,7 +63,7 @@ impl Turn {
 
 /// A box's vote on the orientation of its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Vote {
+pub(crate) struct Vote {
     /// Middle of its visible part: right, forward, in metres.
     pub at: [f32; 2],
     /// Its box.
@@ -89,7 +89,7 @@ impl Vote {
 }
 
 /// The expected orientation of the `index`-th box, from what is `usual` there and the votes of the others in its row.
-pub fn expected(votes: &[Vote], index: usize, usual: Turn) -> Turn {
+pub(crate) fn expected(votes: &[Vote], index: usize, usual: Turn) -> Turn {
     let others = votes.iter().enumerate().filter(|(i, _)| *i != index);
     others
         .filter_map(|(_, vote)| vote.on(votes[index].at))

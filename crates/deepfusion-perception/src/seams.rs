@@ -15,7 +15,7 @@ const COLUMNS: usize = 2;
 
 /// The two sides of a cluster's clearest seam; `None` if it has none.
 #[must_use]
-pub fn part_at_seam(
+pub(crate) fn part_at_seam(
     cluster: &Cluster,
     silhouette: &Silhouette,
     depth: &[f32],

@@ -8,7 +8,7 @@ use crate::{Ground, PerceptionConfig, Rays};
 
 /// A cluster projected onto the ground.
 #[derive(Debug, Clone, Default)]
-pub struct Silhouette {
+pub(crate) struct Silhouette {
     /// The near end of each column: (right, forward) in metres, from left to right.
     pub contour: Vec<[f32; 2]>,
     /// Height of each of those columns' highest point, metres.
@@ -33,7 +33,7 @@ pub struct Silhouette {
 }
 
 /// A column whose lowest point is higher than this does not show its near end: something hides it, metres.
-pub const FOOT_M: f32 = 0.6;
+pub(crate) const FOOT_M: f32 = 0.6;
 /// Approximate number of points kept of a cluster.
 const POINTS: usize = 400;
 /// One in this many of a column's sorted depths lies in front of the contour, so that single pixels do not decide.
@@ -42,7 +42,7 @@ const NEAR_SHARE: usize = 8;
 impl Silhouette {
     /// The silhouette of a cluster in a depth image.
     #[must_use]
-    pub fn of(
+    pub(crate) fn of(
         cluster: &Cluster,
         depth: &[f32],
         obstacles: &Obstacles,

@@ -25,7 +25,7 @@ const PIECE_M: f32 = 0.25;
 
 /// The two parts of a box's cluster; `None` if it is not a row of cars.
 #[must_use]
-pub fn split(
+pub(crate) fn split(
     cluster: &Cluster,
     silhouette: &Silhouette,
     place: &GroundBox,

@@ -29,7 +29,8 @@ pub struct PredictionRecord {
     pub checkpoint_step: usize,
     /// fx, fy, cx, cy in pixels of the input.
     pub intrinsics: Option<[f64; 4]>,
-    /// `given`, `recording` (its own calibration), `exif` (the lens's nominal focal length), `assumed` or `unknown`.
+    /// `given`, `recording` (its own calibration), `exif` (the lens's nominal focal length), `learned` (by the network's run, of recordings
+    /// that did not say it), `assumed` or `unknown`.
     pub intrinsics_from: String,
     /// Whether the camera is known, so that depth is right for its focal length: given, the recording's own, or EXIF's.
     pub camera_known: bool,

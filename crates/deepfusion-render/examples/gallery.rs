@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use deepfusion_data::to_chw;
-use deepfusion_eval::{Crop, Evaluator, Grid, Prediction, Protocol, TrivialBaseline};
+use deepfusion_eval::{Crop, Evaluator, Grid, MeanDepthBaseline, Prediction, Protocol};
 use deepfusion_geometry::DepthMap;
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_render::{
@@ -85,7 +85,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     save("cloud_map.png", &map)?;
     save("cloud_oblique.png", &oblique)?;
 
-    let mut baseline = TrivialBaseline::new();
+    let mut baseline = MeanDepthBaseline::new();
     let (mut evaluator, mut trivial) = (Evaluator::new(protocol())?, Evaluator::new(protocol())?);
     baseline.add_scan(&Grid::from(&first.depth));
     for i in 4..9 {
@@ -106,7 +106,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             &truth,
         )?;
     }
-    let report = evaluator.report()?.with_trivial(&trivial.report()?);
+    let report = evaluator
+        .report()?
+        .with_mean_depth_baseline(&trivial.report()?);
     let steps = |f: fn(f64) -> f64| {
         (0..400)
             .map(|i| (f64::from(i) * 5.0, f(f64::from(i))))

@@ -1,6 +1,5 @@
 use crate::mcap::McapFile;
 use crate::metadata;
-use crate::sqlite::SqliteFile;
 use crate::storage::{self, Storage, hull};
 use deepfusion_rosbag::{
     Connection, Error, Message, MessageIter, MessageSource, Result, Selection, Time, TopicInfo,
@@ -74,7 +73,7 @@ impl Ros2Bag {
     ///
     /// # Errors
     /// [`Error::NoSuchPath`], [`Error::File`]; [`Error::Storage`] for files of another kind, ones that are compressed as
-    /// a whole, and a `metadata.yaml` that cannot be read.
+    /// a whole, and a `metadata.yaml` that cannot be read; [`Error::Feature`] for SQLite without the feature `ros2-sqlite`.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let metadata = std::fs::metadata(path).map_err(|e| Error::file(path, e))?;
@@ -117,7 +116,7 @@ impl Ros2Bag {
 fn open_file(path: &Path) -> Result<Box<dyn Storage>> {
     match Kind::of(path) {
         Some(Kind::Mcap) => Ok(Box::new(McapFile::open(path)?)),
-        Some(Kind::Sqlite) => Ok(Box::new(SqliteFile::open(path)?)),
+        Some(Kind::Sqlite) => open_database(path),
         Some(Kind::Packed) => Err(storage::error(
             path,
             "the whole file is compressed (zstd), so that nothing in it can be found",
@@ -129,6 +128,20 @@ fn open_file(path: &Path) -> Result<Box<dyn Storage>> {
             "give the recording's folder, or one of its .mcap or .db3 files",
         )),
     }
+}
+
+#[cfg(feature = "ros2-sqlite")]
+fn open_database(path: &Path) -> Result<Box<dyn Storage>> {
+    Ok(Box::new(crate::sqlite::SqliteFile::open(path)?))
+}
+
+#[cfg(not(feature = "ros2-sqlite"))]
+fn open_database(path: &Path) -> Result<Box<dyn Storage>> {
+    Err(Error::Feature {
+        path: path.to_owned(),
+        kind: "a ROS 2 bag in SQLite",
+        feature: "ros2-sqlite",
+    })
 }
 
 impl MessageSource for Ros2Bag {

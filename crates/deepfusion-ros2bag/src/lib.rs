@@ -9,11 +9,13 @@
 //! → `index`, or `scan` where there is none → `chunk` → `messages`) or `sqlite` → `bag` (all files in time order) →
 //! [`Message`](deepfusion_rosbag::Message), whose bytes are CDR.
 //!
-//! A separate crate, because it brings C code (SQLite, Zstandard) that a reader of ROS 1 does not need.
+//! A separate crate, because it brings C code (Zstandard, and with the feature `ros2-sqlite` SQLite) that a reader of ROS 1 does not
+//! need. Without that feature a `.db3` is an [`Error::Feature`](deepfusion_rosbag::Error::Feature).
 
 mod bag;
 mod mcap;
 mod metadata;
+#[cfg(feature = "ros2-sqlite")]
 mod sqlite;
 mod storage;
 

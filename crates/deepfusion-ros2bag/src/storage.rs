@@ -38,7 +38,7 @@ pub(crate) struct Channel {
 
 impl Channel {
     /// A channel without messages yet.
-    pub fn new(
+    pub(crate) fn new(
         id: u32,
         topic: String,
         type_name: &str,
@@ -70,7 +70,7 @@ impl Channel {
     }
 
     /// Counts a message.
-    pub fn add(&mut self, time: Time) {
+    pub(crate) fn add(&mut self, time: Time) {
         self.connection.count += 1;
         self.range = hull(self.range, Some((time, time)));
     }

@@ -37,7 +37,7 @@ pub(crate) struct Ahead {
 }
 
 impl Ahead {
-    pub fn new(source: Arc<Source>, limit: usize, threads: usize) -> Self {
+    pub(crate) fn new(source: Arc<Source>, limit: usize, threads: usize) -> Self {
         Self {
             source,
             limit,
@@ -50,7 +50,7 @@ impl Ahead {
     }
 
     /// Starts to open a chunk if that takes work; the threads start with the first such chunk.
-    pub fn submit(&mut self, info: &ChunkInfo) -> Ticket {
+    pub(crate) fn submit(&mut self, info: &ChunkInfo) -> Ticket {
         if self.threads == 0 || !content::is_compressed(&self.source, info) {
             return Ticket::OnDemand;
         }
@@ -75,7 +75,7 @@ impl Ahead {
     }
 
     /// The chunk, as soon as it is open.
-    pub fn redeem(&self, ticket: Ticket, info: &ChunkInfo) -> Outcome {
+    pub(crate) fn redeem(&self, ticket: Ticket, info: &ChunkInfo) -> Outcome {
         let outcome = match ticket {
             Ticket::Ahead(ticket) => ticket.recv().ok(),
             Ticket::OnDemand => None,

@@ -11,7 +11,7 @@ pub(crate) struct Pool {
 }
 
 impl Pool {
-    pub fn new(most: usize) -> Arc<Self> {
+    pub(crate) fn new(most: usize) -> Arc<Self> {
         Arc::new(Self {
             free: Mutex::default(),
             most,
@@ -19,7 +19,7 @@ impl Pool {
     }
 
     /// An empty buffer.
-    pub fn take(self: &Arc<Self>) -> Buffer {
+    pub(crate) fn take(self: &Arc<Self>) -> Buffer {
         // A thread that panicked while it held the lock cannot have left a half-changed list.
         let mut free = self
             .free
@@ -43,7 +43,7 @@ pub(crate) struct Buffer {
 
 impl Buffer {
     /// What is filled, and `room` bytes of no meaning behind it.
-    pub fn split(&mut self, room: usize) -> (&[u8], &mut [u8]) {
+    pub(crate) fn split(&mut self, room: usize) -> (&[u8], &mut [u8]) {
         let needed = self.filled + room;
         if self.bytes.len() < needed {
             self.bytes.resize(needed, 0);
@@ -53,12 +53,12 @@ impl Buffer {
     }
 
     /// Counts bytes that were written behind what was filled.
-    pub fn advance(&mut self, count: usize) {
+    pub(crate) fn advance(&mut self, count: usize) {
         self.filled = (self.filled + count).min(self.bytes.len());
     }
 
     /// Appends bytes.
-    pub fn extend(&mut self, bytes: &[u8]) {
+    pub(crate) fn extend(&mut self, bytes: &[u8]) {
         self.split(bytes.len()).1.copy_from_slice(bytes);
         self.advance(bytes.len());
     }

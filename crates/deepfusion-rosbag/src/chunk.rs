@@ -16,13 +16,13 @@ pub(crate) struct Chunk<'a> {
 }
 
 impl<'a> Chunk<'a> {
-    pub fn read(bytes: &'a [u8], position: u64) -> Result<Self, Fault> {
+    pub(crate) fn read(bytes: &'a [u8], position: u64) -> Result<Self, Fault> {
         Self::from_record(&Record::read(bytes, place(position))?)
     }
 
     /// Up to a break: `stored` is what there is of it, and all that is left where the recorder wrote its header but
     /// never came back to fill in the length.
-    pub fn read_to_break(bytes: &'a [u8], position: u64) -> Result<Self, Fault> {
+    pub(crate) fn read_to_break(bytes: &'a [u8], position: u64) -> Result<Self, Fault> {
         let record = Record::read_header(bytes, place(position))?;
         let mut chunk = Self::from_record(&record)?;
         if record.data_len == 0 && !another_follows(bytes, record.data_at) {
@@ -50,7 +50,7 @@ impl<'a> Chunk<'a> {
 
     /// The bytes of a compressed chunk. Memory grows with what comes out, never beyond `limit` or the size that the
     /// header promises; what came out before an error is left in `out`.
-    pub fn decompress(&self, limit: usize, out: &mut Buffer) -> Result<(), String> {
+    pub(crate) fn decompress(&self, limit: usize, out: &mut Buffer) -> Result<(), String> {
         if self.size != usize::MAX && self.size > limit {
             return Err(format!(
                 "{} bytes decompressed, the limit is {limit} (max_chunk_bytes)",

@@ -20,7 +20,7 @@ pub(crate) enum Content {
 }
 
 impl Content {
-    pub fn bytes<'a>(&'a self, file: &'a [u8]) -> &'a [u8] {
+    pub(crate) fn bytes<'a>(&'a self, file: &'a [u8]) -> &'a [u8] {
         match self {
             Self::Stored { from, to } => &file[*from..*to],
             Self::Unpacked(buffer) => buffer,

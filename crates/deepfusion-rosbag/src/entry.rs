@@ -111,7 +111,7 @@ fn step(content: &[u8], at: usize, walk: &mut Walk) -> Result<usize, Fault> {
 
 impl Walk {
     /// The messages of known connections.
-    pub fn entries(&self, places: &HashMap<u32, u32>) -> Vec<Entry> {
+    pub(crate) fn entries(&self, places: &HashMap<u32, u32>) -> Vec<Entry> {
         let known = |&(id, time, offset): &(u32, Time, u32)| {
             let connection = *places.get(&id)?;
             Some(Entry {

@@ -132,6 +132,16 @@ pub enum Error {
         /// What to do about it, in one line.
         remedy: Option<&'static str>,
     },
+    /// A recording of a kind whose reader is compiled in only with a feature, which is off.
+    #[error("{}: it is {kind}, and this program was built without the feature `{feature}`", path.display())]
+    Feature {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        kind: &'static str,
+        /// The feature, which has this name in every crate.
+        feature: &'static str,
+    },
     /// A set of no bags.
     #[error("a set of bags needs at least one bag")]
     EmptySet,
@@ -191,6 +201,9 @@ impl Hint for Error {
             Self::TooLarge { .. } => "split it over several messages",
             Self::NoSuchConnection { .. } => "use what `add_connection` of this writer returned",
             Self::Storage { remedy, .. } => return remedy.map(str::to_owned),
+            Self::Feature { feature, .. } => {
+                return Some(format!("build with the feature `{feature}` to read it"));
+            }
             Self::EmptySet => return None,
         };
         Some(text.to_owned())
@@ -205,7 +218,7 @@ pub(crate) struct Fault {
 }
 
 impl Fault {
-    pub fn new(offset: usize, problem: impl Into<String>) -> Self {
+    pub(crate) fn new(offset: usize, problem: impl Into<String>) -> Self {
         Self {
             offset: offset as u64,
             problem: problem.into(),

@@ -18,7 +18,7 @@ pub(crate) struct BagHeader {
 }
 
 impl BagHeader {
-    pub fn read(bytes: &[u8], at: usize) -> Result<Self, Fault> {
+    pub(crate) fn read(bytes: &[u8], at: usize) -> Result<Self, Fault> {
         let record = Record::read(bytes, at)?;
         record.expect_op(op::BAG_HEADER, "the bag header")?;
         Ok(Self {
@@ -45,7 +45,7 @@ pub(crate) struct ChunkInfo {
 }
 
 impl ChunkInfo {
-    pub fn messages(&self) -> u64 {
+    pub(crate) fn messages(&self) -> u64 {
         self.counts.iter().map(|&(_, n)| u64::from(n)).sum()
     }
 }
@@ -61,7 +61,7 @@ pub(crate) struct Index {
 
 impl Index {
     /// The index section that `header` points to. The counts are not trusted: memory is allocated record by record.
-    pub fn read(bytes: &[u8], header: &BagHeader) -> Result<Self, Fault> {
+    pub(crate) fn read(bytes: &[u8], header: &BagHeader) -> Result<Self, Fault> {
         let mut index = Self::default();
         let mut at = usize::try_from(header.index_pos).unwrap_or(usize::MAX);
         if at < header.end || at > bytes.len() {
@@ -87,7 +87,7 @@ impl Index {
     }
 
     /// Adds a connection unless its number is known: chunks repeat the connections of the index.
-    pub fn add_connection(&mut self, connection: Connection) {
+    pub(crate) fn add_connection(&mut self, connection: Connection) {
         let place = self.connections.len() as u32;
         if let std::collections::hash_map::Entry::Vacant(entry) = self.places.entry(connection.id) {
             entry.insert(place);
@@ -96,7 +96,7 @@ impl Index {
     }
 
     /// Adds a chunk and its messages to the connections' counts.
-    pub fn add_chunk(&mut self, chunk: ChunkInfo) {
+    pub(crate) fn add_chunk(&mut self, chunk: ChunkInfo) {
         for &(place, count) in &chunk.counts {
             self.connections[place as usize].count += u64::from(count);
         }

@@ -1,7 +1,7 @@
 use crate::buffer::Buffer;
 use crate::connection::Connection;
-use crate::msg::RosMessage;
-use crate::msg::wire::{CDR_HEADER, cdr_is_big_endian};
+use crate::msg::wire::{CDR_HEADER, cdr_is_big_endian, decode_first};
+use crate::msg::{CompressedVideo, Header, RosMessage};
 use crate::{Error, Result, Time};
 use std::ops::Range;
 use std::path::Path;
@@ -120,7 +120,7 @@ impl<'bag> Message<'bag> {
     }
 
     /// The header's time of measurement, without decoding the message, which must begin with a header; `None` if it is
-    /// not set, or the message is too short.
+    /// not set, or the message is too short. [`CompressedVideo`] begins with a time alone, which is as good.
     #[must_use]
     pub fn header_stamp(&self) -> Option<Time> {
         let data = self.data();
@@ -133,6 +133,7 @@ impl<'bag> Message<'bag> {
             })
         };
         let (at, big) = match self.serialization {
+            Serialization::Ros1 if self.is_video() => (0, false),
             // Behind the sequence number.
             Serialization::Ros1 => (size_of::<u32>(), false),
             Serialization::Cdr => (CDR_HEADER, cdr_is_big_endian(data).ok()?),
@@ -141,6 +142,25 @@ impl<'bag> Message<'bag> {
         let before_1970 = self.serialization == Serialization::Cdr && sec > i32::MAX as u32;
         let set = !before_1970 && (sec != 0 || nsec != 0);
         set.then_some(Time { sec, nsec })
+    }
+
+    /// The header's frame, without decoding the message, which must begin with a header; `None` if it is empty, or the
+    /// message is too short.
+    #[must_use]
+    pub fn header_frame(&self) -> Option<String> {
+        let cdr = self.serialization == Serialization::Cdr;
+        let frame = if self.is_video() {
+            let video: CompressedVideo<'_> = decode_first(self.data(), cdr).ok()?;
+            video.frame_id
+        } else {
+            let header: Header = decode_first(self.data(), cdr).ok()?;
+            header.frame_id
+        };
+        Some(frame).filter(|frame| !frame.is_empty())
+    }
+
+    fn is_video(&self) -> bool {
+        self.connection.type_name == CompressedVideo::TYPE
     }
 
     /// Whether it is a `T`, by type name and MD5.

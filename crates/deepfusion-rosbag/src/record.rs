@@ -6,12 +6,12 @@ use crate::error::Fault;
 
 /// What a record is, its field `op`.
 pub(crate) mod op {
-    pub const MESSAGE: u8 = 2;
-    pub const BAG_HEADER: u8 = 3;
-    pub const INDEX_DATA: u8 = 4;
-    pub const CHUNK: u8 = 5;
-    pub const CHUNK_INFO: u8 = 6;
-    pub const CONNECTION: u8 = 7;
+    pub(crate) const MESSAGE: u8 = 2;
+    pub(crate) const BAG_HEADER: u8 = 3;
+    pub(crate) const INDEX_DATA: u8 = 4;
+    pub(crate) const CHUNK: u8 = 5;
+    pub(crate) const CHUNK_INFO: u8 = 6;
+    pub(crate) const CONNECTION: u8 = 7;
 }
 
 /// A record as it lies in `bytes`; nothing is copied or allocated, whatever its lengths claim.
@@ -29,7 +29,7 @@ pub(crate) struct Record<'a> {
 
 impl<'a> Record<'a> {
     /// The record at `at`, whole.
-    pub fn read(bytes: &'a [u8], at: usize) -> Result<Self, Fault> {
+    pub(crate) fn read(bytes: &'a [u8], at: usize) -> Result<Self, Fault> {
         let record = Self::read_header(bytes, at)?;
         if record.data.len() < record.data_len {
             let problem = format!(
@@ -43,7 +43,7 @@ impl<'a> Record<'a> {
     }
 
     /// The record at `at` with the part of its data that is there.
-    pub fn read_header(bytes: &'a [u8], at: usize) -> Result<Self, Fault> {
+    pub(crate) fn read_header(bytes: &'a [u8], at: usize) -> Result<Self, Fault> {
         let cut = |what: &str| {
             Fault::new(
                 at,
@@ -71,23 +71,23 @@ impl<'a> Record<'a> {
     }
 
     /// Where the next record begins.
-    pub fn end(&self) -> usize {
+    pub(crate) fn end(&self) -> usize {
         self.data_at + self.data.len()
     }
 
     /// A fault of this record.
-    pub fn fault(&self, problem: impl Into<String>) -> Fault {
+    pub(crate) fn fault(&self, problem: impl Into<String>) -> Fault {
         Fault::new(self.at, problem)
     }
 
-    pub fn op(&self) -> Option<u8> {
+    pub(crate) fn op(&self) -> Option<u8> {
         match self.fields.get("op") {
             Some(&[op]) => Some(op),
             _ => None,
         }
     }
 
-    pub fn expect_op(&self, op: u8, what: &str) -> Result<(), Fault> {
+    pub(crate) fn expect_op(&self, op: u8, what: &str) -> Result<(), Fault> {
         match self.op() {
             Some(found) if found == op => Ok(()),
             Some(found) => Err(self.fault(format!("expected {what} (op {op}), found op {found}"))),
@@ -95,19 +95,19 @@ impl<'a> Record<'a> {
         }
     }
 
-    pub fn u32(&self, name: &str) -> Result<u32, Fault> {
+    pub(crate) fn u32(&self, name: &str) -> Result<u32, Fault> {
         self.fixed(name).map(u32::from_le_bytes)
     }
 
-    pub fn u64(&self, name: &str) -> Result<u64, Fault> {
+    pub(crate) fn u64(&self, name: &str) -> Result<u64, Fault> {
         self.fixed(name).map(u64::from_le_bytes)
     }
 
-    pub fn time(&self, name: &str) -> Result<Time, Fault> {
+    pub(crate) fn time(&self, name: &str) -> Result<Time, Fault> {
         self.fixed(name).map(time)
     }
 
-    pub fn text(&self, name: &str) -> Result<String, Fault> {
+    pub(crate) fn text(&self, name: &str) -> Result<String, Fault> {
         let value = self.fields.get(name).ok_or_else(|| self.missing(name))?;
         Ok(String::from_utf8_lossy(value).into_owned())
     }
@@ -128,7 +128,7 @@ impl<'a> Record<'a> {
 
     /// Connection and time of a message's record, in one pass over its fields: this runs for every message.
     #[inline]
-    pub fn message(&self) -> Result<(u32, Time), Fault> {
+    pub(crate) fn message(&self) -> Result<(u32, Time), Fault> {
         let (mut op, mut connection, mut stamp) = (None, None, None);
         for (name, value) in self.fields {
             match name {
@@ -151,7 +151,7 @@ pub(crate) struct Fields<'a>(pub &'a [u8]);
 
 impl<'a> Fields<'a> {
     /// The value of the first field called `name`.
-    pub fn get(mut self, name: &str) -> Option<&'a [u8]> {
+    pub(crate) fn get(mut self, name: &str) -> Option<&'a [u8]> {
         self.find(|(found, _)| *found == name.as_bytes())
             .map(|(_, value)| value)
     }

@@ -18,7 +18,7 @@ enum Bytes {
 }
 
 impl Source {
-    pub fn map(path: &Path) -> Result<Self> {
+    pub(crate) fn map(path: &Path) -> Result<Self> {
         let failed = |source| Error::file(path, source);
         let file = File::open(path).map_err(failed)?;
         let metadata = file.metadata().map_err(failed)?;
@@ -41,7 +41,7 @@ impl Source {
         })
     }
 
-    pub fn memory(name: &Path, bytes: Vec<u8>) -> Self {
+    pub(crate) fn memory(name: &Path, bytes: Vec<u8>) -> Self {
         Self {
             path: name.to_owned(),
             bytes: Bytes::Owned(bytes),

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use deepfusion_model::{CheckpointKind, RunFolder, StoredNetwork};
+use deepfusion_geometry::Intrinsics;
+use deepfusion_model::{CheckpointKind, RunFolder, StoredNetwork, TrainConfig};
 use deepfusion_weights::{DEFAULT, Shipped};
 
 use crate::Error;
@@ -95,6 +96,40 @@ impl ModelSource {
         match self {
             Self::Run { folder, kind, .. } => StoredNetwork::of_checkpoint(folder, *kind, set),
             Self::Packed { network, .. } => unpacked(network, set),
+        }
+    }
+
+    /// The camera that recordings without one are taken to have: the one a run assumed or learned for such recordings. `None` where all that
+    /// it learned from said theirs. `set` as in [`Self::load`].
+    ///
+    /// # Errors
+    /// As [`RunFolder::read_config`] and [`RunFolder::read_state`], [`deepfusion_model::Error::ConfigFile`].
+    pub fn assumed_camera(
+        &self,
+        set: Option<&str>,
+    ) -> Result<Option<Intrinsics>, deepfusion_model::Error> {
+        match self {
+            Self::Run { folder, kind, .. } => {
+                let config = folder.read_config()?;
+                match (config.assumed_camera, config.learned_camera()) {
+                    (None, _) => Ok(None),
+                    // Held, whatever other recordings' cameras were.
+                    (Some(held), None) => Ok(Some(held.intrinsics())),
+                    (Some(_), Some(_)) => folder.camera_of(&folder.read_state(*kind)?, set),
+                }
+            }
+            Self::Packed { network, .. } => {
+                let read = TrainConfig::from_run_table(network.card.config.clone());
+                let (config, findings) = read.map_err(|e| deepfusion_model::Error::ConfigFile {
+                    path: network.card.name.clone().into(),
+                    reason: e.to_string(),
+                })?;
+                Ok(match (config.assumed_camera, config.learned_camera()) {
+                    (None, _) => None,
+                    (Some(held), None) => Some(held.intrinsics()),
+                    (Some(_), Some(_)) => findings.camera_of(&config, set),
+                })
+            }
         }
     }
 

@@ -4,9 +4,9 @@ use crate::scanner::gaussian;
 use crate::texture::noise::hash;
 
 /// Rates of speed and angle, per second.
-pub const SPEED_RATE_HZ: f64 = 50.0;
+pub(crate) const SPEED_RATE_HZ: f64 = 50.0;
 /// See [`SPEED_RATE_HZ`].
-pub const STEERING_RATE_HZ: f64 = 80.0;
+pub(crate) const STEERING_RATE_HZ: f64 = 80.0;
 
 /// Distance of the axles, metres.
 pub const WHEELBASE_M: f64 = 2.7;

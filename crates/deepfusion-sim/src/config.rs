@@ -1,3 +1,4 @@
+use crate::rig::CAMERA_HEIGHT;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -130,6 +131,8 @@ pub struct SimConfig {
     pub scene: Scene,
     /// The sensors of the car, and their mounts.
     pub sensors: Sensors,
+    /// Height of the camera above the road, in metres.
+    pub camera_height_m: f64,
     /// [`crate::write_kitti`] writes a velodyne scan for every n-th frame; 0 writes none.
     pub scan_every: usize,
     /// Angle between two columns of a velodyne scan, in degrees.
@@ -147,6 +150,7 @@ impl Default for SimConfig {
             fps: 10.0,
             scene: Scene::Urban,
             sensors: Sensors::Kitti,
+            camera_height_m: CAMERA_HEIGHT,
             scan_every: 1,
             scan_step_deg: 0.3,
         }
@@ -208,6 +212,12 @@ impl SimConfig {
             "a drive of at most 30 minutes",
         )?;
         check(
+            self.camera_height_m >= 0.3 && self.camera_height_m <= 4.0,
+            "camera_height_m",
+            self.camera_height_m.to_string(),
+            "0.3 to 4 metres",
+        )?;
+        check(
             self.scan_step_deg >= 0.05 && self.scan_step_deg <= 5.0,
             "scan_step_deg",
             self.scan_step_deg.to_string(),
@@ -253,6 +263,13 @@ mod tests {
                     ..base()
                 },
                 "moving_cars",
+            ),
+            (
+                SimConfig {
+                    camera_height_m: f64::NAN,
+                    ..base()
+                },
+                "camera_height_m",
             ),
             (
                 SimConfig {

@@ -18,7 +18,7 @@ const DENTS: [f32; 4] = [0.5, 0.25, 0.06, 0.0];
 
 /// One lobe.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Crown {
+pub(crate) struct Crown {
     /// Half axes of the outermost shell, metres.
     pub radii: [f32; 3],
     /// Side of the cells that hold one clump each, metres.
@@ -31,13 +31,13 @@ pub struct Crown {
 
 /// Number of the shell that a face of a crown belongs to, from the outside.
 #[inline]
-pub fn shell_of(face: u8) -> u8 {
+pub(crate) fn shell_of(face: u8) -> u8 {
     (face.saturating_sub(FACE_LEAVES)) % SHELLS.len() as u8
 }
 
 /// The clump of leaves at a point of a lobe (its axes): a hash that is the clump's own, if one is there.
 #[inline]
-pub fn clump(p: &V3, cell: f32, fill: f32, salt: u32) -> Option<u32> {
+pub(crate) fn clump(p: &V3, cell: f32, fill: f32, salt: u32) -> Option<u32> {
     let q = p / cell;
     let fine = {
         let f = q * 4.3;
@@ -82,7 +82,7 @@ pub fn clump(p: &V3, cell: f32, fill: f32, salt: u32) -> Option<u32> {
 impl Crown {
     /// Where a ray (the lobe's axes) first meets a leaf, at t in (0, `limit`).
     #[inline]
-    pub fn enter(&self, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
+    pub(crate) fn enter(&self, o: &V3, d: &V3, limit: f32) -> Option<Entry> {
         let inverse = V3::new(
             1.0 / self.radii[0],
             1.0 / self.radii[1],
@@ -132,7 +132,7 @@ impl Crown {
 
     /// Where the leaves at a point face: outward, each clump a little otherwise.
     #[inline]
-    pub fn normal(&self, p: &V3) -> V3 {
+    pub(crate) fn normal(&self, p: &V3) -> V3 {
         let [a, b, c] = self.radii;
         let out = V3::new(p.x / (a * a), p.y / (b * b), p.z / (c * c));
         let code = clump(p, self.cell, self.fill, self.salt).unwrap_or(0);

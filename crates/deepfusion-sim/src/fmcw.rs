@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Lines, and the angle between two of them, degrees.
-pub const LINES: usize = 120;
+pub(crate) const LINES: usize = 120;
 const LINE_STEP_DEG: f32 = 0.08;
 /// Elevation of the topmost line, degrees: two thirds of the field of view lie below the horizon.
 const TOP_DEG: f32 = 3.2;
@@ -28,7 +28,7 @@ const RANGE_NOISE: f32 = 0.02;
 const VELOCITY_NOISE: f32 = 0.05;
 
 /// Time over which velocities are taken from two positions, seconds.
-pub const VELOCITY_STEP_S: f64 = 1e-3;
+pub(crate) const VELOCITY_STEP_S: f64 = 1e-3;
 
 /// A scan with its ground truth.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -43,7 +43,7 @@ pub struct FmcwScan {
 }
 
 /// Dynamic objects, now and [`VELOCITY_STEP_S`] later, solid by solid.
-pub struct MovingSolids {
+pub(crate) struct MovingSolids {
     /// Now.
     pub now: Vec<Primitive>,
     /// Later, in the same order.
@@ -73,7 +73,7 @@ impl MovingSolids {
 }
 
 /// One scan at one instant. `velocity` is that of the sensor over ground, world axes, m/s; `key` makes the noise.
-pub fn scan(
+pub(crate) fn scan(
     world: &World,
     light: &GroundLight,
     moving: &MovingSolids,

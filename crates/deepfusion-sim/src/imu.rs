@@ -7,7 +7,7 @@ use deepfusion_geometry::Se3;
 use nalgebra::Vector3;
 
 /// Readings per second.
-pub const RATE_HZ: f64 = 100.0;
+pub(crate) const RATE_HZ: f64 = 100.0;
 
 /// Standard deviations of a reading: m/s² and rad/s. Those of a good MEMS unit at this rate.
 const NOISE: (f64, f64) = (0.03, 0.002);

@@ -67,7 +67,7 @@ impl Drop for Staging<'_> {
 }
 
 /// Makes the output folder; whether it was there before.
-pub fn prepare(out: &Path) -> Result<bool> {
+pub(crate) fn prepare(out: &Path) -> Result<bool> {
     match fs::read_dir(out) {
         Ok(mut entries) => match entries.next() {
             None => Ok(true),
@@ -199,7 +199,7 @@ fn encode(
 }
 
 /// A PNG of a picture; `path` is named in errors.
-pub fn encode_rgb(out: impl Write, path: &Path, rgb: &image::RgbImage) -> Result<()> {
+pub(crate) fn encode_rgb(out: impl Write, path: &Path, rgb: &image::RgbImage) -> Result<()> {
     let colour = ExtendedColorType::Rgb8;
     let size = rgb.dimensions();
     encode(out, path, rgb.as_raw(), size, colour, FilterType::Sub)
@@ -210,7 +210,7 @@ fn write_png(path: &Path, frame: &SimFrame) -> Result<()> {
 }
 
 /// KITTI's 16-bit depth: metres × 256, 0 where there is none.
-pub fn encode_depth(out: impl Write, path: &Path, depth: &DepthMap) -> Result<()> {
+pub(crate) fn encode_depth(out: impl Write, path: &Path, depth: &DepthMap) -> Result<()> {
     let bytes: Vec<u8> = depth
         .data
         .iter()

@@ -23,7 +23,7 @@ const LONGEST: f32 = 26.0;
 const CHUNK: usize = 64;
 
 /// The share of sun and sky that is visible from each point of the street.
-pub struct GroundLight {
+pub(crate) struct GroundLight {
     start: f32,
     rows: usize,
     /// Sun and sky, 0–255, row by row along the street.
@@ -45,7 +45,7 @@ struct Caster {
 }
 
 /// The foot of something that keeps the sky off the ground beside it.
-pub struct Foot {
+pub(crate) struct Foot {
     middle: (f64, f64),
     heading: (f32, f32),
     half: [f32; 2],
@@ -56,7 +56,7 @@ pub struct Foot {
 
 impl GroundLight {
     /// Bakes the light of all static objects.
-    pub fn bake(world: &World, cores: Cores) -> Self {
+    pub(crate) fn bake(world: &World, cores: Cores) -> Self {
         let (start, end) = (world.road.start as f32, world.road.end() as f32);
         let rows = (((end - start) / CELL).ceil() as usize).next_multiple_of(CHUNK);
         let casters = casters(world);
@@ -77,7 +77,7 @@ impl GroundLight {
 
     /// Share of the sun and of the sky that a patch of ground of this size sees.
     #[inline]
-    pub fn at(&self, p: &StreetPoint, size: f32) -> (f32, f32) {
+    pub(crate) fn at(&self, p: &StreetPoint, size: f32) -> (f32, f32) {
         if p.lateral.abs() >= REACH - 1.0 {
             return (1.0, 1.0);
         }
@@ -178,7 +178,7 @@ fn casters(world: &World) -> Vec<Caster> {
 
 impl Foot {
     /// The foot of an object.
-    pub fn of(world: &World, object: &SceneObject) -> Self {
+    pub(crate) fn of(world: &World, object: &SceneObject) -> Self {
         let t = object.world_from_object.translation();
         let forward = object.world_from_object.rotate(&Vector3::x());
         let (depth, range, shrink) = match object.class {
@@ -204,7 +204,7 @@ impl Foot {
 
     /// Share of the sky it leaves to the ground at a place.
     #[inline]
-    pub fn open_at(&self, x: f64, y: f64) -> f32 {
+    pub(crate) fn open_at(&self, x: f64, y: f64) -> f32 {
         let (dx, dy) = ((x - self.middle.0) as f32, (y - self.middle.1) as f32);
         let reach = self.half[0] + self.half[1] + 4.0 * self.range;
         if dx.abs() > reach || dy.abs() > reach {

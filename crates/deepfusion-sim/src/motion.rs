@@ -22,11 +22,11 @@ const MAX_LATERAL: f64 = 2.3;
 const LANE: f64 = -1.65;
 
 /// Height of the IMU above the road, metres.
-pub const IMU_HEIGHT: f64 = 0.93;
+pub(crate) const IMU_HEIGHT: f64 = 0.93;
 
 /// Motion of the IMU at one instant, in its own axes (x forward, y left, z up).
 #[derive(Debug, Clone, Copy)]
-pub struct Kinematics {
+pub(crate) struct Kinematics {
     /// Velocity, world axes, m/s.
     pub velocity: Vector3<f64>,
     /// Acceleration, world axes, m/s².
@@ -71,7 +71,7 @@ impl Wander {
 }
 
 /// A drive along a road.
-pub struct Drive {
+pub(crate) struct Drive {
     /// Distance, speed and acceleration at each step of the table.
     table: Vec<[f64; 3]>,
     lateral: Wander,
@@ -82,7 +82,7 @@ pub struct Drive {
 
 impl Drive {
     /// Drives along `road` from s = 0 for `duration_s` seconds, `pace` times as fast as a street allows.
-    pub fn simulate(rng: &mut ChaCha8Rng, road: &Road, duration_s: f64, pace: f64) -> Self {
+    pub(crate) fn simulate(rng: &mut ChaCha8Rng, road: &Road, duration_s: f64, pace: f64) -> Self {
         let wish = Wander::new(rng, 7.0, 9.0, 40.0);
         let mean = rng.random_range(7.5..9.5);
         let wanted = |s: f64, t: f64| {
@@ -123,7 +123,7 @@ impl Drive {
 
     /// Distance along the road and speed at a time: cubic Hermite, so that the speed is the
     /// derivative of the distance.
-    pub fn progress(&self, time_s: f64) -> (f64, f64, f64) {
+    pub(crate) fn progress(&self, time_s: f64) -> (f64, f64, f64) {
         let position = ((time_s + LEAD) / STEP).clamp(0.0, (self.table.len() - 2) as f64);
         let index = (position.floor() as usize).min(self.table.len() - 2);
         let (a, b) = (&self.table[index], &self.table[index + 1]);
@@ -138,7 +138,7 @@ impl Drive {
     }
 
     /// World frame (z up) from the IMU's frame at a time: Rz(yaw)·Ry(pitch)·Rx(roll), as OXTS has it.
-    pub fn world_from_imu(&self, road: &Road, time_s: f64) -> Se3 {
+    pub(crate) fn world_from_imu(&self, road: &Road, time_s: f64) -> Se3 {
         let (yaw, pitch, roll) = self.attitude(road, time_s);
         let (s, ..) = self.progress(time_s);
         let (x, y, _) = road.world(s, LANE + self.lateral.at(s));
@@ -147,7 +147,7 @@ impl Drive {
     }
 
     /// Yaw, pitch and roll in radians (OXTS: pitch positive with the front down).
-    pub fn attitude(&self, road: &Road, time_s: f64) -> (f64, f64, f64) {
+    pub(crate) fn attitude(&self, road: &Road, time_s: f64) -> (f64, f64, f64) {
         let (s, _, acceleration) = self.progress(time_s);
         let (_, _, heading, curvature) = road.centre(s);
         let lateral = LANE + self.lateral.at(s);
@@ -161,7 +161,7 @@ impl Drive {
     }
 
     /// Velocity, acceleration and angular rate of the IMU, by central differences of its pose.
-    pub fn kinematics(&self, road: &Road, time_s: f64) -> Kinematics {
+    pub(crate) fn kinematics(&self, road: &Road, time_s: f64) -> Kinematics {
         const H: f64 = 0.02;
         let [before, now, after] =
             [-H, 0.0, H].map(|offset| self.world_from_imu(road, time_s + offset));
@@ -175,7 +175,7 @@ impl Drive {
 }
 
 /// Rz(yaw)·Ry(pitch)·Rx(roll).
-pub fn rotation(yaw: f64, pitch: f64, roll: f64) -> Matrix3<f64> {
+pub(crate) fn rotation(yaw: f64, pitch: f64, roll: f64) -> Matrix3<f64> {
     let ((sr, cr), (sp, cp), (sy, cy)) = (roll.sin_cos(), pitch.sin_cos(), yaw.sin_cos());
     Matrix3::new(cy, -sy, 0.0, sy, cy, 0.0, 0.0, 0.0, 1.0)
         * Matrix3::new(cp, 0.0, sp, 0.0, 1.0, 0.0, -sp, 0.0, cp)

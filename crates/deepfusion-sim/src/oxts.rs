@@ -11,7 +11,7 @@ const ORIGIN: (f64, f64, f64) = (49.011_212, 8.422_885, 112.83);
 const EARTH_RADIUS: f64 = 6_378_137.0;
 
 /// Standard gravity, m/s².
-pub const GRAVITY: f64 = 9.81;
+pub(crate) const GRAVITY: f64 = 9.81;
 
 /// One OXTS reading, in the order of KITTI's `dataformat.txt`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,7 +105,7 @@ impl OxtsReading {
 }
 
 /// KITTI's description of the numbers.
-pub const DATA_FORMAT: &str = "\
+pub(crate) const DATA_FORMAT: &str = "\
 lat:   latitude of the oxts-unit (deg)
 lon:   longitude of the oxts-unit (deg)
 alt:   altitude of the oxts-unit (m)

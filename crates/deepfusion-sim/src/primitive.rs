@@ -4,19 +4,19 @@ use crate::crown::Crown;
 use nalgebra::Vector3;
 
 /// Short name for the renderer's vectors.
-pub type V3 = Vector3<f32>;
+pub(crate) type V3 = Vector3<f32>;
 
 /// Faces of a box, as [`Hit::face`] counts them: +x, −x, +y, −y, top, bottom. The other shapes use
 /// [`FACE_TOP`] for their flat top and [`FACE_ROUND`] for the rest.
-pub const FACE_TOP: u8 = 4;
+pub(crate) const FACE_TOP: u8 = 4;
 /// A curved surface.
-pub const FACE_ROUND: u8 = 6;
+pub(crate) const FACE_ROUND: u8 = 6;
 /// The shells of a crown are this face and those after it; no hull has so many.
-pub const FACE_LEAVES: u8 = 100;
+pub(crate) const FACE_LEAVES: u8 = 100;
 
 /// A convex solid bounded by planes n·p ≤ d in its own axes.
 #[derive(Debug, Clone)]
-pub struct Hull {
+pub(crate) struct Hull {
     /// Outward unit normals and distances.
     pub planes: Vec<(V3, f32)>,
     /// Half extents along x and y and the range of z: a box around it.
@@ -25,7 +25,7 @@ pub struct Hull {
 
 /// A solid in its own axes: x forward or along the street, y left, z up, metres.
 #[derive(Debug, Clone, Copy)]
-pub enum Shape {
+pub(crate) enum Shape {
     /// Half extents along x and y; z from 0 to `height`.
     Box {
         /// Half the extent along x.
@@ -69,7 +69,7 @@ pub enum Shape {
 
 /// A placed solid.
 #[derive(Debug, Clone, Copy)]
-pub struct Primitive {
+pub(crate) struct Primitive {
     /// Origin of its axes in the world.
     pub position: [f64; 3],
     /// Heading of its x axis in the world: cosine and sine.
@@ -86,7 +86,7 @@ pub struct Primitive {
 
 /// Where a ray enters a solid.
 #[derive(Debug, Clone, Copy)]
-pub struct Entry {
+pub(crate) struct Entry {
     /// In units of the ray's direction.
     pub t: f32,
     /// The face.
@@ -96,20 +96,20 @@ pub struct Entry {
 impl Primitive {
     /// A world direction in the solid's axes.
     #[inline]
-    pub fn local_of(&self, d: &V3) -> V3 {
+    pub(crate) fn local_of(&self, d: &V3) -> V3 {
         let (c, s) = self.heading;
         V3::new(c * d.x + s * d.y, c * d.y - s * d.x, d.z)
     }
 
     /// A direction of the solid's axes in the world.
     #[inline]
-    pub fn world_of(&self, d: &V3) -> V3 {
+    pub(crate) fn world_of(&self, d: &V3) -> V3 {
         let (c, s) = self.heading;
         V3::new(c * d.x - s * d.y, s * d.x + c * d.y, d.z)
     }
 
     /// A world point in the solid's axes; subtracted in f64, so far from the origin too.
-    pub fn local_point(&self, p: &Vector3<f64>) -> V3 {
+    pub(crate) fn local_point(&self, p: &Vector3<f64>) -> V3 {
         let d = V3::new(
             (p.x - self.position[0]) as f32,
             (p.y - self.position[1]) as f32,
@@ -119,7 +119,7 @@ impl Primitive {
     }
 
     /// Half extents along x and y and the range of z of a box around it, in its own axes.
-    pub fn bounds(&self, hulls: &[Hull]) -> (f32, f32, f32, f32) {
+    pub(crate) fn bounds(&self, hulls: &[Hull]) -> (f32, f32, f32, f32) {
         match self.shape {
             Shape::Box {
                 half_x,
@@ -148,7 +148,7 @@ impl Primitive {
 
 /// Where a ray from `o` along `d` (the solid's axes) enters the shape, if at t in (0, `limit`).
 #[inline]
-pub fn enter(shape: &Shape, hulls: &[Hull], o: &V3, d: &V3, limit: f32) -> Option<Entry> {
+pub(crate) fn enter(shape: &Shape, hulls: &[Hull], o: &V3, d: &V3, limit: f32) -> Option<Entry> {
     match *shape {
         Shape::Box {
             half_x,
@@ -333,7 +333,7 @@ fn enter_capsule(half_axis: [f32; 3], radius: f32, o: &V3, d: &V3, limit: f32) -
 
 /// Outward normal of the surface at a point (the solid's axes).
 #[inline]
-pub fn normal_at(shape: &Shape, hulls: &[Hull], p: &V3, face: u8) -> V3 {
+pub(crate) fn normal_at(shape: &Shape, hulls: &[Hull], p: &V3, face: u8) -> V3 {
     match (shape, face) {
         (Shape::Hull(index), face) => hulls[*index as usize].planes[usize::from(face)].0,
         (_, 0) => V3::x(),

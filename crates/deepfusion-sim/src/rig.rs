@@ -4,11 +4,11 @@ use crate::motion::IMU_HEIGHT;
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix3, Vector3};
 
-/// Height of camera 2 above the road, metres.
-pub const CAMERA_HEIGHT: f64 = 1.65;
+/// Height of camera 2 above the road where nothing else is asked for, metres.
+pub(crate) const CAMERA_HEIGHT: f64 = 1.65;
 
 /// Camera 2 sits this far left of camera 0, metres (KITTI's P_rect_02 has the same 6 cm).
-pub const CAM2_FROM_CAM0_X: f64 = 0.06;
+pub(crate) const CAM2_FROM_CAM0_X: f64 = 0.06;
 
 /// The mounts of the sensors on the car. "The IMU" is KITTI's: it represents the car itself, above the middle of
 /// the rear axle.
@@ -25,7 +25,7 @@ pub struct Rig {
 impl Rig {
     /// KITTI's arrangement: the velodyne 27 cm behind the camera and 8 cm above it, turned against
     /// it by fractions of a degree; the IMU 81 cm behind the velodyne and 32 cm left of it.
-    pub fn kitti_like() -> Self {
+    pub fn kitti_like(camera_height_m: f64) -> Self {
         // Camera axes (right, down, forward) of the vehicle's (forward, left, up).
         let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
         let cam0_from_vehicle_axes = Se3::from_parts(&axes, Vector3::zeros());
@@ -35,7 +35,7 @@ impl Rig {
                 * cam0_from_vehicle_axes
                 * tilt;
         // The IMU's axes are the vehicle's; its place is given by the height of the camera.
-        let velo_in_vehicle = Vector3::new(0.81, -0.32, CAMERA_HEIGHT + 0.076 - IMU_HEIGHT);
+        let velo_in_vehicle = Vector3::new(0.81, -0.32, camera_height_m + 0.076 - IMU_HEIGHT);
         let velo_from_imu =
             tilt.inverse() * Se3::from_axis_angle(Vector3::zeros(), -velo_in_vehicle);
         Self {
@@ -47,12 +47,12 @@ impl Rig {
 
     /// UMAD's arrangement on a roof: the camera 80 mm above the LiDAR, a 6-axis unit 50 mm behind it, all of them
     /// 1.6 m before the rear axle; the LiDAR turned against the car by fractions of a degree.
-    pub fn umad_like() -> Self {
+    pub fn umad_like(camera_height_m: f64) -> Self {
         let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
         let cam_axes_from_vehicle_axes = Se3::from_parts(&axes, Vector3::zeros());
         let shift = |x, y, z| Se3::from_axis_angle(Vector3::zeros(), Vector3::new(x, y, z));
         let tilt = Se3::from_axis_angle(Vector3::new(0.003, -0.005, 0.006), Vector3::zeros());
-        let lidar_height = CAMERA_HEIGHT - 0.08 - IMU_HEIGHT;
+        let lidar_height = camera_height_m - 0.08 - IMU_HEIGHT;
         Self {
             cam0_from_velo: shift(-CAM2_FROM_CAM0_X, 0.08, 0.0) * cam_axes_from_vehicle_axes * tilt,
             velo_from_imu: tilt.inverse() * shift(-1.6, 0.0, -lidar_height),
@@ -73,7 +73,7 @@ impl Rig {
 }
 
 /// KITTI's camera 2, resized to `width` × `height`.
-pub fn kitti_like_intrinsics(width: u32, height: u32) -> Intrinsics {
+pub(crate) fn kitti_like_intrinsics(width: u32, height: u32) -> Intrinsics {
     Intrinsics {
         fx: 721.5377,
         fy: 721.5377,
@@ -87,7 +87,7 @@ pub fn kitti_like_intrinsics(width: u32, height: u32) -> Intrinsics {
 
 /// UMAD's camera as the paper prints it, 640×480, except for the row of its centre: the printed 117.6 is
 /// implausible for 480 rows, and the middle is used instead. Resized to `width` × `height`.
-pub fn umad_like_intrinsics(width: u32, height: u32) -> Intrinsics {
+pub(crate) fn umad_like_intrinsics(width: u32, height: u32) -> Intrinsics {
     Intrinsics {
         fx: 703.64,
         fy: 724.82,
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn the_roof_s_sensors_are_where_the_paper_has_them() {
-        let rig = Rig::umad_like();
+        let rig = Rig::umad_like(CAMERA_HEIGHT);
         let lidar_from_cam = rig.cam_from_velo().inverse();
         let above = lidar_from_cam.translation();
         assert!(
@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn the_camera_looks_forward_from_its_height() {
-        let imu_from_cam = Rig::kitti_like().cam_from_imu().inverse();
+        let imu_from_cam = Rig::kitti_like(CAMERA_HEIGHT).cam_from_imu().inverse();
         let forward = imu_from_cam.rotate(&Vector3::z());
         assert!((forward - Vector3::x()).norm() < 1e-12, "{forward}");
         let down = imu_from_cam.rotate(&Vector3::y());

@@ -8,10 +8,10 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 /// Distance between two samples of the centreline, in metres.
-pub const STEP: f64 = 0.5;
+pub(crate) const STEP: f64 = 0.5;
 
 /// Height of pavements and gardens above the road, in metres.
-pub const KERB_HEIGHT: f32 = 0.13;
+pub(crate) const KERB_HEIGHT: f32 = 0.13;
 
 /// Side of a cell of the look-up grid, in metres.
 const CELL: f64 = 4.0;
@@ -20,7 +20,7 @@ const CELL: f64 = 4.0;
 const CELL_REACH: i64 = 36;
 
 /// How far a side street goes, measured from the centreline, in metres.
-pub const SIDE_STREET_LENGTH: f32 = 75.0;
+pub(crate) const SIDE_STREET_LENGTH: f32 = 75.0;
 
 /// Largest heading of the road against the world's x axis, in radians: a road that never turns back
 /// cannot cross itself.
@@ -28,7 +28,7 @@ const MAX_HEADING: f64 = 1.0;
 
 /// One sample of the centreline.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct RoadSample {
+pub(crate) struct RoadSample {
     /// World position, metres.
     pub x: f64,
     /// World position, metres.
@@ -49,7 +49,7 @@ pub struct RoadSample {
 
 /// A street that leaves the main one at a right angle.
 #[derive(Debug, Clone, Copy)]
-pub struct SideStreet {
+pub(crate) struct SideStreet {
     /// Where it leaves, metres along the centreline.
     pub s: f32,
     /// 0: to the right, 1: to the left.
@@ -60,7 +60,7 @@ pub struct SideStreet {
 
 /// Street coordinates of a point.
 #[derive(Debug, Clone, Copy)]
-pub struct StreetPoint {
+pub(crate) struct StreetPoint {
     /// Index of the nearest sample.
     pub index: usize,
     /// Metres along the centreline.
@@ -70,7 +70,7 @@ pub struct StreetPoint {
 }
 
 /// The street.
-pub struct Road {
+pub(crate) struct Road {
     /// `s` of the first sample, metres (negative: the street begins behind the start).
     pub start: f64,
     /// Height of everything beside the carriageway above it, metres.
@@ -85,19 +85,19 @@ pub struct Road {
 
 impl Road {
     /// A random centreline from `start` to at least `end` (metres), without widths yet.
-    pub fn generate(rng: &mut ChaCha8Rng, start: f64, end: f64) -> Self {
+    pub(crate) fn generate(rng: &mut ChaCha8Rng, start: f64, end: f64) -> Self {
         let count = ((end - start) / STEP).ceil() as usize + 2;
         Self::curved(&curvature_profile(rng, count), start)
     }
 
     /// A straight centreline from `start` to at least `end` (metres), without widths yet.
-    pub fn straight(start: f64, end: f64) -> Self {
+    pub(crate) fn straight(start: f64, end: f64) -> Self {
         let count = ((end - start) / STEP).ceil() as usize + 2;
         Self::curved(&vec![0.0; count], start)
     }
 
     /// The same, of gentle bends: as a motorway or a country road, with radii of 150 to 1500 m.
-    pub fn gentle(rng: &mut ChaCha8Rng, start: f64, end: f64) -> Self {
+    pub(crate) fn gentle(rng: &mut ChaCha8Rng, start: f64, end: f64) -> Self {
         let count = ((end - start) / STEP).ceil() as usize + 2;
         let scale: f64 = rng.random_range(0.08..0.4);
         let profile: Vec<f64> = curvature_profile(rng, count)
@@ -149,47 +149,47 @@ impl Road {
     }
 
     /// Removes everything beyond `end` metres.
-    pub fn truncate(&mut self, end: f64) {
+    pub(crate) fn truncate(&mut self, end: f64) {
         let keep = (((end - self.start) / STEP).ceil() as usize + 1).min(self.samples.len());
         self.samples.truncate(keep);
         self.index();
     }
 
     /// Where the street ends, in metres.
-    pub fn end(&self) -> f64 {
+    pub(crate) fn end(&self) -> f64 {
         self.start + STEP * (self.samples.len() - 1) as f64
     }
 
     /// The samples, for the layout to fill in the widths.
-    pub fn samples_mut(&mut self) -> &mut [RoadSample] {
+    pub(crate) fn samples_mut(&mut self) -> &mut [RoadSample] {
         &mut self.samples
     }
 
     /// The sample at an index of [`StreetPoint`].
     #[inline]
-    pub fn sample(&self, index: usize) -> &RoadSample {
+    pub(crate) fn sample(&self, index: usize) -> &RoadSample {
         &self.samples[index]
     }
 
     /// The road's direction at an index of [`StreetPoint`], a unit vector.
     #[inline]
-    pub fn tangent(&self, index: usize) -> (f32, f32) {
+    pub(crate) fn tangent(&self, index: usize) -> (f32, f32) {
         (self.packed[index][0], self.packed[index][1])
     }
 
     /// Index of the sample nearest to `s`, clamped to the street.
-    pub fn index_at(&self, s: f64) -> usize {
+    pub(crate) fn index_at(&self, s: f64) -> usize {
         let index = ((s - self.start) / STEP).round();
         (index.max(0.0) as usize).min(self.samples.len() - 1)
     }
 
     /// The side streets.
-    pub fn side_streets(&self) -> &[SideStreet] {
+    pub(crate) fn side_streets(&self) -> &[SideStreet] {
         &self.side_streets
     }
 
     /// Adds a side street.
-    pub fn add_side_street(&mut self, street: SideStreet) {
+    pub(crate) fn add_side_street(&mut self, street: SideStreet) {
         self.side_streets.push(street);
         let number = self.side_streets.len() as u16;
         let reach = f64::from(street.half_width) + 14.0;
@@ -201,7 +201,7 @@ impl Road {
     }
 
     /// Centre, heading and curvature at `s`, smooth between the samples (cubic Hermite).
-    pub fn centre(&self, s: f64) -> (f64, f64, f64, f64) {
+    pub(crate) fn centre(&self, s: f64) -> (f64, f64, f64, f64) {
         let position = ((s - self.start) / STEP).clamp(0.0, (self.samples.len() - 2) as f64);
         let index = (position.floor() as usize).min(self.samples.len() - 2);
         let (a, b) = (&self.samples[index], &self.samples[index + 1]);
@@ -223,7 +223,7 @@ impl Road {
     }
 
     /// World position of street coordinates, and the heading there.
-    pub fn world(&self, s: f64, lateral: f64) -> (f64, f64, f64) {
+    pub(crate) fn world(&self, s: f64, lateral: f64) -> (f64, f64, f64) {
         let (x, y, heading, _) = self.centre(s);
         (
             x - lateral * heading.sin(),
@@ -234,7 +234,7 @@ impl Road {
 
     /// Street coordinates of a world point, found from the grid.
     #[inline]
-    pub fn locate(&self, x: f64, y: f64) -> StreetPoint {
+    pub(crate) fn locate(&self, x: f64, y: f64) -> StreetPoint {
         let column = (((x - self.grid_x0) / CELL).max(0.0) as usize).min(self.grid.len() - 1);
         let cells = &self.grid[column];
         // The column's first entry is the centreline's own cell row, the rest the hints.
@@ -245,7 +245,7 @@ impl Road {
 
     /// The same, from the index of a sample nearby.
     #[inline]
-    pub fn locate_from(&self, x: f64, y: f64, hint: usize) -> StreetPoint {
+    pub(crate) fn locate_from(&self, x: f64, y: f64, hint: usize) -> StreetPoint {
         let last = self.packed.len() - 1;
         let mut index = hint.min(last);
         let (mut along, mut lateral, mut stretch) = self.offsets(x, y, index);
@@ -285,7 +285,7 @@ impl Road {
 
     /// Signed distance to the kerb, metres: negative on a carriageway.
     #[inline]
-    pub fn kerb_distance(&self, p: &StreetPoint) -> f32 {
+    pub(crate) fn kerb_distance(&self, p: &StreetPoint) -> f32 {
         let half_width = self.half_width(p);
         let main = p.lateral.abs() - half_width;
         let side = usize::from(p.lateral > 0.0);
@@ -304,14 +304,14 @@ impl Road {
 
     /// Half the width of the carriageway at a point, interpolated.
     #[inline]
-    pub fn half_width(&self, p: &StreetPoint) -> f32 {
+    pub(crate) fn half_width(&self, p: &StreetPoint) -> f32 {
         let [_, _, _, width, slope] = self.packed[p.index];
         let along = p.s - (self.start + p.index as f64 * STEP) as f32;
         width + slope * along
     }
 
     /// Builds the look-up tables; call it after any change of the samples.
-    pub fn index(&mut self) {
+    pub(crate) fn index(&mut self) {
         let n = self.samples.len();
         self.packed = (0..n)
             .map(|i| {

@@ -12,7 +12,7 @@ use nalgebra::Matrix3;
 const SECTORS: usize = 240;
 
 /// A scanner at one place and instant.
-pub struct Scanner<'a> {
+pub(crate) struct Scanner<'a> {
     eye: Eye<'a>,
     light: &'a GroundLight,
     air: Air,
@@ -27,7 +27,7 @@ pub struct Scanner<'a> {
 
 /// The return of a ray.
 #[derive(Debug, Clone, Copy)]
-pub struct Echo {
+pub(crate) struct Echo {
     /// Exact range, metres.
     pub range: f32,
     /// Brightness of the surface, 0 to 1.
@@ -40,7 +40,7 @@ pub struct Echo {
 
 impl<'a> Scanner<'a> {
     /// A scanner that sees as far as `reach` metres; `pixel` is the angle that one ray stands for.
-    pub fn new(
+    pub(crate) fn new(
         world: &'a World,
         light: &'a GroundLight,
         moving: &[Primitive],
@@ -103,7 +103,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// The first surface along a ray of the sensor's axes (unit length), unless that is the sky.
-    pub fn cast(&self, local: &V3) -> Option<Echo> {
+    pub(crate) fn cast(&self, local: &V3) -> Option<Echo> {
         let direction = self.world_from_sensor * local;
         let heading = direction.y.atan2(direction.x);
         let sector = std::f32::consts::TAU / SECTORS as f32;
@@ -135,7 +135,7 @@ impl<'a> Scanner<'a> {
 }
 
 /// A standard normal number by Box and Muller's method.
-pub fn gaussian(code: u32, key: u32) -> f32 {
+pub(crate) fn gaussian(code: u32, key: u32) -> f32 {
     let other = hash(code as i32, 17, key);
     let a = ((code >> 8) as f32 + 0.5) / 16_777_216.0;
     let b = (other >> 8) as f32 / 16_777_216.0;

@@ -88,8 +88,14 @@ impl Simulation {
         let traffic = Traffic::new(&mut rng, &world, &drive, duration_s, config.moving_cars);
         let (width, height) = (config.width, config.height);
         let (rig, intrinsics) = match config.sensors {
-            Sensors::Kitti => (Rig::kitti_like(), kitti_like_intrinsics(width, height)),
-            Sensors::Umad => (Rig::umad_like(), umad_like_intrinsics(width, height)),
+            Sensors::Kitti => (
+                Rig::kitti_like(config.camera_height_m),
+                kitti_like_intrinsics(width, height),
+            ),
+            Sensors::Umad => (
+                Rig::umad_like(config.camera_height_m),
+                umad_like_intrinsics(width, height),
+            ),
         };
         Ok(Self {
             config: config.clone(),

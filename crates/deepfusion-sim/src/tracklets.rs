@@ -17,7 +17,7 @@ struct Stretch {
 }
 
 /// The boxes of all frames.
-pub fn to_xml(simulation: &Simulation) -> String {
+pub(crate) fn to_xml(simulation: &Simulation) -> String {
     let stretches = stretches(simulation);
     let mut xml = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"yes\" ?>\n<!DOCTYPE boost_serialization>\n\

@@ -28,14 +28,14 @@ struct MovingCar {
 }
 
 /// All moving cars.
-pub struct Traffic {
+pub(crate) struct Traffic {
     cars: Vec<MovingCar>,
 }
 
 impl Traffic {
     /// `count` cars around a drive of `duration_s` seconds. All cars of one lane have one speed, so
     /// that none runs into another; the ones ahead stay ahead of the camera.
-    pub fn new(
+    pub(crate) fn new(
         rng: &mut ChaCha8Rng,
         world: &World,
         drive: &Drive,
@@ -117,7 +117,7 @@ impl Traffic {
     /// Dense traffic around a camera that is `s` metres along a varied world's street at time 0 and drives on at
     /// `speed` m/s: vehicles ahead in its lane, at least `nearest` metres away, others beside it and towards it.
     /// Nothing stands in parked cars. `density` in [0, 1].
-    pub fn around(
+    pub(crate) fn around(
         rng: &mut ChaCha8Rng,
         world: &World,
         (s, speed, nearest): (f64, f64, f64),
@@ -193,7 +193,7 @@ impl Traffic {
     }
 
     /// Their solids at a time.
-    pub fn solids(&self, world: &World, time_s: f64) -> Vec<Primitive> {
+    pub(crate) fn solids(&self, world: &World, time_s: f64) -> Vec<Primitive> {
         self.present(world, time_s)
             .flat_map(|(_, car, base, heading)| {
                 world.models[car.model].solids(base, heading, car.seed, true)
@@ -202,7 +202,7 @@ impl Traffic {
     }
 
     /// Their boxes and velocities at a time.
-    pub fn objects(&self, world: &World, time_s: f64) -> Vec<SceneObject> {
+    pub(crate) fn objects(&self, world: &World, time_s: f64) -> Vec<SceneObject> {
         self.present(world, time_s)
             .map(|(index, car, base, heading)| {
                 let size = world.models[car.model].size.map(f64::from);

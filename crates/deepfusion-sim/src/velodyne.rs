@@ -30,7 +30,7 @@ fn elevations() -> [f32; 64] {
 
 /// One turn of the scanner at one instant; points in its own axes (x forward, y left, z up), metres.
 /// `key` makes the noise of this scan.
-pub fn scan(
+pub(crate) fn scan(
     world: &World,
     light: &GroundLight,
     moving: &[Primitive],

@@ -107,6 +107,7 @@ fn snippets(batch: usize, height: usize, width: usize, device: &Device) -> Snipp
         intrinsics: matrices(k),
         inverse_intrinsics: matrices(inverse),
         distance_m: vec![Tensor::full([batch], 0.8, device)],
+        distance_weight: vec![None],
         measured: vec![Motion::new(
             Tensor::zeros([batch, 3], device),
             ahead.expand([batch, 3]),

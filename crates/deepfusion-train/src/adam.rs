@@ -55,6 +55,23 @@ impl NamedGradients {
         });
     }
 
+    /// All values one after the other, in the order of the names.
+    pub(crate) fn append_to(&self, flat: &mut Vec<f32>) {
+        for values in self.0.values() {
+            flat.extend_from_slice(values);
+        }
+    }
+
+    /// Takes the values back from where [`Self::append_to`] put them.
+    pub(crate) fn take_from(&mut self, flat: &[f32]) {
+        let mut rest = flat;
+        for values in self.0.values_mut() {
+            let (own, others) = rest.split_at(values.len());
+            values.copy_from_slice(own);
+            rest = others;
+        }
+    }
+
     fn norm(&self) -> f64 {
         self.0
             .values()
@@ -251,6 +268,9 @@ fn parameter_lengths(model: &Model) -> BTreeMap<String, usize> {
     note("pose.", weights::collect(&model.pose_net));
     if let Some(decoder) = &model.flow_decoder {
         note("flow.", weights::collect(decoder));
+    }
+    if let Some(focal) = &model.focal {
+        note("focal.", weights::collect(focal));
     }
     lengths
 }

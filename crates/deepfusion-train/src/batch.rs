@@ -1,10 +1,10 @@
 use crate::loader::Ahead;
 use crate::{
-    BatchFactors, Error, Jitter, Motion, SampleFactors, SampleSet, Sampler, TrainConfig,
+    BatchFactors, Error, Jitter, Motion, SampleFactors, SampleSet, Sampler, TrainConfig, losses,
     sampler::stream,
 };
 use burn::tensor::{Device, Tensor, TensorData};
-use deepfusion_data::{resize_rgb, to_chw};
+use deepfusion_data::{Source, resize_rgb, to_chw};
 use deepfusion_geometry::Se3;
 use rand::Rng;
 use rayon::prelude::*;
@@ -27,6 +27,8 @@ pub struct SnippetBatch {
     pub inverse_intrinsics: Tensor<3>,
     /// Length of the camera's translation by source, each B, in metres.
     pub distance_m: Vec<Tensor<1>>,
+    /// What these lengths weigh in the speed loss by source, each B ([`crate::losses::distance_weight`]); `None` where all weigh 1.
+    pub distance_weight: Vec<Option<Tensor<1>>>,
     /// The camera's `source_from_target` as measured by the vehicle's sensors, by source, B each.
     pub measured: Vec<Motion>,
     /// Offsets of the sources.
@@ -58,6 +60,7 @@ struct RawBatch {
     intrinsics: Vec<f32>,
     inverse_intrinsics: Vec<f32>,
     distance_m: Vec<Vec<f32>>,
+    distance_weight: Vec<Vec<f32>>,
     rotation: Vec<Vec<f32>>,
     translation: Vec<Vec<f32>>,
     offsets: Vec<i32>,
@@ -99,13 +102,18 @@ impl BatchLoader {
     /// configuration says. What a batch holds depends on the seed and its number alone.
     #[must_use]
     pub fn training(config: &TrainConfig, set: SampleSet, first: usize) -> Self {
+        Self::training_batches(config, set, first..)
+    }
+
+    /// As [`Self::training`], the batches of these numbers.
+    pub(crate) fn training_batches(
+        config: &TrainConfig,
+        set: SampleSet,
+        numbers: impl Iterator<Item = usize> + Send + 'static,
+    ) -> Self {
         let sampler = Sampler::new(set.samples.len(), config.batch, config.seed);
-        Self::start(
-            config,
-            set,
-            true,
-            (first..).map(move |i| (i, sampler.batch(i))),
-        )
+        let batches = numbers.map(move |i| (i, sampler.batch(i)));
+        Self::start(config, set, true, batches)
     }
 
     /// All samples once, in order, clean.
@@ -161,6 +169,11 @@ impl BatchLoader {
             intrinsics: matrices(raw.intrinsics),
             inverse_intrinsics: matrices(raw.inverse_intrinsics),
             distance_m: raw.distance_m.into_iter().map(vectors).collect(),
+            distance_weight: raw
+                .distance_weight
+                .into_iter()
+                .map(|weights| weights.iter().any(|w| *w < 1.0).then(|| vectors(weights)))
+                .collect(),
             measured: raw
                 .rotation
                 .into_iter()
@@ -186,6 +199,8 @@ struct Item {
     inverse_intrinsics: [f32; 9],
     /// Distance, rotation and translation by source.
     motion: Vec<(f32, [f32; 9], [f32; 3])>,
+    /// What the distances weigh, by source.
+    weights: Vec<f32>,
 }
 
 impl Maker {
@@ -215,6 +230,10 @@ impl Maker {
             distance_m: sources
                 .clone()
                 .map(|s| items.iter().map(|i| i.motion[s].0).collect())
+                .collect(),
+            distance_weight: sources
+                .clone()
+                .map(|s| items.iter().map(|i| i.weights[s]).collect())
                 .collect(),
             rotation: sources
                 .clone()
@@ -294,7 +313,12 @@ impl Maker {
                 )
             })
             .collect();
+        let weight = |source: &Source| {
+            let motion = &source.motion;
+            losses::distance_weight(motion.distance_m, motion.distance_sigma_m) as f32
+        };
         Ok(Item {
+            weights: sources.iter().map(weight).collect(),
             clean,
             network,
             intrinsics: row_major(&k.matrix()),

@@ -4,7 +4,7 @@ use burn::tensor::Device;
 use deepfusion_model::{Checkpoint, CheckpointKind, Error as ModelError, RunFolder, TrainConfig};
 use deepfusion_nn::weights::{self, Weights};
 
-use crate::{Adam, Error, Model};
+use crate::{Adam, Error, LearnedFocal, Model};
 
 /// Saves networks and optimiser to a run's checkpoints and loads them.
 pub trait Checkpoints {
@@ -62,11 +62,18 @@ impl Checkpoints for RunFolder {
         if let Some(decoder) = &model.flow_decoder {
             all = all.merged(weights::collect(decoder).with_prefix("flow."));
         }
+        if let Some(focal) = &model.focal {
+            all = all.merged(weights::collect(focal).with_prefix("focal."));
+        }
         if let Some(adam) = adam {
             all = all.merged(adam.state().with_prefix("adam."));
             all.metadata
                 .insert("adam_steps".into(), adam.steps().to_string());
         }
+        let state = Checkpoint {
+            focal_ratio: model.focal.as_ref().map(LearnedFocal::ratio),
+            ..*state
+        };
         all.metadata.extend(state.metadata());
         let path = self.checkpoint_path(kind);
         weights::write_safetensors(&path, &all)?;
@@ -87,6 +94,9 @@ impl Checkpoints for RunFolder {
         model.depth_net = weights::apply(model.depth_net, &named("depth."))?;
         model.pose_net = weights::apply(model.pose_net, &named("pose."))?;
         let new_decoder = take_flow_decoder(&mut model, &named("flow."))?;
+        if let Some(focal) = model.focal.take() {
+            model.focal = Some(weights::apply(focal, &named("focal."))?);
+        }
         if !all.metadata.contains_key("adam_steps") {
             return Ok((model, None, state));
         }
@@ -117,7 +127,13 @@ impl Checkpoints for RunFolder {
         let mut model = Model::new(config, device)?;
         if encoders_only {
             let (depth, pose) = (depth.under("encoder."), pose.under("encoder."));
-            model.depth_net.encoder = weights::apply(model.depth_net.encoder, &depth)?;
+            let encoder = model.depth_net.encoder.take();
+            let encoder = encoder.ok_or_else(|| deepfusion_nn::Error::UnknownArchitecture {
+                origin: path.display().to_string(),
+                reason: "it holds ResNets, and this configuration's depth network is Lite-Mono"
+                    .into(),
+            })?;
+            model.depth_net.encoder = Some(weights::apply(encoder, &depth)?);
             model.pose_net.encoder = weights::apply(model.pose_net.encoder, &pose)?;
             return Ok((model, vec!["everything but the encoders"]));
         }

@@ -53,9 +53,18 @@ impl DepthLoader {
     /// Batches number `first`, `first + 1`, … What a batch holds depends on the seed and its number alone.
     #[must_use]
     pub fn training(config: &TrainConfig, set: DepthSet, first: usize) -> Self {
+        Self::training_batches(config, set, first..)
+    }
+
+    /// As [`Self::training`], the batches of these numbers.
+    pub(crate) fn training_batches(
+        config: &TrainConfig,
+        set: DepthSet,
+        numbers: impl Iterator<Item = usize> + Send + 'static,
+    ) -> Self {
         let (seed, size) = (config.seed, config.depth_batch());
         let picker = set.clone();
-        let plans = (first..).map(move |number| {
+        let plans = numbers.map(move |number| {
             let draws = number * size..(number + 1) * size;
             let picks = draws.map(|draw| picker.pick(seed, draw)).collect();
             (number, picks)

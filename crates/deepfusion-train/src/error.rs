@@ -31,6 +31,23 @@ pub enum Error {
         /// The drives with such frames.
         shared: Vec<SharedFrames>,
     },
+    /// A camera is to be learned, and a recording says what it is.
+    #[error("{drive}: it says what its camera is, and the camera is to be learned")]
+    CameraKnown {
+        /// The drive.
+        drive: String,
+    },
+    /// A camera is to be learned, and images of two sizes are of two cameras.
+    #[error(
+        "one camera is learned, of images of one size: {} has {}x{}, {} has {}x{}",
+        drives[0], sizes[0].0, sizes[0].1, drives[1], sizes[1].0, sizes[1].1
+    )]
+    SeveralCameras {
+        /// Two drives.
+        drives: [String; 2],
+        /// Width and height of their images.
+        sizes: [(u32, u32); 2],
+    },
     /// A loss that is not a number.
     #[error("step {step}: the loss term `{term}` is {value}; frames {frames}")]
     NotFinite {
@@ -76,6 +93,16 @@ pub enum Error {
         /// The batch, counted from 0, and what it died of.
         reason: String,
     },
+    /// Workers that learn together, and cannot.
+    #[error("worker {rank} of {count}: {reason}")]
+    Workers {
+        /// This worker, from 0.
+        rank: usize,
+        /// How many there are.
+        count: usize,
+        /// What went wrong between them.
+        reason: String,
+    },
     /// Samples should be held out, and none are.
     #[error("no sample is held out to validate on")]
     NoValidation,
@@ -113,6 +140,13 @@ impl Hint for Error {
                  is held out then"
                     .into(),
             ),
+            Self::CameraKnown { .. } => Some(
+                "a camera that is known is better than one that is learned: train without assumed_camera.learn, or leave this recording out"
+                    .into(),
+            ),
+            Self::SeveralCameras { .. } => {
+                Some("train on the recordings of one camera, at one size".into())
+            }
             Self::NotFinite { .. } | Self::GradientsNotFinite { .. } => Some(
                 "the last good checkpoint is kept; look at the frames named above, or lower the \
                  learning rate, and resume"
@@ -126,6 +160,11 @@ impl Hint for Error {
             Self::Loader { .. } => Some(
                 "this is a fault of the program: please report it with the lines above; what was saved is whole, and \
                  the run can be resumed from there"
+                    .into(),
+            ),
+            Self::Workers { .. } => Some(
+                "all workers need the same configuration, recordings and start; after a failure start all of them again, and resume: the last \
+                 checkpoint is whole"
                     .into(),
             ),
             Self::NoValidation => Some(

@@ -1,4 +1,6 @@
 use crate::{LossTerms, SamplePanel};
+use deepfusion_geometry::Intrinsics;
+use deepfusion_model::LearnedCamera;
 use std::path::PathBuf;
 
 /// What the trainer reports. It never prints; the caller decides what to do with its events.
@@ -63,6 +65,13 @@ pub enum TrainEvent {
         step: usize,
         /// The file.
         path: PathBuf,
+    },
+    /// The camera that the run has learned, at its end or where it was stopped.
+    Camera {
+        /// The camera, at the size of the images.
+        camera: Intrinsics,
+        /// Its focal lengths, and how well the drives told them.
+        learned: LearnedCamera,
     },
     /// Something looks wrong but training goes on.
     Warning {

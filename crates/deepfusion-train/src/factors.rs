@@ -30,6 +30,16 @@ impl BatchFactors {
         }
     }
 
+    /// Those of a network with a canonical focal length, seen through a lens with so many times the f_y, one number: depth grows with it.
+    #[must_use]
+    pub(crate) fn refocused(&self, ratio: Tensor<1>) -> Self {
+        Self {
+            nearest_zero: self.nearest_zero.clone().div(ratio.clone()),
+            span: self.span.clone().div(ratio),
+            ..self.clone()
+        }
+    }
+
     /// Motions with their sets' unit of translation. T is B, or a multiple of it: the samples repeated.
     #[must_use]
     pub fn scale(&self, motion: &Motion) -> Motion {

@@ -14,7 +14,9 @@ mod error;
 mod event;
 mod factors;
 mod fit_depth;
+mod focal_spread;
 mod inspector;
+mod learned_focal;
 mod level;
 mod loader;
 pub mod log;
@@ -32,6 +34,7 @@ mod source;
 mod trainer;
 mod view_synthesis;
 mod window;
+mod workers;
 
 /// The device on which networks are trained: `Device::flex()` is the CPU.
 pub use burn::tensor::Device;
@@ -41,11 +44,11 @@ pub use augment::Jitter;
 pub use batch::{BatchLoader, SnippetBatch};
 pub use checkpoint::Checkpoints;
 pub use deepfusion_model::{
-    Augmentation, CHECKPOINT_VERSION, Checkpoint, CheckpointKind, CompareAt, Compute, ConfigKey,
-    DataConfig, DataSetConfig, DepthLossConfig, FlowLossConfig, Learn, LearningRateSchedule,
-    LossConfig, MovingConfig, Preset, Reprojection, ReversedPose, RunFolder, SampleFactors,
-    SetFindings, SimulatedConfig, StoredNetwork, TrainConfig, TrainFindings, ViewMotion,
-    config_keys,
+    AssumedCamera, Augmentation, CHECKPOINT_VERSION, Checkpoint, CheckpointKind, CompareAt,
+    Compute, ConfigKey, DataConfig, DataSetConfig, DepthLossConfig, FlowLossConfig, Learn,
+    LearnedCamera, LearningRateSchedule, LossConfig, MovingConfig, Preset, Reprojection,
+    ReversedPose, RunFolder, SampleFactors, SetFindings, SimulatedConfig, StoredNetwork,
+    TrainConfig, TrainFindings, ViewMotion, config_keys,
 };
 pub use deepfusion_nn::BilinearResize;
 pub use depth_batch::{DepthBatch, DepthLoader};
@@ -54,6 +57,7 @@ pub use error::Error;
 pub use event::{Control, TrainEvent};
 pub use factors::BatchFactors;
 pub use inspector::Inspector;
+pub use learned_focal::LearnedFocal;
 pub use losses::LossTerms;
 pub use model::{ForwardPass, Model, ViewFlow};
 pub use objective::{BatchLoss, DepthPass, Schedule};
@@ -66,3 +70,4 @@ pub use shared_frames::{SharedFrames, shared_frames};
 pub use source::{Sample, SampleSet};
 pub use trainer::{TrainSummary, Trainer, validation_loss};
 pub use view_synthesis::{Synthesised, synthesise};
+pub use workers::{Alone, Workers};

@@ -1,3 +1,4 @@
+use crate::learned_focal::{LearnedFocal, refocused};
 use crate::{BilinearResize, Error, Motion, Reprojection, ReversedPose, SnippetBatch, TrainConfig};
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
@@ -13,6 +14,8 @@ pub struct Model {
     pub pose_net: PoseNet,
     /// Optical flow from the depth network's features of both; only while training with a flow loss.
     pub flow_decoder: Option<FlowDecoder>,
+    /// The focal length of a camera that nobody gave, in a run that learns it.
+    pub focal: Option<LearnedFocal>,
     pub(crate) config: TrainConfig,
     /// From scale s to full resolution.
     pub(crate) enlarge: Vec<BilinearResize>,
@@ -30,7 +33,7 @@ pub struct ViewFlow {
 /// The networks' outputs for a batch: T targets, which are frame 0 alone, or frames 0 and 1.
 #[derive(Debug, Clone)]
 pub struct ForwardPass {
-    /// Sigmoid disparities of the targets by scale, T×1×H/2ˢ×W/2ˢ.
+    /// Sigmoid disparities of the targets by scale, T×1×H/2ˢ×W/2ˢ: four, of Lite-Mono three.
     pub disparities: Vec<Tensor<4>>,
     /// PoseNet's `source_from_target`, by view, T each.
     pub motions: Vec<Motion>,
@@ -106,6 +109,7 @@ impl Model {
             depth_net,
             pose_net,
             flow_decoder: None,
+            focal: config.learned_camera().map(|_| LearnedFocal::new(device)),
             config: config.clone(),
             enlarge,
         }
@@ -114,12 +118,28 @@ impl Model {
     /// The depth and pose networks for inference, on the device below autodiff.
     #[must_use]
     pub fn valid(&self, device: &Device) -> Self {
-        Self::with_networks(
+        let mut model = Self::with_networks(
             &self.config,
             self.depth_net.valid(),
             self.pose_net.valid(),
             &device.clone().inner(),
-        )
+        );
+        model.focal = self.focal.as_ref().map(Module::valid);
+        model
+    }
+
+    /// The batch as the learned camera sees it; as it is where none is learned.
+    #[must_use]
+    pub fn see(&self, batch: SnippetBatch) -> SnippetBatch {
+        match &self.focal {
+            Some(focal) => self.refocused(&batch, focal.log_ratio.val()),
+            None => batch,
+        }
+    }
+
+    /// The batch seen through assumed cameras of other focal lengths.
+    pub(crate) fn refocused(&self, batch: &SnippetBatch, log_ratio: Tensor<1>) -> SnippetBatch {
+        refocused(batch, log_ratio, self.config.canonical_focal_px.is_some())
     }
 
     /// A scale's disparity at full resolution: the run's size, or the batch's where it has its own.
@@ -181,19 +201,24 @@ impl Model {
             }
         };
         let twice = |k: &Tensor<3>| Tensor::cat(vec![k.clone(), k.clone()], 0);
-        let features = self.depth_net.encoder.forward(pair(first, second, 0));
-        let flows = self.flow_decoder.as_ref().map(|decoder| {
-            let n = batch.len();
-            let [one, other] = [0, n].map(|at| features.clone().map(|f| f.narrow(0, at, n)));
-            let [flow, back] = decoder.forward_both(&one, &other).map(|f| f.flow);
-            ViewFlow {
-                flow: pair(&flow, &back, 0),
-                back: pair(&back, &flow, 0),
+        let images = pair(first, second, 0);
+        let (disparities, flows) = match &self.flow_decoder {
+            None => (self.depth_net.forward(images), Vec::new()),
+            Some(decoder) => {
+                let features = self.depth_net.encode(images);
+                let n = batch.len();
+                let [one, other] = [0, n].map(|at| features.clone().map(|f| f.narrow(0, at, n)));
+                let [flow, back] = decoder.forward_both(&one, &other).map(|f| f.flow);
+                let view = ViewFlow {
+                    flow: pair(&flow, &back, 0),
+                    back: pair(&back, &flow, 0),
+                };
+                (self.depth_net.decode(features), vec![view])
             }
-        });
+        };
         ForwardPass {
-            disparities: self.depth_net.decode(features),
-            flows: flows.into_iter().collect(),
+            disparities,
+            flows,
             motions: vec![motion],
             measured: vec![Motion::cat(vec![
                 batch.measured[0].clone(),
@@ -253,10 +278,7 @@ impl Model {
             return (self.depth_net.forward(batch.network[0].clone()), Vec::new());
         };
         let n = batch.len();
-        let all = self
-            .depth_net
-            .encoder
-            .forward(Tensor::cat(batch.network.clone(), 0));
+        let all = self.depth_net.encode(Tensor::cat(batch.network.clone(), 0));
         let frame = |index: usize| all.clone().map(|f| f.narrow(0, index * n, n));
         let targets = frame(0);
         let flows = (1..batch.network.len()).map(|source| {

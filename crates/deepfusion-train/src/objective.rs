@@ -10,7 +10,7 @@ use crate::{Reprojection, ViewMotion};
 use burn::tensor::module::avg_pool2d;
 use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Bool, Tensor};
-use deepfusion_nn::{DepthOutput, SCALES, ops};
+use deepfusion_nn::{DepthOutput, ops};
 
 /// The parts of the loss that depend on training progress.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +77,8 @@ impl Model {
         let warped = finest.synthesised[0].image.clone().detach();
         let (mut reprojection, mut smooth) = (Vec::new(), Vec::new());
         let mut finest_output = None;
-        for (scale, level) in levels.iter().enumerate() {
+        let scales = pass.disparities.len();
+        for (scale, level) in levels.iter().enumerate().take(scales) {
             let views = match scale {
                 0 => &finest,
                 _ => &self.views((pass, batch), scale, level, &motions),
@@ -94,12 +95,12 @@ impl Model {
             }
         }
         #[expect(clippy::expect_used, reason = "one for each scale")]
-        let output = finest_output.expect("the decoder has four scales");
+        let output = finest_output.expect("a decoder has a scale at least");
         sum.terms.valid_share = share(&output.valid);
         sum.terms.explained_share = share(&output.explained);
         let mean = |terms: Vec<Tensor<1>>| {
             let sum = terms.into_iter().reduce(|a, b| a + b);
-            sum.map(|sum| sum.mul_scalar(1.0 / SCALES as f64))
+            sum.map(|sum| sum.mul_scalar(1.0 / scales as f64))
         };
         sum.terms.reprojection = sum.add(mean(reprojection), 1.0);
         sum.terms.smoothness = sum.add(mean(smooth), settings.smoothness);
@@ -286,7 +287,7 @@ impl Model {
                 there,
                 coords,
                 &target_from_source,
-                &pass.inverse_intrinsics,
+                &pass.inverse_intrinsics.clone().detach(),
             );
             let moving = moving.map(|masks| &masks[index]);
             let pixels = losses::seen_in_both(&view.coords, &view.valid, moving);
@@ -303,7 +304,9 @@ impl Model {
                 let weight = self.config.loss.rotation;
                 mean_of(views.enumerate(), |(view, (motion, measured))| {
                     let distance = self.distance_m(batch, view);
-                    losses::speed(motion, distance, &measured.rotation, weight)
+                    let sure = batch.distance_weight[view].clone();
+                    let sure = sure.map(|weight| self.both_ways(weight));
+                    losses::speed(motion, distance, sure, &measured.rotation, weight)
                 })
             }
         }
@@ -311,11 +314,15 @@ impl Model {
 
     /// The measured distance of a view's targets, T.
     fn distance_m(&self, batch: &SnippetBatch, view: usize) -> Tensor<1> {
-        let distance = batch.distance_m[view].clone();
+        self.both_ways(batch.distance_m[view].clone())
+    }
+
+    /// What each sample of a batch has, for the targets, T.
+    fn both_ways(&self, samples: Tensor<1>) -> Tensor<1> {
         match self.config.reprojection {
             // The second half of the targets looks back, as far.
-            Reprojection::Bidirectional => Tensor::cat(vec![distance.clone(), distance], 0),
-            Reprojection::Minimum => distance,
+            Reprojection::Bidirectional => Tensor::cat(vec![samples.clone(), samples], 0),
+            Reprojection::Minimum => samples,
         }
     }
 

@@ -116,7 +116,7 @@ pub fn rotation_from_axis_angle(axis_angle: Tensor<2>) -> Tensor<3> {
 /// - `v`: `[N, 3]`
 /// - output: `[N, 3, 3]`
 #[must_use]
-pub fn cross_matrix(v: Tensor<2>) -> Tensor<3> {
+pub(crate) fn cross_matrix(v: Tensor<2>) -> Tensor<3> {
     let [n, _] = v.dims();
     // It is linear in v: row i of this matrix is the cross matrix of unit vector i.
     let units: [[f32; 9]; 3] = [

@@ -3,6 +3,18 @@ use deepfusion_data::{Dataset, Snippet, hold_out};
 use deepfusion_geometry::Intrinsics;
 use std::sync::Arc;
 
+/// Standard deviation of a distance, as a share of it, above which its sample is left out: metres that unsure teach no scale.
+const MOST_SIGMA_SHARE: f64 = 0.2;
+
+/// Whether every distance of a sample is sure enough, as far as that is known.
+fn is_sure(snippet: &Snippet) -> bool {
+    snippet.sources.iter().all(|source| {
+        let motion = &source.motion;
+        let sigma_m = motion.distance_sigma_m.unwrap_or(0.0);
+        sigma_m <= MOST_SIGMA_SHARE * motion.distance_m
+    })
+}
+
 /// A training sample and the recording it belongs to.
 #[derive(Debug, Clone)]
 pub struct Sample {
@@ -133,6 +145,19 @@ impl SampleSet {
                     });
                 }
                 Ok(snippets) => {
+                    let all = snippets.len();
+                    let snippets: Vec<_> = snippets.into_iter().filter(is_sure).collect();
+                    if snippets.len() < all {
+                        let reason = format!(
+                            "{}: {} of {all} samples have a distance that is known to no better than {:.0} %",
+                            recording.name(),
+                            all - snippets.len(),
+                            100.0 * MOST_SIGMA_SHARE
+                        );
+                        if !skipped.contains(&reason) {
+                            skipped.push(reason);
+                        }
+                    }
                     let (a, b) = hold_out(snippets, share);
                     let sample = |snippet| Sample { dataset, snippet };
                     train.extend(a.into_iter().map(sample));
@@ -155,7 +180,7 @@ impl SampleSet {
             (true, Some(error)) => Err(error.into()),
             (true, None) => Err(Error::NoSamples {
                 data: "the data given".into(),
-                reason: "it has no drive".into(),
+                reason: skipped.last().cloned().unwrap_or("it has no drive".into()),
             }),
         }
     }

@@ -1,6 +1,9 @@
+use crate::focal_spread::focal_spread;
+use crate::learned_focal::{self, LearnedFocal, check_camera};
 use crate::losses::speed_weight;
 use crate::model::displacement_ratio;
 use crate::selection::selection;
+use crate::workers::{Alone, Crew, Workers};
 use crate::{
     Adam, BatchLoader, BatchLoss, Checkpoint, CheckpointKind, Checkpoints, Control, DepthBatch,
     DepthLoader, DepthPass, Error, ForwardPass, LearningRateSchedule, LossTerms, Model,
@@ -8,11 +11,19 @@ use crate::{
     TrainEvent,
 };
 use burn::tensor::{Device, Tensor};
-use deepfusion_model::{Error as ModelError, SetFindings, TrainFindings};
+use deepfusion_kernels::AdamStep;
+use deepfusion_model::{Error as ModelError, LearnedCamera, SetFindings, TrainFindings};
 use deepfusion_nn::ops::{Precision, autocast, supports};
+use deepfusion_nn::weights::{apply, collect};
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+/// Said where the spread is large.
+const CAMERA_NOT_TOLD: &str = "the drives do not tell the camera's focal length: without turns (and, with the turns of a network, without strong ones) \
+     another focal length explains the images as well; depth of what is not straight ahead is not to be relied on, nor its metres";
+/// The name of the focal length among parameters and moments.
+pub(crate) const FOCAL: &str = "focal";
 /// Skipped steps in a row after which training gives up.
 const MAX_SKIPPED: usize = 20;
 /// Share of the learning rate at which the cosine schedule ends.
@@ -34,6 +45,7 @@ pub struct Trainer {
     state: Checkpoint,
     train: SampleSet,
     validation: SampleSet,
+    workers: Crew,
 }
 
 /// How a run ended.
@@ -67,22 +79,42 @@ impl Trainer {
     /// # Errors
     /// [`Error::Model`], [`Error::NoSamples`], [`Error::NoValidation`].
     pub fn create(
+        config: TrainConfig,
+        folder: RunFolder,
+        sets: (SampleSet, SampleSet),
+        device: &Device,
+        init: impl FnOnce(Model) -> Result<Model, Error>,
+    ) -> Result<Self, Error> {
+        Self::create_among(Box::new(Alone), config, folder, sets, device, init)
+    }
+
+    /// As [`Self::create`], one of several [`Workers`]; `config.batch` and `config.accumulate` are each worker's. Worker 0 alone writes
+    /// into the folder.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub fn create_among(
+        workers: Box<dyn Workers>,
         mut config: TrainConfig,
         folder: RunFolder,
         (train, validation): (SampleSet, SampleSet),
         device: &Device,
         init: impl FnOnce(Model) -> Result<Model, Error>,
     ) -> Result<Self, Error> {
+        let workers = Crew::of(workers);
         config.validate()?;
         check_precision(&config, device)?;
         config.make_absolute();
         check_samples(&config, &train, &validation)?;
+        check_camera(&config, [&train, &validation])?;
         let settings = config;
         let findings = findings(&settings, &train);
         let config = findings.complete(settings.clone());
         let device = device.clone().autodiff();
         let model = init(Model::new(&config, &device)?)?;
-        folder.write_config(&settings, &findings)?;
+        if workers.leads() {
+            folder.write_config(&settings, &findings)?;
+        }
         Ok(Self {
             config,
             folder,
@@ -94,9 +126,11 @@ impl Trainer {
                 best_validation: None,
                 skipped: 0,
                 encoders_only: false,
+                focal_ratio: None,
             },
             train,
             validation,
+            workers,
         })
     }
 
@@ -107,12 +141,27 @@ impl Trainer {
     pub fn resume(
         config: TrainConfig,
         folder: RunFolder,
+        sets: (SampleSet, SampleSet),
+        device: &Device,
+    ) -> Result<Self, Error> {
+        Self::resume_among(Box::new(Alone), config, folder, sets, device)
+    }
+
+    /// As [`Self::resume`], one of several [`Workers`]: each reads the folder's last checkpoint.
+    ///
+    /// # Errors
+    /// As [`Self::resume`].
+    pub fn resume_among(
+        workers: Box<dyn Workers>,
+        config: TrainConfig,
+        folder: RunFolder,
         (train, validation): (SampleSet, SampleSet),
         device: &Device,
     ) -> Result<Self, Error> {
         let config = folder.read_findings()?.complete(config);
         check_precision(&config, device)?;
         check_samples(&config, &train, &validation)?;
+        check_camera(&config, [&train, &validation])?;
         let device = device.clone().autodiff();
         let (model, adam, state) = folder.load(CheckpointKind::Last, &config, &device)?;
         let adam = adam.ok_or_else(|| ModelError::NotResumable {
@@ -128,6 +177,7 @@ impl Trainer {
             state,
             train,
             validation,
+            workers: Crew::of(workers),
         })
     }
 
@@ -137,7 +187,7 @@ impl Trainer {
         self.config.steps_of(self.epoch_steps())
     }
 
-    /// Optimiser steps in one pass over the data: over its video, if there is any.
+    /// Optimiser steps in one pass over the data, of all workers together: over its video, if there is any.
     #[must_use]
     pub fn epoch_steps(&self) -> usize {
         let (samples, batch) = match self.train.samples.len() {
@@ -145,7 +195,7 @@ impl Trainer {
             samples => (samples, self.config.batch),
         };
         let batches = Sampler::new(samples, batch, 0).batches_per_epoch();
-        batches.div_ceil(self.config.accumulate)
+        batches.div_ceil(self.config.accumulate * self.workers.count())
     }
 
     /// Steps done so far.
@@ -187,8 +237,8 @@ impl Trainer {
             0 => self.epoch_steps(),
             every => every,
         };
-        let accumulate = self.config.accumulate;
-        let loaders = Loaders::training(&self.config, &self.train, self.state.step * accumulate);
+        let loaders = Loaders::training(&self.config, &self.train, self.state.step, &self.workers);
+        self.agree()?;
         listen(TrainEvent::Started {
             from_step: self.state.step,
             steps,
@@ -196,6 +246,10 @@ impl Trainer {
             validation_samples: self.validation.samples.len() + self.validation.depth.len(),
             mean_displacement_m: self.train.mean_displacement_m(),
         });
+        if let Some(message) = learned_focal::warning(&self.config, &self.train) {
+            let step = self.state.step;
+            listen(TrainEvent::Warning { step, message });
+        }
         let start = Instant::now();
         let mut saved = start;
         let mut pace = Pace::new();
@@ -204,45 +258,31 @@ impl Trainer {
         let mut low_view = Smoothed::new();
         let mut moving = Smoothed::new();
         while self.state.step < steps && !stopped {
-            let mut gradients = NamedGradients::default();
-            let (mut losses, mut names) = (LossTerms::default(), Vec::new());
-            let schedule = self.schedule(steps);
-            let mut images = 0;
-            let mut panel = None;
-            let scale = 1.0 / accumulate as f64;
-            for _ in 0..accumulate {
-                if let Some(loader) = &loaders.video {
-                    let batch = next(|| loader.next(&self.device))?;
-                    images += batch.len() * (1 + batch.offsets.len());
-                    let (pass, loss) = autocast(self.config.precision, || {
-                        let pass = self.model.forward(&batch);
-                        let loss = self.model.loss(&pass, &batch, schedule);
-                        (pass, loss)
-                    });
-                    self.check_finite(&loss.terms, &batch.names)?;
-                    losses.add(&loss.terms, scale);
-                    low_view.add(loss.terms.valid_share);
-                    moving.add(loss.terms.moving_share);
-                    ratio.add(displacement_ratio(&pass, &batch));
-                    self.add_gradients(&mut gradients, &loss.total, scale);
-                    // The pass's first target is the batch's first sample.
-                    let shown = batch.names.first().cloned().unwrap_or_default();
-                    names.extend(batch.names);
-                    panel = Some(Shown::View(Box::new((pass, loss, shown))));
-                }
-                if let Some(loader) = &loaders.depth {
-                    let batch = next(|| loader.next(&self.device))?;
-                    images += batch.len();
-                    let pass = autocast(self.config.precision, || self.model.learn_depth(&batch));
-                    self.check_finite(&pass.terms, &batch.names)?;
-                    losses.add(&pass.terms, scale);
-                    if loaders.video.is_none() {
-                        ratio.add(pass.scale_ratio);
-                    }
-                    self.add_gradients(&mut gradients, &pass.total, scale);
-                    names.extend(batch.names.iter().cloned());
-                    panel = panel.or(Some(Shown::Depth(Box::new((pass, batch)))));
-                }
+            let learned = self.learn(&loaders, self.schedule(steps));
+            // One that failed does not leave the others waiting for its gradients.
+            let [failed] = self.workers.any([learned.is_err()])?;
+            let Learned {
+                mut gradients,
+                mut losses,
+                names,
+                images,
+                panel,
+                monitors,
+            } = learned?;
+            if failed {
+                return Err(Error::Workers {
+                    rank: self.workers.rank(),
+                    count: self.workers.count(),
+                    reason: "another worker has failed".into(),
+                });
+            }
+            self.workers.average(&mut gradients, &mut losses)?;
+            for (all, of_step) in [
+                (&mut ratio, monitors.ratio),
+                (&mut low_view, monitors.valid),
+                (&mut moving, monitors.moving),
+            ] {
+                of_step.into_iter().for_each(|value| all.add(value));
             }
             let learning_rate = self.learning_rate(steps);
             let (outcome, step) = self.adam.begin(
@@ -256,12 +296,19 @@ impl Trainer {
                     depth_net,
                     pose_net,
                     flow_decoder,
+                    focal,
                     ..
                 } = self.model.clone();
                 self.model.depth_net = self.adam.apply(&step, "depth", depth_net, &gradients);
                 self.model.pose_net = self.adam.apply(&step, "pose", pose_net, &gradients);
                 self.model.flow_decoder =
                     flow_decoder.map(|decoder| self.adam.apply(&step, "flow", decoder, &gradients));
+                let step = self.focal_step(step);
+                let applied = focal.map(|focal| self.adam.apply(&step, FOCAL, focal, &gradients));
+                self.model.focal = match self.config.learned_camera() {
+                    Some(camera) => applied.map(|focal| focal.held_to(camera)),
+                    None => applied,
+                };
             }
             self.state.step += 1;
             let gradient_norm = match outcome {
@@ -290,7 +337,7 @@ impl Trainer {
                     f64::NAN
                 }
             };
-            pace.step(images);
+            pace.step(images * self.workers.count());
             let control = listen(TrainEvent::Step {
                 step: self.state.step,
                 steps,
@@ -301,13 +348,21 @@ impl Trainer {
                 scale_ratio: ratio.value(),
                 gradient_norm,
             });
-            stopped = control == Control::Stop;
+            let save = self.workers.leads() && self.checkpoint_is_due(saved.elapsed());
+            let [stop, save] = self.workers.any([control == Control::Stop, save])?;
+            stopped = stop;
             let due = self.state.step.is_multiple_of(every) || self.state.step == steps;
+            if due || stopped || save {
+                self.share_statistics()?;
+            }
             if due || stopped {
                 let shares = [low_view.value(), moving.value()];
                 self.report(listen, panel, shares, due)?;
+                if stopped || self.state.step == steps {
+                    self.report_camera(listen)?;
+                }
                 saved = Instant::now();
-            } else if self.checkpoint_is_due(saved.elapsed()) {
+            } else if save {
                 self.save_last(listen)?;
                 saved = Instant::now();
             }
@@ -320,6 +375,109 @@ impl Trainer {
             seconds: start.elapsed().as_secs_f64(),
             stopped,
         })
+    }
+
+    /// Losses and gradients of this worker's part of a step: the means over its `accumulate` batches.
+    fn learn(&self, loaders: &Loaders, schedule: Schedule) -> Result<Learned, Error> {
+        let mut learned = Learned::default();
+        let scale = 1.0 / self.config.accumulate as f64;
+        for _ in 0..self.config.accumulate {
+            if let Some(loader) = &loaders.video {
+                let batch = self.model.see(next(|| loader.next(&self.device))?);
+                learned.images += batch.len() * (1 + batch.offsets.len());
+                let (pass, loss) = autocast(self.config.precision, || {
+                    let pass = self.model.forward(&batch);
+                    let loss = self.model.loss(&pass, &batch, schedule);
+                    (pass, loss)
+                });
+                self.check_finite(&loss.terms, &batch.names)?;
+                learned.losses.add(&loss.terms, scale);
+                learned.monitors.valid.push(loss.terms.valid_share);
+                learned.monitors.moving.push(loss.terms.moving_share);
+                learned
+                    .monitors
+                    .ratio
+                    .push(displacement_ratio(&pass, &batch));
+                self.add_gradients(&mut learned.gradients, &loss.total, scale);
+                // The pass's first target is the batch's first sample.
+                let shown = batch.names.first().cloned().unwrap_or_default();
+                learned.names.extend(batch.names);
+                learned.panel = Some(Shown::View(Box::new((pass, loss, shown))));
+            }
+            if let Some(loader) = &loaders.depth {
+                let batch = next(|| loader.next(&self.device))?;
+                learned.images += batch.len();
+                let pass = autocast(self.config.precision, || self.model.learn_depth(&batch));
+                self.check_finite(&pass.terms, &batch.names)?;
+                learned.losses.add(&pass.terms, scale);
+                if loaders.video.is_none() {
+                    learned.monitors.ratio.push(pass.scale_ratio);
+                }
+                self.add_gradients(&mut learned.gradients, &pass.total, scale);
+                learned.names.extend(batch.names.iter().cloned());
+                let panel = learned.panel.take();
+                learned.panel = panel.or(Some(Shown::Depth(Box::new((pass, batch)))));
+            }
+        }
+        Ok(learned)
+    }
+
+    /// That all workers begin from the same.
+    fn agree(&mut self) -> Result<(), Error> {
+        if self.workers.count() == 1 {
+            return Ok(());
+        }
+        let mut weights = DefaultHasher::new();
+        let focal = self.model.focal.as_ref().map(LearnedFocal::ratio);
+        focal.map(f64::to_bits).hash(&mut weights);
+        for (prefix, values) in [
+            ("depth", collect(&self.model.depth_net)),
+            ("pose", collect(&self.model.pose_net)),
+        ] {
+            prefix.hash(&mut weights);
+            for tensor in values.tensors.values() {
+                tensor
+                    .values
+                    .iter()
+                    .for_each(|v| v.to_bits().hash(&mut weights));
+            }
+        }
+        let mut samples = DefaultHasher::new();
+        (self.train.samples.len(), self.train.depth.len()).hash(&mut samples);
+        let mut settings = DefaultHasher::new();
+        let config = &self.config;
+        let rate = config.learning_rate.to_bits();
+        (config.batch, config.accumulate, config.seed, rate).hash(&mut settings);
+        (self.state.step, self.steps()).hash(&mut settings);
+        // Of another assumed camera the same ln(f/f₀) is another f.
+        let camera = config.assumed_camera.map(|camera| {
+            let numbers = [camera.hfov_deg, camera.aspect, camera.learning_rate];
+            (numbers.map(f64::to_bits), camera.learn)
+        });
+        camera.hash(&mut settings);
+        self.workers
+            .hold_the_same([weights.finish(), samples.finish(), settings.finish()])
+    }
+
+    /// Running statistics of batch norms are each worker's own between checkpoints; now they become their means.
+    fn share_statistics(&mut self) -> Result<(), Error> {
+        if self.workers.count() == 1 {
+            return Ok(());
+        }
+        let (depth, pose) = (self.model.depth_net.clone(), self.model.pose_net.clone());
+        self.model.depth_net = apply(
+            depth,
+            &self
+                .workers
+                .mean_statistics(collect(&self.model.depth_net))?,
+        )?;
+        self.model.pose_net = apply(
+            pose,
+            &self
+                .workers
+                .mean_statistics(collect(&self.model.pose_net))?,
+        )?;
+        Ok(())
     }
 
     /// Whether enough time has passed since the last checkpoint to write one between validations.
@@ -358,6 +516,17 @@ impl Trainer {
         self.config.learning_rate * rise * factor
     }
 
+    /// A step of the optimiser at the focal length's own step size, as far into its schedule as the networks'.
+    fn focal_step(&self, step: AdamStep) -> AdamStep {
+        let own = self.config.learned_camera();
+        let share = f64::from(step.learning_rate) / self.config.learning_rate;
+        AdamStep {
+            learning_rate: own.map_or(0.0, |camera| share * camera.learning_rate) as f32,
+            weight_decay: 0.0,
+            ..step
+        }
+    }
+
     /// # Errors
     /// [`Error::NotFinite`] naming the first term that is not finite.
     fn check_finite(&self, terms: &LossTerms, names: &[String]) -> Result<(), Error> {
@@ -379,6 +548,9 @@ impl Trainer {
         gradients.add("pose", &self.model.pose_net, &mut raw, scale);
         if let Some(decoder) = &self.model.flow_decoder {
             gradients.add("flow", decoder, &mut raw, scale);
+        }
+        if let Some(focal) = &self.model.focal {
+            gradients.add(FOCAL, focal, &mut raw, scale);
         }
     }
 
@@ -411,6 +583,9 @@ impl Trainer {
             );
             listen(TrainEvent::Warning { step, message });
         }
+        if !self.workers.leads() {
+            return Ok(());
+        }
         if validate && !self.validation.is_empty() {
             let (losses, scale_ratio) =
                 validation_loss(&self.model, &self.config, &self.validation, &self.device)?;
@@ -437,8 +612,41 @@ impl Trainer {
         self.save_last(listen)
     }
 
+    /// Says which camera was learned and how well, and keeps it among what the run found out.
+    fn report_camera(&self, listen: &mut dyn FnMut(TrainEvent) -> Control) -> Result<(), Error> {
+        let Some(focal) = self.model.focal.as_ref().filter(|_| self.workers.leads()) else {
+            return Ok(());
+        };
+        let size = self.train.camera().map(|k| (k.width, k.height));
+        let camera = size.and_then(|size| self.config.camera_learned(focal.ratio(), size));
+        let Some(camera) = camera else {
+            return Ok(());
+        };
+        let spread = focal_spread(&self.model, &self.config, &self.train, &self.device)?;
+        let step = self.state.step;
+        let learned = LearnedCamera {
+            focal_px: [camera.fx, camera.fy],
+            sigma_px: spread.map(|sigma| [sigma * camera.fx, sigma * camera.fy]),
+            step,
+        };
+        let mut findings = self.folder.read_findings()?;
+        findings.learn_camera(&self.config, camera);
+        findings.learned_camera = Some(learned);
+        self.folder
+            .write_config(&self.folder.read_settings()?, &findings)?;
+        listen(TrainEvent::Camera { camera, learned });
+        if !learned.is_told() {
+            let message = CAMERA_NOT_TOLD.to_owned();
+            listen(TrainEvent::Warning { step, message });
+        }
+        Ok(())
+    }
+
     /// Writes the checkpoint to resume from.
     fn save_last(&self, listen: &mut dyn FnMut(TrainEvent) -> Control) -> Result<(), Error> {
+        if !self.workers.leads() {
+            return Ok(());
+        }
         let step = self.state.step;
         let path = self.folder.save(
             CheckpointKind::Last,
@@ -458,14 +666,38 @@ struct Loaders {
 }
 
 impl Loaders {
-    fn training(config: &TrainConfig, set: &SampleSet, first: usize) -> Self {
+    /// From a step on, this worker's batches: of K workers every K-th.
+    fn training(config: &TrainConfig, set: &SampleSet, step: usize, workers: &Crew) -> Self {
+        let (rank, count) = (workers.rank(), workers.count());
+        let first = step * config.accumulate * count + rank;
+        let numbers = move || (first..).step_by(count);
         let video = !set.samples.is_empty();
         Self {
-            video: video.then(|| BatchLoader::training(config, set.clone(), first)),
+            video: video.then(|| BatchLoader::training_batches(config, set.clone(), numbers())),
             depth: (!set.depth.is_empty())
-                .then(|| DepthLoader::training(config, set.depth.clone(), first)),
+                .then(|| DepthLoader::training_batches(config, set.depth.clone(), numbers())),
         }
     }
+}
+
+/// What a worker has learned from its part of a step.
+#[derive(Default)]
+struct Learned {
+    gradients: NamedGradients,
+    losses: LossTerms,
+    /// Drives and frames.
+    names: Vec<String>,
+    images: usize,
+    panel: Option<Shown>,
+    monitors: Monitors,
+}
+
+/// Figures of each batch that are smoothed over the steps.
+#[derive(Default)]
+struct Monitors {
+    ratio: Vec<f64>,
+    valid: Vec<f64>,
+    moving: Vec<f64>,
 }
 
 /// What a panel shows.
@@ -518,6 +750,7 @@ fn findings(config: &TrainConfig, train: &SampleSet) -> TrainFindings {
     TrainFindings {
         metres_per_unit: unit(config.pose_net.metres_per_unit, train),
         camera: train.camera(),
+        learned_camera: None,
         sets: sets.collect(),
     }
 }
@@ -585,7 +818,7 @@ pub fn validation_loss(
             masks_active: false,
         };
         while let Some(batch) = loader.next(&device) {
-            let batch = batch?;
+            let batch = model.see(batch?);
             let pass = model.forward(&batch);
             let terms = model.loss(&pass, &batch, schedule).terms;
             mean.add(batch.len(), &terms, displacement_ratio(&pass, &batch));

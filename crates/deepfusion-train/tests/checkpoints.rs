@@ -141,6 +141,7 @@ fn imported_encoders_start_a_network_with_other_parts() {
         best_validation: None,
         skipped: 0,
         encoders_only: true,
+        focal_ratio: None,
     };
     let kind = CheckpointKind::Last;
     run.save(kind, &theirs, None, &state).unwrap();

@@ -34,6 +34,30 @@ pub enum Error {
         /// What to do.
         remedy: &'static str,
     },
+    /// A packet of a stream cannot be decoded.
+    #[error("{}: {stream}, message {number}: {problem}", path.display())]
+    Packet {
+        /// The recording.
+        path: PathBuf,
+        /// The stream's name in it.
+        stream: String,
+        /// Which of the stream's messages, counted from 0.
+        number: u64,
+        /// Why not.
+        problem: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A stream of a codec that is not read.
+    #[error("{}: {stream}: a video of format `{format}` is not read", path.display())]
+    Codec {
+        /// The recording.
+        path: PathBuf,
+        /// The stream's name in it.
+        stream: String,
+        /// The format's name.
+        format: String,
+    },
     /// A live source gives no frame for longer than is waited for.
     #[error("{address}: ffmpeg {problem}")]
     Silent {
@@ -66,7 +90,10 @@ impl Hint for Error {
                 _ => return None,
             },
             Self::Picture { .. } => "PNG and JPEG are read",
-            Self::Program { remedy, .. } => remedy,
+            Self::Program { remedy, .. } | Self::Packet { remedy, .. } => remedy,
+            Self::Codec { .. } => {
+                "h264, h265 (hevc), vp9 and av1 are read: encode the stream as one of them, or record images"
+            }
             Self::Silent { .. } => "is the source sending? A longer timeout waits for it",
         };
         Some(text.to_owned())

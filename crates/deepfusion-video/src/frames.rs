@@ -5,14 +5,13 @@
 //! JPEGs of ffmpeg's best quality but one; the folder can be deleted at any time. It is filled under another name and
 //! renamed when it is whole.
 
+use crate::cache::{Origin, frame_path, keep};
 use crate::probe::{Probed, probe};
 use crate::program::{READ, in_either_words, run};
 use crate::{Error, Result};
-use serde::{Deserialize, Serialize};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::time::UNIX_EPOCH;
 
 /// A video's frames: counted when it is opened, decoded when the first of them is asked for.
 #[derive(Debug)]
@@ -31,10 +30,14 @@ impl VideoFrames {
     /// [`Error::Program`].
     pub fn open(file: &Path, folder: &Path) -> Result<Self> {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let cache = folder.join(format!("{name}.frames"));
+        // The programs run in other folders.
+        let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
+        let file = absolute(file)?;
         Ok(Self {
-            probed: probe(file)?,
-            cache: folder.join(format!("{name}.frames")),
-            file: file.to_owned(),
+            probed: probe(&file)?,
+            cache: absolute(&cache)?,
+            file,
             decoded: Mutex::new(false),
         })
     }
@@ -78,76 +81,32 @@ impl VideoFrames {
         // A thread that failed while decoding left nothing behind.
         let mut decoded = self.decoded.lock().unwrap_or_else(|e| e.into_inner());
         if !*decoded {
-            ensure(&self.file, &self.cache, self.probed.frames)?;
+            let frames = self.probed.frames;
+            let origin = Origin::of(&self.file, frames, None)?;
+            keep(&self.cache, &origin, |part| {
+                decode(&self.file, part, frames)
+            })?;
             *decoded = true;
         }
         Ok(frame_path(&self.cache, index))
     }
 }
 
-/// Which video a folder of frames was made from.
-#[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
-struct Origin {
-    bytes: u64,
-    modified_ns: u128,
-    frames: usize,
-}
-
-const ORIGIN: &str = "origin.json";
-
-/// The file of a frame, counted from 0.
-fn frame_path(cache: &Path, index: u64) -> PathBuf {
-    cache.join(format!("{index:010}.jpg"))
-}
-
-/// Decodes the video, unless the folder holds its frames already.
-///
-/// # Errors
-/// [`Error::Program`], [`Error::File`].
-fn ensure(video: &Path, cache: &Path, frames: usize) -> Result<()> {
-    let origin = Origin::of(video, frames)?;
-    if Origin::read(cache).as_ref() == Some(&origin) {
-        return Ok(());
-    }
-    let part = cache.with_extension(format!("part-{}", std::process::id()));
-    let made = decode(video, &part, &origin).and_then(|()| {
-        // Of another video, or of this one before it changed.
-        let old = Origin::read(cache).is_some();
-        if old {
-            std::fs::remove_dir_all(cache).map_err(|e| Error::file(cache, e))?;
-        }
-        deepfusion_fs::publish_folder(&part, cache).map_err(|e| Error::file(cache, e))
-    });
-    if made.is_err() {
-        // Best effort: the error that counts is told.
-        let _ = std::fs::remove_dir_all(&part);
-    }
-    // Another process may have been quicker.
-    if Origin::read(cache).as_ref() == Some(&origin) {
-        Ok(())
-    } else {
-        made
-    }
-}
-
-fn decode(video: &Path, part: &Path, origin: &Origin) -> Result<()> {
-    std::fs::create_dir_all(part).map_err(|e| Error::file(part, e))?;
+fn decode(video: &Path, part: &Path, frames: usize) -> Result<()> {
     // One file a frame: none doubled or dropped to keep a rate.
     in_either_words(|mode| ffmpeg(video, part, mode))?;
     let written = std::fs::read_dir(part)
         .map_err(|e| Error::file(part, e))?
         .count();
-    if written != origin.frames {
+    if written != frames {
         return Err(Error::Program {
             path: video.to_owned(),
             program: "ffmpeg",
-            problem: format!("decoded {written} frames, ffprobe counts {}", origin.frames),
+            problem: format!("decoded {written} frames, ffprobe counts {frames}"),
             remedy: "part of the video is damaged: write it anew, such as ffmpeg -i OLD -c:v libx264 -crf 12 NEW.mp4",
         });
     }
-    let path = part.join(ORIGIN);
-    let json = serde_json::to_vec(origin).map_err(|e| Error::file(&path, e.into()))?;
-    std::fs::write(&path, json).map_err(|e| Error::file(&path, e))
+    Ok(())
 }
 
 fn ffmpeg(video: &Path, part: &Path, mode: &str) -> Result<Vec<u8>> {
@@ -170,25 +129,4 @@ fn ffmpeg(video: &Path, part: &Path, mode: &str) -> Result<Vec<u8>> {
         "%010d.jpg".as_ref(),
     ];
     run("ffmpeg", &arguments, (video, READ), part)
-}
-
-impl Origin {
-    fn of(video: &Path, frames: usize) -> Result<Self> {
-        let about = std::fs::metadata(video).map_err(|e| Error::file(video, e))?;
-        let modified = about
-            .modified()
-            .ok()
-            .and_then(|t| t.duration_since(UNIX_EPOCH).ok());
-        Ok(Self {
-            bytes: about.len(),
-            modified_ns: modified.map_or(0, |t| t.as_nanos()),
-            frames,
-        })
-    }
-
-    /// `None` where the folder is no whole cache.
-    fn read(cache: &Path) -> Option<Self> {
-        let bytes = std::fs::read(cache.join(ORIGIN)).ok()?;
-        serde_json::from_slice(&bytes).ok()
-    }
 }

@@ -1,11 +1,13 @@
 //! Videos, cameras and streams, all through the ffmpeg that the user has installed.
 //!
-//! [`VideoFrames`] gives a file's frames in any order, [`write_video`] makes a file of pictures, and [`LiveSource`] takes the
+//! [`VideoFrames`] gives a file's frames in any order, [`PacketFrames`] those of a stream that lies in messages, [`write_video`] makes a file of pictures, and [`LiveSource`] takes the
 //! newest frame of a camera or stream. Without ffmpeg each says so, and what to do; nothing is linked.
 
+mod cache;
 mod error;
 mod frames;
 mod live;
+mod packets;
 mod probe;
 mod program;
 mod write;
@@ -13,4 +15,5 @@ mod write;
 pub use error::{Error, Result};
 pub use frames::VideoFrames;
 pub use live::{Address, LiveFrame, LiveSource, Taken};
+pub use packets::{Codec, PacketFrames, PacketStream};
 pub use write::{Shown, can_write_video, shown_for, write_video};

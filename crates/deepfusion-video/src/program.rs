@@ -2,6 +2,7 @@
 
 use crate::{Error, Result};
 use std::ffi::OsStr;
+use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -13,12 +14,14 @@ pub(crate) const WRITE: &str = "write videos";
 /// Longest complaint that is passed on, in characters.
 const LONGEST: usize = 400;
 
-/// What a program that succeeded printed.
+/// What a program printed.
 pub(crate) struct Printed {
     /// On its standard output.
     pub(crate) text: Vec<u8>,
     /// On its standard error, shortened.
     pub(crate) complaint: String,
+    /// Whether it ended as it should.
+    pub(crate) succeeded: bool,
 }
 
 /// Runs a program on `file` in a folder, to do `what`, and gives what it printed on its standard output.
@@ -44,39 +47,73 @@ pub(crate) fn output<S: AsRef<OsStr>>(
     (file, what): (&Path, &str),
     folder: &Path,
 ) -> Result<Printed> {
-    let output = Command::new(program)
-        .args(arguments)
-        .current_dir(folder)
-        .stdin(Stdio::null())
-        .output()
-        .map_err(|e| {
-            let remedy = match what {
-                WRITE => {
-                    "install ffmpeg so that it is on the PATH, or save the pictures and make the video elsewhere"
-                }
-                _ => {
-                    "install ffmpeg (it brings ffprobe) so that both are on the PATH, or extract the frames elsewhere \
-                     and give their folder"
-                }
-            };
-            not_started(file, program, &e, what, remedy)
-        })?;
-    let said = String::from_utf8_lossy(&output.stderr);
-    let complaint: String = said.trim().chars().take(LONGEST).collect();
-    if output.status.success() {
-        return Ok(Printed {
-            text: output.stdout,
-            complaint,
-        });
+    let printed = outcome(program, arguments, (file, what), folder, None)?;
+    if printed.succeeded {
+        return Ok(printed);
     }
     Err(Error::Program {
         path: file.to_owned(),
         program,
-        problem: format!("failed: {complaint}"),
+        problem: format!("failed: {}", printed.complaint),
         remedy: match what {
             WRITE => "see whether the disk is full; a newer ffmpeg may have an encoder for MP4",
             _ => "play the file to see whether it is whole; a newer ffmpeg may know its codec",
         },
+    })
+}
+
+/// Runs a program to its end, whether it succeeds or not, with `input` on its standard input.
+///
+/// # Errors
+/// [`Error::Program`] where it is not installed.
+pub(crate) fn outcome<S: AsRef<OsStr>>(
+    program: &'static str,
+    arguments: &[S],
+    (file, what): (&Path, &str),
+    folder: &Path,
+    input: Option<&[u8]>,
+) -> Result<Printed> {
+    let failed = |e: std::io::Error| {
+        let remedy = match what {
+            WRITE => {
+                "install ffmpeg so that it is on the PATH, or save the pictures and make the video elsewhere"
+            }
+            _ => {
+                "install ffmpeg (it brings ffprobe) so that both are on the PATH, or extract the frames elsewhere \
+                 and give their folder"
+            }
+        };
+        not_started(file, program, &e, what, remedy)
+    };
+    let mut child = Command::new(program)
+        .args(arguments)
+        .current_dir(folder)
+        .stdin(if input.is_some() {
+            Stdio::piped()
+        } else {
+            Stdio::null()
+        })
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(failed)?;
+    let pipe = child.stdin.take();
+    let output = std::thread::scope(|scope| {
+        // Beside the reading, or each could wait for the other.
+        scope.spawn(move || {
+            if let (Some(mut pipe), Some(bytes)) = (pipe, input) {
+                // A program that ends early does not read all of it; how it ended says why.
+                let _ = pipe.write_all(bytes);
+            }
+        });
+        child.wait_with_output()
+    })
+    .map_err(failed)?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    Ok(Printed {
+        complaint: said.trim().chars().take(LONGEST).collect(),
+        text: output.stdout,
+        succeeded: output.status.success(),
     })
 }
 

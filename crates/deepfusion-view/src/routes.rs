@@ -34,12 +34,12 @@ pub(crate) struct Routes {
 }
 
 impl Routes {
-    pub fn new(folders: Vec<Folder>, local: bool) -> Self {
+    pub(crate) fn new(folders: Vec<Folder>, local: bool) -> Self {
         Self { folders, local }
     }
 
     /// The answer to a request.
-    pub fn answer(&self, request: &Request) -> Response {
+    pub(crate) fn answer(&self, request: &Request) -> Response {
         // A page elsewhere may give its own name this machine's address, and then read what is served here as its own.
         if self.local && !request.host.as_deref().is_none_or(is_this_machine) {
             return Response::problem(

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// The two files of a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Pair {
+pub(crate) struct Pair {
     /// Its name, as for `--model`: the files' name without the ending.
     pub name: String,
     /// `NAME.toml`.
@@ -16,7 +16,7 @@ pub struct Pair {
 }
 
 /// Whether this is a valid network name: letters a to z, digits and dashes, a letter first. `none` is reserved for `--init none`.
-pub fn is_name(name: &str) -> bool {
+pub(crate) fn is_name(name: &str) -> bool {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     name.starts_with(|c: char| c.is_ascii_lowercase()) && name.chars().all(plain) && name != "none"
 }
@@ -25,7 +25,7 @@ pub fn is_name(name: &str) -> bool {
 ///
 /// # Errors
 /// A line that names a file without its counterpart or with an invalid name, or says why the folder cannot be read.
-pub fn scan(folder: &Path) -> Result<Vec<Pair>, String> {
+pub(crate) fn scan(folder: &Path) -> Result<Vec<Pair>, String> {
     if !folder.exists() {
         return Ok(Vec::new());
     }
@@ -84,7 +84,7 @@ pub fn scan(folder: &Path) -> Result<Vec<Pair>, String> {
 ///
 /// # Errors
 /// If a path is not absolute, or not Unicode: `include_bytes!` could not name it.
-pub fn list(pairs: &[Pair]) -> Result<String, String> {
+pub(crate) fn list(pairs: &[Pair]) -> Result<String, String> {
     let quoted = |path: &Path| match path.to_str() {
         Some(text) if path.is_absolute() => Ok(format!("{text:?}")),
         _ => Err(format!(

@@ -83,6 +83,7 @@
 //! | [`model`] | configurations, weights as safetensors, runs on disk |
 //! | [`weights`] | the networks inside the library |
 //! | [`data`] | recordings as datasets, frames and ground truth |
+//! | [`calibrate`] | a camera from pictures of a checkerboard |
 //! | [`doctor`] | what is wrong with a recording |
 //! | [`video`] | frames of videos, cameras and streams, through the user's ffmpeg |
 //! | [`motion`] | how a vehicle moved, from inertial unit, CAN, GPS |
@@ -98,6 +99,7 @@
 //!
 //! Coordinates are a camera's: x right, y down, z ahead, in metres. A transform is named `target_from_source`.
 
+pub use deepfusion_calibrate as calibrate;
 pub use deepfusion_data as data;
 pub use deepfusion_doctor as doctor;
 pub use deepfusion_eval as eval;

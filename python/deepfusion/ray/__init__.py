@@ -1,4 +1,4 @@
-"""Many machines, by Ray: bulk prediction, the doctor of a fleet's recordings, and trials of configurations.
+"""Many machines, by Ray: bulk prediction, the doctor of a fleet's recordings, trials of configurations, and one network learned by several workers.
 
 Needs Ray (`pip install "deepfusion[ray]"`). Everything runs on the cluster that `ray.init()` has joined, or on this machine where
 none was joined. Inputs and outputs are paths or URLs of any file system that fsspec knows: a folder that all machines see,
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from ._fleet import doctor, inspect, table
 from ._predict import PredictSummary, predict
+from ._train import train
 from ._tune import Trial, ablate, tune
 
-__all__ = ["PredictSummary", "Trial", "ablate", "doctor", "inspect", "predict", "table", "tune"]
+__all__ = ["PredictSummary", "Trial", "ablate", "doctor", "inspect", "predict", "table", "train", "tune"]

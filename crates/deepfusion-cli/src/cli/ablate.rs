@@ -29,7 +29,7 @@ const SHARED_TERMS: [&str; 6] = [
     deepfusion ablate --data street --budget 1200 --with attention,moving --rows hce+speed+flow,speed+flow,minimum\n  \
     deepfusion ablate --out runs/ablation --resume"
 )]
-pub struct AblateArgs {
+pub(crate) struct AblateArgs {
     /// Recordings to train on: drive folders, date folders or KITTI roots.
     #[arg(long, value_name = "PATH", num_args = 1.., required_unless_present = "resume")]
     pub data: Vec<PathBuf>,

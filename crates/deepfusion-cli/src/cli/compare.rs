@@ -15,7 +15,7 @@ use super::EngineArgs;
     deepfusion compare --published --format latex --out tables.tex\n  \
     deepfusion compare runs/a runs/b --pictures street --format html --out a-b.html"
 )]
-pub struct CompareArgs {
+pub(crate) struct CompareArgs {
     /// Run folders, saved evaluations or outputs of `eval --json`.
     #[arg(value_name = "RUN", required_unless_present = "published")]
     pub runs: Vec<PathBuf>,
@@ -41,7 +41,7 @@ pub struct CompareArgs {
 
 /// How tables are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub enum TableFormat {
+pub(crate) enum TableFormat {
     /// For a terminal.
     #[default]
     Text,

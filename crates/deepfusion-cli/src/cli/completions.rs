@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
     deepfusion completions bash > ~/.local/share/bash-completion/completions/deepfusion\n  \
     deepfusion completions zsh > ~/.zfunc/_deepfusion\n  \
     deepfusion completions man --out ~/.local/share/man/man1")]
-pub struct CompletionsArgs {
+pub(crate) struct CompletionsArgs {
     /// The shell, or `man` for pages of the manual.
     #[arg(value_enum, value_name = "SHELL")]
     pub kind: CompletionsKind,
@@ -19,7 +19,7 @@ pub struct CompletionsArgs {
 
 /// What is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum CompletionsKind {
+pub(crate) enum CompletionsKind {
     /// Bash.
     Bash,
     /// Elvish.

@@ -5,7 +5,7 @@ use super::{ComputeDevice, names};
 
 /// `deepfusion config …`.
 #[derive(Debug, Subcommand)]
-pub enum ConfigCommand {
+pub(crate) enum ConfigCommand {
     /// A preset's whole configuration as TOML, with a line on each key.
     Show(ShowArgs),
 }
@@ -16,7 +16,7 @@ pub enum ConfigCommand {
     after_help = "What it prints is a file for `train --config`. Such a file may also name a preset and only the keys in which it differs.\n\n\
     Examples:\n  deepfusion config show light > light.toml\n  deepfusion config show tiny --set loss.smoothness=0.01 --set batch=8"
 )]
-pub struct ShowArgs {
+pub(crate) struct ShowArgs {
     /// The preset.
     #[arg(value_parser = names::preset(), default_value = "tiny")]
     pub preset: Preset,

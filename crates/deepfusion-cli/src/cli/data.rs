@@ -1,16 +1,16 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use deepfusion_data::{Cameras, GtKind};
+use deepfusion_data::{Cameras, GtKind, NamedTopic};
 use deepfusion_logs::SpeedUnit;
 use deepfusion_rosbag::Compression;
 
-use super::values::{hfov, milliseconds};
+use super::values::{ClockOffset, hfov};
 use super::{CameraIntrinsics, names};
 
 /// `deepfusion data …`.
 #[derive(Debug, Subcommand)]
-pub enum DataCommand {
+pub(crate) enum DataCommand {
     /// What is in a recording: streams, rates, gaps, intrinsics, speeds, usable pairs.
     Inspect(InspectArgs),
     /// Write sparse ground-truth depth from the scans as an .npz file.
@@ -26,10 +26,11 @@ pub enum DataCommand {
 #[command(
     after_help = "Examples:\n  deepfusion data inspect kitti/2011_09_26/2011_09_26_drive_0005_sync\n  \
     deepfusion data inspect kitti/2011_09_26 --overlay --out overlays\n  \
-    deepfusion data inspect drive.mp4   # with speed.csv and calibration.yaml beside it"
+    deepfusion data inspect drive.mp4   # with speed.csv and calibration.yaml beside it\n  \
+    deepfusion data inspect drive.bag --topic image=/camera/front/image_raw --write-config"
 )]
-pub struct InspectArgs {
-    /// A recording: KITTI drive, date or root, image folder, video, comma2k19 or RGB-D folder.
+pub(crate) struct InspectArgs {
+    /// A recording: KITTI drive, date or root, KITTI odometry, KITTI-360, nuScenes, bag, image folder, video, comma2k19 or RGB-D folder.
     pub path: PathBuf,
     /// The camera, where the recording has no calibration, in pixels.
     #[arg(long, value_name = "fx,fy,cx,cy")]
@@ -37,15 +38,31 @@ pub struct InspectArgs {
     /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with = "intrinsics")]
     pub hfov: Option<f64>,
-    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
-    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
-    pub camera_ahead_s: Option<f64>,
+    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth. May be repeated.
+    #[arg(long = "topic", value_name = "ROLE=NAME")]
+    pub topics: Vec<NamedTopic>,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle
+    /// does, refused where they do not show it [default: the recording's clock.camera_ahead_s].
+    #[arg(
+        long = "clock-offset",
+        value_name = "MS|auto",
+        allow_negative_numbers = true
+    )]
+    pub clock_offset: Option<ClockOffset>,
     /// Also draw the measured depth on the images that have some.
     #[arg(long)]
     pub overlay: bool,
     /// Folder for the pictures of --overlay [default: runs/inspect-TIME].
     #[arg(long, value_name = "DIR", requires = "overlay")]
     pub out: Option<PathBuf>,
+    /// Of a bag, also write the file beside it (BAG.toml): the topics and where the sensors are, as they were found, to correct and
+    /// to complete. Of the options --topic, --intrinsics, --hfov and --clock-offset go into it.
+    #[arg(long)]
+    pub write_config: bool,
+    /// Replace the file that --write-config finds there: its keys are kept, its comments are not.
+    #[arg(long, requires = "write_config")]
+    pub overwrite: bool,
     /// Print as JSON.
     #[arg(long)]
     pub json: bool,
@@ -58,7 +75,7 @@ pub struct InspectArgs {
     Examples:\n  deepfusion data convert drive.bag kitti-drive\n  \
     deepfusion data convert kitti/2011_09_26/2011_09_26_drive_0005_sync drive.bag"
 )]
-pub struct ConvertArgs {
+pub(crate) struct ConvertArgs {
     /// A recording of any layout.
     #[arg(value_name = "IN")]
     pub input: PathBuf,
@@ -74,9 +91,18 @@ pub struct ConvertArgs {
     /// Which camera.
     #[arg(long, value_name = "2|3", default_value = "2")]
     pub camera: Cameras,
-    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
-    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
-    pub camera_ahead_s: Option<f64>,
+    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth. May be repeated.
+    #[arg(long = "topic", value_name = "ROLE=NAME")]
+    pub topics: Vec<NamedTopic>,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle
+    /// does, refused where they do not show it [default: the recording's clock.camera_ahead_s].
+    #[arg(
+        long = "clock-offset",
+        value_name = "MS|auto",
+        allow_negative_numbers = true
+    )]
+    pub clock_offset: Option<ClockOffset>,
     /// Compression of a bag.
     #[arg(long, value_parser = names::compression(), default_value = "lz4")]
     pub compression: Compression,
@@ -88,15 +114,15 @@ pub struct ConvertArgs {
 /// `deepfusion data import`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Writes speed.csv, imu.csv where the log has turns, and dataset.toml; the video stays where it is. A speed without a unit \
+    after_help = "Writes speed.csv, imu.csv where the log has turns (course.csv where positions alone show them), and dataset.toml; the video stays where it is. A speed without a unit \
     is an error, never a guess.\n\n\
     Examples:\n  deepfusion data import track.gpx --video drive.mp4 --out my-drive\n  \
     deepfusion data import GX010042.MP4 --out my-drive   # a GoPro's own GPS and gyroscope\n  \
     deepfusion data import trackLog.csv --zone +02:00 --video drive.mp4 --out my-drive   # Torque\n  \
     deepfusion data import table.csv --time Zeit --speed Tempo --unit km/h --start 12:00:03 --video drive.mp4 --out my-drive\n  \
-    deepfusion data import can.asc --dbc car.dbc --speed Wheels.Speed --start 1.5 --video drive.mp4 --out my-drive"
+    deepfusion data import trace.blf --dbc car.dbc --speed Wheels.Speed --start 1.5 --video drive.mp4 --out my-drive"
 )]
-pub struct ImportArgs {
+pub(crate) struct ImportArgs {
     /// The log: a file, or a phone app's export folder. Of several the first that has speeds gives them, the first that has turns the turns.
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<PathBuf>,
@@ -106,7 +132,7 @@ pub struct ImportArgs {
     /// The folder of images, in place of a video.
     #[arg(long, value_name = "DIR")]
     pub images: Option<PathBuf>,
-    /// A new folder, or one without speed.csv, imu.csv and dataset.toml.
+    /// A new folder, or one without speed.csv, imu.csv, course.csv and dataset.toml.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// The column of times [default: by its name].
@@ -127,6 +153,14 @@ pub struct ImportArgs {
     /// How far dates without a zone are ahead of UTC, such as +02:00 [default: not at all].
     #[arg(long, value_name = "HH:MM", value_parser = zone, allow_hyphen_values = true)]
     pub zone: Option<i64>,
+    /// The camera's clock is so many milliseconds ahead of the log's, or `auto`: measured by how the pictures turn as the vehicle
+    /// does, refused where they do not show it. It is written into dataset.toml [default: not at all].
+    #[arg(
+        long = "clock-offset",
+        value_name = "MS|auto",
+        allow_negative_numbers = true
+    )]
+    pub clock_offset: Option<ClockOffset>,
     /// The camera's calibration file.
     #[arg(long, value_name = "FILE", conflicts_with = "intrinsics")]
     pub calibration: Option<PathBuf>,
@@ -163,7 +197,7 @@ fn zone(word: &str) -> Result<i64, String> {
     ground along the ray, receding is positive, NaN = none.\n\n\
     Example:\n  deepfusion data export-gt kitti --split eigen/test_files.txt --out gt.npz"
 )]
-pub struct ExportGtArgs {
+pub(crate) struct ExportGtArgs {
     /// Recordings with scans or depth images.
     #[arg(required = true, value_name = "PATH")]
     pub paths: Vec<PathBuf>,
@@ -182,9 +216,18 @@ pub struct ExportGtArgs {
     /// File to write.
     #[arg(long, value_name = "FILE.npz")]
     pub out: PathBuf,
-    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
-    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
-    pub camera_ahead_s: Option<f64>,
+    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth. May be repeated.
+    #[arg(long = "topic", value_name = "ROLE=NAME")]
+    pub topics: Vec<NamedTopic>,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle
+    /// does, refused where they do not show it [default: the recording's clock.camera_ahead_s].
+    #[arg(
+        long = "clock-offset",
+        value_name = "MS|auto",
+        allow_negative_numbers = true
+    )]
+    pub clock_offset: Option<ClockOffset>,
     /// Replace the file if it is there.
     #[arg(long)]
     pub overwrite: bool,

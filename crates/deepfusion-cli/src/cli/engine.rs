@@ -7,7 +7,7 @@ use super::{ComputeDevice, names};
 
 /// What runs a trained network, and where.
 #[derive(Debug, Clone, Args)]
-pub struct EngineArgs {
+pub(crate) struct EngineArgs {
     /// What runs the network.
     #[arg(long, value_enum, default_value_t)]
     pub engine: Engine,
@@ -27,7 +27,7 @@ pub struct EngineArgs {
 
 impl EngineArgs {
     /// What is chosen without a word, on a device.
-    pub fn on(device: ComputeDevice) -> Self {
+    pub(crate) fn on(device: ComputeDevice) -> Self {
         Self {
             engine: Engine::default(),
             precision: Precision::default(),
@@ -40,7 +40,7 @@ impl EngineArgs {
 
 /// What runs the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub enum Engine {
+pub(crate) enum Engine {
     /// `fused` on the processor, `burn` on any other device.
     #[default]
     Auto,

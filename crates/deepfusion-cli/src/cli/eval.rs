@@ -1,10 +1,10 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
-use deepfusion_data::{Cameras, GtKind};
+use deepfusion_data::{Cameras, GtKind, NamedTopic};
 use deepfusion_eval::{Crop, GroundTruth, Holes, Protocol, Scaling};
 
-use super::values::{hfov, milliseconds, positive, scaling};
+use super::values::{ClockOffset, hfov, not_negative, positive, scaling};
 use super::{CameraIntrinsics, EngineArgs, names};
 
 /// `deepfusion eval`.
@@ -12,18 +12,20 @@ use super::{CameraIntrinsics, EngineArgs, names};
 #[command(
     group(ArgGroup::new("what").args(["model", "pred"])),
     after_help = "Metrics are means over images, unscaled and median-scaled, both always; static and moving pixels apart where \
-    the simulator's masks or KITTI's tracklets tell. Array files: .npz (matched by \
+    the simulator's masks or KITTI's tracklets tell. Drives that tell speed and turns are also judged without ground truth: the scale \
+    certificate is the bias of the metre with a 95 % interval, from frames that training did not see. Array files: .npz (matched by \
     name) or N×H×W .npy (in split order), float32 or float64, any size: predictions are resized as disparity. The result \
     of a run is kept in RUN/eval, where `compare` finds it.\n\n\
     Examples:\n  deepfusion eval --model runs/train-1 --data kitti --split eigen/test_files.txt\n  \
     deepfusion eval --pred depth.npz --pred-kind depth --gt gt.npz --crop garg --json\n  \
-    deepfusion eval --model runs/train-1 --data street --points 10000 --report street.html"
+    deepfusion eval --model runs/train-1 --data street --points 10000 --report street.html\n  \
+    deepfusion eval --model runs/train-1 --data my-drive --speed-error 1"
 )]
-pub struct EvalArgs {
+pub(crate) struct EvalArgs {
     /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street].
     #[arg(long, value_name = "RUN|NAME", requires = "data")]
     pub model: Option<PathBuf>,
-    /// Recordings to evaluate on: KITTI drives or roots, image folders, videos, RGB-D folders.
+    /// Recordings to evaluate on: KITTI (raw, odometry, 360) drives or roots, nuScenes, image folders, videos, RGB-D folders.
     #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pred", required_unless_present = "pred")]
     pub data: Vec<PathBuf>,
     /// Only the frames of this split file (lines "folder index side").
@@ -46,9 +48,19 @@ pub struct EvalArgs {
     /// Fail unless every frame of --split is there and has ground truth.
     #[arg(long, requires = "split")]
     pub strict: bool,
-    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
-    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true, conflicts_with = "pred")]
-    pub camera_ahead_s: Option<f64>,
+    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth. May be repeated.
+    #[arg(long = "topic", value_name = "ROLE=NAME")]
+    pub topics: Vec<NamedTopic>,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle
+    /// does, refused where they do not show it [default: the recording's clock.camera_ahead_s].
+    #[arg(
+        long = "clock-offset",
+        value_name = "MS|auto",
+        allow_negative_numbers = true,
+        conflicts_with = "pred"
+    )]
+    pub clock_offset: Option<ClockOffset>,
     /// Predicted arrays.
     #[arg(long, value_name = "FILE", requires = "pred_kind", requires = "gt")]
     pub pred: Option<PathBuf>,
@@ -85,7 +97,7 @@ pub struct EvalArgs {
     /// Predicted values that are NaN, infinite or not above 0 mean "none here": leave them out and count them.
     #[arg(long)]
     pub allow_holes: bool,
-    /// Training scans (from data export-gt) for the trivial row [default: those the model was trained on, if known].
+    /// Training scans (from data export-gt) for the mean-depth baseline [default: those the model was trained on, if known].
     #[arg(long, value_name = "FILE.npz")]
     pub trivial: Option<PathBuf>,
     /// Do not correct depth for another focal length than the one trained on.
@@ -99,6 +111,15 @@ pub struct EvalArgs {
     /// promise, and keep that beside the run. Of drives that training has not seen; measure the result on others.
     #[arg(long, requires = "model", conflicts_with = "gt")]
     pub calibrate_uncertainty: bool,
+    /// Only compare with ground truth: do not also look for what speeds and images alone say of the depth.
+    #[arg(long, conflicts_with = "pred")]
+    pub no_verdict: bool,
+    /// What the vehicle's speed may be off by (one standard error), which the scale certificate's interval then allows for.
+    #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = not_negative, conflicts_with_all = ["pred", "no_verdict"])]
+    pub speed_error: f64,
+    /// Take it that training saw none of these frames, where the program cannot know: of a network that was trained elsewhere.
+    #[arg(long, conflicts_with_all = ["pred", "no_verdict"])]
+    pub assume_unseen: bool,
     /// What runs the network.
     #[command(flatten)]
     pub engine: EngineArgs,
@@ -109,7 +130,7 @@ pub struct EvalArgs {
 
 impl EvalArgs {
     /// The protocol asked for; `default_crop` where none was.
-    pub fn protocol(&self, default_crop: Crop) -> Protocol {
+    pub(crate) fn protocol(&self, default_crop: Crop) -> Protocol {
         Protocol {
             crop: self.crop.unwrap_or(default_crop),
             cap_m: self.cap,
@@ -133,7 +154,7 @@ impl EvalArgs {
 
 /// What a predicted array holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum PredKind {
+pub(crate) enum PredKind {
     /// Camera z in metres.
     Depth,
     /// 1 / depth.

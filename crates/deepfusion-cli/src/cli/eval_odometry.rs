@@ -1,22 +1,22 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
-use deepfusion_data::Cameras;
+use deepfusion_data::{Cameras, NamedTopic};
 
 use super::ComputeDevice;
-use super::values::milliseconds;
+use super::values::ClockOffset;
 
 /// `deepfusion eval-odometry`.
 #[derive(Debug, Args)]
 #[command(
     group(ArgGroup::new("what").required(true).args(["model", "pred"])),
     after_help = "Unscaled. Drift is KITTI's t_rel and r_rel over 100 to 800 m, on shorter drives over 10 to 50 m; ATE is over \
-    five frames. Truth is the simulator's exact poses, else the path integrated from OXTS. Pose files: a line is a pose \
+    five frames. Truth is the simulator's exact poses or the recording's own, of KITTI raw the path integrated from OXTS. Pose files: a line is a pose \
     of the camera in the world, KITTI's 12 numbers or TUM's 8 (time tx ty tz qx qy qz qw).\n\n\
     Examples:\n  deepfusion eval-odometry --model runs/train-1 --data kitti/2011_09_26 --out odometry\n  \
     deepfusion eval-odometry --pred 09.txt --gt poses/09.txt --json"
 )]
-pub struct EvalOdometryArgs {
+pub(crate) struct EvalOdometryArgs {
     /// A run folder or a checkpoint in it.
     #[arg(long, value_name = "RUN", requires = "data")]
     pub model: Option<PathBuf>,
@@ -28,7 +28,7 @@ pub struct EvalOdometryArgs {
         conflicts_with = "pred"
     )]
     pub set: Option<String>,
-    /// Recordings to evaluate on: drive folders, date folders or KITTI roots.
+    /// Recordings to evaluate on: KITTI (raw, odometry, 360) drives or roots, nuScenes, RGB-D folders, bags with exact motion.
     #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "pred")]
     pub data: Vec<PathBuf>,
     /// Which camera.
@@ -39,9 +39,19 @@ pub struct EvalOdometryArgs {
         conflicts_with = "pred"
     )]
     pub camera: Cameras,
-    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
-    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true, conflicts_with = "pred")]
-    pub camera_ahead_s: Option<f64>,
+    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth. May be repeated.
+    #[arg(long = "topic", value_name = "ROLE=NAME")]
+    pub topics: Vec<NamedTopic>,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle
+    /// does, refused where they do not show it [default: the recording's clock.camera_ahead_s].
+    #[arg(
+        long = "clock-offset",
+        value_name = "MS|auto",
+        allow_negative_numbers = true,
+        conflicts_with = "pred"
+    )]
+    pub clock_offset: Option<ClockOffset>,
     /// Predicted poses.
     #[arg(long, value_name = "FILE", requires = "gt")]
     pub pred: Option<PathBuf>,

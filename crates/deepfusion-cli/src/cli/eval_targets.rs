@@ -13,7 +13,7 @@ use super::EngineArgs;
     Examples:\n  deepfusion eval-targets --data street --depth truth\n  \
     deepfusion eval-targets --data kitti/2011_09_26/2011_09_26_drive_0005_sync --model runs/train-1"
 )]
-pub struct EvalTargetsArgs {
+pub(crate) struct EvalTargetsArgs {
     /// Drives with labelled boxes.
     #[arg(long, required = true, num_args = 1.., value_name = "PATH")]
     pub data: Vec<PathBuf>,
@@ -39,7 +39,7 @@ pub struct EvalTargetsArgs {
 
 /// Where measured depth comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum TargetDepth {
+pub(crate) enum TargetDepth {
     /// The simulator's exact depth of every pixel.
     Truth,
     /// The drive's scans, gathered to as coarse an image as they fill.

@@ -13,7 +13,7 @@ use super::Size;
     Examples:\n  deepfusion export --model runs/train-1 --out depth.onnx\n  \
     deepfusion export --model runs/train-1 --out small.onnx --size 320x96"
 )]
-pub struct ExportArgs {
+pub(crate) struct ExportArgs {
     /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street].
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,

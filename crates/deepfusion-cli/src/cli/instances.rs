@@ -7,7 +7,7 @@ use super::values::share;
 
 /// A model that tells things apart in the image, where the user has one.
 #[derive(Debug, Clone, Args)]
-pub struct InstanceArgs {
+pub(crate) struct InstanceArgs {
     /// A segmentation or detection model in ONNX (YOLO-seg, YOLO, YOLOX), run in ONNX Runtime: its masks, with their depth,
     /// become targets of a class; what it does not know is still found by depth alone.
     #[arg(long, value_name = "FILE.onnx", help_heading = HEADING)]
@@ -24,7 +24,7 @@ const HEADING: &str = "Instance masks";
 
 impl InstanceArgs {
     /// What counts as found.
-    pub fn limits(&self) -> Limits {
+    pub(crate) fn limits(&self) -> Limits {
         Limits {
             score: self.instance_score as f32,
             classes: self.classes.clone(),

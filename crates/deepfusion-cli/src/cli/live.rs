@@ -4,7 +4,7 @@ use super::values::positive;
 
 /// What only live sources (cameras, streams, standard input) have.
 #[derive(Debug, Clone, Default, Args)]
-pub struct LiveArgs {
+pub(crate) struct LiveArgs {
     /// Stop after this many frames; skipped ones do not count.
     #[arg(long, value_name = "N", help_heading = HEADING, value_parser = clap::value_parser!(u64).range(1..))]
     pub frames: Option<u64>,
@@ -17,11 +17,11 @@ pub struct LiveArgs {
 }
 
 /// Where their options stand in the help.
-pub const HEADING: &str = "Live sources";
+pub(super) const HEADING: &str = "Live sources";
 
 impl LiveArgs {
     /// The first option that was given.
-    pub fn given(&self) -> Option<&'static str> {
+    pub(crate) fn given(&self) -> Option<&'static str> {
         [
             (self.frames.is_some(), "--frames"),
             (self.duration.is_some(), "--duration"),
@@ -32,7 +32,7 @@ impl LiveArgs {
     }
 
     /// Seconds of silence that are borne.
-    pub fn timeout_s(&self) -> f64 {
+    pub(crate) fn timeout_s(&self) -> f64 {
         self.timeout.unwrap_or(10.0)
     }
 }

@@ -1,6 +1,8 @@
 //! The command line's shape: what can be said, not what it does.
 
 mod ablate;
+mod adapt;
+mod calibrate;
 mod compare;
 mod completions;
 mod config;
@@ -28,26 +30,28 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use deepfusion_rosbag::Compression;
 use deepfusion_sim::{Scene, Sensors};
 
-pub use ablate::AblateArgs;
-pub use compare::{CompareArgs, TableFormat};
-pub use completions::{CompletionsArgs, CompletionsKind};
-pub use config::{ConfigCommand, ShowArgs};
-pub use data::{ConvertArgs, DataCommand, ExportGtArgs, ImportArgs, InspectArgs};
-pub use doctor::DoctorArgs;
-pub use engine::{Engine, EngineArgs};
-pub use eval::{EvalArgs, PredKind};
-pub use eval_odometry::EvalOdometryArgs;
-pub use eval_targets::{EvalTargetsArgs, TargetDepth};
-pub use export::ExportArgs;
-pub use instances::InstanceArgs;
-pub use live::LiveArgs;
-pub use perceive::{PerceiveArgs, PerceiveSave};
-pub use predict::{BenchArgs, PredictArgs, Save};
-pub use prediction::{Outputs, PredictionArgs};
-pub use train::{ComputeDevice, TrainArgs};
-pub use values::{CameraIntrinsics, Shard, Size};
-pub use view::ViewArgs;
-pub use weights::{PackArgs, WeightsCommand};
+pub(crate) use ablate::AblateArgs;
+pub(crate) use adapt::AdaptArgs;
+pub(crate) use calibrate::CalibrateArgs;
+pub(crate) use compare::{CompareArgs, TableFormat};
+pub(crate) use completions::{CompletionsArgs, CompletionsKind};
+pub(crate) use config::{ConfigCommand, ShowArgs};
+pub(crate) use data::{ConvertArgs, DataCommand, ExportGtArgs, ImportArgs, InspectArgs};
+pub(crate) use doctor::DoctorArgs;
+pub(crate) use engine::{Engine, EngineArgs};
+pub(crate) use eval::{EvalArgs, PredKind};
+pub(crate) use eval_odometry::EvalOdometryArgs;
+pub(crate) use eval_targets::{EvalTargetsArgs, TargetDepth};
+pub(crate) use export::ExportArgs;
+pub(crate) use instances::InstanceArgs;
+pub(crate) use live::LiveArgs;
+pub(crate) use perceive::{PerceiveArgs, PerceiveSave};
+pub(crate) use predict::{BenchArgs, PredictArgs, Save};
+pub(crate) use prediction::{Outputs, PredictionArgs};
+pub(crate) use train::{ComputeDevice, TrainArgs};
+pub(crate) use values::{CameraIntrinsics, ClockOffset, Shard, Size};
+pub(crate) use view::ViewArgs;
+pub(crate) use weights::{PackArgs, WeightsCommand};
 
 /// Metric depth from one camera and a speed signal.
 #[derive(Debug, Parser)]
@@ -57,7 +61,7 @@ pub use weights::{PackArgs, WeightsCommand};
     max_term_width = 100,
     subcommand_required = false
 )]
-pub struct Cli {
+pub(crate) struct Cli {
     /// What to do; without it, an overview with examples.
     #[command(subcommand)]
     pub command: Option<Command>,
@@ -68,7 +72,7 @@ pub struct Cli {
 
 /// Everything the program can do.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// With no data at all: depth, cloud and targets of a new street, then learning there.
     #[cfg(feature = "train")]
     Demo(DemoArgs),
@@ -77,11 +81,16 @@ pub enum Command {
     /// Look into recordings.
     #[command(subcommand)]
     Data(DataCommand),
+    /// A camera's intrinsics and lens from pictures or a video of a checkerboard, as a calibration file.
+    Calibrate(CalibrateArgs),
     /// Every reason why training on a recording would fail or give a wrong scale; alone, what this machine has.
     Doctor(DoctorArgs),
     /// Train on drives, without depth labels.
     #[cfg(feature = "train")]
     Train(Box<TrainArgs>),
+    /// Learn on new drives from a network that is there; kept only if nothing that can be checked gets worse.
+    #[cfg(feature = "train")]
+    Adapt(Box<AdaptArgs>),
     /// What can be configured.
     #[command(subcommand)]
     Config(ConfigCommand),
@@ -121,7 +130,7 @@ pub enum Command {
     after_help = "Takes a few minutes on two cores. Leaves pictures, a point cloud and report.html.\n\n\
     Examples:\n  deepfusion demo --out runs/first\n  deepfusion demo --from-scratch --out runs/second"
 )]
-pub struct DemoArgs {
+pub(crate) struct DemoArgs {
     /// Folder for everything it makes [default: runs/demo-TIME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -145,7 +154,7 @@ pub struct DemoArgs {
     Examples:\n  deepfusion simulate --out street --frames 200 --seed 7\n  \
     deepfusion simulate --out traffic --frames 100 --moving-cars 6 --size 1242x375\n  \
     deepfusion simulate --out garage --format bag --scene garage --frames 250")]
-pub struct SimulateArgs {
+pub(crate) struct SimulateArgs {
     /// Folder to write, new or empty.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -173,6 +182,9 @@ pub struct SimulateArgs {
     /// Sensors of the car [default: those of the layout's data set].
     #[arg(long, value_parser = names::sensors())]
     pub sensors: Option<Sensors>,
+    /// Height of the camera above the road.
+    #[arg(long, value_name = "M", default_value_t = 1.65, value_parser = values::positive)]
+    pub camera_height: f64,
     /// Set the clock of camera and LiDAR so many milliseconds ahead of the vehicle's (bag).
     #[arg(
         long,
@@ -194,7 +206,7 @@ pub struct SimulateArgs {
 
 /// Layouts the simulator writes.
 #[derive(Debug, Clone, Copy, Default, ValueEnum)]
-pub enum SimulateFormat {
+pub(crate) enum SimulateFormat {
     /// KITTI raw: images, oxts, velodyne scans, calibration, and exact depth beside them.
     #[default]
     Kitti,

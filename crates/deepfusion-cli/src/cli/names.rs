@@ -23,7 +23,7 @@ fn one_of<T: Copy + Send + Sync + 'static>(
 }
 
 /// Settings to start from.
-pub fn preset() -> impl TypedValueParser<Value = Preset> {
+pub(super) fn preset() -> impl TypedValueParser<Value = Preset> {
     one_of(
         Preset::name,
         &[
@@ -47,12 +47,19 @@ pub fn preset() -> impl TypedValueParser<Value = Preset> {
                 Preset::Monodepth2,
                 "Monodepth2's network and losses, with the speed term",
             ),
+            (
+                Preset::LiteMono,
+                "Lite-Mono (3.1 M parameters), Monodepth2's losses with the speed term",
+            ),
+            (Preset::LiteMonoSmall, "Lite-Mono-small (2.5 M)"),
+            (Preset::LiteMonoTiny, "Lite-Mono-tiny (2.2 M)"),
+            (Preset::LiteMono8m, "Lite-Mono-8M (8.7 M)"),
         ],
     )
 }
 
 /// What a recording is learned from.
-pub fn learn() -> impl TypedValueParser<Value = Learn> {
+pub(super) fn learn() -> impl TypedValueParser<Value = Learn> {
     one_of(
         Learn::name,
         &[
@@ -70,7 +77,7 @@ pub fn learn() -> impl TypedValueParser<Value = Learn> {
 }
 
 /// Whose motion the views are synthesised with.
-pub fn view_motion() -> impl TypedValueParser<Value = ViewMotion> {
+pub(super) fn view_motion() -> impl TypedValueParser<Value = ViewMotion> {
     one_of(
         ViewMotion::name,
         &[
@@ -91,7 +98,7 @@ pub fn view_motion() -> impl TypedValueParser<Value = ViewMotion> {
 }
 
 /// A checkpoint of a run.
-pub fn checkpoint() -> impl TypedValueParser<Value = CheckpointKind> {
+pub(super) fn checkpoint() -> impl TypedValueParser<Value = CheckpointKind> {
     one_of(
         CheckpointKind::name,
         &[
@@ -102,7 +109,7 @@ pub fn checkpoint() -> impl TypedValueParser<Value = CheckpointKind> {
 }
 
 /// In which numbers a network computes.
-pub fn precision() -> impl TypedValueParser<Value = Precision> {
+pub(super) fn precision() -> impl TypedValueParser<Value = Precision> {
     one_of(
         Precision::name,
         &[
@@ -116,7 +123,7 @@ pub fn precision() -> impl TypedValueParser<Value = Precision> {
 }
 
 /// Conventions of ground-truth depth.
-pub fn gt_kind() -> impl TypedValueParser<Value = GtKind> {
+pub(super) fn gt_kind() -> impl TypedValueParser<Value = GtKind> {
     one_of(
         GtKind::name,
         &[
@@ -133,7 +140,7 @@ pub fn gt_kind() -> impl TypedValueParser<Value = GtKind> {
 }
 
 /// Part of the image to compare.
-pub fn crop() -> impl TypedValueParser<Value = Crop> {
+pub(super) fn crop() -> impl TypedValueParser<Value = Crop> {
     one_of(
         Crop::name,
         &[
@@ -147,7 +154,7 @@ pub fn crop() -> impl TypedValueParser<Value = Crop> {
 }
 
 /// How a bag's chunks are compressed.
-pub fn compression() -> impl TypedValueParser<Value = Compression> {
+pub(super) fn compression() -> impl TypedValueParser<Value = Compression> {
     one_of(
         Compression::name,
         &[
@@ -159,7 +166,7 @@ pub fn compression() -> impl TypedValueParser<Value = Compression> {
 }
 
 /// What the simulated car carries.
-pub fn sensors() -> impl TypedValueParser<Value = Sensors> {
+pub(super) fn sensors() -> impl TypedValueParser<Value = Sensors> {
     one_of(
         Sensors::name,
         &[
@@ -173,7 +180,7 @@ pub fn sensors() -> impl TypedValueParser<Value = Sensors> {
 }
 
 /// Places that a simulated drive leads through.
-pub fn scene() -> impl TypedValueParser<Value = Scene> {
+pub(super) fn scene() -> impl TypedValueParser<Value = Scene> {
     one_of(
         Scene::name,
         &[

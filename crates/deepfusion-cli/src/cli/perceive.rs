@@ -20,7 +20,7 @@ use super::{InstanceArgs, Outputs, PredictionArgs, Save};
     deepfusion perceive --model runs/train-1 camera:0 --calib camera.yaml --speed 0 --out targets\n  \
     deepfusion perceive --model runs/train-1 rtsp://192.168.1.20/stream --calib camera.yaml --json --out targets"
 )]
-pub struct PerceiveArgs {
+pub(crate) struct PerceiveArgs {
     /// Which images, through which network, to where.
     #[command(flatten)]
     pub prediction: PredictionArgs,
@@ -46,7 +46,7 @@ pub struct PerceiveArgs {
 
 /// What `perceive` writes for a frame, beside its targets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum PerceiveSave {
+pub(crate) enum PerceiveSave {
     /// Depth as 16-bit PNG, metres × 256: what `view` shows.
     DepthPng,
     /// How sure the network is, as `predict --save sigma` writes it: `view` can then fade what is unsure.
@@ -65,7 +65,7 @@ pub enum PerceiveSave {
 
 impl PerceiveArgs {
     /// What is kept of the prediction that this stands on.
-    pub fn outputs(&self, max_depth_m: f64) -> Outputs {
+    pub(crate) fn outputs(&self, max_depth_m: f64) -> Outputs {
         let both = [
             (PerceiveSave::DepthPng, Save::DepthPng),
             (PerceiveSave::Sigma, Save::Sigma),

@@ -21,7 +21,7 @@ use super::{EngineArgs, Outputs, PredictionArgs, Shard, Size, names};
     deepfusion predict --model runs/train-1 drive --out depth --shard 1/2   # and 2/2 elsewhere\n  \
     deepfusion predict --model runs/train-1 camera:0 --calib camera.yaml --frames 100 --out depth"
 )]
-pub struct PredictArgs {
+pub(crate) struct PredictArgs {
     /// Which images, through which network, to where.
     #[command(flatten)]
     pub prediction: PredictionArgs,
@@ -51,7 +51,7 @@ pub struct PredictArgs {
 
 impl PredictArgs {
     /// What is kept of every image.
-    pub fn outputs(&self) -> Outputs {
+    pub(crate) fn outputs(&self) -> Outputs {
         // A video is made of pictures, when they are all there.
         let of_an_image = |save: &Save| match save {
             Save::Video => Save::SideBySide,
@@ -71,14 +71,14 @@ impl PredictArgs {
     }
 
     /// Whether videos are wanted.
-    pub fn video(&self) -> bool {
+    pub(crate) fn video(&self) -> bool {
         self.save.contains(&Save::Video)
     }
 }
 
 /// What `predict` writes for an image, beside the JSON sidecar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Save {
+pub(crate) enum Save {
     /// 16-bit PNG, metres × 256.
     DepthPng,
     /// H×W f32 metres, for NumPy.
@@ -101,7 +101,7 @@ pub enum Save {
 
 impl Save {
     /// Whether it is a cloud, which needs the camera.
-    pub fn is_cloud(self) -> bool {
+    pub(crate) fn is_cloud(self) -> bool {
         matches!(self, Self::Ply | Self::Pcd)
     }
 }
@@ -112,7 +112,7 @@ impl Save {
     group(ArgGroup::new("network").args(["model", "preset"])),
     after_help = "Example:\n  deepfusion bench --preset light --size 640x192"
 )]
-pub struct BenchArgs {
+pub(crate) struct BenchArgs {
     /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street, where embedded].
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,

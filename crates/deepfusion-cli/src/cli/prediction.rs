@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use deepfusion_data::OpenOptions;
+use deepfusion_data::{NamedTopic, OpenOptions};
 use deepfusion_motion::ScaleMonitorConfig;
 
 use super::values::{hfov, positive};
@@ -9,7 +9,7 @@ use super::{CameraIntrinsics, EngineArgs, LiveArgs, Save};
 
 /// Which images, through which network, to where: what `predict` and `perceive` have in common.
 #[derive(Debug, Clone, Args)]
-pub struct PredictionArgs {
+pub(crate) struct PredictionArgs {
     /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street].
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
@@ -27,6 +27,10 @@ pub struct PredictionArgs {
     /// A calibration file: KITTI's calib_cam_to_cam.txt, OpenCV's, ROS's or Kalibr's YAML, or four numbers; lenses are undone.
     #[arg(long, value_name = "FILE")]
     pub calib: Option<PathBuf>,
+    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth. May be repeated.
+    #[arg(long = "topic", value_name = "ROLE=NAME")]
+    pub topics: Vec<NamedTopic>,
     /// Do not correct depth for another focal length than the one trained on.
     #[arg(long)]
     pub no_focal_correction: bool,
@@ -58,16 +62,17 @@ pub struct PredictionArgs {
 
 impl PredictionArgs {
     /// How recordings among the inputs are opened.
-    pub fn open_options(&self) -> OpenOptions {
+    pub(crate) fn open_options(&self) -> OpenOptions {
         OpenOptions {
             intrinsics: self.intrinsics.map(|k| k.numbers()),
             hfov_deg: self.hfov,
+            topics: self.topics.clone(),
             ..OpenOptions::default()
         }
     }
 
     /// How the scale is watched.
-    pub fn scale_config(&self) -> ScaleMonitorConfig {
+    pub(crate) fn scale_config(&self) -> ScaleMonitorConfig {
         ScaleMonitorConfig {
             height_m: self.camera_height,
             ..ScaleMonitorConfig::default()
@@ -77,7 +82,7 @@ impl PredictionArgs {
 
 /// What is kept of every image.
 #[derive(Debug, Clone)]
-pub struct Outputs {
+pub(crate) struct Outputs {
     /// Beside the sidecar.
     pub save: Vec<Save>,
     /// Points of a cloud beyond this depth are left out, metres.

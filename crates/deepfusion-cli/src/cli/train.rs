@@ -1,10 +1,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use deepfusion_data::Cameras;
+use deepfusion_data::{Cameras, NamedTopic};
 use deepfusion_model::{Compute, Learn, Preset, TrainConfig, ViewMotion};
 
-use super::values::milliseconds;
+use super::values::{ClockOffset, Learned, learned};
 use super::{Size, names};
 
 /// `deepfusion train`.
@@ -20,8 +20,8 @@ use super::{Size, names};
     deepfusion train --data kitti --preset light --epochs 20 --out runs/light\n  \
     deepfusion train --out runs/light --resume"
 )]
-pub struct TrainArgs {
-    /// Recordings to train on: KITTI drives or roots, image folders, videos [default: the config file's].
+pub(crate) struct TrainArgs {
+    /// Recordings to train on: KITTI (raw, odometry, 360) drives or roots, nuScenes, image folders, videos [default: the config file's].
     #[arg(long, value_name = "PATH", num_args = 1.., required_unless_present_any = ["resume", "config"])]
     pub data: Vec<PathBuf>,
     /// Settings to start from [default: tiny].
@@ -69,9 +69,23 @@ pub struct TrainArgs {
     /// Validate on the frames of this split file only, of --val-data, or of --data where there is none.
     #[arg(long, value_name = "FILE")]
     pub val_split: Option<PathBuf>,
-    /// The camera's clock is so many milliseconds ahead of the vehicle's [default: the recording's clock.camera_ahead_s].
-    #[arg(long = "clock-offset", value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
-    pub camera_ahead_s: Option<f64>,
+    /// Learn the camera of recordings that do not say theirs, the last resort: one focal length for all of them, from a field of view
+    /// of 60 degrees on (another one: --set assumed_camera.hfov_deg=90), the principal point in the middle. It takes drives with
+    /// bends, and --view-motion vehicle where there is a yaw rate.
+    #[arg(long, value_name = "learn", value_parser = learned)]
+    pub intrinsics: Option<Learned>,
+    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth. May be repeated.
+    #[arg(long = "topic", value_name = "ROLE=NAME")]
+    pub topics: Vec<NamedTopic>,
+    /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle
+    /// does, refused where they do not show it [default: the recording's clock.camera_ahead_s].
+    #[arg(
+        long = "clock-offset",
+        value_name = "MS|auto",
+        allow_negative_numbers = true
+    )]
+    pub clock_offset: Option<ClockOffset>,
     /// Weights to start from: a run, a checkpoint, a ResNet's file, the name of an embedded network (`weights list`), or none
     /// [default: the embedded network of the preset's layers, if any; with --config what the file says].
     #[arg(long, value_name = "WEIGHTS")]
@@ -92,7 +106,7 @@ pub struct TrainArgs {
 
 /// Where to compute. Help lists what this build has; the others are known, so that they are answered with how to build them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub enum ComputeDevice {
+pub(crate) enum ComputeDevice {
     /// This machine's processor.
     #[default]
     Cpu,
@@ -112,7 +126,7 @@ pub enum ComputeDevice {
 
 impl ComputeDevice {
     /// What a preset's sizes follow.
-    pub fn compute(self) -> Compute {
+    pub(crate) fn compute(self) -> Compute {
         match self {
             Self::Cpu => Compute::Processor,
             Self::Vulkan | Self::Wgpu | Self::Cuda | Self::Metal => Compute::Gpu,

@@ -4,11 +4,11 @@ use std::str::FromStr;
 
 use deepfusion_eval::Scaling;
 use deepfusion_geometry::HFOV_DEG;
-pub use deepfusion_jobs::bulk::Shard;
+pub(crate) use deepfusion_jobs::bulk::Shard;
 
 /// Width and height in pixels, written `640x192`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Size {
+pub(crate) struct Size {
     /// Width, in pixels.
     pub width: u32,
     /// Height, in pixels.
@@ -30,7 +30,7 @@ impl FromStr for Size {
 
 /// A camera's numbers as given on the command line, in pixels of the input image.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CameraIntrinsics {
+pub(crate) struct CameraIntrinsics {
     /// Focal length along x.
     pub fx: f64,
     /// Focal length along y.
@@ -43,7 +43,7 @@ pub struct CameraIntrinsics {
 
 impl CameraIntrinsics {
     /// fx, fy, cx, cy.
-    pub fn numbers(self) -> [f64; 4] {
+    pub(crate) fn numbers(self) -> [f64; 4] {
         [self.fx, self.fy, self.cx, self.cy]
     }
 }
@@ -70,8 +70,22 @@ impl FromStr for CameraIntrinsics {
     }
 }
 
+/// That the camera is to be learned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Learned;
+
+/// The one word that training takes for a camera.
+pub(super) fn learned(text: &str) -> Result<Learned, String> {
+    if text == "learn" {
+        return Ok(Learned);
+    }
+    Err("expected learn; a camera that is known is told beside its recording, in calibration.yaml or dataset.toml \
+         (intrinsics = [fx, fy, cx, cy] or hfov_deg)"
+        .into())
+}
+
 /// `none`, `median` or `fixed=F`.
-pub fn scaling(text: &str) -> Result<Scaling, String> {
+pub(super) fn scaling(text: &str) -> Result<Scaling, String> {
     match text {
         "none" => Ok(Scaling::None),
         "median" => Ok(Scaling::Median),
@@ -86,17 +100,33 @@ pub fn scaling(text: &str) -> Result<Scaling, String> {
     }
 }
 
-/// Milliseconds as seconds.
-pub fn milliseconds(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|ms: &f64| ms.is_finite())
-        .map(|ms| 1e-3 * ms)
-        .ok_or_else(|| "expected milliseconds, such as -60".into())
+/// How far the camera's clock is ahead of the vehicle's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum ClockOffset {
+    /// So many seconds.
+    Seconds(f64),
+    /// As it is measured when the recordings are opened.
+    Auto,
+}
+
+impl FromStr for ClockOffset {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            _ => text
+                .parse()
+                .ok()
+                .filter(|ms: &f64| ms.is_finite())
+                .map(|ms| Self::Seconds(1e-3 * ms))
+                .ok_or_else(|| "expected milliseconds, such as -60, or auto".into()),
+        }
+    }
 }
 
 /// A field of view from left to right, in degrees.
-pub fn hfov(text: &str) -> Result<f64, String> {
+pub(super) fn hfov(text: &str) -> Result<f64, String> {
     let (least, most) = HFOV_DEG;
     text.parse()
         .ok()
@@ -107,7 +137,7 @@ pub fn hfov(text: &str) -> Result<f64, String> {
 }
 
 /// A number from 0 to 1.
-pub fn share(text: &str) -> Result<f64, String> {
+pub(super) fn share(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
         .filter(|n: &f64| (0.0..=1.0).contains(n))
@@ -115,7 +145,7 @@ pub fn share(text: &str) -> Result<f64, String> {
 }
 
 /// A number above 0.
-pub fn positive(text: &str) -> Result<f64, String> {
+pub(super) fn positive(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
         .filter(|n: &f64| n.is_finite() && *n > 0.0)
@@ -123,7 +153,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// A number of 0 or more.
-pub fn not_negative(text: &str) -> Result<f64, String> {
+pub(super) fn not_negative(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
         .filter(|n: &f64| n.is_finite() && *n >= 0.0)
@@ -177,9 +207,10 @@ mod tests {
 
     #[test]
     fn offsets_of_clocks() {
-        assert_eq!(milliseconds("-60"), Ok(-0.06));
+        assert_eq!("-60".parse(), Ok(ClockOffset::Seconds(-0.06)));
+        assert_eq!("auto".parse(), Ok(ClockOffset::Auto));
         for bad in ["", "60ms", "nan", "inf"] {
-            assert!(milliseconds(bad).is_err(), "{bad}");
+            assert!(bad.parse::<ClockOffset>().is_err(), "{bad}");
         }
     }
 

@@ -13,7 +13,7 @@ use clap::Args;
     deepfusion view runs/train-1                # learning curve and panels\n  \
     deepfusion view depth --rerun depth.rrd     # a file for the rerun viewer"
 )]
-pub struct ViewArgs {
+pub(crate) struct ViewArgs {
     /// A folder that `predict` or `perceive` wrote, or a run of `train`.
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,

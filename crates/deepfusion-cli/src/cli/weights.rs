@@ -7,7 +7,7 @@ use super::names;
 
 /// `deepfusion weights …`.
 #[derive(Debug, Subcommand)]
-pub enum WeightsCommand {
+pub(crate) enum WeightsCommand {
     /// Make a run of weights of torchvision's ResNet or of Monodepth2 (.pth, .safetensors).
     #[command(
         after_help = "Examples:\n  deepfusion weights import encoder.pth depth.pth pose_encoder.pth pose.pth --out runs/monodepth2\n  \
@@ -41,7 +41,7 @@ pub enum WeightsCommand {
     program.\n\n\
     Example:\n  deepfusion weights pack --model runs/street --name street --simulated-only --out packed"
 )]
-pub struct PackArgs {
+pub(crate) struct PackArgs {
     /// A run folder or a checkpoint in it.
     #[arg(long, value_name = "RUN")]
     pub model: PathBuf,

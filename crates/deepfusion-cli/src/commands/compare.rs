@@ -24,7 +24,7 @@ const TILE_WIDTH: u32 = 420;
 const LEGEND_WIDTH: u32 = 700;
 
 /// `deepfusion compare`.
-pub fn run(args: &CompareArgs) -> Result<()> {
+pub(super) fn run(args: &CompareArgs) -> Result<()> {
     if let Some(file) = &args.out {
         output::require_folder_of(file)?;
     }

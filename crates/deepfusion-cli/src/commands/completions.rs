@@ -12,7 +12,7 @@ use crate::failure::Result;
 use crate::output;
 
 /// `deepfusion completions`.
-pub fn run(args: &CompletionsArgs) -> Result<()> {
+pub(super) fn run(args: &CompletionsArgs) -> Result<()> {
     let shell = match args.kind {
         CompletionsKind::Bash => Shell::Bash,
         CompletionsKind::Elvish => Shell::Elvish,

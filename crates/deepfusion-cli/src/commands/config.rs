@@ -5,7 +5,7 @@ use crate::failure::Result;
 use crate::output;
 
 /// `deepfusion config show`.
-pub fn show(args: &ShowArgs) -> Result<()> {
+pub(super) fn show(args: &ShowArgs) -> Result<()> {
     let mut config = args.preset.config_on(args.device.compute());
     for assignment in &args.set {
         config.set(assignment)?;

@@ -2,6 +2,7 @@ use std::path::Path;
 
 use deepfusion_data::{Converted, Dataset, OpenOptions, convert_to_bag, convert_to_kitti};
 
+use super::clocks;
 use super::recordings::open_recordings;
 use super::remarks;
 use crate::cli::{CameraIntrinsics, ConvertArgs};
@@ -11,7 +12,7 @@ use crate::output;
 use crate::progress::{Progress, say};
 
 /// `deepfusion data convert`.
-pub fn run(args: &ConvertArgs) -> Result<()> {
+pub(super) fn run(args: &ConvertArgs) -> Result<()> {
     let ends_in = |ending: &str| has_ending(&args.out, ending);
     // It would become a folder of that name, and nobody who names a bag wants one.
     if ends_in("mcap") || ends_in("db3") {
@@ -19,13 +20,14 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
         return Err(CliError::NoRos2Writer { path }.into());
     }
     let input = std::slice::from_ref(&args.input);
-    let options = OpenOptions {
+    let mut options = OpenOptions {
         camera: args.camera,
         intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
         hfov_deg: args.hfov,
-        camera_ahead_s: args.camera_ahead_s,
+        topics: args.topics.clone(),
         ..OpenOptions::default()
     };
+    options.camera_ahead_s = clocks::seconds(args.clock_offset, input, &options)?;
     let datasets = open_recordings(input, &options)?;
     let mut progress = Progress::new("converting");
     let mut report = |done, total| progress.set(done, total);

@@ -9,7 +9,7 @@ use crate::failure::Result;
 
 /// The device asked for, where this build has its backend.
 #[cfg(feature = "train")]
-pub fn open(device: ComputeDevice) -> Result<Device> {
+pub(crate) fn open(device: ComputeDevice) -> Result<Device> {
     #[allow(unused_imports)]
     use burn::tensor::DeviceKind;
     match device {
@@ -31,7 +31,7 @@ pub fn open(device: ComputeDevice) -> Result<Device> {
 }
 
 /// The device's name as on the command line.
-pub fn name(device: ComputeDevice) -> &'static str {
+pub(crate) fn name(device: ComputeDevice) -> &'static str {
     match device {
         ComputeDevice::Cpu => "cpu",
         ComputeDevice::Vulkan => "vulkan",

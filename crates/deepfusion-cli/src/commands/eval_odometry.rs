@@ -9,6 +9,7 @@ use deepfusion_render::TopView;
 use deepfusion_runtime::ModelSource;
 use deepfusion_train::PosePredictor;
 
+use super::clocks;
 use super::device;
 use super::recordings::open_recordings;
 use crate::allocator;
@@ -27,7 +28,7 @@ const PAIRS: usize = 8;
 const FOCAL_TOLERANCE: f64 = 0.05;
 
 /// `deepfusion eval-odometry`.
-pub fn run(args: &EvalOdometryArgs) -> Result<()> {
+pub(super) fn run(args: &EvalOdometryArgs) -> Result<()> {
     let (tracks, truth) = match (&args.pred, &args.gt) {
         (Some(predicted), Some(truth)) => {
             let (predicted, truth) = (PoseFile::read(predicted)?, PoseFile::read(truth)?);
@@ -54,16 +55,19 @@ pub fn run(args: &EvalOdometryArgs) -> Result<()> {
 fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
     allocator::keep_memory();
     let model = args.model.as_deref().unwrap_or(Path::new("."));
-    if let source @ ModelSource::Packed { .. } = ModelSource::named(model)? {
+    let source = ModelSource::named(model)?;
+    if let ModelSource::Packed { .. } = source {
         let model = source.name();
         return Err(CliError::NoPoseNet { model }.into());
     }
     let predictor = PosePredictor::load(model, args.set.as_deref(), &device::open(args.device)?)?;
-    let options = OpenOptions {
+    let mut options = OpenOptions {
         camera: args.camera,
-        camera_ahead_s: args.camera_ahead_s,
+        topics: args.topics.clone(),
+        assumed_camera: source.assumed_camera(args.set.as_deref())?,
         ..OpenOptions::default()
     };
+    options.camera_ahead_s = clocks::seconds(args.clock_offset, &args.data, &options)?;
     let datasets = open_recordings(&args.data, &options)?;
     let mut stretches = Vec::new();
     let (mut exact, mut integrated, mut tracked) = (0, 0, 0);

@@ -41,7 +41,7 @@ struct Check {
 }
 
 /// `deepfusion export`.
-pub fn run(args: &ExportArgs) -> Result<()> {
+pub(super) fn run(args: &ExportArgs) -> Result<()> {
     let out = &args.out;
     if out.exists() && (!args.overwrite || out.is_dir()) {
         return Err(CliError::Exists {

@@ -2,6 +2,7 @@ use deepfusion_data::{Dataset, OpenOptions, export_gt};
 use deepfusion_jobs::evaluation::{check_used, expected_frames};
 use deepfusion_jobs::recordings::read_split;
 
+use super::clocks;
 use super::recordings::open_recordings;
 use super::remarks;
 use crate::cli::ExportGtArgs;
@@ -11,7 +12,7 @@ use crate::output;
 use crate::progress::{Progress, say};
 
 /// `deepfusion data export-gt`.
-pub fn run(args: &ExportGtArgs) -> Result<()> {
+pub(super) fn run(args: &ExportGtArgs) -> Result<()> {
     if args.out.exists() && !args.overwrite {
         return Err(CliError::Exists {
             path: args.out.clone(),
@@ -19,12 +20,13 @@ pub fn run(args: &ExportGtArgs) -> Result<()> {
         }
         .into());
     }
-    let options = OpenOptions {
+    let mut options = OpenOptions {
         camera: args.camera,
         split: read_split(args.split.as_deref())?,
-        camera_ahead_s: args.camera_ahead_s,
+        topics: args.topics.clone(),
         ..OpenOptions::default()
     };
+    options.camera_ahead_s = clocks::seconds(args.clock_offset, &args.paths, &options)?;
     let datasets = open_recordings(&args.paths, &options)?;
     let expected = expected_frames(&options, &datasets, args.strict)?;
     let kind = args.gt_depth;

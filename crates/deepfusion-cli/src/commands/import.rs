@@ -1,15 +1,20 @@
+use std::io::ErrorKind;
+use std::path::Path;
+
+use deepfusion_data::OpenOptions;
 use deepfusion_logs::{
     Camera, Clock, DriveFolder, DriveLog, Media, ReadOptions, read, time_on_clock,
 };
 
-use crate::cli::{CameraIntrinsics, ImportArgs};
+use super::clocks;
+use crate::cli::{CameraIntrinsics, ClockOffset, ImportArgs};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::output;
 use crate::progress::say;
 
 /// `deepfusion data import`.
-pub fn run(args: &ImportArgs) -> Result<()> {
+pub(super) fn run(args: &ImportArgs) -> Result<()> {
     let named = [&args.video, &args.images, &args.calibration];
     if let Some(path) = named.into_iter().flatten().find(|path| !path.exists()) {
         let path = path.clone();
@@ -34,8 +39,15 @@ pub fn run(args: &ImportArgs) -> Result<()> {
             (None, None, None) => None,
         },
         start_ns,
+        camera_ahead_s: match args.clock_offset {
+            Some(ClockOffset::Seconds(ahead_s)) => Some(ahead_s),
+            _ => None,
+        },
     };
     let notes = folder.write(&args.out)?;
+    if args.clock_offset == Some(ClockOffset::Auto) {
+        measure_clock(folder, &args.out)?;
+    }
     let (first, last) = (log.speeds.first(), log.speeds.last());
     let duration_s = first
         .zip(last)
@@ -98,6 +110,21 @@ fn merged(args: &ImportArgs) -> Result<DriveLog> {
     }
     // clap asks for one log at least.
     merged.ok_or_else(|| CliError::NoMedia.into())
+}
+
+/// Measures how far the camera's clock is ahead of the log's in a drive that was just written, and writes it again with that; where it
+/// is not found nothing is left.
+fn measure_clock(mut folder: DriveFolder<'_>, out: &Path) -> Result<()> {
+    let measured = clocks::seconds_of(Some(ClockOffset::Auto), out, &OpenOptions::default());
+    for file in DriveFolder::FILES.map(|name| out.join(name)) {
+        match std::fs::remove_file(&file) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error.into()),
+            _ => {}
+        }
+    }
+    folder.camera_ahead_s = measured?;
+    folder.write(out)?;
+    Ok(())
 }
 
 fn media(args: &ImportArgs, clock: Clock) -> Result<Media> {

@@ -1,26 +1,40 @@
 use std::path::{Path, PathBuf};
 
-use deepfusion_data::{Dataset, GtKind, OpenOptions, ground_truth_names, overlay, save_png};
+use deepfusion_data::{
+    Dataset, GtKind, OpenOptions, ground_truth_names, overlay, save_png, write_bag_config,
+};
 use deepfusion_doctor::inspect;
 
 use crate::cli::{CameraIntrinsics, InspectArgs};
+use crate::commands::clocks;
+use crate::error::CliError;
 use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
 
 /// `deepfusion data inspect`.
-pub fn run(args: &InspectArgs) -> Result<()> {
-    let options = OpenOptions {
+pub(super) fn run(args: &InspectArgs) -> Result<()> {
+    let mut options = OpenOptions {
         intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
         hfov_deg: args.hfov,
-        camera_ahead_s: args.camera_ahead_s,
+        topics: args.topics.clone(),
         ..OpenOptions::default()
     };
+    options.camera_ahead_s = clocks::seconds_of(args.clock_offset, &args.path, &options)?;
     let inspection = inspect(&args.path, &options)?;
+    // First of all, since it may be refused: what is printed then stands as it was read.
+    let written = if args.write_config {
+        write_config(args, &options)?
+    } else {
+        Vec::new()
+    };
     if args.json {
         output::print_json(&inspection)?;
     } else {
         output::print(&inspection.to_string())?;
+    }
+    for file in written {
+        say(&format!("{} written", file.display()));
     }
     if args.overlay {
         let folder = output::run_folder(args.out.as_deref(), "inspect")?;
@@ -28,6 +42,19 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         say(&format!("{pictures} pictures in {}", folder.display()));
     }
     Ok(())
+}
+
+/// The files beside the bags, written.
+fn write_config(args: &InspectArgs, options: &OpenOptions) -> Result<Vec<PathBuf>> {
+    use deepfusion_data::Error;
+    write_bag_config(&args.path, options, args.overwrite).map_err(|error| match error {
+        Error::Exists { path } => CliError::Exists {
+            path,
+            remedy: "it holds for its bag; --overwrite writes it anew, and keeps its keys",
+        }
+        .into(),
+        other => other.into(),
+    })
 }
 
 /// A picture for every frame with ground truth; how many.

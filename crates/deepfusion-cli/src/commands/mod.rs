@@ -2,14 +2,18 @@
 
 #[cfg(feature = "train")]
 mod ablate;
+#[cfg(feature = "train")]
+mod adapt;
 mod bench;
+mod calibrate;
+mod clocks;
 mod compare;
 mod completions;
 mod config;
 mod convert;
 #[cfg(feature = "train")]
 mod demo;
-pub mod device;
+pub(crate) mod device;
 mod doctor;
 mod eval;
 #[cfg(feature = "train")]
@@ -47,7 +51,7 @@ use crate::cli::{Command, ConfigCommand, DataCommand, WeightsCommand};
 use crate::failure::Result;
 
 /// Runs what was asked for.
-pub fn run(command: Option<Command>) -> Result<()> {
+pub(crate) fn run(command: Option<Command>) -> Result<()> {
     let Some(command) = command else {
         return overview::run();
     };
@@ -62,6 +66,8 @@ pub fn run(command: Option<Command>) -> Result<()> {
         Command::Doctor(args) => doctor::run(&args),
         #[cfg(feature = "train")]
         Command::Train(args) => train::run(&args),
+        #[cfg(feature = "train")]
+        Command::Adapt(args) => adapt::run(&args),
         Command::Config(ConfigCommand::Show(args)) => config::show(&args),
         #[cfg(feature = "train")]
         Command::Ablate(args) => ablate::run(&args),
@@ -81,6 +87,7 @@ pub fn run(command: Option<Command>) -> Result<()> {
         }
         Command::Weights(WeightsCommand::Pack(args)) => weights::pack::run(&args),
         Command::Weights(WeightsCommand::List { json }) => weights::list::run(json),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Completions(args) => completions::run(&args),
     }

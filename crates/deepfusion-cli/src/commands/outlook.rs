@@ -14,7 +14,7 @@ const STEPS: usize = 5;
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Watches the first steps of a run, then says once how long it will take.
-pub struct Outlook {
+pub(super) struct Outlook {
     config: TrainConfig,
     compute: Compute,
     /// Whether bf16 could be chosen and is not.
@@ -26,7 +26,7 @@ pub struct Outlook {
 
 impl Outlook {
     /// Of a run with this configuration.
-    pub fn new(config: TrainConfig, compute: Compute) -> Self {
+    pub(super) fn new(config: TrainConfig, compute: Compute) -> Self {
         let on_processor = compute == Compute::Processor && config.precision == Precision::F32;
         Self {
             bf16: on_processor && supports(&Device::flex(), Precision::Bf16),
@@ -38,7 +38,7 @@ impl Outlook {
     }
 
     /// The line to print after a step, where now is the time for it.
-    pub fn after_step(&mut self, step: usize, steps: usize) -> Option<String> {
+    pub(super) fn after_step(&mut self, step: usize, steps: usize) -> Option<String> {
         if self.done {
             return None;
         }

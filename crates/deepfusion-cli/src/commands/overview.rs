@@ -25,14 +25,14 @@ Numbers of any method, from arrays:
   deepfusion data export-gt DRIVE --out gt.npz
   deepfusion eval --pred depth.npz --pred-kind depth --gt gt.npz
 
-Also: compare (runs side by side, published tables), ablate (the system's parts on and off),
-eval-odometry (the camera's path), eval-targets (boxes), export (ONNX), weights import,
-weights list, bench, completions.
+Also: calibrate (a camera, from a checkerboard), compare (runs side by side, published tables),
+ablate (the system's parts on and off), eval-odometry (the camera's path), eval-targets (boxes),
+export (ONNX), weights import, weights list, bench, completions.
 Every command explains itself: deepfusion train --help
 ";
 
 /// `deepfusion` alone: what it can do, with examples to copy.
-pub fn run() -> Result<()> {
+pub(super) fn run() -> Result<()> {
     output::print(OVERVIEW)?;
     if cfg!(feature = "train") {
         Ok(())

@@ -17,7 +17,7 @@ use crate::progress::{Progress, say};
 const LINE_EVERY: Duration = Duration::from_secs(20);
 
 /// Writes the logs of a run and shows its progress.
-pub struct Recorder {
+pub(super) struct Recorder {
     csv: CsvLog,
     events: TensorBoardLog,
     panels: PathBuf,
@@ -30,7 +30,7 @@ pub struct Recorder {
 
 impl Recorder {
     /// For the run in `folder`, going on after `step`; with an `outlook` it says how long the run will take.
-    pub fn open(folder: &Path, step: usize, outlook: Option<Outlook>) -> Result<Self> {
+    pub(super) fn open(folder: &Path, step: usize, outlook: Option<Outlook>) -> Result<Self> {
         let panels = folder.join("panels");
         std::fs::create_dir_all(&panels)
             .with_context(|| format!("{}: cannot be made", panels.display()))?;
@@ -46,7 +46,7 @@ impl Recorder {
     }
 
     /// Handles an event.
-    pub fn handle(&mut self, event: TrainEvent) -> Control {
+    pub(super) fn handle(&mut self, event: TrainEvent) -> Control {
         if let Err(error) = self.record(event) {
             // A full disk: what is saved is safe, more would be lost.
             self.failure.get_or_insert(error);
@@ -60,7 +60,7 @@ impl Recorder {
     }
 
     /// The first failure to write, if any.
-    pub fn finish(self) -> Result<()> {
+    pub(super) fn finish(self) -> Result<()> {
         match self.failure {
             Some(error) => Err(error),
             None => Ok(()),
@@ -172,6 +172,19 @@ impl Recorder {
                 let picture = drawn(&panel)?;
                 deepfusion_data::save_png(&picture, &self.panels.join(format!("{step:06}.png")))?;
             }
+            TrainEvent::Camera { camera, learned } => {
+                let [fx, fy] = learned.focal_px;
+                let spread = match learned.sigma_px {
+                    Some([x, y]) => format!("standard deviations {x:.1} and {y:.1}"),
+                    None => "not told by these drives".into(),
+                };
+                self.events
+                    .scalars(learned.step, &[("camera/fx", fx), ("camera/fy", fy)])?;
+                say(&format!(
+                    "camera learned: fx {fx:.1}, fy {fy:.1} in pixels of {}x{} ({spread}), the principal point in the middle",
+                    camera.width, camera.height
+                ));
+            }
             TrainEvent::Saved { .. } => {}
             TrainEvent::Warning { step, message } => {
                 tracing::warn!("step {step}: {message}");
@@ -249,7 +262,7 @@ fn drawn(panel: &SamplePanel) -> deepfusion_render::Result<RgbImage> {
 }
 
 /// Seconds as minutes and seconds, or hours and minutes.
-pub fn clock(seconds: f64) -> String {
+pub(super) fn clock(seconds: f64) -> String {
     if !seconds.is_finite() {
         return "?".into();
     }

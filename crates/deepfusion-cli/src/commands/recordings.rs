@@ -17,7 +17,7 @@ use super::remarks;
 use crate::jobs;
 
 /// Opens the recordings at several paths, each drive and camera a data set.
-pub fn open_datasets(
+pub(super) fn open_datasets(
     paths: &[PathBuf],
     split: Option<&Path>,
     camera: Cameras,
@@ -31,7 +31,7 @@ pub fn open_datasets(
 }
 
 /// As [`open_datasets`], as the options say.
-pub fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
+pub(super) fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
     let datasets = recordings::open_recordings(paths, options).map_err(jobs::in_words)?;
     tell(options, &datasets);
     Ok(datasets)
@@ -40,7 +40,7 @@ pub fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<D
 /// The training and validation samples of a configuration; warns of drives that are skipped, of speeds that cannot be m/s and of
 /// validation frames that are seen in training.
 #[cfg(feature = "train")]
-pub fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
+pub(super) fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
     let mut warn = |warning: SampleWarning| remarks::warn_once(warning.to_string());
     samples::open_samples(config, &mut tell, &mut warn).map_err(jobs::in_words)
 }

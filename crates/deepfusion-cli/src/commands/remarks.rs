@@ -9,7 +9,7 @@ use deepfusion_data::Dataset;
 static TOLD: LazyLock<Mutex<HashSet<String>>> = LazyLock::new(Mutex::default);
 
 /// Warns on stderr, unless the same was warned of before.
-pub fn warn_once(warning: String) {
+pub(super) fn warn_once(warning: String) {
     if is_new(&warning) {
         tracing::warn!("{warning}");
     }
@@ -17,7 +17,7 @@ pub fn warn_once(warning: String) {
 
 /// Warns on stderr of what was taken for granted, looks odd or cannot be read: one line for what several recordings have
 /// in common.
-pub fn tell(datasets: &[Dataset]) {
+pub(super) fn tell(datasets: &[Dataset]) {
     for (remark, places) in by_remark(datasets.iter().flat_map(remarks)) {
         let new: Vec<String> = places
             .into_iter()

@@ -7,13 +7,13 @@ use deepfusion_jobs::recordings::camera_word;
 use deepfusion_model::TrainConfig;
 
 use super::start;
-use crate::cli::TrainArgs;
+use crate::cli::{ClockOffset, TrainArgs};
 use crate::error::CliError;
 use crate::failure::{Failure, Result};
 
 /// A run's configuration with what was asked for: it may be made longer, and its recordings may have moved; all else must be as
 /// the run has it.
-pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> {
+pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> {
     // Every option by name: one that is added says here what becomes of it.
     let TrainArgs {
         data,
@@ -32,7 +32,9 @@ pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> 
         split,
         val_data,
         val_split,
-        camera_ahead_s,
+        intrinsics,
+        topics,
+        clock_offset,
         init,
         view_motion,
         with,
@@ -65,6 +67,10 @@ pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> 
     if let Some(camera) = camera {
         let found = camera_of(&config);
         same("--camera", camera_word(*camera).into(), found)?;
+    }
+    if intrinsics.is_some() {
+        let found = run.learned_camera().map_or("none", |_| "learn");
+        same("--intrinsics", "learn".into(), found.into())?;
     }
     if let Some(motion) = view_motion {
         let found = run.view_motion.name();
@@ -101,10 +107,27 @@ pub fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainConfig> 
         let found = run.init.as_deref().map_or("none".into(), told);
         same("--init", told(&asked), found)?;
     }
-    if let Some(ahead_s) = camera_ahead_s {
-        let told = |s: f64| format!("{} ms", 1000.0 * s);
-        let found = run.data.camera_ahead_s.map_or("none".into(), told);
-        same("--clock-offset", told(*ahead_s), found)?;
+    let told = |s: f64| format!("{} ms", 1000.0 * s);
+    let found = run.data.camera_ahead_s.map(told);
+    match clock_offset {
+        // What was measured when the run began holds.
+        Some(ClockOffset::Auto) if found.is_some() => {}
+        Some(ClockOffset::Auto) => same("--clock-offset", "auto".into(), "none".into())?,
+        Some(ClockOffset::Seconds(ahead_s)) => {
+            let found = found.unwrap_or("none".into());
+            same("--clock-offset", told(*ahead_s), found)?;
+        }
+        None => {}
+    }
+    for topic in topics {
+        let topic = topic.to_string();
+        if !run.data.topics.contains(&topic) {
+            let found = match run.data.topics.as_slice() {
+                [] => "names none".into(),
+                topics => format!("has {}", topics.join(", ")),
+            };
+            return contradicts("--topic", topic, found);
+        }
     }
     move_recordings(
         &mut config,
@@ -267,7 +290,7 @@ fn told(path: &Path) -> String {
 }
 
 /// Where an error is that one of the run's recordings is not there, one that says how to tell where it is now.
-pub fn where_recordings_are(error: Failure, config: &TrainConfig, run: &Path) -> Failure {
+pub(super) fn where_recordings_are(error: Failure, config: &TrainConfig, run: &Path) -> Failure {
     let Some(path) = error.missing().map(Path::to_owned) else {
         return error;
     };
@@ -370,7 +393,8 @@ mod tests {
             change(&mut expected);
             assert_eq!(with(options).unwrap(), expected, "{options:?}");
         }
-        let refused: [(&[&str], &str, &str); 16] = [
+        let refused: [(&[&str], &str, &str); 18] = [
+            (&["--intrinsics", "learn"], "learn", "none"),
             (&["--preset", "light"], "light", "tiny"),
             (&["--size", "640x192"], "640x192", "320x96"),
             (&["--batch", "3"], "3", "4"),
@@ -389,6 +413,7 @@ mod tests {
             (&["--split", "/s.txt"], "/s.txt", "has none"),
             (&["--val-split", "/s.txt"], "/s.txt", "has none"),
             (&["--clock-offset", "60"], "60 ms", "has none"),
+            (&["--topic", "imu=/imu"], "imu=/imu", "names none"),
             (&["--val-data", "/v"], "/v", "held-out end"),
             (
                 &["--config", &other],

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use deepfusion_eval::verdict::Verdict;
 use deepfusion_jobs::evaluation::Evaluated;
 use deepfusion_perception::Reliability;
 use deepfusion_render::{HtmlReport, LearningLog, ReliabilityBin, ShownFrame};
@@ -13,7 +14,7 @@ const BEST: usize = 2;
 const WORST: usize = 3;
 
 /// An image of an evaluation, and why it is shown.
-pub struct Choice {
+pub(super) struct Choice {
     /// Its place in [`Evaluated::images`].
     pub image: usize,
     /// Whether its clouds are shown, too.
@@ -23,7 +24,7 @@ pub struct Choice {
 }
 
 /// The best frames, the one in the middle (with its clouds) and the worst, by unscaled Abs Rel; none twice.
-pub fn choose(evaluated: &Evaluated) -> Vec<Choice> {
+pub(super) fn choose(evaluated: &Evaluated) -> Vec<Choice> {
     let images = &evaluated.images;
     let error = |i: &usize| images[*i].unscaled.abs_rel;
     let mut order: Vec<usize> = (0..images.len()).collect();
@@ -50,7 +51,7 @@ pub fn choose(evaluated: &Evaluated) -> Vec<Choice> {
 }
 
 /// Whether the depth's confidence keeps its promise, on frames that it was not learned from.
-pub fn reliability(page: HtmlReport, bins: &[Reliability]) -> HtmlReport {
+pub(super) fn reliability(page: HtmlReport, bins: &[Reliability]) -> HtmlReport {
     let bins: Vec<ReliabilityBin> = bins
         .iter()
         .map(|bin| ReliabilityBin {
@@ -63,8 +64,91 @@ pub fn reliability(page: HtmlReport, bins: &[Reliability]) -> HtmlReport {
     page.section("How far to trust a pixel").reliability(&bins)
 }
 
+/// What is said of the depth without ground truth.
+pub(super) fn verdict(page: HtmlReport, verdict: &Verdict) -> HtmlReport {
+    let mut page = page.section("Without ground truth");
+    let percent = |v: f64| format!("{:.1} %", 100.0 * v);
+    let mut rows: Vec<(String, String)> = Vec::new();
+    let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
+    match (&verdict.scale_certificate, &verdict.no_certificate) {
+        (Some(certificate), _) => {
+            let interval = |of: Option<[f64; 2]>| {
+                let ratio =
+                    |[low, high]: [f64; 2]| format!("{:.3} to {:.3}", (-high).exp(), (-low).exp());
+                of.map_or("too few blocks".to_owned(), ratio)
+            };
+            row("scale (1 is metric)", format!("{:.3}", certificate.scale));
+            row("95 % interval", interval(certificate.ci95));
+            let exact = interval(certificate.ci95_given_speed);
+            row("95 % interval, if the speed is exact", exact);
+            row("verdict", certificate.verdict.to_string());
+            let (blocks, points) = (certificate.blocks, certificate.points);
+            row(
+                "from",
+                format!("{blocks} blocks of road, {points} scene points"),
+            );
+            for source in &certificate.sources {
+                row(
+                    &source.name.to_string(),
+                    format!("{} (1 σ)", percent(source.sd)),
+                );
+            }
+        }
+        (None, why) => row(
+            "scale",
+            why.map_or("no certificate".to_owned(), |why| {
+                format!("no certificate: {why}")
+            }),
+        ),
+    }
+    let found = &verdict.without_truth;
+    if let Some(r) = &found.reprojection {
+        row(
+            "reprojection error",
+            format!("{:.4} of {} pairs", r.warped, r.pairs),
+        );
+        row("unwarped", format!("{:.4}", r.unwarped));
+    }
+    if let Some(consistency) = found.consistency {
+        row("depth against the frame before", percent(consistency));
+    }
+    if let Some(flip) = found.flip {
+        row("depth against the mirrored image", percent(flip));
+    }
+    page = page.properties(&rows).note(
+        "The scale follows from how far scene points move between frames while the vehicle drives a measured way. The frames are \
+         none that training saw.",
+    );
+    if !found.ranges.is_empty() {
+        let rows = found.ranges.iter().map(|r| {
+            let range = format!("{} to {} m", r.from_m, r.to_m);
+            vec![range, r.n.to_string(), format!("{:.3}", r.scale)]
+        });
+        page = page.table(
+            &["predicted depth", "points", "scale"],
+            &rows.collect::<Vec<_>>(),
+        );
+    }
+    if !found.speeds.is_empty() {
+        let rows = found.speeds.iter().map(|r| {
+            let range = match r.to_mps {
+                Some(to) => format!("{} to {to} m/s", r.from_mps),
+                None => format!("{} m/s and more", r.from_mps),
+            };
+            vec![range, r.n.to_string(), format!("{:.3}", r.ratio)]
+        });
+        let header = [
+            "vehicle's speed",
+            "pairs",
+            "speed seen through the depth / measured",
+        ];
+        page = page.table(&header, &rows.collect::<Vec<_>>());
+    }
+    page
+}
+
 /// Tables and charts of an evaluation.
-pub fn accuracy(page: HtmlReport, evaluated: &Evaluated) -> HtmlReport {
+pub(super) fn accuracy(page: HtmlReport, evaluated: &Evaluated) -> HtmlReport {
     let report = &evaluated.report;
     let mut page = page.evaluation(report).range_charts(report);
     if evaluated.images.len() > 1 {
@@ -81,7 +165,7 @@ pub fn accuracy(page: HtmlReport, evaluated: &Evaluated) -> HtmlReport {
 }
 
 /// Frames with their pictures, each chosen by [`choose`].
-pub fn frames(page: HtmlReport, shown: &[(Choice, ShownFrame)]) -> Result<HtmlReport> {
+pub(super) fn frames(page: HtmlReport, shown: &[(Choice, ShownFrame)]) -> Result<HtmlReport> {
     let mut page = page.section("Best and worst frames").note(
         "By unscaled Abs Rel. Depth is coloured by the logarithm of metres, warm near and cold far; errors are blue where the \
          prediction is too near, red where it is too far.",
@@ -96,7 +180,7 @@ pub fn frames(page: HtmlReport, shown: &[(Choice, ShownFrame)]) -> Result<HtmlRe
 }
 
 /// How a run learned, and its settings; nothing of a run that has no log.
-pub fn training(mut page: HtmlReport, run: &Path) -> Result<HtmlReport> {
+pub(super) fn training(mut page: HtmlReport, run: &Path) -> Result<HtmlReport> {
     let config = std::fs::read_to_string(run.join("config.toml")).ok();
     let log = run.join("log.csv");
     if log.exists() {
@@ -134,7 +218,7 @@ fn images_a_step(config: &str) -> Option<f64> {
 }
 
 /// The command that is running, as it could be typed again.
-pub fn command() -> String {
+pub(super) fn command() -> String {
     let quoted = |word: String| {
         let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@".contains(c);
         if !word.is_empty() && word.chars().all(plain) {

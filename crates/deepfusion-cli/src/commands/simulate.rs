@@ -5,7 +5,7 @@ use crate::progress::{Progress, say};
 use deepfusion_sim::{BagSettings, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 
 /// `deepfusion simulate`.
-pub fn run(args: &SimulateArgs) -> Result<()> {
+pub(super) fn run(args: &SimulateArgs) -> Result<()> {
     let config = config(args);
     let simulation = Simulation::new(&config)?;
     let mut progress = Progress::new("simulating");
@@ -55,6 +55,7 @@ fn config(args: &SimulateArgs) -> SimConfig {
         fps: args.fps.unwrap_or(fps),
         scene: args.scene,
         sensors: args.sensors.unwrap_or(sensors),
+        camera_height_m: args.camera_height,
         scan_every: args.scan_every,
         ..SimConfig::default()
     }

@@ -9,7 +9,7 @@ use deepfusion_model::{
     CheckpointKind, DepthNetConfig, Error as ModelError, InputNormalisation, RunFolder, TrainConfig,
 };
 use deepfusion_nn::weights::load_torchvision_resnet;
-use deepfusion_runtime::{Error as RuntimeError, embedded, embedded_names};
+use deepfusion_runtime::{Error as RuntimeError, ModelSource, embedded, embedded_names};
 use deepfusion_train::{Checkpoints, Error, Model};
 use deepfusion_weights::Shipped;
 
@@ -20,7 +20,7 @@ use crate::progress::say;
 
 /// The weights of a new run before its first step.
 #[derive(Debug)]
-pub enum Start {
+pub(super) enum Start {
     /// Those of the seed.
     Nothing,
     /// A run's, or an ImageNet encoder's.
@@ -35,7 +35,7 @@ pub enum Start {
 }
 
 /// Whether `--init` asks for nothing at all.
-pub fn is_none(init: &Path) -> bool {
+pub(super) fn is_none(init: &Path) -> bool {
     init == Path::new("none")
 }
 
@@ -46,7 +46,7 @@ impl Start {
     /// # Errors
     /// [`RuntimeError::NoSuchModel`] for what is neither there nor embedded; [`CliError::OtherStart`] where a configuration began from other
     /// weights of the name; [`Shipped::read`]'s.
-    pub fn of(args: &TrainArgs, config: &TrainConfig) -> Result<Self> {
+    pub(super) fn of(args: &TrainArgs, config: &TrainConfig) -> Result<Self> {
         if let Some(init) = &args.init {
             return Self::named(init);
         }
@@ -76,6 +76,17 @@ impl Start {
         }
         let path = None;
         Ok(Self::Packed { network, path })
+    }
+
+    /// A network that was found.
+    pub(super) fn from_source(source: &ModelSource) -> Self {
+        match source {
+            ModelSource::Run { folder, kind, .. } => Self::Path(folder.checkpoint_path(*kind)),
+            ModelSource::Packed { given, network } => Self::Packed {
+                network: network.clone(),
+                path: Shipped::is_at(given).then(|| given.clone()),
+            },
+        }
     }
 
     fn named(init: &Path) -> Result<Self> {
@@ -127,7 +138,7 @@ impl Start {
     ///
     /// # Errors
     /// As [`RunFolder::read_config`] and [`RunFolder::read_state`] of the run it starts from.
-    pub fn record_in(&self, config: &mut TrainConfig) -> Result<(), ModelError> {
+    pub(super) fn record_in(&self, config: &mut TrainConfig) -> Result<(), ModelError> {
         (config.init, config.init_sha256) = match self {
             Self::Nothing => (None, None),
             Self::Path(path) => (Some(path.clone()), None),
@@ -174,7 +185,7 @@ impl Start {
     ///
     /// # Errors
     /// As [`Checkpoints::load_networks`]; [`Error::Model`] for weights of another architecture.
-    pub fn initialise(&self, mut model: Model, device: &Device) -> Result<Model, Error> {
+    pub(super) fn initialise(&self, mut model: Model, device: &Device) -> Result<Model, Error> {
         let device = device.clone().autodiff();
         match self {
             Self::Nothing => Ok(model),
@@ -211,7 +222,7 @@ impl Start {
                     });
                     return Ok(model);
                 }
-                model.depth_net.encoder = load_torchvision_resnet(model.depth_net.encoder, path)?;
+                model.depth_net = model.depth_net.with_torchvision_encoder(path)?;
                 model.pose_net.encoder = load_torchvision_resnet(model.pose_net.encoder, path)?;
                 Ok(model)
             }

@@ -1,5 +1,5 @@
 use deepfusion_data::Cameras;
-use deepfusion_jobs::recordings::camera_word;
+use deepfusion_jobs::recordings::{camera_word, training_recordings};
 use deepfusion_model::{
     DataConfig, Error as ModelError, InputSize, Learn, Preset, RunFolder, TrainConfig,
 };
@@ -9,16 +9,16 @@ use super::outlook::Outlook;
 use super::recorder::{Recorder, clock};
 use super::recordings::open_samples;
 use super::start::Start;
-use super::{device, resume};
+use super::{clocks, device, resume};
 use crate::allocator;
-use crate::cli::TrainArgs;
+use crate::cli::{ClockOffset, TrainArgs};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::say;
-use crate::{interrupt, output};
+use crate::{interrupt, jobs, output};
 
 /// `deepfusion train`.
-pub fn run(args: &TrainArgs) -> Result<()> {
+pub(super) fn run(args: &TrainArgs) -> Result<()> {
     let device = device::open(args.device)?;
     let resumed = match (&args.out, args.resume) {
         (Some(out), true) => Some(RunFolder::open(out)?.0),
@@ -101,7 +101,7 @@ fn plan(trainer: &Trainer) -> String {
 
 /// Runs a trainer with its logs, to its last step or until it is asked to stop; with an `outlook`, how long it will
 /// take is said.
-pub fn train(trainer: &mut Trainer, outlook: Option<Outlook>) -> Result<TrainSummary> {
+pub(super) fn train(trainer: &mut Trainer, outlook: Option<Outlook>) -> Result<TrainSummary> {
     allocator::keep_memory();
     interrupt::catch("stopping after this step; the run is saved");
     let mut recorder = Recorder::open(trainer.folder(), trainer.step(), outlook)?;
@@ -155,10 +155,21 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     }
     // Said last: a motion that contradicts a term left out is an error, and not silently another one.
     config.view_motion = args.view_motion.unwrap_or(config.view_motion);
+    if args.intrinsics.is_some() {
+        let camera = config.assumed_camera.get_or_insert_default();
+        camera.learn = true;
+    }
     for assignment in &args.set {
         config.set(assignment)?;
     }
     choose_recordings(&mut config.data, args)?;
+    if args.clock_offset == Some(ClockOffset::Auto) {
+        // Measured against what the recordings' own files say, and kept in the configuration as a number.
+        config.data.camera_ahead_s = None;
+        let datasets = training_recordings(&config).map_err(jobs::in_words)?;
+        let ahead_s = clocks::measured(datasets.iter().map(|(_, dataset)| dataset))?;
+        config.data.camera_ahead_s = Some(ahead_s);
+    }
     Ok(config)
 }
 
@@ -177,8 +188,11 @@ fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), Mode
         ("--learn", args.learn.is_some()),
         (
             "--clock-offset",
-            args.camera_ahead_s.is_some()
-                && data.sets.iter().any(|set| set.camera_ahead_s.is_some()),
+            args.clock_offset.is_some() && data.sets.iter().any(|set| set.camera_ahead_s.is_some()),
+        ),
+        (
+            "--topic",
+            !args.topics.is_empty() && data.sets.iter().any(|set| !set.topics.is_empty()),
         ),
     ];
     for (field, given) in given {
@@ -203,7 +217,12 @@ fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), Mode
     if args.val_split.is_some() {
         data.validation_split.clone_from(&args.val_split);
     }
-    data.camera_ahead_s = args.camera_ahead_s.or(data.camera_ahead_s);
+    if let Some(ClockOffset::Seconds(ahead_s)) = args.clock_offset {
+        data.camera_ahead_s = Some(ahead_s);
+    }
+    if !args.topics.is_empty() {
+        data.topics = args.topics.iter().map(ToString::to_string).collect();
+    }
     data.learn = args.learn.unwrap_or(data.learn);
     if let Some(camera) = args.camera {
         data.camera = camera_word(camera).into();

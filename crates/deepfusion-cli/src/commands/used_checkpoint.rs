@@ -1,12 +1,13 @@
 use std::path::PathBuf;
 
+use deepfusion_model::LearnedCamera;
 use deepfusion_runtime::DepthEstimator;
 use deepfusion_runtime::ModelSource;
 use serde::Serialize;
 
 /// The checkpoint that was measured: a run's folder alone does not say which of its two.
 #[derive(Serialize)]
-pub struct UsedCheckpoint {
+pub(super) struct UsedCheckpoint {
     /// `best` or `last` of a run; a packed network's own name.
     name: String,
     /// Of a run.
@@ -16,6 +17,9 @@ pub struct UsedCheckpoint {
     #[serde(skip_serializing_if = "Option::is_none")]
     sha256: Option<String>,
     step: usize,
+    /// The camera that a run learned, and how well.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    learned_camera: Option<LearnedCamera>,
     /// Whether a run's folder was given, and the choice is the program's.
     #[serde(skip)]
     chosen: bool,
@@ -23,7 +27,7 @@ pub struct UsedCheckpoint {
 
 impl UsedCheckpoint {
     /// That of an estimator's network.
-    pub fn of(estimator: &DepthEstimator, model: &ModelSource) -> Self {
+    pub(super) fn of(estimator: &DepthEstimator, model: &ModelSource) -> Self {
         let step = estimator.step;
         match model {
             ModelSource::Run {
@@ -35,6 +39,12 @@ impl UsedCheckpoint {
                 path: Some(folder.checkpoint_path(*kind)),
                 sha256: None,
                 step,
+                learned_camera: folder
+                    .read_findings()
+                    .ok()
+                    .and_then(|found| found.learned_camera)
+                    // Another checkpoint has another camera.
+                    .filter(|learned| learned.step == step),
                 chosen: given == folder.path(),
             },
             ModelSource::Packed { network, .. } => Self {
@@ -42,6 +52,7 @@ impl UsedCheckpoint {
                 path: None,
                 sha256: Some(network.card.sha256.clone()),
                 step,
+                learned_camera: None,
                 chosen: false,
             },
         }

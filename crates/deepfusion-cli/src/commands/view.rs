@@ -9,7 +9,7 @@ use crate::progress::say;
 use crate::{interrupt, output};
 
 /// `deepfusion view`.
-pub fn run(args: &ViewArgs) -> Result<()> {
+pub(super) fn run(args: &ViewArgs) -> Result<()> {
     if let Some(file) = &args.rerun {
         return super::view_rerun::run(args, file);
     }

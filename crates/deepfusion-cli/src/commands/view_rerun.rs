@@ -47,7 +47,7 @@ pub fn run(args: &ViewArgs, file: &Path) -> Result<()> {
 
 /// Without the feature: how to get it.
 #[cfg(not(feature = "rerun"))]
-pub fn run(_args: &ViewArgs, _file: &Path) -> Result<()> {
+pub(super) fn run(_args: &ViewArgs, _file: &Path) -> Result<()> {
     Err(CliError::NoRerun.into())
 }
 

@@ -3,7 +3,7 @@
 use super::{Failure, Result};
 
 /// Results that can say what was being done, and with which file.
-pub trait Context<T> {
+pub(crate) trait Context<T> {
     /// Puts `what` before an error.
     ///
     /// # Errors

@@ -28,9 +28,58 @@ as_the_library_says!(
     deepfusion_motion::Error,
     deepfusion_onnx::Error,
     deepfusion_perception::Error,
-    deepfusion_rosbag::Error,
     deepfusion_sim::Error,
 );
+
+impl Reportable for deepfusion_rosbag::Error {
+    fn remedy(&self) -> Option<String> {
+        match self {
+            Self::Feature { feature, .. } => Some(built_with(feature)),
+            _ => self.hint(),
+        }
+    }
+}
+
+/// How to come by a program that reads the bags of ROS 2.
+fn built_with(feature: &str) -> String {
+    format!(
+        "build with `--features {feature}` to read it: cargo install --path crates/deepfusion-cli --features {feature}"
+    )
+}
+
+impl Reportable for deepfusion_calibrate::Error {
+    fn remedy(&self) -> Option<String> {
+        use deepfusion_calibrate::Error as Problem;
+        match self {
+            Problem::NoBoard {
+                seen: Some((columns, rows, _)),
+                ..
+            }
+            | Problem::TooFewViews {
+                seen: Some((columns, rows, _)),
+                ..
+            } => Some(format!(
+                "the size counts inner corners, where four squares meet; if that is your board: --board {columns}x{rows}"
+            )),
+            Problem::NoBoard { .. } => self.hint().map(|hint| format!("{hint}: --board 9x6")),
+            Problem::Undetermined { .. } => self.hint().map(|hint| {
+                format!("{hint}; of a lens that bends straight lines strongly, give --fisheye")
+            }),
+            _ => self.hint(),
+        }
+    }
+}
+
+impl Reportable for deepfusion_doctor::NoCameraAhead {
+    fn remedy(&self) -> Option<String> {
+        let hint = self.hint()?;
+        Some(hint.replacen(
+            "give the offset in milliseconds",
+            "give the offset in milliseconds: --clock-offset MS (without it the clocks count as one)",
+            1,
+        ))
+    }
+}
 
 impl Reportable for deepfusion_logs::Error {
     fn remedy(&self) -> Option<String> {
@@ -78,17 +127,26 @@ impl Reportable for deepfusion_data::Error {
         let hint = self.hint();
         let or = |option: &str| hint.as_ref().map(|hint| format!("{hint}, or {option}"));
         match self {
-            Self::UnknownLayout { .. } if self.needs_ros2() => Some(
-                "build with `--features ros2` to read the bags of ROS 2: cargo install --path crates/deepfusion-cli --features ros2"
-                    .into(),
-            ),
+            Self::UnknownLayout { .. } if self.needs_ros2() => Some(built_with("ros2")),
+            Self::Bag(error) => error.remedy(),
             Self::NoCameraFile {
                 layout: DatasetKind::RgbD,
                 ..
             } => or("--intrinsics 585,585,320,240"),
-            Self::NoCameraFile { .. } => or("--hfov DEGREES"),
-            Self::NoBagCamera { .. } => or("--intrinsics fx,fy,cx,cy, or --hfov DEGREES"),
+            Self::NoCameraFile { .. } => or(
+                "--hfov DEGREES; `deepfusion calibrate` measures a camera from pictures of a checkerboard; the last resort is `train \
+                 --intrinsics learn`, on drives with bends",
+            ),
+            Self::NoBagCamera { .. } => or(
+                "--intrinsics fx,fy,cx,cy, or --hfov DEGREES; `deepfusion calibrate` measures a camera from a checkerboard; the last resort is \
+                 `train --intrinsics learn`, on drives with bends",
+            ),
             Self::OwnCalibration { .. } => Some("leave --intrinsics and --hfov out".into()),
+            Self::Topic {
+                choice: Some(topic),
+                ..
+            } => or(&format!("--topic {topic}")),
+            Self::NoTopics { .. } => Some("leave --topic out, or give bags alone".into()),
             Self::OneCamera { .. } => Some("leave --camera out, or give 2".into()),
             Self::DepthKind { .. } => Some("leave --gt-depth out, or give z".into()),
             Self::Video(error) => error.remedy(),
@@ -266,6 +324,9 @@ impl Reportable for deepfusion_train::Error {
             Self::Data(error) => error.remedy(),
             Self::Model(error) => error.remedy(),
             Self::Precision { .. } => Some(option_of("precision")),
+            Self::CameraKnown { .. } => Some(
+                "a camera that is known is better than one that is learned: leave --intrinsics learn out, or this recording".into(),
+            ),
             Self::SharedFrames { .. } => Some(
                 "validate on other drives (--val-data) or other frames (--val-split), or leave both out: the end of each drive \
                  is held out then"

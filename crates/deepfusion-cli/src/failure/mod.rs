@@ -13,14 +13,14 @@ use anstyle::{AnsiColor, Style};
 
 use crate::interrupt;
 
-pub use context::Context;
+pub(crate) use context::Context;
 
 /// What a command returns.
-pub type Result<T, E = Failure> = std::result::Result<T, E>;
+pub(crate) type Result<T, E = Failure> = std::result::Result<T, E>;
 
 /// An error that a command can end with, in the words of the command line: a library knows settings, this one the options that
 /// set them.
-pub trait Reportable: Error + Send + Sync + 'static {
+pub(crate) trait Reportable: Error + Send + Sync + 'static {
     /// What is wrong.
     fn message(&self) -> String {
         self.to_string()
@@ -63,7 +63,7 @@ impl From<Exit> for ExitCode {
 
 /// Why a command did not do what it was asked for: an error, and what was being done about which file.
 #[derive(Debug)]
-pub struct Failure {
+pub(crate) struct Failure {
     error: Box<dyn Reportable>,
     /// The innermost first.
     contexts: Vec<String>,
@@ -88,23 +88,23 @@ impl fmt::Display for Failure {
 impl Failure {
     /// The same failure of something larger.
     #[must_use]
-    pub fn context(mut self, what: impl Into<String>) -> Self {
+    pub(crate) fn context(mut self, what: impl Into<String>) -> Self {
         self.contexts.push(what.into());
         self
     }
 
     /// The error's own remedy, if it knows one.
-    pub fn hint(&self) -> Option<String> {
+    pub(crate) fn hint(&self) -> Option<String> {
         self.error.remedy()
     }
 
     /// The file or folder that is not there, where that is the error.
-    pub fn missing(&self) -> Option<&Path> {
+    pub(crate) fn missing(&self) -> Option<&Path> {
         self.error.missing()
     }
 
     /// The failure and its causes in one line.
-    pub fn one_line(&self) -> String {
+    pub(crate) fn one_line(&self) -> String {
         let mut chain = self.chain().into_iter();
         let mut text = chain.next().unwrap_or_default();
         for cause in chain {
@@ -117,7 +117,7 @@ impl Failure {
     }
 
     /// Prints it on stderr and says how the program ends.
-    pub fn report(&self) -> ExitCode {
+    pub(crate) fn report(&self) -> ExitCode {
         const ERROR: Style = AnsiColor::Red.on_default().bold();
         const HINT: Style = AnsiColor::Cyan.on_default().bold();
         let mut chain = self.chain().into_iter();

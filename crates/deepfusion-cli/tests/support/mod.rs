@@ -13,7 +13,7 @@ use std::process::Command;
 use serde_json::Value;
 
 /// What a run left.
-pub struct Run {
+pub(crate) struct Run {
     /// Its exit code.
     pub code: i32,
     /// Its standard output.
@@ -23,7 +23,7 @@ pub struct Run {
 }
 
 /// Runs `deepfusion` in a folder.
-pub fn in_folder(folder: &Path, args: &[&str]) -> Run {
+pub(crate) fn in_folder(folder: &Path, args: &[&str]) -> Run {
     let output = Command::new(env!("CARGO_BIN_EXE_deepfusion"))
         .current_dir(folder)
         .args(args)
@@ -38,24 +38,24 @@ pub fn in_folder(folder: &Path, args: &[&str]) -> Run {
 }
 
 /// As [`in_folder`], the arguments in one line.
-pub fn run(folder: &Path, args: &str) -> Run {
+pub(crate) fn run(folder: &Path, args: &str) -> Run {
     in_folder(folder, &args.split_whitespace().collect::<Vec<_>>())
 }
 
 /// A run that must succeed.
-pub fn ok(folder: &Path, args: &str) -> Run {
+pub(crate) fn ok(folder: &Path, args: &str) -> Run {
     let run = run(folder, args);
     assert_eq!(run.code, 0, "{args}: {}", run.stderr);
     run
 }
 
 /// What a run that must succeed prints, as JSON.
-pub fn json(folder: &Path, args: &str) -> Value {
+pub(crate) fn json(folder: &Path, args: &str) -> Value {
     serde_json::from_str(&ok(folder, args).stdout).unwrap()
 }
 
 /// A run that must fail with code 1, name every one of `names`, give a hint, and print nothing.
-pub fn fails(folder: &Path, args: &str, names: &[&str]) {
+pub(crate) fn fails(folder: &Path, args: &str, names: &[&str]) {
     let run = run(folder, args);
     assert_eq!(run.code, 1, "{args}: {}", run.stderr);
     assert_eq!(run.stdout, "", "{args}");

@@ -18,7 +18,7 @@ use super::support::Run;
 const SIZE: (usize, usize) = (320, 96);
 
 /// How bright a frame of [`stream`] is, as RGB: each knows its number.
-pub fn brightness(number: usize) -> u8 {
+pub(crate) fn brightness(number: usize) -> u8 {
     // A video's black is 16, and its white 235.
     ((u32::from(luma(number)) - 16) * 255 / 219) as u8
 }
@@ -28,7 +28,7 @@ fn luma(number: usize) -> u8 {
 }
 
 /// Frames of one grey each, as YUV4MPEG.
-pub fn stream(frames: usize) -> Vec<u8> {
+pub(crate) fn stream(frames: usize) -> Vec<u8> {
     let (w, h) = SIZE;
     let mut bytes = format!("YUV4MPEG2 W{w} H{h} F30:1 Ip A1:1 C420jpeg\n").into_bytes();
     for number in 0..frames {
@@ -40,7 +40,7 @@ pub fn stream(frames: usize) -> Vec<u8> {
 }
 
 /// Runs the program with a stream on its standard input, sent as fast as it is taken.
-pub fn piped(folder: &Path, args: &str, bytes: Vec<u8>) -> Run {
+pub(crate) fn piped(folder: &Path, args: &str, bytes: Vec<u8>) -> Run {
     let mut child = Command::new(env!("CARGO_BIN_EXE_deepfusion"))
         .current_dir(folder)
         .args(args.split_whitespace())
@@ -58,7 +58,7 @@ pub fn piped(folder: &Path, args: &str, bytes: Vec<u8>) -> Run {
 }
 
 /// Runs the program with another search path for programs.
-pub fn with_path(folder: &Path, args: &str, path: &OsStr) -> Run {
+pub(crate) fn with_path(folder: &Path, args: &str, path: &OsStr) -> Run {
     let mut command = Command::new(env!("CARGO_BIN_EXE_deepfusion"));
     command.current_dir(folder).args(args.split_whitespace());
     told(command.env("PATH", path).output().unwrap())
@@ -73,7 +73,7 @@ fn told(output: Output) -> Run {
 }
 
 /// Answers one request as a camera's server would, and does with the connection what the test wants.
-pub fn serve(answer: impl FnOnce(TcpStream) + Send + 'static) -> (String, JoinHandle<()>) {
+pub(crate) fn serve(answer: impl FnOnce(TcpStream) + Send + 'static) -> (String, JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("http://{}/live", listener.local_addr().unwrap());
     let server = std::thread::spawn(move || {

@@ -14,10 +14,12 @@ pub struct CameraCalibration {
     pub intrinsics: Intrinsics,
     /// The lens.
     pub distortion: Distortion,
-    /// Whether the file says the image's size; else it was taken from the images.
+    /// Whether the image's size is said, or does not matter (an angle of view); else it was taken from the images.
     pub size_in_file: bool,
     /// The file, or what else said it.
     pub path: PathBuf,
+    /// Whether nothing said it ([`crate::OpenOptions::assumed_camera`]).
+    pub assumed: bool,
 }
 
 impl CameraCalibration {
@@ -60,6 +62,14 @@ impl CameraCalibration {
         Self::from_numbers(numbers, image_size, told_by)
     }
 
+    /// The same, known to hold for images of any size where `any`, as an angle of view does.
+    pub(crate) fn for_any_size(self, any: bool) -> Self {
+        Self {
+            size_in_file: self.size_in_file || any,
+            ..self
+        }
+    }
+
     fn from_numbers(numbers: Numbers, image_size: (u32, u32), path: &Path) -> Result<Self> {
         let size = numbers.size.unwrap_or(image_size);
         let intrinsics = Intrinsics::from_numbers(numbers.pinhole, size);
@@ -75,6 +85,7 @@ impl CameraCalibration {
             distortion: numbers.distortion,
             size_in_file: numbers.size.is_some(),
             path: path.to_owned(),
+            assumed: false,
         })
     }
 

@@ -1,7 +1,7 @@
 //! Where a recording's camera is looked for.
 
 use super::calibration::CameraCalibration;
-use crate::dataset::numbers_of_hfov;
+use crate::dataset::{assumed_remark, numbers_of_hfov};
 use crate::dataset_toml::FolderConfig;
 use crate::pictures::{ExifCamera, exif_camera};
 use crate::{DatasetKind, Error, OpenOptions, Result};
@@ -24,7 +24,8 @@ const NAMES: [&str; 8] = [
 pub const GIVEN_INTRINSICS: &str = "given intrinsics";
 
 /// The camera of images of a size: given by the caller or in `dataset.toml`, or read from a file beside
-/// them, or in the folder above, or what EXIF says in `images`, which becomes one of the `remarks`.
+/// them, or in the folder above, or what EXIF says in `images`, which becomes one of the `remarks`; where nothing says it, the one
+/// that is to be assumed, which does too.
 ///
 /// # Errors
 /// [`Error::NoCameraFile`] where nothing says it; [`Error::CameraFile`], [`Error::Config`].
@@ -38,14 +39,16 @@ pub(crate) fn find_camera(
     remarks: &mut Vec<String>,
 ) -> Result<CameraCalibration> {
     if let Some(given) = options.given_camera(size) {
-        return CameraCalibration::given(given, size, Path::new(GIVEN_INTRINSICS));
+        let given = CameraCalibration::given(given, size, Path::new(GIVEN_INTRINSICS))?;
+        return Ok(given.for_any_size(options.intrinsics.is_none()));
     }
     if let Some(given) = config.intrinsics {
         return CameraCalibration::given(given, size, &config.path);
     }
     if let Some(hfov_deg) = config.hfov_deg {
         let given = numbers_of_hfov(hfov_deg, size);
-        return CameraCalibration::given(given, size, &config.path);
+        let given = CameraCalibration::given(given, size, &config.path)?;
+        return Ok(given.for_any_size(true));
     }
     let named = config.calibration.as_ref();
     let mut file = config.find(folder, "calibration", named, &NAMES)?;
@@ -57,10 +60,18 @@ pub(crate) fn find_camera(
     if let Some(file) = file {
         return CameraCalibration::read(&file, size);
     }
-    match by_exif(images, size)? {
-        Some((calibration, remark)) => {
-            remarks.push(remark);
-            Ok(calibration)
+    if let Some((calibration, remark)) = by_exif(images, size)? {
+        remarks.push(remark);
+        return Ok(calibration);
+    }
+    match options.assumed_numbers(size) {
+        Some(assumed) => {
+            remarks.push(assumed_remark(assumed));
+            let calibration = CameraCalibration::given(assumed, size, folder)?;
+            Ok(CameraCalibration {
+                assumed: true,
+                ..calibration
+            })
         }
         None => Err(Error::NoCameraFile {
             path: folder.join(NAMES[0]),

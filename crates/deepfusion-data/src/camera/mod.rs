@@ -4,10 +4,12 @@ mod calibration;
 mod find;
 mod lens;
 mod numbers;
+mod write;
 mod yaml;
 
 pub use calibration::CameraCalibration;
 pub use find::GIVEN_INTRINSICS;
 pub(crate) use find::find_camera;
 pub use lens::Lens;
+pub use write::camera_info_yaml;
 pub(crate) use yaml::FISHEYE;

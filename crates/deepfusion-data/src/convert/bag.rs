@@ -114,6 +114,7 @@ pub fn convert_to_bag(
                     path: out.to_owned(),
                     problem: e.to_string(),
                     remedy: "report this with the recording".into(),
+                    choice: None,
                 })?;
                 bag.write(topic, stamp, &cloud)?;
             }

@@ -1,13 +1,15 @@
 use super::camera::Camera;
 use super::ego::Ego;
 use super::frame::Frame;
-use super::inspection::Stream;
+use super::inspection::{Mount, Stream};
 use super::kind::DatasetKind;
 use super::options::OpenOptions;
+use super::receiver::Receiver;
 use super::recording::{CameraPath, Recording};
 use super::selection::Selection;
+use super::split::drive_name;
 use crate::truth::{DynamicAgreement, GtKind, LidarMotion, MovingLabels, ScanTruth};
-use crate::{Error, MotionModel, Result, image_size};
+use crate::{Error, MotionModel, Result, VehicleTrack, image_size};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use image::RgbImage;
 use rayon::prelude::*;
@@ -19,7 +21,7 @@ use std::sync::Arc;
 pub struct DatasetParts {
     /// The drive's name.
     pub name: String,
-    /// Its name in split files; KITTI's is `<date>/<drive>`.
+    /// Its name in split files; KITTI raw's is `<date>/<drive>`.
     pub split_name: String,
     /// The camera whose images these are.
     pub camera: Camera,
@@ -48,20 +50,74 @@ pub struct Dataset {
     parts: DatasetParts,
     selected: Vec<usize>,
     recording: Arc<dyn Recording>,
+    receiver: Receiver,
+    camera_assumed: bool,
     /// The recording's, and what was noticed about its neighbours.
     remarks: Vec<String>,
 }
 
+/// Between the samples of a track whose turns are those of a course, in seconds.
+const COURSE_STEP_S: f64 = 0.1;
+
 impl Dataset {
     /// A data set of all its frames.
     #[must_use]
-    pub fn new(parts: DatasetParts, recording: Arc<dyn Recording>) -> Self {
+    pub fn new(mut parts: DatasetParts, recording: Arc<dyn Recording>) -> Self {
+        parts.split_name = drive_name(&parts.split_name);
         Self {
             selected: (0..parts.frames.len()).collect(),
             parts,
             remarks: recording.remarks().to_vec(),
             recording,
+            receiver: Receiver::default(),
+            camera_assumed: false,
         }
+    }
+
+    /// With a camera that nothing says, or that something does.
+    #[must_use]
+    pub fn with_camera_assumed(mut self, assumed: bool) -> Self {
+        self.camera_assumed = assumed;
+        self
+    }
+
+    /// Whether nothing says what the camera is, and [`OpenOptions::assumed_camera`] stands in.
+    #[must_use]
+    pub fn camera_assumed(&self) -> bool {
+        self.camera_assumed
+    }
+
+    /// With what a satellite receiver says beside the speeds.
+    #[must_use]
+    pub fn with_receiver(mut self, receiver: Receiver) -> Self {
+        self.receiver = receiver;
+        self
+    }
+
+    /// The same with the turns of its receiver's course for a yaw rate, where it has no other: to compare clocks by, not to train
+    /// on, since a course is spread over a second or so. `None` where it has a yaw rate, or no course.
+    #[must_use]
+    pub fn turning_as_its_course(&self) -> Option<Self> {
+        let track = self.parts.track.as_ref().filter(|_| !self.yaw_known())?;
+        let course = self.receiver.course_rate_radps.as_ref()?;
+        let times = course.times_s();
+        let (first, last) = (*times.first()?, *times.last()?);
+        let steps = ((last - first) / COURSE_STEP_S).floor().max(0.0) as usize;
+        let sample = |step: usize| {
+            let time_s = first + step as f64 * COURSE_STEP_S;
+            Some((time_s, track.speed_at(time_s)?, course.at(time_s)?))
+        };
+        let samples: Vec<_> = (0..=steps).filter_map(sample).collect();
+        let mut turning = self.clone();
+        turning.parts.track = Some(VehicleTrack::new(&samples).into());
+        turning.parts.yaw_known = true;
+        Some(turning)
+    }
+
+    /// What a satellite receiver says beside the speeds; nothing where there is none.
+    #[must_use]
+    pub fn receiver(&self) -> &Receiver {
+        &self.receiver
     }
 
     /// With only these frames selected, by index.
@@ -95,7 +151,8 @@ impl Dataset {
         &self.parts.name
     }
 
-    /// Its name in split files: KITTI's is `<date>/<drive>`, others' the folder's name.
+    /// Its name in split files: KITTI raw's is `<date>/<drive>`, others' the folder's name; a number has no leading zeros, as in
+    /// the odometry task's lists.
     #[must_use]
     pub fn split_name(&self) -> &str {
         &self.parts.split_name
@@ -331,6 +388,12 @@ impl Dataset {
         self.recording.streams()
     }
 
+    /// Where its sensors are, and by whom; of a bag.
+    #[must_use]
+    pub fn mounts(&self) -> &[Mount] {
+        self.recording.mounts()
+    }
+
     /// What was taken for granted or looks odd, in sentences.
     #[must_use]
     pub fn remarks(&self) -> &[String] {
@@ -376,6 +439,7 @@ impl Dataset {
                 track,
                 yaw_known: self.parts.yaw_known,
                 cam_from_vehicle,
+                speed_sigma_mps: self.receiver.speed_sigma_mps.as_ref(),
                 leans: true,
             }),
             _ => Err(self.recording.no_motion()),

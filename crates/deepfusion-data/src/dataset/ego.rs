@@ -3,6 +3,7 @@
 use super::frame::Frame;
 use crate::{MotionModel, VehicleMotion};
 use deepfusion_geometry::Se3;
+use deepfusion_motion::Signal;
 
 /// How the camera moved between a target frame and one of its sources.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,6 +12,9 @@ pub struct EgoMotion {
     pub dt_s: f64,
     /// Length of the camera's translation, in metres.
     pub distance_m: f64,
+    /// Standard deviation of that length, in metres, where the speeds say how sure they are. Their errors are taken to be the same
+    /// all the way from one frame to the other, as those of a smoothed track are.
+    pub distance_sigma_m: Option<f64>,
     /// The car's mean speed over that time, in m/s, positive also when reversing.
     pub speed_mps: f64,
     /// A point of the target's camera frame in the source's. Driving ahead, its z is negative for the
@@ -28,6 +32,8 @@ pub struct Ego<'a> {
     pub(crate) yaw_known: bool,
     /// A point of the vehicle (x forward, y left, z up, metres) in the camera.
     pub cam_from_vehicle: Se3,
+    /// How sure the speeds are, where that is known.
+    pub(crate) speed_sigma_mps: Option<&'a Signal>,
     /// Whether the body's lean, where an inertial unit felt it, turns the camera.
     pub(crate) leans: bool,
 }
@@ -85,6 +91,9 @@ impl Ego<'_> {
             dt_s,
             // Without a yaw rate the track's is 0: this is then the way the vehicle itself went.
             distance_m: earlier_from_later.translation().norm(),
+            distance_sigma_m: self
+                .speed_sigma_mps
+                .and_then(|sigma| Some(sigma.at(0.5 * (from_s + to_s))? * dt_s)),
             speed_mps: vehicle.distance_m.abs() / dt_s,
             source_from_target: self.yaw_known.then(|| {
                 if source == earlier {

@@ -32,7 +32,7 @@ pub struct Inspection {
 pub struct DriveInspection {
     /// The drive's name.
     pub name: String,
-    /// The camera looked at: 2, or 3 where there is only that. Layouts other than KITTI raw have one, which counts as 2.
+    /// The camera looked at: 2, or 3 where there is only that. Layouts other than KITTI's have one, which counts as 2.
     pub camera: u8,
     /// Its images.
     pub frames: usize,
@@ -58,8 +58,24 @@ pub struct DriveInspection {
     /// How far the vehicle's clock is then still ahead of the camera's, by how the pictures moved. `None` where nobody
     /// measured it ([`crate::inspect_with`]), the drive does not show it, or there are several drives.
     pub time_offset: Option<ClockOffset>,
+    /// Where its sensors are, and by whom; of a bag.
+    pub mounts: Vec<Mount>,
     /// What was taken for granted or looks odd.
     pub remarks: Vec<String>,
+}
+
+/// Where a sensor is, as the file beside a bag has it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Mount {
+    /// Which transform: `cam_from_vehicle`, `cam_from_lidar`, `vehicle_from_imu`. Camera axes: x right, y down, z forward; the
+    /// others': x forward, y left, z up.
+    pub name: &'static str,
+    /// Who says so.
+    pub source: String,
+    /// In metres.
+    pub translation: [f64; 3],
+    /// An axis-angle vector in radians.
+    pub rotation: [f64; 3],
 }
 
 /// The vehicle's clock less the camera's.
@@ -89,7 +105,7 @@ pub struct IntrinsicsSummary {
 pub struct Stream {
     /// Its folder or file, such as `image_02` or `speed.csv`.
     pub name: String,
-    /// What it holds: `image`, `point_cloud`, `oxts`, `speed`, `imu`, `steering`, `depth`, `pose`.
+    /// What it holds: `image`, `point_cloud`, `oxts`, `speed`, `imu`, `steering`, `depth`, `pose`, `frames`.
     #[serde(rename = "type")]
     pub kind: &'static str,
     /// How many samples.

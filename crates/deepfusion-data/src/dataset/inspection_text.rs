@@ -70,6 +70,20 @@ impl fmt::Display for Inspection {
                 writeln!(f, "            {why}")?;
             }
             writeln!(f, "  scans     {} frames with ground truth", drive.scans)?;
+            for mount in &drive.mounts {
+                let three = |v: [f64; 3], digits: usize| {
+                    v.map(|x| format!("{:.digits$}", unsigned_zero(x)))
+                        .join(", ")
+                };
+                writeln!(
+                    f,
+                    "  mount     {}: {} m, turned by {} rad; {}",
+                    mount.name,
+                    three(mount.translation, 3),
+                    three(mount.rotation, 4),
+                    mount.source
+                )?;
+            }
             for remark in &drive.remarks {
                 writeln!(f, "  note      {remark}")?;
             }

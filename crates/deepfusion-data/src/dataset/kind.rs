@@ -8,6 +8,14 @@ use serde::{Deserialize, Serialize};
 pub enum DatasetKind {
     /// KITTI raw.
     KittiRaw,
+    /// A sequence of KITTI's odometry benchmark.
+    KittiOdometry,
+    /// KITTI-360.
+    #[serde(rename = "kitti_360")]
+    Kitti360,
+    /// A scene of nuScenes.
+    #[serde(rename = "nuscenes")]
+    NuScenes,
     /// A folder of images with tables beside it.
     Folder,
     /// A video file with tables beside it.
@@ -28,6 +36,9 @@ impl DatasetKind {
     pub fn label(self) -> &'static str {
         match self {
             Self::KittiRaw => "KITTI raw",
+            Self::KittiOdometry => "KITTI odometry",
+            Self::Kitti360 => "KITTI-360",
+            Self::NuScenes => "nuScenes",
             Self::Folder => "image folder",
             Self::Video => "video",
             Self::Comma2k19 => "comma2k19 segment",
@@ -35,5 +46,10 @@ impl DatasetKind {
             Self::Bag => "ROS bag",
             Self::Other => "recording",
         }
+    }
+    /// Whether its recordings say what their camera is, so that none can be given.
+    pub(crate) fn brings_calibration(self) -> bool {
+        use DatasetKind::{Kitti360, KittiOdometry, KittiRaw, NuScenes};
+        matches!(self, KittiRaw | KittiOdometry | Kitti360 | NuScenes)
     }
 }

@@ -12,11 +12,13 @@ mod inspection;
 mod inspection_text;
 mod kind;
 mod options;
+mod receiver;
 mod recording;
 pub(crate) mod selection;
 mod snippet;
 mod speed_check;
 mod split;
+mod topic;
 
 pub use camera::{Camera, Cameras};
 pub use coverage::SplitCoverage;
@@ -24,14 +26,16 @@ pub use drive::{Dataset, DatasetParts};
 pub use ego::{Ego, EgoMotion, NoMotion};
 pub use frame::{Frame, FrameImage};
 pub use inspection::{
-    ClockOffset, DriveInspection, Inspection, IntrinsicsSummary, SpeedRange, Stream,
+    ClockOffset, DriveInspection, Inspection, IntrinsicsSummary, Mount, SpeedRange, Stream,
 };
 pub use kind::DatasetKind;
 pub use options::OpenOptions;
-pub(crate) use options::numbers_of_hfov;
+pub(crate) use options::{assumed_remark, numbers_of_hfov};
+pub use receiver::Receiver;
 pub use recording::{CalibrationPlace, CameraPath, Recording};
 pub use snippet::{Snippet, Source, hold_out};
 pub use speed_check::{
     PLAUSIBLE_HEIGHT_M, SpeedWarning, grey_image, road_camera_height, speed_unit_warning,
 };
 pub use split::{Split, SplitEntry};
+pub use topic::{NamedTopic, TopicRole};

@@ -2,6 +2,7 @@
 
 use super::camera::Cameras;
 use super::split::Split;
+use super::topic::NamedTopic;
 use deepfusion_geometry::{HFOV_DEG, Intrinsics};
 
 /// How to open a recording.
@@ -17,10 +18,16 @@ pub struct OpenOptions {
     /// The images' field of view from left to right in degrees, above 0 and below 170: a pinhole camera with square pixels and
     /// the principal point in the middle ([`Intrinsics::from_hfov`]). Where [`Self::intrinsics`] is given too, that holds.
     pub hfov_deg: Option<f64>,
+    /// The camera of recordings of which nothing says it, in place of an error ([`crate::Dataset::camera_assumed`]): this one at
+    /// the images' size ([`Intrinsics::centred_at`]).
+    pub assumed_camera: Option<Intrinsics>,
     /// How far the clock of camera and LiDAR is ahead of the vehicle's, in seconds, instead of what the recording's own
     /// file says (`clock.camera_ahead_s`). It is taken off the images' times, once, when a recording is opened: every time of
     /// a [`crate::Dataset`] is one of the vehicle's clock.
     pub camera_ahead_s: Option<f64>,
+    /// Topics of bags by their role, in place of what the file beside a bag names and of what is found by type. A recording
+    /// that is no bag is refused with them.
+    pub topics: Vec<NamedTopic>,
 }
 
 impl OpenOptions {
@@ -35,6 +42,19 @@ impl OpenOptions {
         let by_view = |hfov_deg| numbers_of_hfov(hfov_deg, size);
         self.intrinsics.or_else(|| self.hfov_deg.map(by_view))
     }
+
+    /// fx, fy, cx, cy of the camera that is assumed of images of a size in pixels, where one is.
+    pub(crate) fn assumed_numbers(&self, size: (u32, u32)) -> Option<[f64; 4]> {
+        let camera = self.assumed_camera.map(|k| k.centred_at(size));
+        camera.map(|k| [k.fx, k.fy, k.cx, k.cy])
+    }
+}
+
+/// What is said of a camera that is assumed.
+pub(crate) fn assumed_remark([fx, fy, ..]: [f64; 4]) -> String {
+    format!(
+        "nothing says what the camera is: fx = {fx:.1}, fy = {fy:.1} are assumed, the principal point in the middle"
+    )
 }
 
 /// fx, fy, cx, cy of images of a size that see `hfov_deg` degrees from left to right. An angle that is none gives numbers that

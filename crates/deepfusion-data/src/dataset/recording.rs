@@ -2,7 +2,7 @@
 
 use super::drive::Dataset;
 use super::frame::Frame;
-use super::inspection::Stream;
+use super::inspection::{Mount, Stream};
 use super::kind::DatasetKind;
 use crate::truth::{DynamicAgreement, GtKind, LidarMotion, MovingLabels, ScanTruth};
 use crate::{Error, Result};
@@ -42,6 +42,11 @@ pub trait Recording: fmt::Debug + Send + Sync {
 
     /// What was taken for granted or looks odd, in sentences for the inspection.
     fn remarks(&self) -> &[String] {
+        &[]
+    }
+
+    /// Where its sensors are, where the recording can tell who says so.
+    fn mounts(&self) -> &[Mount] {
         &[]
     }
 

@@ -18,7 +18,7 @@ pub struct Split {
 /// One line of a split file, `folder index side`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct SplitEntry {
-    /// `<date>/<drive>`, as written.
+    /// `<date>/<drive>`, or whatever the drive's [`crate::Dataset::split_name`] is; a number without leading zeros.
     pub folder: String,
     /// The frame's number.
     pub frame: u64,
@@ -87,6 +87,16 @@ impl std::fmt::Display for SplitEntry {
     }
 }
 
+/// A drive's name in split files. The odometry task's lists name sequence `09` as `9`: names that are numbers have no leading zeros.
+pub(crate) fn drive_name(name: &str) -> String {
+    let number = !name.is_empty() && name.bytes().all(|b| b.is_ascii_digit());
+    match name.trim_start_matches('0') {
+        "" if number => "0".into(),
+        digits if number => digits.into(),
+        _ => name.into(),
+    }
+}
+
 /// The name in `scenario = garage`.
 fn scenario(line: &str) -> Option<&str> {
     let (key, name) = line.split_once('=')?;
@@ -115,7 +125,7 @@ fn parse(line: &str) -> std::result::Result<SplitEntry, String> {
         _ => return Err(format!("side '{side}', expected l or r")),
     };
     Ok(SplitEntry {
-        folder: folder.trim_end_matches('/').to_owned(),
+        folder: drive_name(folder.trim_end_matches('/')),
         frame,
         camera,
     })
@@ -132,6 +142,20 @@ mod tests {
         let plain = parse("2011_09_26/2011_09_26_drive_0009_sync 16").unwrap();
         assert_eq!(padded, plain);
         assert_eq!(parse("a/b 3 r").unwrap().camera, Camera::Right);
+    }
+
+    #[test]
+    fn numbers_are_names_without_leading_zeros() {
+        for (written, name) in [
+            ("09", "9"),
+            ("9", "9"),
+            ("00", "0"),
+            ("0", "0"),
+            ("03_a", "03_a"),
+        ] {
+            let entry = parse(&format!("{written} 1 l")).unwrap();
+            assert_eq!(entry.folder, name);
+        }
     }
 
     #[test]

@@ -11,8 +11,8 @@ use crate::logs::samples::Samples;
 use crate::logs::speed_log::SpeedLog;
 use crate::logs::vehicle_log::VehicleLog;
 use crate::{
-    Dataset, DatasetKind, DriveInspection, Error, Inspection, OpenOptions, Result, SpeedRange,
-    Stream,
+    Camera, Dataset, DatasetKind, DriveInspection, Error, Inspection, OpenOptions, Result,
+    SpeedRange, Stream,
 };
 use deepfusion_motion::{ImuMount, comma};
 use std::collections::BTreeMap;
@@ -95,7 +95,8 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         camera_ahead_s: config.camera_ahead_s(options),
         speeds: speeds(folder, &config)?,
         cam_from_vehicle: config.cam_from_vehicle(),
-        depth: None,
+        camera: Camera::Left,
+        truth: None,
         world_from_cam: BTreeMap::new(),
         streams,
         remarks,
@@ -145,6 +146,7 @@ pub(crate) fn inspect(folder: &Path, options: &OpenOptions) -> Result<Inspection
         distance_m,
         duration_s,
         drives: vec![DriveInspection {
+            mounts: Vec::new(),
             name: name_of(folder),
             camera: crate::Camera::Left.number(),
             frames: 0,
@@ -215,6 +217,9 @@ fn speeds(folder: &Path, config: &FolderConfig) -> Result<Option<SpeedLog>> {
         streams: vec![Stream::new(SPEED, "speed", at.len(), &at)],
         speeds_mps: Samples { ns, values },
         yaw_rates_radps: None,
+        course_rates_radps: None,
+        sigmas_mps: None,
+        tilts_rad: Vec::new(),
         remarks,
     }))
 }

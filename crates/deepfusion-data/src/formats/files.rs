@@ -9,6 +9,18 @@ pub(crate) fn name_of(folder: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
+/// The names of a path: as it was given, and with its links resolved, where that is another. Layouts that are told by the folders above
+/// look at both: a part of a data set is often a link to another disk.
+///
+/// # Errors
+/// [`Error::NoSuchPath`], [`Error::File`].
+pub(crate) fn both_names(path: &Path) -> Result<Vec<PathBuf>> {
+    let real = path.canonicalize().map_err(|e| Error::file(path, e))?;
+    let given = std::path::absolute(path).ok();
+    let given = given.filter(|given| given.file_name().is_some() && *given != real);
+    Ok(given.into_iter().chain([real]).collect())
+}
+
 /// The PNG and JPEG files of a folder, hidden ones left out; none where there is no such folder.
 pub(crate) fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images = Vec::new();

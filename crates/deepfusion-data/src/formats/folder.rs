@@ -7,7 +7,8 @@ use crate::dataset_toml::FolderConfig;
 use crate::logs::frame_times::timed_images;
 use crate::logs::speed_log::SpeedLog;
 use crate::truth::depth_images::DepthImages;
-use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, image_size};
+use crate::truth::measured::MeasuredDepth;
+use crate::{Camera, Dataset, DatasetKind, Error, OpenOptions, Result, image_size};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -63,7 +64,8 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         image_size: size,
         speeds: SpeedLog::read(folder, &config)?,
         cam_from_vehicle: config.cam_from_vehicle(),
-        depth,
+        camera: Camera::Left,
+        truth: depth.map(MeasuredDepth::Images),
         world_from_cam: BTreeMap::new(),
         streams: Vec::new(),
         remarks,

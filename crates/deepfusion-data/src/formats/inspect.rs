@@ -29,6 +29,7 @@ pub fn inspect_with(
     time_offset: impl FnOnce(&Dataset) -> Option<ClockOffset>,
 ) -> Result<Inspection> {
     let layout = Layout::of(path)?;
+    layout.check_topics(path, options)?;
     if let Layout::Comma(segment) = &layout
         && !comma::has_video(segment)
     {
@@ -36,7 +37,7 @@ pub fn inspect_with(
     }
     if let Layout::Bags(bags) = &layout
         && let [bag] = bags.as_slice()
-        && let Some(inspection) = bag::without_images(bag)?
+        && let Some(inspection) = bag::without_images(bag, options)?
     {
         return Ok(inspection);
     }
@@ -81,7 +82,7 @@ pub fn inspect_with(
     })
 }
 
-/// Pairs slower than this are counted as unusable, as in training (SPEC 3.5).
+/// Pairs slower than this are counted as unusable, as in training.
 const MIN_SPEED_MPS: f64 = 0.5;
 
 fn look_at(dataset: &Dataset) -> Result<DriveInspection> {
@@ -105,6 +106,7 @@ fn look_at(dataset: &Dataset) -> Result<DriveInspection> {
     }
     let ends = frames.first().zip(frames.last());
     Ok(DriveInspection {
+        mounts: dataset.mounts().to_vec(),
         name: dataset.name().to_owned(),
         camera: dataset.camera().number(),
         frames: frames.len(),

@@ -2,7 +2,7 @@
 
 use super::files::folders;
 use super::kitti::{self, Drive, drive_around, find_drives};
-use super::{bag, comma, folder, rgbd, video};
+use super::{bag, comma, folder, kitti_odometry, kitti360, nuscenes, rgbd, video};
 use crate::dataset_toml::FolderConfig;
 use crate::error::WITHOUT_ROS2;
 use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
@@ -13,8 +13,9 @@ use std::sync::Arc;
 
 impl Dataset {
     /// Opens a recording of any known layout, told by what is there: a KITTI raw drive, date or root (one
-    /// data set for each drive and camera, in order of names), a folder of images, a video file, a
-    /// comma2k19 segment, a folder of RGB-D frames. Drives without images of the camera, or without a
+    /// data set for each drive and camera, in order of names), KITTI odometry (one for each sequence), KITTI-360 (one for each drive), nuScenes (one for each
+    /// scene), a folder of images, a
+    /// video file, a comma2k19 segment, a folder of RGB-D frames. Drives without images of the camera, or without a
     /// selected frame, are left out.
     ///
     /// The sizes of all images are checked against the calibration. Times and speeds may be absent
@@ -25,7 +26,9 @@ impl Dataset {
     /// (calibration), [`Error::NoImages`], [`Error::OneCamera`], [`Error::FrameSize`], [`Error::Image`],
     /// [`Error::SplitSelectsNothing`], and what the layout's files can have wrong:
     /// [`Error::Calibration`], [`Error::TimeStamp`], [`Error::NoTimeStamp`], [`Error::Oxts`],
-    /// [`Error::Table`], [`Error::Config`], [`Error::Clocks`], [`Error::Program`].
+    /// [`Error::Table`], [`Error::Config`], [`Error::Clocks`], [`Error::Program`], [`Error::Topic`],
+    /// [`Error::Frames`], [`Error::NoTopics`], [`Error::Pose`], [`Error::Json`],
+    /// [`Error::SeveralVersions`].
     pub fn open(path: &Path, options: &OpenOptions) -> Result<Vec<Self>> {
         Layout::of(path)?.open(path, options)
     }
@@ -33,7 +36,7 @@ impl Dataset {
     /// The layout in which [`Self::open`] reads what is at a path, told without opening it.
     ///
     /// # Errors
-    /// [`Error::UnknownLayout`], [`Error::NoSuchPath`], [`Error::Config`].
+    /// [`Error::UnknownLayout`], [`Error::NoSuchPath`], [`Error::Config`], [`Error::SeveralVersions`].
     pub fn kind_at(path: &Path) -> Result<DatasetKind> {
         Ok(Layout::of(path)?.kind())
     }
@@ -53,6 +56,9 @@ impl Dataset {
 #[derive(Debug)]
 pub(crate) enum Layout {
     Kitti(Vec<Drive>),
+    KittiOdometry(Vec<PathBuf>),
+    Kitti360(Vec<kitti360::Drive>),
+    NuScenes(nuscenes::Place),
     Comma(PathBuf),
     RgbD(Vec<PathBuf>),
     Bags(Vec<PathBuf>),
@@ -64,8 +70,20 @@ impl Layout {
     /// The first layout that fits.
     ///
     /// # Errors
-    /// [`Error::NoSuchPath`], [`Error::UnknownLayout`].
+    /// [`Error::NoSuchPath`], [`Error::UnknownLayout`], [`Error::SeveralVersions`].
     pub(crate) fn of(path: &Path) -> Result<Self> {
+        let sequences = kitti_odometry::find(path)?;
+        if !sequences.is_empty() {
+            return Ok(Self::KittiOdometry(sequences));
+        }
+        // Its fisheye cameras 2 and 3 have the names of KITTI raw's.
+        let drives = kitti360::find(path)?;
+        if !drives.is_empty() {
+            return Ok(Self::Kitti360(drives));
+        }
+        if let Some(place) = nuscenes::find(path)? {
+            return Ok(Self::NuScenes(place));
+        }
         let drives = find_drives(path)?;
         if !drives.is_empty() {
             return Ok(Self::Kitti(drives));
@@ -122,6 +140,9 @@ impl Layout {
     pub(crate) fn kind(&self) -> DatasetKind {
         match self {
             Self::Kitti(_) => DatasetKind::KittiRaw,
+            Self::KittiOdometry(_) => DatasetKind::KittiOdometry,
+            Self::Kitti360(_) => DatasetKind::Kitti360,
+            Self::NuScenes(_) => DatasetKind::NuScenes,
             Self::Comma(_) => DatasetKind::Comma2k19,
             Self::RgbD(_) => DatasetKind::RgbD,
             Self::Bags(_) => DatasetKind::Bag,
@@ -130,11 +151,36 @@ impl Layout {
         }
     }
 
+    /// Topics are a bag's alone: named for another recording they would silently say nothing.
+    ///
+    /// # Errors
+    /// [`Error::NoTopics`].
+    pub(crate) fn check_topics(&self, path: &Path, options: &OpenOptions) -> Result<()> {
+        match (self, options.topics.first()) {
+            (Self::Bags(_), _) | (_, None) => Ok(()),
+            (_, Some(topic)) => Err(Error::NoTopics {
+                path: path.to_owned(),
+                layout: self.kind().label(),
+                topic: topic.clone(),
+            }),
+        }
+    }
+
     /// Opens what was found.
     pub(crate) fn open(&self, path: &Path, options: &OpenOptions) -> Result<Vec<Dataset>> {
+        self.check_topics(path, options)?;
+        if options.gives_camera() && self.kind().brings_calibration() {
+            return Err(Error::OwnCalibration {
+                path: path.to_owned(),
+                layout: self.kind().label(),
+            });
+        }
         let one = |dataset: Result<Dataset>| Ok(vec![dataset?.select(path, options)?]);
         match self {
             Self::Kitti(drives) => kitti::open(path, drives, options),
+            Self::KittiOdometry(sequences) => kitti_odometry::open(path, sequences, options),
+            Self::Kitti360(drives) => kitti360::open(path, drives, options),
+            Self::NuScenes(place) => nuscenes::open(path, place, options),
             Self::Comma(folder) => one(comma::open(folder, options)),
             Self::RgbD(folders) => rgbd::open(path, folders, options),
             Self::Bags(bags) => bag::open(path, bags, options),

@@ -1,13 +1,14 @@
-//! What folders, videos, comma2k19 segments and RGB-D folders have in common: frames, tables beside
-//! them, depth images.
+//! What the layouts of frames in files or in a video have in common: one camera, times, speeds, poses, measured depth.
 
+use crate::dataset::selection::Selection;
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
 use crate::logs::frame_times::TimedImage;
 use crate::logs::speed_log::SpeedLog;
-use crate::truth::depth_images::DepthImages;
+use crate::truth::measured::MeasuredDepth;
 use crate::{
     CalibrationPlace, Camera, CameraCalibration, CameraPath, Dataset, DatasetKind, DatasetParts,
-    Error, Frame, FrameImage, GtKind, Lens, Recording, Result, Stream, load_rgb,
+    Error, Frame, FrameImage, GtKind, Lens, OpenOptions, Receiver, Recording, Result, Stream,
+    load_rgb,
 };
 use deepfusion_geometry::{DepthMap, Se3};
 use deepfusion_video::VideoFrames;
@@ -20,6 +21,32 @@ use std::sync::Arc;
 pub(crate) const NO_MOUNT: &str = "the camera's place on the vehicle is not given ([mount] in dataset.toml): it is taken to look straight \
      ahead and to move as the vehicle does";
 
+/// Opens several recordings found at `path`, a data set each; those without a selected frame are left out.
+///
+/// # Errors
+/// That of the first that cannot be opened; [`Error::SplitSelectsNothing`] where no frame of any is selected.
+pub(crate) fn open_each<T>(
+    path: &Path,
+    found: impl IntoIterator<Item = T>,
+    options: &OpenOptions,
+    open: impl Fn(T) -> Result<Dataset>,
+) -> Result<Vec<Dataset>> {
+    let mut datasets = Vec::new();
+    let mut any = false;
+    for one in found {
+        any = true;
+        match open(one)?.select(path, options) {
+            Ok(dataset) => datasets.push(dataset),
+            Err(Error::SplitSelectsNothing { .. }) => {}
+            Err(other) => return Err(other),
+        }
+    }
+    match Selection::new(options).nothing(path) {
+        Some(error) if any && datasets.is_empty() => Err(error),
+        _ => Ok(datasets),
+    }
+}
+
 /// A recording of one camera, put together from what a layout found.
 #[derive(Debug)]
 pub(crate) struct PlainRecording {
@@ -29,7 +56,7 @@ pub(crate) struct PlainRecording {
     calibration: CameraCalibration,
     lens: Lens,
     video: Option<VideoFrames>,
-    depth: Option<DepthImages>,
+    truth: Option<MeasuredDepth>,
     world_from_cam: BTreeMap<u64, Se3>,
     streams: Vec<Stream>,
     remarks: Vec<String>,
@@ -51,9 +78,11 @@ pub(crate) struct PlainParts {
     pub(crate) image_size: (u32, u32),
     pub(crate) speeds: Option<SpeedLog>,
     pub(crate) cam_from_vehicle: Se3,
-    pub(crate) depth: Option<DepthImages>,
+    /// Of the vehicle's cameras.
+    pub(crate) camera: Camera,
+    pub(crate) truth: Option<MeasuredDepth>,
     pub(crate) world_from_cam: BTreeMap<u64, Se3>,
-    /// Beside those of the images, the speeds and the depth images.
+    /// Beside those of the images, the speeds, the poses and the measured depth.
     pub(crate) streams: Vec<Stream>,
     pub(crate) remarks: Vec<String>,
     /// What to do about missing speeds.
@@ -74,6 +103,10 @@ impl PlainParts {
         let motion = match (&self.speeds, origin_ns) {
             (Some(log), Some(origin)) => Some(log.motion(origin)?),
             _ => None,
+        };
+        let receiver = match (&self.speeds, origin_ns) {
+            (Some(log), Some(origin)) => log.receiver(origin),
+            _ => Receiver::default(),
         };
         let yaw_known = motion.as_ref().is_some_and(|(_, known)| *known);
         let track = motion.map(|(track, _)| track);
@@ -111,9 +144,7 @@ impl PlainParts {
             streams.extend(log.streams.iter().cloned());
             self.remarks.extend(log.remarks.iter().cloned());
         }
-        if let Some(depth) = &self.depth {
-            streams.push(Stream::new("depth", "depth", depth.files.len(), &[]));
-        }
+        streams.extend(self.truth.as_ref().map(MeasuredDepth::stream));
         if !self.world_from_cam.is_empty() {
             streams.push(Stream::new("pose", "pose", self.world_from_cam.len(), &[]));
         }
@@ -121,7 +152,7 @@ impl PlainParts {
         let parts = DatasetParts {
             name: self.name.clone(),
             split_name: self.name.clone(),
-            camera: Camera::Left,
+            camera: self.camera,
             frames,
             intrinsics: lens.intrinsics(),
             cam_from_vehicle: Some(self.cam_from_vehicle),
@@ -131,6 +162,7 @@ impl PlainParts {
             camera_ahead_s: self.camera_ahead_s,
             scenario: None,
         };
+        let assumed = self.calibration.assumed;
         let dataset = Dataset::new(
             parts,
             Arc::new(PlainRecording {
@@ -140,13 +172,15 @@ impl PlainParts {
                 calibration: self.calibration,
                 lens,
                 video: self.video,
-                depth: self.depth,
+                truth: self.truth,
                 world_from_cam: self.world_from_cam,
                 streams,
                 remarks: self.remarks,
                 no_motion,
             }),
-        );
+        )
+        .with_receiver(receiver)
+        .with_camera_assumed(assumed);
         dataset.check_sizes()?;
         Ok(dataset)
     }
@@ -205,7 +239,9 @@ impl PlainParts {
         let file = self.calibration.path.display().to_string();
         let name = self.calibration.path.file_name();
         let file = name.map_or(file, |n| n.to_string_lossy().into_owned());
-        if !self.calibration.size_in_file {
+        // A layout with a calibration of its own has images of one size, and what is assumed is learned.
+        let known = self.calibration.size_in_file || self.calibration.assumed;
+        if !known && !self.kind.brings_calibration() {
             let k = &self.calibration.intrinsics;
             self.remarks.push(format!(
                 "{file} does not say for which size its camera is: taken for the images' {}x{}",
@@ -265,23 +301,15 @@ impl Recording for PlainRecording {
     }
 
     fn has_ground_truth(&self, frame: &Frame) -> bool {
-        let depth = self.depth.as_ref();
-        depth.is_some_and(|d| d.files.contains_key(&frame.number))
+        let truth = self.truth.as_ref();
+        truth.is_some_and(|truth| truth.has(frame.number))
     }
 
     fn ground_truth(&self, frame: &Frame, kind: GtKind) -> Result<Option<DepthMap>> {
-        let Some(depth) = &self.depth else {
+        let Some(truth) = &self.truth else {
             return Ok(None);
         };
-        let Some(path) = depth.files.get(&frame.number) else {
-            return Ok(None);
-        };
-        if kind != GtKind::Z {
-            return Err(Error::DepthKind {
-                drive: self.name.clone(),
-            });
-        }
-        Ok(Some(self.lens.correct_depth(depth.read(path)?)?))
+        truth.of(frame.number, kind, &self.lens, &self.name)
     }
 
     fn camera_paths(&self, dataset: &Dataset) -> Result<Vec<CameraPath>> {

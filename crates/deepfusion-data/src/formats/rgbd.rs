@@ -1,14 +1,15 @@
 //! Folders of colour, depth and pose files, one of each a frame, as the 7-Scenes data set has them.
 
 use super::files::{folders, images_in, name_of};
-use super::plain::PlainParts;
+use super::plain::{PlainParts, open_each};
+use super::poses::motion_of_rows;
 use crate::camera::find_camera;
 use crate::dataset_toml::FolderConfig;
 use crate::logs::frame_times::TimedImage;
 use crate::truth::depth_images::DepthImages;
-use crate::{Dataset, DatasetKind, Error, OpenOptions, Result, image_size};
+use crate::truth::measured::MeasuredDepth;
+use crate::{Camera, Dataset, DatasetKind, Error, OpenOptions, Result, image_size};
 use deepfusion_geometry::Se3;
-use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -36,19 +37,9 @@ pub(crate) fn open(
     sequences: &[PathBuf],
     options: &OpenOptions,
 ) -> Result<Vec<Dataset>> {
-    let mut datasets = Vec::new();
-    let mut refused = None;
-    for folder in sequences {
-        match open_sequence(folder, options)?.select(path, options) {
-            Ok(dataset) => datasets.push(dataset),
-            Err(error @ Error::SplitSelectsNothing { .. }) => refused = Some(error),
-            Err(other) => return Err(other),
-        }
-    }
-    match refused {
-        Some(error) if datasets.is_empty() => Err(error),
-        _ => Ok(datasets),
-    }
+    open_each(path, sequences, options, |folder| {
+        open_sequence(folder, options)
+    })
 }
 
 fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
@@ -102,11 +93,12 @@ fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         image_size: size,
         speeds: None,
         cam_from_vehicle: config.cam_from_vehicle(),
-        depth: Some(DepthImages {
+        camera: Camera::Left,
+        truth: Some(MeasuredDepth::Images(DepthImages {
             files: depth,
             unit_m: config.depth_unit_m.unwrap_or(UNIT_M),
             invalid: Some(config.depth_invalid.unwrap_or(INVALID)),
-        }),
+        })),
         world_from_cam,
         streams: Vec::new(),
         remarks: Vec::new(),
@@ -148,13 +140,7 @@ fn read_pose(path: &Path) -> Result<Option<Se3>> {
     if numbers.iter().any(|n| !n.is_finite()) {
         return Ok(None);
     }
-    let at = |row: usize, column: usize| numbers[4 * row + column];
-    let rotation = Matrix3::from_fn(at);
-    if (rotation.transpose() * rotation - Matrix3::identity()).norm() > 1e-2
-        || rotation.determinant() < 0.0
-    {
-        return Err(bad("its rotation is none"));
-    }
-    let place = Vector3::new(at(0, 3), at(1, 3), at(2, 3));
-    Ok(Some(Se3::from_parts(&rotation, place)))
+    motion_of_rows(&numbers[..12])
+        .map(Some)
+        .map_err(|problem| bad(&problem))
 }

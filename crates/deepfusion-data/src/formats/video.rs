@@ -6,7 +6,7 @@ use crate::dataset_toml::FolderConfig;
 use crate::logs::clock::{TimeUnit, seconds};
 use crate::logs::frame_times::{TimedImage, from_start, numbers_by_time};
 use crate::logs::speed_log::SpeedLog;
-use crate::{Dataset, DatasetKind, Error, OpenOptions, Result};
+use crate::{Camera, Dataset, DatasetKind, Error, OpenOptions, Result};
 use deepfusion_video::VideoFrames;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -60,14 +60,15 @@ pub(crate) fn in_folder(folder: &Path) -> Result<Option<InFolder>> {
     }
 }
 
-/// Opens a video file, or the video of a folder.
+/// Opens a video file, or the video of a folder, wherever that has it from: tables and settings are the folder's.
 pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
-    let file = if place.is_dir() {
-        in_folder(place)?.map_or_else(|| place.to_owned(), |found| found.file)
+    let (file, folder) = if place.is_dir() {
+        let file = in_folder(place)?.map_or_else(|| place.to_owned(), |found| found.file);
+        (file, place.to_owned())
     } else {
-        place.to_owned()
+        let folder = place.parent().unwrap_or(Path::new("."));
+        (place.to_owned(), folder.to_owned())
     };
-    let folder = file.parent().unwrap_or(Path::new(".")).to_owned();
     let config = FolderConfig::read(&folder)?;
     let video = frames_of(&file, &config)?;
     let mut remarks = Vec::new();
@@ -133,7 +134,8 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         image_size: video.size(),
         speeds,
         cam_from_vehicle: config.cam_from_vehicle(),
-        depth: None,
+        camera: Camera::Left,
+        truth: None,
         world_from_cam: BTreeMap::new(),
         streams: Vec::new(),
         remarks,

@@ -19,12 +19,14 @@ pub(crate) struct Samples {
 }
 
 impl Samples {
-    /// The same with gaps that are longer than [`MAX_GAP_S`] and not too long filled in a straight line: to `most` seconds, else to
-    /// three times the usual step where that is long, a few seconds at most. What was done is added to the remarks.
+    /// The same with steps that are longer than [`SLOW_S`] and not too long filled in a straight line: to `most` seconds, else to
+    /// three times the usual step where that is long, a few seconds at most. Steps of half a second are filled, too: whoever reads the samples bridges [`MAX_GAP_S`] at
+    /// most, and rounded times are on either side of it. What was done is added to the remarks, with the samples'
+    /// name and the setting that `most` is of.
     pub(crate) fn bridged(
         mut self,
         most: Option<f64>,
-        remarks: Option<(&mut Vec<String>, &str)>,
+        remarks: Option<(&mut Vec<String>, &str, &str)>,
     ) -> Self {
         let steps = self.ns.windows(2).map(|w| seconds(w[1], w[0]));
         let mut steps: Vec<f64> = steps.collect();
@@ -40,8 +42,10 @@ impl Samples {
         for i in 0..self.ns.len() {
             if let Some(before) = i.checked_sub(1) {
                 let gap = seconds(self.ns[i], self.ns[before]);
-                if gap > MAX_GAP_S && gap <= most {
-                    (filled, longest) = (filled + 1, longest.max(gap));
+                if gap > SLOW_S && gap <= most {
+                    if gap > MAX_GAP_S {
+                        (filled, longest) = (filled + 1, longest.max(gap));
+                    }
                     let parts = (gap / SLOW_S).ceil() as i64;
                     for part in 1..parts {
                         let share = part as f64 / parts as f64;
@@ -57,7 +61,7 @@ impl Samples {
             ns.push(self.ns[i]);
             values.push(self.values[i]);
         }
-        if let Some((remarks, name)) = remarks {
+        if let Some((remarks, name, setting)) = remarks {
             let gaps = |n: usize| {
                 if n == 1 {
                     "1 gap".into()
@@ -67,13 +71,13 @@ impl Samples {
             };
             if filled > 0 {
                 remarks.push(format!(
-                    "{name}: {} of up to {longest:.1} s between speeds are bridged in a straight line (max_gap_s in dataset.toml)",
+                    "{name}: {} of up to {longest:.1} s between speeds are bridged in a straight line ({setting})",
                     gaps(filled)
                 ));
             }
             if left > 0 {
                 remarks.push(format!(
-                    "{name}: {} of more than {most:.1} s, across which the speed counts as unknown (max_gap_s in dataset.toml)",
+                    "{name}: {} of more than {most:.1} s, across which the speed counts as unknown ({setting})",
                     gaps(left)
                 ));
             }
@@ -94,5 +98,29 @@ impl Samples {
         let part = seconds(ns, t0) / gap_s;
         (gap_s <= MAX_GAP_S)
             .then(|| self.values[before] + (self.values[after] - self.values[before]) * part)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Half a second after half a second, as a clock of dates has it.
+    #[test]
+    fn two_samples_a_second_leave_no_gap() {
+        let ns: Vec<i64> = (0..20)
+            .map(|i| 1_777_636_800_000_000_000 + i * 500_000_000)
+            .collect();
+        let values = (0..20).map(f64::from).collect();
+        let mut remarks = Vec::new();
+        let bridged = Samples {
+            ns: ns.clone(),
+            values,
+        }
+        .bridged(None, Some((&mut remarks, "log", "max_gap_s")));
+        assert!(remarks.is_empty(), "{remarks:?}");
+        let steps = bridged.ns.windows(2).map(|w| seconds(w[1], w[0]));
+        assert!(steps.fold(0.0, f64::max) <= SLOW_S);
+        assert_eq!(bridged.at(ns[7] + 100_000_000), Some(7.2));
     }
 }

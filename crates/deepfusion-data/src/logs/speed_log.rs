@@ -5,13 +5,18 @@ use super::samples::Samples;
 use super::table::{Column, Table};
 use super::times::{TIMES, times};
 use super::vehicle_log::{VehicleLog, imu_readings};
+use crate::Receiver;
 use crate::dataset_toml::FolderConfig;
 use crate::{Error, MotionModel, Result, Stream, VehicleTrack};
-use deepfusion_logs::{Clock, DriveLog, ReadOptions, is_gps_track};
-use deepfusion_motion::ImuMount;
+use deepfusion_logs::{Clock, DriveLog, ReadOptions, YawRate, is_gps_track};
+use deepfusion_motion::{ImuMount, Signal};
 use std::path::{Path, PathBuf};
 
 const SPEEDS: [&str; 4] = ["speed", "velocity", "vehicle_speed", "v"];
+const SIGMAS: [&str; 3] = ["speed_sigma", "speed_accuracy", "speed_std"];
+/// Longest times over which a receiver's turns and its standard deviations hold, in seconds.
+const COURSE_GAP_S: f64 = 3.0;
+const SIGMA_GAP_S: f64 = 10.0;
 const YAW_RATES: [&str; 6] = [
     "yaw_rate",
     "yawrate",
@@ -27,6 +32,12 @@ pub(crate) struct SpeedLog {
     pub(crate) path: PathBuf,
     pub(crate) speeds_mps: Samples,
     pub(crate) yaw_rates_radps: Option<Samples>,
+    /// How the course over ground turned, where positions alone say it.
+    pub(crate) course_rates_radps: Option<Samples>,
+    /// Standard deviations of the speeds, where the log has them.
+    pub(crate) sigmas_mps: Option<Samples>,
+    /// Roll and pitch by time, where poses say them beside a yaw rate.
+    pub(crate) tilts_rad: Vec<(i64, [f64; 2])>,
     /// An inertial unit, where all six of its columns are there: then the motion comes from its fusion with the speed.
     pub(crate) vehicle: Option<VehicleLog>,
     /// What was found, for the inspection.
@@ -53,16 +64,25 @@ impl SpeedLog {
         };
         let mut remarks = Vec::new();
         let (mut yaw_rates_radps, mut vehicle) = (None, None);
+        let (mut course_rates_radps, mut sigmas_mps) = (course_table(folder, config)?, None);
         let (measured, table) = match own_or_foreign(&path, config)? {
             Either::Own(table) => {
                 let ns = times(&table, config, &mut remarks, &name(&path))?;
                 let column = table.require(&SPEEDS, "time_s,speed_mps")?;
                 let factor = speed_factor(&table, column, config)? * config.speed_scale();
                 let values = scaled(table.numbers(column)?, factor);
+                if let Some(column) = table.column(&SIGMAS) {
+                    let factor = speed_factor(&table, column, config)? * config.speed_scale();
+                    let values = scaled(table.numbers(column)?, factor);
+                    let ns = ns.clone();
+                    sigmas_mps = Some(Samples { ns, values });
+                }
                 (Samples { ns, values }, Some(table))
             }
             Either::Foreign(log) => {
-                yaw_rates_radps = turns(&log);
+                yaw_rates_radps = turns(&log.yaw_rates);
+                course_rates_radps = turns(&log.course_rates);
+                sigmas_mps = sigmas(&log, config.speed_scale());
                 (speeds(&path, &log, config, &mut remarks), None)
             }
         };
@@ -105,15 +125,36 @@ impl SpeedLog {
                 name(&path)
             ));
         }
-        let speeds_mps = measured.bridged(config.max_gap_s, Some((&mut remarks, &name(&path))));
+        let speeds_mps = measured.bridged(
+            config.max_gap_s,
+            Some((&mut remarks, &name(&path), "max_gap_s in dataset.toml")),
+        );
         Ok(Some(Self {
             path,
             speeds_mps,
             yaw_rates_radps,
+            course_rates_radps,
+            sigmas_mps,
+            tilts_rad: Vec::new(),
             vehicle,
             streams,
             remarks,
         }))
+    }
+
+    /// What a receiver's track says beside the speeds, on the frames' clock.
+    pub(crate) fn receiver(&self, origin_ns: i64) -> Receiver {
+        let signal = |samples: &Samples, gap_s: f64| {
+            let pairs = samples.ns.iter().zip(&samples.values);
+            let pairs = pairs.map(|(ns, value)| (seconds(*ns, origin_ns), *value));
+            Signal::with_max_gap(pairs, gap_s)
+        };
+        let course = self.course_rates_radps.as_ref();
+        let sigma = self.sigmas_mps.as_ref();
+        Receiver {
+            course_rate_radps: course.map(|samples| signal(samples, COURSE_GAP_S)),
+            speed_sigma_mps: sigma.map(|samples| signal(samples, SIGMA_GAP_S)),
+        }
     }
 
     /// The car's motion on the frames' clock, and whether its turns are known.
@@ -150,7 +191,13 @@ impl SpeedLog {
             let (v, w) = (self.speeds_mps.at(*ns)?, yaw.at(*ns)?);
             Some((seconds(*ns, origin_ns), v, w))
         });
-        VehicleTrack::new(&known.collect::<Vec<_>>())
+        let track = VehicleTrack::new(&known.collect::<Vec<_>>());
+        if self.tilts_rad.is_empty() {
+            return track;
+        }
+        let tilts = self.tilts_rad.iter();
+        let tilts = tilts.map(|(ns, [roll, pitch])| (seconds(*ns, origin_ns), *roll, *pitch));
+        track.with_tilt(&tilts.collect::<Vec<_>>())
     }
 }
 
@@ -233,11 +280,32 @@ fn speeds(
 }
 
 /// The turns of another program's log, where it has some.
-fn turns(log: &DriveLog) -> Option<Samples> {
-    (!log.yaw_rates.is_empty()).then(|| Samples {
-        ns: log.yaw_rates.iter().map(|y| y.ns).collect(),
-        values: log.yaw_rates.iter().map(|y| y.radps).collect(),
+fn turns(rates: &[YawRate]) -> Option<Samples> {
+    (!rates.is_empty()).then(|| Samples {
+        ns: rates.iter().map(|y| y.ns).collect(),
+        values: rates.iter().map(|y| y.radps).collect(),
     })
+}
+
+/// How sure another program's log is of its speeds, where it says it of some.
+fn sigmas(log: &DriveLog, scale: f64) -> Option<Samples> {
+    let known = log.speeds.iter().filter_map(|s| Some((s.ns, s.sigma_mps?)));
+    let (ns, values): (Vec<i64>, Vec<f64>) = known.unzip();
+    let values = scaled(values, scale);
+    (!ns.is_empty()).then_some(Samples { ns, values })
+}
+
+/// `course.csv`, which `deepfusion-logs` writes of a track of positions.
+fn course_table(folder: &Path, config: &FolderConfig) -> Result<Option<Samples>> {
+    let Some(path) = config.find(folder, "course", None, &["course.csv"])? else {
+        return Ok(None);
+    };
+    let table = Table::read(&path)?;
+    let ns = times(&table, config, &mut Vec::new(), &name(&path))?;
+    let column = table.require(&["course_rate"], "time_s,course_rate_radps")?;
+    let factor = yaw_factor(&table, column, config)?;
+    let values = scaled(table.numbers(column)?, factor);
+    Ok(Some(Samples { ns, values }))
 }
 
 /// m/s of one unit of the column.

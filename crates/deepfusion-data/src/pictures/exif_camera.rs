@@ -24,9 +24,14 @@ pub(crate) struct ExifCamera {
     pub(crate) turned: bool,
 }
 
-/// The block of a PNG or JPEG; one that is damaged says nothing.
+/// The block of a PNG or JPEG; of one that is damaged what can be read, as of those that some libraries write without the end of a
+/// directory.
 pub(super) fn block(mut bytes: impl BufRead + Seek) -> Option<Exif> {
-    exif::Reader::new().read_from_container(&mut bytes).ok()
+    let mut reader = exif::Reader::new();
+    reader.continue_on_error(true);
+    let read = reader.read_from_container(&mut bytes);
+    read.or_else(|error| error.distill_partial_result(|_| ()))
+        .ok()
 }
 
 /// What the block of a file says of the camera of its picture, which is `size` pixels wide and high.

@@ -18,6 +18,8 @@ pub struct Photo {
     /// The camera by EXIF's focal length in 35 mm film, or by the telephone's model and lens where their view is known, with square
     /// pixels and the principal point in the middle; `None` where nothing is said. It is the lens's nominal focal length: of a picture that was cut since it is wrong.
     pub intrinsics: Option<Intrinsics>,
+    /// EXIF's orientation that the picture was turned by: 1 is as it is stored, 6 and 8 are quarter turns, 3 is half a turn.
+    pub orientation: u8,
 }
 
 /// Reads a PNG or JPEG as [`crate::load_rgb`] does, turns it upright, and takes its camera from EXIF. A block that is damaged
@@ -31,13 +33,17 @@ pub fn load_photo(path: &Path) -> Result<Photo> {
     let exif = block(Cursor::new(&bytes));
     let exif = exif.as_ref();
     let turn = exif.and_then(|exif| number(exif, Tag::Orientation));
-    if let Some(turn) = turn.and_then(|n| Orientation::from_exif(u8::try_from(n).ok()?)) {
-        image.apply_orientation(turn);
-    }
+    let turn = turn.and_then(|n| Orientation::from_exif(u8::try_from(n).ok()?));
+    let turn = turn.unwrap_or(Orientation::NoTransforms);
+    image.apply_orientation(turn);
     let image = image.into_rgb8();
     let camera = exif.and_then(|exif| camera_of(exif, image.dimensions()));
     let intrinsics = camera.map(|camera| camera.intrinsics);
-    Ok(Photo { image, intrinsics })
+    Ok(Photo {
+        image,
+        intrinsics,
+        orientation: turn.to_exif(),
+    })
 }
 
 #[cfg(test)]
@@ -102,6 +108,7 @@ mod tests {
             (Tag::FocalLengthIn35mmFilm, 26),
         ]));
         assert_eq!(photo.image.dimensions(), (48, 64));
+        assert_eq!(photo.orientation, 6);
         assert!(is_red(&photo.image, 24, 5) && !is_red(&photo.image, 24, 60));
         let camera = photo.intrinsics.unwrap();
         // 26 mm of a diagonal of 43.27 mm; the picture's diagonal is 80 pixels.
@@ -121,6 +128,7 @@ mod tests {
         ] {
             let photo = load(&jpeg(fields));
             assert_eq!(photo.intrinsics, None, "{fields:?}");
+            assert_eq!(photo.orientation, 1);
             assert_eq!(photo.image.dimensions(), (64, 48));
             assert!(is_red(&photo.image, 5, 24));
         }

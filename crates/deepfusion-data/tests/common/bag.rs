@@ -8,8 +8,10 @@
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
 use deepfusion_rosbag::msg::{
-    AckermannDriveStamped, Float32, Frame, Header, Image, Imu, Odometry, Pose, PoseWithCovariance,
-    Quaternion, Twist, TwistStamped, TwistWithCovariance, Vector3,
+    AckermannDriveStamped, CameraInfo, Float32, Frame, Header, Image, Imu, NavSatFix, NavSatStatus,
+    Odometry, PointCloud2, Pose, PoseWithCovariance, Quaternion, RegionOfInterest, TFMessage,
+    Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance,
+    TwistWithCovarianceStamped, Vector3,
 };
 use deepfusion_rosbag::{BagWriter, RosMessage, Time, WriterOptions};
 use std::borrow::Cow;
@@ -21,24 +23,37 @@ const COUNT: u32 = 25;
 const SIZE: (u32, u32) = (64, 48);
 
 /// A camera for the pictures.
-pub const CAMERA: &str =
+pub(crate) const CAMERA: &str =
     "camera = { fx = 60.0, fy = 60.0, cx = 32.0, cy = 24.0, width = 64, height = 48 }\n";
 
-/// A bag being written, how many streams it has, and whether the headers of the next have a time.
-pub struct TinyBag(BagWriter, u32, bool);
+/// A bag being written, how many streams it has, whether the headers of the next have a time, and which frame.
+pub(crate) struct TinyBag(BagWriter, u32, bool, String);
 
 /// Each stream begins this long after the one before: of two values at one time, only one would be read.
 const SHIFT_NS: u32 = 3_000_000;
 
 impl TinyBag {
     /// A bag with pictures on `image`.
-    pub fn new(path: &Path, image: &str) -> Self {
+    pub(crate) fn new(path: &Path, image: &str) -> Self {
         let mut bag = Self(
             BagWriter::create(path, WriterOptions::default()).unwrap(),
             0,
             true,
+            String::new(),
         );
-        bag.stream(image, |header| Image {
+        bag.images(image);
+        bag
+    }
+
+    /// A bag without any message.
+    pub(crate) fn empty(path: &Path) -> Self {
+        let writer = BagWriter::create(path, WriterOptions::default()).unwrap();
+        Self(writer, 0, true, String::new())
+    }
+
+    /// Pictures.
+    pub(crate) fn images(&mut self, topic: &str) -> &mut Self {
+        self.stream(topic, |header| Image {
             header,
             height: SIZE.1,
             width: SIZE.0,
@@ -46,16 +61,126 @@ impl TinyBag {
             is_bigendian: 0,
             step: SIZE.0,
             data: Cow::Owned((0..SIZE.0 * SIZE.1).map(|at| (at * 7) as u8).collect()),
-        });
-        bag
+        })
     }
 
-    pub fn twist(&mut self, topic: &str, speed_mps: f64) -> &mut Self {
+    /// From here on every header has this frame.
+    pub(crate) fn within(&mut self, frame: &str) -> &mut Self {
+        frame.clone_into(&mut self.3);
+        self
+    }
+
+    /// The pictures' camera, of a focal length in pixels.
+    pub(crate) fn camera_info(&mut self, topic: &str, focal: f64) -> &mut Self {
+        self.stream(topic, |header| CameraInfo {
+            header,
+            width: SIZE.0,
+            height: SIZE.1,
+            distortion_model: String::new(),
+            d: Vec::new(),
+            k: [focal, 0.0, 31.5, 0.0, focal, 23.5, 0.0, 0.0, 1.0],
+            r: [0.0; 9],
+            p: [0.0; 12],
+            binning_x: 0,
+            binning_y: 0,
+            roi: RegionOfInterest::default(),
+        })
+    }
+
+    /// Scans of one point, 10 m along x.
+    pub(crate) fn scans(&mut self, topic: &str) -> &mut Self {
+        self.stream(topic, |header| {
+            let columns: [(&str, &[f32]); 3] = [("x", &[10.0]), ("y", &[0.0]), ("z", &[0.0])];
+            PointCloud2::from_columns(header, &columns).unwrap()
+        })
+    }
+
+    /// Frames in frames: parent, child, the child's origin in the parent and its turn about an axis in radians; the `i`th of
+    /// the messages by `at(i)`.
+    pub(crate) fn transforms(
+        &mut self,
+        topic: &str,
+        at: impl Fn(u32) -> Vec<(&'static str, &'static str, [f64; 3], [f64; 3])>,
+    ) -> &mut Self {
+        let count = std::cell::Cell::new(0_u32);
+        self.stream(topic, |header| {
+            let links = at(count.replace(count.get() + 1)).into_iter();
+            let transforms = links.map(|(parent, child, [x, y, z], turn)| {
+                let angle = turn.iter().map(|a| a * a).sum::<f64>().sqrt();
+                let share = if angle > 0.0 {
+                    (0.5 * angle).sin() / angle
+                } else {
+                    0.0
+                };
+                let [qx, qy, qz] = turn.map(|a| a * share);
+                TransformStamped {
+                    header: Header {
+                        frame_id: parent.into(),
+                        ..header.clone()
+                    },
+                    child_frame_id: child.into(),
+                    transform: Transform {
+                        translation: Vector3 { x, y, z },
+                        rotation: Quaternion {
+                            x: qx,
+                            y: qy,
+                            z: qz,
+                            w: (0.5 * angle).cos(),
+                        },
+                    },
+                }
+            });
+            TFMessage {
+                transforms: transforms.collect(),
+            }
+        })
+    }
+
+    /// Satellite positions on the equator, to the east at a speed.
+    pub(crate) fn fixes(&mut self, topic: &str, speed_mps: f64) -> &mut Self {
+        let count = std::cell::Cell::new(0_u32);
+        self.stream(topic, |header| {
+            let time_s = 0.04 * f64::from(count.replace(count.get() + 1));
+            NavSatFix {
+                header,
+                status: NavSatStatus {
+                    status: 0,
+                    service: 1,
+                },
+                latitude: 0.0,
+                // A degree is 111,319.49 m there.
+                longitude: 8.0 + speed_mps * time_s / 111_319.490_793,
+                altitude: 0.0,
+                position_covariance: [0.0; 9],
+                position_covariance_type: 0,
+            }
+        })
+    }
+
+    pub(crate) fn twist_with_covariance(&mut self, topic: &str, speed_mps: f64) -> &mut Self {
+        self.stream(topic, |header| {
+            let mut twist = Twist::default();
+            twist.linear.x = speed_mps;
+            TwistWithCovarianceStamped {
+                header,
+                twist: TwistWithCovariance {
+                    twist,
+                    covariance: [0.0; 36],
+                },
+            }
+        })
+    }
+
+    pub(crate) fn twist(&mut self, topic: &str, speed_mps: f64) -> &mut Self {
         self.turning_twist(topic, |_| (speed_mps, 0.0))
     }
 
     /// Speed in m/s and yaw rate in rad/s by seconds from the bag's first picture.
-    pub fn turning_twist(&mut self, topic: &str, motion: impl Fn(f64) -> (f64, f64)) -> &mut Self {
+    pub(crate) fn turning_twist(
+        &mut self,
+        topic: &str,
+        motion: impl Fn(f64) -> (f64, f64),
+    ) -> &mut Self {
         let shift_s = 1e-9 * f64::from(self.1 * SHIFT_NS);
         let count = std::cell::Cell::new(0_u32);
         self.stream(topic, |header| {
@@ -71,7 +196,12 @@ impl TinyBag {
     }
 
     /// An inertial unit that lies flat and turns to the left, rad/s.
-    pub fn imu(&mut self, topic: &str, yaw_rate: f64) -> &mut Self {
+    pub(crate) fn imu(&mut self, topic: &str, yaw_rate: f64) -> &mut Self {
+        self.imu_along_z(topic, yaw_rate, 9.81)
+    }
+
+    /// An inertial unit that measures a rate about its z in rad/s, and an acceleration along it in m/s².
+    pub(crate) fn imu_along_z(&mut self, topic: &str, rate: f64, acceleration: f64) -> &mut Self {
         let up = |z| Vector3 {
             z,
             ..Vector3::default()
@@ -80,20 +210,20 @@ impl TinyBag {
             header,
             orientation: Quaternion::default(),
             orientation_covariance: [0.0; 9],
-            angular_velocity: up(yaw_rate),
+            angular_velocity: up(rate),
             angular_velocity_covariance: [0.0; 9],
-            linear_acceleration: up(9.81),
+            linear_acceleration: up(acceleration),
             linear_acceleration_covariance: [0.0; 9],
         })
     }
 
     /// From here on no header says when its message was measured.
-    pub fn without_stamps(&mut self) -> &mut Self {
+    pub(crate) fn without_stamps(&mut self) -> &mut Self {
         self.2 = false;
         self
     }
 
-    pub fn odometry(&mut self, topic: &str, speed_mps: f64) -> &mut Self {
+    pub(crate) fn odometry(&mut self, topic: &str, speed_mps: f64) -> &mut Self {
         self.stream(topic, |header| {
             let twist = Twist {
                 linear: Vector3 {
@@ -117,7 +247,7 @@ impl TinyBag {
         })
     }
 
-    pub fn ackermann(&mut self, topic: &str, speed_mps: f32, angle_rad: f32) -> &mut Self {
+    pub(crate) fn ackermann(&mut self, topic: &str, speed_mps: f32, angle_rad: f32) -> &mut Self {
         self.stream(topic, |header| {
             let mut drive = AckermannDriveStamped {
                 header,
@@ -129,19 +259,19 @@ impl TinyBag {
         })
     }
 
-    pub fn float(&mut self, topic: &str, data: f32) -> &mut Self {
+    pub(crate) fn float(&mut self, topic: &str, data: f32) -> &mut Self {
         self.stream(topic, |_| Float32 { data })
     }
 
     /// Frames of one identifier, all alike but for their time.
-    pub fn can(&mut self, topic: &str, frame: &Frame) -> &mut Self {
+    pub(crate) fn can(&mut self, topic: &str, frame: &Frame) -> &mut Self {
         self.stream(topic, |header| Frame {
             header,
             ..frame.clone()
         })
     }
 
-    pub fn finish(self) {
+    pub(crate) fn finish(self) {
         self.0.finish().unwrap();
     }
 
@@ -158,6 +288,7 @@ impl TinyBag {
             };
             let header = Header {
                 stamp: if self.2 { stamp } else { Time::from_nanos(0) },
+                frame_id: self.3.clone(),
                 ..Header::default()
             };
             self.0.write(connection, stamp, &make(header)).unwrap();

@@ -7,6 +7,8 @@
 )]
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
+pub(crate) mod street;
+
 use deepfusion_geometry::cloud::PointCloud;
 use image::{Rgb, RgbImage};
 use std::fs;
@@ -14,23 +16,23 @@ use std::path::{Path, PathBuf};
 
 /// KITTI's calibration of 2011_09_26 in spirit: rounder numbers, a smaller image, cameras 2 and 3 half a
 /// metre apart (t = P₄ / f: 0.06 m and -0.47 m).
-pub const CAM_TO_CAM: &str = "calib_time: 09-Jan-2012 13:57:47\n\
+pub(crate) const CAM_TO_CAM: &str = "calib_time: 09-Jan-2012 13:57:47\n\
 S_rect_02: 6.200000e+01 1.900000e+01\n\
 R_rect_00: 9.999239e-01 9.837760e-03 -7.445048e-03 -9.869795e-03 9.999421e-01 -4.278459e-03 7.402527e-03 4.351614e-03 9.999631e-01\n\
 P_rect_02: 3.600000e+01 0.0 3.050000e+01 2.160000e+00 0.0 3.600000e+01 8.600000e+00 0.0 0.0 0.0 1.0 0.0\n\
 S_rect_03: 6.200000e+01 1.900000e+01\n\
 P_rect_03: 3.600000e+01 0.0 3.050000e+01 -1.692000e+01 0.0 3.600000e+01 8.600000e+00 0.0 0.0 0.0 1.0 0.0\n";
 
-pub const VELO_TO_CAM: &str = "calib_time: 15-Mar-2012 11:37:16\n\
+pub(crate) const VELO_TO_CAM: &str = "calib_time: 15-Mar-2012 11:37:16\n\
 R: 7.533745e-03 -9.999714e-01 -6.166020e-04 1.480249e-02 7.280733e-04 -9.998902e-01 9.998621e-01 7.523790e-03 1.480755e-02\n\
 T: -4.069766e-03 -7.631618e-02 -2.717806e-01\n";
 
-pub const IMU_TO_VELO: &str = "calib_time: 25-May-2012 16:47:16\n\
+pub(crate) const IMU_TO_VELO: &str = "calib_time: 25-May-2012 16:47:16\n\
 R: 9.999976e-01 7.553071e-04 -2.035826e-03 -7.854027e-04 9.998898e-01 -1.482298e-02 2.024406e-03 1.482454e-02 9.998881e-01\n\
 T: -8.086759e-01 3.195559e-01 -7.997231e-01\n";
 
 /// A drive to write: every frame the same speed and yaw rate unless changed afterwards.
-pub struct TinyDrive {
+pub(crate) struct TinyDrive {
     pub frames: Vec<u64>,
     pub lines: usize,
     pub speed_mps: f64,
@@ -52,15 +54,15 @@ impl Default for TinyDrive {
     }
 }
 
-pub const DRIVE: &str = "2030_01_02/2030_01_02_drive_0007_sync";
+pub(crate) const DRIVE: &str = "2030_01_02/2030_01_02_drive_0007_sync";
 
 impl TinyDrive {
     /// Writes calibration and drive below `root`; returns the drive's folder.
-    pub fn write(&self, root: &Path) -> PathBuf {
+    pub(crate) fn write(&self, root: &Path) -> PathBuf {
         self.write_as(root, DRIVE)
     }
 
-    pub fn write_as(&self, root: &Path, name: &str) -> PathBuf {
+    pub(crate) fn write_as(&self, root: &Path, name: &str) -> PathBuf {
         let drive = root.join(name);
         let date = drive.parent().unwrap();
         for camera in &self.cameras {
@@ -96,7 +98,7 @@ impl TinyDrive {
 }
 
 /// A wall 12 m ahead of the velodyne.
-pub fn wall() -> PointCloud {
+pub(crate) fn wall() -> PointCloud {
     let mut cloud = PointCloud::default();
     for i in -20..=20 {
         for j in -4..=1 {
@@ -116,7 +118,7 @@ fn stamps(lines: usize, first: f64) -> String {
     (0..lines).map(line).collect()
 }
 
-pub fn packet(speed_mps: f64, yaw_rate_radps: f64) -> String {
+pub(crate) fn packet(speed_mps: f64, yaw_rate_radps: f64) -> String {
     let mut values = [0.0; 30];
     values[8] = speed_mps;
     values[19] = yaw_rate_radps;
@@ -126,7 +128,7 @@ pub fn packet(speed_mps: f64, yaw_rate_radps: f64) -> String {
 
 /// A folder of real recordings: below `DEEPFUSION_DATA`, or `../shared/data` beside the workspace. Says
 /// so and gives nothing where it is absent.
-pub fn real_data(inner: &str) -> Option<PathBuf> {
+pub(crate) fn real_data(inner: &str) -> Option<PathBuf> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let root = std::env::var_os("DEEPFUSION_DATA")
         .map_or_else(|| workspace.join("../shared/data"), PathBuf::from);
@@ -143,7 +145,7 @@ pub fn real_data(inner: &str) -> Option<PathBuf> {
 
 /// The real drive again with its forward speeds multiplied, images as links.
 #[cfg(unix)]
-pub fn copy_with_speeds(drive: &Path, to: &Path, factor: f64) -> PathBuf {
+pub(crate) fn copy_with_speeds(drive: &Path, to: &Path, factor: f64) -> PathBuf {
     let link = |from: PathBuf, to: PathBuf| std::os::unix::fs::symlink(from, to).unwrap();
     let date = drive.parent().unwrap().canonicalize().unwrap();
     let drive = drive.canonicalize().unwrap();

@@ -39,7 +39,7 @@ pub fn run_tables(evaluations: &[Evaluation]) -> Tables {
 }
 
 fn ground_tables(ground: &str, members: &[&Evaluation]) -> Vec<Table> {
-    let trivial = trivial_rows(members);
+    let trivial = baseline_rows(members);
     let mut unscaled = metric_table(members, &trivial, false);
     unscaled.title = format!("{ground}Unscaled");
     unscaled.notes.splice(0..0, about(members));
@@ -137,8 +137,8 @@ fn eigen_differences(report: &Report) -> Vec<String> {
     differences
 }
 
-/// Trivial rows and the names of the evaluations that print them.
-fn trivial_rows(members: &[&Evaluation]) -> Vec<(String, Metrics, Metrics)> {
+/// Mean-depth baselines and the names of the evaluations that print them.
+fn baseline_rows(members: &[&Evaluation]) -> Vec<(String, Metrics, Metrics)> {
     let mut rows: Vec<(Vec<&str>, Metrics, Metrics)> = Vec::new();
     for member in members {
         if let Some(trivial) = &member.report.trivial {
@@ -151,9 +151,13 @@ fn trivial_rows(members: &[&Evaluation]) -> Vec<(String, Metrics, Metrics)> {
     let one = rows.len() == 1;
     let named = |(names, unscaled, scaled): (Vec<&str>, Metrics, Metrics)| {
         if one {
-            ("trivial".to_owned(), unscaled, scaled)
+            ("mean-depth baseline".to_owned(), unscaled, scaled)
         } else {
-            (format!("trivial of {}", names.join(", ")), unscaled, scaled)
+            (
+                format!("mean-depth baseline of {}", names.join(", ")),
+                unscaled,
+                scaled,
+            )
         }
     };
     rows.into_iter().map(named).collect()
@@ -221,7 +225,7 @@ fn metric_table(
         Vec::new()
     } else {
         vec![
-            "Trivial: the mean depth of each pixel over the training scans; it is not ranked."
+            "Mean-depth baseline: the mean depth of each pixel over the training scans; it is not ranked."
                 .to_owned(),
         ]
     };

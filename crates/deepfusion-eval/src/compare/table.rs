@@ -122,7 +122,7 @@ pub struct Row {
     pub cells: Vec<Value>,
     /// What is wrong with it.
     pub flags: Vec<Flag>,
-    /// Whether it may be the best: not so the trivial row.
+    /// Whether it may be the best: not so the mean-depth baseline.
     pub ranked: bool,
     /// Where the figures are from.
     pub source: Option<String>,
@@ -283,7 +283,7 @@ mod tests {
             (0.3, true),
         ]));
         assert_eq!(ranks, [Best, Best, Second, None]);
-        // The trivial row does not compete, a single row has nothing to beat.
+        // The mean-depth baseline does not compete, a single row has nothing to beat.
         assert_eq!(column(&table(&[(0.3, true), (0.1, false)])), [None, None]);
         assert_eq!(column(&table(&[(0.1, true), (0.1, true)])), [None, None]);
         assert_eq!(

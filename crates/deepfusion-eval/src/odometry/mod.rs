@@ -1,4 +1,4 @@
-//! Odometry: a predicted path of the camera beside the true one (SPEC 5).
+//! Odometry: a predicted path of the camera beside the true one.
 //!
 //! Every number is unscaled, as a metric method must stand it: nothing is aligned but the place and the
 //! direction from which a stretch starts. A pose is `world_from_cam`, in metres; the two paths' worlds need

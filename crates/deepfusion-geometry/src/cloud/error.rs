@@ -18,14 +18,16 @@ pub enum Error {
     Stream(#[from] std::io::Error),
     /// A scan's length is not a whole number of points.
     #[error(
-        "{}: {bytes} bytes is not a whole number of points (16 bytes each: x, y, z, intensity as f32)",
-        path.display()
+        "{}: {bytes} bytes is not a whole number of points ({point} bytes each: {} as f32)",
+        path.display(), columns(*point)
     )]
     Truncated {
         /// The scan.
         path: PathBuf,
         /// Its length.
         bytes: u64,
+        /// The length of a point: KITTI's 16, nuScenes' 20.
+        point: usize,
     },
     /// A PLY header or body is not what this reader takes.
     #[error("PLY: {0}")]
@@ -44,6 +46,15 @@ pub enum Error {
 
 /// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// What a point of a binary scan of this length holds.
+fn columns(point: usize) -> &'static str {
+    if point == 20 {
+        "x, y, z, intensity, ring"
+    } else {
+        "x, y, z, intensity"
+    }
+}
 
 impl Hint for Error {
     fn hint(&self) -> Option<String> {

@@ -1,10 +1,11 @@
-//! KITTI's velodyne scans: x, y, z, intensity as little-endian f32, nothing else.
+//! Binary scans: KITTI's velodyne's (x, y, z, intensity as little-endian f32, nothing else), nuScenes' (a ring beside them).
 
 use super::{Error, PointCloud, Result};
 use std::io::Write;
 use std::path::Path;
 
 const POINT_BYTES: usize = 16;
+const NUSCENES_POINT_BYTES: usize = 20;
 
 impl PointCloud {
     /// Reads a KITTI velodyne scan: points in the sensor's frame (x forward, y left, z up), in
@@ -13,18 +14,38 @@ impl PointCloud {
     /// # Errors
     /// [`Error::File`] if it cannot be read, [`Error::Truncated`] if it ends within a point.
     pub fn read_kitti_bin(path: &Path) -> Result<Self> {
+        Self::read_bin(path, POINT_BYTES)
+    }
+
+    /// Reads a scan of nuScenes' LIDAR_TOP (`.pcd.bin`: x, y, z, intensity, ring), in metres, with intensity. The file's axes
+    /// (x right, y forward, z up) are turned to KITTI's (x forward, y left, z up).
+    ///
+    /// # Errors
+    /// As [`Self::read_kitti_bin`].
+    pub fn read_nuscenes_bin(path: &Path) -> Result<Self> {
+        let mut cloud = Self::read_bin(path, NUSCENES_POINT_BYTES)?;
+        for point in &mut cloud.xyz {
+            let [x, y, z] = *point;
+            *point = [y, -x, z];
+        }
+        Ok(cloud)
+    }
+
+    /// Points of `size` bytes, of which x, y, z and intensity are the first four values.
+    fn read_bin(path: &Path, size: usize) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|source| Error::File {
             path: path.to_owned(),
             source,
         })?;
-        if bytes.len() % POINT_BYTES != 0 {
+        if bytes.len() % size != 0 {
             return Err(Error::Truncated {
                 path: path.to_owned(),
                 bytes: bytes.len() as u64,
+                point: size,
             });
         }
         let (mut xyz, mut intensity) = (Vec::new(), Vec::new());
-        for point in bytes.chunks_exact(POINT_BYTES) {
+        for point in bytes.chunks_exact(size) {
             let value =
                 |i: usize| f32::from_le_bytes([point[i], point[i + 1], point[i + 2], point[i + 3]]);
             xyz.push([value(0), value(4), value(8)]);
@@ -69,6 +90,21 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         cloud.write_kitti_bin(file.as_file()).unwrap();
         assert_eq!(PointCloud::read_kitti_bin(file.path()).unwrap(), cloud);
+    }
+
+    /// A point 12 m ahead and 3 m to the right, as nuScenes writes it.
+    #[test]
+    fn a_scan_of_nuscenes_is_turned_to_look_along_x() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let values: [f32; 5] = [3.0, 12.0, -1.5, 40.0, 7.0];
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        std::fs::write(file.path(), &bytes).unwrap();
+        let cloud = PointCloud::read_nuscenes_bin(file.path()).unwrap();
+        assert_eq!(cloud.xyz, [[12.0, -3.0, -1.5]]);
+        assert_eq!(cloud.intensity, Some(vec![40.0]));
+        std::fs::write(file.path(), &bytes[..16]).unwrap();
+        let error = PointCloud::read_nuscenes_bin(file.path()).unwrap_err();
+        assert!(error.to_string().contains("20 bytes each"), "{error}");
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod attention;
 mod build;
+mod lite;
 mod oracle;
 mod plain;
 mod remains;

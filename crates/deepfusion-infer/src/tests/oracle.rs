@@ -1,6 +1,6 @@
 //! Reference implementations of the operations, in f64.
 
-use crate::{Activation, Border, Conv, Graph, Op};
+use crate::{Activation, Border, Conv, Depthwise, Graph, Op};
 
 /// Channels × height × width.
 #[derive(Clone)]
@@ -80,7 +80,82 @@ fn conv(conv: &Conv, values: &[Image]) -> Image {
             Activation::Elu if sum < 0.0 => sum.exp_m1(),
             Activation::Elu => sum,
             Activation::Sigmoid => 1.0 / (1.0 + (-sum).exp()),
+            Activation::Gelu => deepfusion_kernels::gelu_exact(sum),
         }
+    })
+}
+
+fn depthwise(op: &Depthwise, input: &Image) -> Image {
+    let half = op.reach() as isize;
+    let (h, w) = (input.height / op.stride, input.width / op.stride);
+    Image::from_fn(input.channels, h, w, |c, y, x| {
+        let mut sum = f64::from(op.bias[c]);
+        for ky in 0..op.kernel {
+            for kx in 0..op.kernel {
+                let at = |i: usize, k: usize, n: usize| {
+                    let i = (i * op.stride + k * op.dilation) as isize - half;
+                    (0..n as isize).contains(&i).then_some(i as usize)
+                };
+                if let (Some(i), Some(j)) = (at(y, ky, input.height), at(x, kx, input.width)) {
+                    let tap = (c * op.kernel + ky) * op.kernel + kx;
+                    sum += f64::from(op.weight[tap]) * input.at(c, i, j);
+                }
+            }
+        }
+        sum
+    })
+}
+
+/// Half-pixel centres: output pixel i lies at (i + ½)/2 − ½ of the input.
+fn enlarged(v: &Image) -> Image {
+    let around = |i: usize, n: usize| {
+        let place = ((i as f64 + 0.5) / 2.0 - 0.5).clamp(0.0, (n - 1) as f64);
+        let low = place.floor() as usize;
+        (low, (low + 1).min(n - 1), place - low as f64)
+    };
+    Image::from_fn(v.channels, v.height * 2, v.width * 2, |c, y, x| {
+        let (top, bottom, down) = around(y, v.height);
+        let (left, right, across) = around(x, v.width);
+        let along = |y| v.at(c, y, left) * (1.0 - across) + v.at(c, y, right) * across;
+        along(top) * (1.0 - down) + along(bottom) * down
+    })
+}
+
+fn channel_norm(v: &Image, epsilon: f32) -> Image {
+    Image::from_fn(v.channels, v.height, v.width, |c, y, x| {
+        let along = || (0..v.channels).map(|k| v.at(k, y, x));
+        let mean = along().sum::<f64>() / v.channels as f64;
+        let squares = along().map(|value| (value - mean).powi(2));
+        let variance = squares.sum::<f64>() / v.channels as f64;
+        (v.at(c, y, x) - mean) / (variance + f64::from(epsilon)).sqrt()
+    })
+}
+
+fn cross_covariance(v: &Image, temperature: &[f32]) -> Image {
+    let (channels, area) = (v.channels / 3, v.height * v.width);
+    let each = channels / temperature.len();
+    let plane = |c: usize| &v.data[c * area..][..area];
+    let dot = |a: usize, b: usize| -> f64 {
+        let pairs = plane(a).iter().zip(plane(b));
+        pairs.map(|(a, b)| a * b).sum()
+    };
+    let shares: Vec<Vec<f64>> = (0..channels)
+        .map(|c| {
+            let head = c / each;
+            let others = head * each..(head + 1) * each;
+            let similar = others.map(|k| {
+                let k = channels + k;
+                f64::from(temperature[head]) * dot(c, k) / (dot(c, c) * dot(k, k)).sqrt()
+            });
+            let similar: Vec<f64> = similar.map(f64::exp).collect();
+            let sum: f64 = similar.iter().sum();
+            similar.iter().map(|s| s / sum).collect()
+        })
+        .collect();
+    Image::from_fn(channels, v.height, v.width, |c, y, x| {
+        let first = 2 * channels + c / each * each;
+        let shares = shares[c].iter().enumerate();
+        shares.map(|(k, share)| share * v.at(first + k, y, x)).sum()
     })
 }
 
@@ -93,6 +168,19 @@ pub(super) fn run(graph: &Graph, image: &[f32], height: usize, width: usize) -> 
     for node in graph.nodes() {
         let value = match &node.op {
             Op::Conv(op) => conv(op, &values),
+            Op::Depthwise(op) => depthwise(op, &values[op.input.0]),
+            Op::Enlarge { input } => enlarged(&values[input.0]),
+            Op::ChannelNorm { input, epsilon } => channel_norm(&values[input.0], *epsilon),
+            Op::CrossCovariance { input, temperature } => {
+                cross_covariance(&values[input.0], temperature)
+            }
+            Op::Position { per_axis, halvings } => {
+                let (h, w) = (height >> halvings, width >> halvings);
+                let code = deepfusion_kernels::position_code(*per_axis, h, w);
+                Image::from_fn(2 * per_axis, h, w, |c, y, x| {
+                    f64::from(code[(c * h + y) * w + x])
+                })
+            }
             Op::MaxPool { input } => {
                 let v = &values[input.0];
                 Image::from_fn(v.channels, v.height / 2, v.width / 2, |c, y, x| {

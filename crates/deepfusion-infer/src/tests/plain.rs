@@ -107,5 +107,6 @@ fn activated(activation: Activation, v: f32) -> f32 {
         Activation::Elu if v < 0.0 => v.exp_m1(),
         Activation::Elu => v,
         Activation::Sigmoid => 1.0 / (1.0 + (-v).exp()),
+        Activation::Gelu => deepfusion_kernels::gelu_exact(f64::from(v)) as f32,
     }
 }

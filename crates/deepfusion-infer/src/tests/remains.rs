@@ -3,7 +3,7 @@
 use super::build::{Builder, deviation, noise, noise_image};
 use super::oracle::run;
 use super::plain::Plain;
-use super::{attention, network, odd_network};
+use super::{attention, lite, network, odd_network};
 use crate::conv_form::ConvForm;
 use crate::element::{Bf16, Element};
 use crate::engine::Typed;
@@ -65,6 +65,7 @@ fn graphs() -> Vec<(Graph, usize, usize)> {
         (network(3, [24, 40, 72, 20], true, 7), 32, 24),
         (attention::small_network(), 32, 32),
         (odd_network(), 24, 16),
+        (lite::small_network(), 32, 32),
         (dense_network(48), 20, 12),
         (widening_network(), 12, 8),
     ]

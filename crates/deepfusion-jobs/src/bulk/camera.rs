@@ -22,6 +22,8 @@ pub enum CameraSource {
     Lens(Arc<LensFile>),
     /// The camera trained with: the inputs are taken to see what it saw.
     Trained(Intrinsics),
+    /// The camera that the run learned, in the same way.
+    Learned(Intrinsics),
     /// Nothing is known.
     Unknown,
 }
@@ -70,6 +72,7 @@ impl CameraSource {
         match self {
             Self::Given(_) | Self::Hfov(_) | Self::File(_) | Self::Lens(_) => "given",
             Self::Trained(_) => "assumed",
+            Self::Learned(_) => "learned",
             Self::Unknown => "unknown",
         }
     }
@@ -89,7 +92,9 @@ impl CameraSource {
             });
         }
         let (camera, from) = match (self, exif) {
-            (Self::Trained(_) | Self::Unknown, Some(camera)) => (Some(camera), "exif"),
+            (Self::Trained(_) | Self::Learned(_) | Self::Unknown, Some(camera)) => {
+                (Some(camera), "exif")
+            }
             _ => (self.of(image.width(), image.height())?, self.word()),
         };
         Ok(PinholeImage {
@@ -118,7 +123,7 @@ impl CameraSource {
             }),
             Self::File(k) => Ok(Some(*k)),
             Self::Lens(_) => Ok(None),
-            Self::Trained(k) => Ok(Some(with_the_view_of(k, width, height))),
+            Self::Trained(k) | Self::Learned(k) => Ok(Some(with_the_view_of(k, width, height))),
             Self::Unknown => Ok(None),
         }
     }
@@ -131,7 +136,7 @@ pub struct PinholeImage {
     pub image: RgbImage,
     /// The camera, where it is known or assumed.
     pub camera: Option<Intrinsics>,
-    /// `given`, `recording`, `exif`, `assumed` or `unknown`.
+    /// `given`, `recording`, `exif`, `learned`, `assumed` or `unknown`.
     pub from: &'static str,
 }
 

@@ -34,7 +34,7 @@ pub fn add_output(sidecar: &mut Sidecar, folder: &Path, file: String) -> Result<
 ///
 /// # Errors
 /// Where something cannot be written.
-pub fn write_all<'a>(
+pub(super) fn write_all<'a>(
     folder: &Path,
     group: impl Iterator<Item = (&'a str, &'a Sidecar)>,
 ) -> Result<()> {
@@ -69,7 +69,7 @@ pub fn write_unsynced(sidecar: &Sidecar, folder: &Path, name: &str) -> Result<()
 
 /// Whether every output is there with the content that was written.
 #[must_use]
-pub fn is_complete(sidecar: &Sidecar, folder: &Path) -> bool {
+pub(super) fn is_complete(sidecar: &Sidecar, folder: &Path) -> bool {
     let files = sidecar.files.len();
     if (sidecar.file_bytes.len(), sidecar.file_crc32.len()) != (files, files) {
         return false;

@@ -19,7 +19,7 @@ const IMAGES: &str = "images";
 ///
 /// # Errors
 /// [`Error::Exists`].
-pub fn make_room(
+pub(super) fn make_room(
     folder: &Path,
     inputs: &[Input],
     ours: &Manifest,

@@ -1,29 +1,29 @@
-//! A method beside the trivial baseline, on the same images.
+//! A method beside the mean-depth baseline, on the same images.
 
 use std::collections::BTreeMap;
 
 use deepfusion_eval::{
-    Evaluator, Prediction, Protocol, Report, Sample, ScenarioRow, TrivialBaseline,
+    Evaluator, MeanDepthBaseline, Prediction, Protocol, Report, Sample, ScenarioRow,
 };
 
 use super::{Evaluated, Place};
 use crate::Result;
 
-/// Evaluates a method and, beside it, the trivial baseline on the same images.
+/// Evaluates a method and, beside it, the mean-depth baseline on the same images.
 pub struct Comparison {
     method: Evaluator,
-    trivial: Option<(Evaluator, TrivialBaseline)>,
+    trivial: Option<(Evaluator, MeanDepthBaseline)>,
     /// By kind of drive, where the recordings say theirs.
     scenarios: BTreeMap<String, Evaluator>,
     protocol: Protocol,
 }
 
 impl Comparison {
-    /// Without any image yet; a baseline without scans gives no trivial row.
+    /// Without any image yet; a baseline without scans gives no mean-depth baseline.
     ///
     /// # Errors
     /// A protocol that nothing can be measured with.
-    pub fn new(protocol: &Protocol, baseline: Option<TrivialBaseline>) -> Result<Self> {
+    pub fn new(protocol: &Protocol, baseline: Option<MeanDepthBaseline>) -> Result<Self> {
         let baseline = baseline.filter(|b| b.scans() > 0);
         Ok(Self {
             method: Evaluator::new(protocol.clone())?,
@@ -78,7 +78,7 @@ impl Comparison {
         })
     }
 
-    /// The method's report with the trivial row, and a row for each kind of drive where there are several.
+    /// The method's report with the mean-depth baseline, and a row for each kind of drive where there are several.
     fn report(&self) -> Result<Report> {
         let mut report = self.method.report()?;
         if self.scenarios.len() > 1 {
@@ -88,7 +88,7 @@ impl Comparison {
             }
         }
         Ok(match &self.trivial {
-            Some((evaluator, _)) => report.with_trivial(&evaluator.report()?),
+            Some((evaluator, _)) => report.with_mean_depth_baseline(&evaluator.report()?),
             None => report,
         })
     }

@@ -11,8 +11,8 @@ use std::collections::HashMap;
 
 use deepfusion_data::{Dataset, DatasetKind, GtKind, RgbImage, ground_truth_names};
 use deepfusion_eval::{
-    ArraySet, Crop, DrawnPoint, Grid, GroundTruth, ImageScore, Prediction, Protocol, Report,
-    Sample, TrivialBaseline, match_names,
+    ArraySet, Crop, DrawnPoint, Grid, GroundTruth, ImageScore, MeanDepthBaseline, Prediction,
+    Protocol, Report, Sample, match_names,
 };
 use deepfusion_geometry::Intrinsics;
 use deepfusion_runtime::DepthEstimator;
@@ -24,8 +24,8 @@ pub use self::coverage::{Shortfall, Why, check_used, expected_frames, missing_fr
 pub use self::division::{Division, divide};
 pub use self::known_pixels::known_pixels;
 pub use self::truth::{
-    Truth, array_places, depth_map, trivial_from_arrays, trivial_from_datasets,
-    trivial_from_training,
+    Truth, array_places, baseline_from_arrays, baseline_from_datasets, baseline_from_training,
+    depth_map,
 };
 
 /// The crop of the recordings' field: Garg's where all of them are KITTI raw, which its tables use; else the whole image.
@@ -80,7 +80,7 @@ pub fn evaluate_datasets<E: From<Error>>(
     datasets: &[Dataset],
     truth: &mut Truth,
     protocol: &Protocol,
-    baseline: Option<TrivialBaseline>,
+    baseline: Option<MeanDepthBaseline>,
     predict: &mut dyn FnMut(&Dataset, usize) -> Result<Prediction, E>,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Evaluated, E> {
@@ -150,7 +150,7 @@ pub fn evaluate_arrays(
     (predicted, of_kind): (&mut ArraySet, &dyn Fn(Grid) -> Prediction),
     known: &mut ArraySet,
     protocol: &Protocol,
-    baseline: Option<TrivialBaseline>,
+    baseline: Option<MeanDepthBaseline>,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Evaluated> {
     let mut comparison = Comparison::new(protocol, baseline)?;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use deepfusion_data::{Dataset, GtKind};
-use deepfusion_eval::{ArraySet, Grid, TrivialBaseline};
+use deepfusion_eval::{ArraySet, Grid, MeanDepthBaseline};
 use deepfusion_geometry::DepthMap;
 use deepfusion_model::TrainConfig;
 
@@ -40,12 +40,12 @@ impl Truth {
     }
 }
 
-/// The trivial row's scans: all of the given (training) recordings'.
+/// The mean-depth baseline's scans: all of the given (training) recordings'.
 ///
 /// # Errors
 /// A scan that cannot be read.
-pub fn trivial_from_datasets(datasets: &[Dataset], kind: GtKind) -> Result<TrivialBaseline> {
-    let mut baseline = TrivialBaseline::new();
+pub fn baseline_from_datasets(datasets: &[Dataset], kind: GtKind) -> Result<MeanDepthBaseline> {
+    let mut baseline = MeanDepthBaseline::new();
     for dataset in datasets {
         for &frame in dataset.selected() {
             if let Some(depth) = dataset.ground_truth(frame, kind)? {
@@ -56,25 +56,25 @@ pub fn trivial_from_datasets(datasets: &[Dataset], kind: GtKind) -> Result<Trivi
     Ok(baseline)
 }
 
-/// The trivial row's scans, from an array file.
+/// The mean-depth baseline's scans, from an array file.
 ///
 /// # Errors
 /// A file that holds no arrays.
-pub fn trivial_from_arrays(path: &Path) -> Result<TrivialBaseline> {
+pub fn baseline_from_arrays(path: &Path) -> Result<MeanDepthBaseline> {
     let mut scans = ArraySet::open(path)?;
-    let mut baseline = TrivialBaseline::new();
+    let mut baseline = MeanDepthBaseline::new();
     for index in 0..scans.len() {
         baseline.add_scan(&scans.read(index)?);
     }
     Ok(baseline)
 }
 
-/// The trivial row from the recordings a model was trained on, where they are still there.
+/// The mean-depth baseline from the recordings a model was trained on, where they are still there.
 #[must_use]
-pub fn trivial_from_training(config: &TrainConfig, kind: GtKind) -> Option<TrivialBaseline> {
+pub fn baseline_from_training(config: &TrainConfig, kind: GtKind) -> Option<MeanDepthBaseline> {
     let recordings = training_recordings(config).ok()?;
     let datasets: Vec<_> = recordings.into_iter().map(|(_, dataset)| dataset).collect();
-    trivial_from_datasets(&datasets, kind).ok()
+    baseline_from_datasets(&datasets, kind).ok()
 }
 
 /// Ground truth as the recordings take it.

@@ -12,6 +12,7 @@ use deepfusion_weights::Shipped;
 use super::{is_run, unseen};
 use crate::evaluation::Place;
 use crate::recordings::{training_recordings, validates};
+use crate::verdict::Unseen;
 
 /// A frame, wherever a copy of its drive lies: the drive's name, the frame's number and the size of its image's file.
 type Seen = (String, u64, u64);
@@ -25,6 +26,25 @@ pub fn held_out(config: &TrainConfig, datasets: &[Dataset], places: &[Place]) ->
         .iter()
         .map(|Place(number, frame)| &datasets[*number].frames()[*frame]);
     Some(measured.all(|frame| !seen.contains(&key(frame))))
+}
+
+/// Which of the recordings' frames training did not see, of this run and of those it began from.
+#[must_use]
+pub fn unseen_frames(config: &TrainConfig, datasets: &[Dataset]) -> Unseen {
+    let Some(seen) = seen_by(config, datasets, &mut HashSet::new()) else {
+        return Unseen::NotKnown;
+    };
+    let mut known = HashSet::new();
+    for (number, dataset) in datasets.iter().enumerate() {
+        let frames = dataset.frames().iter().enumerate();
+        let seen = frames.filter(|(_, frame)| seen.contains(&key(frame)));
+        known.extend(seen.map(|(frame, _)| (number, frame)));
+    }
+    if known.is_empty() {
+        Unseen::All
+    } else {
+        Unseen::Except(known)
+    }
 }
 
 /// What a run saw, and those it began from; `datasets` are what is measured on.

@@ -4,6 +4,7 @@ use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
 
 mod decoder;
 mod encoder;
+mod lite_mono;
 mod skips;
 
 use crate::network::BATCH_NORM_EPSILON;
@@ -45,9 +46,15 @@ pub fn depth_graph_with_uncertainty(
         graph: Graph::new(normalisation.mean(), normalisation.std()),
         weights,
     };
-    let features = builder.encoder(&config.encoder)?;
-    let features = builder.skips(config, features)?;
-    for output in builder.decoder(config, features)? {
+    let outputs = match &config.lite_mono {
+        Some(lite_mono) => builder.lite_mono(lite_mono, config.uncertainty)?,
+        None => {
+            let features = builder.encoder(&config.encoder)?;
+            let features = builder.skips(config, features)?;
+            builder.decoder(config, features)?
+        }
+    };
+    for output in outputs {
         builder.graph.add_output(output);
     }
     builder.nothing_left()?;
@@ -193,7 +200,7 @@ impl Builder {
             ["1", "2", "3"]
                 .map(|s| format!("decoder.heads.{s}."))
                 .iter()
-                .any(|h| name.starts_with(h))
+                .any(|h| name.trim_start_matches("lite_mono.").starts_with(h))
         };
         let mut left = self.weights.tensors.iter().filter(|(name, _)| !head(name));
         match left.next() {

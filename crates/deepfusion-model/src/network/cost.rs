@@ -17,14 +17,16 @@ pub struct ModuleCost {
 
 /// What follows a convolution's sum.
 #[derive(Clone, Copy)]
-enum After {
+pub(super) enum After {
     Norm,
     Bias,
     Nothing,
+    /// Nothing, and its weights are not learned.
+    Fixed,
 }
 
 impl ModuleCost {
-    fn new(name: impl Into<String>) -> Self {
+    pub(super) fn new(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
             parameters: 0,
@@ -33,19 +35,40 @@ impl ModuleCost {
         }
     }
 
-    fn conv(&mut self, [from, to]: [usize; 2], kernel: usize, pixels: usize, after: After) {
-        let weights = from * to * kernel * kernel;
-        let more = match after {
-            After::Norm => 2 * to,
-            After::Bias => to,
-            After::Nothing => 0,
+    pub(super) fn conv(
+        &mut self,
+        [from, to]: [usize; 2],
+        kernel: usize,
+        pixels: usize,
+        after: After,
+    ) {
+        self.products(from * to * kernel * kernel, to, pixels, after);
+    }
+
+    /// A kernel of its own for each channel.
+    pub(super) fn depthwise(
+        &mut self,
+        channels: usize,
+        kernel: usize,
+        pixels: usize,
+        after: After,
+    ) {
+        self.products(channels * kernel * kernel, channels, pixels, after);
+    }
+
+    fn products(&mut self, weights: usize, to: usize, pixels: usize, after: After) {
+        let learned = match after {
+            After::Norm => weights + 2 * to,
+            After::Bias => weights + to,
+            After::Nothing => weights,
+            After::Fixed => 0,
         };
-        self.parameters += (weights + more) as u64;
+        self.parameters += learned as u64;
         self.multiply_adds += (weights * pixels) as u64;
         self.give(to, pixels);
     }
 
-    fn give(&mut self, channels: usize, pixels: usize) {
+    pub(super) fn give(&mut self, channels: usize, pixels: usize) {
         self.values += (channels * pixels) as u64;
     }
 }
@@ -103,6 +126,18 @@ impl DepthNetConfig {
     /// alone has multiply-adds: the others only train.
     #[must_use]
     pub fn costs(&self, size: InputSize) -> Vec<ModuleCost> {
+        if let Some(lite_mono) = &self.lite_mono {
+            let mut costs = lite_mono.costs(size);
+            if self.uncertainty {
+                let [finest, ..] = lite_mono.decoder_widths();
+                let mut cost = ModuleCost::new("uncertainty");
+                let half = (size.width >> 1) * (size.height >> 1);
+                cost.conv([finest, 1], 3, half, After::Bias);
+                cost.give(1, size.width * size.height);
+                costs.push(cost);
+            }
+            return costs;
+        }
         let mut costs = self.encoder.costs("encoder", size);
         let (raw, refined) = (self.encoder.channels(), self.decoder_channels());
         let pixels = feature_pixels(&self.encoder, size);

@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AttentionConfig, DecoderConfig, HceConfig, InputNormalisation, NetworkError, ResNetConfig,
-    ResNetDepth,
+    AttentionConfig, DecoderConfig, HceConfig, InputNormalisation, LiteMonoConfig, LiteMonoSize,
+    NetworkError, ResNetConfig, ResNetDepth,
 };
 
 /// ln b is held within these, in learning and in a prediction: errors of ln depth between 0.25 % and a factor of 7.
@@ -55,8 +55,11 @@ impl InputSize {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DepthNetConfig {
-    /// The backbone.
+    /// The backbone. Where there is a `lite_mono`, only `normalisation` and `frozen_statistics` of it are read.
     pub encoder: ResNetConfig,
+    /// Lite-Mono in place of the ResNet and its decoder; absent: those.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lite_mono: Option<LiteMonoConfig>,
     /// Hierarchical context encoding of the features of `layer1`…`layer4` on their way to the decoder;
     /// absent: the decoder reads the features as they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -91,6 +94,7 @@ impl DepthNetConfig {
     pub fn new(depth: ResNetDepth) -> Self {
         Self {
             encoder: ResNetConfig::new(depth),
+            lite_mono: None,
             hce: None,
             attention: None,
             aggregation: false,
@@ -128,6 +132,41 @@ impl DepthNetConfig {
         }
     }
 
+    /// Lite-Mono: its normalisation, its range of 0.1 to 100, starting at 10 m.
+    #[must_use]
+    pub fn lite_mono(size: LiteMonoSize) -> Self {
+        Self {
+            lite_mono: Some(LiteMonoConfig::new(size)),
+            initial_depth_m: Some(10.0),
+            ..Self::monodepth2(ResNetDepth::ResNet18)
+        }
+    }
+
+    /// Lite-Mono has an encoder and a decoder of its own; settings of others would say nothing.
+    fn validate_lite_mono(&self, lite_mono: &LiteMonoConfig) -> Result<(), NetworkError> {
+        lite_mono.validate()?;
+        let read = ResNetConfig {
+            normalisation: self.encoder.normalisation,
+            frozen_statistics: self.encoder.frozen_statistics,
+            ..ResNetConfig::new(ResNetDepth::ResNet18)
+        };
+        let others = [
+            ("encoder", self.encoder == read),
+            ("hce", self.hce.is_none()),
+            ("attention", self.attention.is_none()),
+            ("aggregation", !self.aggregation),
+            ("decoder", self.decoder == DecoderConfig::default()),
+        ];
+        match others.into_iter().find(|(_, as_it_was)| !as_it_was) {
+            None => Ok(()),
+            Some((field, _)) => Err(NetworkError::config(
+                field,
+                "left as it is where there is a lite_mono, which does not read it",
+                "another value",
+            )),
+        }
+    }
+
     /// # Errors
     /// [`NetworkError::Config`] for a network that cannot be built, or a depth range that is none.
     pub fn validate(&self) -> Result<(), NetworkError> {
@@ -137,6 +176,9 @@ impl DepthNetConfig {
             .as_ref()
             .map_or(Ok(()), AttentionConfig::validate)?;
         self.decoder.validate()?;
+        self.lite_mono
+            .as_ref()
+            .map_or(Ok(()), |lite_mono| self.validate_lite_mono(lite_mono))?;
         if self.encoder.frames != 1 {
             return Err(NetworkError::config(
                 "encoder.frames",

@@ -7,6 +7,8 @@ mod depth_net;
 mod error;
 mod flow_decoder;
 mod hce;
+mod lite_mono;
+mod lite_mono_cost;
 mod pose_net;
 mod resnet;
 
@@ -17,5 +19,6 @@ pub use depth_net::{DepthNetConfig, InputSize, LOG_SCALE_BOUNDS};
 pub use error::NetworkError;
 pub use flow_decoder::FlowDecoderConfig;
 pub use hce::HceConfig;
+pub use lite_mono::{LAYER_NORM_EPSILON, LiteMonoConfig, LiteMonoSize, POSITION_CHANNELS};
 pub use pose_net::{POSE_WIDTH, PoseNetConfig};
 pub use resnet::{BATCH_NORM_EPSILON, InputNormalisation, ResNetConfig, ResNetDepth};

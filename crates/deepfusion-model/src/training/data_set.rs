@@ -100,6 +100,9 @@ pub struct DataSetConfig {
     /// How far the cameras' clock is ahead of the vehicles', in seconds; absent: as `data.camera_ahead_s`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera_ahead_s: Option<f64>,
+    /// Topics of its bags for a role, as `image=/camera/front/image_raw`; none: as `data.topics`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub topics: Vec<String>,
     /// Which cameras: `2`, `3` or `both`; empty means `data.camera`.
     pub camera: String,
     /// What is learned from it.
@@ -135,21 +138,37 @@ impl TrainConfig {
             .map_or(own, |set| (set.range.unwrap_or(own.0), set.metres_per_unit))
     }
 
+    /// The data set that is meant by a name, or without one: the only set; or, where all sets share one range of depths, the only
+    /// one whose motion is learned, since a depth means the same metres in all of them.
+    pub(crate) fn set_meant(&self, name: Option<&str>) -> Option<&DataSetConfig> {
+        let sets = self.data.sets.as_slice();
+        if let Some(name) = name {
+            return sets.iter().find(|s| s.name == name);
+        }
+        let range = |set: &DataSetConfig| set.range.unwrap_or(self.depth_net.range);
+        let one_range = sets
+            .windows(2)
+            .all(|pair| range(&pair[0]) == range(&pair[1]));
+        let mut moving = sets.iter().filter(|set| set.learn.from_motion());
+        match (sets, moving.next(), moving.next()) {
+            ([only], ..) => Some(only),
+            (_, Some(only), None) if one_range => Some(only),
+            _ => None,
+        }
+    }
+
     /// The configuration of a run as one of its data sets sees it: depths and displacements mean metres of that set. A run
-    /// without sets is its own; of one with a single set, that is meant. The set's camera is
-    /// [`crate::TrainFindings::camera_of`].
+    /// without sets is its own; without a name, the only set is meant, or the only one whose motion is learned where all share one
+    /// range of depths. The set's camera is [`crate::TrainFindings::camera_of`].
     ///
     /// # Errors
     /// [`Error::DataSet`] where the run has several sets and none is named, or none of that name.
     pub fn for_set(mut self, name: Option<&str>) -> Result<Self, Error> {
         let names = || -> Vec<&str> { self.data.sets.iter().map(|s| s.name.as_str()).collect() };
-        let found = match (self.data.sets.as_slice(), name) {
-            ([], None) => return Ok(self),
-            ([only], None) => Some(only),
-            (sets, Some(name)) => sets.iter().find(|s| s.name == name),
-            (_, None) => None,
-        };
-        let Some(set) = found.cloned() else {
+        if self.data.sets.is_empty() && name.is_none() {
+            return Ok(self);
+        }
+        let Some(set) = self.set_meant(name).cloned() else {
             let expected = match names().as_slice() {
                 [] => "none: this run learned from one data set".to_owned(),
                 names => format!(
@@ -298,6 +317,22 @@ mod tests {
         // It survives the run's folder.
         let text = config.to_toml().unwrap();
         assert_eq!(toml::from_str::<TrainConfig>(&text).unwrap(), config);
+    }
+
+    /// Recorded drives beside simulated depth of the same range: nobody has to say which metres are meant.
+    #[test]
+    fn of_sets_with_one_range_the_one_that_moves_is_meant() {
+        let mut config = config();
+        config.data.sets[1].range = None;
+        assert!(config.clone().for_set(None).is_err(), "both move");
+        config.data.sets[0].learn = Learn::Depth;
+        let meant = config.clone().for_set(None).unwrap();
+        assert_eq!(meant.pose_net.metres_per_unit, 0.1);
+        config.data.sets[0].range = Some(DepthRange {
+            min_m: 1.0,
+            max_m: 50.0,
+        });
+        assert!(config.for_set(None).is_err(), "other depths");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use deepfusion_geometry::Intrinsics;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use super::TrainConfig;
+use super::{LearnedCamera, TrainConfig};
 
 /// The table of a run's `config.toml` that holds it.
 const TABLE: &str = "findings";
@@ -23,6 +23,9 @@ pub struct TrainFindings {
     /// The camera trained with, at the size of its images; `None` for imported weights. Several cameras: the first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera: Option<Intrinsics>,
+    /// How well that camera is known, where the run learned it; written when it ends.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub learned_camera: Option<LearnedCamera>,
     /// The same for each of `data.sets`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<SetFindings>,
@@ -64,12 +67,25 @@ impl TrainFindings {
     /// The camera that a data set was learned with; `set` as for [`TrainConfig::for_set`].
     #[must_use]
     pub fn camera_of(&self, config: &TrainConfig, set: Option<&str>) -> Option<Intrinsics> {
-        let only = match config.data.sets.as_slice() {
-            [only] => Some(only.name.as_str()),
-            _ => None,
-        };
-        let own = set.or(only).and_then(|name| self.set(name));
+        let meant = config.set_meant(set);
+        let own = meant.and_then(|meant| self.set(&meant.name));
         own.and_then(|own| own.camera).or(self.camera)
+    }
+
+    /// Takes in a camera that was learned: that of every data set whose motion is learned from.
+    pub fn learn_camera(&mut self, config: &TrainConfig, camera: Intrinsics) {
+        self.camera = Some(camera);
+        for set in config
+            .data
+            .sets
+            .iter()
+            .filter(|set| set.learn.from_motion())
+        {
+            let found = self.sets.iter_mut().find(|found| found.name == set.name);
+            if let Some(found) = found {
+                found.camera = Some(camera);
+            }
+        }
     }
 
     fn set(&self, name: &str) -> Option<&SetFindings> {
@@ -119,6 +135,7 @@ impl TrainFindings {
         let found = Self {
             metres_per_unit: None,
             camera,
+            learned_camera: None,
             sets,
         };
         Ok((found != Self::default()).then_some(found))
@@ -196,6 +213,11 @@ mod tests {
         TrainFindings {
             metres_per_unit: Some(0.8),
             camera: Some(camera(230.4)),
+            learned_camera: Some(LearnedCamera {
+                focal_px: [230.4, 230.4],
+                sigma_px: Some([3.0, 4.0]),
+                step: 12,
+            }),
             sets: vec![set("road", Some(1.1), 230.4), set("hall", None, 150.0)],
         }
     }

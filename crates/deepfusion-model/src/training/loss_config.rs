@@ -121,7 +121,7 @@ pub struct MovingConfig {
 }
 
 impl Default for MovingConfig {
-    /// Off, with SPEC 2's limits.
+    /// Off, with the usual limits.
     fn default() -> Self {
         Self {
             enabled: false,

@@ -1,6 +1,7 @@
 //! Everything that decides a training run, as one struct: the command line, `--config` and a run's `config.toml` say the same.
 //! What a run finds out from its data is another: [`TrainFindings`].
 
+mod assumed_camera;
 mod config_file;
 mod config_keys;
 mod data_set;
@@ -10,6 +11,7 @@ mod preset;
 mod sample_factors;
 mod train_config;
 
+pub use assumed_camera::{AssumedCamera, LearnedCamera};
 pub use config_keys::{ConfigKey, config_keys};
 pub use data_set::{DataSetConfig, Learn, SimulatedConfig};
 pub use findings::{SetFindings, TrainFindings};

@@ -4,8 +4,8 @@ use super::{
 };
 use super::{CompareAt, DepthLossConfig, FlowLossConfig, LossConfig, MovingConfig};
 use crate::{
-    DecoderConfig, DepthNetConfig, FlowDecoderConfig, InputSize, PoseNetConfig, ResNetConfig,
-    ResNetDepth,
+    DecoderConfig, DepthNetConfig, FlowDecoderConfig, InputSize, LiteMonoSize, PoseNetConfig,
+    ResNetConfig, ResNetDepth,
 };
 use deepfusion_kernels::Precision;
 use schemars::JsonSchema;
@@ -25,6 +25,18 @@ pub enum Preset {
     Paper,
     /// Monodepth2's network and losses (three frames, minimum reprojection) with the speed term.
     Monodepth2,
+    /// Lite-Mono (3.1 M parameters) with the losses of `monodepth2`, 640×192.
+    #[serde(rename = "lite-mono")]
+    LiteMono,
+    /// Lite-Mono-small: 2.5 M.
+    #[serde(rename = "lite-mono-small")]
+    LiteMonoSmall,
+    /// Lite-Mono-tiny: 2.2 M.
+    #[serde(rename = "lite-mono-tiny")]
+    LiteMonoTiny,
+    /// Lite-Mono-8M: 8.7 M.
+    #[serde(rename = "lite-mono-8m")]
+    LiteMono8m,
 }
 
 /// What a run computes on, as far as a preset's sizes follow it.
@@ -43,12 +55,16 @@ const MIN_STEPS: usize = 1200;
 
 impl Preset {
     /// All presets.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 9] = [
         Self::Tiny,
         Self::Light,
         Self::Resnet50,
         Self::Paper,
         Self::Monodepth2,
+        Self::LiteMono,
+        Self::LiteMonoSmall,
+        Self::LiteMonoTiny,
+        Self::LiteMono8m,
     ];
 
     /// Its name, on the command line and in files.
@@ -60,6 +76,10 @@ impl Preset {
             Self::Resnet50 => "resnet50",
             Self::Paper => "paper",
             Self::Monodepth2 => "monodepth2",
+            Self::LiteMono => "lite-mono",
+            Self::LiteMonoSmall => "lite-mono-small",
+            Self::LiteMonoTiny => "lite-mono-tiny",
+            Self::LiteMono8m => "lite-mono-8m",
         }
     }
 
@@ -114,6 +134,7 @@ impl Preset {
             start_moving: false,
             view_motion: ViewMotion::PoseNet,
             canonical_focal_px: None,
+            assumed_camera: None,
             data: DataConfig::default(),
             loss: LossConfig {
                 ssim_weight: 0.85,
@@ -138,13 +159,26 @@ impl Preset {
             },
             depth_net: DepthNetConfig::new(depth),
             pose_net: PoseNetConfig {
-                // Measured from the data when training starts (SPEC 1.2).
+                // Measured from the data when training starts.
                 metres_per_unit: 0.0,
                 ..PoseNetConfig::new(depth)
             },
             flow_decoder: FlowDecoderConfig::default(),
         };
+        let lite_mono = |size: LiteMonoSize| TrainConfig {
+            preset: self,
+            epochs: 35,
+            learning_rate: 5e-4,
+            learning_rate_schedule: LearningRateSchedule::Cosine,
+            weight_decay: 1e-2,
+            depth_net: DepthNetConfig::lite_mono(size),
+            ..Self::Monodepth2.config()
+        };
         match self {
+            Self::LiteMono => lite_mono(LiteMonoSize::Full),
+            Self::LiteMonoSmall => lite_mono(LiteMonoSize::Small),
+            Self::LiteMonoTiny => lite_mono(LiteMonoSize::Tiny),
+            Self::LiteMono8m => lite_mono(LiteMonoSize::EightM),
             Self::Tiny => {
                 let narrow = |config: ResNetConfig| config.with_base_width(32);
                 let mut config = base(ResNetDepth::ResNet18);

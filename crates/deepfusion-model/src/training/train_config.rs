@@ -1,8 +1,8 @@
+use crate::{AssumedCamera, DataSetConfig, Error, Learn, LossConfig, Preset};
 use crate::{
     AttentionConfig, AttentionForm, DepthNetConfig, FlowDecoderConfig, HceConfig, InputSize,
     PoseNetConfig,
 };
-use crate::{DataSetConfig, Error, Learn, LossConfig, Preset};
 use deepfusion_kernels::Precision;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -104,6 +104,9 @@ pub struct DataConfig {
     /// How far the cameras' clock is ahead of the vehicles', in seconds, instead of what the recordings' own files say.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera_ahead_s: Option<f64>,
+    /// Topics of bags for a role, as `image=/camera/front/image_raw`, where their types do not tell.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub topics: Vec<String>,
     /// Which cameras: `2`, `3` or `both`; empty means 2.
     pub camera: String,
     /// What is learned from.
@@ -195,6 +198,9 @@ pub struct TrainConfig {
     /// the depth of the camera it is trained with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub canonical_focal_px: Option<f64>,
+    /// The camera of recordings that do not say theirs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub assumed_camera: Option<AssumedCamera>,
     /// The recordings.
     #[serde(default)]
     pub data: DataConfig,
@@ -231,6 +237,7 @@ impl DataConfig {
             split,
             validation_split,
             camera_ahead_s: _,
+            topics: _,
             camera: _,
             learn: _,
             sets,
@@ -424,6 +431,13 @@ impl TrainConfig {
             let expected = "false where nothing is learned from known depth: the head has nothing else to learn from";
             return fail("depth_net.uncertainty", expected, "true".into());
         }
+        if self.depth_net.lite_mono.is_some() && self.loss.flow.weight > 0.0 {
+            return fail(
+                "loss.flow.weight",
+                "0 where there is a depth_net.lite_mono: the flow decoder reads a ResNet's features",
+                self.loss.flow.weight.to_string(),
+            );
+        }
         if self.batch == 0 {
             return fail("batch", "at least 1", "0".into());
         }
@@ -440,6 +454,9 @@ impl TrainConfig {
             && !(focal > 0.0 && focal.is_finite())
         {
             return fail("canonical_focal_px", "above 0", focal.to_string());
+        }
+        if let Some(camera) = &self.assumed_camera {
+            camera.validate()?;
         }
         if !(0.0..=1.0).contains(&self.learning_rate_drop) {
             let found = self.learning_rate_drop.to_string();
@@ -543,6 +560,7 @@ mod tests {
             split: Some("g.txt".into()),
             validation_split: Some("h.txt".into()),
             camera_ahead_s: None,
+            topics: Vec::new(),
             camera: "both".into(),
             learn: Learn::default(),
             sets: vec![set],

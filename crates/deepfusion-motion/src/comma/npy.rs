@@ -14,7 +14,7 @@ pub(super) struct Table {
 
 impl Table {
     /// Reads an array of `float64` or `float32` with this many columns; a single column may be one-dimensional.
-    pub fn read(path: &Path, columns: usize) -> Result<Self> {
+    pub(super) fn read(path: &Path, columns: usize) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
         Self::parse(&bytes, columns).map_err(|problem| Error::Array {
             path: path.to_owned(),

@@ -73,7 +73,7 @@ pub(super) struct Fit {
 
 impl Fit {
     /// The best of the fits from several starts; `None` if none converges.
-    pub fn best(observations: &[Observation], config: &IdentifyConfig) -> Option<Self> {
+    pub(super) fn best(observations: &[Observation], config: &IdentifyConfig) -> Option<Self> {
         let turning: f64 = observations
             .iter()
             .map(|o| o.speed * o.steering * o.yaw_rate)
@@ -165,7 +165,7 @@ impl Fit {
         (direction.transpose() * self.covariance * direction)[0].max(0.0)
     }
 
-    pub fn product_m(&self) -> Estimate {
+    pub(super) fn product_m(&self) -> Estimate {
         let value = self.parameters[PRODUCT].exp();
         Estimate {
             value: self.sign * value,
@@ -173,7 +173,7 @@ impl Fit {
         }
     }
 
-    pub fn steering_ratio(&self) -> Estimate {
+    pub(super) fn steering_ratio(&self) -> Estimate {
         let value = self.parameters[RATIO].exp();
         Estimate {
             value: self.sign * value,
@@ -181,7 +181,7 @@ impl Fit {
         }
     }
 
-    pub fn wheelbase_m(&self) -> Estimate {
+    pub(super) fn wheelbase_m(&self) -> Estimate {
         let value = (self.parameters[PRODUCT] - self.parameters[RATIO]).exp();
         let direction = Parameters::x() - Parameters::y();
         Estimate {
@@ -193,7 +193,7 @@ impl Fit {
         }
     }
 
-    pub fn steering_offset_rad(&self) -> Estimate {
+    pub(super) fn steering_offset_rad(&self) -> Estimate {
         let ratio = self.parameters[RATIO].exp();
         Estimate {
             value: self.sign * ratio * self.parameters[ZERO],
@@ -201,7 +201,7 @@ impl Fit {
         }
     }
 
-    pub fn yaw_rate_bias(&self) -> Estimate {
+    pub(super) fn yaw_rate_bias(&self) -> Estimate {
         Estimate {
             value: self.parameters[BIAS],
             std_error: self.variance(Parameters::w()).sqrt(),

@@ -56,7 +56,7 @@ impl Problem<'_> {
     }
 
     /// Parameters within their range, and tied where the wheelbase is known.
-    pub fn allowed(&self, mut p: Parameters) -> Parameters {
+    pub(super) fn allowed(&self, mut p: Parameters) -> Parameters {
         if !self.ratio_is_known {
             p[RATIO] = p[RATIO].clamp(RATIO_RANGE.0.ln(), RATIO_RANGE.1.ln());
         }
@@ -72,7 +72,7 @@ impl Problem<'_> {
         if scaled <= HUBER { 1.0 } else { HUBER / scaled }
     }
 
-    pub fn sigma(&self, p: &Parameters) -> f64 {
+    pub(super) fn sigma(&self, p: &Parameters) -> f64 {
         let mut sizes: Vec<f64> = self
             .observations
             .iter()
@@ -84,7 +84,7 @@ impl Problem<'_> {
     }
 
     /// Huber's loss over σ², and the priors.
-    pub fn cost(&self, p: &Parameters, sigma: f64) -> f64 {
+    pub(super) fn cost(&self, p: &Parameters, sigma: f64) -> f64 {
         let loss = |r: f64| {
             let scaled = r.abs() / sigma;
             if scaled <= HUBER {
@@ -101,7 +101,7 @@ impl Problem<'_> {
         data + 0.5 * (p[ZERO] / ZERO_PRIOR_RAD).powi(2) + 0.5 * (p[BIAS] / BIAS_PRIOR_RADPS).powi(2)
     }
 
-    pub fn normal_equations(&self, p: &Parameters, sigma: f64) -> (Covariance, Parameters) {
+    pub(super) fn normal_equations(&self, p: &Parameters, sigma: f64) -> (Covariance, Parameters) {
         let (mut normal, mut gradient) = (Covariance::zeros(), Parameters::zeros());
         for o in self.observations {
             let (residual, derivative) = self.residual(o, p);
@@ -118,7 +118,7 @@ impl Problem<'_> {
 
     /// The covariance of the free parameters; a fixed one has none. With the wheelbase known, the
     /// product's is the ratio's.
-    pub fn free_inverse(&self, normal: &Covariance) -> Option<Covariance> {
+    pub(super) fn free_inverse(&self, normal: &Covariance) -> Option<Covariance> {
         let mut padded = *normal;
         let fixed = |i: usize| normal[(i, i)] == 0.0;
         for i in (0..4).filter(|i| fixed(*i)) {
@@ -139,7 +139,7 @@ impl Problem<'_> {
 
     /// Factor by which correlated residuals widen the variance: (1 + r) / (1 − r), r the
     /// correlation of neighbours.
-    pub fn runs(&self, p: &Parameters) -> f64 {
+    pub(super) fn runs(&self, p: &Parameters) -> f64 {
         let residuals: Vec<f64> = self
             .observations
             .iter()

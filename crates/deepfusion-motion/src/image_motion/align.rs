@@ -35,7 +35,7 @@ pub(super) struct Warp {
 }
 
 impl Plane {
-    pub fn new(width: usize, height: usize, values: &[f32]) -> Self {
+    pub(super) fn new(width: usize, height: usize, values: &[f32]) -> Self {
         Self {
             width,
             height,
@@ -44,7 +44,7 @@ impl Plane {
     }
 
     /// The picture at half the size, each pixel the mean of four; `None` where that is too small.
-    pub fn half(&self) -> Option<Self> {
+    pub(super) fn half(&self) -> Option<Self> {
         let (width, height) = (self.width / 2, self.height / 2);
         if width < COARSEST.0 || height < COARSEST.1 {
             return None;

@@ -34,7 +34,7 @@ pub(super) struct Channel {
 impl Channel {
     /// Compares over the pairs that the vehicle's signal covers at every offset, so that all offsets
     /// use the same pairs. `None` without pairs.
-    pub fn new(
+    pub(super) fn new(
         pictures: &[ImageMotion],
         picture: fn(&ImageMotion) -> f64,
         vehicle: &Signal,
@@ -99,12 +99,12 @@ impl Channel {
     }
 
     /// Number of pairs of frames compared.
-    pub fn pairs(&self) -> usize {
+    pub(super) fn pairs(&self) -> usize {
         self.pairs
     }
 
     /// The correlation at the step nearest to an offset.
-    pub fn correlation_at(&self, offset_s: f64) -> f64 {
+    pub(super) fn correlation_at(&self, offset_s: f64) -> f64 {
         let step = ((offset_s + self.search_s) / STEP_S).round().max(0.0) as usize;
         let step = step.min(2 * half(self.search_s));
         correlation(&self.sum(step, self.blocks.keys()))

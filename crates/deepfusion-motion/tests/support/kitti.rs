@@ -14,14 +14,14 @@ use std::fs;
 use std::path::Path;
 
 /// One OXTS packet: time in seconds of the day, and its 30 numbers (`oxts/dataformat.txt`).
-pub struct Packet {
+pub(crate) struct Packet {
     pub time_s: f64,
     values: Vec<f64>,
 }
 
 impl Packet {
     /// East and north in metres, by Mercator's projection at the drive's latitude, as KITTI's own tools.
-    pub fn place(&self, latitude_deg: f64) -> [f64; 2] {
+    pub(crate) fn place(&self, latitude_deg: f64) -> [f64; 2] {
         const RADIUS: f64 = 6_378_137.0;
         let scale = latitude_deg.to_radians().cos();
         let (lat, lon) = (self.values[0], self.values[1]);
@@ -31,11 +31,11 @@ impl Packet {
         [scale * RADIUS * lon.to_radians(), scale * RADIUS * north]
     }
 
-    pub fn latitude_deg(&self) -> f64 {
+    pub(crate) fn latitude_deg(&self) -> f64 {
         self.values[0]
     }
 
-    pub fn heading_rad(&self) -> f64 {
+    pub(crate) fn heading_rad(&self) -> f64 {
         self.values[5]
     }
 }
@@ -52,7 +52,7 @@ fn times(path: &Path) -> Vec<f64> {
 }
 
 /// The packets of a drive.
-pub fn packets(drive: &Path) -> Vec<Packet> {
+pub(crate) fn packets(drive: &Path) -> Vec<Packet> {
     let times = times(&drive.join("oxts/timestamps.txt"));
     let read = |(i, time_s): (usize, &f64)| {
         let path = drive.join(format!("oxts/data/{i:010}.txt"));
@@ -70,13 +70,13 @@ pub fn packets(drive: &Path) -> Vec<Packet> {
 }
 
 /// Forward speed `vf` and yaw rate `wz` as one track.
-pub fn track(packets: &[Packet]) -> VehicleTrack {
+pub(crate) fn track(packets: &[Packet]) -> VehicleTrack {
     let sample = |p: &Packet| (p.time_s, p.values[8], p.values[19]);
     VehicleTrack::new(&packets.iter().map(sample).collect::<Vec<_>>())
 }
 
 /// `vf` as the vehicle's speed, `ax`… and `wx`… as an inertial unit.
-pub fn sensors(packets: &[Packet]) -> VehicleSensors {
+pub(crate) fn sensors(packets: &[Packet]) -> VehicleSensors {
     let three = |p: &Packet, i: usize| Vector3::new(p.values[i], p.values[i + 1], p.values[i + 2]);
     let imu = packets.iter().map(|p| ImuSample {
         time_s: p.time_s,
@@ -91,7 +91,7 @@ pub fn sensors(packets: &[Packet]) -> VehicleSensors {
 }
 
 /// Length of the path through every `step`-th position, in metres.
-pub fn path_length_m(packets: &[Packet], step: usize) -> f64 {
+pub(crate) fn path_length_m(packets: &[Packet], step: usize) -> f64 {
     let latitude = packets[0].latitude_deg();
     let mut places: Vec<[f64; 2]> = packets
         .iter()
@@ -107,7 +107,7 @@ pub fn path_length_m(packets: &[Packet], step: usize) -> f64 {
 }
 
 /// How the pictures of camera 2 move, at 160×48.
-pub fn image_motion(drive: &Path) -> Vec<ImageMotion> {
+pub(crate) fn image_motion(drive: &Path) -> Vec<ImageMotion> {
     let times = times(&drive.join("image_02/timestamps.txt"));
     let frame = |(i, time_s): (usize, &f64)| {
         let path = drive.join(format!("image_02/data/{i:010}.jpg"));

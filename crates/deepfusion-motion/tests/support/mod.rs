@@ -8,7 +8,7 @@
 )]
 #![allow(dead_code)] // Each test uses its part.
 
-pub mod kitti;
+pub(crate) mod kitti;
 
 use deepfusion_geometry::Trajectory;
 use deepfusion_motion::{FusedTrack, MotionParts, Signal};
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 /// A folder of real recordings: below `DEEPFUSION_DATA`, or `../shared/data` beside the workspace. Says
 /// so and gives nothing where it is absent.
-pub fn real_data(inner: &str) -> Option<PathBuf> {
+pub(crate) fn real_data(inner: &str) -> Option<PathBuf> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let root = std::env::var_os("DEEPFUSION_DATA")
         .map_or_else(|| workspace.join("../shared/data"), PathBuf::from);
@@ -33,7 +33,7 @@ pub fn real_data(inner: &str) -> Option<PathBuf> {
 
 /// What is true about one interval.
 #[derive(Debug, Clone, Copy)]
-pub struct Truth {
+pub(crate) struct Truth {
     pub from_s: f64,
     pub to_s: f64,
     pub distance_m: f64,
@@ -42,7 +42,7 @@ pub struct Truth {
 
 /// Every interval of `length_s` of a reference path, one starting every `every_s`. Distance is the sum
 /// of the steps between poses, yaw the change of heading.
-pub fn windows(reference: &Trajectory, length_s: f64, every_s: f64) -> Vec<Truth> {
+pub(crate) fn windows(reference: &Trajectory, length_s: f64, every_s: f64) -> Vec<Truth> {
     let poses = reference.poses();
     let (mut along, mut heading) = (vec![0.0], vec![0.0]);
     for pair in poses.windows(2) {
@@ -70,7 +70,7 @@ pub fn windows(reference: &Trajectory, length_s: f64, every_s: f64) -> Vec<Truth
 }
 
 /// A path cut in two at half its time.
-pub fn halves(path: &Trajectory) -> (Trajectory, Trajectory) {
+pub(crate) fn halves(path: &Trajectory) -> (Trajectory, Trajectory) {
     let poses = path.poses();
     let (first, second) = poses.split_at(poses.len() / 2);
     (
@@ -80,7 +80,7 @@ pub fn halves(path: &Trajectory) -> (Trajectory, Trajectory) {
 }
 
 /// The path's length over the speed's integral.
-pub fn speed_scale(speed: &Signal, path: &Trajectory) -> f64 {
+pub(crate) fn speed_scale(speed: &Signal, path: &Trajectory) -> f64 {
     let poses = path.poses();
     let integral = speed.integral(poses[0].time_s, poses[poses.len() - 1].time_s);
     path.length_m() / integral.unwrap()
@@ -88,7 +88,7 @@ pub fn speed_scale(speed: &Signal, path: &Trajectory) -> f64 {
 
 /// Errors over windows.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Errors {
+pub(crate) struct Errors {
     /// Mean of the signed error of the distance, over the mean distance.
     pub distance_bias: f64,
     /// Mean of its absolute value, in metres.
@@ -101,7 +101,7 @@ pub struct Errors {
 }
 
 /// The errors of distances and yaws, each window's as (distance in m, yaw in rad).
-pub fn errors(truths: &[Truth], of: impl Fn(&Truth) -> Option<(f64, f64)>) -> Errors {
+pub(crate) fn errors(truths: &[Truth], of: impl Fn(&Truth) -> Option<(f64, f64)>) -> Errors {
     let mut sum = Errors::default();
     let mut driven = 0.0;
     for truth in truths {
@@ -126,7 +126,7 @@ pub fn errors(truths: &[Truth], of: impl Fn(&Truth) -> Option<(f64, f64)>) -> Er
 }
 
 /// The three rows of the table: vehicle only, inertial unit only, fused.
-pub fn rows(track: &FusedTrack, truths: &[Truth]) -> [(&'static str, Errors); 3] {
+pub(crate) fn rows(track: &FusedTrack, truths: &[Truth]) -> [(&'static str, Errors); 3] {
     let parts = |t: &Truth| track.parts(t.from_s, t.to_s);
     let vehicle = |p: MotionParts| Some((p.vehicle_distance_m, p.steering_yaw_rad?));
     let imu = |p: MotionParts| Some((p.imu_distance_m?, p.imu_yaw_rad?));

@@ -78,6 +78,51 @@ impl<B: KernelBackward> Backward<B, 3> for BatchNorm {
 }
 
 #[derive(Debug)]
+struct Depthwise;
+
+impl<B: KernelBackward> Backward<B, 2> for Depthwise {
+    type State = (FloatTensor<B>, FloatTensor<B>, usize);
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 2>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let (x, weight, dilation) = ops.state;
+        let [x_node, weight_node] = ops.parents;
+        let grad = grads.consume::<B>(&ops.node);
+        if let Some(node) = weight_node {
+            let shape = weight.shape().dims();
+            let grad = B::depthwise_grad_weight(x, grad.clone(), shape, dilation);
+            grads.register::<B>(node.id, grad);
+        }
+        if let Some(node) = x_node {
+            grads.register::<B>(node.id, B::depthwise_grad_x(weight, grad, dilation));
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Gelu;
+
+impl<B: KernelBackward> Backward<B, 1> for Gelu {
+    type State = FloatTensor<B>;
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 1>,
+        grads: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let grad = grads.consume::<B>(&ops.node);
+        if let [Some(node)] = ops.parents {
+            grads.register::<B>(node.id, B::gelu_grad(ops.state, grad));
+        }
+    }
+}
+
+#[derive(Debug)]
 struct Elu;
 
 impl<B: KernelBackward> Backward<B, 1> for Elu {
@@ -267,6 +312,23 @@ where
         let state = (x, [gamma, beta], statistics, epsilon, relu);
         let output = record!(BatchNorm, C, nodes, output, state);
         (output, Self::from_inner(mean), Self::from_inner(variance))
+    }
+
+    fn kernel_depthwise(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        dilation: usize,
+    ) -> FloatTensor<Self> {
+        let ((x, x_node), (weight, weight_node)) = (x.into_parts(), weight.into_parts());
+        let output = B::kernel_depthwise(x.clone(), weight.clone(), dilation);
+        let nodes = [x_node, weight_node];
+        record!(Depthwise, C, nodes, output, (x, weight, dilation))
+    }
+
+    fn kernel_gelu(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        let (x, node) = x.into_parts();
+        let output = B::kernel_gelu(x.clone());
+        record!(Gelu, C, [node], output, x)
     }
 
     fn kernel_elu(x: FloatTensor<Self>) -> FloatTensor<Self> {

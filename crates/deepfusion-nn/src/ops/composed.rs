@@ -65,6 +65,21 @@ pub fn batch_norm(
     }
 }
 
+/// [`super::depthwise`].
+#[must_use]
+pub fn depthwise(x: Tensor<4>, weight: Tensor<4>, dilation: usize) -> Tensor<4> {
+    let [channels, _, kernel, _] = weight.dims();
+    let (padding, d) = (kernel / 2 * dilation, dilation);
+    let options = BurnConvOptions::new([1, 1], [padding, padding], [d, d], channels);
+    burn::tensor::module::conv2d(x, weight, None, options)
+}
+
+/// [`super::gelu`].
+#[must_use]
+pub fn gelu(x: Tensor<4>) -> Tensor<4> {
+    burn::tensor::activation::gelu(x)
+}
+
 /// [`super::elu`], as relu(x) + e^(−relu(−x)) − 1: the exponential's argument is never positive, so
 /// that large activations cannot make an infinity whose gradient is NaN.
 #[must_use]
@@ -211,7 +226,7 @@ pub fn project(inverse_depth: Tensor<4>, homography: Tensor<3>, shift: Tensor<2>
 
 /// [`super::in_view`].
 #[must_use]
-pub fn in_view(coords: Tensor<4>, size: [usize; 2]) -> Tensor<4, Bool> {
+pub(super) fn in_view(coords: Tensor<4>, size: [usize; 2]) -> Tensor<4, Bool> {
     let inside = |axis: usize, size: usize| {
         let p = coords.clone().narrow(1, axis, 1);
         p.clone()

@@ -6,7 +6,8 @@ use super::kernel::{ConvOptions, KernelOps};
 use burn::backend::{Flex, TensorMetadata, ops::FloatTensorOps, tensor::FloatTensor};
 use burn::tensor::TensorData;
 use deepfusion_kernels::{
-    self as kernels, ConvShape, CorrelationShape, PhotometricShape, SmoothnessShape, WarpShape,
+    self as kernels, ConvShape, CorrelationShape, DepthwiseShape, PhotometricShape,
+    SmoothnessShape, WarpShape,
 };
 use std::mem::MaybeUninit;
 
@@ -81,6 +82,16 @@ fn conv_shape(x: [usize; 4], weight: [usize; 4], options: ConvOptions) -> ConvSh
         dilation: options.dilation,
         reflect: options.reflect,
         precision: options.precision,
+    }
+}
+
+fn depthwise_shape(x: [usize; 4], kernel: usize, dilation: usize) -> DepthwiseShape {
+    DepthwiseShape {
+        channels: x[1],
+        height: x[2],
+        width: x[3],
+        kernel,
+        dilation,
     }
 }
 
@@ -192,6 +203,24 @@ impl KernelOps for Flex {
             tensor(saved.mean, channels),
             tensor(saved.variance, channels),
         )
+    }
+
+    fn kernel_depthwise(x: Float, weight: Float, dilation: usize) -> Float {
+        let sizes: [usize; 4] = dims(&x);
+        let [_, _, kernel, _] = dims(&weight);
+        let shape = depthwise_shape(sizes, kernel, dilation);
+        let (x, weight) = (Values::of(x), Values::of(weight));
+        let mut out = zeros(&sizes);
+        kernels::depthwise(&shape, x.slice(), weight.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn kernel_gelu(x: Float) -> Float {
+        let sizes: [usize; 4] = dims(&x);
+        let x = Values::of(x);
+        // SAFETY: a kernel that takes a `Slot` writes every value.
+        let (out, ()) = unsafe { written(x.slice().len(), |out| kernels::gelu(x.slice(), out)) };
+        tensor(out, sizes)
     }
 
     fn kernel_elu(x: Float) -> Float {

@@ -33,7 +33,7 @@ impl Default for ConvOptions {
 
 /// The forward passes. Shapes are those of the functions in [`super`].
 #[backend_extension(Flex, Autodiff)]
-pub trait KernelOps: Backend {
+pub(super) trait KernelOps: Backend {
     /// See [`super::conv2d`]; `bias` is not read unless `has_bias`.
     fn kernel_conv2d(
         x: FloatTensor<Self>,
@@ -51,6 +51,16 @@ pub trait KernelOps: Backend {
         epsilon: f64,
         relu: bool,
     ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>);
+
+    /// See [`super::depthwise`].
+    fn kernel_depthwise(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        dilation: usize,
+    ) -> FloatTensor<Self>;
+
+    /// See [`super::gelu`].
+    fn kernel_gelu(x: FloatTensor<Self>) -> FloatTensor<Self>;
 
     /// See [`super::elu`].
     fn kernel_elu(x: FloatTensor<Self>) -> FloatTensor<Self>;
@@ -94,7 +104,7 @@ pub trait KernelOps: Backend {
 
 /// The backward passes, on the backend below autodiff. Each gives the gradient of its inputs; where
 /// an input needs none, its work can be left out.
-pub trait KernelBackward: Backend {
+pub(super) trait KernelBackward: Backend {
     /// Gradient of the input of [`KernelOps::kernel_conv2d`].
     fn conv2d_grad_x(
         x: FloatTensor<Self>,
@@ -123,6 +133,24 @@ pub trait KernelBackward: Backend {
         epsilon: f64,
         relu: bool,
     ) -> [FloatTensor<Self>; 3];
+
+    /// Gradient of the input of [`KernelOps::kernel_depthwise`].
+    fn depthwise_grad_x(
+        weight: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+        dilation: usize,
+    ) -> FloatTensor<Self>;
+
+    /// Gradient of its weights, whose shape is given.
+    fn depthwise_grad_weight(
+        x: FloatTensor<Self>,
+        grad: FloatTensor<Self>,
+        shape: [usize; 4],
+        dilation: usize,
+    ) -> FloatTensor<Self>;
+
+    /// Gradient of [`KernelOps::kernel_gelu`] from its input.
+    fn gelu_grad(x: FloatTensor<Self>, grad: FloatTensor<Self>) -> FloatTensor<Self>;
 
     /// Gradient of [`KernelOps::kernel_elu`] from its output.
     fn elu_grad(output: FloatTensor<Self>, grad: FloatTensor<Self>) -> FloatTensor<Self>;

@@ -17,8 +17,8 @@ use kernel::KernelOps;
 
 pub use autocast::{autocast, supports};
 pub use composed::{
-    batch_norm as composed_batch_norm, conv2d as composed_conv2d, elu as composed_elu,
-    local_correlation as composed_local_correlation,
+    batch_norm as composed_batch_norm, conv2d as composed_conv2d, depthwise as composed_depthwise,
+    elu as composed_elu, gelu as composed_gelu, local_correlation as composed_local_correlation,
     photometric_error as composed_photometric_error, project as composed_project,
     smoothness as composed_smoothness, upsample_concat as composed_upsample_concat,
     warp as composed_warp,
@@ -109,6 +109,35 @@ pub fn batch_norm(
         mean: Tensor::from_dispatch(mean),
         variance: Tensor::from_dispatch(variance),
     }
+}
+
+/// Depthwise convolution at stride 1 that keeps the size, with a border of zeros: every channel has a kernel of its own.
+///
+/// # Shapes
+/// - `x`, output: `[N, C, H, W]`
+/// - `weight`: `[C, 1, k, k]`, k odd
+///
+/// # Panics
+/// When the shapes do not fit each other, as Burn's own operations do.
+#[must_use]
+pub fn depthwise(x: Tensor<4>, weight: Tensor<4>, dilation: usize) -> Tensor<4> {
+    if !on_cpu(&x) {
+        return composed::depthwise(x, weight, dilation);
+    }
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_depthwise(
+        x.into_dispatch(),
+        weight.into_dispatch(),
+        dilation,
+    ))
+}
+
+/// GELU, x·Φ(x), Φ the normal distribution.
+#[must_use]
+pub fn gelu(x: Tensor<4>) -> Tensor<4> {
+    if !on_cpu(&x) {
+        return composed::gelu(x);
+    }
+    Tensor::from_dispatch(<Dispatch as KernelOps>::kernel_gelu(x.into_dispatch()))
 }
 
 /// ELU, x for x > 0 and eˣ − 1 below.

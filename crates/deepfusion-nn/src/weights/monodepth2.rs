@@ -42,6 +42,9 @@ impl Monodepth2Files {
     }
 }
 
+/// A pose network and what it is.
+pub type Pose = (PoseNetConfig, PoseNet);
+
 /// Monodepth2's networks, imported.
 #[derive(Debug)]
 pub struct Monodepth2 {
@@ -50,7 +53,7 @@ pub struct Monodepth2 {
     /// The depth network.
     pub depth_net: DepthNet,
     /// The pose network and what it is, where the files have one.
-    pub pose: Option<(PoseNetConfig, PoseNet)>,
+    pub pose: Option<Pose>,
     /// The image size it was trained at, where `encoder.pth` says so.
     pub input_size: Option<InputSize>,
 }
@@ -66,8 +69,14 @@ pub fn load_monodepth2(files: &Monodepth2Files, device: &Device) -> Result<Monod
     let decoder = read(&files.depth)?;
     let decoder = rename(decoder, depth_decoder_name)?;
     let mut depth_net = DepthNet::new(&depth_config, device)?;
-    depth_net.encoder = apply_torchvision(depth_net.encoder, encoder)?;
-    depth_net.decoder = apply(depth_net.decoder, &decoder)?;
+    depth_net.encoder = depth_net
+        .encoder
+        .map(|net| apply_torchvision(net, encoder))
+        .transpose()?;
+    depth_net.decoder = depth_net
+        .decoder
+        .map(|net| apply(net, &decoder))
+        .transpose()?;
 
     let pose = match &files.pose {
         None => None,
@@ -81,11 +90,7 @@ pub fn load_monodepth2(files: &Monodepth2Files, device: &Device) -> Result<Monod
     })
 }
 
-fn load_pose(
-    encoder: &Path,
-    decoder: &Path,
-    device: &Device,
-) -> Result<(PoseNetConfig, PoseNet), Error> {
+pub(super) fn load_pose(encoder: &Path, decoder: &Path, device: &Device) -> Result<Pose, Error> {
     let encoder = read_encoder(encoder)?;
     let decoder = rename(read(decoder)?, pose_decoder_name)?;
     let mut config = PoseNetConfig::monodepth2(detect_resnet(&encoder)?);
@@ -110,7 +115,10 @@ fn read_encoder(path: &Path) -> Result<Weights, Error> {
 }
 
 /// Renames every tensor; an error names the first that the network does not have.
-fn rename(weights: Weights, name_of: fn(&str) -> Option<String>) -> Result<Weights, Error> {
+pub(super) fn rename(
+    weights: Weights,
+    name_of: impl Fn(&str) -> Option<String>,
+) -> Result<Weights, Error> {
     let unknown: Vec<_> = weights
         .tensors
         .iter()
@@ -160,7 +168,7 @@ fn pose_decoder_name(name: &str) -> Option<String> {
 }
 
 /// `encoder.pth` holds `height`, `width` and `use_stereo` beside its tensors.
-fn input_size(encoder: &Path) -> Option<InputSize> {
+pub(super) fn input_size(encoder: &Path) -> Option<InputSize> {
     let PickleValue::Dict(entries) = PytorchReader::read_pickle_data(encoder, None).ok()? else {
         return None;
     };

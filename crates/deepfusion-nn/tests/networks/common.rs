@@ -17,13 +17,13 @@ use flate2::read::GzDecoder;
 use safetensors::tensor::{Dtype, TensorView};
 
 /// Batch, height and width of the reference images.
-pub const BATCH: usize = 2;
-pub const HEIGHT: usize = 64;
-pub const WIDTH: usize = 96;
+pub(crate) const BATCH: usize = 2;
+pub(crate) const HEIGHT: usize = 64;
+pub(crate) const WIDTH: usize = 96;
 /// After how many values the weights in the `.pth` files repeat.
-pub const PERIOD: usize = 101;
+pub(crate) const PERIOD: usize = 101;
 
-pub fn reference(file: &str) -> PathBuf {
+pub(crate) fn reference(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("tests/reference")
         .join(file)
@@ -31,7 +31,7 @@ pub fn reference(file: &str) -> PathBuf {
 
 /// `count` values in [−1, 1) from a hash of the name and the index; repeating, and then without their
 /// mean, where there is a period.
-pub fn uniform(name: &str, count: usize, period: Option<usize>) -> Vec<f32> {
+pub(crate) fn uniform(name: &str, count: usize, period: Option<usize>) -> Vec<f32> {
     let seed = name.bytes().fold(0x811C_9DC5_u32, |seed, byte| {
         (seed ^ u32::from(byte)).wrapping_mul(0x0100_0193)
     });
@@ -56,7 +56,7 @@ pub fn uniform(name: &str, count: usize, period: Option<usize>) -> Vec<f32> {
 }
 
 /// The weights of the tensor `name`.
-pub fn formula(name: &str, shape: &[usize], period: Option<usize>) -> Vec<f32> {
+pub(crate) fn formula(name: &str, shape: &[usize], period: Option<usize>) -> Vec<f32> {
     let v = uniform(name, shape.iter().product(), period);
     let affine = |offset: f32, factor: f32| v.iter().map(|v| offset + factor * v).collect();
     if name.ends_with("running_var") {
@@ -74,7 +74,7 @@ pub fn formula(name: &str, shape: &[usize], period: Option<usize>) -> Vec<f32> {
 }
 
 /// The images of the reference, `[BATCH, channels, HEIGHT, WIDTH]` in [0, 1).
-pub fn images(name: &str, channels: usize, device: &Device) -> Tensor<4> {
+pub(crate) fn images(name: &str, channels: usize, device: &Device) -> Tensor<4> {
     let values: Vec<f32> = uniform(name, BATCH * channels * HEIGHT * WIDTH, None)
         .iter()
         .map(|v| v * 0.5 + 0.5)
@@ -86,15 +86,15 @@ pub fn images(name: &str, channels: usize, device: &Device) -> Tensor<4> {
 }
 
 /// A file's tensors in the order PyTorch lists them: name, shape, type.
-pub type Listing = Vec<(String, Vec<usize>, String)>;
+pub(crate) type Listing = Vec<(String, Vec<usize>, String)>;
 
 /// The listings of the real files, by `model/file`.
-pub fn manifest() -> BTreeMap<String, Listing> {
+pub(crate) fn manifest() -> BTreeMap<String, Listing> {
     serde_json::from_str(&fs::read_to_string(reference("manifest.json")).unwrap()).unwrap()
 }
 
 /// Writes a safetensors file with the names, shapes and types of a real one and the formula's weights.
-pub fn write_listed(path: &Path, listing: &Listing) {
+pub(crate) fn write_listed(path: &Path, listing: &Listing) {
     let bytes: Vec<Vec<u8>> = listing
         .iter()
         .map(|(name, shape, kind)| match kind.as_str() {
@@ -120,7 +120,7 @@ pub fn write_listed(path: &Path, listing: &Listing) {
 }
 
 /// Unpacks `tests/reference/<name>.gz.gz` into the folder.
-pub fn unpack(name: &str, folder: &Path) -> PathBuf {
+pub(crate) fn unpack(name: &str, folder: &Path) -> PathBuf {
     let packed = fs::File::open(reference(&format!("{name}.gz.gz"))).unwrap();
     let target = folder.join(name);
     let mut file = fs::File::create(&target).unwrap();
@@ -129,13 +129,13 @@ pub fn unpack(name: &str, folder: &Path) -> PathBuf {
 }
 
 /// The expected values, by name.
-pub fn expected() -> Weights {
+pub(crate) fn expected() -> Weights {
     weights::read(&reference("expected.safetensors")).unwrap()
 }
 
 /// The largest |actual − expected|, and the root mean square of the expected values; the actual values are
 /// taken at every `step`-th place as in the reference.
-pub fn largest_difference(
+pub(crate) fn largest_difference(
     expected: &Weights,
     name: &str,
     actual: &[f32],
@@ -152,11 +152,11 @@ pub fn largest_difference(
 }
 
 /// The largest |actual − expected| over max(1, rms of the expected values), as [`largest_difference`].
-pub fn largest_error(expected: &Weights, name: &str, actual: &[f32], step: usize) -> f32 {
+pub(crate) fn largest_error(expected: &Weights, name: &str, actual: &[f32], step: usize) -> f32 {
     let (difference, rms) = largest_difference(expected, name, actual, step);
     difference / rms.max(1.0)
 }
 
-pub fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+pub(crate) fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.into_data().iter::<f32>().collect()
 }

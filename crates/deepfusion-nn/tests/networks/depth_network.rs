@@ -224,9 +224,7 @@ fn the_whole_network() {
     let fifty = small_paper(ResNetDepth::ResNet50, 8, AttentionForm::Residual);
     let net = freeze_statistics(DepthNet::new(&fifty, &device).unwrap(), true);
     // Through `decode`, as another decoder beside this one does.
-    check("paper_50", net, shape, |net, x| {
-        net.decode(net.encoder.forward(x))
-    });
+    check("paper_50", net, shape, |net, x| net.decode(net.encode(x)));
 }
 
 #[test]
@@ -243,6 +241,7 @@ fn inspection_shows_what_forward_uses() {
         assert_eq!(masks.spatial.dims(), [n, 1, h, w]);
     }
     let expected = net.forward(x.clone()).swap_remove(0);
-    let actual = net.decoder.forward(seen.refined).swap_remove(0);
+    let refined = seen.refined.try_into().unwrap();
+    let actual = net.decoder.unwrap().forward(refined).swap_remove(0);
     assert_eq!(values(actual), values(expected));
 }

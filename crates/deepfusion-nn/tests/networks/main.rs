@@ -5,6 +5,7 @@ mod against_pytorch;
 mod common;
 mod depth_network;
 mod flow_decoder;
+mod lite_mono;
 mod operations;
 mod training_step;
 mod weight_files;

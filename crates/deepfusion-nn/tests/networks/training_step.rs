@@ -205,7 +205,7 @@ fn frozen_statistics_stay_while_everything_learns() {
     assert_eq!(statistics(&net), before);
 
     let gradients = output.mean().backward();
-    let bn = &net.encoder.layer4[1].bn2;
+    let bn = &net.encoder.as_ref().unwrap().layer4[1].bn2;
     assert!(bn.weight.val().grad(&gradients).is_some());
     assert!(bn.bias.val().grad(&gradients).is_some());
 

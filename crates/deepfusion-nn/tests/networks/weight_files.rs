@@ -71,7 +71,16 @@ fn a_network_survives_the_way_through_a_file_to_the_last_bit() {
         values(net.forward(x).swap_remove(0))
     );
     let gradients = output.mean().backward();
-    assert!(loaded.encoder.conv1.weight.val().grad(&gradients).is_some());
+    assert!(
+        loaded
+            .encoder
+            .unwrap()
+            .conv1
+            .weight
+            .val()
+            .grad(&gradients)
+            .is_some()
+    );
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::env;
 use std::path::{Path, PathBuf};
 
 /// Folders that exist, in the order in which they are searched.
-pub fn folders() -> Vec<PathBuf> {
+pub(super) fn folders() -> Vec<PathBuf> {
     let mut all = Vec::new();
     if let Some(folder) = env::current_exe().ok().as_deref().and_then(Path::parent) {
         all.push(folder.to_owned());
@@ -33,7 +33,7 @@ pub fn folders() -> Vec<PathBuf> {
 }
 
 /// Libraries in a folder, the newest first, by their names.
-pub fn libraries_in(folder: &Path) -> Vec<PathBuf> {
+pub(super) fn libraries_in(folder: &Path) -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = entries(folder)
         .filter(|path| {
             path.file_name()

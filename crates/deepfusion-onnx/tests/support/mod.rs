@@ -8,15 +8,15 @@
 #![allow(dead_code)] // Not every test uses all of it.
 
 use deepfusion_geometry::DepthRange;
-use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
+use deepfusion_infer::{Activation, Border, Conv, Depthwise, Graph, Op, ValueId};
 use deepfusion_onnx::{DepthModel, FocalLength};
 
 /// A sequence without a pattern, from a seed.
-pub struct Random(pub u64);
+pub(crate) struct Random(pub u64);
 
 impl Random {
     /// 0 to `below` − 1.
-    pub fn below(&mut self, below: usize) -> usize {
+    pub(crate) fn below(&mut self, below: usize) -> usize {
         self.0 = self
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -25,7 +25,7 @@ impl Random {
     }
 
     /// −1 to 1.
-    pub fn signed(&mut self) -> f32 {
+    pub(crate) fn signed(&mut self) -> f32 {
         self.below(20_001) as f32 / 10_000.0 - 1.0
     }
 
@@ -35,7 +35,12 @@ impl Random {
 }
 
 /// A convolution with random weights, small enough that sums stay near 1.
-pub fn conv(random: &mut Random, graph: &Graph, input: ValueId, channels_out: usize) -> Conv {
+pub(crate) fn conv(
+    random: &mut Random,
+    graph: &Graph,
+    input: ValueId,
+    channels_out: usize,
+) -> Conv {
     let channels_in = graph.shape(input).channels;
     let kernel = random.pick(&[1, 3, 3, 5]);
     let taps = channels_in * kernel * kernel;
@@ -64,6 +69,7 @@ pub fn conv(random: &mut Random, graph: &Graph, input: ValueId, channels_out: us
             Activation::Relu,
             Activation::Elu,
             Activation::Sigmoid,
+            Activation::Gelu,
         ]),
     }
 }
@@ -109,8 +115,59 @@ fn attended(random: &mut Random, graph: &mut Graph, x: ValueId, name: &str) -> O
     }
 }
 
+/// Each channel by a kernel of its own.
+fn depthwise(random: &mut Random, graph: &Graph, input: ValueId) -> Op {
+    let channels = graph.shape(input).channels;
+    let kernel = random.pick(&[1, 3, 5]);
+    let stride = if graph.shape(input).halvings < 2 {
+        random.pick(&[1, 2])
+    } else {
+        1
+    };
+    let dilation = random.pick(&[1, 2, 4]);
+    let mut weights = |n: usize| (0..n).map(|_| random.signed()).collect::<Vec<_>>();
+    Op::Depthwise(Box::new(Depthwise {
+        input,
+        weight: weights(channels * kernel * kernel),
+        bias: weights(channels),
+        kernel,
+        stride,
+        dilation,
+    }))
+}
+
+/// Normalised channels with the pixels' places, and the last operation of all: attention between them.
+fn mixed(random: &mut Random, graph: &mut Graph, x: ValueId, name: &str) -> Op {
+    let mut push = |part: &str, op: Op| graph.push(format!("{name}.{part}"), op).unwrap();
+    // Of at least two channels: one alone is always at its mean.
+    let normed = push(
+        "norm",
+        Op::ChannelNorm {
+            input: x,
+            epsilon: 0.3,
+        },
+    );
+    let heads = 1 + random.below(3);
+    let width = 3 * heads * (1 + random.below(4));
+    let halvings = graph.shape(x).halvings;
+    let mut push = |part: &str, op: Op| graph.push(format!("{name}.{part}"), op).unwrap();
+    let per_axis = 1 + random.below(3);
+    let code = push("code", Op::Position { per_axis, halvings });
+    let placed = conv(random, graph, code, width);
+    let placed = graph
+        .push(format!("{name}.placed"), Op::Conv(Box::new(placed)))
+        .unwrap();
+    let mut all = conv(random, graph, normed, width);
+    all.residual = Some(placed);
+    let input = graph.push(format!("{name}.all"), Op::Conv(Box::new(all)));
+    Op::CrossCovariance {
+        input: input.unwrap(),
+        temperature: (0..heads).map(|_| 3.0 * random.signed()).collect(),
+    }
+}
+
 /// A network of every operation, in an order and with connections that the seed decides.
-pub fn model(seed: u64) -> DepthModel {
+pub(crate) fn model(seed: u64) -> DepthModel {
     let mut random = Random(seed);
     let r = &mut random;
     let mean = [0; 3].map(|_| 0.5 + 0.2 * r.signed());
@@ -122,7 +179,7 @@ pub fn model(seed: u64) -> DepthModel {
         let shape = graph.shape(input);
         let channels_out = 1 + r.below(5);
         let name = format!("stage.{i}");
-        let op = match r.below(6) {
+        let op = match r.below(9) {
             0 if shape.halvings < 2 => Op::MaxPool { input },
             1 if shape.halvings > 0 => {
                 let fitting = |v: &&ValueId| graph.shape(**v).halvings + 1 == shape.halvings;
@@ -137,6 +194,9 @@ pub fn model(seed: u64) -> DepthModel {
                 Op::Concat { inputs }
             }
             5 => attended(r, &mut graph, input, &name),
+            6 => depthwise(r, &graph, input),
+            7 => mixed(r, &mut graph, input, &name),
+            8 if shape.halvings > 0 => Op::Enlarge { input },
             _ => {
                 let mut conv = conv(r, &graph, input, channels_out);
                 if shape.halvings < 2 && r.below(3) == 0 {

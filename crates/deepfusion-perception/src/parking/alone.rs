@@ -10,7 +10,7 @@ use crate::obstacles::NONE;
 const BESIDE: u32 = 2;
 
 /// Whether a detection is small and nothing nearer hides its continuation on either side: then it is not part of a car.
-pub fn stands_alone(detection: &Detection, view: &View) -> bool {
+pub(super) fn stands_alone(detection: &Detection, view: &View) -> bool {
     let small = detection.place.footprint.iter().all(|side| *side <= SMALL);
     small && is_open(detection, view)
 }

@@ -16,7 +16,12 @@ const KNOWN: f32 = 0.4;
 const LOWEST_M: f32 = 1.3;
 
 /// The car at a position along a row, from its points, and whether its front is visible, which fixes its position.
-pub fn car(along: f32, points: &[&Seen], row: &Row, view: &View) -> Option<(Detection, bool)> {
+pub(super) fn car(
+    along: f32,
+    points: &[&Seen],
+    row: &Row,
+    view: &View,
+) -> Option<(Detection, bool)> {
     let mut alongs: Vec<f32> = points.iter().map(|p| p.along).collect();
     let [first, last] = ends(&mut alongs, 1000)?;
     let away = row.at(along).signum();

@@ -10,7 +10,7 @@ use crate::Detection;
 const FOUND: f32 = 2.0;
 
 /// Follows a row from its near to its far end: each car that is visible enough updates the row's direction.
-pub fn follow(row: &mut Row, standing: &Standing, view: &View) -> Vec<Detection> {
+pub(super) fn follow(row: &mut Row, standing: &Standing, view: &View) -> Vec<Detection> {
     let mut found = Vec::new();
     let mut done = f32::NEG_INFINITY;
     loop {

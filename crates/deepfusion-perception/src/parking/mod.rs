@@ -40,7 +40,7 @@ const ACROSS_M: [f32; 2] = [8.6, 15.0];
 
 /// Completes rows of parked cars, frame by frame.
 #[derive(Debug, Clone, Default)]
-pub struct Parking {
+pub(crate) struct Parking {
     remembered: Vec<RememberedCar>,
     /// Those cars as seen from the present pose, and the rows with two certain cars.
     cars: Vec<Parked>,
@@ -49,7 +49,7 @@ pub struct Parking {
 
 /// What is seen.
 #[derive(Clone, Copy)]
-pub struct View<'a> {
+pub(crate) struct View<'a> {
     pub depth: &'a [f32],
     pub obstacles: &'a Obstacles,
     pub rays: &'a Rays,
@@ -59,12 +59,12 @@ pub struct View<'a> {
 
 impl Parking {
     /// Forgets all cars.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         *self = Self::default();
     }
 
     /// Starts a frame: transforms the remembered cars to the present camera and finds their rows.
-    pub fn begin_frame(&mut self, ground: &Ground, world_from_cam: Option<&Se3>) {
+    pub(crate) fn begin_frame(&mut self, ground: &Ground, world_from_cam: Option<&Se3>) {
         self.cars = world_from_cam.map_or(Vec::new(), |pose| {
             let cam_from_world = pose.inverse();
             let seen = |known: &RememberedCar| known.seen(ground, &cam_from_world);
@@ -75,7 +75,7 @@ impl Parking {
     }
 
     /// The usual orientation at a point: along the lane, but at a right angle to it in a row and across the lane from one.
-    pub fn usual_turn(&self, at: [f32; 2]) -> Turn {
+    pub(crate) fn usual_turn(&self, at: [f32; 2]) -> Turn {
         let square = |row: &Row| {
             let [along, off] = row.locate(at);
             let across = -off * row.at(along).signum();
@@ -89,7 +89,7 @@ impl Parking {
     /// Replaces detections that are parts of parked cars by the cars of their row. Everything else is kept: what is dynamic
     /// (`moving`, in the world), what has a class, what stands in a row by itself, and what no car of a row explains. Without a
     /// pose nothing is remembered and no rows are used.
-    pub fn complete(
+    pub(crate) fn complete(
         &mut self,
         detections: Vec<Detection>,
         moving: &[Vector3<f64>],

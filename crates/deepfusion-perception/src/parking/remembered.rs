@@ -35,7 +35,7 @@ const ASTRAY: f32 = 0.6;
 
 /// A car of a row, remembered.
 #[derive(Debug, Clone)]
-pub struct RememberedCar {
+pub(super) struct RememberedCar {
     /// Its middle and the row's direction, in the world's axes.
     middle: Vector3<f64>,
     along: Vector3<f64>,
@@ -44,7 +44,7 @@ pub struct RememberedCar {
 
 impl RememberedCar {
     /// A car on this ground, seen by a camera at this pose.
-    pub fn new(car: &Parked, ground: &Ground, world_from_cam: &Se3) -> Self {
+    pub(super) fn new(car: &Parked, ground: &Ground, world_from_cam: &Se3) -> Self {
         let in_world = |at: [f32; 2]| {
             let p = ground.place([at[0], at[1], 0.0]);
             world_from_cam.transform(&Vector3::from(p.map(f64::from)))
@@ -59,7 +59,7 @@ impl RememberedCar {
     }
 
     /// The car as seen from the present camera; `None` if it was passed long ago or no longer stands across the lane.
-    pub fn seen(&self, ground: &Ground, cam_from_world: &Se3) -> Option<Parked> {
+    pub(super) fn seen(&self, ground: &Ground, cam_from_world: &Se3) -> Option<Parked> {
         let middle = on_ground(ground, &cam_from_world.transform(&self.middle));
         let next = cam_from_world.transform(&(self.middle + self.along));
         let next = on_ground(ground, &next);
@@ -74,7 +74,7 @@ impl RememberedCar {
 }
 
 /// A box as a car of a row, if it passes the limits.
-pub fn parked(place: &GroundBox) -> Option<Parked> {
+pub(super) fn parked(place: &GroundBox) -> Option<Parked> {
     let off = (place.angle + FRAC_PI_2).rem_euclid(PI) - FRAC_PI_2;
     let [length, width] = place.footprint;
     let fits = (LENGTHS_M[0]..LENGTHS_M[1]).contains(&length)
@@ -93,7 +93,7 @@ pub fn parked(place: &GroundBox) -> Option<Parked> {
 }
 
 /// Merges a car into the known ones.
-pub fn merge(cars: &mut Vec<Parked>, car: Parked) {
+pub(super) fn merge(cars: &mut Vec<Parked>, car: Parked) {
     let same = |other: &&mut Parked| distance(other.middle, car.middle) < SAME_M;
     let Some(known) = cars.iter_mut().find(same) else {
         cars.push(car);
@@ -107,7 +107,7 @@ pub fn merge(cars: &mut Vec<Parked>, car: Parked) {
 }
 
 /// The lane's direction at a dynamic box, if that is a vehicle along the lane: pedestrians walk in any direction.
-pub fn heading(place: &GroundBox) -> Option<Heading> {
+pub(super) fn heading(place: &GroundBox) -> Option<Heading> {
     let off = place.angle.rem_euclid(PI) - FRAC_PI_2;
     let [_, forward] = place.middle;
     let drives = place.footprint[0] > LENGTHS_M[0] && place.footprint[1] > WIDTHS_M[0];
@@ -118,13 +118,13 @@ pub fn heading(place: &GroundBox) -> Option<Heading> {
 }
 
 /// A point of the camera's frame, on the ground: right, forward.
-pub fn on_ground(ground: &Ground, p: &Vector3<f64>) -> [f32; 2] {
+pub(super) fn on_ground(ground: &Ground, p: &Vector3<f64>) -> [f32; 2] {
     let [right, forward, _] = ground.locate([p.x as f32, p.y as f32, p.z as f32]);
     [right, forward]
 }
 
 /// Distance of two points on the ground, metres.
-pub fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
+pub(super) fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 

@@ -5,7 +5,7 @@ use nalgebra::{Matrix4, Vector4};
 
 /// A car that stands across the lane, in the ground's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parked {
+pub(super) struct Parked {
     /// Its middle: right, forward, in metres.
     pub middle: [f32; 2],
     /// Direction of the row at the car, right over forward: at a right angle to the car.
@@ -45,7 +45,7 @@ const ROWS_M: f32 = 5.0;
 
 /// The lane's direction at a point, as shown by a vehicle driving along it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Heading {
+pub(super) struct Heading {
     /// The point, forward in metres.
     pub forward: f32,
     /// Its direction, right over forward.
@@ -56,7 +56,7 @@ pub struct Heading {
 ///
 /// The row across the lane, if there is one, has the same p₁ and p₂ and its own p₀.
 #[derive(Debug, Clone)]
-pub struct Row {
+pub(super) struct Row {
     cars: Vec<Parked>,
     across: Vec<Parked>,
     lane: Vec<Heading>,
@@ -69,7 +69,7 @@ pub struct Row {
 
 impl Row {
     /// The rows of some cars, the most certain first: of at least two cars each, or of one across the lane from such a row.
-    pub fn all(cars: &[Parked]) -> Vec<Self> {
+    pub(super) fn all(cars: &[Parked]) -> Vec<Self> {
         let mut groups: Vec<Vec<Parked>> = Vec::new();
         for car in cars {
             // Those that it belongs to become one.
@@ -130,7 +130,7 @@ impl Row {
     }
 
     /// Takes the other row's cars into the fit, if it is across the lane.
-    pub fn align_with(&mut self, other: &Self) {
+    pub(super) fn align_with(&mut self, other: &Self) {
         let [from, to] = self.reach();
         let [other_from, other_to] = other.reach();
         let between = 0.5 * (from.max(other_from) + to.min(other_to));
@@ -142,19 +142,19 @@ impl Row {
     }
 
     /// Takes the headings of vehicles along the lane into the fit.
-    pub fn keep_to(&mut self, lane: &[Heading]) {
+    pub(super) fn keep_to(&mut self, lane: &[Heading]) {
         self.lane = lane.to_vec();
         self.fit();
     }
 
     /// Adds a car.
-    pub fn add(&mut self, car: Parked) {
+    pub(super) fn add(&mut self, car: Parked) {
         self.cars.push(car);
         self.fit();
     }
 
     /// From now on cars near this forward position, in metres, count most.
-    pub fn focus(&mut self, forward: f32) {
+    pub(super) fn focus(&mut self, forward: f32) {
         self.focus = Some(forward);
         self.fit();
     }
@@ -194,18 +194,18 @@ impl Row {
     }
 
     /// Lateral position of its cars' middles, right in metres, at this forward position.
-    pub fn at(&self, forward: f32) -> f32 {
+    pub(super) fn at(&self, forward: f32) -> f32 {
         let q = forward - self.from;
         self.line[0] + self.line[1] * q + self.line[2] * q * q / BEND
     }
 
     /// Its direction at this forward position, right over forward.
-    pub fn slope(&self, forward: f32) -> f32 {
+    pub(super) fn slope(&self, forward: f32) -> f32 {
         self.line[1] + 2.0 * self.line[2] * (forward - self.from) / BEND
     }
 
     /// Range of its own cars, forward in metres.
-    pub fn reach(&self) -> [f32; 2] {
+    pub(super) fn reach(&self) -> [f32; 2] {
         let ends = [f32::INFINITY, f32::NEG_INFINITY];
         self.cars.iter().fold(ends, |[low, high], car| {
             [low.min(car.middle[1]), high.max(car.middle[1])]
@@ -213,47 +213,47 @@ impl Row {
     }
 
     /// Start of the search range, forward in metres.
-    pub fn start(&self) -> f32 {
+    pub(super) fn start(&self) -> f32 {
         self.reach()[0] - BEFORE_M
     }
 
     /// End of the search range, forward in metres.
-    pub fn end(&self) -> f32 {
+    pub(super) fn end(&self) -> f32 {
         let all = self.cars.iter().chain(&self.across);
         let last = all.map(|car| car.middle[1]);
         last.fold(f32::NEG_INFINITY, f32::max) + GOES_ON_M
     }
 
     /// Whether this forward position is within the search range.
-    pub fn passes(&self, along: f32) -> bool {
+    pub(super) fn passes(&self, along: f32) -> bool {
         (self.start()..self.end()).contains(&along)
     }
 
     /// Whether a point (right, forward) is in the row.
-    pub fn holds(&self, at: [f32; 2]) -> bool {
+    pub(super) fn holds(&self, at: [f32; 2]) -> bool {
         let [along, off] = self.locate(at);
         off.abs() <= HALF_M && self.passes(along)
     }
 
     /// Number of its cars that were seen often.
-    pub fn sure(&self) -> usize {
+    pub(super) fn sure(&self) -> usize {
         self.cars.iter().filter(|car| car.weight >= SURE).count()
     }
 
     /// A point in the row's coordinates: position along it (as forward, on its line), and offset from the line to the right.
-    pub fn locate(&self, [right, forward]: [f32; 2]) -> [f32; 2] {
+    pub(super) fn locate(&self, [right, forward]: [f32; 2]) -> [f32; 2] {
         let off = right - self.at(forward);
         [forward + self.slope(forward) * off, off]
     }
 
     /// The point at this position along the row and this offset to the right of it: right, forward in metres.
-    pub fn place(&self, along: f32, off: f32) -> [f32; 2] {
+    pub(super) fn place(&self, along: f32, off: f32) -> [f32; 2] {
         let (sin, cos) = self.angle(along).sin_cos();
         [self.at(along) + off * cos, along + off * sin]
     }
 
     /// Orientation of its cars at this position, as [`crate::GroundBox::angle`].
-    pub fn angle(&self, along: f32) -> f32 {
+    pub(super) fn angle(&self, along: f32) -> f32 {
         (-self.slope(along)).atan()
     }
 }

@@ -9,7 +9,7 @@ use deepfusion_geometry::Intrinsics;
 const CAMERA_M: f32 = 1.6;
 
 /// What a camera of 640×192 sees of some boxes.
-pub struct Scene {
+pub(super) struct Scene {
     depth: Vec<f32>,
     obstacles: Obstacles,
     rays: Rays,
@@ -19,7 +19,7 @@ pub struct Scene {
 
 impl Scene {
     /// Sees these boxes.
-    pub fn of(boxes: &[GroundBox]) -> Self {
+    pub(super) fn of(boxes: &[GroundBox]) -> Self {
         let (width, height) = (640, 192);
         let rays = Rays::of(&Intrinsics {
             fx: 370.0,
@@ -50,7 +50,7 @@ impl Scene {
     }
 
     /// One of the boxes as it is found, with the pixels that show it.
-    pub fn detection(&self, place: GroundBox) -> Detection {
+    pub(super) fn detection(&self, place: GroundBox) -> Detection {
         let width = self.rays.x.len();
         let shows = |pixel: &usize| {
             let (x, y) = (self.rays.x[pixel % width], self.rays.y[pixel / width]);
@@ -74,7 +74,7 @@ impl Scene {
     }
 
     /// What is seen.
-    pub fn view(&self) -> View<'_> {
+    pub(super) fn view(&self) -> View<'_> {
         View {
             depth: &self.depth,
             obstacles: &self.obstacles,
@@ -86,7 +86,7 @@ impl Scene {
 }
 
 /// Somebody who stands there: right, forward in metres.
-pub fn person(middle: [f32; 2]) -> GroundBox {
+pub(super) fn person(middle: [f32; 2]) -> GroundBox {
     GroundBox {
         middle,
         angle: 0.0,

@@ -52,13 +52,13 @@ struct Point {
 }
 
 /// The obstacle points, without what reaches the ceiling.
-pub struct Standing {
+pub(super) struct Standing {
     points: Vec<Point>,
 }
 
 impl Standing {
     /// Finds them in an image, leaving out the pixels of `others`, which are known not to be parked.
-    pub fn find<'a>(view: &View, others: impl Iterator<Item = &'a Detection>) -> Self {
+    pub(super) fn find<'a>(view: &View, others: impl Iterator<Item = &'a Detection>) -> Self {
         let width = view.rays.x.len();
         let mut taken = vec![false; view.depth.len()];
         for run in others.flat_map(|detection| &detection.runs) {
@@ -94,7 +94,7 @@ impl Standing {
     }
 
     /// The segments on a row between two positions along it, in order.
-    pub fn segments(&self, row: &Row, [from, to]: [f32; 2], view: &View) -> Vec<Segment> {
+    pub(super) fn segments(&self, row: &Row, [from, to]: [f32; 2], view: &View) -> Vec<Segment> {
         let places = ((to - from).max(0.0) / PLACE_M) as usize + 1;
         let mut taken = vec![false; places];
         let mut there = Vec::new();
@@ -151,7 +151,7 @@ fn cell([right, forward]: [f32; 2]) -> Option<usize> {
 }
 
 /// A point in its row's coordinates, metres.
-pub struct Seen {
+pub(super) struct Seen {
     /// Along the line.
     pub along: f32,
     /// To the right of the row's line.
@@ -163,7 +163,7 @@ pub struct Seen {
 }
 
 /// A contiguous stretch of a row that is occupied.
-pub struct Segment {
+pub(super) struct Segment {
     /// Start and end along the row, metres.
     pub along: [f32; 2],
     points: Vec<Seen>,
@@ -171,7 +171,7 @@ pub struct Segment {
 
 impl Segment {
     /// Its cars: the position of each one's middle along the row, and its points.
-    pub fn cars(&self, row: &Row, view: &View) -> Vec<(f32, Vec<&Seen>)> {
+    pub(super) fn cars(&self, row: &Row, view: &View) -> Vec<(f32, Vec<&Seen>)> {
         let [from, to] = self.along;
         let width = to - from;
         let count = if width > WIDEST_M {
@@ -244,7 +244,7 @@ impl Segment {
     }
 
     /// The slope of a row at a right angle to the near side of its first car, if that side is visible.
-    pub fn slope(&self, row: &Row) -> Option<f32> {
+    pub(super) fn slope(&self, row: &Row) -> Option<f32> {
         let half = 0.5 * STRIP_M * STRIPS as f32;
         let (mut near, mut counts) = ([f32::INFINITY; STRIPS], [0; STRIPS]);
         for p in self.points.iter().filter(|p| p.along < self.along[0] + 1.0) {

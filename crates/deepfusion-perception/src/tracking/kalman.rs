@@ -7,7 +7,7 @@ const UNKNOWN_SPEED: f64 = 8.0;
 
 /// A constant-velocity Kalman filter on the ground, in the world's horizontal axes, metres and m/s.
 #[derive(Debug, Clone)]
-pub struct Kalman {
+pub(super) struct Kalman {
     /// x, z, and their velocities.
     state: Vector4<f64>,
     covariance: Matrix4<f64>,
@@ -15,7 +15,7 @@ pub struct Kalman {
 
 impl Kalman {
     /// A filter at a measured position with its covariance, of unknown velocity.
-    pub fn new(place: Vector2<f64>, noise: &Matrix2<f64>) -> Self {
+    pub(super) fn new(place: Vector2<f64>, noise: &Matrix2<f64>) -> Self {
         let mut covariance = Matrix4::identity() * UNKNOWN_SPEED.powi(2);
         covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(noise);
         Self {
@@ -25,7 +25,7 @@ impl Kalman {
     }
 
     /// Predicts `dt` seconds ahead.
-    pub fn predict(&mut self, dt: f64) {
+    pub(super) fn predict(&mut self, dt: f64) {
         let mut step = Matrix4::identity();
         step[(0, 2)] = dt;
         step[(1, 3)] = dt;
@@ -42,7 +42,7 @@ impl Kalman {
     }
 
     /// Updates with a measured position and its covariance.
-    pub fn update(&mut self, place: Vector2<f64>, noise: &Matrix2<f64>) {
+    pub(super) fn update(&mut self, place: Vector2<f64>, noise: &Matrix2<f64>) {
         let observe = Matrix2x4::identity();
         let Some(inverse) = self.innovation(noise).try_inverse() else {
             return;
@@ -55,7 +55,7 @@ impl Kalman {
     }
 
     /// Squared Mahalanobis distance of a measured position.
-    pub fn distance2(&self, place: Vector2<f64>, noise: &Matrix2<f64>) -> f64 {
+    pub(super) fn distance2(&self, place: Vector2<f64>, noise: &Matrix2<f64>) -> f64 {
         let off = place - self.place();
         self.innovation(noise)
             .try_inverse()
@@ -69,17 +69,17 @@ impl Kalman {
     }
 
     /// The position.
-    pub fn place(&self) -> Vector2<f64> {
+    pub(super) fn place(&self) -> Vector2<f64> {
         self.state.fixed_rows::<2>(0).into()
     }
 
     /// The velocity.
-    pub fn velocity(&self) -> Vector2<f64> {
+    pub(super) fn velocity(&self) -> Vector2<f64> {
         self.state.fixed_rows::<2>(2).into()
     }
 
     /// Standard deviation of its speed along its direction of motion, m/s.
-    pub fn speed_deviation(&self) -> f64 {
+    pub(super) fn speed_deviation(&self) -> f64 {
         let v = self.velocity();
         let direction = v.try_normalize(1e-9).unwrap_or_else(Vector2::x);
         let part = self.covariance.fixed_view::<2, 2>(2, 2);

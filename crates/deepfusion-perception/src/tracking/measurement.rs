@@ -3,7 +3,7 @@ use deepfusion_geometry::Se3;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 /// A detection in world coordinates.
-pub struct Measurement<'a> {
+pub(super) struct Measurement<'a> {
     /// Its index among the image's detections.
     pub index: usize,
     /// The detection.
@@ -18,7 +18,7 @@ pub struct Measurement<'a> {
 
 impl<'a> Measurement<'a> {
     /// The measurement of detection `index` on `ground`, by a camera at `world_from_cam`.
-    pub fn new(
+    pub(super) fn new(
         (index, detection): (usize, &'a Detection),
         ground: &'a Ground,
         world_from_cam: &'a Se3,
@@ -39,7 +39,7 @@ impl<'a> Measurement<'a> {
     }
 
     /// Centre of the box in the world with this length and width, metres.
-    pub fn centre_with(&self, extents: [f64; 2]) -> Vector3<f64> {
+    pub(super) fn centre_with(&self, extents: [f64; 2]) -> Vector3<f64> {
         let [right, forward] = self.detection.place.middle_with(extents.map(|e| e as f32));
         let [low, high] = self.detection.place.heights;
         let p = self.ground.place([right, forward, 0.5 * (low + high)]);
@@ -49,7 +49,7 @@ impl<'a> Measurement<'a> {
 
     /// Covariance of the centre in the world's horizontal axes: the error of depth along the ray, from these pixels or
     /// else the configured one, and the part of the box that had to be completed.
-    pub fn noise(&self, config: &PerceptionConfig) -> Matrix2<f64> {
+    pub(super) fn noise(&self, config: &PerceptionConfig) -> Matrix2<f64> {
         let place = &self.detection.place;
         let ray = self
             .world_from_cam

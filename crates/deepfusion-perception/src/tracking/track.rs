@@ -34,7 +34,7 @@ impl Mean {
 
 /// How a track was seen in a frame.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen {
+pub(super) struct Seen {
     pixels: usize,
     bounds: [u32; 4],
     detection: usize,
@@ -52,7 +52,7 @@ impl Seen {
 
 /// A tracked target.
 #[derive(Debug, Clone)]
-pub struct Track {
+pub(super) struct Track {
     pub id: u64,
     filter: Kalman,
     /// Height of the centre: the world's y, down.
@@ -78,7 +78,7 @@ pub struct Track {
 }
 
 impl Track {
-    pub fn new(id: u64, measurement: &Measurement, config: &PerceptionConfig) -> Self {
+    pub(super) fn new(id: u64, measurement: &Measurement, config: &PerceptionConfig) -> Self {
         let place = &measurement.detection.place;
         let centre = measurement.centre_with(place.footprint.map(f64::from));
         let (sin, cos) = (2.0 * measurement.heading).sin_cos();
@@ -107,11 +107,11 @@ impl Track {
     }
 
     /// Whether it counts as dynamic.
-    pub fn is_moving(&self) -> bool {
+    pub(super) fn is_moving(&self) -> bool {
         self.moving == Some(true)
     }
 
-    pub fn predict(&mut self, dt: f64) {
+    pub(super) fn predict(&mut self, dt: f64) {
         self.filter.predict(dt);
         self.unseen_s += dt;
         self.seen = None;
@@ -146,7 +146,7 @@ impl Track {
     }
 
     /// Squared distance of a measurement in standard deviations and in metres.
-    pub fn distance2(&self, measurement: &Measurement, noise: &Matrix2<f64>) -> (f64, f64) {
+    pub(super) fn distance2(&self, measurement: &Measurement, noise: &Matrix2<f64>) -> (f64, f64) {
         let (centre, _) = self.centre_of(measurement);
         let place = Vector2::new(centre.x, centre.z);
         (
@@ -155,7 +155,7 @@ impl Track {
         )
     }
 
-    pub fn update(&mut self, measurement: &Measurement, noise: &Matrix2<f64>) {
+    pub(super) fn update(&mut self, measurement: &Measurement, noise: &Matrix2<f64>) {
         let (centre, crossed) = self.centre_of(measurement);
         self.filter.update(Vector2::new(centre.x, centre.z), noise);
         let place = &measurement.detection.place;
@@ -206,18 +206,18 @@ impl Track {
     }
 
     /// Centre in the world, metres.
-    pub fn centre(&self) -> Vector3<f64> {
+    pub(super) fn centre(&self) -> Vector3<f64> {
         let place = self.filter.place();
         Vector3::new(place.x, self.y.value, place.y)
     }
 
     /// Half its diagonal on the ground, metres.
-    pub fn reach(&self) -> f64 {
+    pub(super) fn reach(&self) -> f64 {
         0.5 * self.size[0].value.hypot(self.size[1].value)
     }
 
     /// Corners of its footprint in the world, at the height of its centre, metres.
-    pub fn corners(&self) -> [Vector3<f64>; 4] {
+    pub(super) fn corners(&self) -> [Vector3<f64>; 4] {
         let (sin, cos) = self.axis().sin_cos();
         let half = [0, 1].map(|i| 0.5 * self.size[i].value);
         [[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]].map(|[a, b]| {
@@ -227,7 +227,7 @@ impl Track {
         })
     }
 
-    pub fn target(&self, cam_from_world: &Se3) -> Target {
+    pub(super) fn target(&self, cam_from_world: &Se3) -> Target {
         let centre = cam_from_world.transform(&self.centre());
         let velocity = self.filter.velocity();
         let velocity = match self.moving {

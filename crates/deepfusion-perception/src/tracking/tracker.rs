@@ -16,7 +16,7 @@ const CONFIRMED: u32 = 3;
 const LONGEST_PAUSE_S: f64 = 2.0;
 
 /// Time, pose and content of a frame.
-pub struct Now<'a> {
+pub(crate) struct Now<'a> {
     pub time_s: f64,
     pub world_from_cam: Se3,
     pub depth: &'a [f32],
@@ -26,7 +26,7 @@ pub struct Now<'a> {
 
 /// Follows targets from frame to frame.
 #[derive(Debug, Default)]
-pub struct Tracker {
+pub(crate) struct Tracker {
     tracks: Vec<Track>,
     next_id: u64,
     time_s: Option<f64>,
@@ -34,25 +34,25 @@ pub struct Tracker {
 
 impl Tracker {
     /// A new, unused id.
-    pub fn new_id(&mut self) -> u64 {
+    pub(crate) fn new_id(&mut self) -> u64 {
         self.next_id += 1;
         self.next_id
     }
 
     /// Drops all tracks; their ids are not used again.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.tracks.clear();
         self.time_s = None;
     }
 
     /// The last positions of dynamic targets, in the world.
-    pub fn moving(&self) -> impl Iterator<Item = Vector3<f64>> {
+    pub(crate) fn moving(&self) -> impl Iterator<Item = Vector3<f64>> {
         let moving = self.tracks.iter().filter(|track| track.is_moving());
         moving.map(Track::centre)
     }
 
     /// Updates the tracks with a frame's detections and returns its targets.
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         detections: &[Detection],
         now: &Now,

@@ -4,24 +4,24 @@
 use deepfusion_geometry::{DepthMap, Intrinsics};
 use nalgebra::Vector3;
 
-pub const SIZE: (usize, usize) = (640, 192);
-pub const HEIGHT_M: f64 = 1.65;
+pub(crate) const SIZE: (usize, usize) = (640, 192);
+pub(crate) const HEIGHT_M: f64 = 1.65;
 
-pub fn camera() -> Intrinsics {
+pub(crate) fn camera() -> Intrinsics {
     Intrinsics::from_numbers([370.0, 370.0, 319.5, 80.0], (SIZE.0 as u32, SIZE.1 as u32))
 }
 
 /// A box: from left, front to right, back on a level ground, and so high, metres.
-pub type Block = ([f64; 2], [f64; 2], f64);
+pub(crate) type Block = ([f64; 2], [f64; 2], f64);
 
 /// Two cars doors to doors, fronts in one line: a single wall to the depth.
-pub const CARS: [Block; 2] = [
+pub(crate) const CARS: [Block; 2] = [
     ([-2.6, 10.0], [-0.8, 14.2], 1.5),
     ([-0.8, 10.0], [1.0, 14.2], 1.5),
 ];
 
 /// Depth of each pixel, and which block it sees.
-pub fn scene(blocks: &[Block]) -> (DepthMap, Vec<Option<usize>>) {
+pub(crate) fn scene(blocks: &[Block]) -> (DepthMap, Vec<Option<usize>>) {
     let k = camera();
     let (width, height) = SIZE;
     let seen = |i: usize| {

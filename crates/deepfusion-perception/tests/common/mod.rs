@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 const VISIBLE: usize = 50;
 
 /// The boxes of a frame as its camera sees them; cars of which enough is visible count.
-pub fn labels(simulation: &Simulation, number: usize, frame: &SimFrame) -> Vec<Label> {
+pub(crate) fn labels(simulation: &Simulation, number: usize, frame: &SimFrame) -> Vec<Label> {
     let cam_from_world = frame.world_from_cam.inverse();
     let k = simulation.intrinsics();
     let label = |object: SceneObject| {
@@ -64,7 +64,7 @@ pub fn labels(simulation: &Simulation, number: usize, frame: &SimFrame) -> Vec<L
 }
 
 /// Perceives whole drives from exact depth and scores them.
-pub fn score(drives: &[SimConfig]) -> TargetScore {
+pub(crate) fn score(drives: &[SimConfig]) -> TargetScore {
     let mut scorer = Scorer::new(ScoringRules::default());
     for config in drives {
         let simulation = Simulation::new(config).unwrap();

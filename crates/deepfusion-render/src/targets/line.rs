@@ -1,7 +1,13 @@
 use image::{Rgb, RgbImage};
 
 /// Draws a line of `thickness` pixels; parts outside the picture are not drawn.
-pub fn line(picture: &mut RgbImage, from: [f64; 2], to: [f64; 2], thickness: u32, colour: Rgb<u8>) {
+pub(super) fn line(
+    picture: &mut RgbImage,
+    from: [f64; 2],
+    to: [f64; 2],
+    thickness: u32,
+    colour: Rgb<u8>,
+) {
     let Some((from, to)) = within(picture, from, to) else {
         return;
     };

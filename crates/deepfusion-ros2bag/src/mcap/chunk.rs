@@ -15,7 +15,7 @@ pub(super) enum Content<'a> {
 }
 
 impl Content<'_> {
-    pub fn bytes(&self) -> &[u8] {
+    pub(super) fn bytes(&self) -> &[u8] {
         match self {
             Self::Stored(bytes) => bytes,
             Self::Unpacked(bytes) => bytes,

@@ -15,7 +15,7 @@ pub(super) struct Definitions {
 
 impl Definitions {
     /// Adds a record; `None` if it is malformed. The first channel of a number counts.
-    pub fn add(&mut self, op: u8, content: &[u8]) -> Option<()> {
+    pub(super) fn add(&mut self, op: u8, content: &[u8]) -> Option<()> {
         let mut fields = Fields(content);
         let id = fields.u16()?;
         if op == op::SCHEMA {

@@ -29,7 +29,7 @@ struct OpenChunk<'a> {
 }
 
 impl<'a> Messages<'a> {
-    pub fn new(file: &'a McapFile, wanted: Vec<bool>, selection: &Selection) -> Self {
+    pub(super) fn new(file: &'a McapFile, wanted: Vec<bool>, selection: &Selection) -> Self {
         let index = &file.index;
         let is_wanted = |channel: &u16| index.places.get(channel).is_some_and(|p| wanted[*p]);
         let chunks = index.chunks.iter().filter(|info| {

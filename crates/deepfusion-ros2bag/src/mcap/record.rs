@@ -10,15 +10,15 @@ const HEAD: usize = 9;
 pub(super) const TAIL: usize = HEAD + 20 + MAGIC.len();
 
 pub(super) mod op {
-    pub const FOOTER: u8 = 0x02;
-    pub const SCHEMA: u8 = 0x03;
-    pub const CHANNEL: u8 = 0x04;
-    pub const MESSAGE: u8 = 0x05;
-    pub const CHUNK: u8 = 0x06;
-    pub const MESSAGE_INDEX: u8 = 0x07;
-    pub const CHUNK_INDEX: u8 = 0x08;
-    pub const STATISTICS: u8 = 0x0b;
-    pub const DATA_END: u8 = 0x0f;
+    pub(crate) const FOOTER: u8 = 0x02;
+    pub(crate) const SCHEMA: u8 = 0x03;
+    pub(crate) const CHANNEL: u8 = 0x04;
+    pub(crate) const MESSAGE: u8 = 0x05;
+    pub(crate) const CHUNK: u8 = 0x06;
+    pub(crate) const MESSAGE_INDEX: u8 = 0x07;
+    pub(crate) const CHUNK_INDEX: u8 = 0x08;
+    pub(crate) const STATISTICS: u8 = 0x0b;
+    pub(crate) const DATA_END: u8 = 0x0f;
 }
 
 /// A record in its file or chunk.
@@ -32,7 +32,7 @@ pub(super) struct Record<'a> {
 
 impl Record<'_> {
     /// Where the next one begins.
-    pub fn end(&self) -> usize {
+    pub(super) fn end(&self) -> usize {
         self.start + self.content.len()
     }
 }
@@ -50,7 +50,7 @@ pub(super) struct Cut<'a> {
 }
 
 impl Cut<'_> {
-    pub fn problem(&self) -> String {
+    pub(super) fn problem(&self) -> String {
         match self.op {
             Some(op) => format!(
                 "the record at byte {} (type {op:#04x}) lacks {} bytes",
@@ -100,7 +100,7 @@ pub(super) fn record(bytes: &[u8], at: usize) -> Result<Option<Record<'_>>, Cut<
 pub(super) struct Fields<'a>(pub &'a [u8]);
 
 impl<'a> Fields<'a> {
-    pub fn bytes(&mut self, count: usize) -> Option<&'a [u8]> {
+    pub(super) fn bytes(&mut self, count: usize) -> Option<&'a [u8]> {
         let (taken, rest) = self.0.split_at_checked(count)?;
         self.0 = rest;
         Some(taken)
@@ -112,26 +112,26 @@ impl<'a> Fields<'a> {
         Some(*taken)
     }
 
-    pub fn u16(&mut self) -> Option<u16> {
+    pub(super) fn u16(&mut self) -> Option<u16> {
         self.array().map(u16::from_le_bytes)
     }
 
-    pub fn u32(&mut self) -> Option<u32> {
+    pub(super) fn u32(&mut self) -> Option<u32> {
         self.array().map(u32::from_le_bytes)
     }
 
-    pub fn u64(&mut self) -> Option<u64> {
+    pub(super) fn u64(&mut self) -> Option<u64> {
         self.array().map(u64::from_le_bytes)
     }
 
-    pub fn text(&mut self) -> Option<String> {
+    pub(super) fn text(&mut self) -> Option<String> {
         let length = self.u32()? as usize;
         let bytes = self.bytes(length)?;
         Some(String::from_utf8_lossy(bytes).into_owned())
     }
 
     /// A map of numbers, preceded by its length in bytes.
-    pub fn map(&mut self) -> Option<Vec<(u16, u64)>> {
+    pub(super) fn map(&mut self) -> Option<Vec<(u16, u64)>> {
         let length = self.u32()? as usize;
         let mut inside = Fields(self.bytes(length)?);
         let mut entries = Vec::new();
@@ -152,7 +152,7 @@ pub(super) struct MessageHead {
 pub(super) const MESSAGE_HEAD: usize = 2 + 4 + 8 + 8;
 
 impl MessageHead {
-    pub fn read(content: &[u8]) -> Option<Self> {
+    pub(super) fn read(content: &[u8]) -> Option<Self> {
         let mut fields = Fields(content);
         let (channel, _sequence) = (fields.u16()?, fields.u32()?);
         let (log_time, _publish_time) = (fields.u64()?, fields.u64()?);
@@ -173,7 +173,7 @@ pub(super) struct ChunkHead {
 }
 
 impl ChunkHead {
-    pub fn read(content: &[u8]) -> Option<Self> {
+    pub(super) fn read(content: &[u8]) -> Option<Self> {
         let mut fields = Fields(content);
         let (_first, _last, size) = (fields.u64()?, fields.u64()?, fields.u64()?);
         let (crc, compression) = (fields.u32()?, fields.text()?);

@@ -87,7 +87,7 @@ pub(super) struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    pub fn new(file: &'a SqliteFile, wanted: Vec<bool>, selection: &Selection) -> Self {
+    pub(super) fn new(file: &'a SqliteFile, wanted: Vec<bool>, selection: &Selection) -> Self {
         let start = selection.start().nanos();
         let listed = file.listed.as_ref();
         Self {

@@ -15,7 +15,7 @@ use std::hint::black_box;
 use std::path::Path;
 
 /// Name, compression, whether small messages or pictures and clouds, how many.
-pub const RECORDINGS: [(&str, Compression, bool, u32); 3] = [
+pub(crate) const RECORDINGS: [(&str, Compression, bool, u32); 3] = [
     ("small_none.bag", Compression::None, true, 200_000),
     ("large_lz4.bag", Compression::Lz4, false, 240),
     ("large_bz2.bag", Compression::Bz2, false, 24),
@@ -97,7 +97,12 @@ fn cloud(i: u32, noise: &mut Noise) -> PointCloud2<'static> {
 }
 
 /// Writes one of [`RECORDINGS`].
-pub fn write(path: &Path, compression: Compression, small: bool, messages: u32) -> Result<()> {
+pub(crate) fn write(
+    path: &Path,
+    compression: Compression,
+    small: bool,
+    messages: u32,
+) -> Result<()> {
     let mut noise = Noise(0x9e37_79b9_7f4a_7c15);
     let mut bag = BagWriter::create(
         path,
@@ -126,7 +131,7 @@ pub fn write(path: &Path, compression: Compression, small: bool, messages: u32) 
 }
 
 /// Opens a bag and makes every message a value of its type; how many, and their bytes.
-pub fn read(path: &Path) -> Result<(u64, u64)> {
+pub(crate) fn read(path: &Path) -> Result<(u64, u64)> {
     let bag = Bag::open(path)?;
     let (mut count, mut bytes) = (0, 0);
     for message in bag.messages(Selection::all())? {

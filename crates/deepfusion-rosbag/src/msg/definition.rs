@@ -27,6 +27,19 @@ macro_rules! twist {
     () => { part!("geometry_msgs/Twist", "geometry_msgs/Vector3 linear" "geometry_msgs/Vector3 angular") };
 }
 
+macro_rules! transform {
+    () => { part!("geometry_msgs/Transform", "geometry_msgs/Vector3 translation" "geometry_msgs/Quaternion rotation") };
+}
+
+macro_rules! transforms {
+    () => {
+        part!(
+            "geometry_msgs/TransformStamped",
+            "std_msgs/Header header" "string child_frame_id" "geometry_msgs/Transform transform"
+        )
+    };
+}
+
 /// A definition: the type's own lines, then the parts.
 macro_rules! definition {
     ($($line:literal)*; $($part:ident!($($inside:tt)*)),*) => {
@@ -34,4 +47,4 @@ macro_rules! definition {
     };
 }
 
-pub(crate) use {definition, header, part, quaternion, twist, vector3};
+pub(crate) use {definition, header, part, quaternion, transform, transforms, twist, vector3};

@@ -93,3 +93,41 @@ message! {
     /// The velocity.
     twist: Twist,
 }
+
+message! {
+    /// A velocity with its time and frame, and how far it is trusted: a fused one, or wheel odometry.
+    TwistWithCovarianceStamped = "geometry_msgs/TwistWithCovarianceStamped" "8927a1a12fb2607ceea095b2dc440a96" definition!(
+        "std_msgs/Header header"
+        "geometry_msgs/TwistWithCovariance twist";
+        header!(),
+        part!("geometry_msgs/TwistWithCovariance", "geometry_msgs/Twist twist" "float64[36] covariance"),
+        twist!(),
+        vector3!()
+    );
+    /// When and in which frame.
+    header: Header,
+    /// The velocity.
+    twist: TwistWithCovariance,
+}
+
+message! {
+    /// Where a frame is in another: `parent_from_child`, first rotated, then moved.
+    #[derive(Copy, Default)]
+    Transform;
+    /// The child's origin in the parent, metres.
+    translation: Vector3,
+    /// The child's axes in the parent.
+    rotation: Quaternion,
+}
+
+message! {
+    /// A transform with its time and the names of its frames.
+    #[derive(Default)]
+    TransformStamped;
+    /// When, and the parent's frame.
+    header: Header,
+    /// The child's frame.
+    child_frame_id: String,
+    /// `parent_from_child`.
+    transform: Transform,
+}

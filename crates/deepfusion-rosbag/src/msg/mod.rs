@@ -10,11 +10,14 @@ mod can_msgs;
 mod cloud;
 mod definition;
 mod error;
+mod ffmpeg_image_transport_msgs;
+mod foxglove_msgs;
 mod geometry_msgs;
 mod image;
 mod nav_msgs;
 mod sensor_msgs;
 mod std_msgs;
+mod tf2_msgs;
 pub(crate) mod wire;
 mod yuv;
 
@@ -22,8 +25,11 @@ pub use ackermann_msgs::{AckermannDrive, AckermannDriveStamped};
 pub use can_msgs::Frame;
 pub use cloud::{Column, Datatype};
 pub use error::MessageError;
+pub use ffmpeg_image_transport_msgs::{FfmpegPacket, OldFfmpegPacket};
+pub use foxglove_msgs::CompressedVideo;
 pub use geometry_msgs::{
-    Point, Pose, PoseWithCovariance, Quaternion, Twist, TwistStamped, TwistWithCovariance, Vector3,
+    Point, Pose, PoseWithCovariance, Quaternion, Transform, TransformStamped, Twist, TwistStamped,
+    TwistWithCovariance, TwistWithCovarianceStamped, Vector3,
 };
 pub use image::{BayerPattern, Encoding};
 pub use nav_msgs::Odometry;
@@ -32,6 +38,7 @@ pub use sensor_msgs::{
     RegionOfInterest,
 };
 pub use std_msgs::{Float32, Float64, Header};
+pub use tf2_msgs::{OldTFMessage, TFMessage};
 
 /// A message type.
 pub trait RosMessage<'a>: Sized {

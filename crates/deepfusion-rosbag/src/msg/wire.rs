@@ -115,6 +115,20 @@ pub(crate) fn decode_cdr<'a, T: Wire<'a>>(bytes: &'a [u8]) -> Result<T, MessageE
     }
 }
 
+/// Decodes what a message begins with.
+pub(crate) fn decode_first<'a, T: Wire<'a>>(bytes: &'a [u8], cdr: bool) -> Result<T, MessageError> {
+    let format = if cdr {
+        Format::Cdr {
+            big: cdr_is_big_endian(bytes)?,
+            length: bytes.len() - CDR_HEADER,
+        }
+    } else {
+        Format::Ros1
+    };
+    let rest = if cdr { &bytes[CDR_HEADER..] } else { bytes };
+    T::read(&mut Reader { rest, format })
+}
+
 /// Bytes in front of a CDR payload: what it is, and options.
 pub(crate) const CDR_HEADER: usize = 4;
 
@@ -158,7 +172,7 @@ macro_rules! number {
         }
     )*};
 }
-number!(u8, i8, u16, u32, f32, f64);
+number!(u8, i8, u16, u32, i32, u64, f32, f64);
 
 impl<'a> Wire<'a> for bool {
     const LEAST: usize = 1;

@@ -13,18 +13,18 @@ use sha2::{Digest, Sha256};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-pub fn reference(name: &str) -> PathBuf {
+pub(crate) fn reference(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("tests/reference")
         .join(name)
 }
 
-pub fn read_json<T: serde::de::DeserializeOwned>(name: &str) -> T {
+pub(crate) fn read_json<T: serde::de::DeserializeOwned>(name: &str) -> T {
     let text = std::fs::read_to_string(reference(name)).unwrap();
     serde_json::from_str(&text).unwrap()
 }
 
-pub fn sha256(bytes: impl AsRef<[u8]>) -> String {
+pub(crate) fn sha256(bytes: impl AsRef<[u8]>) -> String {
     Sha256::digest(bytes)
         .iter()
         .map(|byte| format!("{byte:02x}"))
@@ -32,12 +32,12 @@ pub fn sha256(bytes: impl AsRef<[u8]>) -> String {
 }
 
 /// The 16 hexadecimal digits of a number's f64: exact, and NaN can be compared.
-pub fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     format!("{:016x}", value.to_bits())
 }
 
 /// A value as lines `field = text`.
-pub trait Lines {
+pub(crate) trait Lines {
     fn lines(&self, name: &str, out: &mut Vec<String>);
 }
 
@@ -50,7 +50,7 @@ macro_rules! plain {
         }
     )*};
 }
-plain!(bool, u8, i8, u16, u32, String, Time);
+plain!(bool, u8, i8, u16, u32, i32, u64, String, Time);
 
 impl Lines for f64 {
     fn lines(&self, name: &str, out: &mut Vec<String>) {
@@ -99,6 +99,14 @@ impl Lines for Vec<f64> {
     }
 }
 
+impl Lines for Vec<TransformStamped> {
+    fn lines(&self, name: &str, out: &mut Vec<String>) {
+        for (i, transform) in self.iter().enumerate() {
+            transform.lines(&format!("{name}[{i}]"), out);
+        }
+    }
+}
+
 impl Lines for Vec<PointField> {
     fn lines(&self, name: &str, out: &mut Vec<String>) {
         for (i, field) in self.iter().enumerate() {
@@ -122,6 +130,9 @@ macro_rules! fields {
 }
 
 fields! {
+    CompressedVideo<'_>: timestamp, frame_id, data, format;
+    FfmpegPacket<'_>: header, width, height, encoding, pts, flags, is_bigendian, data;
+    OldFfmpegPacket<'_>: header, data, img_width, img_height, encoding, pts, flags;
     Header: seq, stamp, frame_id;
     Float32: data;
     Float64: data;
@@ -133,6 +144,11 @@ fields! {
     Twist: linear, angular;
     TwistWithCovariance: twist, covariance;
     TwistStamped: header, twist;
+    TwistWithCovarianceStamped: header, twist;
+    Transform: translation, rotation;
+    TransformStamped: header, child_frame_id, transform;
+    TFMessage: transforms;
+    OldTFMessage: transforms;
     Odometry: header, child_frame_id, pose, twist;
     AckermannDrive: steering_angle, steering_angle_velocity, speed, acceleration, jerk;
     AckermannDriveStamped: header, drive;
@@ -157,6 +173,11 @@ fn typed<'m, T: RosMessage<'m> + Lines>(message: &'m Message<'_>) -> Vec<String>
         value.encode(&mut again);
         assert_eq!(again, message.data(), "{message:?} encodes to other bytes");
     }
+    lines_of(&value)
+}
+
+/// A message's values.
+pub(crate) fn lines_of(value: &impl Lines) -> Vec<String> {
     let mut lines = Vec::new();
     value.lines("", &mut lines);
     lines
@@ -164,7 +185,7 @@ fn typed<'m, T: RosMessage<'m> + Lines>(message: &'m Message<'_>) -> Vec<String>
 
 /// The message's values as its own type, having checked that they encode to the same bytes; none of a type that is
 /// not known.
-pub fn lines(message: &Message<'_>) -> Vec<String> {
+pub(crate) fn lines(message: &Message<'_>) -> Vec<String> {
     match message.connection().type_name.as_str() {
         Float32::TYPE => typed::<Float32>(message),
         Float64::TYPE => typed::<Float64>(message),
@@ -184,7 +205,7 @@ pub fn lines(message: &Message<'_>) -> Vec<String> {
 
 /// A folder of real bags: `rosbag` below `DEEPFUSION_DATA`, or `../shared/data` beside the workspace. Says so and gives
 /// nothing where it is absent.
-pub fn real_bags() -> Option<PathBuf> {
+pub(crate) fn real_bags() -> Option<PathBuf> {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let root = std::env::var_os("DEEPFUSION_DATA")
         .map_or_else(|| workspace.join("../shared/data"), PathBuf::from);

@@ -15,7 +15,7 @@ use std::path::Path;
 
 /// A message as it was handed to the writer.
 #[derive(Serialize)]
-pub struct Written {
+pub(crate) struct Written {
     topic: &'static str,
     time: u64,
     values: Vec<String>,
@@ -53,7 +53,7 @@ impl Recorder {
 }
 
 /// Writes the recording; what it holds, in the order of writing.
-pub fn write(path: &Path, compression: Compression) -> Vec<Written> {
+pub(crate) fn write(path: &Path, compression: Compression) -> Vec<Written> {
     let options = WriterOptions {
         compression,
         chunk_bytes: 4000,

@@ -8,7 +8,7 @@ use crate::texture::sky::Sky;
 
 /// The weather and the hour of one picture. It changes colours only, never the end of a ray.
 #[derive(Debug, Clone, Copy)]
-pub struct Air {
+pub(crate) struct Air {
     /// The sky's gradient and clouds.
     pub sky: Sky,
     /// Multiplies the sky's radiance.
@@ -25,7 +25,7 @@ pub struct Air {
 
 /// The sun's disc and its aureole.
 #[derive(Debug, Clone, Copy)]
-pub struct Glow {
+pub(crate) struct Glow {
     /// Towards the sun, unit length, world axes.
     pub sun: V3,
     /// Radiance at its middle.
@@ -35,7 +35,7 @@ pub struct Glow {
 /// Homogeneous fog or haze (Koschmieder): what is at range r keeps e^(−extinction · r) of its light, and the
 /// rest is the fog's own.
 #[derive(Debug, Clone, Copy)]
-pub struct Fog {
+pub(crate) struct Fog {
     /// Extinction, 1/m.
     pub extinction: f32,
     /// Its radiance.
@@ -46,7 +46,7 @@ pub struct Fog {
 
 impl Air {
     /// A world's own light, in clear air.
-    pub fn of(world: &World) -> Self {
+    pub(crate) fn of(world: &World) -> Self {
         Self {
             sky: world.sky,
             tint: Rgb::new(1.0, 1.0, 1.0),
@@ -58,7 +58,7 @@ impl Air {
     }
 
     /// The sky's radiance from a direction, of any length.
-    pub fn radiance(&self, noise: &Noise, d: &V3) -> Rgb {
+    pub(crate) fn radiance(&self, noise: &Noise, d: &V3) -> Rgb {
         let mut sky = self.sky.radiance(noise, d).component_mul(&self.tint);
         if let Some(glow) = &self.glow {
             sky += glow.radiance(d, self.sky.clouds);
@@ -74,7 +74,7 @@ impl Air {
 
     /// Light of a surface at `t` along `d` (metres for a ray of unit length), as it reaches the camera.
     #[inline]
-    pub fn through(&self, colour: Rgb, d: &V3, t: f32) -> Rgb {
+    pub(crate) fn through(&self, colour: Rgb, d: &V3, t: f32) -> Rgb {
         match &self.fog {
             None => colour,
             Some(fog) => fog.over(colour, t * d.norm()),
@@ -83,7 +83,7 @@ impl Air {
 
     /// What wetness leaves of the albedo of the ground.
     #[inline]
-    pub fn soaked(&self) -> f32 {
+    pub(crate) fn soaked(&self) -> f32 {
         1.0 - 0.5 * self.wet
     }
 }

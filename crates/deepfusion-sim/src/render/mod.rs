@@ -10,12 +10,12 @@ use crate::road::StreetPoint;
 use crate::scene::SceneObject;
 use crate::scene::World;
 use crate::texture::Rgb;
-pub use air::{Air, Fog, Glow};
+pub(crate) use air::{Air, Fog, Glow};
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use image::RgbImage;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-pub use shade::Shader;
+pub(crate) use shade::Shader;
 use shade::encode_srgb;
 use tiles::{TILE, Tiles};
 
@@ -28,7 +28,7 @@ const FARTHEST_GROUND: f32 = 600.0;
 
 /// What a ray hits.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Surface {
+pub(crate) enum Surface {
     /// Nothing.
     Sky,
     /// A solid of the frame: its index and face.
@@ -44,7 +44,7 @@ pub enum Surface {
 impl Surface {
     /// Whether it is the same surface; all leaves of a lobe are one.
     #[inline]
-    pub fn is_like(&self, other: &Self) -> bool {
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Solid(a, face), Self::Solid(b, other)) => {
                 a == b && (face == other || *face.min(other) >= FACE_LEAVES)
@@ -56,7 +56,7 @@ impl Surface {
 
 /// Where a ray ends: `t` in units of its direction.
 #[derive(Debug, Clone, Copy)]
-pub struct Hit {
+pub(crate) struct Hit {
     /// In units of the ray's direction; infinite for the sky.
     pub t: f32,
     /// The surface it hit.
@@ -64,7 +64,7 @@ pub struct Hit {
 }
 
 /// A solid seen from one eye.
-pub struct FrameSolid {
+pub(crate) struct FrameSolid {
     /// The solid.
     pub primitive: Primitive,
     /// The eye in the solid's axes.
@@ -74,7 +74,7 @@ pub struct FrameSolid {
 }
 
 /// The solids around a place on the street (ahead and behind it along the street), and those that move.
-pub fn gather(world: &World, moving: &[Primitive], eye: &Vector3<f64>) -> Vec<Primitive> {
+pub(crate) fn gather(world: &World, moving: &[Primitive], eye: &Vector3<f64>) -> Vec<Primitive> {
     let s = world.road.locate(eye.x, eye.y).s;
     let from = world.along.partition_point(|a| *a < s - BEHIND);
     let to = world.along.partition_point(|a| *a < s + AHEAD);
@@ -87,7 +87,7 @@ pub fn gather(world: &World, moving: &[Primitive], eye: &Vector3<f64>) -> Vec<Pr
 }
 
 /// The origin of rays in the world.
-pub struct Eye<'a> {
+pub(crate) struct Eye<'a> {
     /// The world.
     pub world: &'a World,
     /// Its position.
@@ -99,7 +99,7 @@ pub struct Eye<'a> {
 impl Eye<'_> {
     /// First solid among `candidates` (indices, nearest first) along `d`, or the ground, or the sky.
     #[inline]
-    pub fn trace(&self, candidates: &[u32], d: &V3) -> Hit {
+    pub(crate) fn trace(&self, candidates: &[u32], d: &V3) -> Hit {
         let mut hit = Hit {
             t: f32::INFINITY,
             surface: Surface::Sky,
@@ -129,7 +129,7 @@ impl Eye<'_> {
 
     /// Street coordinates of the ray's point at `t`.
     #[inline]
-    pub fn street_point(&self, d: &V3, t: f32) -> StreetPoint {
+    pub(crate) fn street_point(&self, d: &V3, t: f32) -> StreetPoint {
         let x = self.position.x + f64::from(d.x * t);
         let y = self.position.y + f64::from(d.y * t);
         self.world.road.locate(x, y)
@@ -170,7 +170,7 @@ impl Eye<'_> {
 }
 
 /// A rendered picture.
-pub struct Picture {
+pub(crate) struct Picture {
     /// Colours.
     pub rgb: RgbImage,
     /// Camera z in metres, 0 for the sky.
@@ -180,7 +180,7 @@ pub struct Picture {
 }
 
 /// The linear light at the camera, before image formation.
-pub struct Exposure {
+pub(crate) struct Exposure {
     /// Linear light, row by row.
     pub light: Vec<Rgb>,
     /// The hits of the rays through the pixels' centres.
@@ -193,7 +193,7 @@ pub struct Exposure {
 
 /// The input of a rendering.
 #[derive(Clone, Copy)]
-pub struct Shot<'a> {
+pub(crate) struct Shot<'a> {
     /// The world.
     pub world: &'a World,
     /// Light on its ground.
@@ -209,7 +209,7 @@ pub struct Shot<'a> {
 }
 
 /// Renders what a camera sees; `moving` are the solids of the moving `cars`.
-pub fn render(
+pub(crate) fn render(
     world: &World,
     light: &GroundLight,
     moving: &[Primitive],
@@ -236,7 +236,7 @@ pub fn render(
 }
 
 /// The image of an ideal camera, without a real one's imperfections.
-pub fn encode(light: &[Rgb], width: u32, height: u32) -> RgbImage {
+pub(crate) fn encode(light: &[Rgb], width: u32, height: u32) -> RgbImage {
     let bytes = light.iter().flat_map(encode_srgb).collect();
     // The buffer has 3 · width · height bytes by construction.
     RgbImage::from_raw(width, height, bytes).unwrap_or_else(|| RgbImage::new(width, height))
@@ -244,7 +244,7 @@ pub fn encode(light: &[Rgb], width: u32, height: u32) -> RgbImage {
 
 /// The cores to use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cores {
+pub(crate) enum Cores {
     /// On this thread, for callers that have many of their own.
     One,
     /// On all of rayon's.
@@ -253,7 +253,7 @@ pub enum Cores {
 
 impl Cores {
     /// Calls `work` with the number and the items of each piece of `size` items.
-    pub fn split<T: Send>(
+    pub(crate) fn split<T: Send>(
         self,
         items: &mut [T],
         size: usize,
@@ -275,7 +275,7 @@ impl Cores {
 
 /// The antialiasing of a pixel with several surfaces, from the four rays through it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Edges {
+pub(crate) enum Edges {
     /// Every ray is shaded.
     EachRay,
     /// Every surface is shaded once: twice as fast, and as smooth at edges.
@@ -283,7 +283,7 @@ pub enum Edges {
 }
 
 /// The light that falls on each pixel, and the exact depth.
-pub fn expose(shot: &Shot, solids: Vec<Primitive>, cores: Cores, edges: Edges) -> Exposure {
+pub(crate) fn expose(shot: &Shot, solids: Vec<Primitive>, cores: Cores, edges: Edges) -> Exposure {
     let (world, k) = (shot.world, shot.intrinsics);
     let (tiles, solids) = Tiles::bin(world, solids, shot.world_from_cam, k);
     let eye = Eye {
@@ -401,7 +401,7 @@ fn on_edge(hits: &[Hit], width: usize, height: usize, u: usize, v: usize) -> boo
 }
 
 /// The rays of a pinhole camera, in world axes.
-pub struct Camera {
+pub(crate) struct Camera {
     columns: [V3; 3],
     inverse: [f32; 4],
     /// Width of a pixel at depth 1.
@@ -410,7 +410,7 @@ pub struct Camera {
 
 impl Camera {
     /// The rays of a camera at a pose.
-    pub fn new(world_from_cam: &Se3, k: &Intrinsics) -> Self {
+    pub(crate) fn new(world_from_cam: &Se3, k: &Intrinsics) -> Self {
         let rotation = world_from_cam.rotation();
         let column = |i: usize| rotation.column(i).map(|x| x as f32).into_owned();
         Self {
@@ -427,7 +427,7 @@ impl Camera {
 
     /// The ray of a pixel, with camera z = 1: its parameter is the depth.
     #[inline]
-    pub fn ray(&self, u: f32, v: f32) -> V3 {
+    pub(crate) fn ray(&self, u: f32, v: f32) -> V3 {
         let x = u * self.inverse[0] + self.inverse[1];
         let y = v * self.inverse[2] + self.inverse[3];
         self.columns[0] * x + self.columns[1] * y + self.columns[2]

@@ -13,7 +13,7 @@ use std::sync::LazyLock;
 const LONGEST: f32 = 30.0;
 
 /// Shades hits of one eye.
-pub struct Shader<'a> {
+pub(crate) struct Shader<'a> {
     /// The eye.
     pub eye: &'a Eye<'a>,
     /// Light on the ground.
@@ -31,7 +31,7 @@ pub struct Shader<'a> {
 impl Shader<'_> {
     /// Linear colour of a hit of the ray along `d`.
     #[inline]
-    pub fn colour(&self, hit: &Hit, d: &V3) -> Rgb {
+    pub(crate) fn colour(&self, hit: &Hit, d: &V3) -> Rgb {
         let colour = match hit.surface {
             Surface::Sky => return self.air.radiance(&self.eye.world.noise, d),
             Surface::Solid(index, face) => self.solid(hit.t, d, index, face),
@@ -41,7 +41,7 @@ impl Shader<'_> {
     }
 
     /// Albedo alone, for a scanner.
-    pub fn albedo(&self, hit: &Hit, d: &V3) -> Rgb {
+    pub(crate) fn albedo(&self, hit: &Hit, d: &V3) -> Rgb {
         match hit.surface {
             Surface::Sky => Rgb::zeros(),
             Surface::Solid(index, face) => self.solid_albedo(hit.t, d, index, face).0,
@@ -239,7 +239,7 @@ static GAMMA: LazyLock<Vec<u8>> = LazyLock::new(|| {
 
 /// Linear light to 8-bit sRGB, with a soft shoulder so that nothing clips hard.
 #[inline]
-pub fn encode_srgb(colour: &Rgb) -> [u8; 3] {
+pub(super) fn encode_srgb(colour: &Rgb) -> [u8; 3] {
     const EXPOSURE: f32 = 0.78;
     [colour.x, colour.y, colour.z].map(|c| {
         let c = (c * EXPOSURE).max(0.0);

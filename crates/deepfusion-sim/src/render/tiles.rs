@@ -7,13 +7,13 @@ use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::Vector3;
 
 /// Side of a tile, in pixels.
-pub const TILE: usize = 8;
+pub(super) const TILE: usize = 8;
 
 /// Nearest depth anything is drawn at, metres.
 const NEAR: f64 = 0.2;
 
 /// For each tile, the solids whose boxes overlap it, nearest first.
-pub struct Tiles {
+pub(super) struct Tiles {
     columns: usize,
     /// Start of each tile's list in `lists`.
     starts: Vec<u32>,
@@ -22,7 +22,7 @@ pub struct Tiles {
 
 impl Tiles {
     /// Projects every solid's box and sorts it into the tiles; returns the visible solids with it.
-    pub fn bin(
+    pub(super) fn bin(
         world: &World,
         solids: Vec<Primitive>,
         world_from_cam: &Se3,
@@ -78,7 +78,7 @@ impl Tiles {
 
     /// The candidates of a pixel.
     #[inline]
-    pub fn at(&self, u: usize, v: usize) -> &[u32] {
+    pub(super) fn at(&self, u: usize, v: usize) -> &[u32] {
         let tile = v / TILE * self.columns + u / TILE;
         &self.lists[self.starts[tile] as usize..self.starts[tile + 1] as usize]
     }

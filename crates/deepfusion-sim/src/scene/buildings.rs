@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// What kind of house.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Style {
+pub(super) enum Style {
     /// In a closed row, two to four floors.
     Terrace,
     /// Alone in a garden.
@@ -20,7 +20,7 @@ pub enum Style {
 
 /// Size of a house to be built, metres.
 #[derive(Debug, Clone, Copy)]
-pub struct Plot {
+pub(super) struct Plot {
     /// Along the street.
     pub width: f64,
     /// Away from the street.
@@ -82,7 +82,7 @@ pub(super) fn pick(rng: &mut ChaCha8Rng, colours: &[[f32; 3]]) -> Rgb {
 }
 
 /// Builds a house.
-pub fn build(world: &mut World, rng: &mut ChaCha8Rng, plot: &Plot, style: Style) {
+pub(super) fn build(world: &mut World, rng: &mut ChaCha8Rng, plot: &Plot, style: Style) {
     let floors = match style {
         Style::Terrace => rng.random_range(2..=4),
         Style::Detached => rng.random_range(1..=2),

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// One model of car in one colour.
 #[derive(Debug, Clone)]
-pub struct CarModel {
+pub(crate) struct CarModel {
     /// What it is.
     pub class: ObjectClass,
     /// Length, width, height, metres.
@@ -21,7 +21,13 @@ pub struct CarModel {
 
 impl CarModel {
     /// The solids of a car at a place with a heading.
-    pub fn solids(&self, base: [f64; 3], heading: f64, seed: u32, moving: bool) -> Vec<Primitive> {
+    pub(crate) fn solids(
+        &self,
+        base: [f64; 3],
+        heading: f64,
+        seed: u32,
+        moving: bool,
+    ) -> Vec<Primitive> {
         let (sin, cos) = heading.sin_cos();
         self.parts
             .iter()
@@ -114,7 +120,7 @@ const FLOOR: f32 = 0.24;
 const WHEEL: f32 = 0.31;
 
 /// Every body in several colours.
-pub fn models(world: &mut World, rng: &mut ChaCha8Rng) -> Vec<CarModel> {
+pub(crate) fn models(world: &mut World, rng: &mut ChaCha8Rng) -> Vec<CarModel> {
     let tyre = world.material(Material::Tyre);
     let mut models = Vec::new();
     for body in &BODIES {
@@ -223,7 +229,7 @@ pub(super) fn upper_hull(body: &Body) -> Hull {
 }
 
 /// Parks a car.
-pub fn park(world: &mut World, rng: &mut ChaCha8Rng, base: [f64; 3], heading: f64) {
+pub(crate) fn park(world: &mut World, rng: &mut ChaCha8Rng, base: [f64; 3], heading: f64) {
     let index = rng.random_range(0..world.models.len());
     let model = world.models[index].clone();
     let solids = model.solids(base, heading, rng.random(), false);

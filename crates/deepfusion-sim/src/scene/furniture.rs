@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 const GROUND: f64 = KERB_HEIGHT as f64 - 0.02;
 
 /// Materials that the furniture of a drive shares.
-pub struct Furniture {
+pub(super) struct Furniture {
     pole: u32,
     dark: u32,
     pale: u32,
@@ -46,7 +46,7 @@ const SIGNS: [[[f32; 3]; 2]; 6] = [
 
 impl Furniture {
     /// Chooses the colours.
-    pub fn new(world: &mut World, rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn new(world: &mut World, rng: &mut ChaCha8Rng) -> Self {
         let metal = |world: &mut World, tone: f32| {
             world.material(Material::Metal(Rgb::new(tone, tone, tone * 0.97)))
         };
@@ -81,7 +81,14 @@ impl Furniture {
     }
 
     /// A lamp post whose arm reaches over the road (`towards` is the heading to it).
-    pub fn lamp(&self, world: &mut World, rng: &mut ChaCha8Rng, x: f64, y: f64, towards: f64) {
+    pub(super) fn lamp(
+        &self,
+        world: &mut World,
+        rng: &mut ChaCha8Rng,
+        x: f64,
+        y: f64,
+        towards: f64,
+    ) {
         let height = rng.random_range(4.5..7.5f32);
         let paint = if rng.random_bool(0.5) {
             self.pole
@@ -122,7 +129,14 @@ impl Furniture {
     }
 
     /// A traffic sign that faces along `heading`.
-    pub fn sign(&self, world: &mut World, rng: &mut ChaCha8Rng, x: f64, y: f64, heading: f64) {
+    pub(super) fn sign(
+        &self,
+        world: &mut World,
+        rng: &mut ChaCha8Rng,
+        x: f64,
+        y: f64,
+        heading: f64,
+    ) {
         let height = rng.random_range(2.1..2.9f32);
         let post = Shape::Cylinder {
             radius: 0.04,
@@ -147,7 +161,7 @@ impl Furniture {
     }
 
     /// A bollard.
-    pub fn bollard(&self, world: &mut World, rng: &mut ChaCha8Rng, x: f64, y: f64) {
+    pub(super) fn bollard(&self, world: &mut World, rng: &mut ChaCha8Rng, x: f64, y: f64) {
         let shape = Shape::Cylinder {
             radius: 0.07,
             height: 0.9,
@@ -157,7 +171,14 @@ impl Furniture {
     }
 
     /// A column for posters, or a cabinet, or a bin.
-    pub fn cabinet(&self, world: &mut World, rng: &mut ChaCha8Rng, x: f64, y: f64, heading: f64) {
+    pub(super) fn cabinet(
+        &self,
+        world: &mut World,
+        rng: &mut ChaCha8Rng,
+        x: f64,
+        y: f64,
+        heading: f64,
+    ) {
         if rng.random_bool(0.2) {
             let shape = Shape::Cylinder {
                 radius: 0.6,
@@ -185,7 +206,7 @@ impl Furniture {
     }
 
     /// A fence of planks or a garden wall.
-    pub fn fence(
+    pub(super) fn fence(
         &self,
         world: &mut World,
         rng: &mut ChaCha8Rng,

@@ -24,7 +24,7 @@ const BAY: f64 = 2.6;
 const PILLAR_PAINTS: [[f32; 3]; 3] = [[0.55, 0.42, 0.06], [0.10, 0.22, 0.42], [0.42, 0.09, 0.07]];
 
 /// Builds it along the whole road.
-pub fn furnish(world: &mut World, rng: &mut ChaCha8Rng) {
+pub(super) fn furnish(world: &mut World, rng: &mut ChaCha8Rng) {
     lay_ground(world, rng);
     let concrete = world.material(Material::Masonry(Rgb::new(0.46, 0.45, 0.43)));
     let soffit = world.material(Material::Masonry(Rgb::new(0.38, 0.38, 0.37)));

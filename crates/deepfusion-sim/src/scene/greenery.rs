@@ -8,14 +8,14 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 /// Materials that all plants of a drive share.
-pub struct Greens {
+pub(super) struct Greens {
     leaves: Vec<u32>,
     bark: Vec<u32>,
 }
 
 impl Greens {
     /// The colours of this drive's season.
-    pub fn new(world: &mut World, rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn new(world: &mut World, rng: &mut ChaCha8Rng) -> Self {
         let autumn = rng.random_range(0.0..0.35);
         let leaves = (0..8)
             .map(|_| {
@@ -47,7 +47,7 @@ impl Greens {
     }
 
     /// A tree of broad leaves, or now and then a conifer.
-    pub fn tree(&self, world: &mut World, rng: &mut ChaCha8Rng, x: f64, y: f64) {
+    pub(super) fn tree(&self, world: &mut World, rng: &mut ChaCha8Rng, x: f64, y: f64) {
         let size = rng.random_range(0.7..1.25f32);
         let (leaves, bark) = (Self::any(rng, &self.leaves), Self::any(rng, &self.bark));
         let ground = f64::from(KERB_HEIGHT) - 0.05;
@@ -110,7 +110,7 @@ impl Greens {
     }
 
     /// A bush.
-    pub fn bush(&self, world: &mut World, rng: &mut ChaCha8Rng, x: f64, y: f64) {
+    pub(super) fn bush(&self, world: &mut World, rng: &mut ChaCha8Rng, x: f64, y: f64) {
         let leaves = Self::any(rng, &self.leaves);
         let size = rng.random_range(0.4..1.0f64);
         for _ in 0..4 {
@@ -133,7 +133,7 @@ impl Greens {
     }
 
     /// A hedge, `length` metres along `heading`, with an uneven top.
-    pub fn hedge(
+    pub(super) fn hedge(
         &self,
         world: &mut World,
         rng: &mut ChaCha8Rng,

@@ -19,30 +19,30 @@ struct Lamp {
 
 /// All lamps that burn, by their place along the street.
 #[derive(Debug, Clone, Default)]
-pub struct Lamps {
+pub(crate) struct Lamps {
     lamps: Vec<(f32, Lamp)>,
 }
 
 impl Lamps {
     /// Adds a lamp `s` metres along the street.
-    pub fn add(&mut self, s: f32, place: [f64; 3], strength: Rgb) {
+    pub(crate) fn add(&mut self, s: f32, place: [f64; 3], strength: Rgb) {
         let place = Vector3::from(place);
         self.lamps.push((s, Lamp { place, strength }));
     }
 
     /// Whether none burns.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.lamps.is_empty()
     }
 
     /// To be called once all are there.
-    pub fn sort(&mut self) {
+    pub(crate) fn sort(&mut self) {
         self.lamps.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
 
     /// What they send onto a surface at `place`, `s` metres along the street. It depends on the surface's
     /// position and direction alone, never on the viewer's. Nothing casts a shadow in it.
-    pub fn irradiance(&self, place: &Vector3<f64>, s: f32, normal: &V3) -> Rgb {
+    pub(crate) fn irradiance(&self, place: &Vector3<f64>, s: f32, normal: &V3) -> Rgb {
         let first = self.lamps.partition_point(|lamp| lamp.0 < s - REACH);
         let near = self.lamps[first..]
             .iter()

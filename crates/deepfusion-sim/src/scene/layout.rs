@@ -69,7 +69,7 @@ struct Side {
 }
 
 /// Fills the world: widths, side streets, houses, plants, furniture, parked cars.
-pub fn furnish(world: &mut World, rng: &mut ChaCha8Rng) {
+pub(super) fn furnish(world: &mut World, rng: &mut ChaCha8Rng) {
     let sections = sections(world, rng);
     apply_widths(world, &sections);
     add_side_streets(world, rng);

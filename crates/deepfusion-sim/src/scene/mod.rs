@@ -1,7 +1,7 @@
 //! The street and everything on it.
 
 mod buildings;
-pub mod cars;
+pub(crate) mod cars;
 mod furniture;
 mod garage;
 mod greenery;
@@ -72,7 +72,7 @@ pub struct SceneObject {
 }
 
 /// The static world.
-pub struct World {
+pub(crate) struct World {
     /// The street.
     pub road: Road,
     /// Stretches of the street.
@@ -118,7 +118,7 @@ pub struct World {
 /// A room: a rectangle along the world's axes, and the height of its ceiling. A camera may be anywhere in it where
 /// nothing else is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Room {
+pub(crate) struct Room {
     /// Least x and y, metres.
     pub low: [f64; 2],
     /// Greatest x and y, metres.
@@ -129,7 +129,7 @@ pub struct Room {
 
 /// Where vehicles drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lane {
+pub(crate) struct Lane {
     /// Metres left of the centreline.
     pub lateral: f64,
     /// As the camera drives, not against it.
@@ -175,12 +175,12 @@ impl ObjectClass {
 impl World {
     /// Furnishes `road` for the drive of `seed`.
     #[cfg(test)]
-    pub fn furnish(road: Road, seed: u64, scene: Scene) -> Self {
+    pub(crate) fn furnish(road: Road, seed: u64, scene: Scene) -> Self {
         Self::furnish_varied(road, seed, scene, &Variety::none())
     }
 
     /// Furnishes `road` for the drive of `seed` with as much variety as is asked for.
-    pub fn furnish_varied(road: Road, seed: u64, scene: Scene, variety: &Variety) -> Self {
+    pub(crate) fn furnish_varied(road: Road, seed: u64, scene: Scene, variety: &Variety) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5EED_57AE_E700_0001);
         let azimuth: f32 = rng.random_range(0.0..std::f32::consts::TAU);
         let elevation: f32 = rng.random_range(0.5..1.0);
@@ -236,7 +236,7 @@ impl World {
     }
 
     /// Where traffic drives: the camera's own lane and the one beside it, unless the world has more.
-    pub fn lanes(&self) -> Vec<Lane> {
+    pub(crate) fn lanes(&self) -> Vec<Lane> {
         if !self.lanes.is_empty() {
             return self.lanes.clone();
         }
@@ -337,7 +337,7 @@ impl World {
 }
 
 /// The pose of an upright box from the middle of its underside, its heading and its height.
-pub fn upright(base: [f64; 3], heading: f64, height: f64) -> Se3 {
+pub(crate) fn upright(base: [f64; 3], heading: f64, height: f64) -> Se3 {
     Se3::from_axis_angle(
         Vector3::new(0.0, 0.0, heading),
         Vector3::new(base[0], base[1], base[2] + 0.5 * height),

@@ -7,7 +7,7 @@ use crate::primitive::FACE_TOP;
 
 /// What a wall is built of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wall {
+pub(crate) enum Wall {
     /// Rendered, with stains.
     Plaster,
     /// Courses of bricks.
@@ -18,7 +18,7 @@ pub enum Wall {
 
 /// How one house looks.
 #[derive(Debug, Clone)]
-pub struct Facade {
+pub(crate) struct Facade {
     /// Half the house's extents along its x and y axes, metres.
     pub half: [f32; 2],
     /// Height of the walls, metres.
@@ -51,7 +51,7 @@ pub struct Facade {
 
 impl Facade {
     /// Albedo of the walls, and of the flat top.
-    pub fn albedo(&self, noise: &Noise, patch: &Patch) -> Rgb {
+    pub(crate) fn albedo(&self, noise: &Noise, patch: &Patch) -> Rgb {
         let p = &patch.point;
         if patch.face == FACE_TOP {
             let grain = noise.fractal(p.x, p.y, 2.0, 5, 0.6, patch.size);
@@ -285,7 +285,7 @@ impl Facade {
 /// Courses of bricks, stones or slabs with joints: `tile` is [length, height], all metres. Each
 /// tile has its own tone (`spread`).
 #[inline]
-pub fn courses(
+pub(crate) fn courses(
     colour: &Rgb,
     u: f32,
     v: f32,
@@ -314,7 +314,7 @@ pub fn courses(
 }
 
 /// Rows of tiles on a roof.
-pub fn roof(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
+pub(crate) fn roof(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
     let p = &patch.point;
     // Gables, the upright faces of a roof, are plain wall.
     let along = if patch.normal.y.abs() > patch.normal.x.abs() {

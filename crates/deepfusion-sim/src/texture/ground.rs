@@ -7,7 +7,7 @@ use super::{Rgb, mix, vary};
 
 /// A piece of ground that one pixel (or one sample of it) sees.
 #[derive(Debug, Clone, Copy)]
-pub struct GroundPatch {
+pub(crate) struct GroundPatch {
     /// World position, metres.
     pub x: f32,
     /// World position, metres.
@@ -28,7 +28,7 @@ pub struct GroundPatch {
 
 /// How a stretch of road is painted and what lies beside it.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Stretch {
+pub(crate) struct Stretch {
     /// Dashes along the middle: their period and length, metres; 0: none.
     pub dashes: [f32; 2],
     /// Lines along the edges.
@@ -49,7 +49,7 @@ pub struct Stretch {
 
 /// Ground beyond the pavement.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Beyond {
+pub(crate) enum Beyond {
     /// A lawn.
     #[default]
     Grass,
@@ -61,7 +61,7 @@ pub enum Beyond {
 
 /// Surface of a pavement.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Paving {
+pub(crate) enum Paving {
     /// Square slabs.
     #[default]
     Slabs,
@@ -72,7 +72,7 @@ pub enum Paving {
 }
 
 /// The carriageway.
-pub fn road(noise: &Noise, p: &GroundPatch, stretch: &Stretch, seed: u32) -> Rgb {
+pub(crate) fn road(noise: &Noise, p: &GroundPatch, stretch: &Stretch, seed: u32) -> Rgb {
     if let Some(style) = &stretch.style {
         return style.carriageway(noise, p, seed);
     }
@@ -175,7 +175,7 @@ fn markings(noise: &Noise, p: &GroundPatch, stretch: &Stretch) -> f32 {
 
 /// A manhole's lid, here and there.
 #[inline]
-pub fn manhole(noise: &Noise, p: &GroundPatch, colour: &Rgb, seed: u32) -> Rgb {
+pub(crate) fn manhole(noise: &Noise, p: &GroundPatch, colour: &Rgb, seed: u32) -> Rgb {
     let (cs, cl) = ((p.s / 11.0).floor(), (p.lateral / 2.9).floor());
     let code = hash(cs as i32, cl as i32, seed ^ 0xAB);
     if unit(code, 0) > 0.33 || p.size > 0.3 {
@@ -198,7 +198,7 @@ pub fn manhole(noise: &Noise, p: &GroundPatch, colour: &Rgb, seed: u32) -> Rgb {
 
 /// Fallen leaves and litter: at most one in each cell of 0.4 m.
 #[inline]
-pub fn leaves(p: &GroundPatch, colour: &Rgb, density: f32, seed: u32) -> Rgb {
+pub(crate) fn leaves(p: &GroundPatch, colour: &Rgb, density: f32, seed: u32) -> Rgb {
     const CELL: f32 = 0.4;
     let seen = (1.5 - p.size / 0.09).clamp(0.0, 1.0);
     if seen <= 0.0 {
@@ -228,7 +228,7 @@ pub fn leaves(p: &GroundPatch, colour: &Rgb, density: f32, seed: u32) -> Rgb {
 }
 
 /// The upright face of the kerb; `height` metres above the road.
-pub fn kerb(noise: &Noise, p: &GroundPatch, height: f32) -> Rgb {
+pub(crate) fn kerb(noise: &Noise, p: &GroundPatch, height: f32) -> Rgb {
     let grain = noise.fractal(p.x + p.y, p.y - p.x, 0.8, 5, 0.7, p.size);
     let joints = bands(p.s + p.lateral, 1.0, 0.0, 0.02, p.extent[0].max(p.size));
     let code = hash((p.s + p.lateral).floor() as i32, 5, 11);
@@ -238,7 +238,7 @@ pub fn kerb(noise: &Noise, p: &GroundPatch, height: f32) -> Rgb {
 
 /// Beside the road: kerb stone, verge, pavement, and what lies beyond them. `verge` and `pavement`
 /// are their widths.
-pub fn beside(
+pub(crate) fn beside(
     noise: &Noise,
     p: &GroundPatch,
     stretch: &Stretch,

@@ -7,7 +7,7 @@ use super::{Rgb, mix, vary};
 
 /// A line painted along the road.
 #[derive(Debug, Clone, Copy)]
-pub struct Line {
+pub(crate) struct Line {
     /// Metres left of the centreline.
     pub at: f32,
     /// Half its width, metres.
@@ -18,7 +18,7 @@ pub struct Line {
 
 /// The material of a ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// Even, with grain and stains.
     Asphalt,
     /// Stones, slabs, tiles or parquet with joints.
@@ -33,7 +33,7 @@ pub enum Kind {
 
 /// One ground.
 #[derive(Debug, Clone, Copy)]
-pub struct Surface {
+pub(crate) struct Surface {
     /// Its material.
     pub kind: Kind,
     /// Its main colour.
@@ -50,7 +50,7 @@ pub struct Surface {
 
 /// The ground of a stretch.
 #[derive(Debug, Clone, Copy)]
-pub struct GroundStyle {
+pub(crate) struct GroundStyle {
     /// The carriageway.
     pub road: Surface,
     /// Pavement and what lies beyond it: right, left.
@@ -84,7 +84,7 @@ pub struct GroundStyle {
 impl Surface {
     /// Albedo at a patch; `u` and `v` are its coordinates in the joints' grid.
     #[inline]
-    pub fn albedo(&self, noise: &Noise, p: &GroundPatch, seed: u32) -> Rgb {
+    pub(crate) fn albedo(&self, noise: &Noise, p: &GroundPatch, seed: u32) -> Rgb {
         let shift = (seed % 613) as f32;
         let [fs, fl] = p.extent;
         let fine = noise.fractal(p.x + shift, p.y, self.grain[0], 5, 0.85, p.size);
@@ -138,7 +138,7 @@ impl Surface {
 
 impl GroundStyle {
     /// The carriageway.
-    pub fn carriageway(&self, noise: &Noise, p: &GroundPatch, seed: u32) -> Rgb {
+    pub(crate) fn carriageway(&self, noise: &Noise, p: &GroundPatch, seed: u32) -> Rgb {
         let mut colour = self.road.albedo(noise, p, seed);
         if self.indoors {
             return colour;
@@ -240,13 +240,13 @@ impl GroundStyle {
     }
 
     /// The upright face of the kerb, `height` metres above the road.
-    pub fn kerb(&self, noise: &Noise, p: &GroundPatch, height: f32) -> Rgb {
+    pub(crate) fn kerb(&self, noise: &Noise, p: &GroundPatch, height: f32) -> Rgb {
         let plain = ground::kerb(noise, p, height);
         plain.component_mul(&self.kerb) * 3.0
     }
 
     /// Beside the carriageway.
-    pub fn beside(
+    pub(crate) fn beside(
         &self,
         noise: &Noise,
         p: &GroundPatch,

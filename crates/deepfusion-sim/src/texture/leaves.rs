@@ -6,7 +6,7 @@ use crate::crown::{clump, shell_of};
 
 /// The leaves of one lobe; `cell` and `fill` are the lobe's own.
 #[derive(Debug, Clone, Copy)]
-pub struct Leaves {
+pub(crate) struct Leaves {
     /// Colour in the light.
     pub colour: Rgb,
     /// Colour of single other clumps: blossom, dry leaves.
@@ -21,7 +21,7 @@ pub struct Leaves {
 
 impl Leaves {
     /// Albedo of a patch; the solid's seed is the lobe's salt.
-    pub fn albedo(&self, noise: &Noise, patch: &Patch) -> Rgb {
+    pub(crate) fn albedo(&self, noise: &Noise, patch: &Patch) -> Rgb {
         let p = &patch.point;
         let code = clump(p, self.cell, self.fill, patch.seed).unwrap_or(0);
         // Single clumps are told apart only where a pixel is smaller than one.

@@ -1,24 +1,24 @@
 //! Textures: albedo as a function of the position on the surface, never of the viewer.
 
-pub mod facade;
-pub mod ground;
-pub mod ground_style;
-pub mod leaves;
-pub mod noise;
-pub mod objects;
-pub mod pattern;
-pub mod sky;
+pub(crate) mod facade;
+pub(crate) mod ground;
+pub(crate) mod ground_style;
+pub(crate) mod leaves;
+pub(crate) mod noise;
+pub(crate) mod objects;
+pub(crate) mod pattern;
+pub(crate) mod sky;
 
 use crate::primitive::V3;
 use facade::Facade;
 use noise::Noise;
 
 /// A colour, linear red, green, blue.
-pub type Rgb = V3;
+pub(crate) type Rgb = V3;
 
 /// A piece of a surface that one pixel (or one sample of it) sees.
 #[derive(Debug, Clone, Copy)]
-pub struct Patch {
+pub(crate) struct Patch {
     /// Its middle, in the solid's axes, metres.
     pub point: V3,
     /// The solid's face.
@@ -35,7 +35,7 @@ pub struct Patch {
 
 /// The material of a solid.
 #[derive(Debug, Clone)]
-pub enum Material {
+pub(crate) enum Material {
     /// Walls with windows and doors; also the flat top of the house.
     Facade(Box<Facade>),
     /// A tiled roof of this colour.
@@ -64,7 +64,7 @@ pub enum Material {
 
 impl Material {
     /// Albedo of a patch.
-    pub fn albedo(&self, noise: &Noise, patch: &Patch) -> Rgb {
+    pub(crate) fn albedo(&self, noise: &Noise, patch: &Patch) -> Rgb {
         match self {
             Self::Facade(facade) => facade.albedo(noise, patch),
             Self::Roof(colour) => facade::roof(noise, patch, colour),
@@ -84,12 +84,12 @@ impl Material {
 
 /// A multiple of `colour` that noise of about ±1 moves by about ±`strength`; never below zero.
 #[inline]
-pub fn vary(colour: &Rgb, noise: f32, strength: f32) -> Rgb {
+pub(crate) fn vary(colour: &Rgb, noise: f32, strength: f32) -> Rgb {
     colour * (1.0 + strength * noise).max(0.05)
 }
 
 /// Two colours mixed.
 #[inline]
-pub fn mix(a: &Rgb, b: &Rgb, t: f32) -> Rgb {
+pub(crate) fn mix(a: &Rgb, b: &Rgb, t: f32) -> Rgb {
     a + (b - a) * t
 }

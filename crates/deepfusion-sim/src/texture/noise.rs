@@ -13,13 +13,13 @@ const SIZE: usize = 256;
 const LACUNARITY: f32 = 0.46;
 
 /// Two-dimensional value noise from a random table.
-pub struct Noise {
+pub(crate) struct Noise {
     table: Vec<f32>,
 }
 
 impl Noise {
     /// The noise of a seed.
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         Self {
             table: (0..SIZE * SIZE)
@@ -30,7 +30,7 @@ impl Noise {
 
     /// Smooth noise of wavelength 1 in [−1, 1].
     #[inline]
-    pub fn at(&self, x: f32, y: f32) -> f32 {
+    pub(crate) fn at(&self, x: f32, y: f32) -> f32 {
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = (x - x0, y - y0);
         // The mask wraps negative coordinates too.
@@ -47,7 +47,7 @@ impl Noise {
 
     /// Noise of one wavelength in metres, faded out where a pixel of size `footprint` covers it.
     #[inline]
-    pub fn wave(&self, x: f32, y: f32, wavelength: f32, footprint: f32) -> f32 {
+    pub(crate) fn wave(&self, x: f32, y: f32, wavelength: f32, footprint: f32) -> f32 {
         let weight = visibility(wavelength, footprint);
         if weight <= 0.0 {
             return 0.0;
@@ -58,7 +58,7 @@ impl Noise {
     /// Several octaves, from `wavelength` (metres) down; each is `gain` times the one before.
     /// Stops at what a pixel of size `footprint` cannot show.
     #[inline]
-    pub fn fractal(
+    pub(crate) fn fractal(
         &self,
         x: f32,
         y: f32,
@@ -84,7 +84,7 @@ impl Noise {
     /// Dark or bright thin lines where the noise changes sign: cracks, veins. 1 on a line, 0 off it;
     /// `width` in metres. A line thinner than the footprint gets fainter instead of thinner.
     #[inline]
-    pub fn ridge(&self, x: f32, y: f32, wavelength: f32, width: f32, footprint: f32) -> f32 {
+    pub(crate) fn ridge(&self, x: f32, y: f32, wavelength: f32, width: f32, footprint: f32) -> f32 {
         let weight = visibility(wavelength, footprint);
         if weight <= 0.0 {
             return 0.0;
@@ -102,26 +102,26 @@ fn visibility(wavelength: f32, footprint: f32) -> f32 {
 }
 
 #[inline]
-pub fn lerp(a: f32, b: f32, t: f32) -> f32 {
+pub(crate) fn lerp(a: f32, b: f32, t: f32) -> f32 {
     a + (b - a) * t
 }
 
 /// 0 below `a`, 1 above `b`, smooth between.
 #[inline]
-pub fn smoothstep(a: f32, b: f32, x: f32) -> f32 {
+pub(crate) fn smoothstep(a: f32, b: f32, x: f32) -> f32 {
     let t = ((x - a) / (b - a)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
 /// √(x² + y²), without the care for huge numbers that makes the library's slow.
 #[inline]
-pub fn length(x: f32, y: f32) -> f32 {
+pub(crate) fn length(x: f32, y: f32) -> f32 {
     (x * x + y * y).sqrt()
 }
 
 /// A well-mixed hash of a cell.
 #[inline]
-pub fn hash(x: i32, y: i32, seed: u32) -> u32 {
+pub(crate) fn hash(x: i32, y: i32, seed: u32) -> u32 {
     let mut h = (x as u32).wrapping_mul(0x9E37_79B1)
         ^ (y as u32).wrapping_mul(0x85EB_CA77).rotate_left(13)
         ^ seed.wrapping_mul(0xC2B2_AE3D);
@@ -134,27 +134,27 @@ pub fn hash(x: i32, y: i32, seed: u32) -> u32 {
 
 /// A number in [0, 1) from 8 bits of a hash; `byte` 0–3 gives four independent ones.
 #[inline]
-pub fn unit(hash: u32, byte: u32) -> f32 {
+pub(crate) fn unit(hash: u32, byte: u32) -> f32 {
     ((hash >> (8 * byte)) & 0xFF) as f32 / 256.0
 }
 
 /// Share of the pixel [x − f/2, x + f/2] inside the band [a, b].
 #[inline]
-pub fn band(x: f32, a: f32, b: f32, footprint: f32) -> f32 {
+pub(crate) fn band(x: f32, a: f32, b: f32, footprint: f32) -> f32 {
     let f = footprint.max(1e-4);
     (((x + 0.5 * f).min(b) - (x - 0.5 * f).max(a)) / f).clamp(0.0, 1.0)
 }
 
 /// Share of the pixel beyond `edge`.
 #[inline]
-pub fn beyond(x: f32, edge: f32, footprint: f32) -> f32 {
+pub(crate) fn beyond(x: f32, edge: f32, footprint: f32) -> f32 {
     ((x - edge) / footprint.max(1e-4) + 0.5).clamp(0.0, 1.0)
 }
 
 /// Share of the pixel inside bands [a, b] that repeat every `period` (0 ≤ a ≤ b ≤ period): exact for
 /// footprints of any size, the mean share for huge ones.
 #[inline]
-pub fn bands(x: f32, period: f32, a: f32, b: f32, footprint: f32) -> f32 {
+pub(crate) fn bands(x: f32, period: f32, a: f32, b: f32, footprint: f32) -> f32 {
     let f = footprint.max(1e-4);
     let covered = |x: f32| {
         let cell = (x / period).floor();

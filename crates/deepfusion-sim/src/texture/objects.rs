@@ -30,7 +30,7 @@ fn solid(noise: &Noise, patch: &Patch, wavelength: f32, octaves: u32, gain: f32)
 }
 
 /// Leaves: clumps, gaps that let the dark through, single bright leaves.
-pub fn foliage(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
+pub(crate) fn foliage(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
     let clumps = solid(noise, patch, 0.4, 2, 0.7);
     let leaves = solid(noise, patch, 0.09, 2, 1.0);
     let shade = smoothstep(-1.0, 1.0, 0.6 * clumps + 1.3 * leaves);
@@ -40,7 +40,7 @@ pub fn foliage(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
 }
 
 /// Bark: upright furrows.
-pub fn bark(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
+pub(crate) fn bark(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
     let p = &patch.point;
     let angle = p.y.atan2(p.x) * 0.4;
     let shift = (patch.seed % 211) as f32;
@@ -50,7 +50,7 @@ pub fn bark(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
 }
 
 /// Painted metal: scratches, stickers, a darker foot.
-pub fn metal(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
+pub(crate) fn metal(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
     let p = &patch.point;
     let worn = solid(noise, patch, 0.4, 4, 0.7);
     let code = hash((p.z / 0.5).floor() as i32, 3, patch.seed);
@@ -65,7 +65,7 @@ pub fn metal(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
 }
 
 /// A fence of upright planks, each with its own tone.
-pub fn planks(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
+pub(crate) fn planks(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
     let p = &patch.point;
     let (u, fu) = (p.x + p.y, patch.extent.x + patch.extent.y);
     let board = (u / 0.16).floor();
@@ -87,7 +87,7 @@ pub fn planks(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
 }
 
 /// A garden wall: courses, a pale coping, moss.
-pub fn masonry(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
+pub(crate) fn masonry(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
     let p = &patch.point;
     let (u, fu) = (p.x + p.y, patch.extent.x + patch.extent.y);
     let laid = courses(
@@ -108,7 +108,7 @@ pub fn masonry(noise: &Noise, patch: &Patch, colour: &Rgb) -> Rgb {
 }
 
 /// Two colours in bold shapes, with a border.
-pub fn sign(noise: &Noise, patch: &Patch, a: &Rgb, b: &Rgb) -> Rgb {
+pub(crate) fn sign(noise: &Noise, patch: &Patch, a: &Rgb, b: &Rgb) -> Rgb {
     let p = &patch.point;
     let shift = (patch.seed % 613) as f32;
     let bold = noise.fractal(p.x + p.y + shift, p.z, 0.7, 2, 0.5, patch.size);
@@ -117,7 +117,7 @@ pub fn sign(noise: &Noise, patch: &Patch, a: &Rgb, b: &Rgb) -> Rgb {
 }
 
 /// Black rubber around a grey rim with spokes.
-pub fn tyre(noise: &Noise, patch: &Patch) -> Rgb {
+pub(crate) fn tyre(noise: &Noise, patch: &Patch) -> Rgb {
     let p = &patch.point;
     let radius = length(p.x, p.z);
     let grain = solid(noise, patch, 0.1, 2, 0.6);
@@ -133,7 +133,7 @@ pub fn tyre(noise: &Noise, patch: &Patch) -> Rgb {
 
 /// The outside of a car: paint on the body, glass in the cabin.
 #[derive(Debug, Clone, Copy)]
-pub struct Paint {
+pub(crate) struct Paint {
     /// Colour of the paint.
     pub colour: Rgb,
     /// Length, width and height of the whole car, metres.
@@ -146,7 +146,7 @@ pub struct Paint {
 
 impl Paint {
     /// Albedo of the body or the cabin; the part's axes are the car's, moved up by `base`.
-    pub fn albedo(&self, noise: &Noise, patch: &Patch) -> Rgb {
+    pub(crate) fn albedo(&self, noise: &Noise, patch: &Patch) -> Rgb {
         let p = &patch.point;
         let z = p.z + self.base;
         let f = &patch.extent;

@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// How the first two colours share the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// The first colour alone.
     Plain,
     /// Cloudy patches.
@@ -39,7 +39,7 @@ pub enum Kind {
 
 /// A random surface.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pattern {
+pub(crate) struct Pattern {
     /// What is drawn.
     pub kind: Kind,
     /// Its colours.
@@ -59,7 +59,7 @@ pub struct Pattern {
 }
 
 /// A random colour of albedo 0.02 to 0.85; `vivid` 0 is grey, 1 a child's toy.
-pub fn colour(rng: &mut ChaCha8Rng, vivid: f32) -> Rgb {
+pub(crate) fn colour(rng: &mut ChaCha8Rng, vivid: f32) -> Rgb {
     let tone = if rng.random_bool(0.5) {
         rng.random_range(0.02..0.85f32)
     } else {
@@ -73,7 +73,7 @@ pub fn colour(rng: &mut ChaCha8Rng, vivid: f32) -> Rgb {
 }
 
 /// A colour of plaster, stone or wood: greys, creams, browns, and now and then a bold one.
-pub fn wall_colour(rng: &mut ChaCha8Rng) -> Rgb {
+pub(crate) fn wall_colour(rng: &mut ChaCha8Rng) -> Rgb {
     if rng.random_bool(0.18) {
         return colour(rng, 0.8);
     }
@@ -89,7 +89,7 @@ pub fn wall_colour(rng: &mut ChaCha8Rng) -> Rgb {
 
 impl Pattern {
     /// Any pattern at all.
-    pub fn wild(rng: &mut ChaCha8Rng) -> Self {
+    pub(crate) fn wild(rng: &mut ChaCha8Rng) -> Self {
         let vivid = rng.random_range(0.0..1.0);
         let kind = match rng.random_range(0..13) {
             0 => Kind::Plain,
@@ -114,7 +114,7 @@ impl Pattern {
     }
 
     /// A smooth surface of one colour with some grain.
-    pub fn plain(rng: &mut ChaCha8Rng, colour: Rgb) -> Self {
+    pub(crate) fn plain(rng: &mut ChaCha8Rng, colour: Rgb) -> Self {
         Self {
             kind: Kind::Plain,
             colours: [colour; 2],
@@ -134,7 +134,7 @@ impl Pattern {
     }
 
     /// What houses are clad with.
-    pub fn wall(rng: &mut ChaCha8Rng) -> Self {
+    pub(crate) fn wall(rng: &mut ChaCha8Rng) -> Self {
         let base = wall_colour(rng);
         let mut pattern = Self::plain(rng, base);
         let brick = Rgb::new(
@@ -204,7 +204,7 @@ impl Pattern {
     }
 
     /// Albedo of a patch.
-    pub fn albedo(&self, noise: &Noise, patch: &Patch) -> Rgb {
+    pub(crate) fn albedo(&self, noise: &Noise, patch: &Patch) -> Rgb {
         let (u, v, fu, fv) = unwrapped(patch);
         self.at(
             noise,
@@ -218,7 +218,7 @@ impl Pattern {
 
     /// Albedo at coordinates of a flat surface, metres; `height` above the solid's foot.
     #[inline]
-    pub fn at(
+    pub(crate) fn at(
         &self,
         noise: &Noise,
         [u, v]: [f32; 2],
@@ -359,7 +359,7 @@ impl Pattern {
 
 /// Coordinates in a surface (metres) and a patch's extents along them.
 #[inline]
-pub fn unwrapped(patch: &Patch) -> (f32, f32, f32, f32) {
+pub(crate) fn unwrapped(patch: &Patch) -> (f32, f32, f32, f32) {
     let (p, n, f) = (&patch.point, patch.normal, &patch.extent);
     if n.z.abs() > 0.75 {
         (p.x, p.y, f.x, f.y)

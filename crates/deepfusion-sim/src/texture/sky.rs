@@ -6,7 +6,7 @@ use crate::primitive::V3;
 
 /// The weather of a drive.
 #[derive(Debug, Clone, Copy)]
-pub struct Sky {
+pub(crate) struct Sky {
     /// Colour at the horizon.
     pub horizon: Rgb,
     /// Colour overhead.
@@ -17,7 +17,7 @@ pub struct Sky {
 
 impl Sky {
     /// Radiance from a direction (need not be of unit length).
-    pub fn radiance(&self, noise: &Noise, direction: &V3) -> Rgb {
+    pub(crate) fn radiance(&self, noise: &Noise, direction: &V3) -> Rgb {
         let flat = length(direction.x, direction.y).max(1e-6);
         let up = (direction.z / flat).max(0.0);
         let clear = mix(&self.horizon, &self.zenith, 1.0 - (-2.6 * up).exp());

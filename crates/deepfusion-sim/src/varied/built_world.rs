@@ -24,7 +24,7 @@ const DURATION_S: f64 = 9.0;
 const UNVARIED: f64 = 0.12;
 
 /// A built world, ready to be viewed.
-pub struct BuiltWorld {
+pub(super) struct BuiltWorld {
     /// The street and what stands on it.
     pub world: World,
     /// Light on its ground.
@@ -39,7 +39,7 @@ pub struct BuiltWorld {
 
 impl BuiltWorld {
     /// Builds world `number` of a stream.
-    pub fn build(config: &EndlessConfig, number: u64) -> Self {
+    pub(super) fn build(config: &EndlessConfig, number: u64) -> Self {
         // Drawn apart, so that the other worlds are the same whatever the share of the plain ones is.
         let mut rng = generator(config.seed, number, 0x91A1);
         let plain = rng.random_bool(config.plain);
@@ -78,7 +78,7 @@ impl BuiltWorld {
     }
 
     /// The traffic around a place on the street, metres along it. `nearest`: how far ahead of it the lane is free.
-    pub fn traffic(&self, rng: &mut ChaCha8Rng, s: f64, nearest: f64) -> Traffic {
+    pub(super) fn traffic(&self, rng: &mut ChaCha8Rng, s: f64, nearest: f64) -> Traffic {
         let speed = 9.0 * self.world.scene.pace();
         let density = self.density * rng.random_range(0.0..1.0);
         Traffic::around(rng, &self.world, (s, speed, nearest), density)

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Keeps the `capacity` most recently used objects. The lock is not held during a build: threads that want
 /// other objects proceed, and those that want the same one wait for it.
-pub struct Cache<T> {
+pub(super) struct Cache<T> {
     capacity: usize,
     entries: Mutex<Entries<T>>,
 }
@@ -21,7 +21,7 @@ struct Entries<T> {
 
 impl<T> Cache<T> {
     /// A cache of at least one thing.
-    pub fn new(capacity: usize) -> Self {
+    pub(super) fn new(capacity: usize) -> Self {
         Self {
             capacity: capacity.max(1),
             entries: Mutex::new(Entries {
@@ -32,7 +32,7 @@ impl<T> Cache<T> {
     }
 
     /// The object of a key, built if necessary.
-    pub fn get(&self, key: u64, build: impl FnOnce() -> T) -> Arc<T> {
+    pub(super) fn get(&self, key: u64, build: impl FnOnce() -> T) -> Arc<T> {
         let cell = {
             // The map is never left half changed, so a panic elsewhere does not corrupt it.
             let mut entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
@@ -53,7 +53,7 @@ impl<T> Cache<T> {
 
     /// How many things it holds.
     #[cfg(test)]
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.entries
             .lock()
             .unwrap_or_else(PoisonError::into_inner)

@@ -12,10 +12,10 @@ use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{PI, TAU};
 
 /// Least and greatest height of a camera above its ground, metres.
-pub const HEIGHTS: (f64, f64) = (0.3, 2.5);
+pub(super) const HEIGHTS: (f64, f64) = (0.3, 2.5);
 
 /// Least and greatest horizontal field of view, radians.
-pub const FIELDS: (f64, f64) = (35.0 * PI / 180.0, 110.0 * PI / 180.0);
+pub(super) const FIELDS: (f64, f64) = (35.0 * PI / 180.0, 110.0 * PI / 180.0);
 
 /// A camera keeps this far from every solid's box, metres.
 const CLEARANCE: f64 = 0.35;
@@ -28,7 +28,7 @@ const TRIES: usize = 40;
 
 /// The camera's pose in a world.
 #[derive(Debug, Clone, Copy)]
-pub struct Stand {
+pub(super) struct Stand {
     /// World (z up) from the camera.
     pub world_from_cam: Se3,
     /// Height above the ground below it, metres.
@@ -45,7 +45,11 @@ pub struct Stand {
 /// and within 3 % in the others. The principal point is off the middle by normal draws of 1.5 % of the width and 5 % of
 /// the height; in one of five of the pictures that were not squeezed by up to 20 % of the height, as where a picture
 /// was cut from a taller one.
-pub fn intrinsics(rng: &mut ChaCha8Rng, (width, height): (u32, u32), indoors: bool) -> Intrinsics {
+pub(super) fn intrinsics(
+    rng: &mut ChaCha8Rng,
+    (width, height): (u32, u32),
+    indoors: bool,
+) -> Intrinsics {
     let field = match rng.random_range(0..20) {
         0..=13 => normal(rng, if indoors { 64.0 } else { 78.0 }, 8.0, 1.78),
         14..=16 => rng.random_range(35.0..60.0),
@@ -191,7 +195,7 @@ fn in_room(rng: &mut ChaCha8Rng, place: &BuiltWorld, s: f64) -> (f64, f64, f64) 
 
 /// Draws a free place for a camera among the traffic around `anchor`, metres along the street: not within a solid nor
 /// close to one, and not with most of its view within arm's length of one.
-pub fn stand(
+pub(super) fn stand(
     rng: &mut ChaCha8Rng,
     place: &BuiltWorld,
     (moving, anchor): (&[Primitive], f64),

@@ -4,12 +4,12 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// An independent generator for each (seed, number, purpose).
-pub fn generator(seed: u64, number: u64, purpose: u64) -> ChaCha8Rng {
+pub(super) fn generator(seed: u64, number: u64, purpose: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(mix(mix(mix(seed) ^ number) ^ purpose))
 }
 
 /// SplitMix64's finaliser (Steele, Lea and Flood, 2014): neighbouring numbers become unrelated ones.
-pub fn mix(number: u64) -> u64 {
+pub(super) fn mix(number: u64) -> u64 {
     let mut z = number.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -17,19 +17,19 @@ pub fn mix(number: u64) -> u64 {
 }
 
 /// A normal draw (Box and Muller), cut at `most` standard deviations.
-pub fn normal(rng: &mut ChaCha8Rng, mean: f64, deviation: f64, most: f64) -> f64 {
+pub(super) fn normal(rng: &mut ChaCha8Rng, mean: f64, deviation: f64, most: f64) -> f64 {
     let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     let angle = std::f64::consts::TAU * rng.random::<f64>();
     mean + deviation * (radius * angle.cos()).clamp(-most, most)
 }
 
 /// A draw that is uniform in the logarithm.
-pub fn log_uniform(rng: &mut ChaCha8Rng, least: f64, most: f64) -> f64 {
+pub(super) fn log_uniform(rng: &mut ChaCha8Rng, least: f64, most: f64) -> f64 {
     (least.ln() + (most / least).ln() * rng.random::<f64>()).exp()
 }
 
 /// One of several, by weight.
-pub fn weighted<T: Copy>(rng: &mut ChaCha8Rng, choices: &[(f64, T)]) -> T {
+pub(super) fn weighted<T: Copy>(rng: &mut ChaCha8Rng, choices: &[(f64, T)]) -> T {
     let total: f64 = choices.iter().map(|c| c.0).sum();
     let mut left = total * rng.random::<f64>();
     for (weight, choice) in choices {
@@ -42,17 +42,17 @@ pub fn weighted<T: Copy>(rng: &mut ChaCha8Rng, choices: &[(f64, T)]) -> T {
 }
 
 /// A fast stream of approximately normal numbers for noise in pixels: the sum of four uniform ones.
-pub struct Hiss(u64);
+pub(super) struct Hiss(u64);
 
 impl Hiss {
     /// The stream of a seed.
-    pub fn new(seed: u64) -> Self {
+    pub(super) fn new(seed: u64) -> Self {
         Self(mix(seed))
     }
 
     /// Mean 0, deviation 1, within ±3.47.
     #[inline]
-    pub fn next(&mut self) -> f32 {
+    pub(super) fn next(&mut self) -> f32 {
         // A Weyl sequence through a multiply-xorshift mixer.
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;

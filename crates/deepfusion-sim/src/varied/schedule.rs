@@ -4,14 +4,14 @@
 /// world is replaced after `views` views; the slots' replacements are spread evenly over time, so that never two
 /// worlds have to be built at once.
 #[derive(Debug, Clone, Copy)]
-pub struct Schedule {
+pub(super) struct Schedule {
     worlds: u64,
     views: u64,
 }
 
 /// A view of a world.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Turn {
+pub(super) struct Turn {
     /// Number of the world, from 0.
     pub world: u64,
     /// Number of the view among those of its world.
@@ -20,7 +20,7 @@ pub struct Turn {
 
 impl Schedule {
     /// `worlds` at a time and `views` of each, both at least 1.
-    pub fn new(worlds: usize, views: usize) -> Self {
+    pub(super) fn new(worlds: usize, views: usize) -> Self {
         Self {
             worlds: (worlds as u64).max(1),
             views: (views as u64).max(1),
@@ -28,7 +28,7 @@ impl Schedule {
     }
 
     /// The world and the view of an index.
-    pub fn turn(&self, index: u64) -> Turn {
+    pub(super) fn turn(&self, index: u64) -> Turn {
         let (slot, round) = (index % self.worlds, index / self.worlds);
         let shifted = round + slot * self.views / self.worlds;
         Turn {

@@ -30,7 +30,7 @@ pub enum Weather {
 }
 
 /// The weather of a world without a random draw.
-pub fn plain(world: &World) -> Weather {
+pub(super) fn plain(world: &World) -> Weather {
     match world.scene {
         Scene::Garage | Scene::Indoor => Weather::Indoor,
         Scene::Night => Weather::Night,
@@ -40,7 +40,7 @@ pub fn plain(world: &World) -> Weather {
 
 /// Draws the weather: by day 42 % clear, 20 % cloudy, 33 % overcast, 5 % fog. Haze (visibility of 0.8 to 20 km) in half of
 /// the pictures; the ground is wet in a third of those without sun and in one of ten others.
-pub fn draw(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {
+pub(super) fn draw(rng: &mut ChaCha8Rng, world: &World) -> (Weather, Air) {
     match world.scene {
         Scene::Garage | Scene::Indoor => (Weather::Indoor, indoor(rng, world)),
         Scene::Night => (Weather::Night, night(rng, world)),

@@ -13,7 +13,7 @@ const GRAZING: f32 = 0.55;
 
 /// Adds to the ground of a wet street what it mirrors: the picture's own colour in the mirrored direction, as if what
 /// is mirrored were far away, and the sky's where that is not in the picture. Depth is not touched.
-pub fn reflect(shot: &Shot, exposure: &mut Exposure) {
+pub(super) fn reflect(shot: &Shot, exposure: &mut Exposure) {
     let wet = shot.air.wet;
     if wet <= 0.0 {
         return;

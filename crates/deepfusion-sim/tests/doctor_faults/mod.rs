@@ -13,21 +13,21 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 /// Indices of values in an OXTS packet.
-pub mod oxts {
-    pub const VN: usize = 6;
-    pub const VE: usize = 7;
-    pub const VF: usize = 8;
-    pub const VL: usize = 9;
+pub(crate) mod oxts {
+    pub(crate) const VN: usize = 6;
+    pub(crate) const VE: usize = 7;
+    pub(crate) const VF: usize = 8;
+    pub(crate) const VL: usize = 9;
 }
 
 /// A copy of the clean drive.
-pub struct Drive {
+pub(crate) struct Drive {
     folder: tempfile::TempDir,
 }
 
 impl Drive {
     /// Simulated once, copied for each test.
-    pub fn clean() -> Self {
+    pub(crate) fn clean() -> Self {
         static CLEAN: OnceLock<tempfile::TempDir> = OnceLock::new();
         let clean = CLEAN.get_or_init(|| {
             let folder = tempfile::tempdir().unwrap();
@@ -46,7 +46,7 @@ impl Drive {
         Self { folder }
     }
 
-    pub fn diagnose(&self) -> Diagnosis {
+    pub(crate) fn diagnose(&self) -> Diagnosis {
         doctor(&self.folder.path().join("kitti"), None)
     }
 
@@ -63,7 +63,7 @@ impl Drive {
     }
 
     /// Changes fx, 0, cx, 0, fy, cy, 0, 0, 1 of camera 2.
-    pub fn camera(&self, change: impl FnOnce(&mut [f64; 9])) {
+    pub(crate) fn camera(&self, change: impl FnOnce(&mut [f64; 9])) {
         let path = self.date().join("calib_cam_to_cam.txt");
         let text = std::fs::read_to_string(&path).unwrap();
         let line = |key: &str| -> Vec<f64> {
@@ -91,7 +91,7 @@ impl Drive {
     }
 
     /// Turns the vehicle's axes nose down against the sensors', degrees.
-    pub fn pitch_vehicle(&self, degrees: f64) {
+    pub(crate) fn pitch_vehicle(&self, degrees: f64) {
         let path = self.date().join("calib_imu_to_velo.txt");
         let text = std::fs::read_to_string(&path).unwrap();
         let lines = text.lines().map(|line| {
@@ -116,7 +116,7 @@ impl Drive {
     }
 
     /// Changes every oxts packet's values.
-    pub fn oxts(&self, change: impl Fn(usize, &mut [f64])) {
+    pub(crate) fn oxts(&self, change: impl Fn(usize, &mut [f64])) {
         for number in 0..SimConfig::default().frames {
             let path = self.drive().join(format!("oxts/data/{number:010}.txt"));
             let text = std::fs::read_to_string(&path).unwrap();
@@ -136,7 +136,7 @@ impl Drive {
     }
 
     /// Sets the camera's clock ahead of the vehicle's.
-    pub fn camera_clock_ahead(&self, seconds: f64) {
+    pub(crate) fn camera_clock_ahead(&self, seconds: f64) {
         let path = self.drive().join("image_02/timestamps.txt");
         let text = std::fs::read_to_string(&path).unwrap();
         let lines = text.lines().map(|line| {
@@ -154,7 +154,7 @@ impl Drive {
     }
 
     /// Changes every image.
-    pub fn images(&self, change: impl Fn(usize, &mut RgbImage)) {
+    pub(crate) fn images(&self, change: impl Fn(usize, &mut RgbImage)) {
         for number in 0..SimConfig::default().frames {
             let path = self.image(number);
             let mut image = image::open(&path).unwrap().into_rgb8();
@@ -165,7 +165,7 @@ impl Drive {
 
     /// A second camera, beside the first, that sees all of it so many pixels farther to the right: to the left of it (negative)
     /// if it is the right one.
-    pub fn second_camera(&self, shift: i64) {
+    pub(crate) fn second_camera(&self, shift: i64) {
         let second = self.drive().join("image_03");
         std::fs::create_dir(&second).unwrap();
         copy(&self.drive().join("image_02"), &second);
@@ -189,13 +189,13 @@ impl Drive {
         }
     }
 
-    pub fn remove_images(&self, numbers: &[usize]) {
+    pub(crate) fn remove_images(&self, numbers: &[usize]) {
         for number in numbers {
             std::fs::remove_file(self.image(*number)).unwrap();
         }
     }
 
-    pub fn remove_oxts(&self, numbers: std::ops::Range<usize>) {
+    pub(crate) fn remove_oxts(&self, numbers: std::ops::Range<usize>) {
         for number in numbers {
             let path = self.drive().join(format!("oxts/data/{number:010}.txt"));
             std::fs::remove_file(path).unwrap();
@@ -203,14 +203,14 @@ impl Drive {
     }
 
     /// Each of these is there once more instead of the next.
-    pub fn repeat_images(&self, numbers: &[usize]) {
+    pub(crate) fn repeat_images(&self, numbers: &[usize]) {
         for number in numbers {
             std::fs::copy(self.image(*number), self.image(*number + 1)).unwrap();
         }
     }
 
     /// Leaves half of an image's file.
-    pub fn cut_image(&self, number: usize) {
+    pub(crate) fn cut_image(&self, number: usize) {
         let bytes = std::fs::read(self.image(number)).unwrap();
         std::fs::write(self.image(number), &bytes[..bytes.len() / 2]).unwrap();
     }

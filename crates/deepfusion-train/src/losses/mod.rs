@@ -19,7 +19,7 @@ pub use mean::{mean_where, share};
 pub use moving::{RigidView, epipolar_distance, moving_pixels};
 pub use reprojection::{ReprojectionOutput, View, reprojection};
 pub use smoothness::smoothness;
-pub use speed::{motion, speed, speed_weight};
+pub use speed::{distance_weight, motion, speed, speed_weight};
 pub use uncertainty::uncertainty;
 
 /// The loss of a batch, term by term, as numbers.
@@ -72,6 +72,42 @@ impl LossTerms {
         ]
     }
 
+    /// Sets every term, in the order of [`Self::named`]; values that are not given stay.
+    pub fn set_from(&mut self, values: &[f64]) {
+        let Self {
+            total,
+            reprojection,
+            smoothness,
+            speed,
+            affine,
+            flow,
+            agreement,
+            depth,
+            uncertainty,
+            valid_share,
+            explained_share,
+            moving_share,
+        } = self;
+        let terms = [
+            total,
+            reprojection,
+            smoothness,
+            speed,
+            affine,
+            flow,
+            agreement,
+            depth,
+            uncertainty,
+            valid_share,
+            explained_share,
+            moving_share,
+        ];
+        terms
+            .into_iter()
+            .zip(values)
+            .for_each(|(term, value)| *term = *value);
+    }
+
     /// Adds every term of another batch, times `weight`, to accumulate a weighted mean.
     pub fn add(&mut self, other: &Self, weight: f64) {
         self.total += weight * other.total;
@@ -102,6 +138,14 @@ impl LossTerms {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn terms_are_set_in_the_order_of_their_names() {
+        let values: Vec<f64> = (0..12).map(f64::from).collect();
+        let mut terms = LossTerms::default();
+        terms.set_from(&values);
+        assert_eq!(terms.named().map(|(_, value)| value).to_vec(), values);
+    }
 
     #[test]
     fn the_part_is_named_before_the_sum() {

@@ -1,22 +1,45 @@
 use crate::Motion;
 use burn::tensor::Tensor;
 
-/// The speed loss (Eq. 32–39): mean over pairs of |‖t̂‖ − d| + β_R·angle(R̂ᵀ·R), d and R from the
-/// vehicle's sensors. It fixes the metric scale.
+/// Standard deviation of a distance, as a share of it, at which its pair weighs half.
+const HALF_WEIGHT_SHARE: f64 = 0.05;
+
+/// The weight of a pair in [`speed`] by how sure its distance is: 1 / (1 + (σ / 0.05 d)²), and 1 where σ is not known. It is the
+/// share that a distance of that variance has in a mean with one of 5 %, so that a receiver's slow and uncertain metres pull
+/// less than its fast ones.
+#[must_use]
+pub fn distance_weight(distance_m: f64, sigma_m: Option<f64>) -> f64 {
+    match sigma_m.filter(|sigma| *sigma > 0.0) {
+        None => 1.0,
+        Some(sigma) => {
+            let half = HALF_WEIGHT_SHARE * distance_m.abs();
+            half * half / (half * half + sigma * sigma)
+        }
+    }
+}
+
+/// The speed loss (Eq. 32–39): mean over pairs of w·|‖t̂‖ − d| + β_R·angle(R̂ᵀ·R), d and R from the
+/// vehicle's sensors, w as [`distance_weight`]. It fixes the metric scale.
 ///
 /// # Shapes
 /// - `motion`: N predicted motions
 /// - `distance_m`: `[N]`, length of the camera's true translation
+/// - `weight`: `[N]`, w; `None`: 1
 /// - `rotation`: `[N, 3, 3]`, the true rotation in the same direction; read only where β_R > 0
 /// - output: one value, in metres
 #[must_use]
 pub fn speed(
     motion: &Motion,
     distance_m: Tensor<1>,
+    weight: Option<Tensor<1>>,
     rotation: &Tensor<3>,
     rotation_weight: f64,
 ) -> Tensor<1> {
-    let translation = motion.distance().sub(distance_m).abs().mean();
+    let off = motion.distance().sub(distance_m).abs();
+    let translation = match weight {
+        Some(weight) => off.mul(weight).mean(),
+        None => off.mean(),
+    };
     if rotation_weight == 0.0 {
         return translation;
     }
@@ -57,7 +80,7 @@ pub fn motion(predicted: &Motion, measured: &Motion) -> Tensor<1> {
             .sub(measured.translation.clone()),
     };
     let nothing = Tensor::zeros([n], &measured.translation.device());
-    speed(&apart, nothing, &measured.rotation, METRES_PER_RADIAN)
+    speed(&apart, nothing, None, &measured.rotation, METRES_PER_RADIAN)
 }
 
 /// λ_v at a step (counted from 0): it rises linearly over one epoch or `warmup_steps`, whichever is
@@ -88,10 +111,29 @@ mod tests {
         let rotation = motion.rotation.clone();
         let loss = |d: [f32; 2]| {
             let d = Tensor::<1>::from_data(d, &device);
-            speed(&motion, d, &rotation, 0.5).into_scalar::<f32>()
+            speed(&motion, d, None, &rotation, 0.5).into_scalar::<f32>()
         };
         assert!(loss([1.0, 5.0]) < 1e-5);
         assert!((loss([1.5, 4.0]) - 0.75).abs() < 1e-5);
+    }
+
+    #[test]
+    fn an_unsure_distance_pulls_less() {
+        assert!((distance_weight(2.0, None) - 1.0).abs() < 1e-12);
+        assert!((distance_weight(2.0, Some(0.0)) - 1.0).abs() < 1e-12);
+        // 5 % weighs half, 15 % a tenth.
+        assert!((distance_weight(2.0, Some(0.1)) - 0.5).abs() < 1e-12);
+        assert!((distance_weight(-2.0, Some(0.3)) - 0.1).abs() < 1e-12);
+        assert!(distance_weight(0.0, Some(0.3)).abs() < 1e-12);
+        let device = Device::flex();
+        let zeros = Tensor::<2>::zeros([2, 3], &device);
+        let translation = Tensor::<2>::from_data([[0.0, 0.6, 0.8], [3.0, 0.0, -4.0]], &device);
+        let motion = Motion::new(zeros, translation);
+        let d = Tensor::<1>::from_data([1.5, 4.0], &device);
+        let weight = Tensor::<1>::from_data([0.5, 0.1], &device);
+        let loss = speed(&motion, d, Some(weight), &motion.rotation, 0.0);
+        // (0.5 · 0.5 + 0.1 · 1) / 2.
+        assert!((loss.into_scalar::<f32>() - 0.175).abs() < 1e-5);
     }
 
     #[test]
@@ -119,7 +161,7 @@ mod tests {
         let motion = Motion::new(turned, translation.clone());
         let straight = Motion::new(Tensor::zeros([1, 3], &device), translation);
         let one = Tensor::<1>::ones([1], &device);
-        let loss = speed(&motion, one, &straight.rotation, 1.0).into_scalar::<f32>();
+        let loss = speed(&motion, one, None, &straight.rotation, 1.0).into_scalar::<f32>();
         assert!((loss - 0.02).abs() < 1e-5, "{loss}");
     }
 
@@ -164,7 +206,11 @@ mod tests {
         );
         // ‖t̂‖ is 1.19, not 0.7.
         check_gradient("speed", point, &|motion| {
-            speed(motion, distance(), &measured.rotation, 0.3)
+            speed(motion, distance(), None, &measured.rotation, 0.3)
+        });
+        check_gradient("weighted speed", point, &|motion| {
+            let weight = Tensor::<1>::from_data([0.4], &device);
+            speed(motion, distance(), Some(weight), &measured.rotation, 0.3)
         });
         // Neither the same translation nor the same rotation.
         check_gradient("motion", point, &|predicted| motion(predicted, &measured));

@@ -55,7 +55,7 @@ pub(crate) struct FrameFile {
 }
 
 impl FrameFile {
-    pub fn new(file: String, meta: &Metadata) -> Self {
+    pub(crate) fn new(file: String, meta: &Metadata) -> Self {
         let since = meta
             .modified()
             .ok()
@@ -83,7 +83,7 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    pub fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         Self {
             name: name.to_owned(),
             ..Self::default()
@@ -91,7 +91,7 @@ impl Entry {
     }
 
     /// Takes in a file. Of two of a kind the first in the order of names stays (`.npy`, whose metres are exact, before `.png`).
-    pub fn add(&mut self, kind: FileKind, file: FrameFile) {
+    pub(crate) fn add(&mut self, kind: FileKind, file: FrameFile) {
         let place = match kind {
             FileKind::Sidecar => &mut self.sidecar,
             FileKind::Depth => &mut self.depth,
@@ -105,7 +105,7 @@ impl Entry {
     }
 
     /// A number that changes with any of the files.
-    pub fn revision(&self) -> u64 {
+    pub(crate) fn revision(&self) -> u64 {
         let mut hash = DefaultHasher::new();
         let files = [
             &self.sidecar,

@@ -29,7 +29,7 @@ pub(super) struct Listing {
 }
 
 impl Listing {
-    pub fn new(folder: &Path) -> Self {
+    pub(super) fn new(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
             entries: Vec::new(),
@@ -39,19 +39,19 @@ impl Listing {
         }
     }
 
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
 
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.entries.len()
     }
 
-    pub fn entry(&self, name: &str) -> Option<&Entry> {
+    pub(super) fn entry(&self, name: &str) -> Option<&Entry> {
         self.places.get(name).map(|i| &self.entries[*i])
     }
 
-    pub fn range(&self, from: usize, count: usize) -> Vec<Entry> {
+    pub(super) fn range(&self, from: usize, count: usize) -> Vec<Entry> {
         self.entries
             .iter()
             .skip(from)
@@ -61,7 +61,7 @@ impl Listing {
     }
 
     /// Lists the folder again if it may have changed.
-    pub fn refresh(&mut self) -> io::Result<()> {
+    pub(super) fn refresh(&mut self) -> io::Result<()> {
         let changed = std::fs::metadata(&self.folder)?
             .modified()
             .unwrap_or(SystemTime::UNIX_EPOCH);
@@ -125,7 +125,7 @@ impl Listing {
     }
 
     /// Reads the small files of frames that are not known yet, for a while.
-    pub fn summarise(&mut self) {
+    pub(super) fn summarise(&mut self) {
         let begin = Instant::now();
         for entry in self.entries.iter_mut().filter(|e| e.summary.is_none()) {
             if begin.elapsed() > READING_TIME {
@@ -137,7 +137,7 @@ impl Listing {
     }
 
     /// The list as sent to the page: columns with one entry per frame.
-    pub fn json(&self, known: Option<u64>, failure: Option<String>) -> Value {
+    pub(super) fn json(&self, known: Option<u64>, failure: Option<String>) -> Value {
         let version = self.version;
         if known == Some(version) && failure.is_none() {
             return json!({ "version": version, "unchanged": true });

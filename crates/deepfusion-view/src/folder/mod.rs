@@ -32,7 +32,7 @@ pub(crate) enum Kind {
 
 impl Kind {
     /// A description for messages.
-    pub fn describe(self) -> &'static str {
+    pub(crate) fn describe(self) -> &'static str {
         match self {
             Self::Predictions => "predictions",
             Self::Training => "a training run",

@@ -27,7 +27,7 @@ pub(crate) struct Summary {
 
 impl Summary {
     /// Reads the frame's sidecar and targets. What cannot be read becomes [`Summary::problem`].
-    pub fn read(folder: &Path, entry: &Entry) -> Self {
+    pub(crate) fn read(folder: &Path, entry: &Entry) -> Self {
         let files = SmallFiles::read(folder, entry);
         let mut summary = Self {
             // A sidecar that is being written is a frame that comes.

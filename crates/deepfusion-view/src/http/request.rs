@@ -26,7 +26,7 @@ pub(crate) enum Refusal {
 
 impl Request {
     /// Parses a request's head; `None` while it is incomplete. Returns it with its length in bytes.
-    pub fn parse(bytes: &[u8]) -> Result<Option<(Self, usize)>, Refusal> {
+    pub(crate) fn parse(bytes: &[u8]) -> Result<Option<(Self, usize)>, Refusal> {
         let mut headers = [httparse::EMPTY_HEADER; 64];
         let mut head = httparse::Request::new(&mut headers);
         let taken = match head.parse(bytes).map_err(|_| Refusal::Malformed)? {
@@ -76,7 +76,7 @@ impl Request {
     }
 
     /// A number of the query.
-    pub fn number(&self, key: &str) -> Option<u64> {
+    pub(crate) fn number(&self, key: &str) -> Option<u64> {
         let (_, value) = self.query.iter().find(|(k, _)| k == key)?;
         value.parse().ok()
     }

@@ -17,7 +17,7 @@ const POLICY: &str = "default-src 'self'; img-src 'self' blob: data:; style-src 
 
 impl Response {
     /// A successful response.
-    pub fn ok(content_type: &'static str, body: impl Into<Cow<'static, [u8]>>) -> Self {
+    pub(crate) fn ok(content_type: &'static str, body: impl Into<Cow<'static, [u8]>>) -> Self {
         Self {
             status: 200,
             content_type,
@@ -26,12 +26,12 @@ impl Response {
     }
 
     /// A value as JSON.
-    pub fn json(value: &serde_json::Value) -> Self {
+    pub(crate) fn json(value: &serde_json::Value) -> Self {
         Self::ok("application/json", value.to_string().into_bytes())
     }
 
     /// A failure, as the page shows it.
-    pub fn problem(status: u16, problem: &str, hint: Option<&str>) -> Self {
+    pub(crate) fn problem(status: u16, problem: &str, hint: Option<&str>) -> Self {
         let value = serde_json::json!({ "error": problem, "hint": hint });
         Self {
             status,
@@ -54,7 +54,12 @@ impl Response {
     }
 
     /// Writes head and body; the body's length alone for HEAD.
-    pub fn write(&self, out: &mut impl Write, head_only: bool, keep_alive: bool) -> io::Result<()> {
+    pub(crate) fn write(
+        &self,
+        out: &mut impl Write,
+        head_only: bool,
+        keep_alive: bool,
+    ) -> io::Result<()> {
         let head = format!(
             "HTTP/1.1 {} {}\r\nContent-Type: {}\r\nContent-Length: {}\r\nCache-Control: no-store\r\n\
              X-Content-Type-Options: nosniff\r\nCross-Origin-Resource-Policy: same-origin\r\nReferrer-Policy: no-referrer\r\n\

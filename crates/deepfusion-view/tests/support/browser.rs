@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A page in a headless browser.
-pub struct Browser {
+pub(crate) struct Browser {
     process: Child,
     orders: ChildStdin,
     answers: Receiver<Value>,
@@ -48,7 +48,7 @@ fn program() -> Option<PathBuf> {
 
 impl Browser {
     /// Starts it with a window of the given size; prints a note and returns `None` if there is no browser.
-    pub fn start(width: u32, height: u32) -> Option<Self> {
+    pub(crate) fn start(width: u32, height: u32) -> Option<Self> {
         let Some(program) = program() else {
             eprintln!("no Chromium found (CHROMIUM names one): the page is not tested");
             return None;
@@ -132,7 +132,7 @@ impl Browser {
     }
 
     /// Gives an order and waits for its result.
-    pub fn order(&mut self, method: &str, parameters: Value) -> Value {
+    pub(crate) fn order(&mut self, method: &str, parameters: Value) -> Value {
         self.count += 1;
         let mut order = json!({"id": self.count, "method": method, "params": parameters});
         if let Some(session) = &self.session {
@@ -177,7 +177,7 @@ impl Browser {
     }
 
     /// The value of an expression, or of the promise that it is.
-    pub fn value(&mut self, expression: &str) -> Value {
+    pub(crate) fn value(&mut self, expression: &str) -> Value {
         let parameters =
             json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
         let result = self.order("Runtime.evaluate", parameters);
@@ -190,7 +190,7 @@ impl Browser {
     }
 
     /// Waits until an expression is true.
-    pub fn wait_for(&mut self, expression: &str) {
+    pub(crate) fn wait_for(&mut self, expression: &str) {
         let begin = Instant::now();
         while self.value(&format!("Boolean({expression})")) != json!(true) {
             assert!(
@@ -203,12 +203,12 @@ impl Browser {
     }
 
     /// Opens an address.
-    pub fn open(&mut self, url: &str) {
+    pub(crate) fn open(&mut self, url: &str) {
         self.order("Page.navigate", json!({"url": url}));
     }
 
     /// Moves the mouse.
-    pub fn mouse(&mut self, x: f64, y: f64) {
+    pub(crate) fn mouse(&mut self, x: f64, y: f64) {
         self.order(
             "Input.dispatchMouseEvent",
             json!({"type": "mouseMoved", "x": x, "y": y}),
@@ -216,7 +216,7 @@ impl Browser {
     }
 
     /// Presses a key.
-    pub fn key(&mut self, key: &str) {
+    pub(crate) fn key(&mut self, key: &str) {
         for kind in ["keyDown", "keyUp"] {
             self.order("Input.dispatchKeyEvent", json!({"type": kind, "key": key}));
         }

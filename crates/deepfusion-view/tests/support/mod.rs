@@ -19,12 +19,12 @@ use deepfusion_view::{Folder, Server, Settings};
 use serde_json::{Value, json};
 
 /// The generated pictures' size.
-pub const SIZE: (u32, u32) = (96, 48);
+pub(crate) const SIZE: (u32, u32) = (96, 48);
 /// fx, fy, cx, cy of the generated camera.
-pub const CAMERA: [f64; 4] = [60.0, 58.0, 47.0, 22.5];
+pub(crate) const CAMERA: [f64; 4] = [60.0, 58.0, 47.0, 22.5];
 
 /// Steps of 1/256 m at a pixel of frame `i`: a slope with a hole, other in every frame.
-pub fn steps(i: usize, x: u32, y: u32) -> u16 {
+pub(crate) fn steps(i: usize, x: u32, y: u32) -> u16 {
     if x < 4 && y < 4 {
         0
     } else {
@@ -33,7 +33,7 @@ pub fn steps(i: usize, x: u32, y: u32) -> u16 {
 }
 
 /// The target of every frame, in camera axes: it comes nearer by half a metre a frame.
-pub fn target(i: usize) -> Value {
+pub(crate) fn target(i: usize) -> Value {
     json!({
         "id": 7, "center_m": [1.0, 0.5, 14.0 - 0.5 * i as f64], "size_m": [4.0, 1.8, 1.5], "yaw_rad": 0.6, "distance_m": 14.0,
         "velocity_mps": [0.0, 0.0, -5.0], "moving": true, "confidence": 0.9,
@@ -41,7 +41,7 @@ pub fn target(i: usize) -> Value {
 }
 
 /// Writes frame `i` as `perceive` does: a picture, depth, targets, and the sidecar last.
-pub fn write_frame(folder: &Path, i: usize) {
+pub(crate) fn write_frame(folder: &Path, i: usize) {
     let (width, height) = SIZE;
     let name = format!("{i:06}");
     // A colour that nothing else in the page has.
@@ -73,7 +73,7 @@ pub fn write_frame(folder: &Path, i: usize) {
 }
 
 /// Writes a sidecar, with some fields replaced.
-pub fn write_sidecar(folder: &Path, name: &str, replaced: &Value) {
+pub(crate) fn write_sidecar(folder: &Path, name: &str, replaced: &Value) {
     let mut sidecar = json!({
         "image": "gone/street.mp4", "size": [SIZE.0, SIZE.1], "unit": "metres along the camera's axis (z)", "intrinsics": CAMERA,
         "intrinsics_from": "given", "scale_trusted": true, "focal_factor": 1.0, "window": [0, 0, SIZE.0, SIZE.1], "depth_m": [5.9, 21.0],
@@ -85,14 +85,14 @@ pub fn write_sidecar(folder: &Path, name: &str, replaced: &Value) {
 }
 
 /// A folder of `count` frames.
-pub fn results(count: usize) -> tempfile::TempDir {
+pub(crate) fn results(count: usize) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     (0..count).for_each(|i| write_frame(folder.path(), i));
     folder
 }
 
 /// A server at work; it ends when this goes.
-pub struct Running {
+pub(crate) struct Running {
     pub address: SocketAddr,
     pub url: String,
     stop: Arc<AtomicBool>,
@@ -100,7 +100,7 @@ pub struct Running {
 }
 
 impl Running {
-    pub fn start(folder: &Path, other: Option<&Path>) -> Self {
+    pub(crate) fn start(folder: &Path, other: Option<&Path>) -> Self {
         let open = |p: &Path| Folder::open(p).unwrap();
         let server = Server::bind(any_port(), open(folder), other.map(open)).unwrap();
         let (address, url) = (server.address(), server.url());
@@ -116,7 +116,7 @@ impl Running {
     }
 
     /// Status and body of a path.
-    pub fn get(&self, path: &str) -> (u16, Vec<u8>) {
+    pub(crate) fn get(&self, path: &str) -> (u16, Vec<u8>) {
         let request = format!(
             "GET {path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n",
             self.address
@@ -125,14 +125,14 @@ impl Running {
     }
 
     /// The JSON of a path that is there.
-    pub fn json(&self, path: &str) -> Value {
+    pub(crate) fn json(&self, path: &str) -> Value {
         let (status, body) = self.get(path);
         assert_eq!(status, 200, "{path}: {}", String::from_utf8_lossy(&body));
         serde_json::from_slice(&body).unwrap()
     }
 
     /// Status and body of what is answered to these bytes.
-    pub fn raw(&self, request: &[u8]) -> (u16, Vec<u8>) {
+    pub(crate) fn raw(&self, request: &[u8]) -> (u16, Vec<u8>) {
         let mut stream = TcpStream::connect(self.address).unwrap();
         stream
             .set_read_timeout(Some(Duration::from_secs(20)))
@@ -145,7 +145,7 @@ impl Running {
 }
 
 /// An answer's status and body.
-pub fn split(answer: &[u8]) -> (u16, Vec<u8>) {
+pub(crate) fn split(answer: &[u8]) -> (u16, Vec<u8>) {
     let end = answer
         .windows(4)
         .position(|w| w == b"\r\n\r\n")
@@ -165,7 +165,7 @@ impl Drop for Running {
 }
 
 /// This machine, whatever port is free.
-pub fn any_port() -> Settings {
+pub(crate) fn any_port() -> Settings {
     Settings {
         host: [127, 0, 0, 1].into(),
         port: 0,

@@ -10,7 +10,7 @@ use burn::tensor::Device;
 use deepfusion_data::{Cameras, GtKind};
 use deepfusion_eval::{GroundTruth, Protocol, Report};
 use deepfusion_jobs::evaluation::{
-    Truth, default_crop, evaluate_datasets, predict, trivial_from_datasets,
+    Truth, baseline_from_datasets, default_crop, evaluate_datasets, predict,
 };
 use deepfusion_jobs::recordings::{camera_word, training_recordings};
 use deepfusion_model::{CheckpointKind, Preset, RunFolder, TrainConfig, ViewMotion};
@@ -53,7 +53,7 @@ fn settings<'de, D: Deserializer<'de>>(from: D) -> Result<TrainConfig, D::Error>
 const PLAN: &str = "ablate.toml";
 
 /// `deepfusion ablate`.
-pub fn run(args: &AblateArgs) -> Result<()> {
+pub(super) fn run(args: &AblateArgs) -> Result<()> {
     let (out, plan) = if args.resume {
         let out = args.out.clone().unwrap_or_default();
         let mut plan = read_plan(&out)?;
@@ -308,7 +308,7 @@ fn measure(run: &Path, plan: &Plan, device: ComputeDevice) -> Result<Report> {
         &eval_sets,
         &mut Truth::Scans(GtKind::Z),
         &protocol,
-        Some(trivial_from_datasets(&train_sets, GtKind::Z)?),
+        Some(baseline_from_datasets(&train_sets, GtKind::Z)?),
         &mut |dataset, frame| {
             let image = dataset.load_image(frame)?;
             let camera = dataset.intrinsics(frame);
@@ -321,7 +321,7 @@ fn measure(run: &Path, plan: &Plan, device: ComputeDevice) -> Result<Report> {
 
 type Datasets = Vec<deepfusion_data::Dataset>;
 
-/// The recordings trained on, for the trivial row, and those measured on.
+/// The recordings trained on, for the mean-depth baseline, and those measured on.
 fn open_eval_data(plan: &Plan) -> Result<(Datasets, Datasets)> {
     let trained_on = || -> Result<Datasets> {
         let recordings = training_recordings(&plan.config)?;
@@ -350,7 +350,7 @@ fn write_tables(out: &Path, plan: &Plan, results: &[RunResult]) -> Result<()> {
     ));
     if let Some(trivial) = results.iter().find_map(|r| r.report.trivial.as_ref()) {
         text.push_str(&format!(
-            "trivial row: abs_rel {:.3} unscaled, {:.3} median-scaled\n",
+            "mean-depth baseline: abs_rel {:.3} unscaled, {:.3} median-scaled\n",
             trivial.unscaled.abs_rel, trivial.median_scaled.abs_rel
         ));
     }

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 /// One row of the table: what is switched on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Row {
+pub(super) struct Row {
     /// Hierarchical context encoding.
     pub hce: bool,
     /// The speed loss.
@@ -16,7 +16,7 @@ pub struct Row {
 
 impl Row {
     /// The rows of the paper's Table 3: everything on first, then what lacks something.
-    pub fn table_3() -> Vec<Self> {
+    pub(super) fn table_3() -> Vec<Self> {
         let combination = |off: u8| Self {
             hce: off & 1 == 0,
             speed: off & 2 == 0,
@@ -27,7 +27,7 @@ impl Row {
     }
 
     /// Every row that can be asked for: those of Table 3, and everything on with three frames.
-    pub fn all() -> Vec<Self> {
+    pub(super) fn all() -> Vec<Self> {
         let three_frames = Self {
             hce: true,
             speed: true,
@@ -39,7 +39,7 @@ impl Row {
 
     /// Its name in file names and on the command line: what is on, joined by `+`; `none`, or `minimum` for the row with
     /// three frames.
-    pub fn name(self) -> String {
+    pub(super) fn name(self) -> String {
         if self.minimum {
             return "minimum".into();
         }
@@ -66,7 +66,7 @@ impl Row {
     ///
     /// # Errors
     /// [`Error::Config`] where the shared settings and the row's cannot be together.
-    pub fn config(self, shared: &TrainConfig) -> Result<TrainConfig, Error> {
+    pub(super) fn config(self, shared: &TrainConfig) -> Result<TrainConfig, Error> {
         let mut config = shared.clone();
         for (on, term) in [
             (self.hce, "hce"),

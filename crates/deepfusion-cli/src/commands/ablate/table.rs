@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 /// What one run came to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RunResult {
+pub(super) struct RunResult {
     /// Its row.
     pub row: Row,
     /// Its seed.
@@ -58,7 +58,7 @@ const COLUMNS: [Column; 13] = [
 
 /// A figure over the seeds of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Spread {
+pub(super) struct Spread {
     /// The mean.
     pub mean: f64,
     /// The standard deviation between seeds (n − 1); absent for one seed.
@@ -86,7 +86,7 @@ impl Spread {
 
 /// A row with its figures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TableRow {
+pub(super) struct TableRow {
     /// What is on.
     #[serde(flatten)]
     pub row: Row,
@@ -108,7 +108,7 @@ fn by_name<S: serde::Serializer>(
 }
 
 /// The rows of `rows` that have a run, with what their runs came to.
-pub fn table(rows: &[Row], results: &[RunResult]) -> Vec<TableRow> {
+pub(super) fn table(rows: &[Row], results: &[RunResult]) -> Vec<TableRow> {
     let of_row = |row: &Row| {
         let runs: Vec<_> = results.iter().filter(|r| r.row == *row).collect();
         let figure = |column: &Column| {
@@ -145,7 +145,7 @@ fn views(row: Row) -> &'static str {
 }
 
 /// For people at a terminal.
-pub fn text(table: &[TableRow]) -> String {
+pub(super) fn text(table: &[TableRow]) -> String {
     let mark = |on: bool| if on { "x" } else { "·" }.to_owned();
     let mut lines = vec![
         ["HCE", "speed", "flow", "frames", "seeds"]
@@ -192,7 +192,7 @@ fn aligned(lines: &[Vec<String>], left: usize) -> String {
 }
 
 /// For a spreadsheet: mean and standard deviation in columns of their own, every digit.
-pub fn csv(table: &[TableRow]) -> String {
+pub(super) fn csv(table: &[TableRow]) -> String {
     let mut out = String::from("row,hce,speed,flow,minimum,seeds");
     for column in &COLUMNS {
         let _ = write!(out, ",{0},{0}_std", column.name);
@@ -216,7 +216,7 @@ pub fn csv(table: &[TableRow]) -> String {
 }
 
 /// For a README.
-pub fn markdown(table: &[TableRow]) -> String {
+pub(super) fn markdown(table: &[TableRow]) -> String {
     let columns = shown(table);
     let mut out = String::from("| HCE | speed | flow | frames | seeds |");
     for i in &columns {
@@ -246,7 +246,7 @@ pub fn markdown(table: &[TableRow]) -> String {
 }
 
 /// For a paper: a `tabular` that needs amssymb's check mark.
-pub fn latex(table: &[TableRow]) -> String {
+pub(super) fn latex(table: &[TableRow]) -> String {
     let columns = shown(table);
     let mut out = format!(
         "\\begin{{tabular}}{{cccl{}}}\n\\hline\n",

@@ -70,7 +70,7 @@ struct Stages {
 }
 
 /// `deepfusion bench`.
-pub fn run(args: &BenchArgs) -> Result<()> {
+pub(super) fn run(args: &BenchArgs) -> Result<()> {
     let (name, config, mut runner) = network(args)?;
     let modules = Modules::new(&config);
     let table = modules.table();
@@ -364,7 +364,7 @@ fn median<T>(repeats: usize, mut work: impl FnMut() -> Result<T>) -> Result<f64>
 }
 
 /// The most memory this process ever had, where the system tells (Linux).
-pub fn peak_rss_mb() -> Option<f64> {
+pub(super) fn peak_rss_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
     let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// A part of the networks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Module {
+pub(super) struct Module {
     name: String,
     /// Numbers that are learned.
     parameters: u64,
@@ -34,13 +34,13 @@ impl From<ModuleCost> for Module {
 
 /// The depth network's parts in the order in which they run, and the pose network, which only trains.
 #[derive(Debug)]
-pub struct Modules {
+pub(super) struct Modules {
     pub depth: Vec<Module>,
     pub pose: Module,
 }
 
 impl Modules {
-    pub fn new(config: &TrainConfig) -> Self {
+    pub(super) fn new(config: &TrainConfig) -> Self {
         let depth = config.depth_net.costs(config.size);
         Self {
             depth: depth.into_iter().map(Module::from).collect(),
@@ -49,21 +49,21 @@ impl Modules {
     }
 
     /// Of the depth network.
-    pub fn parameters(&self) -> u64 {
+    pub(super) fn parameters(&self) -> u64 {
         self.depth.iter().map(|m| m.parameters).sum()
     }
 
     /// Of the depth network, for one image.
-    pub fn multiply_adds(&self) -> u64 {
+    pub(super) fn multiply_adds(&self) -> u64 {
         self.depth.iter().map(|m| m.multiply_adds).sum()
     }
 
     /// All of them.
-    pub fn into_list(self) -> Vec<Module> {
+    pub(super) fn into_list(self) -> Vec<Module> {
         self.depth.into_iter().chain([self.pose]).collect()
     }
 
-    pub fn table(&self) -> String {
+    pub(super) fn table(&self) -> String {
         let row = |m: &Module| {
             format!(
                 "{:18} {:10.3} {:12.3} {:11.1} {:10.1}\n",

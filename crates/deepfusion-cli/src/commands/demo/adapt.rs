@@ -45,7 +45,7 @@ struct Typed {
 }
 
 /// The demo of an embedded network.
-pub fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
+pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     say("1/4 simulating a drive along a street that no network has seen");
     let street = SimConfig {
         seed: demo.args.seed.wrapping_add(TEST_SEED),
@@ -216,7 +216,7 @@ fn report(
     .facts(&[
         ("Abs Rel at first sight", &number(before.unscaled.abs_rel)),
         ("after learning", &number(after.unscaled.abs_rel)),
-        ("trivial row", &trivial.map_or("-".into(), number)),
+        ("mean-depth baseline", &trivial.map_or("-".into(), number)),
         ("scale (1 is metric)", &number(after.scale.median)),
         ("first image to depth", &format!("{first_ms:.0} ms")),
         ("time", &clock(demo.start.elapsed().as_secs_f64())),

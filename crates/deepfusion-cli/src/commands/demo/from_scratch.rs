@@ -21,7 +21,7 @@ const FRAMES_PER_SECOND: [f64; 6] = [5.0, 8.0, 12.0, 18.0, 26.0, 36.0];
 const STREET_FRAMES: usize = 260;
 /// Their pictures: larger than what the network sees, small enough to draw quickly.
 const STREET_SIZE: (u32, u32) = (320, 96);
-/// Every n-th of their frames has a scan, for the trivial row alone.
+/// Every n-th of their frames has a scan, for the mean-depth baseline alone.
 const STREET_SCAN_EVERY: usize = 20;
 /// Frames of the street that is measured on, and how many of them have a scan.
 const TEST_FRAMES: usize = 200;
@@ -32,7 +32,7 @@ const STEPS: usize = 1500;
 const SIZE: (usize, usize) = (192, 64);
 
 /// The demo that needs no embedded network.
-pub fn run(demo: &Demo) -> Result<()> {
+pub(super) fn run(demo: &Demo) -> Result<()> {
     say("1/4 simulating streets to learn on, and another to be measured on");
     let seed = demo.args.seed;
     let street = |(i, fps): (usize, f64)| SimConfig {
@@ -90,7 +90,7 @@ pub fn run(demo: &Demo) -> Result<()> {
     )
     .facts(&[
         ("Abs Rel, unscaled", &number(report.unscaled.abs_rel)),
-        ("Abs Rel, trivial row", &trivial.map_or("-".into(), number)),
+        ("Abs Rel, mean-depth baseline", &trivial.map_or("-".into(), number)),
         ("scale (1 is metric)", &number(report.scale.median)),
         ("within 25 %", &format!("{:.1} %", 100.0 * report.unscaled.a1)),
         ("time", &clock(demo.start.elapsed().as_secs_f64())),

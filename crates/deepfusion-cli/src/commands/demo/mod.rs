@@ -13,7 +13,7 @@ use burn::tensor::Device;
 use deepfusion_data::{Dataset, GtKind};
 use deepfusion_eval::{Crop, GroundTruth, Protocol};
 use deepfusion_jobs::evaluation::{
-    Evaluated, Truth, evaluate_datasets, predict, trivial_from_datasets,
+    Evaluated, Truth, baseline_from_datasets, evaluate_datasets, predict,
 };
 use deepfusion_model::{RunFolder, TrainConfig};
 use deepfusion_runtime::DepthEstimator;
@@ -37,7 +37,7 @@ const TEST_SEED: u64 = 1_000_003;
 const DEMO: &str = "the demo";
 
 /// `deepfusion demo`.
-pub fn run(args: &DemoArgs) -> Result<()> {
+pub(super) fn run(args: &DemoArgs) -> Result<()> {
     let embedded = if args.from_scratch {
         None
     } else {
@@ -131,7 +131,7 @@ fn measure(
         test,
         &mut Truth::Scans(GtKind::Z),
         &protocol,
-        Some(trivial_from_datasets(train, GtKind::Z)?),
+        Some(baseline_from_datasets(train, GtKind::Z)?),
         &mut |dataset, frame| {
             interrupt::check(DEMO)?;
             let image = dataset.load_image(frame)?;

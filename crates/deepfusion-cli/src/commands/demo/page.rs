@@ -17,15 +17,15 @@ use crate::interrupt;
 use crate::output;
 
 /// How both ways measure.
-pub const PROTOCOL: &str = "Scans of the simulated LiDAR, Garg's crop, 80 m. Unscaled: the prediction as it is, in metres. \
+pub(super) const PROTOCOL: &str = "Scans of the simulated LiDAR, Garg's crop, 80 m. Unscaled: the prediction as it is, in metres. \
     Median-scaled: each image multiplied by median(truth) / median(prediction), as methods without a metric scale need. The \
-    trivial row predicts each pixel's mean depth over the training streets.";
+    mean-depth baseline predicts each pixel's mean depth over the training streets.";
 
 /// Points of the cloud reach so far, metres.
 const CLOUD_REACH_M: f32 = 60.0;
 
 /// A frame and the depth that a network sees in it.
-pub struct Shown {
+pub(super) struct Shown {
     number: u64,
     image: RgbImage,
     camera: Intrinsics,
@@ -38,7 +38,7 @@ pub struct Shown {
 
 impl Shown {
     /// Predicts a frame of a simulated drive.
-    pub fn of(
+    pub(super) fn of(
         demo: &Demo,
         estimator: &mut DepthEstimator,
         drive: &Dataset,
@@ -64,7 +64,7 @@ impl Shown {
     }
 
     /// The frame's number.
-    pub fn number(&self) -> u64 {
+    pub(super) fn number(&self) -> u64 {
         self.number
     }
 
@@ -73,7 +73,7 @@ impl Shown {
     }
 
     /// The image beside its depth; `mark` is added to the files' names.
-    pub fn add_to(&self, page: HtmlReport, what: &str, mark: &str) -> Result<HtmlReport> {
+    pub(super) fn add_to(&self, page: HtmlReport, what: &str, mark: &str) -> Result<HtmlReport> {
         let side = side_by_side(&self.image, &self.depth, &self.scale)?;
         save_png(&side, &self.path(&format!("side{mark}")))?;
         write_depth_png(&self.depth, &self.path(&format!("depth{mark}")))?;
@@ -82,7 +82,7 @@ impl Shown {
     }
 
     /// The exact depth, and where the prediction is wrong.
-    pub fn add_truth_to(&self, page: HtmlReport) -> Result<HtmlReport> {
+    pub(super) fn add_truth_to(&self, page: HtmlReport) -> Result<HtmlReport> {
         let exact = with_depth_legend(&depth_picture(&self.truth, &self.scale), &self.scale);
         save_png(&exact, &self.path("truth"))?;
         let page = page.picture("The same frame: exact depth", &exact, PictureFormat::Png)?;
@@ -90,14 +90,19 @@ impl Shown {
     }
 
     /// Where the prediction is wrong.
-    pub fn add_error_to(&self, page: HtmlReport, mark: &str, caption: &str) -> Result<HtmlReport> {
+    pub(super) fn add_error_to(
+        &self,
+        page: HtmlReport,
+        mark: &str,
+        caption: &str,
+    ) -> Result<HtmlReport> {
         let errors = error_picture(&self.image, &self.depth, &self.truth)?;
         save_png(&errors, &self.path(mark))?;
         Ok(page.picture(caption, &errors, PictureFormat::Png)?)
     }
 
     /// The point cloud from two sides, and as a PLY file.
-    pub fn add_cloud_to(&self, mut page: HtmlReport, path: &Path) -> Result<HtmlReport> {
+    pub(super) fn add_cloud_to(&self, mut page: HtmlReport, path: &Path) -> Result<HtmlReport> {
         let colours = Some(self.image.as_raw().as_slice());
         let cloud = PointCloud::from_depth(&self.depth, &self.camera, colours, CLOUD_REACH_M)?;
         let mut bytes = Vec::new();

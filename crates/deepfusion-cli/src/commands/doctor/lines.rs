@@ -8,7 +8,7 @@ use deepfusion_doctor::{Outcome, Severity, Status};
 type Checked<'a> = (Option<&'a str>, &'a Outcome);
 
 /// The checks as lines of text.
-pub fn of(checks: &[Checked<'_>]) -> String {
+pub(super) fn of(checks: &[Checked<'_>]) -> String {
     let mut text = String::new();
     for (check, how) in rows(checks) {
         let _ = writeln!(text, "  {check:15} {how}");
@@ -17,7 +17,7 @@ pub fn of(checks: &[Checked<'_>]) -> String {
 }
 
 /// The checks by name, in the order in which they come, each with how it came out in all drives.
-pub fn rows<'a>(checks: &[Checked<'a>]) -> Vec<(&'a str, String)> {
+pub(super) fn rows<'a>(checks: &[Checked<'a>]) -> Vec<(&'a str, String)> {
     let mut names: Vec<&str> = Vec::new();
     for (_, outcome) in checks {
         if !names.contains(&outcome.check) {

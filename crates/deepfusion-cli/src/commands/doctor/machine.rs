@@ -35,7 +35,7 @@ struct Tool {
 }
 
 /// Tells it.
-pub fn run(json: bool) -> Result<()> {
+pub(super) fn run(json: bool) -> Result<()> {
     let machine = Machine::look();
     if json {
         output::print_json(&machine)

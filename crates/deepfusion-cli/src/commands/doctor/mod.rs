@@ -8,36 +8,67 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use deepfusion_data::{DatasetKind, OpenOptions};
-use deepfusion_doctor::{Diagnosis, Severity, doctor_with};
+use deepfusion_doctor::{Diagnosis, Severity, doctor_log, doctor_with, is_log};
+use deepfusion_logs::ReadOptions;
 
 use crate::cli::{CameraIntrinsics, DoctorArgs};
+use crate::commands::clocks;
 use crate::error::CliError;
 use crate::failure::{Reportable, Result};
 use crate::output;
 use crate::progress::say;
 
 /// `deepfusion doctor`.
-pub fn run(args: &DoctorArgs) -> Result<()> {
+pub(super) fn run(args: &DoctorArgs) -> Result<()> {
     let Some(path) = &args.path else {
         return machine::run(args.json);
     };
-    let options = OpenOptions {
+    if is_log(path) {
+        return log(path, args);
+    }
+    let mut options = OpenOptions {
         intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
         hfov_deg: args.hfov,
-        camera_ahead_s: args.camera_ahead_s,
+        topics: args.topics.clone(),
         ..OpenOptions::default()
     };
-    let diagnosis = doctor_with(path, &options)
-        .unwrap_or_else(|error| Diagnosis::unopened(error.message(), error.remedy()));
-    if args.json {
-        output::print_json(&serde_json::json!(diagnosis.record()))?;
-    } else {
-        output::print(&told(&diagnosis, args.verbose))?;
-    }
+    options.camera_ahead_s = clocks::seconds_of(args.clock_offset, path, &options)?;
+    let diagnosis = doctor_with(path, &options).unwrap_or_else(|error| {
+        Diagnosis::unopened(error.message(), error.remedy()).with_log_within(path)
+    });
+    show(&diagnosis, args)?;
     if let Some(file) = &args.report {
         report::write(path, &options, &diagnosis, file)?;
         say(&format!("report: {}", file.display()));
     }
+    verdict(path, &diagnosis)
+}
+
+/// A log of speeds by itself.
+fn log(path: &Path, args: &DoctorArgs) -> Result<()> {
+    let options = ReadOptions {
+        time: args.time.clone(),
+        speed: args.speed.clone(),
+        unit: args.unit,
+        dbc: args.dbc.clone(),
+    };
+    let diagnosis = doctor_log(path, &options);
+    show(&diagnosis, args)?;
+    if args.report.is_some() {
+        say("no report: a log by itself has nothing to be drawn");
+    }
+    verdict(path, &diagnosis)
+}
+
+fn show(diagnosis: &Diagnosis, args: &DoctorArgs) -> Result<()> {
+    if args.json {
+        output::print_json(&serde_json::json!(diagnosis.record()))
+    } else {
+        output::print(&told(diagnosis, args.verbose))
+    }
+}
+
+fn verdict(path: &Path, diagnosis: &Diagnosis) -> Result<()> {
     let errors = diagnosis.count(Severity::Error);
     match errors {
         0 => Ok(()),
@@ -58,7 +89,9 @@ fn told(diagnosis: &Diagnosis, verbose: bool) -> String {
     for drive in &diagnosis.drives {
         // Only KITTI numbers its cameras.
         let camera = match drive.kind {
-            DatasetKind::KittiRaw => format!(" (camera {})", drive.camera),
+            DatasetKind::KittiRaw | DatasetKind::KittiOdometry | DatasetKind::Kitti360 => {
+                format!(" (camera {})", drive.camera)
+            }
             _ => String::new(),
         };
         let _ = writeln!(

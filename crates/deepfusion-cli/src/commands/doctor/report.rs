@@ -10,7 +10,12 @@ use super::lines;
 use crate::failure::Result;
 
 /// Writes the page.
-pub fn write(path: &Path, options: &OpenOptions, diagnosis: &Diagnosis, file: &Path) -> Result<()> {
+pub(super) fn write(
+    path: &Path,
+    options: &OpenOptions,
+    diagnosis: &Diagnosis,
+    file: &Path,
+) -> Result<()> {
     let mut report = HtmlReport::new("Doctor", path.display().to_string());
     let findings = diagnosis.findings();
     let rows: Vec<Vec<String>> = findings

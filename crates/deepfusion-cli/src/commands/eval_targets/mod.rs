@@ -31,7 +31,7 @@ struct Report {
 }
 
 /// `deepfusion eval-targets`.
-pub fn run(args: &EvalTargetsArgs) -> Result<()> {
+pub(super) fn run(args: &EvalTargetsArgs) -> Result<()> {
     let source = source(args)?;
     let config = read_config(args.config.as_deref(), source.settings())?;
     let out = match &args.out {

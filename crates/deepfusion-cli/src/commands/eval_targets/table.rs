@@ -1,7 +1,7 @@
 use deepfusion_perception::TargetScore;
 
 /// The score in words.
-pub fn text(depth: &str, score: &TargetScore) -> String {
+pub(super) fn text(depth: &str, score: &TargetScore) -> String {
     let share = |value: Option<f64>| value.map_or("–".into(), |v| format!("{:.1} %", 100.0 * v));
     let number =
         |value: Option<f64>, unit: &str| value.map_or("–".into(), |v| format!("{v:.2} {unit}"));

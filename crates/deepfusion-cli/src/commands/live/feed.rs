@@ -15,7 +15,7 @@ const LOOK_UP: Duration = Duration::from_millis(100);
 
 /// Why a run over a live source came to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ending {
+pub(crate) enum Ending {
     /// The stream was over.
     Stream,
     /// `--frames` or `--duration`.
@@ -26,7 +26,7 @@ pub enum Ending {
 
 impl Ending {
     /// In words.
-    pub fn told(self) -> &'static str {
+    pub(crate) fn told(self) -> &'static str {
         match self {
             Self::Stream => "the stream ended",
             Self::Enough => "as many as were asked for",
@@ -36,7 +36,7 @@ impl Ending {
 }
 
 /// The frames of a source until it ends, is lost, or enough of them were seen.
-pub struct Feed {
+pub(crate) struct Feed {
     source: LiveSource,
     frames: u64,
     duration: Option<Duration>,
@@ -46,7 +46,7 @@ pub struct Feed {
 
 impl Feed {
     /// Begins to read.
-    pub fn open(address: &Address, args: &LiveArgs) -> Result<Self> {
+    pub(crate) fn open(address: &Address, args: &LiveArgs) -> Result<Self> {
         let timeout = seconds(args.timeout_s());
         Ok(Self {
             source: LiveSource::open(address.clone(), timeout)?,
@@ -68,7 +68,7 @@ impl Feed {
     }
 
     /// The whole run's figures; `None` where nothing came.
-    pub fn told(&self) -> Option<String> {
+    pub(crate) fn told(&self) -> Option<String> {
         self.figures.told()
     }
 
@@ -108,7 +108,7 @@ fn seconds(s: f64) -> Duration {
 /// skipped, and none is late.
 ///
 /// What was looked at is written, also where the source is lost: its error comes after that.
-pub fn run<O: Send>(
+pub(crate) fn run<O: Send>(
     feed: &mut Feed,
     mut look: impl FnMut(LiveFrame) -> Result<(O, f64)>,
     write: impl Fn(O) -> Result<()> + Sync,

@@ -56,7 +56,7 @@ impl Latencies {
 
 /// Frames a second, latency and skipped frames: lately, and of the whole run.
 #[derive(Debug)]
-pub struct Figures {
+pub(super) struct Figures {
     lately: Latencies,
     since: Instant,
     all: Latencies,
@@ -67,7 +67,7 @@ pub struct Figures {
 
 impl Figures {
     /// Of nothing yet.
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self {
             lately: Latencies::new(),
             since: Instant::now(),
@@ -78,7 +78,7 @@ impl Figures {
     }
 
     /// Counts a frame that was done, and now and then says how it goes.
-    pub fn add(&mut self, latency_ms: f64, dropped: u64) {
+    pub(super) fn add(&mut self, latency_ms: f64, dropped: u64) {
         let now = Instant::now();
         let first = self.span.map_or(now, |(first, _)| first);
         if self.span.is_none() {
@@ -101,7 +101,7 @@ impl Figures {
     }
 
     /// The whole run in a few words; `None` where nothing came.
-    pub fn told(&self) -> Option<String> {
+    pub(super) fn told(&self) -> Option<String> {
         let (first, last) = self.span?;
         let took = last.duration_since(first).as_secs_f64();
         let rate = match self.all.count() {

@@ -11,12 +11,12 @@ const PREFIX: &str = "live-";
 const DIGITS: usize = 10;
 
 /// The name of a frame by its place in the stream.
-pub fn name(number: u64) -> String {
+pub(super) fn name(number: u64) -> String {
     format!("{PREFIX}{number:0DIGITS$}")
 }
 
 /// The video of all frames.
-pub const VIDEO: &str = "live_video.mp4";
+pub(crate) const VIDEO: &str = "live_video.mp4";
 
 /// Whether a file is an output of a live frame, or of all.
 fn is_of_a_frame(file: &str) -> bool {
@@ -32,7 +32,7 @@ fn is_of_a_frame(file: &str) -> bool {
 
 /// Makes the folder. Frames of an earlier run would stand between those of this one: they are an error, or with
 /// `overwrite` removed.
-pub fn make_room(folder: &Path, overwrite: bool) -> Result<()> {
+pub(crate) fn make_room(folder: &Path, overwrite: bool) -> Result<()> {
     let failed = |e| deepfusion_data::Error::file(folder, e);
     std::fs::create_dir_all(folder).map_err(failed)?;
     for entry in std::fs::read_dir(folder).map_err(failed)? {

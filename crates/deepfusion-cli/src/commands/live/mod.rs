@@ -4,8 +4,8 @@ mod feed;
 mod figures;
 mod folder;
 
-pub use self::feed::{Feed, run};
-pub use self::folder::{VIDEO, make_room};
+pub(super) use self::feed::{Feed, run};
+pub(super) use self::folder::{VIDEO, make_room};
 
 use std::io::IsTerminal;
 
@@ -17,7 +17,7 @@ use crate::error::CliError;
 use crate::failure::Result;
 
 /// The live source among the arguments, if they name one; it is then alone, and options of live sources are for it.
-pub fn source(inputs: &[String], args: &LiveArgs) -> Result<Option<Address>, CliError> {
+pub(super) fn source(inputs: &[String], args: &LiveArgs) -> Result<Option<Address>, CliError> {
     let mut found = inputs.iter().filter_map(|input| Address::parse(input));
     match (found.next(), args.given()) {
         (Some(address), _) if inputs.len() > 1 => Err(CliError::LiveAlone {
@@ -33,7 +33,7 @@ pub fn source(inputs: &[String], args: &LiveArgs) -> Result<Option<Address>, Cli
 }
 
 /// A frame as an input among others: named by its place in the stream.
-pub fn input(address: &Address, frame: &LiveFrame) -> Input {
+pub(super) fn input(address: &Address, frame: &LiveFrame) -> Input {
     Input {
         path: address.to_string().into(),
         name: folder::name(frame.number),

@@ -22,7 +22,7 @@ use crate::failure::Result;
 use crate::model::ModelFacts;
 
 /// A frame that is loaded, and when that began.
-pub struct Begun {
+pub(super) struct Begun {
     pub input: Input,
     pub loaded: Loaded,
     pub prepared: PreparedImage,
@@ -30,7 +30,7 @@ pub struct Begun {
 }
 
 /// A frame with all that was found in it.
-pub struct Found {
+pub(super) struct Found {
     pub input: Input,
     pub loaded: Loaded,
     pub seen: Seen,
@@ -41,7 +41,7 @@ pub struct Found {
 }
 
 /// Looks at frame after frame, and remembers what it saw.
-pub struct Eyes<'a> {
+pub(super) struct Eyes<'a> {
     args: &'a PerceiveArgs,
     estimator: &'a mut DepthEstimator,
     perception: Perception,
@@ -55,7 +55,7 @@ pub struct Eyes<'a> {
 
 impl<'a> Eyes<'a> {
     /// Open, nothing seen yet.
-    pub fn open(
+    pub(super) fn open(
         args: &'a PerceiveArgs,
         model: &ModelSource,
         estimator: &'a mut DepthEstimator,
@@ -78,7 +78,7 @@ impl<'a> Eyes<'a> {
     }
 
     /// The next frame, and how the camera came there.
-    pub fn look(&mut self, begun: Begun, motion: Motion) -> Result<Found> {
+    pub(super) fn look(&mut self, begun: Begun, motion: Motion) -> Result<Found> {
         let Begun {
             input,
             loaded,

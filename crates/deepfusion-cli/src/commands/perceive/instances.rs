@@ -11,17 +11,17 @@ use crate::cli::InstanceArgs;
 use crate::failure::Result;
 
 /// Finds things by their look, where the user gave a model for that.
-pub struct Spotter(Option<InstanceModel>);
+pub(super) struct Spotter(Option<InstanceModel>);
 
 impl Spotter {
     /// Loads the model; `library` is the ONNX Runtime library that was named.
-    pub fn of(args: &InstanceArgs, library: Option<&Path>) -> Result<Self> {
+    pub(super) fn of(args: &InstanceArgs, library: Option<&Path>) -> Result<Self> {
         let load = |path: &Path| InstanceModel::load(path, library, 0, args.limits());
         Ok(Self(args.instances.as_deref().map(load).transpose()?))
     }
 
     /// The things in an image, in the size of its depth.
-    pub fn find(&mut self, image: &RgbImage, depth: &DepthMap) -> Result<Vec<Instance>> {
+    pub(super) fn find(&mut self, image: &RgbImage, depth: &DepthMap) -> Result<Vec<Instance>> {
         let Some(model) = &mut self.0 else {
             return Ok(Vec::new());
         };

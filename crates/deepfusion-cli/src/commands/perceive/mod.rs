@@ -26,7 +26,7 @@ use crate::progress::say;
 use crate::{engine, interrupt, output};
 
 /// `deepfusion perceive`.
-pub fn run(args: &PerceiveArgs) -> Result<()> {
+pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
     let prediction = &args.prediction;
     let out = &prediction.out;
     let model = model::chosen(prediction.model.as_deref())?;
@@ -34,7 +34,7 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
     let all = match (&source, args.speed) {
         (Some(_), _) => Vec::new(),
         (None, Some(_)) => return Err(CliError::OnlyLive { option: "--speed" }.into()),
-        (None, None) => find_inputs(prediction)?,
+        (None, None) => find_inputs(prediction, &model)?,
     };
     check_watched(prediction, source.as_ref(), &all)?;
     let mut config = read_config(args.config.as_deref(), PerceptionConfig::predicted())?;
@@ -69,7 +69,7 @@ pub fn run(args: &PerceiveArgs) -> Result<()> {
 }
 
 /// Settings from a file over `base`, with rows of parked cars unless the file says otherwise.
-pub fn read_config(path: Option<&Path>, base: PerceptionConfig) -> Result<PerceptionConfig> {
+pub(super) fn read_config(path: Option<&Path>, base: PerceptionConfig) -> Result<PerceptionConfig> {
     let base = PerceptionConfig {
         parking_rows: true,
         ..base

@@ -21,7 +21,7 @@ const GRID: (f32, f32) = (0.25, 50.0);
 const BIRDS_EYE: (u32, u32) = (480, 600);
 
 /// Something to be written.
-pub enum Picture {
+pub(crate) enum Picture {
     /// As PNG.
     Image(RgbImage),
     /// As PLY or PCD, by its file's ending.
@@ -29,7 +29,7 @@ pub enum Picture {
 }
 
 /// Draws what was asked for and can be: without ground there is no bird's-eye view.
-pub fn draw(
+pub(crate) fn draw(
     save: &[PerceiveSave],
     image: &RgbImage,
     camera: &Intrinsics,
@@ -122,7 +122,7 @@ fn confidences(
 }
 
 /// Where a frame's picture goes.
-pub fn path(out: &Path, name: &str, save: PerceiveSave) -> PathBuf {
+pub(crate) fn path(out: &Path, name: &str, save: PerceiveSave) -> PathBuf {
     out.join(match save {
         PerceiveSave::DepthPng => format!("{name}_depth.png"),
         PerceiveSave::Sigma => format!("{name}_sigma.npy"),
@@ -136,7 +136,7 @@ pub fn path(out: &Path, name: &str, save: PerceiveSave) -> PathBuf {
 
 impl Picture {
     /// Writes it, atomically.
-    pub fn save(&self, path: &Path) -> Result<()> {
+    pub(crate) fn save(&self, path: &Path) -> Result<()> {
         match self {
             Self::Image(picture) => save_png(picture, path)?,
             Self::Cloud(cloud) => {
@@ -156,7 +156,7 @@ impl Picture {
 }
 
 /// The frame's own image, where it is no file: a viewer needs it.
-pub fn save_jpeg(image: &RgbImage, path: &Path) -> Result<()> {
+pub(crate) fn save_jpeg(image: &RgbImage, path: &Path) -> Result<()> {
     let mut bytes = Vec::new();
     image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 90).encode_image(image)?;
     output::write_unsynced(path, bytes)

@@ -16,7 +16,7 @@ const LAYERS: [&str; 5] = ["conv1", "layer1", "layer2", "layer3", "layer4"];
 
 /// Image and depth, then for each layer its feature, what the decoder reads of it, and the spatial mask; without
 /// context and attention the features alone.
-pub fn picture(
+pub(super) fn picture(
     image: &RgbImage,
     depth: &DepthMap,
     [x, y, width, height]: [u32; 4],

@@ -8,9 +8,9 @@ mod imp {
     use crate::cli::ComputeDevice;
     use crate::commands::device;
 
-    pub use deepfusion_train::Inspector;
+    pub(crate) use deepfusion_train::Inspector;
 
-    pub fn open(network: &StoredNetwork, device: ComputeDevice) -> Result<Inspector> {
+    pub(crate) fn open(network: &StoredNetwork, device: ComputeDevice) -> Result<Inspector> {
         Ok(Inspector::new(network, &device::open(device)?)?)
     }
 }
@@ -25,15 +25,15 @@ mod imp {
     use crate::error::CliError;
 
     /// There is none.
-    pub enum Inspector {}
+    pub(crate) enum Inspector {}
 
     impl Inspector {
-        pub fn inspect(&self, _: &[f32], _: InputSize) -> Vec<LayerMaps> {
+        pub(crate) fn inspect(&self, _: &[f32], _: InputSize) -> Vec<LayerMaps> {
             match *self {}
         }
     }
 
-    pub fn open(_: &StoredNetwork, _: ComputeDevice) -> Result<Inspector> {
+    pub(crate) fn open(_: &StoredNetwork, _: ComputeDevice) -> Result<Inspector> {
         Err(CliError::BuiltWithoutTraining {
             what: "--save features",
         }
@@ -41,4 +41,4 @@ mod imp {
     }
 }
 
-pub use imp::{Inspector, open};
+pub(super) use imp::{Inspector, open};

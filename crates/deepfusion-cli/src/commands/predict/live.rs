@@ -16,7 +16,7 @@ use crate::progress::say;
 use crate::{engine, interrupt, output};
 
 /// `deepfusion predict` of a live source: no manifest, for there is nothing to go on with.
-pub fn run(args: &PredictArgs, model: &ModelSource, address: &Address) -> Result<()> {
+pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) -> Result<()> {
     let (prediction, out) = (&args.prediction, &args.prediction.out);
     if args.shard != Shard::WHOLE {
         return Err(CliError::LiveShard.into());

@@ -11,7 +11,7 @@ use crate::commands::device;
 use crate::model::ModelFacts;
 
 /// For these arguments and this network.
-pub fn made_with(
+pub(super) fn made_with(
     args: &PredictionArgs,
     outputs: &Outputs,
     model: &ModelSource,
@@ -35,6 +35,7 @@ pub fn made_with(
             CameraSource::Hfov(_)
             | CameraSource::Lens(_)
             | CameraSource::Trained(_)
+            | CameraSource::Learned(_)
             | CameraSource::Unknown => None,
         },
         hfov_deg: match camera {

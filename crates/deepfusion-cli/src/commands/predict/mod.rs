@@ -10,7 +10,7 @@ use std::fmt::Display;
 use std::path::PathBuf;
 use std::sync::Once;
 
-use deepfusion_data::{RgbImage, load_photo};
+use deepfusion_data::{OpenOptions, RgbImage, load_photo};
 use deepfusion_eval::IntervalFactors;
 use deepfusion_eval::compare::MetricScale;
 use deepfusion_geometry::Intrinsics;
@@ -44,6 +44,8 @@ pub(super) struct Job<'a> {
     model: &'a ModelSource,
     outputs: Outputs,
     camera: CameraSource,
+    /// Whether the network's run learned its camera.
+    learned: bool,
     preparer: Preparer,
     made_with: MadeWith,
     step: usize,
@@ -78,7 +80,7 @@ pub(super) struct Seen {
 }
 
 /// `deepfusion predict`.
-pub fn run(args: &PredictArgs) -> Result<()> {
+pub(super) fn run(args: &PredictArgs) -> Result<()> {
     let PredictArgs {
         prediction, shard, ..
     } = args;
@@ -88,7 +90,7 @@ pub fn run(args: &PredictArgs) -> Result<()> {
     if let Some(address) = sources::source(&prediction.inputs, &prediction.live)? {
         return live::run(args, &model, &address);
     }
-    let all = find_inputs(prediction)?;
+    let all = find_inputs(prediction, &model)?;
     check_watched(prediction, None, &all)?;
     if prediction.correct_scale && *shard != Shard::WHOLE {
         return Err(CliError::CorrectShard.into());
@@ -176,8 +178,11 @@ fn outcome(summary: Summary<crate::failure::Failure>) -> Result<Result<()>> {
 }
 
 /// The images that the arguments mean; what was noticed of recordings among them is told.
-pub(super) fn find_inputs(args: &PredictionArgs) -> Result<Vec<Input>> {
-    let options = args.open_options();
+pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<Vec<Input>> {
+    let options = OpenOptions {
+        assumed_camera: model.assumed_camera(args.engine.set.as_deref())?,
+        ..args.open_options()
+    };
     Ok(deepfusion_jobs::find_inputs(
         &args.inputs,
         &options,
@@ -247,6 +252,14 @@ fn tell_assumed() {
     );
 }
 
+/// Warns of a camera that nobody gave, and that training found.
+fn tell_learned() {
+    tracing::warn!(
+        "no intrinsics given: the camera that the run learned is taken, so the metres are only as right as that is \
+         (camera_known: false; give --intrinsics, --hfov or --calib)"
+    );
+}
+
 fn predict(
     job: &Job,
     estimator: &mut DepthEstimator,
@@ -295,7 +308,7 @@ fn predict(
 
 impl<'a> Job<'a> {
     /// The work that the arguments ask of a network.
-    pub fn new(
+    pub(super) fn new(
         args: &'a PredictionArgs,
         outputs: Outputs,
         model: &'a ModelSource,
@@ -306,9 +319,16 @@ impl<'a> Job<'a> {
             return Err(CliError::NoUncertainty.into());
         }
         let given = args.intrinsics.map(CameraIntrinsics::numbers);
+        let learned = estimator.config().learned_camera().is_some();
         let camera = match args.hfov {
             Some(degrees) => CameraSource::Hfov(degrees),
-            None => CameraSource::new(given, args.calib.as_deref(), estimator.training_camera())?,
+            None => {
+                let trained = estimator.training_camera();
+                match CameraSource::new(given, args.calib.as_deref(), trained)? {
+                    CameraSource::Trained(k) if learned => CameraSource::Learned(k),
+                    found => found,
+                }
+            }
         };
         let set = args.engine.set.as_deref();
         Ok(Self {
@@ -316,6 +336,7 @@ impl<'a> Job<'a> {
             model,
             made_with: made_with::made_with(args, &outputs, model, estimator, &camera)?,
             camera,
+            learned,
             preparer: estimator.preparer(),
             step: estimator.step,
             intervals: model.interval_factors()?,
@@ -344,7 +365,7 @@ impl<'a> Job<'a> {
     }
 
     /// Reads an image and makes it the network's input.
-    pub fn load(&self, input: &Input) -> Result<(Loaded, PreparedImage)> {
+    pub(super) fn load(&self, input: &Input) -> Result<(Loaded, PreparedImage)> {
         // Before it is read: a change in between is then noticed by the next run.
         let failed = |e| deepfusion_data::Error::file(&input.path, e);
         let mark = FileMark::of(&input.path).map_err(failed)?;
@@ -352,7 +373,11 @@ impl<'a> Job<'a> {
             Some((dataset, index)) => PinholeImage {
                 image: dataset.load_image(*index)?,
                 camera: Some(dataset.intrinsics(*index)),
-                from: "recording",
+                from: match (dataset.camera_assumed(), self.learned) {
+                    (false, _) => "recording",
+                    (true, false) => "assumed",
+                    (true, true) => "learned",
+                },
             },
             None => {
                 let photo = load_photo(&input.path)?;
@@ -360,14 +385,16 @@ impl<'a> Job<'a> {
                 seen.with_context(|| input.path.display().to_string())?
             }
         };
-        if taken.from == "assumed" {
-            self.tell_assumed.call_once(tell_assumed);
+        match taken.from {
+            "assumed" => self.tell_assumed.call_once(tell_assumed),
+            "learned" => self.tell_assumed.call_once(tell_learned),
+            _ => {}
         }
         Ok(self.prepare(mark, taken))
     }
 
     /// Makes a live source's frame the network's input.
-    pub fn load_live(&self, frame: LiveFrame) -> Result<(Loaded, PreparedImage)> {
+    pub(super) fn load_live(&self, frame: LiveFrame) -> Result<(Loaded, PreparedImage)> {
         let mark = FileMark::of_arrival(frame.image.as_raw().len() as u64, frame.arrived_at);
         let taken = self.camera.see(frame.image, None)?;
         Ok(self.prepare(mark, taken))
@@ -394,7 +421,11 @@ impl<'a> Job<'a> {
     }
 
     /// What the network says about an image, and what its layers do where that is asked for.
-    pub fn see(&self, estimator: &mut DepthEstimator, prepared: &PreparedImage) -> Result<Seen> {
+    pub(super) fn see(
+        &self,
+        estimator: &mut DepthEstimator,
+        prepared: &PreparedImage,
+    ) -> Result<Seen> {
         Ok(Seen {
             prediction: estimator.infer(prepared)?,
             layers: match &self.inspector {
@@ -406,7 +437,7 @@ impl<'a> Job<'a> {
     }
 
     /// Writes an image's outputs, then its sidecar, without waiting for the disk.
-    pub fn write(&self, input: &Input, loaded: &Loaded, seen: &Seen) -> Result<Sidecar> {
+    pub(super) fn write(&self, input: &Input, loaded: &Loaded, seen: &Seen) -> Result<Sidecar> {
         let sidecar = self.write_outputs(input, loaded, seen)?;
         write_unsynced(&sidecar, &self.args.out, &input.name)?;
         Ok(sidecar)

@@ -17,7 +17,7 @@ use crate::failure::{Failure, Result};
 use crate::output;
 
 /// What the name of an output ends with, after its image's.
-pub fn ending(save: Save) -> &'static str {
+pub(super) fn ending(save: Save) -> &'static str {
     match save {
         Save::DepthPng => "_depth.png",
         Save::Npy => "_depth.npy",
@@ -32,7 +32,7 @@ pub fn ending(save: Save) -> &'static str {
 }
 
 /// What the network says of an image.
-pub struct Maps<'a> {
+pub(super) struct Maps<'a> {
     pub prediction: &'a Prediction,
     /// At the image's own size.
     pub depth: &'a DepthMap,
@@ -43,7 +43,7 @@ pub struct Maps<'a> {
 }
 
 /// Writes one output, whole or not at all, without waiting for the disk.
-pub fn write(
+pub(super) fn write(
     save: Save,
     (max_depth_m, max_sigma): (f64, Option<f64>),
     image: &RgbImage,

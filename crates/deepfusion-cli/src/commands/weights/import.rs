@@ -14,7 +14,7 @@ use crate::output;
 use crate::progress::say;
 
 /// `deepfusion weights import`.
-pub fn run(files: &[PathBuf], out: &Path) -> Result<()> {
+pub(crate) fn run(files: &[PathBuf], out: &Path) -> Result<()> {
     let device = Device::flex();
     let encoders_only = matches!(files, [file] if !file.is_dir());
     let (config, model) = match files {
@@ -29,6 +29,7 @@ pub fn run(files: &[PathBuf], out: &Path) -> Result<()> {
         best_validation: None,
         skipped: 0,
         encoders_only,
+        focal_ratio: None,
     };
     let path = folder.save(CheckpointKind::Last, &model, None, &state)?;
     say("imported; the scale of imported weights is not metric until they are trained with speeds");
@@ -76,7 +77,7 @@ fn from_resnet(file: &Path, device: &Device) -> Result<(TrainConfig, Model)> {
     config.pose_net = PoseNetConfig::new(depth);
     let mut depth_net = DepthNet::new(&config.depth_net, device)?;
     let mut pose_net = PoseNet::new(&config.pose_net, device)?;
-    depth_net.encoder = load_torchvision_resnet(depth_net.encoder, file)?;
+    depth_net = depth_net.with_torchvision_encoder(file)?;
     pose_net.encoder = load_torchvision_resnet(pose_net.encoder, file)?;
     let model = Model::with_networks(&config, depth_net, pose_net, device);
     Ok((config, model))

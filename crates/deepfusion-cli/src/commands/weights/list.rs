@@ -28,7 +28,7 @@ const KNOWN: [[&str; 4]; 3] = [
 
 /// What `--json` prints of a packed network: its card without the configuration, and what of that one asks for first.
 #[derive(Debug, Serialize)]
-pub struct Listed<'a> {
+pub(crate) struct Listed<'a> {
     name: &'a str,
     /// Whether it is meant where no `--model` is given.
     default: bool,
@@ -78,7 +78,7 @@ impl<'a> From<&'a Card> for Listed<'a> {
 }
 
 /// `deepfusion weights list`.
-pub fn run(json: bool) -> Result<()> {
+pub(crate) fn run(json: bool) -> Result<()> {
     let networks = deepfusion_weights::all()?;
     if json {
         let embedded: Vec<Listed> = networks.iter().map(|n| Listed::from(&n.card)).collect();

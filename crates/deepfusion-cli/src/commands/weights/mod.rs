@@ -1,6 +1,6 @@
 //! `deepfusion weights …`: what is embedded, what can be brought in, and how a run becomes a file to embed.
 
 #[cfg(feature = "train")]
-pub mod import;
-pub mod list;
-pub mod pack;
+pub(super) mod import;
+pub(super) mod list;
+pub(super) mod pack;

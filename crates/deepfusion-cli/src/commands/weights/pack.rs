@@ -8,7 +8,7 @@ use crate::output;
 use crate::progress::say;
 
 /// `deepfusion weights pack`.
-pub fn run(args: &PackArgs) -> Result<()> {
+pub(crate) fn run(args: &PackArgs) -> Result<()> {
     let options = PackOptions {
         checkpoint: args.checkpoint,
         name: args.name.clone(),

@@ -1,40 +1,39 @@
-//! The camera of a bag: its lens, and where it is on the vehicle.
+//! The camera of a bag: its lens.
 
 use super::config::BagConfig;
-use super::index::{Index, Place};
+use super::index::Index;
+use super::source;
 use super::topics::{Role, Topics};
-use super::{image, source};
 use crate::camera::{FISHEYE, GIVEN_INTRINSICS};
 use crate::{CalibrationPlace, CameraCalibration, Error, Lens, OpenOptions, Result};
-use deepfusion_geometry::{Distortion, Intrinsics, Se3};
+use deepfusion_geometry::{Distortion, Intrinsics};
 use deepfusion_rosbag::MessageSource;
 use deepfusion_rosbag::msg::CameraInfo;
-use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
-/// The camera by what is given, by the file beside the bag, by CameraInfo, or as the profile prints it.
+/// The camera by what is given, by the file beside the bag, by CameraInfo, as the profile prints it, or as it is to be assumed: then the
+/// last is true.
 ///
 /// # Errors
-/// [`Error::CameraFile`] where nothing says it or it cannot be; [`Error::FrameSize`] where it is of another size than `first`,
-/// the first image, which is read for it.
+/// [`Error::CameraFile`] where nothing says it or it cannot be; [`Error::FrameSize`] where it is of another size than the first
+/// image.
 pub(super) fn find(
     messages: &dyn MessageSource,
     topics: &Topics,
     index: &Index,
-    first: &Place,
+    (width, height): (u32, u32),
     config: &BagConfig,
     options: &OpenOptions,
-) -> Result<(Lens, CalibrationPlace)> {
+) -> Result<(Lens, CalibrationPlace, bool)> {
     let bag = messages.path();
     let topic = topics.of(Role::Image).unwrap_or_default();
-    let picture = image::decode(messages, &image::message(messages, topic, first)?)?;
-    let (width, height) = picture.dimensions();
     let rectified = topic.contains("rect");
     let place = |file: &Path, field| CalibrationPlace {
         file: file.to_owned(),
         field,
     };
     let pinhole = |intrinsics: Intrinsics| Lens::new(intrinsics, &Distortion::default());
+    let mut assumed = false;
     let (lens, place) = if let Some(numbers) = options.given_camera((width, height)) {
         let given = Intrinsics::from_numbers(numbers, (width, height));
         (pinhole(given), place(bag, GIVEN_INTRINSICS))
@@ -47,6 +46,10 @@ pub(super) fn find(
         (of_camera_info(info, rectified), place(bag, "CameraInfo"))
     } else if let Some(camera) = config.profile_camera {
         (pinhole(camera.intrinsics()), place(&config.path, "profile"))
+    } else if let Some(numbers) = options.assumed_numbers((width, height)) {
+        assumed = true;
+        let camera = Intrinsics::from_numbers(numbers, (width, height));
+        (pinhole(camera), place(bag, "the assumed camera"))
     } else {
         return Err(Error::NoBagCamera {
             path: bag.to_owned(),
@@ -70,7 +73,7 @@ pub(super) fn find(
             calibration: place.file,
         });
     }
-    Ok((lens, place))
+    Ok((lens, place, assumed))
 }
 
 /// The camera of the calibration file that the file beside the bag names.
@@ -122,23 +125,6 @@ fn of_camera_info(info: &CameraInfo, rectified: bool) -> std::result::Result<Len
     };
     let k = &info.k;
     Lens::new(of(k[0], k[4], k[2], k[5]), &distortion)
-}
-
-/// Where the camera is on the vehicle; what is taken for granted goes to the remarks.
-pub(super) fn mount(config: &BagConfig, remarks: &mut Vec<String>) -> Se3 {
-    if let Some(transform) = config.cam_from_vehicle {
-        return transform.se3();
-    }
-    remarks.push(
-        "nothing says where the camera is on the vehicle: it is taken to look ahead and to move as the rear axle does".into(),
-    );
-    looking_ahead()
-}
-
-/// A camera at the rear axle that looks ahead.
-fn looking_ahead() -> Se3 {
-    let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
-    Se3::from_parts(&axes, Vector3::zeros())
 }
 
 #[cfg(test)]

@@ -2,7 +2,8 @@
 
 use super::can_config::{CanConfig, SpeedUnit};
 use super::profile;
-use crate::{Error, Result};
+use crate::dataset_toml::MOST_GAP_S;
+use crate::{Error, NamedTopic, OpenOptions, Result, TopicRole};
 use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_motion::{FusionConfig, SPEED_SCALES};
 use nalgebra::Vector3;
@@ -24,8 +25,12 @@ pub(super) struct BagConfig {
     pub(super) topics: TopicNames,
     /// A camera without distortion, where there is no CameraInfo.
     pub(super) camera: Option<CameraConfig>,
+    /// Where the frames of a video stream are kept once decoded, from this file's folder.
+    pub(super) cache: Option<PathBuf>,
     /// A calibration tool's file, from this one's folder.
     pub(super) calibration: Option<PathBuf>,
+    /// Frames of `/tf_static` and `/tf` by name, where neither messages nor usual names tell.
+    pub(super) frames: FrameNames,
     /// A point of the LiDAR in the camera.
     pub(super) cam_from_lidar: Option<Transform>,
     /// A point of the vehicle (middle of the rear axle; x forward, y left, z up) in the camera.
@@ -45,9 +50,32 @@ pub(super) struct BagConfig {
     /// The profile's camera, where nothing else says one.
     #[serde(skip)]
     pub(super) profile_camera: Option<CameraConfig>,
+    /// The profile's mounts that the file does not have: they go behind the bag's own frames.
+    #[serde(skip)]
+    pub(super) profile_mounts: MountConfig,
     /// Where it was read from; the path it would have where there is none.
     #[serde(skip)]
     pub(super) path: PathBuf,
+}
+
+/// Where the sensors are.
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct MountConfig {
+    pub(super) cam_from_lidar: Option<Transform>,
+    pub(super) cam_from_vehicle: Option<Transform>,
+    pub(super) vehicle_from_imu: Option<Transform>,
+}
+
+/// Frames by name.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct FrameNames {
+    /// Below or at the middle of the rear axle; x forward, y left, z up.
+    pub(super) vehicle: Option<String>,
+    pub(super) camera: Option<String>,
+    pub(super) lidar: Option<String>,
+    pub(super) imu: Option<String>,
 }
 
 /// Topics by name.
@@ -98,6 +126,8 @@ pub(super) struct VehicleConfig {
     pub(super) steering_offset_rad: f64,
     /// Needed where the speed is a Float32 or Float64.
     pub(super) speed_unit: Option<SpeedUnit>,
+    /// Longest gap between satellite positions across which their speed is a straight line, in seconds.
+    pub(super) max_gap_s: Option<f64>,
 }
 
 /// The LiDAR's ways.
@@ -154,11 +184,41 @@ impl Default for ClockConfig {
 }
 
 impl BagConfig {
-    /// Reads the file beside a bag; where there is none, nothing is said.
+    /// Reads the file beside a bag, with what a caller says in its place; where there is none, nothing is said.
     ///
     /// # Errors
     /// [`Error::Config`], [`Error::File`].
-    pub(super) fn beside(bag: &Path) -> Result<Self> {
+    pub(super) fn of(bag: &Path, options: &OpenOptions) -> Result<Self> {
+        let mut config = Self::beside(bag)?;
+        options.topics.iter().for_each(|topic| config.name(topic));
+        Ok(config)
+    }
+
+    /// Names a topic. A signal that the file has for the same quantity is not read then.
+    fn name(&mut self, NamedTopic { role, topic }: &NamedTopic) {
+        let names = &mut self.topics;
+        let place = match role {
+            TopicRole::Image => &mut names.image,
+            TopicRole::CameraInfo => &mut names.camera_info,
+            TopicRole::Lidar => &mut names.lidar,
+            TopicRole::Dynamic => &mut names.dynamic,
+            TopicRole::Imu => &mut names.imu,
+            TopicRole::Speed => &mut names.speed,
+            TopicRole::Steering => &mut names.steering,
+            TopicRole::Can => &mut names.can,
+            TopicRole::Truth => &mut names.truth,
+        };
+        *place = Some(topic.clone());
+        if let Some(can) = &mut self.can {
+            match role {
+                TopicRole::Speed => can.speed = None,
+                TopicRole::Steering => can.steering = None,
+                _ => {}
+            }
+        }
+    }
+
+    fn beside(bag: &Path) -> Result<Self> {
         let mut candidates = Self::candidates(bag);
         // Of a link, the file beside what it leads to, where the link has none beside itself.
         if let Ok(real) = bag.canonicalize() {
@@ -184,7 +244,7 @@ impl BagConfig {
     }
 
     /// Where a bag's file is looked for, in this order.
-    fn candidates(bag: &Path) -> Vec<PathBuf> {
+    pub(super) fn candidates(bag: &Path) -> Vec<PathBuf> {
         let shared = bag.with_file_name(OF_FOLDER);
         if !bag.is_dir() {
             return vec![bag.with_extension("toml"), shared];
@@ -204,6 +264,13 @@ impl BagConfig {
         let scale = self.vehicle.speed_scale.unwrap_or(1.0);
         if !SPEED_SCALES.contains(&scale) {
             return Err(self.wrong(crate::dataset_toml::bad_speed_scale(scale)));
+        }
+        if let Some(gap) = self.vehicle.max_gap_s
+            && !(gap > 0.0 && gap <= MOST_GAP_S)
+        {
+            return Err(self.wrong(format!(
+                "vehicle.max_gap_s is {gap}, expected a time above 0 s, at most {MOST_GAP_S} s"
+            )));
         }
         for (key, value, positive) in numbers {
             if !value.is_finite() || (positive && value <= 0.0) {

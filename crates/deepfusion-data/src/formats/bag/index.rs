@@ -2,12 +2,16 @@
 
 use super::can::Can;
 use super::config::BagConfig;
+use super::fixes::Fixes;
+use super::frames::Frames;
 use super::topics::{Role, Topics};
+use super::video::{self, Seen};
 use crate::{Error, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::ImuSample;
 use deepfusion_rosbag::msg::{
-    AckermannDriveStamped, CameraInfo, Float32, Float64, Frame, Imu, Odometry, Twist, TwistStamped,
+    AckermannDriveStamped, CameraInfo, Float32, Float64, Frame, Imu, NavSatFix, Odometry,
+    OldTFMessage, TFMessage, Twist, TwistStamped, TwistWithCovarianceStamped,
 };
 use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
 use nalgebra::Vector3;
@@ -39,11 +43,16 @@ pub(super) fn nearest(
 #[derive(Debug, Default)]
 pub(super) struct Index {
     pub(super) images: Vec<Place>,
+    /// Of a camera whose messages are a video stream's.
+    pub(super) video: Option<Seen>,
     pub(super) scans: Vec<Place>,
     /// Messages of the points that move.
     pub(super) dynamic: Vec<Place>,
     pub(super) camera_info: Option<CameraInfo>,
+    /// Of a message each; of satellite positions what [`Fixes::speeds`] makes of them.
     pub(super) speed_mps: Vec<(i64, f64)>,
+    /// Satellite positions, where they are the speed's source.
+    pub(super) fixes: Fixes,
     /// Of the message that holds the speed, rad/s; not every publisher fills it.
     pub(super) yaw_rate: Vec<(i64, f64)>,
     /// Roll and pitch rate, in rad/s, where a twist gives all three.
@@ -52,10 +61,21 @@ pub(super) struct Index {
     pub(super) imu: Vec<(i64, ImuSample)>,
     /// `world_from_vehicle`, exact.
     pub(super) truth: Vec<(i64, Se3)>,
+    /// Where frames are in each other.
+    pub(super) frames: Frames,
+    /// The frame of the images, by the first that has one, as of the others.
+    pub(super) image_frame: Option<String>,
+    pub(super) camera_info_frame: Option<String>,
+    pub(super) lidar_frame: Option<String>,
+    pub(super) imu_frame: Option<String>,
+    /// The frame whose speed it is.
+    pub(super) speed_frame: Option<String>,
     /// Chunks or messages that could not be read, in sentences.
     pub(super) lost: Vec<String>,
     /// CAN signals that no frame holds, in sentences.
     pub(super) silent: Vec<String>,
+    /// How speeds were computed, in sentences.
+    pub(super) computed: Vec<String>,
     /// Messages whose header has no time, by topic: the time of recording stands for it.
     pub(super) unstamped: BTreeMap<String, usize>,
 }
@@ -78,17 +98,37 @@ impl Index {
         for message in bag.messages(Selection::topics(names))? {
             let read = message
                 .map_err(Error::from)
-                .and_then(|message| index.add(&message, topics, config, &can));
+                .and_then(|message| index.add(bag, &message, topics, config, &can));
             match read {
                 Ok(()) => {}
-                Err(error @ Error::Config { .. }) => return Err(error),
+                Err(error @ (Error::Config { .. } | Error::Video(_))) => return Err(error),
                 Err(error) => index.lost.push(error.to_string()),
             }
+        }
+        if !index.fixes.is_empty() {
+            let topic = topics.of(Role::Speed).unwrap_or_default();
+            let most = config.vehicle.max_gap_s;
+            index.speed_mps = index.fixes.speeds(topic, most, &mut index.computed);
         }
         // The one place where the vehicle's speeds are scaled, whichever message held them.
         let scale = config.vehicle.speed_scale.unwrap_or(1.0);
         index.speed_mps.iter_mut().for_each(|(_, v)| *v *= scale);
         index.silent = can.silent(index.speed_mps.len(), index.steering_rad.len());
+        if let Some(video) = &mut index.video {
+            if video.count != index.images.len() {
+                return Err(Error::Image {
+                    path: bag.path().to_owned(),
+                    problem: format!(
+                        "{}: some of its messages are pictures, others packets of a video",
+                        video.topic
+                    ),
+                    truncated: false,
+                });
+            }
+            video.order = (0..index.images.len() as u64).collect();
+            let stamp_ns = |packet: &u64| index.images[*packet as usize].stamp_ns;
+            video.order.sort_by_key(stamp_ns);
+        }
         index.images.sort_by_key(|p| p.stamp_ns);
         index.scans.sort_by_key(|p| p.stamp_ns);
         index.dynamic.sort_by_key(|p| p.stamp_ns);
@@ -98,6 +138,7 @@ impl Index {
 
     fn add(
         &mut self,
+        bag: &dyn MessageSource,
         message: &Message<'_>,
         topics: &Topics,
         config: &BagConfig,
@@ -106,21 +147,32 @@ impl Index {
         let at_ns = stamp(message);
         let mut timed = false;
         for role in topics.roles(message.topic()) {
-            timed |= role != Role::CameraInfo;
+            if role == Role::Image
+                && let Some((codec, packet)) = video::packet(bag.path(), message)?
+                && !Seen::add(&mut self.video, message.topic(), (codec, &packet))
+            {
+                continue;
+            }
+            timed |= !matches!(role, Role::CameraInfo | Role::Frames);
             match role {
                 Role::Image | Role::Lidar | Role::Dynamic => {
                     let place = Place {
                         recorded: message.time(),
                         stamp_ns: at_ns,
                     };
-                    match role {
-                        Role::Image => self.images.push(place),
-                        Role::Dynamic => self.dynamic.push(place),
-                        _ => self.scans.push(place),
+                    let (places, frame) = match role {
+                        Role::Image => (&mut self.images, Some(&mut self.image_frame)),
+                        Role::Dynamic => (&mut self.dynamic, None),
+                        _ => (&mut self.scans, Some(&mut self.lidar_frame)),
+                    };
+                    places.push(place);
+                    if let Some(frame @ None) = frame {
+                        *frame = message.header_frame();
                     }
                 }
                 Role::CameraInfo if self.camera_info.is_none() => {
                     self.camera_info = Some(message.decode::<CameraInfo>()?);
+                    self.camera_info_frame = message.header_frame();
                 }
                 Role::CameraInfo => {}
                 Role::Imu => {
@@ -132,9 +184,30 @@ impl Index {
                         angular_rate_radps: Vector3::new(w.x, w.y, w.z),
                     };
                     self.imu.push((at_ns, sample));
+                    if self.imu_frame.is_none() {
+                        self.imu_frame = Some(imu.header.frame_id).filter(|f| !f.is_empty());
+                    }
+                }
+                Role::Speed if message.is::<NavSatFix>() => {
+                    self.fixes.add(at_ns, &message.decode()?);
+                }
+                Role::Frames => {
+                    let transforms = if message.is::<OldTFMessage>() {
+                        message.decode::<OldTFMessage>()?.transforms
+                    } else {
+                        message.decode::<TFMessage>()?.transforms
+                    };
+                    transforms.iter().for_each(|t| self.frames.add(t));
                 }
                 Role::Speed => {
-                    let Reading { speed_mps, rates } = reading(message, config)?;
+                    let Reading {
+                        speed_mps,
+                        rates,
+                        frame,
+                    } = reading(message, config)?;
+                    if self.speed_frame.is_none() {
+                        self.speed_frame = frame.filter(|f| !f.is_empty());
+                    }
                     self.speed_mps.push((at_ns, speed_mps));
                     if let Some([roll, pitch, yaw]) = rates {
                         self.yaw_rate.push((at_ns, yaw));
@@ -172,6 +245,8 @@ struct Reading {
     speed_mps: f64,
     /// Roll, pitch and yaw rate, in rad/s.
     rates: Option<[f64; 3]>,
+    /// The frame that has this speed.
+    frame: Option<String>,
 }
 
 /// The vehicle's forward speed by whatever message holds it.
@@ -181,6 +256,15 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
         return Ok(Reading {
             speed_mps: twist.twist.linear.x,
             rates: Some(rates(&twist.twist)),
+            frame: Some(twist.header.frame_id),
+        });
+    }
+    if message.is::<TwistWithCovarianceStamped>() {
+        let twist: TwistWithCovarianceStamped = message.decode()?;
+        return Ok(Reading {
+            speed_mps: twist.twist.twist.linear.x,
+            rates: Some(rates(&twist.twist.twist)),
+            frame: Some(twist.header.frame_id),
         });
     }
     if message.is::<AckermannDriveStamped>() {
@@ -188,6 +272,7 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
         return Ok(Reading {
             speed_mps: f64::from(drive.drive.speed),
             rates: None,
+            frame: Some(drive.header.frame_id),
         });
     }
     if message.is::<Odometry>() {
@@ -196,6 +281,7 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
         return Ok(Reading {
             speed_mps: twist.linear.x,
             rates: Some(rates(&twist)),
+            frame: Some(odometry.child_frame_id),
         });
     }
     let value = number(message)?;
@@ -208,6 +294,7 @@ fn reading(message: &Message<'_>, config: &BagConfig) -> Result<Reading> {
     Ok(Reading {
         speed_mps: value * unit.metres_per_second(),
         rates: None,
+        frame: None,
     })
 }
 
@@ -240,9 +327,10 @@ pub(super) fn stamp(message: &Message<'_>) -> i64 {
     nanos(stamp.flatten().unwrap_or(message.time()))
 }
 
-/// Whether a message of a type that is read here begins with a header: all but bare numbers do.
+/// Whether a message of a type that is read here begins with a header: all but bare numbers and lists of frames do.
 fn has_header(message: &Message<'_>) -> bool {
-    !message.is::<Float32>() && !message.is::<Float64>()
+    let frames = message.is::<TFMessage>() || message.is::<OldTFMessage>();
+    !frames && !message.is::<Float32>() && !message.is::<Float64>()
 }
 
 pub(super) fn nanos(time: Time) -> i64 {

@@ -2,10 +2,12 @@
 
 use super::config::BagConfig;
 use super::index::Index;
+use super::mounts::Mounts;
 use super::streams::{remarks_on, streams};
 use super::topics::{Role, Topics};
 use super::{sensors, source};
-use crate::{DatasetKind, DriveInspection, Inspection, Result, SpeedRange};
+use crate::{DatasetKind, DriveInspection, Inspection, OpenOptions, Result, SpeedRange};
+use deepfusion_geometry::Se3;
 use deepfusion_motion::Signal;
 use std::path::Path;
 
@@ -16,14 +18,18 @@ const MAX_GAP_S: f64 = 0.5;
 ///
 /// # Errors
 /// As [`crate::Dataset::open`].
-pub(crate) fn without_images(path: &Path) -> Result<Option<Inspection>> {
-    let config = BagConfig::beside(path)?;
+pub(crate) fn without_images(path: &Path, options: &OpenOptions) -> Result<Option<Inspection>> {
+    let config = BagConfig::of(path, options)?;
     let bag = source::open(path)?;
     let topics = Topics::find(bag.as_ref(), &config)?;
     if topics.of(Role::Image).is_some() {
         return Ok(None);
     }
     let index = Index::read(bag.as_ref(), &topics, &config)?;
+    let remarks = remarks_on(bag.as_ref(), &index);
+    // Of the mounts only the inertial unit's counts here; what is wrong with the others ends an opening, and no look at it.
+    let mounts = Mounts::find(path, &config, &index, &mut Vec::new()).ok();
+    let imu = mounts.and_then(|mounts| mounts.vehicle_from_imu);
     let mut speeds = index.speed_mps.clone();
     speeds.sort_by_key(|s| s.0);
     let seconds = |from: i64, to: i64| (to - from) as f64 * 1e-9;
@@ -47,11 +53,12 @@ pub(crate) fn without_images(path: &Path) -> Result<Option<Inspection>> {
         scans: 0,
         speed_mps,
         distance_m,
-        turn_rad: turn(path, &index, &config),
+        turn_rad: turn(path, &index, &config, imu.as_ref()),
         duration_s,
         camera_ahead_s: 0.0,
         time_offset: None,
-        remarks: remarks_on(bag.as_ref(), &index),
+        mounts: Vec::new(),
+        remarks,
     };
     Ok(Some(Inspection {
         kind: DatasetKind::Bag,
@@ -68,16 +75,22 @@ pub(crate) fn without_images(path: &Path) -> Result<Option<Inspection>> {
 
 /// How far the vehicle turned, in radians, positive to the left: by all its sensors where it has a speed, else by the
 /// yaw rates as they were measured, bias included. `None` where there are none.
-fn turn(path: &Path, index: &Index, config: &BagConfig) -> Option<f64> {
+fn turn(
+    path: &Path,
+    index: &Index,
+    config: &BagConfig,
+    vehicle_from_imu: Option<&Se3>,
+) -> Option<f64> {
     let origin_ns = index.speed_mps.iter().map(|s| s.0).min();
     // Sensors that contradict each other end an opening; here they still say what they measured.
-    let motion = origin_ns.and_then(|ns| sensors::motion(path, index, config, ns).ok().flatten());
+    let motion = |ns| sensors::motion(path, index, config, vehicle_from_imu, ns);
+    let motion = origin_ns.and_then(|ns| motion(ns).ok().flatten());
     if let Some(motion) = motion.filter(|m| m.yaw_known) {
         let track = &motion.track;
         let pairs = track.times_s().windows(2);
         return total(pairs.filter_map(|t| Some(track.motion(t[0], t[1])?.yaw_rad)));
     }
-    let mut rates = yaw_rates(index, config);
+    let mut rates = yaw_rates(index, vehicle_from_imu);
     rates.sort_by_key(|r| r.0);
     let first_ns = rates.first()?.0;
     let seconds = |ns: i64| (ns - first_ns) as f64 * 1e-9;
@@ -87,12 +100,11 @@ fn turn(path: &Path, index: &Index, config: &BagConfig) -> Option<f64> {
 }
 
 /// Yaw rates in rad/s by whoever measures them: the speed's messages if they ever say a turn (not every publisher
-/// fills it), else the inertial unit, whose z is up unless the file beside the bag turns it.
-fn yaw_rates(index: &Index, config: &BagConfig) -> Vec<(i64, f64)> {
+/// fills it), else the inertial unit, whose z is up unless the file beside the bag, or its frames, turn it.
+fn yaw_rates(index: &Index, vehicle_from_imu: Option<&Se3>) -> Vec<(i64, f64)> {
     if index.yaw_rate.iter().any(|(_, rate)| *rate != 0.0) {
         return index.yaw_rate.clone();
     }
-    let vehicle_from_imu = config.vehicle_from_imu.map(|t| t.se3());
     let rates = index.imu.iter().map(|(ns, sample)| {
         let rate = sample.angular_rate_radps;
         let turned = vehicle_from_imu.map_or(rate, |t| t.rotate(&rate));

@@ -3,11 +3,14 @@
 use super::config::BagConfig;
 use super::dynamic::DynamicPoints;
 use super::index::{Index, Place};
+use super::mounts::Mounts;
 use super::recording::BagRecording;
 use super::scans::BagScans;
 use super::streams::{remarks_on, streams};
 use super::topics::{Role, Topics};
-use super::{camera, sensors, source};
+use super::video::{BagVideo, Seen};
+use super::{camera, image, sensors, source};
+use crate::dataset::assumed_remark;
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
 use crate::{
     Camera, Dataset, DatasetParts, Error, Frame, FrameImage, MotionModel, OpenOptions, Result,
@@ -56,18 +59,33 @@ pub(crate) fn open(path: &Path, bags: &[PathBuf], options: &OpenOptions) -> Resu
 /// As [`Dataset::open`].
 pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Result<Dataset> {
     let path = bag.path();
-    let config = BagConfig::beside(path)?;
+    let config = BagConfig::of(path, options)?;
     let topics = Topics::find(bag.as_ref(), &config)?;
     let index = Index::read(bag.as_ref(), &topics, &config)?;
     let first = first_image(bag.as_ref(), &index)?;
     let clock = Clock::from_image(&first, &config, options);
     let mut remarks = remarks_on(bag.as_ref(), &index);
 
-    let (lens, calibration) =
-        camera::find(bag.as_ref(), &topics, &index, &first, &config, options)?;
+    let video = BagVideo::of(path, &index, &config)?;
+    let picture = match &video {
+        Some(video) => video.first(bag.as_ref())?,
+        None => {
+            let topic = topics.of(Role::Image).unwrap_or_default();
+            image::decode(bag.as_ref(), &image::message(bag.as_ref(), topic, &first)?)?
+        }
+    };
+    let size = picture.dimensions();
+    let (lens, calibration, assumed) =
+        camera::find(bag.as_ref(), &topics, &index, size, &config, options)?;
+    if assumed {
+        let k = lens.intrinsics();
+        remarks.push(assumed_remark([k.fx, k.fy, k.cx, k.cy]));
+    }
     remarks.extend(lens.intrinsics().implausible());
-    let cam_from_vehicle = camera::mount(&config, &mut remarks);
-    let motion = sensors::motion(path, &index, &config, clock.origin_ns)?;
+    let mounts = Mounts::find(path, &config, &index, &mut remarks)?;
+    let cam_from_vehicle = mounts.cam_from_vehicle;
+    let imu = mounts.vehicle_from_imu.as_ref();
+    let motion = sensors::motion(path, &index, &config, imu, clock.origin_ns)?;
     let yaw_known = motion.as_ref().is_some_and(|m| m.yaw_known);
     let track = motion.map(|m| m.track);
 
@@ -85,10 +103,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         camera_ahead_s: clock.camera_ahead_s,
         scenario: config.scenario.clone(),
     };
-    let scans = match (
-        topics.of(Role::Lidar),
-        config.cam_from_lidar.map(|transform| transform.se3()),
-    ) {
+    let scans = match (topics.of(Role::Lidar), mounts.cam_from_lidar) {
         (Some(topic), Some(cam_from_lidar)) => Some(Arc::new(BagScans {
             bag: Arc::clone(&bag),
             topic: topic.to_owned(),
@@ -124,19 +139,30 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         topics,
         truth: truth(&index, clock.origin_ns),
         images: index.images,
+        video,
         lens,
+        mounts: mounts.said,
         remarks,
         cam_from_vehicle,
         scans,
         calibration,
     };
-    Ok(Dataset::new(parts, Arc::new(recording)))
+    Ok(Dataset::new(parts, Arc::new(recording)).with_camera_assumed(assumed))
 }
 
 /// The first image, with which the data set's time begins.
 fn first_image(bag: &dyn MessageSource, index: &Index) -> Result<Place> {
     if let Some(first) = index.images.first() {
         return Ok(*first);
+    }
+    if let Some(Seen { topic, before, .. }) = &index.video {
+        return Err(Error::NoFrames {
+            path: bag.path().to_owned(),
+            why: format!(
+                "none of the {before} messages of {topic} is a key frame, with the parameters that decoding begins with"
+            ),
+            remedy: "record for longer than from one key frame of the encoder to the next, or have it write them more often".into(),
+        });
     }
     let list: Vec<String> = bag.topics()?.into_iter().map(|t| t.name).collect();
     Err(Error::NoFrames {

@@ -10,6 +10,9 @@ const PROFILES: [(&str, &str); 1] = [(
     include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/profiles/umad.toml")),
 )];
 
+/// The keys of mounts.
+const MOUNTS: [&str; 3] = ["cam_from_lidar", "cam_from_vehicle", "vehicle_from_imu"];
+
 /// The names that `profile` may be.
 pub(super) fn names() -> impl Iterator<Item = &'static str> {
     PROFILES.iter().map(|(name, _)| *name)
@@ -17,7 +20,7 @@ pub(super) fn names() -> impl Iterator<Item = &'static str> {
 
 impl BagConfig {
     /// The table of a bag's file, with what it leaves out as the profile of this name has it. Its camera goes behind
-    /// CameraInfo, and therefore stays apart. `None` where there is no such profile.
+    /// CameraInfo, its mounts behind the bag's frames, and therefore both stay apart. `None` where there is no such profile.
     ///
     /// # Errors
     /// What of either is no such file.
@@ -26,9 +29,18 @@ impl BagConfig {
         let taken_together = || {
             let mut all: Table = toml::from_str(text)?;
             let camera = all.remove("camera").map(Value::try_into).transpose()?;
+            let mut mounts = Table::new();
+            for name in MOUNTS {
+                if !own.contains_key(name)
+                    && let Some(mount) = all.remove(name)
+                {
+                    mounts.insert(name.to_owned(), mount);
+                }
+            }
             merge(&mut all, own);
             let mut config: Self = all.try_into()?;
             config.profile_camera = camera;
+            config.profile_mounts = mounts.try_into()?;
             Ok(config)
         };
         Some(taken_together())
@@ -72,7 +84,9 @@ mod tests {
 
     #[test]
     fn ahead_of_the_lidar_is_ahead_of_the_camera() {
-        let cam_from_lidar = umad("").cam_from_lidar.unwrap().se3();
+        let config = umad("");
+        assert!(config.cam_from_lidar.is_none());
+        let cam_from_lidar = config.profile_mounts.cam_from_lidar.unwrap().se3();
         let ahead = cam_from_lidar.transform(&Vector3::new(10.0, 1.0, 2.0));
         let expected = Vector3::new(-1.0, -2.0 + 0.08, 10.0);
         assert!((ahead - expected).norm() < 1e-9, "{ahead}");
@@ -83,6 +97,7 @@ mod tests {
         let config =
             umad("[cam_from_lidar]\ntranslation = [0.0, 0.1, 0.0]\nrotation = [0.0, 0.0, 0.0]\n");
         assert_eq!(config.cam_from_lidar.unwrap().translation, [0.0, 0.1, 0.0]);
+        assert!(config.profile_mounts.cam_from_lidar.is_none());
         // CameraInfo goes before the profile's camera, the file's own before CameraInfo.
         assert!(config.camera.is_none());
         assert_eq!(config.profile_camera.unwrap().cy, 117.60);

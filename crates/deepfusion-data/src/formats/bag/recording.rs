@@ -4,9 +4,10 @@ use super::image;
 use super::index::Place;
 use super::scans::{BagScans, MovingPoints};
 use super::topics::{Role, Topics};
+use super::video::BagVideo;
 use crate::{
     CalibrationPlace, CameraPath, Dataset, DatasetKind, DynamicAgreement, Error, Frame, GtKind,
-    Lens, LidarMotion, MovingLabels, MovingSource, Recording, Result, ScanTruth, Stream,
+    Lens, LidarMotion, Mount, MovingLabels, MovingSource, Recording, Result, ScanTruth, Stream,
 };
 use ::image::RgbImage;
 use deepfusion_geometry::{DepthMap, Se3, Trajectory};
@@ -21,8 +22,11 @@ pub(super) struct BagRecording {
     pub(super) bag: Arc<dyn MessageSource>,
     pub(super) topics: Topics,
     pub(super) images: Vec<Place>,
+    /// Where the images are packets of a stream.
+    pub(super) video: Option<BagVideo>,
     pub(super) lens: Lens,
     pub(super) streams: Vec<Stream>,
+    pub(super) mounts: Vec<Mount>,
     pub(super) remarks: Vec<String>,
     /// Where the vehicle was, exactly, on the vehicle's clock.
     pub(super) truth: Trajectory,
@@ -41,16 +45,21 @@ impl Recording for BagRecording {
     }
 
     fn load_image(&self, frame: &Frame) -> Result<RgbImage> {
+        let missing = || Error::Image {
+            path: self.bag.path().to_owned(),
+            problem: format!("there is no image {}", frame.number),
+            truncated: false,
+        };
+        if let Some(video) = &self.video {
+            let image = video.load(self.bag.as_ref(), frame.number)?;
+            return self.lens.correct(image.ok_or_else(missing)?);
+        }
         let topic = self.topics.of(Role::Image).unwrap_or_default();
         let place = usize::try_from(frame.number)
             .ok()
             .and_then(|n| self.images.get(n));
         let Some(place) = place else {
-            return Err(Error::Image {
-                path: self.bag.path().to_owned(),
-                problem: format!("there is no image {}", frame.number),
-                truncated: false,
-            });
+            return Err(missing());
         };
         let message = image::message(self.bag.as_ref(), topic, place)?;
         self.lens
@@ -68,13 +77,19 @@ impl Recording for BagRecording {
     fn no_motion(&self) -> Error {
         Error::NoTrack {
             drive: self.bag.path().display().to_string(),
-            why: "the bag has no speed of the vehicle (TwistStamped, Odometry, a CAN signal)".into(),
+            why: "the bag has no speed of the vehicle (TwistStamped, TwistWithCovarianceStamped, Odometry, AckermannDriveStamped, NavSatFix, a \
+                  CAN signal)"
+                .into(),
             remedy: "topics.speed in the file beside the bag names its topic; [can] reads it from CAN frames".into(),
         }
     }
 
     fn remarks(&self) -> &[String] {
         &self.remarks
+    }
+
+    fn mounts(&self) -> &[Mount] {
+        &self.mounts
     }
 
     fn has_ground_truth(&self, frame: &Frame) -> bool {

@@ -74,6 +74,7 @@ fn column(
         remedy:
             "lidar.velocity_field names the field of the radial velocity; x, y and z must be there"
                 .into(),
+        choice: None,
     })?;
     Ok(column.f32s().collect())
 }

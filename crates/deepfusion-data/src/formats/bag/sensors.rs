@@ -3,6 +3,7 @@
 use super::config::BagConfig;
 use super::index::Index;
 use crate::{Error, Result};
+use deepfusion_geometry::Se3;
 use deepfusion_motion::{
     Bicycle, FusedTrack, ImuConfig, ImuMount, ImuSample, MotionConfig, MotionModel, Signal,
     VehicleSensors, VehicleTrack,
@@ -24,6 +25,7 @@ pub(super) fn motion(
     bag: &Path,
     index: &Index,
     config: &BagConfig,
+    vehicle_from_imu: Option<&Se3>,
     origin_ns: i64,
 ) -> Result<Option<Motion>> {
     if index.speed_mps.is_empty() {
@@ -56,9 +58,9 @@ pub(super) fn motion(
         imu: (!imu.is_empty()).then_some(imu),
     };
     let vehicle = &config.vehicle;
-    let mount = config.vehicle_from_imu.map(|t| ImuMount {
-        rotation_rad: t.rotation,
-        translation_m: t.translation,
+    let mount = vehicle_from_imu.map(|t| ImuMount {
+        rotation_rad: t.axis_angle().into(),
+        translation_m: t.translation().into(),
     });
     let motion = MotionConfig {
         // The index scaled the speeds already.

@@ -5,7 +5,7 @@ use deepfusion_rosbag::{Bag, MessageSource};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Whether a path is a bag: of ROS 1 by its name, of ROS 2 where this was built with them.
+/// Whether a path is a bag: of ROS 1 by its name, of ROS 2 where this was built with `ros2`.
 pub(crate) fn is_bag(path: &Path) -> bool {
     is_ros1_bag(path) || is_ros2_bag(path)
 }

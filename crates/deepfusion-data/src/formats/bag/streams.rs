@@ -24,6 +24,10 @@ pub(super) fn streams(
                 index.dynamic.iter().map(|p| p.stamp_ns).collect(),
             ),
             Some(Role::Imu) => ("imu", index.imu.iter().map(|s| s.0).collect()),
+            Some(Role::Speed) if !index.fixes.is_empty() => {
+                ("speed", index.fixes.times().collect())
+            }
+            Some(Role::Frames) => ("frames", Vec::new()),
             Some(Role::Speed) => ("speed", index.speed_mps.iter().map(|s| s.0).collect()),
             Some(Role::Steering) => ("steering", index.steering_rad.iter().map(|s| s.0).collect()),
             Some(Role::Truth) => ("pose", index.truth.iter().map(|s| s.0).collect()),
@@ -42,7 +46,8 @@ pub(super) fn streams(
 
 /// What of a bag cannot be read, in sentences.
 pub(super) fn remarks_on(bag: &dyn MessageSource, index: &Index) -> Vec<String> {
-    let mut remarks = Vec::new();
+    let mut remarks: Vec<String> = Vec::new();
+    remarks.extend(index.video.iter().filter_map(|video| video.remark()));
     let damage = bag.damage();
     remarks.extend(damage.map(|damage| format!("the bag is damaged: {damage}")));
     if let Some(lost) = index.lost.first() {
@@ -52,6 +57,7 @@ pub(super) fn remarks_on(bag: &dyn MessageSource, index: &Index) -> Vec<String> 
         ));
     }
     remarks.extend(index.silent.iter().cloned());
+    remarks.extend(index.computed.iter().cloned());
     let unstamped = index.unstamped.iter();
     remarks.extend(unstamped.map(|(topic, messages)| {
         format!(

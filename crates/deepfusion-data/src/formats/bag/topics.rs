@@ -1,10 +1,11 @@
 //! Which topic is which: by message type, unless the file beside the bag names it.
 
 use super::config::BagConfig;
-use crate::{Error, Result};
+use crate::{Error, NamedTopic, Result, TopicRole};
 use deepfusion_rosbag::msg::{
     AckermannDriveStamped, CameraInfo, CompressedImage, Float32, Float64, Frame, Image, Imu,
-    Odometry, PointCloud2, TwistStamped,
+    NavSatFix, Odometry, OldTFMessage, PointCloud2, TFMessage, TwistStamped,
+    TwistWithCovarianceStamped,
 };
 use deepfusion_rosbag::{MessageSource, RosMessage, TopicInfo};
 use std::path::Path;
@@ -21,6 +22,26 @@ pub(super) enum Role {
     Steering,
     Can,
     Truth,
+    /// Transforms of frames; as many topics as there are.
+    Frames,
+}
+
+impl Role {
+    /// Its key in `[topics]`; frames have none.
+    pub(super) fn key(self) -> Option<TopicRole> {
+        Some(match self {
+            Self::Image => TopicRole::Image,
+            Self::CameraInfo => TopicRole::CameraInfo,
+            Self::Lidar => TopicRole::Lidar,
+            Self::Dynamic => TopicRole::Dynamic,
+            Self::Imu => TopicRole::Imu,
+            Self::Speed => TopicRole::Speed,
+            Self::Steering => TopicRole::Steering,
+            Self::Can => TopicRole::Can,
+            Self::Truth => TopicRole::Truth,
+            Self::Frames => return None,
+        })
+    }
 }
 
 /// The topics that are read, and what for.
@@ -48,24 +69,30 @@ impl Topics {
             config: &config.path,
         };
         let names = &config.topics;
-        let images = [Image::<'_>::TYPE, CompressedImage::<'_>::TYPE];
+        let pictures = [Image::<'_>::TYPE, CompressedImage::<'_>::TYPE];
+        let images = [&pictures[..], &super::video::TYPES].concat();
         let mut found = Vec::new();
         let mut add = |role, name: Option<String>| found.extend(name.map(|name| (role, name)));
-        add(
-            Role::Image,
-            search.one("image", &names.image, &images, |t| !is_depth(&t.name))?,
-        );
+        let image = |types: &[&str]| {
+            search.one(TopicRole::Image, &names.image, types, |t| {
+                !is_depth(&t.name)
+            })
+        };
+        // Of a camera that was recorded as pictures and as a video the pictures count: they can be read one by one.
+        let image = match names.image {
+            None => image(&pictures)?
+                .map_or_else(|| image(&super::video::TYPES), |found| Ok(Some(found)))?,
+            Some(_) => image(&images)?,
+        };
+        add(Role::Image, image.clone());
         add(
             Role::CameraInfo,
-            search.one(
-                "camera_info",
-                &names.camera_info,
-                &[CameraInfo::TYPE],
-                |_| true,
-            )?,
+            search.camera_info(&names.camera_info, image.as_deref())?,
         );
         let clouds = [PointCloud2::<'_>::TYPE];
-        let lidar = search.one("lidar", &names.lidar, &clouds, |t| !is_dynamic(&t.name))?;
+        let lidar = search.one(TopicRole::Lidar, &names.lidar, &clouds, |t| {
+            !is_dynamic(&t.name)
+        })?;
         add(Role::Lidar, lidar.clone());
         add(
             Role::Dynamic,
@@ -73,28 +100,34 @@ impl Topics {
         );
         add(
             Role::Imu,
-            search.one("imu", &names.imu, &[Imu::TYPE], |_| true)?,
+            search.one(TopicRole::Imu, &names.imu, &[Imu::TYPE], |_| true)?,
         );
         let can = config.can.as_ref();
         let steered = can.is_some_and(|can| can.steering.is_some());
         let driven = can.is_some_and(|can| can.speed.is_some());
-        if !search.on_can("steering", steered, &names.steering)? {
+        if !search.on_can(TopicRole::Steering, steered, &names.steering)? {
             add(Role::Steering, search.steering(&names.steering)?);
         }
-        if !search.on_can("speed", driven, &names.speed)? {
+        if !search.on_can(TopicRole::Speed, driven, &names.speed)? {
             add(Role::Speed, search.speed(&names.speed)?);
         }
         if steered || driven {
             add(Role::Can, Some(search.can(&names.can)?));
         }
         let truth = match &names.truth {
-            Some(_) => search.one("truth", &names.truth, &[Odometry::TYPE], |_| true)?,
+            Some(_) => search.one(TopicRole::Truth, &names.truth, &[Odometry::TYPE], |_| true)?,
             None => all
                 .iter()
                 .find(|t| t.name.starts_with(TRUTH) && t.type_name == Odometry::TYPE)
                 .map(|t| t.name.clone()),
         };
         add(Role::Truth, truth);
+        let frames = [TFMessage::TYPE, OldTFMessage::TYPE];
+        for topic in &all {
+            if frames.contains(&topic.type_name.as_str()) {
+                add(Role::Frames, Some(topic.name.clone()));
+            }
+        }
         Ok(Self { found })
     }
 
@@ -134,7 +167,7 @@ impl Search<'_> {
     /// The topic that the file names, or the only one of these types.
     fn one(
         &self,
-        key: &str,
+        role: TopicRole,
         named: &Option<String>,
         types: &[&str],
         fits: impl Fn(&TopicInfo) -> bool,
@@ -142,14 +175,14 @@ impl Search<'_> {
         if let Some(name) = named {
             let Some(topic) = self.all.iter().find(|t| t.name == *name) else {
                 let there: Vec<&str> = self.all.iter().map(|t| t.name.as_str()).collect();
-                return Err(self.error(format!("has no topic {name}"), || {
-                    format!("topics.{key} must be one of: {}", there.join(", "))
+                return Err(self.error(format!("has no topic {name}"), None, || {
+                    format!("topics.{role} must be one of: {}", there.join(", "))
                 }));
             };
             if !types.contains(&topic.type_name.as_str()) {
                 let problem = format!("{name} holds {}", topic.type_name);
-                return Err(self.error(problem, || {
-                    format!("topics.{key} must be a topic of {}", types.join(" or "))
+                return Err(self.error(problem, None, || {
+                    format!("topics.{role} must be a topic of {}", types.join(" or "))
                 }));
             }
             return Ok(Some(name.clone()));
@@ -166,12 +199,16 @@ impl Search<'_> {
             several => {
                 let list: Vec<&str> = several.iter().map(|t| t.name.as_str()).collect();
                 let problem = format!(
-                    "{} topics could be the {key}: {}",
+                    "{} topics could be the {role}: {}",
                     list.len(),
                     list.join(", ")
                 );
-                Err(self.error(problem, || {
-                    format!("name it: [topics] {key} = \"{}\"", list[0])
+                let choice = NamedTopic {
+                    role,
+                    topic: list[0].to_owned(),
+                };
+                Err(self.error(problem, Some(choice), || {
+                    format!("name it: [topics] {role} = \"{}\"", list[0])
                 }))
             }
         }
@@ -179,14 +216,15 @@ impl Search<'_> {
 
     /// Whether a quantity is read from CAN frames. No topic is looked for then: the values of two sources, each with its
     /// own scale, would be read as one's.
-    fn on_can(&self, key: &str, signal: bool, named: &Option<String>) -> Result<bool> {
+    fn on_can(&self, role: TopicRole, signal: bool, named: &Option<String>) -> Result<bool> {
         match named {
             Some(name) if signal => Err(Error::Topic {
                 path: self.config.to_owned(),
                 problem: format!(
-                    "topics.{key} (\"{name}\") and can.{key} both say where the {key} is"
+                    "topics.{role} (\"{name}\") and can.{role} both say where the {role} is"
                 ),
-                remedy: format!("keep one of them: delete topics.{key} or can.{key}"),
+                remedy: format!("keep one of them: delete topics.{role} or can.{role}"),
+                choice: None,
             }),
             _ => Ok(signal),
         }
@@ -194,10 +232,10 @@ impl Search<'_> {
 
     /// The topic of CAN frames, without which `[can]` would silently say nothing.
     fn can(&self, named: &Option<String>) -> Result<String> {
-        self.one("can", named, &[Frame::TYPE], |_| true)?
+        self.one(TopicRole::Can, named, &[Frame::TYPE], |_| true)?
             .ok_or_else(|| {
                 let problem = format!("has no topic of {}, which [can] reads", Frame::TYPE);
-                self.error(problem, || "delete [can], or record the bus".into())
+                self.error(problem, None, || "delete [can], or record the bus".into())
             })
     }
 
@@ -208,28 +246,32 @@ impl Search<'_> {
             Some(_) => &any[..],
             None => &any[..1],
         };
-        self.one("steering", named, types, |_| true)
+        self.one(TopicRole::Steering, named, types, |_| true)
     }
 
-    /// The vehicle's speed: a TwistStamped, else an odometry, else steering messages with a speed; never two of them.
-    /// A bare number must be named, since its unit must be said too.
+    /// The vehicle's speed: a twist, else an odometry, else steering messages with a speed, else satellite positions to compute
+    /// it from; never two of them. A bare number must be named, since its unit must be said too.
     fn speed(&self, named: &Option<String>) -> Result<Option<String>> {
         let any = [
             TwistStamped::TYPE,
+            TwistWithCovarianceStamped::TYPE,
             AckermannDriveStamped::TYPE,
             Odometry::TYPE,
+            NavSatFix::TYPE,
             Float32::TYPE,
             Float64::TYPE,
         ];
         if named.is_some() {
-            return self.one("speed", named, &any, |_| true);
+            return self.one(TopicRole::Speed, named, &any, |_| true);
         }
         for kind in [
             TwistStamped::TYPE,
+            TwistWithCovarianceStamped::TYPE,
             Odometry::TYPE,
             AckermannDriveStamped::TYPE,
+            NavSatFix::TYPE,
         ] {
-            if let Some(topic) = self.one("speed", &None, &[kind], |_| true)? {
+            if let Some(topic) = self.one(TopicRole::Speed, &None, &[kind], |_| true)? {
                 return Ok(Some(topic));
             }
         }
@@ -240,7 +282,7 @@ impl Search<'_> {
     fn dynamic(&self, named: &Option<String>, lidar: Option<&str>) -> Result<Option<String>> {
         let clouds = [PointCloud2::<'_>::TYPE];
         let one = |fits: &dyn Fn(&str) -> bool| {
-            self.one("dynamic", named, &clouds, |t| {
+            self.one(TopicRole::Dynamic, named, &clouds, |t| {
                 is_dynamic(&t.name) && Some(t.name.as_str()) != lidar && fits(&t.name)
             })
         };
@@ -257,11 +299,36 @@ impl Search<'_> {
         }
     }
 
-    fn error(&self, problem: String, remedy: impl Fn() -> String) -> Error {
+    /// The camera's calibration: of several in the bag the one beside the images.
+    fn camera_info(&self, named: &Option<String>, image: Option<&str>) -> Result<Option<String>> {
+        let kinds = [CameraInfo::TYPE];
+        let one = |fits: &dyn Fn(&str) -> bool| {
+            self.one(TopicRole::CameraInfo, named, &kinds, |t| fits(&t.name))
+        };
+        // `/camera/image_raw/compressed` is the same camera's as `/camera/image_raw`; so is what the transport `ffmpeg` sends.
+        let transported = |name: &'static str| image.and_then(|i| i.strip_suffix(name));
+        let raw = transported("/compressed")
+            .or(transported("/ffmpeg"))
+            .or(image);
+        if let Some(space) = raw.map(namespace)
+            && let Some(beside) = one(&|name| namespace(name) == space)?
+        {
+            return Ok(Some(beside));
+        }
+        one(&|_| true)
+    }
+
+    fn error(
+        &self,
+        problem: String,
+        choice: Option<NamedTopic>,
+        remedy: impl Fn() -> String,
+    ) -> Error {
         Error::Topic {
             path: self.bag.to_owned(),
             problem,
             remedy: format!("{} (in {})", remedy(), self.config.display()),
+            choice,
         }
     }
 }

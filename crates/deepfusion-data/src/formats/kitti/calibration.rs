@@ -1,9 +1,9 @@
 //! The three calibration files of a date.
 
+use super::fields::{Fields, cam_from_cam0};
 use crate::{Camera, Error, Result};
 use deepfusion_geometry::{Intrinsics, Se3};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4, Vector3};
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// How one rectified colour camera sees the world, and where it sits on the car.
@@ -48,22 +48,13 @@ impl Calibration {
         let (size_field, p_field) = (format!("S_rect_0{number}"), format!("P_rect_0{number}"));
         let size = cameras.numbers::<2>(&size_field)?;
         let p_rect = Matrix3x4::from_row_slice(&cameras.numbers::<12>(&p_field)?);
-        let intrinsics = Intrinsics {
-            fx: p_rect[(0, 0)],
-            fy: p_rect[(1, 1)],
-            cx: p_rect[(0, 2)],
-            cy: p_rect[(1, 2)],
-            width: cameras.size(&size_field, size[0])?,
-            height: cameras.size(&size_field, size[1])?,
-        };
-        if let Some(problem) = intrinsics.implausible() {
-            return Err(cameras.error(&p_field, problem));
-        }
+        let size = (
+            cameras.size(&size_field, size[0])?,
+            cameras.size(&size_field, size[1])?,
+        );
+        let intrinsics = cameras.camera(&p_field, &p_rect, size)?;
         let r_rect = Matrix3::from_row_slice(&cameras.numbers::<9>("R_rect_00")?);
-        // P_rect = K [I | t]: t = K⁻¹ p₄ is where rectified camera 0's origin lies for this camera.
-        let p4 = Vector3::new(p_rect[(0, 3)], p_rect[(1, 3)], p_rect[(2, 3)]);
-        let cam_from_rect0 =
-            Se3::from_parts(&Matrix3::identity(), intrinsics.inverse_matrix() * p4);
+        let cam_from_rect0 = cam_from_cam0(&intrinsics, &p_rect);
         let rect0_from_cam0 = Se3::from_parts(&r_rect, Vector3::zeros());
 
         let mut calibration = Self {
@@ -129,83 +120,4 @@ fn homogeneous(rotation: &Matrix3<f64>, translation: &Vector3<f64>) -> Matrix4<f
     m.fixed_view_mut::<3, 3>(0, 0).copy_from(rotation);
     m.fixed_view_mut::<3, 1>(0, 3).copy_from(translation);
     m
-}
-
-/// The `name: values` lines of a calibration file.
-struct Fields {
-    path: PathBuf,
-    values: HashMap<String, String>,
-}
-
-impl Fields {
-    /// `None` where the file does not exist.
-    fn read(path: &Path) -> Result<Option<Self>> {
-        let bytes = match std::fs::read(path) {
-            Ok(bytes) => bytes,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(e) => return Err(Error::file(path, e)),
-        };
-        let text = String::from_utf8_lossy(&bytes);
-        let values = text
-            .lines()
-            .filter_map(|line| line.split_once(':'))
-            .map(|(name, values)| (name.trim().to_owned(), values.trim().to_owned()))
-            .collect();
-        Ok(Some(Self {
-            path: path.to_owned(),
-            values,
-        }))
-    }
-
-    fn error(&self, field: &str, problem: String) -> Error {
-        Error::Calibration {
-            path: self.path.clone(),
-            field: field.to_owned(),
-            problem,
-        }
-    }
-
-    /// Exactly `N` finite numbers.
-    fn numbers<const N: usize>(&self, field: &str) -> Result<[f64; N]> {
-        let text = self
-            .values
-            .get(field)
-            .ok_or_else(|| self.error(field, "the file has no such line".into()))?;
-        let mut numbers = [0.0; N];
-        let mut count = 0;
-        for word in text.split_whitespace() {
-            let number: f64 = word
-                .parse()
-                .map_err(|_| self.error(field, format!("'{word}' is not a number")))?;
-            if !number.is_finite() {
-                return Err(self.error(field, format!("'{word}' is not finite")));
-            }
-            if let Some(slot) = numbers.get_mut(count) {
-                *slot = number;
-            }
-            count += 1;
-        }
-        if count != N {
-            return Err(self.error(field, format!("{count} numbers, expected {N}")));
-        }
-        Ok(numbers)
-    }
-
-    fn rigid(&self) -> Result<(Matrix3<f64>, Vector3<f64>)> {
-        let rotation = Matrix3::from_row_slice(&self.numbers::<9>("R")?);
-        if (rotation * rotation.transpose() - Matrix3::identity()).norm() > 1e-2
-            || rotation.determinant() < 0.0
-        {
-            return Err(self.error("R", "is not a rotation".into()));
-        }
-        Ok((rotation, Vector3::from(self.numbers::<3>("T")?)))
-    }
-
-    fn size(&self, field: &str, value: f64) -> Result<u32> {
-        if value.fract() == 0.0 && (1.0..=65_535.0).contains(&value) {
-            Ok(value as u32)
-        } else {
-            Err(self.error(field, format!("{value} is not a size in pixels")))
-        }
-    }
 }

@@ -3,6 +3,7 @@
 
 mod calibration;
 mod config;
+mod fields;
 mod layout;
 mod moving;
 mod oxts;
@@ -14,10 +15,11 @@ mod velodyne;
 
 pub use crate::truth::GtKind;
 pub use calibration::Calibration;
-pub(crate) use layout::drive_around;
+pub(crate) use fields::{Fields, cam_from_cam0};
 pub use layout::{Drive, find_drives};
+pub(crate) use layout::{drive_around, numbered_files};
 pub use oxts::{OxtsPacket, read_oxts};
-pub(crate) use recording::open;
+pub(crate) use recording::{open, optional};
 pub use timestamps::TimeStamps;
 pub use tracklets::{Tracklet, TrackletPose};
 pub use velodyne::{depth_map, velo_point};

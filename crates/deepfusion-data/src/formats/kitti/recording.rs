@@ -38,11 +38,6 @@ struct KittiRecording {
 
 /// Opens the cameras of the drives found at `path`.
 pub(crate) fn open(path: &Path, drives: &[Drive], options: &OpenOptions) -> Result<Vec<Dataset>> {
-    if options.gives_camera() {
-        return Err(Error::OwnCalibration {
-            path: path.to_owned(),
-        });
-    }
     let selection = Selection::new(options);
     let (mut datasets, mut images) = (Vec::new(), 0);
     for drive in drives {
@@ -260,7 +255,7 @@ impl Recording for KittiRecording {
 }
 
 /// A part that may be absent, but not broken.
-fn optional<T>(part: Result<T>) -> Result<Option<T>> {
+pub(crate) fn optional<T>(part: Result<T>) -> Result<Option<T>> {
     match part {
         Ok(part) => Ok(Some(part)),
         Err(Error::Missing { .. }) => Ok(None),

@@ -60,13 +60,21 @@ impl TimeStamps {
     /// # Errors
     /// [`Error::NoTimeStamp`] if the file ends before that frame.
     pub fn seconds(&self, frame: u64, origin_ns: i64) -> Result<Option<f64>> {
+        let ns = self.nanoseconds(frame)?;
+        Ok(ns.map(|ns| (ns - origin_ns) as f64 * 1e-9))
+    }
+
+    /// The time of `frame`, in nanoseconds since 1970; `None` where its line is empty.
+    ///
+    /// # Errors
+    /// [`Error::NoTimeStamp`] if the file ends before that frame.
+    pub fn nanoseconds(&self, frame: u64) -> Result<Option<i64>> {
         let found = usize::try_from(frame).ok().and_then(|i| self.ns.get(i));
-        let ns = found.ok_or_else(|| Error::NoTimeStamp {
+        found.copied().ok_or_else(|| Error::NoTimeStamp {
             path: self.path.clone(),
             lines: self.ns.len(),
             frame,
-        })?;
-        Ok(ns.map(|ns| (ns - origin_ns) as f64 * 1e-9))
+        })
     }
 
     /// Seconds from `origin_ns` to the time of every frame.

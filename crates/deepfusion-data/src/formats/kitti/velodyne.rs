@@ -1,4 +1,4 @@
-//! Sparse ground-truth depth from a velodyne scan (SPEC 5).
+//! Sparse ground-truth depth from a velodyne scan.
 
 use crate::truth::GtKind;
 use deepfusion_geometry::DepthMap;

@@ -2,8 +2,8 @@
 
 use super::super::kernel::{ConvOptions, KernelBackward};
 use super::{
-    Float, Values, conv_shape, correlation_shape, count, dims, photometric_shape, single,
-    smoothness_shape, tensor, warp_shape, written, zeros,
+    Float, Values, conv_shape, correlation_shape, count, depthwise_shape, dims, photometric_shape,
+    single, smoothness_shape, tensor, warp_shape, written, zeros,
 };
 use burn::backend::Flex;
 use deepfusion_kernels::{self as kernels, BatchNormSaved};
@@ -76,6 +76,36 @@ impl KernelBackward for Flex {
             tensor(grad_gamma, channels),
             tensor(grad_beta, channels),
         ]
+    }
+
+    fn depthwise_grad_x(weight: Float, grad: Float, dilation: usize) -> Float {
+        let sizes: [usize; 4] = dims(&grad);
+        let [_, _, kernel, _] = dims(&weight);
+        let shape = depthwise_shape(sizes, kernel, dilation);
+        let (weight, grad) = (Values::of(weight), Values::of(grad));
+        let mut out = zeros(&sizes);
+        kernels::depthwise_backward_input(&shape, weight.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn depthwise_grad_weight(x: Float, grad: Float, sizes: [usize; 4], dilation: usize) -> Float {
+        let shape = depthwise_shape(dims(&x), sizes[2], dilation);
+        let (x, grad) = (Values::of(x), Values::of(grad));
+        let mut out = zeros(&sizes);
+        kernels::depthwise_backward_weight(&shape, x.slice(), grad.slice(), &mut out);
+        tensor(out, sizes)
+    }
+
+    fn gelu_grad(x: Float, grad: Float) -> Float {
+        let sizes: [usize; 4] = dims(&x);
+        let (x, grad) = (Values::of(x), Values::of(grad));
+        // SAFETY: a kernel that takes a `Slot` writes every value.
+        let (out, ()) = unsafe {
+            written(grad.slice().len(), |out| {
+                kernels::gelu_backward(x.slice(), grad.slice(), out);
+            })
+        };
+        tensor(out, sizes)
     }
 
     fn elu_grad(output: Float, grad: Float) -> Float {

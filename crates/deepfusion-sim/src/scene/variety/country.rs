@@ -10,7 +10,7 @@ use crate::texture::ground_style::Line;
 use rand::Rng;
 
 /// Furnishes a country road.
-pub fn furnish(site: &mut Site) {
+pub(super) fn furnish(site: &mut Site) {
     site.world.road.kerb = 0.0;
     let half = site.draw(2.75, 4.2);
     let mut sections = Vec::new();

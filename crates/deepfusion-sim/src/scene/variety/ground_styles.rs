@@ -23,7 +23,7 @@ impl Site<'_> {
     }
 
     /// Asphalt or concrete.
-    pub fn asphalt(&mut self) -> Surface {
+    pub(super) fn asphalt(&mut self) -> Surface {
         let colour = self.grey(0.035, 0.4);
         Surface {
             kind: Kind::Asphalt,
@@ -36,7 +36,7 @@ impl Site<'_> {
     }
 
     /// Stones, slabs, bricks or tiles.
-    pub fn laid(&mut self) -> Surface {
+    pub(super) fn laid(&mut self) -> Surface {
         let base = if self.rng.random_bool(0.6) {
             self.grey(0.07, 0.5)
         } else {
@@ -54,7 +54,7 @@ impl Site<'_> {
     }
 
     /// Lawn, meadow, dry grass.
-    pub fn grass(&mut self) -> Surface {
+    pub(super) fn grass(&mut self) -> Surface {
         let tone = self.rng.random_range(0.5..1.6f32);
         let green = Rgb::new(
             self.rng.random_range(0.05..0.13),
@@ -80,7 +80,7 @@ impl Site<'_> {
     }
 
     /// Gravel, soil, sand.
-    pub fn loose(&mut self) -> Surface {
+    pub(super) fn loose(&mut self) -> Surface {
         let tone = 0.06 * 7f32.powf(self.rng.random_range(0.0..1.0));
         let base = Rgb::new(tone, tone * 0.88, tone * self.rng.random_range(0.55..0.95));
         Surface {
@@ -94,7 +94,7 @@ impl Site<'_> {
     }
 
     /// A field: furrows, stubble, young corn.
-    pub fn field(&mut self) -> Surface {
+    pub(super) fn field(&mut self) -> Surface {
         let (soil, plants) = (self.loose(), self.grass());
         Surface {
             kind: Kind::Field,
@@ -115,7 +115,7 @@ impl Site<'_> {
     }
 
     /// What lies beside a street.
-    pub fn yard(&mut self) -> Surface {
+    pub(super) fn yard(&mut self) -> Surface {
         match self.rng.random_range(0..10) {
             0..=3 => self.grass(),
             4..=5 => self.laid(),
@@ -125,7 +125,7 @@ impl Site<'_> {
     }
 
     /// The ground of a stretch of street of this half width, painted as streets are.
-    pub fn style(&mut self, half_width: f32) -> GroundStyle {
+    pub(super) fn style(&mut self, half_width: f32) -> GroundStyle {
         let road = match self.rng.random_range(0..20) {
             0..=15 => self.asphalt(),
             16..=18 => self.laid(),

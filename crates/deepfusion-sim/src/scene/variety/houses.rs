@@ -10,7 +10,7 @@ use rand::Rng;
 
 /// What kind of building.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub(super) enum Kind {
     /// In a closed row, two to five floors.
     Row,
     /// Alone in a garden.
@@ -33,7 +33,7 @@ struct Storeys {
 impl Site<'_> {
     /// Builds a house around a spot: `size` along its heading and across it. The street is to its left where
     /// `street_left`. Houses at the back are plainer.
-    pub fn house(
+    pub(super) fn house(
         &mut self,
         spot: &Spot,
         size: [f64; 2],

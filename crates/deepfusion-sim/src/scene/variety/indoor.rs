@@ -13,13 +13,13 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// Where doors and passages are, metres left of the centreline: a way through all rooms.
 const WAY: f64 = -1.65;
 /// Half the width of that way that furniture leaves free, metres.
-pub const FREE: f64 = 0.62;
+pub(super) const FREE: f64 = 0.62;
 
 /// Walls between rooms are as high as the highest ceiling and more, metres.
 const TALL: f64 = 5.4;
 
 /// Furnishes a row of rooms along a straight line in the place of the road.
-pub fn furnish(site: &mut Site) {
+pub(super) fn furnish(site: &mut Site) {
     let (start, end) = (site.world.road.start, site.world.road.end());
     site.world.road = Road::straight(start, end);
     site.world.road.kerb = 0.0;

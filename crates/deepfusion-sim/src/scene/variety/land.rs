@@ -10,7 +10,7 @@ use rand::Rng;
 
 impl Site<'_> {
     /// Hills far away on both sides and ahead, with this probability.
-    pub fn hills(&mut self, probability: f64) {
+    pub(super) fn hills(&mut self, probability: f64) {
         if !self.chance(probability) {
             return;
         }
@@ -60,7 +60,7 @@ impl Site<'_> {
     }
 
     /// Wires over the street, between its sides or along it.
-    pub fn wires(&mut self) {
+    pub(super) fn wires(&mut self) {
         if !self.chance(0.3) {
             return;
         }
@@ -88,7 +88,7 @@ impl Site<'_> {
     }
 
     /// A bridge over the road at `s`, with piers `out` metres from the centreline.
-    pub fn bridge(&mut self, s: f64, out: f64) {
+    pub(super) fn bridge(&mut self, s: f64, out: f64) {
         let kit = self.kit;
         let stone = self.often(&kit.stone);
         let (height, deep) = (self.draw(4.6, 6.5), self.draw(5.0, 16.0));
@@ -114,7 +114,7 @@ impl Site<'_> {
     }
 
     /// A piece of bank beside the road: its foot, its height, the width of its slope and of its top.
-    pub fn bank(
+    pub(super) fn bank(
         &mut self,
         spot: &Spot,
         length: f64,

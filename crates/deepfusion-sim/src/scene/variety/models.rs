@@ -25,7 +25,7 @@ fn paint(rng: &mut ChaCha8Rng) -> Rgb {
 }
 
 /// Every kind of vehicle, cars most often.
-pub fn vehicles(world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> Vec<CarModel> {
+pub(super) fn vehicles(world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> Vec<CarModel> {
     let mut models = Vec::new();
     for number in 0..36 {
         let body = varied(rng, &BODIES[number % BODIES.len()]);

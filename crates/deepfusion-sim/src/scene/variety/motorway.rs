@@ -12,7 +12,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 const LANE: f64 = 3.75;
 
 /// Furnishes a motorway.
-pub fn furnish(site: &mut Site) {
+pub(super) fn furnish(site: &mut Site) {
     site.world.road.kerb = 0.0;
     let (right, left) = (site.rng.random_range(0..2u8), site.rng.random_range(0..3u8));
     let widest = f64::from(right.max(left));
@@ -131,7 +131,7 @@ fn rails(site: &mut Site, half: f64) {
 }
 
 /// The spot halfway between two, headed from the first to the second.
-pub fn between(a: &Spot, b: &Spot) -> Spot {
+pub(super) fn between(a: &Spot, b: &Spot) -> Spot {
     Spot {
         x: 0.5 * (a.x + b.x),
         y: 0.5 * (a.y + b.y),
@@ -141,7 +141,7 @@ pub fn between(a: &Spot, b: &Spot) -> Spot {
 }
 
 /// Banks, bushes and woods beyond `from` metres from the centreline.
-pub fn verge(site: &mut Site, side: f64, from: f64) {
+pub(super) fn verge(site: &mut Site, side: f64, from: f64) {
     let kit = site.kit;
     let end = site.world.road.end();
     let mut s = site.world.road.start;

@@ -85,7 +85,7 @@ impl Figure {
 }
 
 /// Everyone who may be met in a world.
-pub fn models(_world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> Vec<CarModel> {
+pub(super) fn models(_world: &mut World, rng: &mut ChaCha8Rng, kit: &Kit) -> Vec<CarModel> {
     let mut crowd = Vec::new();
     for _ in 0..14 {
         let mut figure = Figure::default();

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 impl Site<'_> {
     /// A tree `height` metres high with a crown of `radius`, on a spot; its lowest leaves at `clear` metres.
-    pub fn tree(&mut self, spot: &Spot, height: f64, radius: f64, clear: f64) {
+    pub(super) fn tree(&mut self, spot: &Spot, height: f64, radius: f64, clear: f64) {
         let number = self.rng.random_range(0..self.kit.trees.len());
         let species = self.kit.trees[number];
         let mark = self.mark();
@@ -139,7 +139,7 @@ impl Site<'_> {
     }
 
     /// A bush of about this size.
-    pub fn bush(&mut self, spot: &Spot, size: f64) {
+    pub(super) fn bush(&mut self, spot: &Spot, size: f64) {
         let number = self.rng.random_range(0..self.kit.bushes.len());
         let species = self.kit.bushes[number];
         let mark = self.mark();
@@ -158,7 +158,7 @@ impl Site<'_> {
     }
 
     /// A hedge along the spot's heading.
-    pub fn hedge(&mut self, spot: &Spot, length: f64, height: f64) {
+    pub(super) fn hedge(&mut self, spot: &Spot, length: f64, height: f64) {
         let number = self.rng.random_range(0..self.kit.bushes.len());
         let species = self.kit.bushes[number];
         let mark = self.mark();
@@ -193,7 +193,7 @@ impl Site<'_> {
     }
 
     /// Tall grass and weeds: a few flat tufts.
-    pub fn weeds(&mut self, spot: &Spot, size: f64) {
+    pub(super) fn weeds(&mut self, spot: &Spot, size: f64) {
         let number = self.rng.random_range(0..self.kit.bushes.len());
         let species = self.kit.bushes[number];
         for _ in 0..3 {

@@ -7,7 +7,7 @@ use rand::Rng;
 
 impl Site<'_> {
     /// A lamp post whose arm reaches `arm` metres along the spot's heading.
-    pub fn lamp(&mut self, spot: &Spot) {
+    pub(super) fn lamp(&mut self, spot: &Spot) {
         let kit = self.kit;
         let mark = self.mark();
         let metal = self.often(&kit.metal);
@@ -35,7 +35,7 @@ impl Site<'_> {
     }
 
     /// A traffic sign that faces along the spot's heading.
-    pub fn sign(&mut self, spot: &Spot) {
+    pub(super) fn sign(&mut self, spot: &Spot) {
         let kit = self.kit;
         let mark = self.mark();
         let metal = self.any(&kit.metal);
@@ -73,7 +73,7 @@ impl Site<'_> {
     }
 
     /// Traffic lights.
-    pub fn lights(&mut self, spot: &Spot) {
+    pub(super) fn lights(&mut self, spot: &Spot) {
         let kit = self.kit;
         let mark = self.mark();
         let metal = self.any(&kit.metal);
@@ -89,7 +89,7 @@ impl Site<'_> {
     }
 
     /// One of the many things that stand about on pavements.
-    pub fn thing(&mut self, spot: &Spot) {
+    pub(super) fn thing(&mut self, spot: &Spot) {
         let kit = self.kit;
         let mark = self.mark();
         let class = match self.rng.random_range(0..15) {
@@ -199,7 +199,7 @@ impl Site<'_> {
     }
 
     /// A bench along the spot's heading.
-    pub fn bench(&mut self, spot: &Spot) {
+    pub(super) fn bench(&mut self, spot: &Spot) {
         let kit = self.kit;
         let (wood, metal) = (self.often(&kit.wood), self.any(&kit.metal));
         self.block(&spot.spot(0.0, 0.0, 0.42, 0.0), [1.7, 0.45, 0.06], wood);
@@ -253,7 +253,7 @@ impl Site<'_> {
     }
 
     /// A chair whose back is to −x of the spot.
-    pub fn chair(&mut self, spot: &Spot, material: u32) {
+    pub(super) fn chair(&mut self, spot: &Spot, material: u32) {
         let metal = self.kit.metal[1];
         let seat = self.draw(0.42, 0.48);
         self.block(
@@ -297,7 +297,7 @@ impl Site<'_> {
     }
 
     /// A fence, a railing or a wall along the spot's heading.
-    pub fn enclosure(&mut self, spot: &Spot, length: f64) {
+    pub(super) fn enclosure(&mut self, spot: &Spot, length: f64) {
         let kit = self.kit;
         match self.rng.random_range(0..12) {
             0..=3 => {

@@ -9,7 +9,7 @@ use std::f64::consts::FRAC_PI_2;
 
 impl Site<'_> {
     /// Things along a wall: x runs along it from the spot, y into the room. They are at most `deep` metres deep.
-    pub fn along(&mut self, wall: &Spot, length: f64, deep: f64, height: f64) {
+    pub(super) fn along(&mut self, wall: &Spot, length: f64, deep: f64, height: f64) {
         let mut x = self.draw(0.05, 0.4);
         let full = 0.35 + 0.6 * self.variety.clutter;
         while x + 0.5 < length {
@@ -311,7 +311,7 @@ impl Site<'_> {
     }
 
     /// Things on a surface of this size: cups, books, bottles, boxes, fruit.
-    pub fn clutter(&mut self, at: &Spot, [wide, deep]: [f64; 2], tall: f64) {
+    pub(super) fn clutter(&mut self, at: &Spot, [wide, deep]: [f64; 2], tall: f64) {
         let kit = self.kit;
         let most = 1.0 + 9.0 * self.variety.clutter * wide.min(1.5);
         for _ in 0..self.rng.random_range(0..=most as usize) {
@@ -347,7 +347,7 @@ impl Site<'_> {
     }
 
     /// What stands in the open, `room` metres wide.
-    pub fn island(&mut self, spot: &Spot, room: f64, height: f64) {
+    pub(super) fn island(&mut self, spot: &Spot, room: f64, height: f64) {
         let kit = self.kit;
         if !self.chance(0.3 + 0.6 * self.variety.clutter) {
             return;

@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// A place and a heading in the world.
 #[derive(Debug, Clone, Copy)]
-pub struct Spot {
+pub(super) struct Spot {
     /// World position, metres.
     pub x: f64,
     /// World position, metres.
@@ -26,7 +26,7 @@ pub struct Spot {
 
 impl Spot {
     /// The world point at coordinates of the spot's axes (x along its heading, y left, z up).
-    pub fn at(&self, x: f64, y: f64, z: f64) -> [f64; 3] {
+    pub(super) fn at(&self, x: f64, y: f64, z: f64) -> [f64; 3] {
         let (sin, cos) = self.heading.sin_cos();
         [
             self.x + cos * x - sin * y,
@@ -36,7 +36,7 @@ impl Spot {
     }
 
     /// A spot in this one's axes, turned by `turn`.
-    pub fn spot(&self, x: f64, y: f64, z: f64, turn: f64) -> Self {
+    pub(super) fn spot(&self, x: f64, y: f64, z: f64, turn: f64) -> Self {
         let [x, y, z] = self.at(x, y, z);
         Self {
             x,
@@ -49,7 +49,7 @@ impl Spot {
 
 /// A kind of tree or bush.
 #[derive(Debug, Clone, Copy)]
-pub struct Species {
+pub(super) struct Species {
     /// The leaves' materials, from the shaded ones below to those in the light.
     pub leaves: [u32; 3],
     /// Side of the cells of its clumps, metres.
@@ -67,7 +67,7 @@ pub struct Species {
 }
 
 /// Materials of one world.
-pub struct Kit {
+pub(super) struct Kit {
     /// Anything.
     pub wild: Vec<u32>,
     /// Painted and bare metal.
@@ -103,7 +103,7 @@ fn plain(world: &mut World, rng: &mut ChaCha8Rng, tint: Rgb) -> u32 {
 
 impl Kit {
     /// Draws the materials of a world.
-    pub fn new(world: &mut World, rng: &mut ChaCha8Rng, variety: &Variety) -> Self {
+    pub(super) fn new(world: &mut World, rng: &mut ChaCha8Rng, variety: &Variety) -> Self {
         let wild = (0..26)
             .map(|_| {
                 let pattern = Pattern::wild(rng);
@@ -299,7 +299,7 @@ fn species(world: &mut World, rng: &mut ChaCha8Rng, variety: &Variety, bush: boo
 }
 
 /// A world being built.
-pub struct Site<'a> {
+pub(super) struct Site<'a> {
     /// The world.
     pub world: &'a mut World,
     /// Where everything is drawn from.
@@ -312,12 +312,12 @@ pub struct Site<'a> {
 
 impl Site<'_> {
     /// One of some materials.
-    pub fn any(&mut self, of: &[u32]) -> u32 {
+    pub(super) fn any(&mut self, of: &[u32]) -> u32 {
         of[self.rng.random_range(0..of.len())]
     }
 
     /// Now and then a wild material in the place of one of these.
-    pub fn often(&mut self, of: &[u32]) -> u32 {
+    pub(super) fn often(&mut self, of: &[u32]) -> u32 {
         if self.rng.random_bool(self.variety.wild) {
             let kit = self.kit;
             self.any(&kit.wild)
@@ -327,17 +327,17 @@ impl Site<'_> {
     }
 
     /// A uniform draw.
-    pub fn draw(&mut self, from: f64, to: f64) -> f64 {
+    pub(super) fn draw(&mut self, from: f64, to: f64) -> f64 {
         self.rng.random_range(from..to)
     }
 
     /// Whether something that happens with this probability does.
-    pub fn chance(&mut self, probability: f64) -> bool {
+    pub(super) fn chance(&mut self, probability: f64) -> bool {
         self.rng.random_bool(probability.clamp(0.0, 1.0))
     }
 
     /// The spot `out` metres left of the centreline at `s`, on the ground there.
-    pub fn beside(&self, s: f64, lateral: f64) -> Spot {
+    pub(super) fn beside(&self, s: f64, lateral: f64) -> Spot {
         let (x, y, heading) = self.world.road.world(s, lateral);
         let p = self.world.road.locate(x, y);
         let z = if self.world.road.kerb_distance(&p) > 0.0 {
@@ -349,13 +349,13 @@ impl Site<'_> {
     }
 
     /// Whether a rectangle around a spot keeps `clear` metres from every kerb.
-    pub fn is_clear(&self, spot: &Spot, half: [f64; 2], clear: f32) -> bool {
+    pub(super) fn is_clear(&self, spot: &Spot, half: [f64; 2], clear: f32) -> bool {
         self.world
             .is_clear(spot.x, spot.y, spot.heading, half, clear)
     }
 
     /// A box of this length, width and height that stands on a spot.
-    pub fn block(&mut self, spot: &Spot, size: [f64; 3], material: u32) {
+    pub(super) fn block(&mut self, spot: &Spot, size: [f64; 3], material: u32) {
         let seed = self.rng.random();
         let shape = Shape::Box {
             half_x: 0.5 * size[0] as f32,
@@ -367,7 +367,7 @@ impl Site<'_> {
     }
 
     /// An upright cylinder.
-    pub fn column(&mut self, spot: &Spot, radius: f64, height: f64, material: u32) {
+    pub(super) fn column(&mut self, spot: &Spot, radius: f64, height: f64, material: u32) {
         let seed = self.rng.random();
         let shape = Shape::Cylinder {
             radius: radius as f32,
@@ -378,7 +378,7 @@ impl Site<'_> {
     }
 
     /// An ellipsoid around a spot.
-    pub fn ball(&mut self, spot: &Spot, radii: [f64; 3], material: u32) {
+    pub(super) fn ball(&mut self, spot: &Spot, radii: [f64; 3], material: u32) {
         let seed = self.rng.random();
         let shape = Shape::Ellipsoid {
             radii: radii.map(|r| r as f32),
@@ -388,7 +388,7 @@ impl Site<'_> {
     }
 
     /// A round-ended rod between two points of the world.
-    pub fn rod(&mut self, a: [f64; 3], b: [f64; 3], radius: f64, material: u32) {
+    pub(super) fn rod(&mut self, a: [f64; 3], b: [f64; 3], radius: f64, material: u32) {
         let seed = self.rng.random();
         let middle = [0, 1, 2].map(|i| 0.5 * (a[i] + b[i]));
         let half_axis = [0, 1, 2].map(|i| (0.5 * (b[i] - a[i])) as f32);
@@ -403,7 +403,7 @@ impl Site<'_> {
     }
 
     /// A lobe of leaves around a point; `light` 0 to 2 chooses how bright.
-    pub fn lobe(&mut self, at: [f64; 3], radii: [f64; 3], species: &Species, light: usize) {
+    pub(super) fn lobe(&mut self, at: [f64; 3], radii: [f64; 3], species: &Species, light: usize) {
         let salt = self.rng.random();
         let crown = Crown {
             radii: radii.map(|r| r as f32),
@@ -418,7 +418,7 @@ impl Site<'_> {
     }
 
     /// A convex solid with this outline in its x–z plane (counter-clockwise seen from −y) and this width along y.
-    pub fn prism(&mut self, spot: &Spot, outline: &[[f64; 2]], width: f64, material: u32) {
+    pub(super) fn prism(&mut self, spot: &Spot, outline: &[[f64; 2]], width: f64, material: u32) {
         let count = outline.len();
         let mut planes: Vec<(V3, f32)> = (0..count)
             .map(|i| {
@@ -452,12 +452,12 @@ impl Site<'_> {
     }
 
     /// How many solids there are: where a new object's begin.
-    pub fn mark(&self) -> usize {
+    pub(super) fn mark(&self) -> usize {
         self.world.primitives.len()
     }
 
     /// Lists the solids since `mark` as one object; its box, along the spot's axes, holds them.
-    pub fn close(&mut self, class: ObjectClass, spot: &Spot, mark: usize) {
+    pub(super) fn close(&mut self, class: ObjectClass, spot: &Spot, mark: usize) {
         let solids = &self.world.primitives[mark..];
         if let Some((base, size)) = boxed(self.world, spot, solids) {
             self.world.object(class, base, spot.heading, size);
@@ -465,7 +465,7 @@ impl Site<'_> {
     }
 
     /// Puts a model (a car, a person) on a spot.
-    pub fn put(&mut self, model: &CarModel, spot: &Spot) {
+    pub(super) fn put(&mut self, model: &CarModel, spot: &Spot) {
         let seed = self.rng.random();
         let base = [spot.x, spot.y, spot.z];
         let solids = model.solids(base, spot.heading, seed, false);
@@ -475,7 +475,7 @@ impl Site<'_> {
     }
 
     /// A vehicle of the world's models that `fits`.
-    pub fn vehicle(&mut self, fits: impl Fn(&CarModel) -> bool) -> Option<CarModel> {
+    pub(super) fn vehicle(&mut self, fits: impl Fn(&CarModel) -> bool) -> Option<CarModel> {
         let count = self.world.models.len();
         let from = self.rng.random_range(0..count.max(1));
         (0..count)
@@ -485,7 +485,7 @@ impl Site<'_> {
     }
 
     /// Someone of the world's crowd, of this class.
-    pub fn person(&mut self, class: ObjectClass) -> Option<CarModel> {
+    pub(super) fn person(&mut self, class: ObjectClass) -> Option<CarModel> {
         let those: Vec<usize> = (0..self.world.crowd.len())
             .filter(|i| self.world.crowd[*i].class == class)
             .collect();
@@ -495,7 +495,11 @@ impl Site<'_> {
 }
 
 /// Middle of the underside and size of the least box, along a spot's axes, that holds some solids.
-pub fn boxed(world: &World, spot: &Spot, solids: &[Primitive]) -> Option<([f64; 3], [f64; 3])> {
+pub(super) fn boxed(
+    world: &World,
+    spot: &Spot,
+    solids: &[Primitive],
+) -> Option<([f64; 3], [f64; 3])> {
     let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
     for solid in solids {
         let (half_x, half_y, from, to) = solid.bounds(&world.hulls);

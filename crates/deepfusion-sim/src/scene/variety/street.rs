@@ -18,7 +18,7 @@ const ROOM: f64 = 2.85;
 
 /// What stands along a side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Frontage {
+pub(super) enum Frontage {
     /// Houses wall to wall.
     Row,
     /// Houses in gardens.
@@ -49,7 +49,7 @@ enum Parking {
 
 /// One side of a section.
 #[derive(Clone, Copy)]
-pub struct Side {
+pub(super) struct Side {
     pub frontage: Frontage,
     pub pavement: f32,
     pub verge: f32,
@@ -63,7 +63,7 @@ pub struct Side {
 
 impl Side {
     /// Nothing but land, without a pavement.
-    pub fn open() -> Self {
+    pub(super) fn open() -> Self {
         Self {
             frontage: Frontage::Green,
             pavement: 0.0,
@@ -77,7 +77,7 @@ impl Side {
 }
 
 /// A stretch of the street.
-pub struct Section {
+pub(super) struct Section {
     pub from: f64,
     pub to: f64,
     pub half_width: f32,
@@ -85,7 +85,7 @@ pub struct Section {
 }
 
 /// Furnishes a street.
-pub fn furnish(site: &mut Site) {
+pub(super) fn furnish(site: &mut Site) {
     let sections = sections(site);
     apply_widths(site, &sections);
     side_streets(site);
@@ -220,7 +220,7 @@ fn plan(site: &mut Site, scene: Scene, home: Frontage, half_width: f32, side: us
 }
 
 /// Gives the road its widths.
-pub fn apply_widths(site: &mut Site, sections: &[Section]) {
+pub(super) fn apply_widths(site: &mut Site, sections: &[Section]) {
     let world = &mut *site.world;
     let start = world.road.start;
     let count = world.road.samples_mut().len();

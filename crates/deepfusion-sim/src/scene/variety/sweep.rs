@@ -6,7 +6,7 @@ use crate::scene::World;
 
 /// A way that must be free.
 #[derive(Debug, Clone, Copy)]
-pub struct Way {
+pub(super) struct Way {
     /// Metres left of the centreline, from and to.
     pub lane: [f64; 2],
     /// Nothing hangs lower over it, metres.
@@ -14,13 +14,13 @@ pub struct Way {
 }
 
 /// The lane of a car.
-pub const ROAD: Way = Way {
+pub(super) const ROAD: Way = Way {
     lane: [-2.7, -0.6],
     headroom: 2.3,
 };
 
 /// The way through rooms and their doors.
-pub const ROOMS: Way = Way {
+pub(super) const ROOMS: Way = Way {
     lane: [-2.19, -1.11],
     headroom: 1.95,
 };
@@ -68,7 +68,7 @@ fn intrudes(world: &World, way: &Way, solid: &Primitive) -> bool {
 }
 
 /// Removes everything that reaches into a way.
-pub fn clear(world: &mut World, way: &Way) {
+pub(super) fn clear(world: &mut World, way: &Way) {
     let kept: Vec<Primitive> = world
         .primitives
         .iter()

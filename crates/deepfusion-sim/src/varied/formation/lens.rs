@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// A lens, as it was focused and held.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Lens {
+pub(super) struct Lens {
     /// Deviation of its blur, pixels; 0: none.
     blur: f32,
     /// The camera turned while the shutter was open: the length and direction (radians) of the smear, in pixels.
@@ -23,7 +23,7 @@ pub struct Lens {
 impl Lens {
     /// Softness: none in half of them, as in pictures that were made smaller; a bell of 0.25 to 0.6 pixels in three of
     /// eight, of up to 1.6 in one of eight. One of twenty is smeared by 1.5 to 6 pixels, mostly sideways, as cameras turn.
-    pub fn draw(rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn draw(rng: &mut ChaCha8Rng) -> Self {
         Self {
             blur: match rng.random_range(0..8) {
                 0..=3 => 0.0,
@@ -48,7 +48,7 @@ impl Lens {
     }
 
     /// Light through the lens.
-    pub fn pass(&self, planes: &mut Planes) {
+    pub(super) fn pass(&self, planes: &mut Planes) {
         if self.lateral != [0.0; 2] {
             self.spread_colours(planes);
         }

@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// One camera's image formation, with the random effects of one picture.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Formation {
+pub(super) struct Formation {
     lens: lens::Lens,
     sensor: sensor::Sensor,
     processing: processing::Processing,
@@ -27,7 +27,7 @@ pub struct Formation {
 
 /// Brightness of the scene, for the automatic exposure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Brightness {
+pub(super) enum Brightness {
     /// Daylight: the exposure is what it should be, but for its error.
     Day,
     /// Lamps: the exposure stays too short, the gain high.
@@ -36,7 +36,7 @@ pub enum Brightness {
 
 impl Formation {
     /// Draws one; `grey` is the share of cameras without colour.
-    pub fn draw(rng: &mut ChaCha8Rng, brightness: Brightness, grey: f64) -> Self {
+    pub(super) fn draw(rng: &mut ChaCha8Rng, brightness: Brightness, grey: f64) -> Self {
         Self {
             lens: lens::Lens::draw(rng),
             sensor: sensor::Sensor::draw(rng, brightness),
@@ -49,12 +49,12 @@ impl Formation {
     }
 
     /// Whether the camera sees no colours.
-    pub fn is_grey(&self) -> bool {
+    pub(super) fn is_grey(&self) -> bool {
         self.processing.grey.is_some()
     }
 
     /// The image of the light of `width` × `height` pixels, row by row; `seed` is the noise's.
-    pub fn image(&self, light: &[Rgb], width: usize, height: usize, seed: u64) -> RgbImage {
+    pub(super) fn image(&self, light: &[Rgb], width: usize, height: usize, seed: u64) -> RgbImage {
         let mut planes = Planes::of(light, width, height);
         self.lens.pass(&mut planes);
         self.sensor.expose(&mut planes, &mut Hiss::new(seed));

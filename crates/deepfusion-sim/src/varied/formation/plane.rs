@@ -4,7 +4,7 @@ use crate::texture::Rgb;
 
 /// Red, green and blue, each row by row.
 #[derive(Debug, Clone)]
-pub struct Planes {
+pub(super) struct Planes {
     /// Width, in pixels.
     pub width: usize,
     /// Height, in pixels.
@@ -15,7 +15,7 @@ pub struct Planes {
 
 impl Planes {
     /// The planes of colours, row by row.
-    pub fn of(light: &[Rgb], width: usize, height: usize) -> Self {
+    pub(super) fn of(light: &[Rgb], width: usize, height: usize) -> Self {
         Self {
             width,
             height,
@@ -25,7 +25,7 @@ impl Planes {
 }
 
 /// The taps of a normal bell of this deviation, from the middle to one side; they sum to 1 over both sides.
-pub fn bell(deviation: f32) -> Vec<f32> {
+pub(super) fn bell(deviation: f32) -> Vec<f32> {
     let reach = (2.6 * deviation).ceil().max(1.0) as usize;
     let mut taps: Vec<f32> = (0..=reach)
         .map(|i| (-0.5 * (i as f32 / deviation).powi(2)).exp())
@@ -38,7 +38,7 @@ pub fn bell(deviation: f32) -> Vec<f32> {
 }
 
 /// A symmetric filter along both axes; `taps` from the middle to one side.
-pub fn filter(plane: &mut [f32], work: &mut [f32], width: usize, taps: &[f32]) {
+pub(super) fn filter(plane: &mut [f32], work: &mut [f32], width: usize, taps: &[f32]) {
     let height = plane.len() / width;
     for (row, out) in plane.chunks(width).zip(work.chunks_mut(width)) {
         along_row(row, out, taps);
@@ -96,7 +96,7 @@ fn along_row(row: &[f32], out: &mut [f32], taps: &[f32]) {
 
 /// The plane at fractional coordinates within it, bilinear.
 #[inline]
-pub fn sample(plane: &[f32], width: usize, x: f32, y: f32) -> f32 {
+pub(super) fn sample(plane: &[f32], width: usize, x: f32, y: f32) -> f32 {
     let height = plane.len() / width;
     let x = x.clamp(0.0, (width - 1) as f32);
     let y = y.clamp(0.0, (height - 1) as f32);

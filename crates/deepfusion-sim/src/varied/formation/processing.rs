@@ -14,7 +14,7 @@ const TONES: usize = 2048;
 
 /// A camera's processor.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Processing {
+pub(super) struct Processing {
     /// Weights of red, green and blue, where the camera sees no colours.
     pub grey: Option<[f32; 3]>,
     /// How vivid colours are: 1 leaves them, 0 takes them away.
@@ -35,7 +35,7 @@ pub struct Processing {
 
 impl Processing {
     /// Draws one; `grey` is the share of cameras without colour.
-    pub fn draw(rng: &mut ChaCha8Rng, grey: f64) -> Self {
+    pub(super) fn draw(rng: &mut ChaCha8Rng, grey: f64) -> Self {
         Self {
             grey: sometimes(rng, grey, None, |rng| {
                 // Some see near infrared through their red pixels.
@@ -60,7 +60,7 @@ impl Processing {
     }
 
     /// The image of a sensor's reading.
-    pub fn develop(&self, mut planes: Planes) -> RgbImage {
+    pub(super) fn develop(&self, mut planes: Planes) -> RgbImage {
         self.colour(&mut planes);
         let tones = self.tones();
         let channels = if self.grey.is_some() { 1 } else { 3 };
@@ -142,7 +142,7 @@ impl Processing {
 }
 
 /// The image after it was stored as a JPEG file of this quality.
-pub fn through_jpeg(image: RgbImage, quality: u8) -> RgbImage {
+pub(super) fn through_jpeg(image: RgbImage, quality: u8) -> RgbImage {
     let (width, height) = image.dimensions();
     let mut file = Vec::new();
     let encoder = Encoder::new(&mut file, quality);

@@ -7,11 +7,11 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 /// Weights of red, green and blue in the light that an exposure is measured by (ITU-R BT.709).
-pub const LUMA: [f32; 3] = [0.2126, 0.7152, 0.0722];
+pub(super) const LUMA: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 /// A sensor and its automatic exposure.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sensor {
+pub(super) struct Sensor {
     /// The mean the exposure aims at, as a share of full scale, its error included.
     aim: f32,
     /// How much more the lower half counts than the upper one while measuring.
@@ -34,7 +34,7 @@ impl Sensor {
     /// Aims at 0.16 to 0.26 of full scale on what is mostly ground (the sky may clip), with an error of 0.4 stops (one
     /// of seven: over one stop). Noise of 0.1 to 1.6 % of full scale, more in the dark; in half of the cameras smoothed
     /// to grains. Two of three take glare off the dark parts.
-    pub fn draw(rng: &mut ChaCha8Rng, brightness: Brightness) -> Self {
+    pub(super) fn draw(rng: &mut ChaCha8Rng, brightness: Brightness) -> Self {
         let error = if rng.random_bool(0.14) {
             stops(rng, 0.9, 1.3)
         } else {
@@ -60,7 +60,7 @@ impl Sensor {
     }
 
     /// Linear light to the sensor's reading, 0 to 1.
-    pub fn expose(&self, planes: &mut Planes, hiss: &mut Hiss) {
+    pub(super) fn expose(&self, planes: &mut Planes, hiss: &mut Hiss) {
         self.deepen(planes);
         let towards_grey = self.towards_grey(planes);
         let gain = (self.aim / self.measured(planes).max(1e-6)).min(self.gain);

@@ -3,20 +3,20 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use crate::{Error, Grid, Result};
 
-/// Depth where no scan of the training data ever saw anything on a row, in metres (SPEC 5): the usual cap.
+/// Depth where no scan of the training data ever saw anything on a row, in metres: the usual cap.
 const EMPTY_ROW_M: f64 = 80.0;
 
-/// The trivial row of SPEC 5: the mean depth of each pixel over the training data's scans, a pixel without any taking
+/// The mean-depth baseline: the mean depth of each pixel over the training data's scans, a pixel without any taking
 /// its row's mean, a row without any 80 m. An image that is itself among the scans is evaluated without its own scan.
 #[derive(Debug, Clone, Default)]
-pub struct TrivialBaseline {
+pub struct MeanDepthBaseline {
     size: Option<(usize, usize)>,
     sum_m: Vec<f64>,
     count: Vec<u32>,
     scans: HashSet<u64>,
 }
 
-impl TrivialBaseline {
+impl MeanDepthBaseline {
     /// A baseline without any scan.
     #[must_use]
     pub fn new() -> Self {
@@ -53,7 +53,7 @@ impl TrivialBaseline {
     pub fn depth_for(&self, own: Option<&Grid>) -> Result<Grid> {
         let (width, height) = self.size.ok_or(Error::NothingToEvaluate {
             skipped: 0,
-            names: "the trivial row needs scans of the training data".into(),
+            names: "the mean-depth baseline needs scans of the training data".into(),
         })?;
         let (mut sum_m, mut count) = (self.sum_m.clone(), self.count.clone());
         if let Some(scan) = own.filter(|scan| self.scans.contains(&fingerprint(scan))) {
@@ -109,7 +109,7 @@ mod tests {
 
     #[test]
     fn pixels_rows_and_the_rest() {
-        let mut baseline = TrivialBaseline::new();
+        let mut baseline = MeanDepthBaseline::new();
         baseline.add_scan(&grid(&[10.0, 0.0, 0.0, 0.0]));
         baseline.add_scan(&grid(&[20.0, 0.0, 0.0, 0.0]));
         let depth = baseline.depth_for(None).unwrap();
@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn an_image_never_sees_its_own_scan() {
         let (a, b) = (grid(&[10.0, 0.0]), grid(&[20.0, 30.0]));
-        let mut baseline = TrivialBaseline::new();
+        let mut baseline = MeanDepthBaseline::new();
         baseline.add_scan(&a);
         baseline.add_scan(&b);
         baseline.add_scan(&b);
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn scans_of_another_size_go_where_their_pixels_lie() {
-        let mut baseline = TrivialBaseline::new();
+        let mut baseline = MeanDepthBaseline::new();
         baseline.add_scan(&grid(&[0.0, 0.0, 0.0, 7.0]));
         let mut large = vec![0.0; 16];
         (large[0], large[15]) = (5.0, 9.0);
@@ -150,6 +150,6 @@ mod tests {
 
     #[test]
     fn without_scans_there_is_no_row() {
-        assert!(TrivialBaseline::new().depth_for(None).is_err());
+        assert!(MeanDepthBaseline::new().depth_for(None).is_err());
     }
 }

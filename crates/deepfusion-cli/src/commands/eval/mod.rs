@@ -1,14 +1,18 @@
+mod verdict;
+
+use std::fmt;
 use std::path::Path;
 
 use deepfusion_data::{Cameras, Dataset, OpenOptions, RgbImage};
 use deepfusion_eval::compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
+use deepfusion_eval::verdict::{ScaleCertificate, Verdict};
 use deepfusion_eval::{ArraySet, Crop, Grid, Prediction, Protocol, Report};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_jobs::evaluation::confidence::{self, Calibrated};
-pub use deepfusion_jobs::evaluation::predict;
+pub(super) use deepfusion_jobs::evaluation::predict;
 use deepfusion_jobs::evaluation::{
-    Evaluated, Place, Truth, array_places, check_used, default_crop, depth_map, evaluate_arrays,
-    evaluate_datasets, expected_frames, trivial_from_arrays, trivial_from_training,
+    Evaluated, Place, Truth, array_places, baseline_from_arrays, baseline_from_training,
+    check_used, default_crop, depth_map, evaluate_arrays, evaluate_datasets, expected_frames,
 };
 use deepfusion_jobs::held_out::{held_out, unseen};
 use deepfusion_jobs::intervals;
@@ -19,6 +23,7 @@ use deepfusion_runtime::DepthEstimator;
 use deepfusion_runtime::ModelSource;
 use serde::Serialize;
 
+use super::clocks;
 use super::recordings::open_recordings;
 use super::remarks;
 use super::run_report::{self, Choice};
@@ -32,27 +37,62 @@ use crate::output;
 use crate::progress::{Progress, say};
 
 /// `deepfusion eval`.
-pub fn run(args: &EvalArgs) -> Result<()> {
+pub(super) fn run(args: &EvalArgs) -> Result<()> {
     if let Some(file) = &args.report {
         output::require_folder_of(file)?;
     }
-    let (report, checkpoint) = match (&args.pred, args.pred_kind, &args.gt) {
-        (Some(predictions), Some(kind), Some(truth)) => {
-            (from_arrays(args, predictions, kind, truth)?, None)
-        }
-        _ => {
-            let (report, checkpoint) = from_model(args)?;
-            (report, Some(checkpoint))
-        }
+    let found = match (&args.pred, args.pred_kind, &args.gt) {
+        (Some(predictions), Some(kind), Some(truth)) => Found {
+            report: Some(from_arrays(args, predictions, kind, truth)?),
+            ..Found::default()
+        },
+        _ => from_model(args)?,
     };
     if args.json {
-        return output::print_json(&Printed {
-            checkpoint: checkpoint.as_ref(),
-            report: &report,
-        });
+        return output::print_json(&found.printed());
     }
-    let used = checkpoint.map_or(String::new(), |c| format!("{c}\n\n"));
-    output::print(&format!("{used}{report}"))
+    output::print(&found.to_string())
+}
+
+/// What was found, as far as the data tell.
+#[derive(Default)]
+struct Found {
+    checkpoint: Option<UsedCheckpoint>,
+    /// With ground truth.
+    report: Option<Report>,
+    /// Without it.
+    verdict: Option<Verdict>,
+}
+
+impl Found {
+    fn printed(&self) -> Printed<'_> {
+        let certificate = self
+            .verdict
+            .as_ref()
+            .and_then(|v| v.scale_certificate.as_ref());
+        Printed {
+            checkpoint: self.checkpoint.as_ref(),
+            report: self.report.as_ref(),
+            certificate: certificate.filter(|_| self.report.is_none()),
+            verdict: self.verdict.as_ref(),
+        }
+    }
+}
+
+impl fmt::Display for Found {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(checkpoint) = &self.checkpoint {
+            write!(f, "{checkpoint}\n\n")?;
+        }
+        if let Some(report) = &self.report {
+            write!(f, "{report}")?;
+        }
+        if let Some(verdict) = &self.verdict {
+            let between = if self.report.is_some() { "\n" } else { "" };
+            write!(f, "{between}{verdict}")?;
+        }
+        Ok(())
+    }
 }
 
 /// What `--json` prints.
@@ -61,12 +101,17 @@ struct Printed<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     checkpoint: Option<&'a UsedCheckpoint>,
     #[serde(flatten)]
-    report: &'a Report,
+    report: Option<&'a Report>,
+    /// The certificate where there is nothing else to go by; it is always in `scale_certificate`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    certificate: Option<&'a ScaleCertificate>,
+    #[serde(flatten)]
+    verdict: Option<&'a Verdict>,
 }
 
 /// Predicts every frame that has ground truth. An image of another aspect ratio is stretched, so that
 /// all of its ground truth counts.
-fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
+fn from_model(args: &EvalArgs) -> Result<Found> {
     let model = model::chosen(args.model.as_deref())?;
     if args.calibrate_confidence && model.folder().is_none() {
         let (option, model) = ("--calibrate-confidence", model.name());
@@ -76,14 +121,21 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
     if args.calibrate_uncertainty {
         check_calibration(&model, &estimator)?;
     }
-    let options = OpenOptions {
+    let mut options = OpenOptions {
         camera: args.camera,
         split: read_split(args.split.as_deref())?,
         intrinsics: args.intrinsics.map(CameraIntrinsics::numbers),
         hfov_deg: args.hfov,
-        camera_ahead_s: args.camera_ahead_s,
+        topics: args.topics.clone(),
+        assumed_camera: model.assumed_camera(args.engine.set.as_deref())?,
+        ..OpenOptions::default()
     };
+    options.camera_ahead_s = clocks::seconds(args.clock_offset, &args.data, &options)?;
     let datasets = open_recordings(&args.data, &options)?;
+    let found = verdict::of_model(args, &model, &mut estimator, &datasets)?;
+    if found.is_some() && !verdict::has_truth(args, &datasets) {
+        return verdict::alone(args, &model, found, UsedCheckpoint::of(&estimator, &model));
+    }
     let expected = expected_frames(&options, &datasets, args.strict)?;
     let crop = default_crop(&datasets);
     let kind = args.gt_depth;
@@ -92,8 +144,8 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
         None => Truth::Scans(kind),
     };
     let baseline = match &args.trivial {
-        Some(path) => Some(trivial_from_arrays(path)?),
-        None => trivial_from_training(estimator.config(), kind),
+        Some(path) => Some(baseline_from_arrays(path)?),
+        None => baseline_from_training(estimator.config(), kind),
     };
     let protocol = args.protocol(crop);
     let mut progress = Progress::new("evaluating");
@@ -180,14 +232,20 @@ fn from_model(args: &EvalArgs) -> Result<(Report, UsedCheckpoint)> {
         if let Some(bins) = reliability {
             page = run_report::reliability(page, &bins);
         }
+        if let Some(found) = &found {
+            page = run_report::verdict(page, found);
+        }
         if let Some(folder) = model.folder() {
             page = run_report::training(page, folder)?;
         }
         page.write(path)?;
         say(&format!("report  {}", path.display()));
     }
-    let checkpoint = UsedCheckpoint::of(&estimator, &model);
-    Ok((evaluated.report, checkpoint))
+    Ok(Found {
+        checkpoint: Some(UsedCheckpoint::of(&estimator, &model)),
+        report: Some(evaluated.report),
+        verdict: found,
+    })
 }
 
 /// That a network's intervals can be calibrated at all, before anything is measured.
@@ -237,7 +295,7 @@ fn from_arrays(
     let baseline = args
         .trivial
         .as_deref()
-        .map(trivial_from_arrays)
+        .map(baseline_from_arrays)
         .transpose()?;
     let protocol = args.protocol(Crop::None);
     let mut progress = Progress::new("evaluating");
@@ -328,7 +386,10 @@ fn page(
     let page = HtmlReport::new(name, format!("Depth measured{on}"))
         .facts(&[
             ("Abs Rel, unscaled", &number(report.unscaled.abs_rel)),
-            ("Abs Rel, trivial row", &trivial.map_or("–".into(), number)),
+            (
+                "Abs Rel, mean-depth baseline",
+                &trivial.map_or("–".into(), number),
+            ),
             ("scale (1 is metric)", &number(report.scale.median)),
             (
                 "within 25 %",

@@ -1,0 +1,278 @@
+//! From views to a camera.
+
+use crate::model::Camera;
+use crate::refine::{Fit, Pose};
+use crate::zhang::beginnings;
+use crate::{
+    Board, Calibration, Coverage, Error, LensModel, Result, StandardErrors, View, ViewFit,
+};
+use nalgebra::{Vector2, Vector3};
+
+/// Fewest views. Three have as many equations as the camera has numbers; with five, a bad one can be told.
+pub const LEAST_VIEWS: usize = 5;
+/// Beginnings that are tried, and for how many steps before the best goes on.
+const TRIED: usize = 4;
+const TRIED_STEPS: usize = 25;
+/// A view is left out whose error is above this many times the middle view's, and above this many pixels.
+const OUTLYING: f64 = 3.0;
+const OUTLYING_PX: f64 = 0.3;
+/// Rounds of leaving out, and the largest part of the views that goes in each.
+const ROUNDS: usize = 4;
+const PART: usize = 4;
+/// Below this tilt, in degrees, a board says little of the focal length.
+const TILTED_DEG: f64 = 12.0;
+/// Views that should be tilted more.
+const TILTED_VIEWS: usize = 3;
+/// Standard error of the focal length, as a share of it, that is warned of.
+const UNSURE: f64 = 0.005;
+/// Root mean square error that is warned of, in pixels per 1000 of the image's longer side, and at least in pixels.
+const ROUGH_PX: (f64, f64) = (0.5, 0.5);
+/// Views that are enough.
+const GOOD_VIEWS: usize = 10;
+
+/// Fits a camera to views of a board. Views whose corners disagree with those of all others are left out.
+///
+/// # Errors
+/// [`Error::Corners`] for a view of another board, [`Error::TooFewViews`] for fewer than [`LEAST_VIEWS`], [`Error::Undetermined`] where
+/// the views leave the camera open: the board was parallel to the image in all of them.
+pub fn calibrate(
+    views: &[View],
+    board: &Board,
+    image_size: (u32, u32),
+    model: LensModel,
+) -> Result<Calibration> {
+    let points = board.points();
+    for view in views {
+        if view.corners.len() != points.len() {
+            return Err(Error::Corners {
+                name: view.name.clone(),
+                corners: view.corners.len(),
+                expected: points.len(),
+            });
+        }
+    }
+    if views.len() < LEAST_VIEWS {
+        return Err(Error::TooFewViews {
+            board: *board,
+            found: views.len(),
+            pictures: views.len(),
+            needed: LEAST_VIEWS,
+            seen: None,
+        });
+    }
+    let mut used: Vec<usize> = (0..views.len()).collect();
+    let mut fitted = fit(&chosen(views, &used), &points, image_size, model)?;
+    for _ in 0..ROUNDS {
+        let bad = outlying(&fitted, &chosen(views, &used), &points);
+        if bad.is_empty() || used.len() - bad.len() < LEAST_VIEWS {
+            break;
+        }
+        let kept = used.iter().enumerate().filter(|(i, _)| !bad.contains(i));
+        used = kept.map(|(_, view)| *view).collect();
+        fitted = fit(&chosen(views, &used), &points, image_size, model)?;
+    }
+    told(&fitted, views, &used, &points, image_size)
+}
+
+fn chosen<'a>(views: &'a [View], used: &[usize]) -> Vec<&'a [Vector2<f64>]> {
+    used.iter().map(|i| views[*i].corners.as_slice()).collect()
+}
+
+/// The fit of least squares that the beginnings lead to.
+fn fit(
+    views: &[&[Vector2<f64>]],
+    board: &[Vector3<f64>],
+    size: (u32, u32),
+    model: LensModel,
+) -> Result<Fit> {
+    let tried = beginnings(views, board, size, model)
+        .into_iter()
+        .take(TRIED);
+    let tried = tried.filter_map(|fit| fit.refined(views, board, Some(TRIED_STEPS)));
+    let best = tried
+        .filter(|(fit, _)| plausible(&fit.camera, size))
+        .min_by(|a, b| a.1.total_cmp(&b.1));
+    best.and_then(|(fit, _)| fit.refined(views, board, None))
+        .map(|(fit, _)| fit)
+        .filter(|fit| plausible(&fit.camera, size))
+        .ok_or_else(|| undetermined("no camera explains them"))
+}
+
+/// Numbers that a camera of this image size can have, with room to spare.
+fn plausible(camera: &Camera, size: (u32, u32)) -> bool {
+    let [fx, fy, cx, cy, ..] = camera.numbers;
+    let side = f64::from(size.0.max(size.1));
+    let focal = |f: f64| (0.05 * side..100.0 * side).contains(&f);
+    let within = |c: f64, side: u32| (-0.5..1.5).contains(&(c / f64::from(side)));
+    focal(fx) && focal(fy) && within(cx, size.0) && within(cy, size.1)
+}
+
+fn undetermined(problem: &str) -> Error {
+    Error::Undetermined {
+        problem: problem.to_owned(),
+    }
+}
+
+/// Root mean square error of a view in pixels.
+fn rms(fit: &Fit, view: &[Vector2<f64>], pose: &Pose, board: &[Vector3<f64>]) -> Option<f64> {
+    let cost = fit.cost_of(view, pose, board)?;
+    Some((cost / view.len() as f64).sqrt())
+}
+
+/// The views whose errors are out of all proportion, the worst first, at most a quarter of all.
+fn outlying(fit: &Fit, views: &[&[Vector2<f64>]], board: &[Vector3<f64>]) -> Vec<usize> {
+    let of = |(view, pose): (&&[Vector2<f64>], &Pose)| {
+        rms(fit, view, pose, board).unwrap_or(f64::INFINITY)
+    };
+    let errors: Vec<f64> = views.iter().zip(&fit.poses).map(of).collect();
+    let mut sorted = errors.clone();
+    sorted.sort_by(f64::total_cmp);
+    let limit = (OUTLYING * sorted[sorted.len() / 2]).max(OUTLYING_PX);
+    let mut bad: Vec<usize> = (0..errors.len()).filter(|i| errors[*i] > limit).collect();
+    bad.sort_by(|a, b| errors[*b].total_cmp(&errors[*a]));
+    bad.truncate((views.len() / PART).max(1));
+    bad
+}
+
+fn told(
+    fit: &Fit,
+    views: &[View],
+    used: &[usize],
+    board: &[Vector3<f64>],
+    size: (u32, u32),
+) -> Result<Calibration> {
+    let seen = chosen(views, used);
+    let model = fit.camera.model;
+    let cost = fit
+        .cost(&seen, board)
+        .ok_or_else(|| undetermined("a board would be behind the camera"))?;
+    let corners = (seen.len() * board.len()) as f64;
+    let free = 2.0 * corners - (model.numbers() + 6 * seen.len()) as f64;
+    let covariance = fit.camera_covariance(&seen, board).ok_or_else(|| {
+        undetermined("the focal length and the boards' distances explain each other")
+    })?;
+    let error = |i: usize| (covariance[(i, i)] * cost / free).sqrt();
+    let standard_errors = StandardErrors {
+        fx: error(0),
+        fy: error(1),
+        cx: error(2),
+        cy: error(3),
+        coefficients: (4..model.numbers()).map(error).collect(),
+    };
+    let fits = view_fits(fit, views, used, board);
+    let mut calibration = Calibration {
+        intrinsics: fit.camera.intrinsics(size),
+        model,
+        coefficients: fit.camera.coefficients().to_vec(),
+        rms_px: (cost / corners).sqrt(),
+        standard_errors,
+        hfov_deg: fit.camera.hfov_deg(size.0),
+        coverage: Coverage::of(seen.iter().copied().flatten(), size),
+        views: fits,
+        warnings: Vec::new(),
+    };
+    calibration.warnings = warnings(&calibration);
+    Ok(calibration)
+}
+
+/// Every view, also those left out, under the camera of those used.
+fn view_fits(fit: &Fit, views: &[View], used: &[usize], board: &[Vector3<f64>]) -> Vec<ViewFit> {
+    let mut all = Vec::with_capacity(views.len());
+    for (i, view) in views.iter().enumerate() {
+        let place = used.iter().position(|u| *u == i);
+        let pose = match place {
+            Some(place) => Some(fit.poses[place]),
+            None => alone(fit, &view.corners, board),
+        };
+        let middle = board[board.len() - 1] / 2.0;
+        all.push(ViewFit {
+            name: view.name.clone(),
+            used: place.is_some(),
+            rms_px: pose.and_then(|pose| rms(fit, &view.corners, &pose, board)),
+            distance_m: pose.map(|pose| (pose.turn * middle + pose.shift).norm()),
+            tilt_deg: pose.map(|pose| {
+                let normal = pose.turn * Vector3::z();
+                normal.z.abs().min(1.0).acos().to_degrees()
+            }),
+        });
+    }
+    all
+}
+
+/// The pose of a view that the camera was not fitted to: by corners as a lens without distortion would show them.
+fn alone(fit: &Fit, view: &[Vector2<f64>], board: &[Vector3<f64>]) -> Option<Pose> {
+    use crate::homography::{homography, pose};
+    let [fx, fy, cx, cy, ..] = fit.camera.numbers;
+    let lens = fit.camera.distortion()?;
+    let pairs = board.iter().zip(view).filter_map(|(p, seen)| {
+        let seen = Vector2::new((seen.x - cx) / fx, (seen.y - cy) / fy);
+        Some((p.xy(), lens.undistort(&seen)?))
+    });
+    let (turn, shift) = pose(&homography(&pairs.collect::<Vec<_>>())?)?;
+    Some(Pose { turn, shift })
+}
+
+/// What makes it less sure than it could be.
+fn warnings(found: &Calibration) -> Vec<String> {
+    let mut told = Vec::new();
+    let used = found.used();
+    if used < GOOD_VIEWS {
+        told.push(format!(
+            "{used} views are few: {GOOD_VIEWS} to 30, from many sides, are better"
+        ));
+    }
+    let tilts: Vec<f64> = found
+        .views
+        .iter()
+        .filter(|v| v.used)
+        .filter_map(|v| v.tilt_deg)
+        .collect();
+    let tilted = tilts.iter().filter(|t| **t > TILTED_DEG).count();
+    if tilted < TILTED_VIEWS {
+        let most = tilts.iter().copied().fold(0.0, f64::max);
+        told.push(format!(
+            "the boards are all but parallel to the image (tilted by {most:.0} degrees at most): the focal length is unsure; tilt the board by 20 to 45 degrees"
+        ));
+    }
+    let empty = found.coverage.empty_corners();
+    if !empty.is_empty() {
+        told.push(format!(
+            "no corner was seen in the image's {}: the lens is guessed there; show the board there, too",
+            empty.join(", ")
+        ));
+    }
+    let margins: Vec<String> = found
+        .coverage
+        .wide_margins()
+        .iter()
+        .map(|(edge, share)| format!("the {edge} {:.0} %", 100.0 * share))
+        .collect();
+    if empty.is_empty() && !margins.is_empty() {
+        told.push(format!(
+            "no corner was seen in {} of the image: the lens is guessed there; show the board there, too",
+            margins.join(", ")
+        ));
+    }
+    let k = &found.intrinsics;
+    let unsure = (found.standard_errors.fx / k.fx).max(found.standard_errors.fy / k.fy);
+    if unsure > UNSURE {
+        told.push(format!(
+            "the focal length is known to {:.1} % only: more tilted views, and nearer ones, make it surer",
+            100.0 * unsure
+        ));
+    }
+    let side = f64::from(k.width.max(k.height)) / 1000.0;
+    if found.rms_px > (ROUGH_PX.0 * side).max(ROUGH_PX.1) {
+        told.push(format!(
+            "the corners are {:.2} px off (root mean square): is the board flat, the picture sharp and unmoved, and the lens model right (fisheye or not)?",
+            found.rms_px
+        ));
+    }
+    if found.hfov_deg.is_none() {
+        told.push(
+            "the lens model shows nothing at the image's left or right edge: show the board there, too"
+                .into(),
+        );
+    }
+    told
+}

@@ -1,0 +1,136 @@
+//! What an adaptation came to.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use deepfusion_eval::verdict::{Check, Verdict, Worse};
+use serde::Serialize;
+
+use crate::error::CliError;
+use crate::failure::{Context, Result};
+use crate::output;
+
+/// Before, after, and what follows from it; `adapt.json` in the run's folder.
+#[derive(Debug, Serialize)]
+pub(super) struct Outcome {
+    /// The given network.
+    pub from: String,
+    /// Where the adapted one lies.
+    #[serde(skip_serializing_if = "is_nowhere")]
+    pub run: PathBuf,
+    /// Steps of learning.
+    pub steps: usize,
+    /// Whether it may take the given one's place.
+    pub kept: bool,
+    /// The checks that became worse.
+    pub worse: Vec<Worse>,
+    /// The given network on the held-out frames.
+    pub before: Verdict,
+    /// The adapted one on the same.
+    pub after: Verdict,
+}
+
+fn is_nowhere(path: &Path) -> bool {
+    path.as_os_str().is_empty()
+}
+
+impl Outcome {
+    /// Compares; where it lies is not known yet.
+    pub(super) fn of(from: String, steps: usize, (before, after): (Verdict, Verdict)) -> Self {
+        let worse = before.worse(&after);
+        Self {
+            from,
+            run: PathBuf::new(),
+            steps,
+            kept: worse.as_ref().is_some_and(Vec::is_empty),
+            worse: worse.unwrap_or_default(),
+            before,
+            after,
+        }
+    }
+
+    /// Keeps it in the run's folder, wherever that is moved.
+    pub(super) fn write(&self, folder: &Path) -> Result<()> {
+        let text =
+            serde_json::to_string_pretty(self).context("the outcome cannot be written as JSON")?;
+        output::write(&folder.join("adapt.json"), text + "\n")
+    }
+
+    /// Why it is not kept.
+    pub(super) fn refusal(&self) -> Option<CliError> {
+        if self.kept {
+            return None;
+        }
+        let rows = self.worse.iter().map(|worse| {
+            let Worse {
+                check,
+                before,
+                after,
+            } = *worse;
+            format!(
+                "{check} {} after {}",
+                number(check, after),
+                number(check, before)
+            )
+        });
+        let worse: Vec<String> = rows.collect();
+        Some(CliError::Refused {
+            path: self.run.clone(),
+            worse: if worse.is_empty() {
+                "the frames that are held out tell nothing of it any more".into()
+            } else {
+                worse.join(", ")
+            },
+        })
+    }
+}
+
+/// A check's figure.
+fn number(check: Check, value: f64) -> String {
+    match check {
+        Check::Reprojection => format!("{value:.4}"),
+        _ => format!("{:.1} %", 100.0 * value),
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{:<36}{:>10}{:>10}",
+            format!("held out ({} frames)", self.after.without_truth.frames),
+            "before",
+            "after"
+        )?;
+        let mut row = |name: &str, before: Option<String>, after: Option<String>| {
+            let told = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
+            writeln!(f, "{name:<36}{:>10}{:>10}", told(before), told(after))
+        };
+        for check in [
+            Check::Reprojection,
+            Check::Consistency,
+            Check::Flip,
+            Check::Scale,
+        ] {
+            let of = |verdict: &Verdict| verdict.of(check).map(|value| number(check, value));
+            row(&check.to_string(), of(&self.before), of(&self.after))?;
+        }
+        let scale = |verdict: &Verdict| {
+            let certificate = verdict.scale_certificate.as_ref();
+            certificate.map(|certificate| format!("{:.3}", certificate.scale))
+        };
+        row(
+            "scale (1 is metric)",
+            scale(&self.before),
+            scale(&self.after),
+        )?;
+        if self.kept {
+            let run = self.run.display();
+            writeln!(
+                f,
+                "\nkept: {run}  (undo it with: deepfusion adapt --undo {run})"
+            )?;
+        }
+        Ok(())
+    }
+}

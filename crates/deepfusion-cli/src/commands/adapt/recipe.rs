@@ -1,0 +1,131 @@
+//! With what settings a network learns on a new drive.
+
+use burn::tensor::Device;
+use deepfusion_jobs::recordings::camera_word;
+use deepfusion_model::{
+    AssumedCamera, DataSetConfig, Learn, LearningRateSchedule, Preset, SimulatedConfig,
+    TrainConfig, ViewMotion,
+};
+use deepfusion_nn::ops::{Precision, supports};
+use deepfusion_runtime::DepthEstimator;
+
+use crate::cli::AdaptArgs;
+use crate::failure::Result;
+
+/// Steps over which the step size rises: the optimiser knows nothing of the gradients' sizes yet.
+const WARMUP: usize = 30;
+/// Simulated worlds that no recipe has used.
+const SEED: u64 = 91;
+/// Share of them in clear weather and through a plain camera.
+const PLAIN: f64 = 0.2;
+
+/// The configuration: the network as it is, the loss of its own run where that learned from drives, else Monodepth2's with the
+/// vehicle's motion, in small steps.
+pub(super) fn config(
+    args: &AdaptArgs,
+    estimator: &DepthEstimator,
+    device: &Device,
+    camera_ahead_s: Option<f64>,
+) -> Result<TrainConfig> {
+    let own = estimator.config();
+    let learned_from_drives = if own.data.sets.is_empty() {
+        own.data.learn.from_motion()
+    } else {
+        own.data.sets.iter().any(|set| set.learn.from_motion())
+    };
+    let mut config = if learned_from_drives {
+        own.clone()
+    } else {
+        let monodepth2 = Preset::Monodepth2.config_on(args.device.compute());
+        TrainConfig {
+            preset: own.preset,
+            size: own.size,
+            depth_net: own.depth_net.clone(),
+            view_motion: ViewMotion::Vehicle,
+            ..monodepth2
+        }
+    };
+    // A few drives say little of how pictures are distributed.
+    config.depth_net.encoder.frozen_statistics = true;
+    // The lens it learned with is the one that others are brought to: a new camera is another matter than a new place.
+    config.canonical_focal_px = own.canonical_focal_px.or_else(|| {
+        let camera = estimator.training_camera()?;
+        let (width, height) = (own.size.width as u32, own.size.height as u32);
+        Some(camera.resized(width, height).fy)
+    });
+    config.assumed_camera = assumed_camera(estimator);
+    if !learned_from_drives {
+        // A new PoseNet's unit is found from these drives.
+        config.pose_net.metres_per_unit = 0.0;
+    }
+    config.batch = args.batch;
+    config.depth_batch = args.simulated;
+    config.accumulate = 1;
+    config.steps = Some(args.steps);
+    config.learning_rate = args.learning_rate;
+    config.learning_rate_warmup_steps = WARMUP.min(args.steps / 4);
+    config.learning_rate_schedule = LearningRateSchedule::Cosine;
+    config.weight_decay = 0.0;
+    config.seed = args.seed;
+    config.validation_share = args.held_out;
+    config.validate_every = (args.steps / 4).max(1);
+    config.checkpoint_minutes = 2.0;
+    if supports(device, Precision::Bf16) {
+        config.precision = Precision::Bf16;
+    }
+    config.data = Default::default();
+    config.data.camera_ahead_s = camera_ahead_s;
+    config.data.camera = camera_word(args.camera).into();
+    config.data.topics = args.topics.iter().map(ToString::to_string).collect();
+    if args.simulated == 0 {
+        config.data.paths.clone_from(&args.data);
+        // The head has nothing to learn from; what it knows would no longer fit.
+        config.depth_net.uncertainty = false;
+    } else {
+        config.data.sets = vec![drives(args, &config), simulated(&config)];
+        config.loss.depth.weight = 1.0;
+        config.loss.depth.gradient = 0.5;
+    }
+    for assignment in &args.set {
+        config.set(assignment)?;
+    }
+    Ok(config)
+}
+
+/// Of a network whose run had recordings without a camera, the one that it learned or assumed for them, held as it is.
+pub(super) fn assumed_camera(estimator: &DepthEstimator) -> Option<AssumedCamera> {
+    let assumed = estimator.config().assumed_camera?;
+    if !assumed.learn {
+        return Some(assumed);
+    }
+    estimator
+        .training_camera()
+        .as_ref()
+        .map(AssumedCamera::held)
+}
+
+fn drives(args: &AdaptArgs, config: &TrainConfig) -> DataSetConfig {
+    DataSetConfig {
+        name: "drives".into(),
+        paths: args.data.clone(),
+        learn: Learn::OwnMotion,
+        metres_per_unit: config.pose_net.metres_per_unit,
+        ..DataSetConfig::default()
+    }
+}
+
+fn simulated(config: &TrainConfig) -> DataSetConfig {
+    DataSetConfig {
+        name: "streets".into(),
+        learn: Learn::Depth,
+        simulated: Some(SimulatedConfig {
+            seed: SEED.wrapping_add(config.seed),
+            views: 2000,
+            validation_views: 16,
+            views_per_world: 12,
+            plain: PLAIN,
+        }),
+        metres_per_unit: 1.0,
+        ..DataSetConfig::default()
+    }
+}

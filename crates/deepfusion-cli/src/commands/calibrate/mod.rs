@@ -1,0 +1,137 @@
+//! `deepfusion calibrate`: a camera from pictures of a checkerboard.
+
+mod page;
+mod pictures;
+mod told;
+
+use deepfusion_calibrate::{Board, Calibration, Error, LEAST_VIEWS, calibrate};
+use deepfusion_data::{Lens, camera_info_yaml};
+use serde::Serialize;
+
+use crate::cli::CalibrateArgs;
+use crate::error::CliError;
+use crate::failure::Result;
+use crate::output;
+use crate::progress::say;
+
+use pictures::{LeftOut, Seen};
+
+/// What is told of a calibration.
+#[derive(Debug, Serialize)]
+struct Told<'a> {
+    #[serde(flatten)]
+    calibration: &'a Calibration,
+    /// Names of `coefficients`.
+    coefficient_names: &'a [&'a str],
+    board: Board,
+    /// Pictures and frames of videos that were looked at.
+    looked_at: usize,
+    /// Those that show no whole board.
+    left_out: &'a [LeftOut],
+    /// Frames of videos that show the board where another does already, or less sharply.
+    not_picked: usize,
+    written: &'a std::path::Path,
+}
+
+/// `deepfusion calibrate`.
+pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
+    let board = Board::new(
+        args.board.width as usize,
+        args.board.height as usize,
+        args.square,
+    )?;
+    if args.out.exists() && !args.overwrite {
+        return Err(CliError::Exists {
+            path: args.out.clone(),
+            remedy: "choose another --out, or give --overwrite to replace it",
+        }
+        .into());
+    }
+    for file in std::iter::once(&args.out).chain(&args.report) {
+        output::require_folder_of(file)?;
+    }
+    let seen = pictures::look(&args.inputs, &board, usize::from(args.frames))?;
+    enough(&seen, &board)?;
+    let mut found = calibrate(&seen.views, &board, seen.size, args.model())?;
+    found.warnings.extend(seen.turned());
+    let lens = found
+        .distortion()
+        .map_err(|problem| Error::Undetermined { problem })?;
+    if let Err(problem) = Lens::new(found.intrinsics, &lens) {
+        found.warnings.push(format!(
+            "images cannot be corrected with this lens: {problem}; show the board nearer to the image's border"
+        ));
+    }
+    let name = output::name_of(args.inputs[0].as_ref());
+    let yaml = camera_info_yaml(&name, &found.intrinsics, &lens, &remarks(&found, &board));
+    output::write(&args.out, yaml)?;
+    let told = Told {
+        calibration: &found,
+        coefficient_names: found.model.coefficients(),
+        board,
+        looked_at: seen.looked_at,
+        left_out: &seen.left_out,
+        not_picked: seen.not_picked,
+        written: &args.out,
+    };
+    if let Some(path) = &args.report {
+        page::write(path, &told, &seen.views)?;
+        say(&format!("report    {}", path.display()));
+    }
+    for warning in &found.warnings {
+        tracing::warn!("{warning}");
+    }
+    if args.json {
+        return output::print_json(&told);
+    }
+    output::print(&told::text(&told))?;
+    say(&format!(
+        "use it: deepfusion predict --calib {} IMAGES --out DIR, or as calibration.yaml in a drive's folder",
+        args.out.display()
+    ));
+    Ok(())
+}
+
+/// Whether there are views enough; which grid was seen instead, where not.
+fn enough(seen: &Seen, board: &Board) -> Result<()> {
+    let (found, pictures, board) = (seen.views.len(), seen.looked_at, *board);
+    if found >= LEAST_VIEWS {
+        return Ok(());
+    }
+    let instead = seen.other_grid();
+    Err(if found == 0 {
+        Error::NoBoard {
+            board,
+            pictures,
+            seen: instead,
+        }
+    } else {
+        Error::TooFewViews {
+            board,
+            found,
+            pictures,
+            needed: LEAST_VIEWS,
+            seen: instead,
+        }
+    }
+    .into())
+}
+
+/// What the file says of itself.
+fn remarks(found: &Calibration, board: &Board) -> Vec<String> {
+    let errors = &found.standard_errors;
+    vec![
+        format!(
+            "deepfusion calibrate: {} views of a board of {}x{} inner corners, squares of {} m; error {:.3} px (root mean square)",
+            found.used(),
+            board.columns,
+            board.rows,
+            board.square_m,
+            found.rms_px
+        ),
+        format!(
+            "standard errors in px: fx {:.3}, fy {:.3}, cx {:.3}, cy {:.3}",
+            errors.fx, errors.fy, errors.cx, errors.cy
+        ),
+    ]
+}

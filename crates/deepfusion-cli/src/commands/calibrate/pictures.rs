@@ -1,0 +1,282 @@
+//! The board in pictures and videos.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use deepfusion_calibrate::{Board, Candidate, Error, Look, View, find_board, pick, sharpness};
+use deepfusion_data::{OpenOptions, load_photo, load_rgb};
+use deepfusion_jobs::find_inputs;
+use deepfusion_video::VideoFrames;
+use image::GrayImage;
+use image::imageops::grayscale;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::error::CliError;
+use crate::failure::Result;
+use crate::progress::{Progress, say};
+
+/// Endings of pictures and videos.
+const IMAGES: [&str; 3] = ["png", "jpg", "jpeg"];
+const VIDEOS: [&str; 7] = ["mp4", "mkv", "mov", "avi", "hevc", "m4v", "webm"];
+/// A video is looked at in so many parts, of each the sharpest of so many frames.
+const PARTS: usize = 200;
+const FRAMES_OF_A_PART: usize = 4;
+/// Pictures that are in memory at once.
+const BATCH: usize = 8;
+
+/// A picture without the board.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct LeftOut {
+    /// The picture.
+    pub name: String,
+    /// Why.
+    pub why: String,
+}
+
+/// What was seen in all pictures.
+#[derive(Debug, Default)]
+pub(super) struct Seen {
+    /// The board in pictures, and in the frames picked of videos.
+    pub views: Vec<View>,
+    /// Width and height of all of them.
+    pub size: (u32, u32),
+    /// How many were looked at.
+    pub looked_at: usize,
+    /// Those without the board.
+    pub left_out: Vec<LeftOut>,
+    /// Frames with the board that were not picked.
+    pub not_picked: usize,
+    /// The first picture's name, and its orientation by EXIF.
+    first: Option<(String, u8)>,
+    /// Whole grids of other sizes, and how often each was seen.
+    others: BTreeMap<(usize, usize), usize>,
+}
+
+/// Looks for the board in everything that the arguments mean; of each video at most so many frames are kept.
+///
+/// # Errors
+/// Inputs that cannot be read, or that are of several sizes or orientations.
+pub(super) fn look(inputs: &[String], board: &Board, most_frames: usize) -> Result<Seen> {
+    let (mut files, mut videos) = (Vec::new(), Vec::new());
+    for input in inputs {
+        let path = PathBuf::from(input);
+        if path.is_dir() {
+            files.extend(images_of(&path)?);
+        } else if path.exists() && has_ending(&path, &VIDEOS) {
+            videos.push(path);
+        } else {
+            let found = find_inputs(std::slice::from_ref(input), &OpenOptions::default(), |_| ())?;
+            files.extend(found.into_iter().map(|i| i.path));
+        }
+    }
+    let mut seen = Seen::default();
+    seen.look_at_pictures(&files, board)?;
+    for video in &videos {
+        seen.look_at_video(video, board, most_frames)?;
+    }
+    Ok(seen)
+}
+
+/// The pictures of a folder in the order of their names.
+fn images_of(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| deepfusion_data::Error::file(folder, e))?;
+    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut images: Vec<_> = paths.filter(|p| has_ending(p, &IMAGES)).collect();
+    if images.is_empty() {
+        return Err(CliError::NoImages {
+            input: folder.display().to_string(),
+        }
+        .into());
+    }
+    images.sort();
+    Ok(images)
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    let ending = path.extension().and_then(|e| e.to_str());
+    ending.is_some_and(|e| endings.contains(&e.to_ascii_lowercase().as_str()))
+}
+
+impl Seen {
+    fn look_at_pictures(&mut self, files: &[PathBuf], board: &Board) -> Result<()> {
+        let mut progress = Progress::new("looking for the board");
+        for (done, batch) in files.chunks(BATCH).enumerate() {
+            let looked: Vec<Result<(GrayImage, u8, Look)>> = batch
+                .par_iter()
+                .map(|file| {
+                    let photo = load_photo(file)?;
+                    let image = grayscale(&photo.image);
+                    let look = find_board(&image, board);
+                    Ok((image, photo.orientation, look))
+                })
+                .collect();
+            for (file, looked) in batch.iter().zip(looked) {
+                let (image, orientation, look) = looked?;
+                let name = file.display().to_string();
+                self.fits(&name, image.dimensions(), orientation)?;
+                self.looked_at += 1;
+                match look {
+                    Look::Board(corners) => self.views.push(View { name, corners }),
+                    other => self.leave_out(name, &other, board),
+                }
+            }
+            progress.set((done * BATCH + batch.len()).min(files.len()), files.len());
+        }
+        Ok(())
+    }
+
+    /// Of each part of a video the sharpest frame is looked at; of those with the board, the most different are kept.
+    fn look_at_video(&mut self, file: &Path, board: &Board, most: usize) -> Result<()> {
+        let folder = file.parent().unwrap_or(Path::new("."));
+        let video = VideoFrames::open(file, folder)?;
+        let frames = video.count();
+        let parts = frames.min(PARTS);
+        let name = file.display().to_string();
+        say(&format!("{name}: {frames} frames"));
+        if frames > 0 {
+            // The first look decodes all of them.
+            video.frame(0)?;
+        }
+        let part = |i: usize| (i * frames / parts)..((i + 1) * frames / parts);
+        let mut progress = Progress::new("looking for the board");
+        let mut candidates: Vec<(Candidate, String)> = Vec::new();
+        let numbers: Vec<usize> = (0..parts).collect();
+        for batch in numbers.chunks(BATCH) {
+            let looked: Vec<Result<(usize, GrayImage, f64, Look)>> = batch
+                .par_iter()
+                .map(|i| {
+                    let (number, image, sharp) = sharpest(&video, part(*i))?;
+                    let look = find_board(&image, board);
+                    Ok((number, image, sharp, look))
+                })
+                .collect();
+            for looked in looked {
+                let (number, image, sharpness, look) = looked?;
+                let name = format!("{name}, frame {number}");
+                self.fits(&name, image.dimensions(), 1)?;
+                self.looked_at += 1;
+                match look {
+                    Look::Board(corners) => {
+                        let candidate = Candidate { corners, sharpness };
+                        candidates.push((candidate, name));
+                    }
+                    other => self.leave_out(name, &other, board),
+                }
+            }
+            progress.set(batch[0] + batch.len(), parts);
+        }
+        let alone: Vec<Candidate> = candidates.iter().map(|(c, _)| c.clone()).collect();
+        let picked = pick(&alone, self.size, most);
+        self.not_picked += candidates.len() - picked.len();
+        for index in picked {
+            let (candidate, name) = &candidates[index];
+            self.views.push(View {
+                name: name.clone(),
+                corners: candidate.corners.clone(),
+            });
+        }
+        Ok(())
+    }
+
+    /// Checks that a picture is of the size and orientation of the first.
+    fn fits(&mut self, name: &str, size: (u32, u32), orientation: u8) -> Result<()> {
+        let Some((first, first_orientation)) = &self.first else {
+            self.first = Some((name.to_owned(), orientation));
+            self.size = size;
+            return Ok(());
+        };
+        let (picture, first) = (name.to_owned(), first.clone());
+        if orientation != *first_orientation {
+            return Err(Error::MixedOrientations {
+                picture,
+                turned: turned(orientation),
+                first,
+                first_turned: turned(*first_orientation),
+            }
+            .into());
+        }
+        if size != self.size {
+            return Err(Error::MixedSizes {
+                picture,
+                size,
+                first,
+                first_size: self.size,
+            }
+            .into());
+        }
+        Ok(())
+    }
+
+    fn leave_out(&mut self, name: String, look: &Look, board: &Board) {
+        let why = match look {
+            Look::Other {
+                columns,
+                rows,
+                corners,
+            } => {
+                let (c, r) = (*columns, *rows);
+                let longer = board.columns.max(board.rows);
+                let shorter = board.columns.min(board.rows);
+                if *corners == c * r {
+                    *self.others.entry((c, r)).or_default() += 1;
+                }
+                if corners * 2 < board.corners() {
+                    // A fence has some, too.
+                    "no board".into()
+                } else if c > longer || r > shorter {
+                    format!("a grid of {c}x{r}")
+                } else {
+                    format!("{corners} of {} corners", board.corners())
+                }
+            }
+            _ => "no board".into(),
+        };
+        self.left_out.push(LeftOut { name, why });
+    }
+
+    /// The whole grid of another size that was seen most often: columns, rows, how often.
+    pub(super) fn other_grid(&self) -> Option<(usize, usize, usize)> {
+        let most = self.others.iter().max_by_key(|(_, n)| **n);
+        most.map(|((columns, rows), n)| (*columns, *rows, *n))
+    }
+
+    /// That pictures were turned upright, which the calibration then is of.
+    pub(super) fn turned(&self) -> Option<String> {
+        let (_, orientation) = self.first.as_ref()?;
+        (*orientation != 1).then(|| {
+            format!(
+                "EXIF turns the pictures by {}: the calibration is of the upright ones, {}x{}, which `predict` sees; a recording's images are used as they are stored",
+                turned(*orientation),
+                self.size.0,
+                self.size.1
+            )
+        })
+    }
+}
+
+/// The sharpest of some frames of a part, and its number.
+fn sharpest(video: &VideoFrames, part: std::ops::Range<usize>) -> Result<(usize, GrayImage, f64)> {
+    let step = part.len().div_ceil(FRAMES_OF_A_PART).max(1);
+    let mut best: Option<(usize, GrayImage, f64)> = None;
+    for number in part.step_by(step) {
+        let image = grayscale(&load_rgb(&video.frame(number as u64)?)?);
+        let sharp = sharpness(&image);
+        if best.as_ref().is_none_or(|b| b.2 < sharp) {
+            best = Some((number, image, sharp));
+        }
+    }
+    // No part is empty; a frame that is would be no board.
+    Ok(best.unwrap_or_default())
+}
+
+/// What EXIF's orientation does to a picture.
+fn turned(orientation: u8) -> &'static str {
+    match orientation {
+        1 => "0 degrees",
+        3 => "180 degrees",
+        6 => "90 degrees",
+        8 => "270 degrees",
+        _ => "a mirror",
+    }
+}

@@ -1,0 +1,54 @@
+//! `--clock-offset`: given, or measured from the recordings themselves.
+
+use std::path::PathBuf;
+
+use deepfusion_data::{Dataset, OpenOptions};
+use deepfusion_doctor::common_camera_ahead;
+use deepfusion_jobs::recordings::open_recordings;
+
+use crate::cli::ClockOffset;
+use crate::failure::Result;
+use crate::jobs;
+use crate::progress::say;
+
+/// How far the camera's clock is said or measured to be ahead, in seconds; `None` where nothing is asked.
+pub(super) fn seconds(
+    asked: Option<ClockOffset>,
+    paths: &[PathBuf],
+    options: &OpenOptions,
+) -> Result<Option<f64>> {
+    match asked {
+        None => Ok(None),
+        Some(ClockOffset::Seconds(ahead_s)) => Ok(Some(ahead_s)),
+        Some(ClockOffset::Auto) => {
+            let options = OpenOptions {
+                split: None,
+                camera_ahead_s: None,
+                ..options.clone()
+            };
+            let datasets = open_recordings(paths, &options).map_err(jobs::in_words)?;
+            measured(&datasets).map(Some)
+        }
+    }
+}
+
+/// As [`seconds`], for one recording.
+pub(super) fn seconds_of(
+    asked: Option<ClockOffset>,
+    path: &std::path::Path,
+    options: &OpenOptions,
+) -> Result<Option<f64>> {
+    seconds(asked, &[path.to_owned()], options)
+}
+
+/// Measures the offset of open recordings, and says it.
+pub(super) fn measured<'a>(datasets: impl IntoIterator<Item = &'a Dataset>) -> Result<f64> {
+    let found = common_camera_ahead(datasets)?;
+    let (ahead_ms, error_ms) = (1e3 * found.ahead_s, 1e3 * found.std_error_s);
+    say(&format!(
+        "the camera's clock is {ahead_ms:+.0} ± {error_ms:.0} ms ahead of the vehicle's by how the pictures turn (correlation {:.2}); \
+         --clock-offset {ahead_ms:.0} says so without measuring",
+        found.correlation
+    ));
+    Ok(found.ahead_s)
+}

@@ -1,0 +1,93 @@
+//! What is said of depth without ground truth.
+
+use deepfusion_data::Dataset;
+use deepfusion_eval::verdict::{NoCertificate, Verdict};
+use deepfusion_jobs::held_out::{unseen, unseen_frames};
+use deepfusion_jobs::scene::motion_known;
+use deepfusion_jobs::verdict::{Unseen, VerdictOptions, verdict};
+use deepfusion_render::HtmlReport;
+use deepfusion_runtime::{DepthEstimator, ModelSource};
+
+use super::Found;
+use crate::cli::EvalArgs;
+use crate::commands::used_checkpoint::UsedCheckpoint;
+use crate::commands::{remarks, run_report};
+use crate::failure::Result;
+use crate::model::ModelFacts;
+use crate::output;
+use crate::progress::{Progress, say};
+
+/// Whether there is ground truth to compare with.
+pub(super) fn has_truth(args: &EvalArgs, datasets: &[Dataset]) -> bool {
+    let known = |dataset: &Dataset| {
+        let mut frames = dataset.selected().iter();
+        frames.any(|frame| dataset.has_ground_truth(*frame))
+    };
+    args.gt.is_some() || datasets.iter().any(known)
+}
+
+/// The verdict, where the recordings tell how the camera moved and it was not declined; a split asks for its frames alone.
+pub(super) fn of_model(
+    args: &EvalArgs,
+    model: &ModelSource,
+    estimator: &mut DepthEstimator,
+    datasets: &[Dataset],
+) -> Result<Option<Verdict>> {
+    let declined = args.no_verdict || args.split.is_some() || args.gt.is_some();
+    if declined || !datasets.iter().any(motion_known) {
+        return Ok(None);
+    }
+    let unseen = if args.assume_unseen {
+        Unseen::All
+    } else {
+        match model {
+            ModelSource::Run { .. } => unseen_frames(estimator.config(), datasets),
+            ModelSource::Packed { network, .. } if unseen(&network.card, datasets) => Unseen::All,
+            ModelSource::Packed { .. } => Unseen::NotKnown,
+        }
+    };
+    let options = VerdictOptions::new(args.speed_error / 100.0, !args.no_focal_correction);
+    let mut progress = Progress::new("judging without ground truth");
+    let found = verdict(
+        estimator,
+        datasets,
+        &unseen,
+        &options,
+        &mut |done, total| {
+            progress.set(done, total);
+        },
+    )?;
+    if found.no_certificate == Some(NoCertificate::SeenNotKnown) {
+        let warning = "whether training saw these frames is not known, so there is no scale certificate; --assume-unseen takes it that \
+                       it did not";
+        remarks::warn_once(warning.to_owned());
+    }
+    Ok(Some(found))
+}
+
+/// What `eval` finds where there is no ground truth.
+pub(super) fn alone(
+    args: &EvalArgs,
+    model: &ModelSource,
+    verdict: Option<Verdict>,
+    checkpoint: UsedCheckpoint,
+) -> Result<Found> {
+    if let (Some(path), Some(verdict)) = (&args.report, &verdict) {
+        let names: Vec<_> = args.data.iter().map(|p| output::name_of(p)).collect();
+        let title = format!("Depth judged without ground truth on {}", names.join(", "));
+        let mut page = run_report::verdict(HtmlReport::new(model.name(), title), verdict);
+        if let Some(folder) = model.folder() {
+            page = run_report::training(page, folder)?;
+        }
+        let page = page
+            .section("How it was measured")
+            .command(&run_report::command());
+        page.write(path)?;
+        say(&format!("report  {}", path.display()));
+    }
+    Ok(Found {
+        checkpoint: Some(checkpoint),
+        report: None,
+        verdict,
+    })
+}

@@ -1,0 +1,246 @@
+//! A camera from pictures of a board, through the program alone, and what reads the file that it writes. The pictures are those of
+//! `deepfusion-calibrate` (`tests/reference/boards.py`), whose camera is known.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+mod support;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+use support::{fails, json, ok, run};
+
+fn boards() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../deepfusion-calibrate/tests/reference")
+}
+
+/// A folder with some of a camera's pictures in `pictures`.
+fn folder(camera: &str, least: usize, most: usize) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("pictures")).unwrap();
+    for number in least..most {
+        let name = format!("{number:02}.jpg");
+        let from = boards().join(camera).join(&name);
+        fs::copy(from, folder.path().join("pictures").join(&name)).unwrap();
+    }
+    folder
+}
+
+fn close(value: &Value, expected: f64, tolerance: f64) {
+    let value = value.as_f64().unwrap();
+    assert!((value - expected).abs() < tolerance, "{value} {expected}");
+}
+
+const BOARD: &str = "--board 9x6 --square 0.025";
+
+#[test]
+fn a_camera_is_measured_and_its_file_undoes_the_lens() {
+    let folder = folder("brown", 0, 9);
+    let at = folder.path();
+    // A picture without a board is named, and no harm.
+    let plain = image::RgbImage::from_pixel(400, 300, image::Rgb([90, 100, 110]));
+    plain.save(at.join("pictures/wall.png")).unwrap();
+    let told = json(
+        at,
+        &format!("calibrate pictures {BOARD} --out camera.yaml --report camera.html --json"),
+    );
+    // The truth of the renderer, within four standard errors and 0.4 %; see the crate's own tests.
+    close(&told["intrinsics"]["fx"], 335.0, 1.0);
+    close(&told["intrinsics"]["fy"], 332.5, 1.0);
+    close(&told["intrinsics"]["cx"], 205.3, 0.8);
+    close(&told["intrinsics"]["cy"], 145.8, 0.8);
+    close(&told["coefficients"][0], -0.29, 0.006);
+    assert_eq!(told["coefficient_names"][4], "k3");
+    assert_eq!(told["looked_at"], 10);
+    assert_eq!(told["left_out"][0]["name"], "pictures/wall.png");
+    assert_eq!(told["left_out"][0]["why"], "no board");
+    assert_eq!(told["views"].as_array().unwrap().len(), 9);
+    assert!(told["rms_px"].as_f64().unwrap() < 0.1);
+    let page = fs::read_to_string(at.join("camera.html")).unwrap();
+    assert!(page.contains("Where corners were seen") && page.contains("pictures/08.jpg"));
+    // Not twice over each other.
+    let again = format!("calibrate pictures {BOARD} --out camera.yaml");
+    fails(at, &again, &["camera.yaml", "--overwrite"]);
+    let text = ok(at, &format!("{again} --overwrite")).stdout;
+    for line in [
+        "fx            33",
+        "9 used of 10",
+        "wall.png (no board)",
+        "camera.yaml",
+    ] {
+        assert!(text.contains(line), "no `{line}` in\n{text}");
+    }
+
+    // `predict` reads it, and says the camera of the corrected image: another one than that of the lens.
+    ok(
+        at,
+        "predict --model tiny pictures/00.jpg --calib camera.yaml --out depth --save npy",
+    );
+    let sidecar: Value =
+        serde_json::from_slice(&fs::read(at.join("depth/00.json")).unwrap()).unwrap();
+    let fx = sidecar["intrinsics"][0].as_f64().unwrap();
+    assert!(
+        (200.0..500.0).contains(&fx) && (fx - 335.0).abs() > 2.0,
+        "{sidecar}"
+    );
+
+    // Beside a drive's images it is found by its name. The folder above is looked into, too: so one deeper.
+    let drive = at.join("drives/one");
+    fs::create_dir_all(drive.join("images")).unwrap();
+    for number in 0..9 {
+        let name = format!("{number:02}.jpg");
+        fs::copy(
+            at.join("pictures").join(&name),
+            drive.join("images").join(&name),
+        )
+        .unwrap();
+    }
+    fails(
+        at,
+        "data inspect drives/one",
+        &["calibration.yaml", "`deepfusion calibrate`"],
+    );
+    fs::copy(at.join("camera.yaml"), drive.join("calibration.yaml")).unwrap();
+    let inspected = json(at, "data inspect drives/one --json");
+    // The corrected image's camera, as `predict` says it.
+    close(&inspected["intrinsics"]["fx"], fx, 1e-6);
+}
+
+#[test]
+fn a_fisheye_lens_is_measured() {
+    let folder = folder("fisheye", 0, 10);
+    let at = folder.path();
+    let told = json(
+        at,
+        &format!("calibrate pictures/*.jpg {BOARD} --fisheye --out fisheye.yml --json"),
+    );
+    close(&told["intrinsics"]["fx"], 158.0, 0.6);
+    close(&told["intrinsics"]["cy"], 147.5, 0.6);
+    assert_eq!(told["model"], "fisheye");
+    // 203.5 px of θ(1 + 0.031 θ² …) = 1.288 to the left, and 197 px to the right.
+    close(&told["hfov_deg"], 139.0, 6.0);
+    let written = fs::read_to_string(at.join("fisheye.yml")).unwrap();
+    assert!(
+        written.contains("distortion_model: equidistant"),
+        "{written}"
+    );
+    ok(
+        at,
+        "predict --model tiny pictures/00.jpg --calib fisheye.yml --out depth --save npy",
+    );
+}
+
+#[test]
+fn what_goes_wrong_is_told_with_what_to_do() {
+    let few = folder("brown", 0, 4);
+    let at = few.path();
+    fails(
+        at,
+        &format!("calibrate pictures {BOARD} --out c.yaml"),
+        &["4 of 4 pictures", "5 are needed"],
+    );
+    // The board's squares counted instead of its corners.
+    fails(
+        at,
+        "calibrate pictures --board 10x7 --square 0.025 --out c.yaml",
+        &["10x7", "9x6 is in 4", "--board 9x6"],
+    );
+    fails(
+        at,
+        "calibrate pictures --board 2x6 --square 0.025 --out c.yaml",
+        &["2x6", "3 to 100"],
+    );
+    let wall = image::GrayImage::from_pixel(400, 300, image::Luma([90]));
+    fs::create_dir(at.join("walls")).unwrap();
+    for i in 0..6 {
+        wall.save(at.join(format!("walls/{i}.png"))).unwrap();
+    }
+    fails(
+        at,
+        &format!("calibrate walls {BOARD} --out c.yaml"),
+        &["any of 6 pictures", "10x7 squares has 9x6"],
+    );
+    // Another size, and a picture that EXIF turns.
+    fs::copy(boards().join("plain/00.jpg"), at.join("pictures/small.jpg")).unwrap();
+    fails(
+        at,
+        &format!("calibrate pictures {BOARD} --out c.yaml"),
+        &["small.jpg", "320x240", "400x300"],
+    );
+    let plain = fs::read(boards().join("brown/05.jpg")).unwrap();
+    let exif = b"Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x03\0\0\0\0\0\0";
+    let length = u16::try_from(exif.len() + 2).unwrap().to_be_bytes();
+    let turned = [&plain[..2], &[0xFF, 0xE1], &length, exif, &plain[2..]].concat();
+    fs::write(at.join("pictures/small.jpg"), turned).unwrap();
+    fails(
+        at,
+        &format!("calibrate pictures {BOARD} --out c.yaml"),
+        &["small.jpg", "180 degrees", "held one way"],
+    );
+    fails(
+        at,
+        &format!("calibrate pictures/03.jpg nowhere.jpg {BOARD} --out c.yaml"),
+        &["nowhere.jpg"],
+    );
+    assert!(!at.join("c.yaml").exists());
+    let wrong = run(at, &format!("calibrate pictures {BOARD} --out c.txt"));
+    assert!(
+        wrong.code == 2 && wrong.stderr.contains("camera.yaml"),
+        "{}",
+        wrong.stderr
+    );
+}
+
+/// A video of every picture four times over, some of them blurred: each pose is taken once.
+#[test]
+fn a_videos_frames_are_picked() {
+    for program in ["ffmpeg", "ffprobe"] {
+        if Command::new(program).arg("-version").output().is_err() {
+            eprintln!("skipped: there is no {program} for videos");
+            return;
+        }
+    }
+    let folder = folder("brown", 0, 9);
+    let at = folder.path();
+    let mut number = 0;
+    fs::create_dir(at.join("frames")).unwrap();
+    for picture in 0..9 {
+        let image = image::open(at.join(format!("pictures/{picture:02}.jpg"))).unwrap();
+        for repeat in 0..4 {
+            let frame = if repeat == 2 {
+                image.clone()
+            } else {
+                image.blur(1.0)
+            };
+            frame
+                .save(at.join(format!("frames/{number:03}.png")))
+                .unwrap();
+            number += 1;
+        }
+    }
+    let made = Command::new("ffmpeg")
+        .current_dir(at)
+        .args("-v error -framerate 10 -i frames/%03d.png -c:v mpeg4 -q:v 1 board.mp4".split(' '))
+        .status()
+        .unwrap();
+    assert!(made.success());
+    let told = json(
+        at,
+        &format!("calibrate board.mp4 {BOARD} --out camera.yaml --json"),
+    );
+    assert_eq!(told["looked_at"], 36);
+    assert_eq!(told["views"].as_array().unwrap().len(), 9);
+    assert_eq!(told["not_picked"], 27);
+    close(&told["intrinsics"]["fx"], 335.0, 1.5);
+    let few = json(
+        at,
+        &format!("calibrate board.mp4 {BOARD} --frames 6 --out few.yaml --json"),
+    );
+    assert_eq!(few["views"].as_array().unwrap().len(), 6);
+}

@@ -1,0 +1,187 @@
+//! `--clock-offset auto`: a simulated drive whose camera runs ahead of its log by a time that is known.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+mod support;
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use support::{fails, ok};
+
+const DRIVE: &str = "sim/2026_01_01/2026_01_01_drive_0005_sync";
+/// 2026-01-01 00:00 UTC.
+const DAY_S: f64 = 1_767_225_600.0;
+
+/// A reading of the simulated inertial unit.
+struct Reading {
+    time_s: f64,
+    latitude: f64,
+    longitude: f64,
+    mps: f64,
+    yaw_radps: f64,
+}
+
+/// A simulated drive of ten frames a second: its images in `images`, when they were taken, and what the vehicle measured.
+fn drive(at: &Path, frames: usize) -> Vec<Reading> {
+    ok(
+        at,
+        &format!("simulate --out sim --frames {frames} --seed 5 --size 240x144 --scan-every 0"),
+    );
+    let drive = at.join(DRIVE);
+    fs::rename(drive.join("image_02/data"), at.join("images")).unwrap();
+    let stamps = fs::read_to_string(drive.join("image_02/timestamps.txt")).unwrap();
+    let seconds = |stamp: &str| {
+        let clock: Vec<f64> = stamp[11..]
+            .split(':')
+            .map(|part| part.parse().unwrap())
+            .collect();
+        DAY_S + clock[0] * 3600.0 + clock[1] * 60.0 + clock[2]
+    };
+    let reading = |(i, stamp): (usize, &str)| {
+        let oxts = fs::read_to_string(drive.join(format!("oxts/data/{i:010}.txt"))).unwrap();
+        let numbers: Vec<f64> = oxts
+            .split_whitespace()
+            .map(|n| n.parse().unwrap())
+            .collect();
+        Reading {
+            time_s: seconds(stamp),
+            latitude: numbers[0],
+            longitude: numbers[1],
+            mps: numbers[8],
+            yaw_radps: numbers[22],
+        }
+    };
+    stamps.lines().enumerate().map(reading).collect()
+}
+
+/// A folder of the images, taken by a clock that is `ahead_s` ahead of the readings'.
+fn folder(at: &Path, name: &str, readings: &[Reading], ahead_s: f64) {
+    fs::create_dir(at.join(name)).unwrap();
+    let mut frames = String::from("time_s,file\n");
+    for (i, reading) in readings.iter().enumerate() {
+        let _ = writeln!(frames, "{:.6},{i:010}.png", reading.time_s + ahead_s);
+    }
+    fs::write(at.join(name).join("frames.csv"), frames).unwrap();
+    let config = "images = \"../images\"\nintrinsics = [139.43, 277.07, 117.13, 65.82]\n";
+    fs::write(at.join(name).join("dataset.toml"), config).unwrap();
+}
+
+/// The offset and its standard error as they are printed, milliseconds.
+fn found(told: &str) -> (f64, f64) {
+    let line = told
+        .lines()
+        .find(|line| line.contains("the camera's clock is"))
+        .unwrap();
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let at = words.iter().position(|word| *word == "±").unwrap();
+    (
+        words[at - 1].parse().unwrap(),
+        words[at + 1].parse().unwrap(),
+    )
+}
+
+#[track_caller]
+fn is_within(told: &str, ahead_ms: f64) {
+    let (offset, error) = found(told);
+    println!("{ahead_ms}: {offset} ± {error}");
+    assert!(
+        (offset - ahead_ms).abs() <= (3.0 * error).min(50.0),
+        "{told}"
+    );
+}
+
+#[test]
+fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
+    let temporary = tempfile::tempdir().unwrap();
+    let at = temporary.path();
+    let readings = drive(at, 900);
+    let mut table = String::from("time_s,speed_mps,yaw_rate_radps\n");
+    let mut track = String::from("<gpx version=\"1.1\"><trk><trkseg>\n");
+    for (i, reading) in readings.iter().enumerate() {
+        let _ = writeln!(
+            table,
+            "{:.6},{:.4},{:.5}",
+            reading.time_s, reading.mps, reading.yaw_radps
+        );
+        if i % 2 == 0 {
+            let s = reading.time_s - DAY_S;
+            let (hour, minute) = ((s / 3600.0).floor(), (s / 60.0).floor() % 60.0);
+            let _ = writeln!(
+                track,
+                "<trkpt lat=\"{:.8}\" lon=\"{:.8}\"><time>2026-01-01T{hour:02}:{minute:02}:{:09.6}Z</time></trkpt>",
+                reading.latitude,
+                reading.longitude,
+                s % 60.0
+            );
+        }
+    }
+    track += "</trkseg></trk></gpx>\n";
+    for (name, ahead_s) in [("ahead", 0.24), ("behind", -0.31)] {
+        folder(at, name, &readings, ahead_s);
+        fs::write(at.join(name).join("speed.csv"), &table).unwrap();
+        let told = ok(at, &format!("data inspect {name} --clock-offset auto"));
+        is_within(&told.stderr, 1e3 * ahead_s);
+    }
+    folder(at, "track", &readings, 0.24);
+    fs::write(at.join("track/track.gpx"), &track).unwrap();
+    let told = ok(at, "data inspect track --clock-offset auto");
+    is_within(&told.stderr, 240.0);
+    // A log that is imported: what was measured stands in its dataset.toml, and nothing is left to find.
+    fs::copy(at.join("track/track.gpx"), at.join("track.gpx")).unwrap();
+    fs::copy(at.join("track/frames.csv"), at.join("images/frames.csv")).unwrap();
+    let told = ok(
+        at,
+        "data import track.gpx --images images --intrinsics 139.43,277.07,117.13,65.82 --clock-offset -250 --out given",
+    );
+    assert!(
+        !told.stderr.contains("the camera's clock is"),
+        "{}",
+        told.stderr
+    );
+    let config = fs::read_to_string(at.join("given/dataset.toml")).unwrap();
+    assert!(
+        config.contains("[clock]\ncamera_ahead_s = -0.25\n"),
+        "{config}"
+    );
+    assert!(at.join("given/course.csv").exists());
+    let speeds = fs::read_to_string(at.join("given/speed.csv")).unwrap();
+    assert!(speeds.starts_with("time_s,speed_mps,speed_sigma_mps\n"));
+}
+
+#[test]
+fn an_offset_that_cannot_be_found_is_refused() {
+    let temporary = tempfile::tempdir().unwrap();
+    let at = temporary.path();
+    let readings = drive(at, 80);
+    // Neither turns nor changes of speed.
+    folder(at, "straight", &readings, 0.2);
+    let mut table = String::from("time_s,speed_mps,yaw_rate_radps\n");
+    for reading in &readings {
+        let _ = writeln!(table, "{:.6},8.0,0.0", reading.time_s);
+    }
+    fs::write(at.join("straight/speed.csv"), table).unwrap();
+    fails(
+        at,
+        "data inspect straight --clock-offset auto",
+        &["nothing measured changes", "--clock-offset MS"],
+    );
+    // Turns of another drive.
+    folder(at, "other", &readings, 0.2);
+    let mut table = String::from("time_s,speed_mps,yaw_rate_radps\n");
+    for (i, reading) in readings.iter().enumerate() {
+        let turn = 0.2 * (0.7 * i as f64).sin();
+        let _ = writeln!(table, "{:.6},8.0,{turn:.4}", reading.time_s);
+    }
+    fs::write(at.join("other/speed.csv"), table).unwrap();
+    fails(
+        at,
+        "data inspect other --clock-offset auto",
+        &["--clock-offset MS"],
+    );
+}

@@ -1,0 +1,156 @@
+//! What `eval` says of depth without ground truth, held against the simulator's truth.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use support::{json, ok};
+
+/// A drive of some 70 metres along a street that no network saw.
+const DRIVE: &str = "simulate --frames 80 --seed 90100 --moving-cars 2";
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+/// The files below a folder whose names end so.
+fn files(folder: &Path, end: &str) -> Vec<std::path::PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path, end));
+        } else if path.to_string_lossy().ends_with(end) {
+            found.push(path);
+        }
+    }
+    found
+}
+
+#[test]
+fn the_certificate_holds_the_true_scale() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, &format!("{DRIVE} --scan-every 10 --out street"));
+    let found = json(
+        at,
+        "eval --data street --assume-unseen --report page.html --json",
+    );
+    let certificate = &found["scale_certificate"];
+    let (true_scale, scale) = (
+        number(&found["scale"]["median"]),
+        number(&certificate["scale"]),
+    );
+    let [low, high] = [0, 1].map(|i| number(&certificate["scale_ci95"][i]));
+    assert!(low < true_scale && true_scale < high, "{certificate}");
+    assert!((scale / true_scale).ln().abs() < 0.07, "{certificate}");
+    assert!(number(&certificate["blocks"]) >= 5.0);
+    // The speed's own error makes it wider, by what was said of it.
+    let bias = |name: &str| [0, 1].map(|i| number(&certificate[name][i]));
+    let wide = |[low, high]: [f64; 2]| high - low;
+    assert!(wide(bias("ci95")) > wide(bias("ci95_given_speed")) + 0.02);
+    let without = &found["without_truth"];
+    assert_eq!(without["held_out"], true);
+    let reprojection = &without["reprojection"];
+    assert!(number(&reprojection["warped"]) < 0.7 * number(&reprojection["unwarped"]));
+    assert!(number(&without["flip"]) < 0.1 && number(&without["consistency"]) < 0.1);
+    let page = fs::read_to_string(at.join("page.html")).unwrap();
+    assert!(page.contains("Without ground truth") && page.contains("95 % interval"));
+
+    // A vehicle that says it drives 20 % faster than it does: everything seems to be that much farther away.
+    for path in files(&at.join("street"), ".txt") {
+        if path.parent().unwrap().ends_with("oxts/data") {
+            let text = fs::read_to_string(&path).unwrap();
+            let mut values: Vec<f64> = text
+                .split_whitespace()
+                .map(|v| v.parse().unwrap())
+                .collect();
+            values[6..11].iter_mut().for_each(|v| *v *= 1.2);
+            let words: Vec<String> = values.iter().map(f64::to_string).collect();
+            fs::write(&path, words.join(" ")).unwrap();
+        }
+    }
+    let fast = json(
+        at,
+        "eval --data street --assume-unseen --speed-error 0 --json",
+    );
+    let fast = &fast["scale_certificate"];
+    let ratio = number(&fast["scale"]) / scale;
+    assert!((1.15..1.25).contains(&ratio), "{ratio}: {fast}");
+    assert_eq!(fast["ci95"], fast["ci95_given_speed"]);
+}
+
+#[test]
+fn a_drive_without_ground_truth_has_a_verdict() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(at, &format!("{DRIVE} --scan-every 0 --out drive"));
+    let found = json(
+        at,
+        "eval --data drive --assume-unseen --report page.html --json",
+    );
+    assert_eq!(found["certificate"], found["scale_certificate"]);
+    assert!(found["certificate"]["ci95"].is_array(), "{found}");
+    assert!(at.join("page.html").exists());
+    // A few metres of road say something, but not how sure it is.
+    ok(
+        at,
+        "simulate --frames 20 --seed 90102 --scan-every 0 --out short",
+    );
+    let text = ok(at, "eval --data short --assume-unseen").stdout;
+    for part in [
+        "scale  ",
+        "too little road",
+        "reprojection",
+        "mirrored",
+        "seen through the depth",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    // Whether a simulated drive is among what a packed network learned from is not known.
+    let unknown = json(at, "eval --data short --json");
+    assert_eq!(unknown["scale_certificate"], Value::Null);
+    assert_eq!(unknown["no_certificate"], "seen_not_known");
+    assert_eq!(unknown["without_truth"]["held_out"], Value::Null);
+    assert!(unknown.get("unscaled").is_none() && unknown.get("certificate").is_none());
+    // Nothing is left to say then.
+    let none = support::run(at, "eval --data short --no-verdict");
+    assert_eq!(none.code, 1, "{}", none.stdout);
+}
+
+#[test]
+fn frames_that_training_saw_do_not_vouch_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --frames 40 --seed 90101 --size 320x96 --scan-every 0 --out drive",
+    );
+    let train = "train --size 96x64 --batch 2 --steps 2 --init none";
+    ok(
+        at,
+        &format!("{train} --data drive --set validation_share=0.4 --out run"),
+    );
+    let found = json(at, "eval --model run --data drive --json");
+    let looked = number(&found["without_truth"]["frames"]);
+    let all = json(at, "eval --model run --data drive --assume-unseen --json");
+    let all = number(&all["without_truth"]["frames"]);
+    assert!(looked > 0.0 && looked < all, "{looked} of {all}");
+    ok(
+        at,
+        &format!("{train} --data drive --set validation_share=0 --out whole"),
+    );
+    let seen = json(at, "eval --model whole --data drive --json");
+    assert_eq!(seen["no_certificate"], "all_seen");
+    assert_eq!(seen["without_truth"]["held_out"], false);
+}

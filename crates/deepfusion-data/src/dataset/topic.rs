@@ -1,0 +1,123 @@
+//! Which topic of a bag is for what, where a caller says it.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// What a topic of a bag is read for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum TopicRole {
+    /// The camera's images.
+    Image,
+    /// The camera's calibration.
+    CameraInfo,
+    /// The LiDAR's scans.
+    Lidar,
+    /// Those points of the scans that move.
+    Dynamic,
+    /// The inertial unit.
+    Imu,
+    /// The vehicle's speed, or the satellite positions that it is computed from.
+    Speed,
+    /// The steering angle.
+    Steering,
+    /// CAN frames.
+    Can,
+    /// The exact motion, for evaluation alone.
+    Truth,
+}
+
+impl TopicRole {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Image,
+        Self::CameraInfo,
+        Self::Lidar,
+        Self::Dynamic,
+        Self::Imu,
+        Self::Speed,
+        Self::Steering,
+        Self::Can,
+        Self::Truth,
+    ];
+
+    /// Its name, which is its key in `[topics]` of the file beside a bag.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Image => "image",
+            Self::CameraInfo => "camera_info",
+            Self::Lidar => "lidar",
+            Self::Dynamic => "dynamic",
+            Self::Imu => "imu",
+            Self::Speed => "speed",
+            Self::Steering => "steering",
+            Self::Can => "can",
+            Self::Truth => "truth",
+        }
+    }
+}
+
+impl fmt::Display for TopicRole {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A topic and what it is read for, written `speed=/gps/fix`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedTopic {
+    /// What for.
+    pub role: TopicRole,
+    /// The topic's whole name.
+    pub topic: String,
+}
+
+impl fmt::Display for NamedTopic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.role, self.topic)
+    }
+}
+
+impl FromStr for NamedTopic {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (role, topic) = text
+            .split_once('=')
+            .ok_or("expected ROLE=NAME, such as image=/camera/front/image_raw")?;
+        let known = TopicRole::ALL.into_iter().find(|r| r.name() == role.trim());
+        let Some(role) = known else {
+            let names = TopicRole::ALL.map(TopicRole::name).join(", ");
+            return Err(format!("`{role}` is no role: {names} are"));
+        };
+        match topic.trim() {
+            "" => Err(format!("no topic is named for {role}")),
+            topic => Ok(Self {
+                role,
+                topic: topic.to_owned(),
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        for role in TopicRole::ALL {
+            let text = format!("{role}=/a/b");
+            let read: NamedTopic = text.parse().unwrap();
+            assert_eq!((read.role, read.to_string()), (role, text));
+        }
+        for (text, why) in [
+            ("/camera", "ROLE=NAME"),
+            ("picture=/camera", "`picture` is no role: image,"),
+            ("image= ", "no topic is named for image"),
+        ] {
+            let error = text.parse::<NamedTopic>().unwrap_err();
+            assert!(error.contains(why), "{error}");
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The vehicle's speed by a satellite receiver's positions (NavSatFix).
+
+use crate::logs::samples::Samples;
+use deepfusion_motion::{Fix, speeds_of_fixes};
+use deepfusion_rosbag::msg::NavSatFix;
+
+/// A receiver that has no position says so by a status below this.
+const HAS_FIX: i8 = 0;
+
+/// Positions in the order of their messages.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Fixes {
+    /// Nanoseconds; degrees to the north and to the east.
+    places: Vec<(i64, [f64; 2])>,
+    /// Messages of a receiver that had no position.
+    without: usize,
+}
+
+impl Fixes {
+    /// Takes a message in.
+    pub(super) fn add(&mut self, at_ns: i64, fix: &NavSatFix) {
+        let place = [fix.latitude, fix.longitude];
+        if fix.status.status < HAS_FIX || !place.iter().all(|x| x.is_finite()) {
+            self.without += 1;
+        } else {
+            self.places.push((at_ns, place));
+        }
+    }
+
+    /// Whether there was no message.
+    pub(super) fn is_empty(&self) -> bool {
+        self.places.is_empty() && self.without == 0
+    }
+
+    /// When they were measured, in nanoseconds.
+    pub(super) fn times(&self) -> impl Iterator<Item = i64> {
+        self.places.iter().map(|(ns, _)| *ns)
+    }
+
+    /// Speeds over ground in m/s, of all positions together, with those between that a slow receiver leaves out: gaps of up to
+    /// `max_gap_s` are bridged, or of a few seconds. How that was done goes to the remarks.
+    pub(super) fn speeds(
+        &mut self,
+        topic: &str,
+        max_gap_s: Option<f64>,
+        remarks: &mut Vec<String>,
+    ) -> Vec<(i64, f64)> {
+        self.places.sort_by_key(|(ns, _)| *ns);
+        if self.without > 0 {
+            let all = self.without + self.places.len();
+            remarks.push(format!(
+                "{topic}: {} of {all} messages have no position and are left out",
+                self.without
+            ));
+        }
+        let Some(&(origin_ns, _)) = self.places.first() else {
+            return Vec::new();
+        };
+        let fixes = self.places.iter().map(|(ns, [north, east])| Fix {
+            time_s: (ns - origin_ns) as f64 * 1e-9,
+            latitude_deg: *north,
+            longitude_deg: *east,
+            speed_mps: None,
+        });
+        let smoothed = speeds_of_fixes(&fixes.collect::<Vec<_>>());
+        let mut sigmas: Vec<f64> = smoothed.iter().map(|s| s.sigma_mps).collect();
+        sigmas.sort_by(f64::total_cmp);
+        let Some(usual) = sigmas.get(sigmas.len() / 2) else {
+            remarks.push(format!(
+                "{topic}: {} positions give no speed, at least two in ten seconds are needed",
+                self.places.len()
+            ));
+            return Vec::new();
+        };
+        remarks.push(format!(
+            "{topic}: speeds are those of its positions, smoothed, sure to {usual:.2} m/s in the middle"
+        ));
+        let ns = |s: f64| origin_ns + (s * 1e9).round() as i64;
+        let samples = Samples {
+            ns: smoothed.iter().map(|s| ns(s.time_s)).collect(),
+            values: smoothed.iter().map(|s| s.speed_mps).collect(),
+        };
+        let setting = "vehicle.max_gap_s in the file beside the bag";
+        let bridged = samples.bridged(max_gap_s, Some((remarks, topic, setting)));
+        bridged.ns.into_iter().zip(bridged.values).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_rosbag::msg::{Header, NavSatStatus};
+
+    /// At the equator, where a degree of longitude is 111,319.49 m.
+    fn fix(metres_east: f64, status: i8) -> NavSatFix {
+        NavSatFix {
+            header: Header::default(),
+            status: NavSatStatus { status, service: 1 },
+            latitude: 0.0,
+            longitude: metres_east / 111_319.490_793,
+            altitude: 0.0,
+            position_covariance: [0.0; 9],
+            position_covariance_type: 0,
+        }
+    }
+
+    #[test]
+    fn what_is_no_position_is_left_out_and_gaps_are_bridged() {
+        let mut fixes = Fixes::default();
+        for second in 0..20_i64 {
+            // 10 m/s; while the receiver has no position it says the origin's, and once there is a number missing.
+            let (metres, status) = match second {
+                7 => (0.0, -1),
+                8 => (f64::NAN, 0),
+                _ => (10.0 * second as f64, 0),
+            };
+            fixes.add(second * 1_000_000_000, &fix(metres, status));
+        }
+        let mut remarks = Vec::new();
+        let speeds = fixes.speeds("/fix", None, &mut remarks);
+        assert!(
+            speeds.iter().all(|(_, v)| (v - 10.0).abs() < 0.05),
+            "{speeds:?}"
+        );
+        let steps = speeds.windows(2).map(|w| w[1].0 - w[0].0);
+        assert_eq!(steps.max(), Some(250_000_000), "3 s are bridged too");
+        let remarks = remarks.join("\n");
+        for said in [
+            "2 of 20 messages have no position",
+            "sure to 0.",
+            "vehicle.max_gap_s",
+            "up to 3.0 s",
+        ] {
+            assert!(remarks.contains(said), "{said}: {remarks}");
+        }
+        // Not across more than is allowed.
+        let speeds = fixes.speeds("/fix", Some(2.0), &mut Vec::new());
+        let steps = speeds.windows(2).map(|w| w[1].0 - w[0].0);
+        assert_eq!(steps.max(), Some(3_000_000_000));
+        // One position alone is no speed, and none at all is none.
+        let mut lone = Fixes::default();
+        lone.add(0, &fix(0.0, 0));
+        let mut remarks = Vec::new();
+        assert!(lone.speeds("/fix", None, &mut remarks).is_empty());
+        assert!(remarks[0].contains("at least two"), "{remarks:?}");
+    }
+}

@@ -1,0 +1,344 @@
+//! Frames within frames, as `/tf_static` and `/tf` have them, and the way from one to another.
+
+use deepfusion_geometry::Se3;
+use deepfusion_rosbag::msg::TransformStamped;
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+
+/// Two transforms are the same if they differ by no more: metres, and radians (half a degree). Drivers publish calibrations with
+/// few digits.
+const SAME_M: f64 = 0.01;
+const SAME_RAD: f64 = 0.0087;
+/// So many ways between two frames are looked at; one tells a tree, a second one that it is none.
+const MOST_WAYS: usize = 16;
+
+/// All transforms of a bag.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Frames {
+    /// By parent and child.
+    links: BTreeMap<(String, String), Link>,
+    /// Transforms that are none: no rotation, or no number.
+    pub(super) broken: usize,
+}
+
+/// Where a frame is in its parent, over the bag.
+#[derive(Debug, Clone, Copy)]
+struct Link {
+    /// Of the first message.
+    parent_from_child: Se3,
+    /// How far later ones are from it.
+    change: Change,
+}
+
+/// How far two transforms are apart.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Change {
+    pub(super) metres: f64,
+    pub(super) radians: f64,
+}
+
+impl Change {
+    /// Between two ways from one frame to another.
+    pub(super) fn between(a: &Se3, b: &Se3) -> Self {
+        Self {
+            metres: (a.translation() - b.translation()).norm(),
+            radians: (a.inverse() * *b).angle(),
+        }
+    }
+
+    /// Whether it is none to speak of.
+    pub(super) fn is_small(self) -> bool {
+        self.metres <= SAME_M && self.radians <= SAME_RAD
+    }
+
+    fn or_larger(self, other: Self) -> Self {
+        Self {
+            metres: self.metres.max(other.metres),
+            radians: self.radians.max(other.radians),
+        }
+    }
+}
+
+impl std::fmt::Display for Change {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let degrees = self.radians.to_degrees();
+        write!(f, "{:.3} m and {degrees:.2}°", self.metres)
+    }
+}
+
+/// A way from one frame to another.
+#[derive(Debug, Clone)]
+pub(super) struct Chain {
+    /// From the source's frame to the target's.
+    names: Vec<String>,
+    pub(super) target_from_source: Se3,
+}
+
+impl std::fmt::Display for Chain {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.names.join(" → "))
+    }
+}
+
+/// What the frames say of where one is in another.
+#[derive(Debug, Clone)]
+pub(super) enum Way {
+    /// It stays there.
+    Fixed(Chain),
+    /// Two ways that say different things.
+    Several(Box<[Chain; 2]>),
+    /// It moves on the way: the link that does, and by how much.
+    Moves([String; 2], Change),
+    /// Nothing.
+    Unknown,
+}
+
+impl Frames {
+    /// Takes a transform in.
+    pub(super) fn add(&mut self, transform: &TransformStamped) {
+        let (t, q) = (
+            transform.transform.translation,
+            transform.transform.rotation,
+        );
+        let numbers = [t.x, t.y, t.z, q.w, q.x, q.y, q.z];
+        let norm = [q.w, q.x, q.y, q.z].map(|x| x * x).iter().sum::<f64>();
+        if !numbers.iter().all(|x| x.is_finite()) || norm < 1e-12 {
+            self.broken += 1;
+            return;
+        }
+        let place = Vector3::new(t.x, t.y, t.z);
+        let parent_from_child = Se3::from_quaternion([q.w, q.x, q.y, q.z], place);
+        let parent = plain(&transform.header.frame_id).to_owned();
+        let child = plain(&transform.child_frame_id).to_owned();
+        let link = self.links.entry((parent, child)).or_insert(Link {
+            parent_from_child,
+            change: Change::default(),
+        });
+        let change = Change::between(&link.parent_from_child, &parent_from_child);
+        link.change = link.change.or_larger(change);
+    }
+
+    /// Whether there are any.
+    pub(super) fn is_empty(&self) -> bool {
+        self.links.is_empty()
+    }
+
+    /// Whether a frame is one of them.
+    pub(super) fn has(&self, name: &str) -> bool {
+        let name = plain(name);
+        self.links.keys().any(|(p, c)| p == name || c == name)
+    }
+
+    /// All of them, in the order of their names.
+    pub(super) fn names(&self) -> Vec<&str> {
+        let ends = self.links.keys().flat_map(|(p, c)| [p.as_str(), c]);
+        let mut names: Vec<&str> = ends.collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+
+    /// Where the source's frame is in the target's.
+    pub(super) fn way(&self, target: &str, source: &str) -> Way {
+        let (target, source) = (plain(target), plain(source));
+        if !(self.has(target) && self.has(source)) {
+            return Way::Unknown;
+        }
+        let mut fixed = self.ways(target, source, true);
+        fixed.sort_by_key(|chain| chain.names.len());
+        if let Some(first) = fixed.first() {
+            let other = fixed.iter().find(|other| {
+                !Change::between(&first.target_from_source, &other.target_from_source).is_small()
+            });
+            return match other {
+                Some(other) => Way::Several(Box::new([first.clone(), other.clone()])),
+                None => Way::Fixed(first.clone()),
+            };
+        }
+        let moving = self.ways(target, source, false);
+        let links = moving.first().into_iter().flat_map(|chain| {
+            chain.names.windows(2).filter_map(|pair| {
+                let link = self.link(&pair[0], &pair[1])?;
+                (!link.change.is_small()).then_some((pair, link.change))
+            })
+        });
+        let size = |change: &Change| change.metres + change.radians;
+        let worst = links.max_by(|a, b| size(&a.1).total_cmp(&size(&b.1)));
+        worst.map_or(Way::Unknown, |(pair, change)| {
+            Way::Moves([pair[0].clone(), pair[1].clone()], change)
+        })
+    }
+
+    /// The link between two frames, whichever is the parent.
+    fn link(&self, a: &str, b: &str) -> Option<&Link> {
+        let key = |p: &str, c: &str| (p.to_owned(), c.to_owned());
+        self.links
+            .get(&key(a, b))
+            .or_else(|| self.links.get(&key(b, a)))
+    }
+
+    /// The ways without a frame twice, over links that stay as they are or over any.
+    fn ways(&self, target: &str, source: &str, only_fixed: bool) -> Vec<Chain> {
+        // Depth first; a tree has one way, so that every frame is seen once.
+        let mut open = vec![Chain {
+            names: vec![source.to_owned()],
+            target_from_source: Se3::identity(),
+        }];
+        let (mut found, mut steps) = (Vec::new(), 0);
+        while let Some(chain) = open.pop() {
+            steps += 1;
+            let here = chain.names.last().map_or("", String::as_str);
+            if here == target {
+                found.push(chain);
+                if found.len() == MOST_WAYS {
+                    break;
+                }
+                continue;
+            }
+            // Hundreds of frames with many loops have more ways than there is time for.
+            if steps > 100_000 {
+                break;
+            }
+            for ((parent, child), link) in &self.links {
+                if only_fixed && !link.change.is_small() {
+                    continue;
+                }
+                let (next, next_from_here) = if child == here {
+                    (parent, link.parent_from_child)
+                } else if parent == here {
+                    (child, link.parent_from_child.inverse())
+                } else {
+                    continue;
+                };
+                if !chain.names.contains(next) {
+                    let mut names = chain.names.clone();
+                    names.push(next.clone());
+                    open.push(Chain {
+                        names,
+                        target_from_source: next_from_here * chain.target_from_source,
+                    });
+                }
+            }
+        }
+        found
+    }
+}
+
+/// A frame's name: before tf2 some had a slash in front.
+pub(super) fn plain(name: &str) -> &str {
+    name.strip_prefix('/').unwrap_or(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_rosbag::msg::{Header, Quaternion, Transform, Vector3 as Vector3Msg};
+
+    fn link(parent: &str, child: &str, x: f64, yaw: f64) -> TransformStamped {
+        let (sin, cos) = (0.5 * yaw).sin_cos();
+        TransformStamped {
+            header: Header {
+                frame_id: parent.into(),
+                ..Header::default()
+            },
+            child_frame_id: child.into(),
+            transform: Transform {
+                translation: Vector3Msg { x, y: 0.0, z: 0.0 },
+                rotation: Quaternion {
+                    x: 0.0,
+                    y: 0.0,
+                    z: sin,
+                    w: cos,
+                },
+            },
+        }
+    }
+
+    fn frames(links: &[TransformStamped]) -> Frames {
+        let mut frames = Frames::default();
+        links.iter().for_each(|link| frames.add(link));
+        frames
+    }
+
+    fn fixed(way: Way) -> Chain {
+        match way {
+            Way::Fixed(chain) => chain,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_chain_goes_up_and_down() {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let tree = frames(&[
+            link("base", "/mast", 1.0, quarter),
+            link("mast", "camera", 2.0, 0.0),
+            link("base", "lidar", 5.0, 0.0),
+        ]);
+        // The camera is 2 m along the mast's x, which points along the base's y.
+        let chain = fixed(tree.way("base", "camera"));
+        assert_eq!(chain.to_string(), "camera → mast → base");
+        let place = chain.target_from_source.translation();
+        assert!((place - Vector3::new(1.0, 2.0, 0.0)).norm() < 1e-12);
+        // The LiDAR in the camera's axes: 4 m ahead of the base's x = 1, the camera looks to the left.
+        let place = fixed(tree.way("camera", "lidar"))
+            .target_from_source
+            .translation();
+        assert!(
+            (place - Vector3::new(-2.0, -4.0, 0.0)).norm() < 1e-12,
+            "{place}"
+        );
+        assert!(matches!(tree.way("base", "radar"), Way::Unknown));
+        assert!(
+            fixed(tree.way("base", "base"))
+                .target_from_source
+                .translation()
+                .norm()
+                == 0.0
+        );
+    }
+
+    #[test]
+    fn two_parents_are_told_unless_they_agree() {
+        let with = |x| {
+            frames(&[
+                link("base", "a", 1.0, 0.0),
+                link("base", "b", 2.0, 0.0),
+                link("a", "camera", 3.0, 0.0),
+                link("b", "camera", x, 0.0),
+            ])
+        };
+        assert!(matches!(with(2.0).way("base", "camera"), Way::Fixed(_)));
+        let Way::Several(both) = with(2.1).way("base", "camera") else {
+            panic!("4.0 and 4.1 m");
+        };
+        let found = both.map(|chain| chain.target_from_source.translation().x);
+        assert!(found.contains(&4.0) && found.contains(&4.1), "{found:?}");
+    }
+
+    #[test]
+    fn what_moves_is_no_mount() {
+        let tree = frames(&[
+            link("odom", "base", 0.0, 0.0),
+            link("base", "pan", 1.0, 0.0),
+            link("pan", "camera", 0.1, 0.0),
+            link("odom", "base", 7.0, 1.0),
+            link("base", "pan", 1.0, 0.3),
+        ]);
+        assert!(matches!(tree.way("pan", "camera"), Way::Fixed(_)));
+        let Way::Moves(names, change) = tree.way("base", "camera") else {
+            panic!("it pans");
+        };
+        assert_eq!(names, ["pan", "base"]);
+        assert!((change.radians - 0.3).abs() < 1e-12 && change.metres < 1e-12);
+    }
+
+    #[test]
+    fn a_rotation_of_zeros_is_left_out() {
+        let mut zeros = link("base", "camera", 1.0, 0.0);
+        zeros.transform.rotation = Quaternion::default();
+        let tree = frames(&[zeros]);
+        assert!(tree.is_empty());
+        assert_eq!(tree.broken, 1);
+    }
+}

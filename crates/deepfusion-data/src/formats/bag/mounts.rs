@@ -1,0 +1,415 @@
+//! Where camera, LiDAR and inertial unit are: by the file beside the bag, else by the frames of `/tf_static` and `/tf`, else by
+//! the profile.
+
+use super::config::BagConfig;
+use super::frames::{Chain, Change, Way};
+use super::index::Index;
+use crate::{Error, Mount, Result};
+use deepfusion_geometry::Se3;
+use nalgebra::{Matrix3, Vector3};
+use std::path::Path;
+
+/// Names of the vehicle's frame, the likelier to be at the rear axle first; the last part of a name counts. REP 105 lets
+/// `base_link` lie anywhere on the base; vehicles' stacks put it below the middle of the rear axle.
+const VEHICLES: [&[&str]; 4] = [
+    &["rear_axle", "rear_axle_link", "rear_axis_middle"],
+    &["base_link"],
+    &["base_footprint"],
+    &["vehicle", "ego_vehicle", "ego", "car"],
+];
+/// From this component of "up" along the z axis of an image's frame on, that axis does not look into the picture (REP 103: an
+/// optical frame's z does, its y looks down).
+const BODY_AXES: f64 = 0.7;
+
+/// Where the sensors are.
+#[derive(Debug)]
+pub(super) struct Mounts {
+    pub(super) cam_from_vehicle: Se3,
+    /// `None` where nothing says it.
+    pub(super) cam_from_lidar: Option<Se3>,
+    /// `None` where nothing says it.
+    pub(super) vehicle_from_imu: Option<Se3>,
+    /// Each that is known, and by whom.
+    pub(super) said: Vec<Mount>,
+}
+
+impl Mounts {
+    /// The mounts of a bag; what is taken for granted, or contradicts another source, goes to the remarks.
+    ///
+    /// # Errors
+    /// [`Error::Frames`] where the frames say two things of a mount that the file does not say.
+    pub(super) fn find(
+        bag: &Path,
+        config: &BagConfig,
+        index: &Index,
+        remarks: &mut Vec<String>,
+    ) -> Result<Self> {
+        let by_frames = ByFrames::new(bag, config, index)?;
+        let mut search = Search {
+            config,
+            remarks,
+            said: Vec::new(),
+        };
+        if index.frames.broken > 0 {
+            search.remarks.push(format!(
+                "{} transforms of frames have no rotation, or no numbers, and are left out",
+                index.frames.broken
+            ));
+        }
+        let (own, profile) = (config, &config.profile_mounts);
+        let place = |t: Option<super::config::Transform>| t.map(|t| t.se3());
+        let cam_from_vehicle = search.one(
+            "cam_from_vehicle",
+            [place(own.cam_from_vehicle), place(profile.cam_from_vehicle)],
+            || by_frames.cam_from_vehicle(),
+        )?;
+        let cam_from_lidar = search.one(
+            "cam_from_lidar",
+            [place(own.cam_from_lidar), place(profile.cam_from_lidar)],
+            || by_frames.cam_from_lidar(),
+        )?;
+        let vehicle_from_imu = search.one(
+            "vehicle_from_imu",
+            [place(own.vehicle_from_imu), place(profile.vehicle_from_imu)],
+            || by_frames.vehicle_from_imu(),
+        )?;
+        let by_tf = search
+            .said
+            .iter()
+            .any(|m| m.source.starts_with(BY_FRAMES) && m.name.starts_with("cam"));
+        if let Some(name) = by_frames
+            .camera
+            .as_ref()
+            .filter(|_| by_frames.body_axes && by_tf)
+        {
+            search.remarks.push(format!(
+                "the images' frame {name} has its z axis up, so it is no optical frame: its x is taken to look ahead and its y to the left"
+            ));
+        }
+        if cam_from_vehicle.is_none() {
+            search.remarks.push(
+                "nothing says where the camera is on the vehicle: it is taken to look ahead and to move as the rear axle does".into(),
+            );
+        }
+        Ok(Self {
+            cam_from_vehicle: cam_from_vehicle.unwrap_or_else(looking_ahead),
+            cam_from_lidar,
+            vehicle_from_imu,
+            said: search.said,
+        })
+    }
+}
+
+/// What begins the source of a mount that the frames say.
+const BY_FRAMES: &str = "frames ";
+
+/// Sources in their order, for one mount after the other.
+struct Search<'a> {
+    config: &'a BagConfig,
+    remarks: &'a mut Vec<String>,
+    said: Vec<Mount>,
+}
+
+impl Search<'_> {
+    /// The bag's own file first, then the frames, then the profile.
+    fn one(
+        &mut self,
+        name: &'static str,
+        [own, profile]: [Option<Se3>; 2],
+        by_frames: impl FnOnce() -> Result<Said>,
+    ) -> Result<Option<Se3>> {
+        let found = match by_frames() {
+            Ok(found) => found,
+            // What the file says settles it.
+            Err(_) if own.is_some() => Said::Nothing,
+            Err(error) => return Err(error),
+        };
+        let in_file = self.config.path.display().to_string();
+        let of_profile = self.config.profile.clone().unwrap_or_default();
+        let (transform, source) = match (own, found) {
+            (Some(own), found) => {
+                if let Said::Here(by_frames, chain) = found {
+                    self.compare(name, (&own, &in_file), (&by_frames, &chain));
+                }
+                (own, in_file)
+            }
+            (None, Said::Here(by_frames, chain)) => {
+                if let Some(profile) = profile {
+                    let who = format!("the profile {of_profile}");
+                    self.compare(name, (&by_frames, &chain), (&profile, &who));
+                }
+                (by_frames, chain)
+            }
+            (None, other) => {
+                if let Said::No(why) = other {
+                    self.remarks.push(format!("{name}: {why}"));
+                }
+                match profile {
+                    Some(profile) => (profile, format!("profile {of_profile}")),
+                    None => return Ok(None),
+                }
+            }
+        };
+        self.said.push(Mount {
+            name,
+            source,
+            translation: transform.translation().into(),
+            rotation: transform.axis_angle().into(),
+        });
+        Ok(Some(transform))
+    }
+
+    /// Two sources that do not say the same: the first is taken.
+    fn compare(&mut self, name: &str, taken: (&Se3, &str), other: (&Se3, &str)) {
+        let change = Change::between(taken.0, other.0);
+        if !change.is_small() {
+            self.remarks.push(format!(
+                "{name}: {} and {} are {change} apart; the former is taken",
+                taken.1, other.1
+            ));
+        }
+    }
+}
+
+/// What the frames say of a mount.
+enum Said {
+    /// It, and by which way.
+    Here(Se3, String),
+    /// Why nothing, where something could be expected.
+    No(String),
+    /// Nothing, and nothing was to be expected.
+    Nothing,
+}
+
+/// The frames with the sensors' names in them.
+struct ByFrames<'a> {
+    bag: &'a Path,
+    config: &'a BagConfig,
+    index: &'a Index,
+    /// The images' frame, where it is among the frames.
+    camera: Option<String>,
+    lidar: Option<String>,
+    imu: Option<String>,
+    /// Whether the images' frame has the axes of a body: x forward, y left, z up.
+    body_axes: bool,
+}
+
+impl<'a> ByFrames<'a> {
+    fn new(bag: &'a Path, config: &'a BagConfig, index: &'a Index) -> Result<Self> {
+        let (frames, named) = (&index.frames, &config.frames);
+        for (key, name) in [
+            ("vehicle", &named.vehicle),
+            ("camera", &named.camera),
+            ("lidar", &named.lidar),
+            ("imu", &named.imu),
+        ] {
+            if let Some(name) = name
+                && !frames.has(name)
+            {
+                let there = match frames.names().as_slice() {
+                    [] => "the bag has no transforms of frames".to_owned(),
+                    names => format!("there are {}", names.join(", ")),
+                };
+                return Err(
+                    config.wrong(format!("frames.{key}: {name} is in no transform; {there}"))
+                );
+            }
+        }
+        let among = |named: &Option<String>, of_messages: &[&Option<String>]| {
+            let of_messages = of_messages.iter().filter_map(|name| (*name).clone());
+            let mut names = named.iter().cloned().chain(of_messages);
+            names.find(|name| frames.has(name))
+        };
+        let mut all = Self {
+            bag,
+            config,
+            index,
+            camera: among(
+                &named.camera,
+                &[&index.image_frame, &index.camera_info_frame],
+            ),
+            lidar: among(&named.lidar, &[&index.lidar_frame]),
+            imu: among(&named.imu, &[&index.imu_frame]),
+            body_axes: false,
+        };
+        all.body_axes = all.has_body_axes();
+        Ok(all)
+    }
+
+    fn cam_from_vehicle(&self) -> Result<Said> {
+        let Some(camera) = &self.camera else {
+            let of_images = &self.index.image_frame;
+            return Ok(self.absent(of_images, "the images", "camera"));
+        };
+        let Some(vehicle) = self.vehicle(camera)? else {
+            let vehicles: Vec<&str> = VEHICLES
+                .iter()
+                .flat_map(|tier| tier.iter().copied())
+                .collect();
+            return Ok(Said::No(format!(
+                "none of the frames {} is known as the vehicle's ({}); frames.vehicle in {} names it",
+                self.index.frames.names().join(", "),
+                vehicles.join(", "),
+                self.config.path.display()
+            )));
+        };
+        Ok(self.upright(self.said("cam_from_vehicle", camera, &vehicle)?))
+    }
+
+    fn cam_from_lidar(&self) -> Result<Said> {
+        let Some(camera) = &self.camera else {
+            return Ok(Said::Nothing);
+        };
+        let Some(lidar) = &self.lidar else {
+            let of_scans = &self.index.lidar_frame;
+            return Ok(self.absent(of_scans, "the scans", "lidar"));
+        };
+        Ok(self.upright(self.said("cam_from_lidar", camera, lidar)?))
+    }
+
+    fn vehicle_from_imu(&self) -> Result<Said> {
+        let Some(imu) = &self.imu else {
+            let of_imu = &self.index.imu_frame;
+            return Ok(self.absent(of_imu, "the inertial unit", "imu"));
+        };
+        // One vehicle for all sensors.
+        let anchor = self.camera.as_ref().unwrap_or(imu);
+        match self.vehicle(anchor)? {
+            Some(vehicle) => self.said("vehicle_from_imu", &vehicle, imu),
+            None => Ok(Said::Nothing),
+        }
+    }
+
+    /// A sensor's frame that no transform has.
+    fn absent(&self, frame: &Option<String>, whose: &str, key: &str) -> Said {
+        if self.index.frames.is_empty() {
+            return Said::Nothing;
+        }
+        // A sensor that was not recorded has no messages, and none is missed.
+        let Some(frame) = frame else {
+            return Said::Nothing;
+        };
+        Said::No(format!(
+            "the frame of {whose}, {frame}, is in no transform of the bag; frames.{key} in {} names another",
+            self.config.path.display()
+        ))
+    }
+
+    /// The vehicle's frame: the one that the file names, else the likeliest that a sensor's frame is fixed to.
+    fn vehicle(&self, anchor: &str) -> Result<Option<String>> {
+        if let Some(named) = &self.config.frames.vehicle {
+            return Ok(Some(named.clone()));
+        }
+        let frames = &self.index.frames;
+        let names = frames.names();
+        let last = |name: &str| name.rsplit('/').next().unwrap_or(name).to_owned();
+        let mut tiers: Vec<Vec<&str>> = VEHICLES
+            .iter()
+            .map(|tier| {
+                let of_tier = |name: &&&str| tier.contains(&last(name).as_str());
+                names.iter().filter(of_tier).copied().collect()
+            })
+            .collect();
+        let of_speed = self.index.speed_frame.as_deref();
+        tiers.push(
+            of_speed
+                .filter(|name| frames.has(name))
+                .into_iter()
+                .collect(),
+        );
+        let mut moving = None;
+        for tier in tiers {
+            let mut found: Option<(&str, Chain)> = None;
+            for name in tier {
+                match frames.way(anchor, name) {
+                    Way::Fixed(chain) => match &found {
+                        Some((first, other)) if !same(other, &chain) => {
+                            return Err(self.error(
+                                format!("{first} and {name} could both be the vehicle's frame"),
+                                format!("frames.vehicle = \"{first}\""),
+                            ));
+                        }
+                        Some(_) => {}
+                        None => found = Some((name, chain)),
+                    },
+                    // Told as what it is by the caller, who asks for this way again.
+                    Way::Several(_) => return Ok(Some(name.to_owned())),
+                    Way::Moves(..) => moving = moving.or(Some(name)),
+                    Way::Unknown => {}
+                }
+            }
+            if let Some((name, _)) = found {
+                return Ok(Some(name.to_owned()));
+            }
+        }
+        Ok(moving.map(str::to_owned))
+    }
+
+    /// Where the source's frame is in the target's.
+    fn said(&self, mount: &str, target: &str, source: &str) -> Result<Said> {
+        Ok(match self.index.frames.way(target, source) {
+            Way::Fixed(chain) => {
+                let source = format!("{BY_FRAMES}{chain}");
+                Said::Here(chain.target_from_source, source)
+            }
+            Way::Several(both) => {
+                let [a, b] = *both;
+                let apart = Change::between(&a.target_from_source, &b.target_from_source);
+                return Err(self.error(
+                    format!("{mount} is ambiguous: the frames {a} and {b} are {apart} apart"),
+                    format!("say it: [{mount}] translation = […], rotation = […]"),
+                ));
+            }
+            Way::Moves([a, b], change) => Said::No(format!(
+                "the frames {source} and {target} are not fixed to each other: {a} moves in {b} by up to {change}, so it is not \
+                 taken from them"
+            )),
+            Way::Unknown => Said::No(format!(
+                "no transforms lead from the frame {source} to {target}"
+            )),
+        })
+    }
+
+    /// Whether the images' frame is none of an optical kind: "up" is along its z. What is up, the vehicle's frame says, else
+    /// the LiDAR's.
+    fn has_body_axes(&self) -> bool {
+        let Some(camera) = &self.camera else {
+            return false;
+        };
+        let vehicle = self.vehicle(camera).ok().flatten();
+        let upright = vehicle.iter().chain(&self.lidar);
+        let mut ups = upright.filter_map(|name| match self.index.frames.way(camera, name) {
+            Way::Fixed(chain) => Some(chain.target_from_source.rotate(&Vector3::z())),
+            _ => None,
+        });
+        ups.next().is_some_and(|up| up.z > BODY_AXES)
+    }
+
+    /// A transform into the images' frame as one into the camera's axes.
+    fn upright(&self, said: Said) -> Said {
+        match said {
+            Said::Here(body_from, source) if self.body_axes => {
+                Said::Here(looking_ahead() * body_from, source)
+            }
+            other => other,
+        }
+    }
+
+    fn error(&self, problem: String, remedy: String) -> Error {
+        Error::Frames {
+            path: self.bag.to_owned(),
+            problem,
+            remedy: format!("{remedy} (in {})", self.config.path.display()),
+        }
+    }
+}
+
+fn same(a: &Chain, b: &Chain) -> bool {
+    Change::between(&a.target_from_source, &b.target_from_source).is_small()
+}
+
+/// A camera at the rear axle that looks ahead: camera axes (right, down, forward) from a body's (forward, left, up).
+fn looking_ahead() -> Se3 {
+    let axes = Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+    Se3::from_parts(&axes, Vector3::zeros())
+}

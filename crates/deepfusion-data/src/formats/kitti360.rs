@@ -1,0 +1,304 @@
+//! KITTI-360: `data_2d_raw/<drive>/image_00/{data_rect,timestamps.txt}`, `calibration/{perspective.txt,calib_cam_to_pose.txt,
+//! calib_cam_to_velo.txt}`, `data_poses/<drive>/{poses.txt,cam0_to_world.txt}`, `data_3d_raw/<drive>/velodyne_points/data`.
+//!
+//! A pose is where the inertial unit was (x forward, y right, z down, above the rear axle), in a world that does not move. Frames in which
+//! the car hardly moved have none. Cameras 0 and 1, whose images are rectified, are the left and the right one; 2 and 3 are fisheyes.
+
+use super::files::{both_names, folders, name_of};
+use super::kitti::{Fields, TimeStamps, numbered_files, optional};
+use super::plain::{PlainParts, open_each};
+use super::pose_track::speed_log;
+use super::poses::read_poses;
+use crate::logs::frame_times::TimedImage;
+use crate::truth::measured::{MeasuredDepth, velodyne};
+use crate::{
+    Camera, CameraCalibration, Dataset, DatasetKind, Error, OpenOptions, Result, image_size,
+};
+use deepfusion_geometry::{Distortion, Se3};
+use nalgebra::{Matrix3x4, Vector3};
+use std::f64::consts::PI;
+use std::path::{Path, PathBuf};
+
+/// Poses by frame number.
+type NumberedPoses = Vec<(u64, Se3)>;
+
+const IMAGES: &str = "data_2d_raw";
+const SCANS: &str = "data_3d_raw";
+const POSES: &str = "data_poses";
+const CALIBRATION: &str = "calibration";
+const PERSPECTIVE: &str = "perspective.txt";
+const CAM_TO_POSE: &str = "calib_cam_to_pose.txt";
+const CAM_TO_VELO: &str = "calib_cam_to_velo.txt";
+const CALIBRATION_REMEDY: &str =
+    "put KITTI-360's calibration files (calibration.zip) beside data_2d_raw";
+
+/// A drive and the root around its parts.
+#[derive(Debug)]
+pub(crate) struct Drive {
+    root: PathBuf,
+    /// In `data_2d_raw`.
+    folder: PathBuf,
+}
+
+/// The drives at a path: those of a root, of its `data_2d_raw`, or the drive itself.
+pub(crate) fn find(path: &Path) -> Result<Vec<Drive>> {
+    for folder in both_names(path)? {
+        let found = find_named(folder)?;
+        if !found.is_empty() {
+            return Ok(found);
+        }
+    }
+    Ok(Vec::new())
+}
+
+fn find_named(folder: PathBuf) -> Result<Vec<Drive>> {
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let of = |folder: PathBuf| {
+        let root = folder.parent()?.parent()?.to_owned();
+        Some(Drive { root, folder })
+    };
+    let in_place = |folder: &Path| {
+        let place = folder.parent().map(name_of);
+        place.is_some_and(|place| place == IMAGES) && is_drive(folder)
+    };
+    if in_place(&folder) {
+        return Ok(of(folder).into_iter().collect());
+    }
+    let place = if name_of(&folder) == IMAGES {
+        folder
+    } else {
+        folder.join(IMAGES)
+    };
+    if !place.is_dir() {
+        return Ok(Vec::new());
+    }
+    let drives = folders(&place)?.into_iter().filter(|f| is_drive(f));
+    Ok(drives.filter_map(of).collect())
+}
+
+fn is_drive(folder: &Path) -> bool {
+    (0..4).any(|camera| folder.join(format!("image_0{camera}")).is_dir())
+}
+
+/// Opens the cameras of the drives found at `path`, a data set each.
+pub(crate) fn open(path: &Path, drives: &[Drive], options: &OpenOptions) -> Result<Vec<Dataset>> {
+    let mut found = Vec::new();
+    for drive in drives {
+        for &camera in options.camera.cameras() {
+            let place = drive.camera(camera).join("data_rect");
+            if !place.is_dir() {
+                continue;
+            }
+            let images = numbered_files(&place, &["jpeg", "jpg", "png"])?;
+            if !images.is_empty() {
+                found.push((drive, camera, images));
+            }
+        }
+    }
+    if found.is_empty() {
+        let camera = options.camera.cameras()[0];
+        let place = drives.first().map(|drive| drive.camera(camera));
+        return Err(Error::NoImages {
+            path: place.map_or_else(|| path.to_owned(), |p| p.join("data_rect")),
+            camera: camera.number(),
+        });
+    }
+    open_each(path, found, options, |(drive, camera, images)| {
+        drive.open(camera, images, options)
+    })
+}
+
+impl Drive {
+    /// The folder of a camera.
+    fn camera(&self, camera: Camera) -> PathBuf {
+        self.folder.join(image_name(camera))
+    }
+
+    /// `images` are not empty.
+    fn open(
+        &self,
+        camera: Camera,
+        images: Vec<(u64, PathBuf)>,
+        options: &OpenOptions,
+    ) -> Result<Dataset> {
+        let rig = Rig::read(&self.root.join(CALIBRATION), camera)?;
+        let times = optional(TimeStamps::read(
+            &self.camera(camera).join("timestamps.txt"),
+        ))?;
+        let time = |number: u64| match &times {
+            None => Ok(None),
+            Some(times) => times.nanoseconds(number),
+        };
+        let (poses_file, world_from_vehicle) = self.poses(&rig)?;
+        let mut timed = Vec::with_capacity(world_from_vehicle.len());
+        for (number, pose) in &world_from_vehicle {
+            timed.extend(time(*number)?.map(|ns| (ns, *pose)));
+        }
+        let speeds = poses_file
+            .filter(|_| !timed.is_empty())
+            .map(|file| speed_log(&file, &timed));
+        let truth = self.scans(&rig, &images)?;
+        let size = image_size(&images[0].1)?;
+        let mut frames = Vec::with_capacity(images.len());
+        for (number, path) in images {
+            let ns = time(number)?;
+            frames.push(TimedImage { number, path, ns });
+        }
+        let vehicle_from_cam = rig.cam_from_vehicle.inverse();
+        PlainParts {
+            kind: DatasetKind::Kitti360,
+            folder: self.folder.clone(),
+            name: name_of(&self.folder),
+            images: frames,
+            video: None,
+            calibration: rig.calibration,
+            camera_ahead_s: options.camera_ahead_s.unwrap_or(0.0),
+            image_size: size,
+            speeds,
+            cam_from_vehicle: rig.cam_from_vehicle,
+            camera,
+            truth,
+            world_from_cam: world_from_vehicle
+                .into_iter()
+                .map(|(number, pose)| (number, pose * vehicle_from_cam))
+                .collect(),
+            streams: Vec::new(),
+            remarks: Vec::new(),
+            speed_remedy: "speeds come from data_poses/<drive>/poses.txt and timestamps.txt: train on drives that have them; \
+                 evaluation and prediction need none",
+        }
+        .into_dataset()
+    }
+
+    /// `world_from_vehicle` by frame number, and the file that says it; the unit's poses, else the left camera's.
+    fn poses(&self, rig: &Rig) -> Result<(Option<PathBuf>, NumberedPoses)> {
+        let place = self.root.join(POSES).join(name_of(&self.folder));
+        let ways = [
+            ("poses.txt", 12, pose_from_vehicle()),
+            ("cam0_to_world.txt", 16, rig.cam0_from_vehicle),
+        ];
+        for (name, columns, file_from_vehicle) in ways {
+            let file = place.join(name);
+            if file.is_file() {
+                let poses = read_poses(&file, true, columns)?.into_iter();
+                let poses = poses.map(|(number, pose)| (number, pose * file_from_vehicle));
+                return Ok((Some(file), poses.collect()));
+            }
+        }
+        Ok((None, Vec::new()))
+    }
+
+    /// The scans of its frames, of which there is one each by number.
+    fn scans(&self, rig: &Rig, images: &[(u64, PathBuf)]) -> Result<Option<MeasuredDepth>> {
+        let name = name_of(&self.folder);
+        let place = self
+            .root
+            .join(SCANS)
+            .join(name)
+            .join("velodyne_points/data");
+        if !place.is_dir() {
+            return Ok(None);
+        }
+        velodyne(
+            "velodyne_points",
+            &place,
+            images,
+            &rig.calibration.intrinsics,
+            || rig.cam_from_velo(&self.root.join(CALIBRATION)),
+        )
+    }
+}
+
+/// A rectified camera and where it is.
+struct Rig {
+    calibration: CameraCalibration,
+    /// A point of the vehicle (the unit's place; x forward, y left, z up) in the rectified camera.
+    cam_from_vehicle: Se3,
+    /// The same in rectified camera 0.
+    cam0_from_vehicle: Se3,
+    /// Unrectified camera 0, in whose axes the velodyne's place is said, in the rectified camera.
+    cam_from_raw0: Se3,
+}
+
+impl Rig {
+    /// Reads `perspective.txt` and `calib_cam_to_pose.txt` for a camera.
+    ///
+    /// # Errors
+    /// [`Error::Missing`], [`Error::Calibration`].
+    fn read(folder: &Path, camera: Camera) -> Result<Self> {
+        let fields = |name: &str, what| {
+            let path = folder.join(name);
+            Fields::read(&path)?.ok_or(Error::Missing {
+                path,
+                what,
+                remedy: CALIBRATION_REMEDY,
+            })
+        };
+        let cameras = fields(PERSPECTIVE, "the cameras' intrinsics")?;
+        let mounts = fields(CAM_TO_POSE, "where the cameras are")?;
+        // Unrectified camera axes to the unit's; the rectification turns a camera on its place.
+        let cam_from_pose = |camera: Camera| -> Result<Se3> {
+            let rect = format!("R_rect_0{}", camera.number() - 2);
+            let rect = cameras.rotation(&rect)?;
+            let pose_from_raw = mounts.motion(&image_name(camera))?;
+            Ok(Se3::from_parts(&rect, Vector3::zeros()) * pose_from_raw.inverse())
+        };
+        let number = camera.number() - 2;
+        let (size_field, p_field) = (format!("S_rect_0{number}"), format!("P_rect_0{number}"));
+        let [width, height] = cameras.numbers::<2>(&size_field)?;
+        let size = (
+            cameras.size(&size_field, width)?,
+            cameras.size(&size_field, height)?,
+        );
+        let projection = Matrix3x4::from_row_slice(&cameras.numbers::<12>(&p_field)?);
+        let intrinsics = cameras.camera(&p_field, &projection, size)?;
+        let cam_from_pose_here = cam_from_pose(camera)?;
+        Ok(Self {
+            calibration: CameraCalibration {
+                intrinsics,
+                distortion: Distortion::default(),
+                size_in_file: true,
+                assumed: false,
+                path: folder.join(PERSPECTIVE),
+            },
+            cam_from_vehicle: cam_from_pose_here * pose_from_vehicle(),
+            cam0_from_vehicle: cam_from_pose(Camera::Left)? * pose_from_vehicle(),
+            cam_from_raw0: cam_from_pose_here * mounts.motion(&image_name(Camera::Left))?,
+        })
+    }
+
+    /// A velodyne point in the rectified camera.
+    ///
+    /// # Errors
+    /// [`Error::Missing`], [`Error::Pose`] for a file that is no motion.
+    fn cam_from_velo(&self, folder: &Path) -> Result<Se3> {
+        let path = folder.join(CAM_TO_VELO);
+        if !path.is_file() {
+            return Err(Error::Missing {
+                path,
+                what: "where the velodyne is",
+                remedy: CALIBRATION_REMEDY,
+            });
+        }
+        let velo_from_raw0 = read_poses(&path, false, 12)?.into_iter().next();
+        let (_, velo_from_raw0) = velo_from_raw0.ok_or_else(|| Error::Pose {
+            path,
+            line: 1,
+            field: "pose".into(),
+            problem: "the file is empty".into(),
+        })?;
+        Ok(self.cam_from_raw0 * velo_from_raw0.inverse())
+    }
+}
+
+/// The unit's axes (x forward, y right, z down) from the vehicle's (x forward, y left, z up): half a turn about x.
+fn pose_from_vehicle() -> Se3 {
+    Se3::from_axis_angle(Vector3::x() * PI, Vector3::zeros())
+}
+
+/// The name of a camera's folder, and of its line in the files.
+fn image_name(camera: Camera) -> String {
+    format!("image_0{}", camera.number() - 2)
+}

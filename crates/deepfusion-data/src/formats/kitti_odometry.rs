@@ -1,0 +1,265 @@
+//! KITTI's odometry benchmark: `sequences/<nn>/{image_2,image_3,image_0,image_1,velodyne,calib.txt,times.txt}`, and
+//! `poses/<nn>.txt` of the first eleven sequences.
+//!
+//! A pose is where rectified camera 0 was, in the axes of its first place. There are no speeds: they are the poses' slopes. Nor is it
+//! said where the cameras are on the car, which is KITTI raw's.
+
+use super::files::{both_names, folders, name_of};
+use super::kitti::{Fields, cam_from_cam0, numbered_files, optional};
+use super::plain::{PlainParts, open_each};
+use super::pose_track::{cam_from_vehicle, speed_log};
+use super::poses::read_poses;
+use crate::dataset_toml::FolderConfig;
+use crate::logs::clock::TimeUnit;
+use crate::logs::frame_times::TimedImage;
+use crate::truth::measured::{MeasuredDepth, velodyne};
+use crate::{
+    Camera, CameraCalibration, Dataset, DatasetKind, Error, OpenOptions, Result, image_size,
+};
+use deepfusion_geometry::{Distortion, Intrinsics, Se3};
+use nalgebra::Matrix3x4;
+use std::path::{Path, PathBuf};
+
+const CALIBRATION: &str = "calib.txt";
+const TIMES: &str = "times.txt";
+const IMAGES: [&str; 3] = ["jpeg", "jpg", "png"];
+/// The unit above KITTI's rear axle in rectified camera 0, in metres: R_rect_00 · (cam0_from_velo · velo_from_imu) by KITTI raw's
+/// calibration of 2011_09_26.
+const VEHICLE_IN_CAM0: [f64; 3] = [-0.314, 0.719, -1.089];
+const MOUNT: &str = "KITTI odometry does not say where the cameras are on the car: their place is taken from KITTI raw's calibration, \
+     their direction from the way the car goes";
+
+/// The sequences at a path: the folder itself, those in `sequences`, or those in it.
+pub(crate) fn find(path: &Path) -> Result<Vec<PathBuf>> {
+    for folder in both_names(path)? {
+        let found = find_named(folder)?;
+        if !found.is_empty() {
+            return Ok(found);
+        }
+    }
+    Ok(Vec::new())
+}
+
+fn find_named(folder: PathBuf) -> Result<Vec<PathBuf>> {
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    if is_sequence(&folder) {
+        return Ok(vec![folder]);
+    }
+    let inner = folder.join("sequences");
+    let place = if inner.is_dir() { inner } else { folder };
+    let mut found = folders(&place)?;
+    found.retain(|folder| is_sequence(folder));
+    Ok(found)
+}
+
+/// A folder that says itself what it is (`dataset.toml`) is none: `times.txt` is an image folder's list of times, too.
+fn is_sequence(folder: &Path) -> bool {
+    if folder.join(FolderConfig::NAME).is_file() {
+        return false;
+    }
+    let tables = [CALIBRATION, TIMES].map(|name| folder.join(name).is_file());
+    let images = (0..4).any(|n| folder.join(format!("image_{n}")).is_dir());
+    tables == [true, true] || (images && tables != [false, false])
+}
+
+/// Opens the cameras of the sequences found at `path`, a data set each.
+pub(crate) fn open(
+    path: &Path,
+    sequences: &[PathBuf],
+    options: &OpenOptions,
+) -> Result<Vec<Dataset>> {
+    let cameras = options.camera.cameras();
+    let mut found = Vec::new();
+    for folder in sequences {
+        for &camera in cameras {
+            found.extend(Sequence::of(folder, camera)?);
+        }
+    }
+    if found.is_empty() {
+        let camera = cameras[0].number();
+        let folder = sequences.first().map_or(path, PathBuf::as_path);
+        return Err(Error::NoImages {
+            path: folder.join(format!("image_{camera}")),
+            camera,
+        });
+    }
+    open_each(path, found, options, |sequence| sequence.open(options))
+}
+
+/// One camera of a sequence.
+struct Sequence<'a> {
+    folder: &'a Path,
+    camera: Camera,
+    /// KITTI's number: 2 or 3, or 0 or 1 where there is grey alone.
+    number: u8,
+    /// Never empty.
+    images: Vec<(u64, PathBuf)>,
+}
+
+impl<'a> Sequence<'a> {
+    /// The colour camera's images, else those of the grey one on its side; `None` without either.
+    fn of(folder: &'a Path, camera: Camera) -> Result<Option<Self>> {
+        let colour = camera.number();
+        for number in [colour, colour - 2] {
+            let place = folder.join(format!("image_{number}"));
+            if !place.is_dir() {
+                continue;
+            }
+            let images = numbered_files(&place, &IMAGES)?;
+            if !images.is_empty() {
+                return Ok(Some(Self {
+                    folder,
+                    camera,
+                    number,
+                    images,
+                }));
+            }
+        }
+        Ok(None)
+    }
+
+    fn open(self, options: &OpenOptions) -> Result<Dataset> {
+        let size = image_size(&self.images[0].1)?;
+        let path = self.folder.join(CALIBRATION);
+        let fields = Fields::read(&path)?.ok_or_else(|| Error::Missing {
+            path: path.clone(),
+            what: "the cameras' projections P0 to P3",
+            remedy: "put the sequence's calibration there (data_odometry_calib.zip)",
+        })?;
+        let field = format!("P{}", self.number);
+        let projection = Matrix3x4::from_row_slice(&fields.numbers::<12>(&field)?);
+        let intrinsics = fields.camera(&field, &projection, size)?;
+        let cam_from_cam0 = cam_from_cam0(&intrinsics, &projection);
+        let times = optional(read_times(&self.folder.join(TIMES)))?;
+        let time = |number: u64| match &times {
+            None => Ok(None),
+            Some(times) => usize::try_from(number)
+                .ok()
+                .and_then(|i| times.get(i).copied())
+                .map(Some)
+                .ok_or_else(|| Error::NoTimeStamp {
+                    path: self.folder.join(TIMES),
+                    lines: times.len(),
+                    frame: number,
+                }),
+        };
+        let poses_file = poses_of(self.folder);
+        let poses = match &poses_file {
+            Some(file) => read_poses(file, false, 12)?,
+            None => Vec::new(),
+        };
+        let world_from_cam0: Vec<Se3> = poses.iter().map(|(_, pose)| *pose).collect();
+        let cam0_from_vehicle = cam_from_vehicle(&world_from_cam0, VEHICLE_IN_CAM0.into());
+        let has_poses = poses_file.is_some();
+        let mut timed = Vec::with_capacity(poses.len());
+        for (number, pose) in &poses {
+            let pose = *pose * cam0_from_vehicle;
+            timed.extend(time(*number)?.map(|ns| (ns, pose)));
+        }
+        let truth = self.scans(&fields, &intrinsics, &cam_from_cam0)?;
+        let mut images = Vec::with_capacity(self.images.len());
+        for (number, path) in self.images {
+            let ns = time(number)?;
+            images.push(TimedImage { number, path, ns });
+        }
+        let cam0_from_cam = cam_from_cam0.inverse();
+        let speeds = poses_file
+            .filter(|_| !timed.is_empty())
+            .map(|file| speed_log(&file, &timed));
+        PlainParts {
+            kind: DatasetKind::KittiOdometry,
+            folder: self.folder.to_owned(),
+            name: name_of(self.folder),
+            images,
+            video: None,
+            calibration: CameraCalibration {
+                intrinsics,
+                distortion: Distortion::default(),
+                size_in_file: false,
+                assumed: false,
+                path,
+            },
+            camera_ahead_s: options.camera_ahead_s.unwrap_or(0.0),
+            image_size: size,
+            remarks: speeds.iter().map(|_| MOUNT.to_owned()).collect(),
+            speeds,
+            cam_from_vehicle: cam_from_cam0 * cam0_from_vehicle,
+            camera: self.camera,
+            truth,
+            world_from_cam: poses
+                .into_iter()
+                .map(|(number, pose)| (number, pose * cam0_from_cam))
+                .collect(),
+            streams: Vec::new(),
+            speed_remedy: if times.is_none() && has_poses {
+                "speeds come from poses and times.txt: put the sequence's times there (data_odometry_calib.zip)"
+            } else { "speeds come from poses/<sequence>.txt, which KITTI publishes of sequences 00 to 10: train on those; \
+                 evaluation and prediction need none"
+            },
+        }
+        .into_dataset()
+    }
+
+    /// The scans of its frames.
+    ///
+    /// # Errors
+    /// [`Error::Calibration`] where there are some and nothing says where the scanner is.
+    fn scans(
+        &self,
+        fields: &Fields,
+        camera: &Intrinsics,
+        cam_from_cam0: &Se3,
+    ) -> Result<Option<MeasuredDepth>> {
+        let place = self.folder.join("velodyne");
+        if !place.is_dir() {
+            return Ok(None);
+        }
+        velodyne("velodyne", &place, &self.images, camera, || {
+            Ok(*cam_from_cam0 * fields.motion("Tr")?)
+        })
+    }
+}
+
+/// The poses of a sequence, where they are published.
+fn poses_of(folder: &Path) -> Option<PathBuf> {
+    let root = folder.parent()?.parent()?;
+    let file = root.join("poses").join(format!("{}.txt", name_of(folder)));
+    file.is_file().then_some(file)
+}
+
+/// The times of a sequence's frames in nanoseconds, a line each in seconds.
+///
+/// # Errors
+/// [`Error::Missing`]; [`Error::TimeStamp`] with the number of a line that is none, or not after the one above.
+fn read_times(path: &Path) -> Result<Vec<i64>> {
+    let bytes = std::fs::read(path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => Error::Missing {
+            path: path.to_owned(),
+            what: "the time of every frame",
+            remedy: "put the sequence's times there (data_odometry_calib.zip)",
+        },
+        _ => Error::file(path, e),
+    })?;
+    let mut times = Vec::new();
+    for (i, line) in String::from_utf8_lossy(&bytes)
+        .trim_end()
+        .lines()
+        .enumerate()
+    {
+        let shown: String = line.trim().chars().take(60).collect();
+        let bad = |problem: String| Error::TimeStamp {
+            path: path.to_owned(),
+            line: i + 1,
+            problem,
+        };
+        let ns = TimeUnit::Seconds.nanoseconds(line);
+        let ns = ns.ok_or_else(|| bad(format!("'{shown}' is not a time in seconds")))?;
+        if times.last().is_some_and(|last| ns <= *last) {
+            return Err(bad(format!("'{shown}' is not after the line above")));
+        }
+        times.push(ns);
+    }
+    Ok(times)
+}

@@ -1,0 +1,204 @@
+//! nuScenes: tables of JSON in `v1.0-mini` (`-trainval`, `-test`), files in `samples` and `sweeps` beside it.
+//!
+//! A scene is a data set of the front camera's images, keyframes and sweeps by time. Every recording of every sensor has the vehicle's pose
+//! at its time, so that a scan is brought to the time of an image, and speed and yaw rate are the slopes of the camera's and the LiDAR's poses.
+
+mod rows;
+mod tables;
+
+use self::tables::{CALIBRATED_SENSOR, CAMERA, LIDAR, SAMPLE_DATA, Scene, Taken, read_scenes};
+use super::files::{folders, name_of};
+use super::plain::{PlainParts, open_each};
+use super::pose_track::speed_log;
+use crate::logs::frame_times::{TimedImage, numbers_by_time};
+use crate::truth::measured::{MeasuredDepth, PlacedScan, Scans};
+use crate::{
+    Camera, CameraCalibration, Dataset, DatasetKind, Error, OpenOptions, Result, image_size,
+};
+use deepfusion_geometry::cloud::PointCloud;
+use deepfusion_geometry::{Intrinsics, Se3};
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
+use std::path::{Path, PathBuf};
+
+/// An image is taken while the scanner passes it; the scan ends, and gets its time, up to a turn (50 ms) and what its times spread later.
+const SCAN_WITHIN_NS: i64 = 60_000_000;
+
+/// A folder of tables and the files they name.
+#[derive(Debug)]
+pub(crate) struct Place {
+    root: PathBuf,
+    tables: PathBuf,
+}
+
+/// The data set at a path: its root, or the folder of its tables.
+///
+/// # Errors
+/// [`Error::NoSuchPath`], [`Error::File`]; [`Error::SeveralVersions`] for a root with several folders of tables.
+pub(crate) fn find(path: &Path) -> Result<Option<Place>> {
+    let folder = path.canonicalize().map_err(|e| Error::file(path, e))?;
+    if !folder.is_dir() {
+        return Ok(None);
+    }
+    if has_tables(&folder) {
+        let root = folder.parent().unwrap_or(&folder).to_owned();
+        return Ok(Some(Place {
+            root,
+            tables: folder,
+        }));
+    }
+    let mut versions = folders(&folder)?;
+    versions.retain(|version| name_of(version).starts_with("v1.") && has_tables(version));
+    if versions.len() > 1 {
+        return Err(Error::SeveralVersions {
+            path: path.to_owned(),
+            versions: versions.iter().map(|v| name_of(v)).collect(),
+        });
+    }
+    Ok(versions.pop().map(|tables| Place {
+        root: folder,
+        tables,
+    }))
+}
+
+fn has_tables(folder: &Path) -> bool {
+    folder.join(SAMPLE_DATA).is_file()
+}
+
+/// Opens the scenes of which there are images, a data set each.
+pub(crate) fn open(path: &Path, place: &Place, options: &OpenOptions) -> Result<Vec<Dataset>> {
+    let scenes = read_scenes(&place.tables)?;
+    let all = scenes.len();
+    let mut first = None;
+    let mut here = Vec::new();
+    for scene in scenes {
+        first = first.or_else(|| scene.images.first().map(|image| image.file.clone()));
+        let files = scene
+            .images
+            .iter()
+            .map(|image| place.root.join(&image.file));
+        let there: Vec<bool> = files.map(|file| file.is_file()).collect();
+        if there.contains(&true) {
+            here.push((scene, there));
+        }
+    }
+    if here.is_empty() {
+        let named = first.unwrap_or_else(|| format!("samples/{CAMERA}"));
+        return Err(Error::NoFrames {
+            path: place.root.join(named),
+            why: format!(
+                "not there, and no other image of {CAMERA} that {SAMPLE_DATA} names in {all} scenes"
+            ),
+            remedy: "unpack samples and sweeps beside the folder of the tables".into(),
+        });
+    }
+    open_each(path, here, options, |(scene, there)| {
+        place.open(scene, &there, options)
+    })
+}
+
+impl Place {
+    /// `there` says which of the scene's images are; one is.
+    fn open(&self, scene: Scene, there: &[bool], options: &OpenOptions) -> Result<Dataset> {
+        let Scene {
+            name,
+            images,
+            scans,
+        } = scene;
+        let times: Vec<i64> = images.iter().map(|image| image.ns).collect();
+        let numbered = numbers_by_time(&times).into_iter().zip(&images);
+        let here = numbered.zip(there).filter(|(_, there)| **there);
+        let here: Vec<(u64, &Taken)> = here.map(|(image, _)| image).collect();
+        let mut remarks = Vec::new();
+        let lost = images.len() - here.len();
+        if lost > 0 {
+            let gone = images.iter().zip(there).find(|(_, there)| !**there);
+            remarks.push(format!(
+                "{lost} of {} images are not there, such as {}",
+                images.len(),
+                gone.map_or("", |(image, _)| &image.file)
+            ));
+        }
+        let calibrations = self.tables.join(CALIBRATED_SENSOR);
+        let one_camera = images.iter().all(|image| image.sensor == images[0].sensor);
+        let (true, Some((_, first))) = (one_camera, here.first()) else {
+            return Err(Error::CameraFile {
+                path: calibrations,
+                problem: format!("{name}: its images have several calibrations of {CAMERA}"),
+                remedy: "a scene has one camera: leave it out".into(),
+            });
+        };
+        let size = image_size(&self.root.join(&first.file))?;
+        let pinhole = first.sensor.pinhole.unwrap_or([f64::NAN; 4]);
+        let calibration = CameraCalibration::given(pinhole, size, &calibrations)?;
+        let vehicle_from_cam = first.sensor.vehicle_from_sensor;
+        let poses = images.iter().chain(&scans);
+        let mut poses: Vec<(i64, Se3)> = poses.map(|t| (t.ns, t.world_from_vehicle)).collect();
+        poses.sort_by_key(|(ns, _)| *ns);
+        let speeds = speed_log(&self.tables.join("ego_pose.json"), &poses);
+        let truth = self.truth(&here, &scans, &calibration.intrinsics);
+        let image = |(number, taken): &(u64, &Taken)| TimedImage {
+            number: *number,
+            path: self.root.join(&taken.file),
+            ns: Some(taken.ns),
+        };
+        PlainParts {
+            kind: DatasetKind::NuScenes,
+            folder: self.root.clone(),
+            name,
+            images: here.iter().map(image).collect(),
+            video: None,
+            calibration,
+            camera_ahead_s: options.camera_ahead_s.unwrap_or(0.0),
+            image_size: size,
+            speeds: Some(speeds),
+            cam_from_vehicle: vehicle_from_cam.inverse(),
+            camera: Camera::Left,
+            truth,
+            world_from_cam: here
+                .iter()
+                .map(|(number, taken)| (*number, taken.world_from_vehicle * vehicle_from_cam))
+                .collect(),
+            streams: Vec::new(),
+            remarks,
+            speed_remedy: "",
+        }
+        .into_dataset()
+    }
+
+    /// The scan of each image: the first that ended after it, in the place that the vehicle had when the image was taken.
+    fn truth(
+        &self,
+        images: &[(u64, &Taken)],
+        scans: &[Taken],
+        camera: &Intrinsics,
+    ) -> Option<MeasuredDepth> {
+        // The reader's axes (x forward, y left) to the LiDAR's (x right, y forward).
+        let lidar_from_scan =
+            Se3::from_axis_angle(Vector3::new(0.0, 0.0, FRAC_PI_2), Vector3::zeros());
+        let mut files = BTreeMap::new();
+        let mut times_s = Vec::new();
+        for (number, image) in images {
+            let scan = scans.get(scans.partition_point(|scan| scan.ns < image.ns));
+            let scan = scan.filter(|scan| scan.ns - image.ns <= SCAN_WITHIN_NS);
+            let Some((scan, file)) = scan.map(|scan| (scan, self.root.join(&scan.file))) else {
+                continue;
+            };
+            if !file.is_file() {
+                continue;
+            }
+            let world_from_cam = image.world_from_vehicle * image.sensor.vehicle_from_sensor;
+            let world_from_lidar = scan.world_from_vehicle * scan.sensor.vehicle_from_sensor;
+            let cam_from_scan = world_from_cam.inverse() * world_from_lidar * lidar_from_scan;
+            files.insert(*number, PlacedScan::new(file, camera, &cam_from_scan));
+            times_s.push(scan.ns as f64 * 1e-9);
+        }
+        (!files.is_empty()).then_some(MeasuredDepth::Scans(Scans {
+            name: LIDAR,
+            read: PointCloud::read_nuscenes_bin,
+            files,
+            times_s,
+        }))
+    }
+}

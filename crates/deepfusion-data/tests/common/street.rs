@@ -1,0 +1,178 @@
+//! A small drive of the simulator, whose motion, camera and depth are known, for tests that write it in another layout.
+
+use deepfusion_data::{Dataset, Error, GtKind, OpenOptions};
+use deepfusion_geometry::Se3;
+use deepfusion_sim::{SimConfig, Simulation};
+use nalgebra::Vector3;
+use std::fs;
+use std::path::Path;
+
+/// A street of some frames, 320×96.
+pub(crate) fn street(frames: usize, fps: f64) -> Simulation {
+    let config = SimConfig {
+        seed: 12,
+        frames,
+        width: 320,
+        height: 96,
+        moving_cars: 0,
+        scan_step_deg: 0.5,
+        fps,
+        ..SimConfig::default()
+    };
+    Simulation::new(&config).unwrap()
+}
+
+/// What lies at a path, as it is opened by default.
+pub(crate) fn open(path: &Path) -> Result<Vec<Dataset>, Error> {
+    Dataset::open(path, &OpenOptions::default())
+}
+
+/// Writes a file, its folders too.
+pub(crate) fn write(path: &Path, bytes: impl AsRef<[u8]>) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    fs::write(path, bytes).unwrap();
+}
+
+/// Writes the picture of a frame as a PNG.
+pub(crate) fn write_picture(street: &Simulation, frame: usize, path: &Path) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    street.frame(frame).rgb.save(path).unwrap();
+}
+
+/// Writes a scan as KITTI does.
+pub(crate) fn write_scan(street: &Simulation, frame: usize, path: &Path) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    let cloud = street.velodyne(frame);
+    cloud
+        .write_kitti_bin(fs::File::create(path).unwrap())
+        .unwrap();
+}
+
+/// Numbers as KITTI prints them.
+pub(crate) fn numbers(values: impl IntoIterator<Item = f64>) -> String {
+    let words: Vec<String> = values.into_iter().map(|v| format!("{v:.12e}")).collect();
+    words.join(" ")
+}
+
+/// The upper three rows of a motion's matrix.
+pub(crate) fn rows(pose: &Se3) -> Vec<f64> {
+    let matrix = pose.matrix();
+    (0..12).map(|i| matrix[(i / 4, i % 4)]).collect()
+}
+
+/// The camera against the simulator's, to the digits that the files have.
+pub(crate) fn check_intrinsics(dataset: &Dataset, street: &Simulation) {
+    let (read, exact) = (dataset.intrinsics(0).matrix(), street.intrinsics().matrix());
+    assert!((read - exact).amax() < 1e-9, "{read} not {exact}");
+}
+
+/// The camera's place on the unit against the simulator's.
+pub(crate) fn check_mount(dataset: &Dataset, street: &Simulation) {
+    let off = dataset.cam_from_vehicle().unwrap().inverse() * street.rig().cam_from_imu();
+    assert!(
+        off.angle() < 1e-9 && off.translation().norm() < 1e-9,
+        "{off:?}"
+    );
+}
+
+/// The frames' motion as a data set has it against the simulator's; `frame_of` is the simulator's number of a frame's index. Speeds
+/// are the unit's over the rear axle.
+///
+/// At 10 Hz the car's acceleration changes by up to some m/s³: a central difference is then off by jerk · (0.1 s)² / 6, below a
+/// centimetre a second, and as much again for the bounce that the speed does not see. The arc knows no bounce (1.5 cm within a second or so, 1 cm a frame) and no slip.
+pub(crate) fn check_motion(
+    dataset: &Dataset,
+    street: &Simulation,
+    frame_of: impl Fn(usize) -> usize,
+) {
+    let frames = dataset.frames();
+    let inner = 1..frames.len() - 1;
+    for i in inner.clone() {
+        let exact = street.oxts(frame_of(i)).forward_speed();
+        let speed = frames[i].speed_mps.unwrap();
+        assert!(
+            (speed - exact).abs() < 0.03,
+            "frame {i}: {speed} not {exact} m/s"
+        );
+        let yaw_rate = heading_rate(street, frame_of(i));
+        let motion = dataset.track().unwrap();
+        let (t0, t1) = (frames[i - 1].time_s.unwrap(), frames[i + 1].time_s.unwrap());
+        let turned = motion.motion(t0, t1).unwrap().yaw_rad / (t1 - t0);
+        assert!(
+            (turned - yaw_rate).abs() < 0.01,
+            "frame {i}: {turned} not {yaw_rate} rad/s"
+        );
+    }
+    let snippets = dataset.snippets(&[1], 0.5).unwrap();
+    assert_eq!(snippets.len(), frames.len() - 1);
+    let (mut way, mut exact_way) = (0.0, 0.0);
+    for snippet in &snippets {
+        let i = snippet.target;
+        let at = |i: usize| street.world_from_cam(frame_of(i));
+        let exact = at(i + 1).inverse() * at(i);
+        let source = &snippet.sources[0];
+        way += source.motion.distance_m;
+        exact_way += exact.translation().norm();
+        let found = source.motion.source_from_target.unwrap();
+        let off = found.inverse() * exact;
+        let (moved, turned) = (off.translation().norm(), off.angle());
+        assert!(
+            moved < 0.03 && turned < 0.003,
+            "pair {i}: {moved} m, {turned} rad"
+        );
+    }
+    assert!(
+        (way / exact_way - 1.0).abs() < 2e-3,
+        "{way} not {exact_way} m"
+    );
+}
+
+/// How fast the unit's heading turns about the vertical between the frames beside one.
+fn heading_rate(street: &Simulation, frame: usize) -> f64 {
+    let heading = |frame: usize| {
+        let ahead = street.world_from_imu(frame).rotate(&Vector3::x());
+        ahead.y.atan2(ahead.x)
+    };
+    let (before, after) = (frame - 1, frame + 1);
+    (heading(after) - heading(before)) / (street.time_s(after) - street.time_s(before))
+}
+
+/// Truth of a frame by the scan against the simulator's exact depth. The scanner sees from another place: at silhouettes a pixel has
+/// the depth of what is behind; its ranges have a noise of 2 cm. So most pixels agree to 2 %, not all.
+pub(crate) fn check_truth(dataset: &Dataset, index: usize, exact: &deepfusion_geometry::DepthMap) {
+    let truth = dataset.ground_truth(index, GtKind::Z).unwrap().unwrap();
+    assert_eq!((truth.width, truth.height), (exact.width, exact.height));
+    let pairs = truth.data.iter().zip(&exact.data);
+    let known: Vec<f32> = pairs
+        .filter(|(scan, exact)| **scan > 0.0 && **exact > 0.0)
+        .map(|(scan, exact)| (scan / exact - 1.0).abs())
+        .collect();
+    let close = known.iter().filter(|off| **off < 0.02).count();
+    assert!(known.len() > 1000, "{} pixels", known.len());
+    let share = close as f64 / known.len() as f64;
+    assert!(share > 0.85, "{share} of {} pixels", known.len());
+}
+
+/// Path against the simulator's, from the first frame's place.
+pub(crate) fn check_path(
+    dataset: &Dataset,
+    street: &Simulation,
+    frame_of: impl Fn(usize) -> usize,
+) {
+    let paths = dataset.camera_paths().unwrap();
+    assert_eq!(paths.len(), 1);
+    let path = &paths[0];
+    assert_eq!(path.frames.len(), dataset.frames().len());
+    assert_eq!(path.times_s.len(), path.frames.len());
+    let first = path.world_from_cam[0].inverse();
+    let exact_first = street.world_from_cam(frame_of(0)).inverse();
+    for (i, pose) in path.world_from_cam.iter().enumerate() {
+        let exact = exact_first * street.world_from_cam(frame_of(i));
+        let off = (first * *pose).inverse() * exact;
+        // The files' twelve digits of places of some hundred metres.
+        assert!(
+            off.translation().norm() < 1e-6 && off.angle() < 1e-6,
+            "{i}: {off:?}"
+        );
+    }
+}

@@ -1,0 +1,233 @@
+//! The offset of the camera's clock, to be applied: as the check `clock` measures it, but an error where it is not sure.
+
+use super::clock::{rates, settled};
+use super::epipolar;
+use super::survey::Survey;
+use deepfusion_data::Dataset;
+use deepfusion_hint::Hint;
+use deepfusion_motion::{NoTimeOffset, OffsetConfig, TimeOffset};
+
+/// Largest standard error of an offset that is applied, in seconds: at 3 m/s² of braking it is 0.15 m/s.
+pub const MOST_STD_ERROR_S: f64 = 0.05;
+/// The same where only a receiver's course shows the turns: smoothing spreads them, and what resampling says of it is too little.
+pub const MOST_TRACK_STD_ERROR_S: f64 = 0.035;
+/// Least correlation of the picture's motion with the vehicle's.
+pub const LEAST_CORRELATION: f64 = 0.3;
+/// How far the clocks may be apart, in seconds: first near, then wide, where more offsets fit by chance.
+const SEARCH_S: [f64; 2] = [1.0, 4.0];
+/// How many times as many pictures are read where only a receiver's course shows the turns.
+const TRACK_SURVEY: usize = 3;
+/// What is slower than this is taken out of the turns of a course, in seconds: smoothing has taken what is faster than two.
+const TRACK_TREND_S: f64 = 15.0;
+/// Drives of one recording agree where they differ by so many standard errors, or so many seconds, at most.
+const SIGMAS: f64 = 4.0;
+const AGREE_S: f64 = 0.02;
+
+/// How far the camera's clock is ahead of the vehicle's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraAhead {
+    /// In seconds, as [`deepfusion_data::OpenOptions::camera_ahead_s`].
+    pub ahead_s: f64,
+    /// Its standard error, in seconds.
+    pub std_error_s: f64,
+    /// The best correlation of the picture's motion with the vehicle's at that offset.
+    pub correlation: f64,
+}
+
+/// Why no offset can be applied.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoCameraAhead {
+    /// Nothing was recorded to compare the pictures with.
+    #[error("{drive}: the clocks cannot be compared: it has no speeds, or its frames no times")]
+    NoSpeeds {
+        /// The drive.
+        drive: String,
+    },
+    /// The pictures do not follow the vehicle.
+    #[error("{drive}: {source}")]
+    NotFound {
+        /// The drive.
+        drive: String,
+        /// Why not.
+        source: NoTimeOffset,
+    },
+    /// The pictures follow the vehicle too loosely.
+    #[error(
+        "{drive}: the pictures follow the vehicle best {ahead_s:+.2} s off, with a correlation of {correlation:.2}; at least {LEAST_CORRELATION} is \
+         needed"
+    )]
+    Weak {
+        /// The drive.
+        drive: String,
+        /// Best offset, in seconds.
+        ahead_s: f64,
+        /// The correlation there.
+        correlation: f64,
+    },
+    /// The offset is not known well enough.
+    #[error(
+        "{drive}: the clocks are {ahead_s:+.2} ± {std_error_s:.3} s apart; a standard error of at most {most_s} s is needed"
+    )]
+    Unsure {
+        /// The drive.
+        drive: String,
+        /// The offset, in seconds.
+        ahead_s: f64,
+        /// Its standard error, in seconds.
+        std_error_s: f64,
+        /// The largest that is applied.
+        most_s: f64,
+    },
+    /// Drives whose clocks are differently far apart.
+    #[error(
+        "the clocks of {} are {:+.3} ± {:.3} s apart, those of {} {:+.3} ± {:.3} s", first.0, first.1, first.2, other.0, other.1, other.2
+    )]
+    Differ {
+        /// A drive, its offset and standard error in seconds.
+        first: (String, f64, f64),
+        /// Another one.
+        other: (String, f64, f64),
+    },
+    /// No drive.
+    #[error("no recording to compare clocks of")]
+    Nothing,
+}
+
+impl Hint for NoCameraAhead {
+    fn hint(&self) -> Option<String> {
+        Some(match self {
+            Self::NoSpeeds { .. } => "give a recording with speeds and times, or the offset in milliseconds".into(),
+            Self::NotFound { source, .. } => {
+                let own = source.hint().map(|hint| hint + ", or ");
+                own.unwrap_or_default() + "give the offset in milliseconds"
+            }
+            Self::Weak { .. } | Self::Unsure { .. } => {
+                "use a longer drive with more bends, or a log with a gyroscope; or give the offset in milliseconds".into()
+            }
+            Self::Differ { .. } => {
+                "write clock.camera_ahead_s beside each recording (dataset.toml), or give them one by one".into()
+            }
+            Self::Nothing => "name a recording".into(),
+        })
+    }
+}
+
+/// Measures how far the camera's clock is ahead of the vehicle's: by the turns of an inertial unit or a yaw rate, else of a receiver's
+/// course, and by changes of speed. A few hundred pictures are read.
+///
+/// # Errors
+/// Why it is not known well enough to be applied.
+pub fn camera_ahead(dataset: &Dataset) -> Result<CameraAhead, NoCameraAhead> {
+    let drive = || dataset.name().to_owned();
+    let turning = dataset.turning_as_its_course();
+    let by_course = turning.is_some();
+    let dataset = turning.as_ref().unwrap_or(dataset);
+    let timed = dataset.frames().iter().any(|frame| frame.time_s.is_some());
+    let rates = rates(dataset)
+        .filter(|_| timed)
+        .ok_or_else(|| NoCameraAhead::NoSpeeds { drive: drive() })?;
+    // The turns of a course are spread over time: it takes more of them.
+    let survey = if by_course {
+        Survey::times(dataset, TRACK_SURVEY)
+    } else {
+        Survey::of(dataset)
+    };
+    let pairs = epipolar::pairs(&survey);
+    let measure = |search_s: f64| {
+        let config = OffsetConfig {
+            search_s,
+            trend_s: if by_course {
+                TRACK_TREND_S
+            } else {
+                OffsetConfig::default().trend_s
+            },
+        };
+        settled(&survey, &pairs, &rates, &config)
+    };
+    let mut found = measure(SEARCH_S[0]);
+    for search_s in &SEARCH_S[1..] {
+        if matches!(found, Err(NoTimeOffset::NoPeak { .. })) {
+            found = measure(*search_s);
+        }
+    }
+    let offset = found.map_err(|source| NoCameraAhead::NotFound {
+        drive: drive(),
+        source,
+    })?;
+    let ahead = CameraAhead {
+        ahead_s: dataset.camera_ahead_s() - offset.vehicle_minus_camera_s,
+        std_error_s: offset.std_error_s,
+        correlation: correlation(&offset),
+    };
+    if ahead.correlation < LEAST_CORRELATION {
+        return Err(NoCameraAhead::Weak {
+            drive: drive(),
+            ahead_s: ahead.ahead_s,
+            correlation: ahead.correlation,
+        });
+    }
+    let most_s = if by_course {
+        MOST_TRACK_STD_ERROR_S
+    } else {
+        MOST_STD_ERROR_S
+    };
+    if ahead.std_error_s.is_nan() || ahead.std_error_s > most_s {
+        return Err(NoCameraAhead::Unsure {
+            drive: drive(),
+            most_s,
+            ahead_s: ahead.ahead_s,
+            std_error_s: ahead.std_error_s,
+        });
+    }
+    Ok(ahead)
+}
+
+/// The best of the correlations.
+fn correlation(offset: &TimeOffset) -> f64 {
+    let all = [
+        offset.yaw_correlation,
+        offset.pitch_correlation,
+        offset.roll_correlation,
+        offset.speed_correlation,
+    ];
+    all.into_iter().flatten().fold(0.0, f64::max)
+}
+
+/// [`camera_ahead`] of drives that were recorded by one setup: the mean, weighted by the inverse squares of the standard errors.
+///
+/// # Errors
+/// As [`camera_ahead`], where no drive shows it; [`NoCameraAhead::Differ`] where two drives contradict each other.
+pub fn common_camera_ahead<'a>(
+    datasets: impl IntoIterator<Item = &'a Dataset>,
+) -> Result<CameraAhead, NoCameraAhead> {
+    let mut found: Vec<(String, CameraAhead)> = Vec::new();
+    let mut problem = NoCameraAhead::Nothing;
+    for dataset in datasets {
+        match camera_ahead(dataset) {
+            Ok(ahead) => found.push((dataset.name().to_owned(), ahead)),
+            Err(why) => problem = why,
+        }
+    }
+    let Some((name, first)) = found.first() else {
+        return Err(problem);
+    };
+    for (other, ahead) in &found[1..] {
+        let most = SIGMAS * first.std_error_s.hypot(ahead.std_error_s);
+        if (ahead.ahead_s - first.ahead_s).abs() > most.max(AGREE_S) {
+            return Err(NoCameraAhead::Differ {
+                first: (name.clone(), first.ahead_s, first.std_error_s),
+                other: (other.clone(), ahead.ahead_s, ahead.std_error_s),
+            });
+        }
+    }
+    let weight = |ahead: &CameraAhead| ahead.std_error_s.max(1e-3).powi(-2);
+    let all = || found.iter().map(|(_, ahead)| ahead);
+    let sum: f64 = all().map(weight).sum();
+    let mean: f64 = all().map(|a| weight(a) * a.ahead_s).sum::<f64>() / sum;
+    Ok(CameraAhead {
+        ahead_s: mean,
+        std_error_s: sum.sqrt().recip(),
+        correlation: all().map(|a| a.correlation).fold(f64::INFINITY, f64::min),
+    })
+}

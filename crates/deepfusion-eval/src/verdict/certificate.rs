@@ -1,0 +1,223 @@
+//! The scale certificate: the bias of the metre, and how sure it is.
+
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::{SplitMix64, median};
+
+/// A metre is trusted where its whole interval is within this share of 1, either way.
+pub const TOLERANCE: f64 = 0.1;
+/// Fewest blocks that say how much they differ.
+const LEAST_BLOCKS: usize = 5;
+/// Resamples of the bootstrap, and its seed.
+const RESAMPLES: usize = 4000;
+const SEED: u64 = 7;
+
+/// What one block of a drive, some tens of metres of road, says of the scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BlockScale {
+    /// Median over its scene points of ln(depth by the scene's movement / depth predicted).
+    pub log_scale: f64,
+    /// The same of the nearer half of the points less that of the farther half.
+    pub near_less_far: f64,
+    /// Scene points.
+    pub points: usize,
+}
+
+/// A part of the interval's width.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ErrorSource {
+    /// `blocks`: how much parts of the drives differ, by bootstrap. `ranges`: near and far depth want different factors. `speed`: what the
+    /// vehicle's speed itself may be off by, as given.
+    pub name: SourceName,
+    /// Standard error of the bias.
+    pub sd: f64,
+}
+
+/// See [`ErrorSource::name`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SourceName {
+    /// Differences among blocks.
+    Blocks,
+    /// Differences among ranges.
+    Ranges,
+    /// The speed's own error.
+    Speed,
+}
+
+/// Whether the metre can be trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ScaleVerdict {
+    /// The whole interval is within [`TOLERANCE`] of 1.
+    Trusted,
+    /// It reaches over the edge of it, or there is no interval.
+    Open,
+    /// The whole interval is outside.
+    Wrong,
+}
+
+/// The bias of the metre, without ground truth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ScaleCertificate {
+    /// What depth is to be multiplied by: comparable with `scale.median` of an evaluation with ground truth.
+    pub scale: f64,
+    /// Its 95 % interval.
+    pub scale_ci95: Option<[f64; 2]>,
+    /// ln(depth predicted / depth by the scene's movement), the median over blocks: positive where things are seen too far away, as `scale.bias` is.
+    pub bias: f64,
+    /// Its 95 % interval, from all `sources`; `None` below five blocks.
+    pub ci95: Option<[f64; 2]>,
+    /// The same if the speed were exact.
+    pub ci95_given_speed: Option<[f64; 2]>,
+    /// Blocks.
+    pub blocks: usize,
+    /// Scene points of all blocks.
+    pub points: usize,
+    /// What makes the interval as wide as it is.
+    pub sources: Vec<ErrorSource>,
+    /// Whether the metre can be trusted.
+    pub verdict: ScaleVerdict,
+}
+
+impl ScaleCertificate {
+    /// From blocks that training did not see; `speed_sd` is the standard error of the vehicle's speed as a share of it. `None` of no blocks.
+    #[must_use]
+    pub fn of(blocks: &[BlockScale], speed_sd: f64) -> Option<Self> {
+        let scales: Vec<f64> = blocks.iter().map(|b| b.log_scale).collect();
+        let log_scale = median(&scales)?;
+        let n = blocks.len();
+        let enough = n >= LEAST_BLOCKS;
+        let of_blocks = enough.then(|| bootstrap_median_sd(&scales));
+        let differences: Vec<f64> = blocks.iter().map(|b| b.near_less_far).collect();
+        // Which part of the depth an error is asked for is open: a scale of the whole may lie anywhere between the two.
+        let of_ranges = median(&differences).unwrap_or(0.0).abs() / 12.0_f64.sqrt();
+        let mut sources = Vec::new();
+        let named = |name, sd| ErrorSource { name, sd };
+        sources.extend(of_blocks.map(|sd| named(SourceName::Blocks, sd)));
+        sources.push(named(SourceName::Ranges, of_ranges));
+        sources.push(named(SourceName::Speed, speed_sd));
+        let bias = -log_scale;
+        let interval = |others: f64| {
+            // Few blocks know their own spread badly: Student's t for the part that is estimated from them.
+            let wide = (t_975(n - 1) * of_blocks?).hypot(1.96 * others);
+            Some([bias - wide, bias + wide])
+        };
+        let ci95 = interval(of_ranges.hypot(speed_sd));
+        Some(Self {
+            scale: log_scale.exp(),
+            scale_ci95: ci95.map(|[low, high]| [(-high).exp(), (-low).exp()]),
+            bias,
+            ci95,
+            ci95_given_speed: interval(of_ranges),
+            blocks: n,
+            points: blocks.iter().map(|b| b.points).sum(),
+            sources,
+            verdict: judge(ci95),
+        })
+    }
+}
+
+fn judge(ci95: Option<[f64; 2]>) -> ScaleVerdict {
+    let tolerance = TOLERANCE.ln_1p();
+    match ci95 {
+        Some([low, high]) if low >= -tolerance && high <= tolerance => ScaleVerdict::Trusted,
+        Some([low, high]) if low > tolerance || high < -tolerance => ScaleVerdict::Wrong,
+        _ => ScaleVerdict::Open,
+    }
+}
+
+/// The standard deviation of the median over resamples with replacement.
+fn bootstrap_median_sd(values: &[f64]) -> f64 {
+    let mut random = SplitMix64(SEED);
+    let mut sample = vec![0.0; values.len()];
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for _ in 0..RESAMPLES {
+        for value in &mut sample {
+            *value = values[random.below(values.len())];
+        }
+        let middle = median(&sample).unwrap_or(f64::NAN);
+        sum += middle;
+        squares += middle * middle;
+    }
+    let mean = sum / RESAMPLES as f64;
+    (squares / RESAMPLES as f64 - mean * mean).max(0.0).sqrt()
+}
+
+/// The 97.5 % quantile of Student's t (Fisher and Cornish's expansion about the normal one, within 1 % from 3 degrees of freedom on).
+fn t_975(freedom: usize) -> f64 {
+    let f = freedom.max(1) as f64;
+    1.959_964 + 2.372_3 / f + 2.822_5 / f.powi(2) + 2.555_9 / f.powi(3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blocks(scales: &[f64]) -> Vec<BlockScale> {
+        let block = |log_scale: &f64| BlockScale {
+            log_scale: *log_scale,
+            near_less_far: 0.0,
+            points: 100,
+        };
+        scales.iter().map(block).collect()
+    }
+
+    #[test]
+    fn students_t_is_that_of_the_tables() {
+        for (freedom, table) in [(3, 3.182), (5, 2.571), (9, 2.262), (30, 2.042)] {
+            assert!((t_975(freedom) / table - 1.0).abs() < 0.01, "{freedom}");
+        }
+    }
+
+    #[test]
+    fn the_interval_holds_the_truth_as_often_as_it_says() {
+        // Blocks about a known bias; the interval of the statistics alone.
+        let mut random = SplitMix64(5);
+        let mut uniform = || random.below(1 << 30) as f64 / f64::from(1 << 30);
+        let mut normal = || -> f64 { (0..12).map(|_| uniform()).sum::<f64>() - 6.0 };
+        for n in [6, 12, 30] {
+            let (mut held, tries) = (0, 150);
+            for _ in 0..tries {
+                let scales: Vec<f64> = (0..n).map(|_| 0.2 + 0.05 * normal()).collect();
+                let certificate = ScaleCertificate::of(&blocks(&scales), 0.0).unwrap();
+                let [low, high] = certificate.ci95_given_speed.unwrap();
+                held += usize::from(low <= -0.2 && -0.2 <= high);
+            }
+            // 95 % expected; a binomial of 150 is above 90 % and below 100 % nearly always.
+            let share = held as f64 / f64::from(tries);
+            assert!((0.90..=1.0).contains(&share), "{n} blocks: {share}");
+        }
+    }
+
+    #[test]
+    fn a_speed_that_is_not_sure_widens_and_few_blocks_say_nothing() {
+        let scales = [0.01, -0.01, 0.02, 0.0, -0.02, 0.01];
+        let exact = ScaleCertificate::of(&blocks(&scales), 0.0).unwrap();
+        let given = ScaleCertificate::of(&blocks(&scales), 0.03).unwrap();
+        assert_eq!(exact.ci95, exact.ci95_given_speed);
+        assert_eq!(exact.ci95, given.ci95_given_speed);
+        let wide = |c: &ScaleCertificate| c.ci95.map(|[low, high]| high - low).unwrap();
+        assert!(wide(&given) > 2.0 * 1.96 * 0.03);
+        assert_eq!(given.verdict, ScaleVerdict::Trusted);
+        let few = ScaleCertificate::of(&blocks(&scales[..4]), 0.03).unwrap();
+        assert_eq!((few.ci95, few.verdict), (None, ScaleVerdict::Open));
+        assert_eq!(ScaleCertificate::of(&[], 0.03), None);
+    }
+
+    #[test]
+    fn verdicts() {
+        let of = |shift: f64| {
+            let scales: Vec<f64> = (0..9).map(|i| shift + 0.002 * f64::from(i % 3)).collect();
+            ScaleCertificate::of(&blocks(&scales), 0.02).unwrap()
+        };
+        assert_eq!(of(0.0).verdict, ScaleVerdict::Trusted);
+        assert_eq!(of(0.08).verdict, ScaleVerdict::Open);
+        let far = of(0.3);
+        assert_eq!(far.verdict, ScaleVerdict::Wrong);
+        // True depth is larger than what was predicted: seen too near.
+        assert!(far.bias < 0.0 && far.scale > 1.3);
+        let [low, high] = far.scale_ci95.unwrap();
+        assert!(low < far.scale && far.scale < high);
+    }
+}

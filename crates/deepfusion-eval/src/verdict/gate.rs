@@ -1,0 +1,145 @@
+//! Whether a network that was learned on became worse, by what can be known without ground truth.
+
+use serde::{Deserialize, Serialize};
+
+use super::Verdict;
+
+/// A share by which the reprojection error may rise: it is of thousands of pixels and hardly varies.
+const REPROJECTION: f64 = 0.01;
+/// A share and an amount by which disagreements of depths may rise, whichever is more.
+const DISAGREEMENT: (f64, f64) = (0.15, 0.005);
+/// By how much the bias of the metre may grow.
+const BIAS: f64 = 0.02;
+
+/// A check that a network does not pass as well as the one before it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Worse {
+    /// The check.
+    pub check: Check,
+    /// What it gave before.
+    pub before: f64,
+    /// What it gives now.
+    pub after: f64,
+}
+
+/// What is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Check {
+    /// How well the frames explain each other.
+    Reprojection,
+    /// Depth against the frame before.
+    Consistency,
+    /// Depth against the mirrored image.
+    Flip,
+    /// The size of the metre's bias.
+    Scale,
+}
+
+impl Verdict {
+    /// The checks that `after` passes less well than this one, of the same frames; `None` where none of them can be compared.
+    #[must_use]
+    pub fn worse(&self, after: &Self) -> Option<Vec<Worse>> {
+        let checks = [
+            Check::Reprojection,
+            Check::Consistency,
+            Check::Flip,
+            Check::Scale,
+        ];
+        let mut compared = false;
+        let mut worse = Vec::new();
+        for check in checks {
+            let (Some(before), Some(after)) = (self.of(check), after.of(check)) else {
+                continue;
+            };
+            compared = true;
+            // What is no number is worse than any.
+            if after.is_nan() || after > check.most(before) {
+                worse.push(Worse {
+                    check,
+                    before,
+                    after,
+                });
+            }
+        }
+        compared.then_some(worse)
+    }
+
+    /// What a check gives; lower is better.
+    #[must_use]
+    pub fn of(&self, check: Check) -> Option<f64> {
+        let found = &self.without_truth;
+        match check {
+            Check::Reprojection => found.reprojection.map(|r| r.warped),
+            Check::Consistency => found.consistency,
+            Check::Flip => found.flip,
+            Check::Scale => self.scale_certificate.as_ref().map(|c| c.bias.abs()),
+        }
+    }
+}
+
+impl Check {
+    /// The most that is not worse than `before`.
+    fn most(self, before: f64) -> f64 {
+        match self {
+            Self::Reprojection => before * (1.0 + REPROJECTION),
+            Self::Consistency | Self::Flip => {
+                let (share, amount) = DISAGREEMENT;
+                before + (share * before).max(amount)
+            }
+            Self::Scale => before + BIAS,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{BlockScale, Evidence, Reprojection, ScaleCertificate};
+    use super::*;
+
+    fn verdict(warped: f64, flip: f64, log_scale: f64) -> Verdict {
+        let block = BlockScale {
+            log_scale,
+            near_less_far: 0.0,
+            points: 100,
+        };
+        Verdict {
+            scale_certificate: ScaleCertificate::of(&[block; 6], 0.03),
+            no_certificate: None,
+            without_truth: Evidence {
+                reprojection: Some(Reprojection {
+                    warped,
+                    unwarped: 0.2,
+                    pairs: 30,
+                }),
+                flip: Some(flip),
+                ..Evidence::default()
+            },
+        }
+    }
+
+    fn names(worse: Option<Vec<Worse>>) -> Vec<Check> {
+        worse.unwrap().iter().map(|w| w.check).collect()
+    }
+
+    #[test]
+    fn what_became_worse_is_named() {
+        let before = verdict(0.10, 0.03, 0.05);
+        assert_eq!(names(before.worse(&before)), []);
+        assert_eq!(names(before.worse(&verdict(0.09, 0.034, -0.06))), []);
+        assert_eq!(
+            names(before.worse(&verdict(0.11, 0.03, 0.05))),
+            [Check::Reprojection]
+        );
+        assert_eq!(
+            names(before.worse(&verdict(0.08, 0.05, -0.2))),
+            [Check::Flip, Check::Scale]
+        );
+        // What is no number is no better.
+        assert_eq!(
+            names(before.worse(&verdict(f64::NAN, 0.03, 0.05))),
+            [Check::Reprojection]
+        );
+        assert_eq!(before.worse(&Verdict::default()), None);
+    }
+}

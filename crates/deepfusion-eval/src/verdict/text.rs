@@ -1,0 +1,136 @@
+//! The verdict as a person reads it.
+
+use std::fmt;
+
+use super::{
+    Check, Evidence, NoCertificate, ScaleCertificate, ScaleVerdict, SourceName, TOLERANCE, Verdict,
+};
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let frames = self.without_truth.frames;
+        writeln!(f, "without ground truth ({frames} frames)")?;
+        match (&self.scale_certificate, &self.no_certificate) {
+            (Some(certificate), _) => write!(f, "{certificate}")?,
+            (None, Some(why)) => writeln!(f, "  scale           no certificate: {why}")?,
+            (None, None) => {}
+        }
+        write!(f, "{}", self.without_truth)
+    }
+}
+
+impl fmt::Display for Evidence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(r) = &self.reprojection {
+            let share = 100.0 * (1.0 - r.warped / r.unwarped);
+            writeln!(
+                f,
+                "  reprojection    {:.4}, unwarped {:.4} ({share:.0} % explained), {} pairs",
+                r.warped, r.unwarped, r.pairs
+            )?;
+        }
+        if let Some(consistency) = self.consistency {
+            let percent = 100.0 * consistency;
+            writeln!(f, "  frame to frame  depths differ by {percent:.1} %")?;
+        }
+        if let Some(flip) = self.flip {
+            writeln!(
+                f,
+                "  mirrored        depths differ by {:.1} %",
+                100.0 * flip
+            )?;
+        }
+        if !self.ranges.is_empty() {
+            writeln!(f, "\n  predicted depth   points  scale")?;
+            for row in &self.ranges {
+                writeln!(
+                    f,
+                    "  {:>4} to {:>3} m     {:>6}  {:.3}",
+                    row.from_m, row.to_m, row.n, row.scale
+                )?;
+            }
+        }
+        if !self.speeds.is_empty() {
+            writeln!(f, "\n  vehicle's speed   pairs  seen through the depth")?;
+            for row in &self.speeds {
+                let to = row
+                    .to_mps
+                    .map_or("  up".to_owned(), |to| format!("{to:>4}"));
+                writeln!(
+                    f,
+                    "  {:>2} to {to} m/s    {:>5}  × {:.3}",
+                    row.from_mps, row.n, row.ratio
+                )?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for ScaleCertificate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = match (self.verdict, self.ci95) {
+            (ScaleVerdict::Open, None) => "open: too little road for an interval".to_owned(),
+            (verdict, _) => verdict.to_string(),
+        };
+        let between = match self.scale_ci95 {
+            Some([low, high]) => format!(" ({low:.3} to {high:.3}, 95 %)"),
+            None => String::new(),
+        };
+        writeln!(
+            f,
+            "  scale           {:.3}{between}, {verdict}; {} blocks, {} points",
+            self.scale, self.blocks, self.points
+        )?;
+        let sources: Vec<String> = self
+            .sources
+            .iter()
+            .map(|source| format!("{} {:.1} %", source.name, 100.0 * source.sd))
+            .collect();
+        writeln!(f, "  its errors      {} (1 σ)", sources.join(", "))
+    }
+}
+
+impl fmt::Display for ScaleVerdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = 100.0 * TOLERANCE;
+        match self {
+            Self::Trusted => write!(f, "trusted: within {percent:.0} %"),
+            Self::Open => f.write_str("open: the interval is too wide to tell"),
+            Self::Wrong => write!(f, "wrong: off by more than {percent:.0} %"),
+        }
+    }
+}
+
+impl fmt::Display for SourceName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Blocks => "differences along the way",
+            Self::Ranges => "near against far",
+            Self::Speed => "the speed itself, as given",
+        })
+    }
+}
+
+impl fmt::Display for NoCertificate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::MotionUnknown => "the recordings do not tell speed and turns",
+            Self::NoMovement => "the camera hardly moves between the frames",
+            Self::AllSeen => "training saw all of these frames: measure on another drive",
+            Self::SeenNotKnown => "whether training saw these frames is not known",
+            Self::FewPoints => "the scene shows too few points that can be followed",
+        })
+    }
+}
+
+impl fmt::Display for Check {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Reprojection => "reprojection error",
+            Self::Consistency => "depth against the frame before",
+            Self::Flip => "depth against the mirrored image",
+            Self::Scale => "bias of the metre",
+        })
+    }
+}

@@ -1,0 +1,241 @@
+//! One frame, compared with those before it.
+
+use deepfusion_data::{Dataset, RgbImage, grey_image};
+use deepfusion_eval::median;
+use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
+use deepfusion_kernels::{PhotometricShape, photometric_error};
+use deepfusion_motion::{Alignment, DepthImage, GreyImage, GreyPyramid, View, align, scene_points};
+use deepfusion_runtime::DepthEstimator;
+use image::imageops::{crop_imm, flip_horizontal};
+use nalgebra::Vector3;
+
+use super::Target;
+use crate::Result;
+
+/// An alignment that turns by more than this from what was measured, radians, has gone astray: bumps are smaller.
+const ASTRAY_TURN: f64 = 0.05;
+/// The same of the direction that the camera goes in; a camera's mount is often known only roughly.
+const ASTRAY_WAY: f64 = 0.45;
+/// Least share of the textured pixels that must be seen in the frame before.
+const SEEN: f64 = 0.4;
+
+/// What a frame says.
+#[derive(Default)]
+pub(super) struct Looked {
+    /// Scene points: depth as predicted, and the logarithm of the factor that it wants.
+    pub points: Vec<(f64, f64)>,
+    /// ln(way through the depth / way measured).
+    pub log_way: Option<f64>,
+    /// Photometric error of the frame before, warped and as it is.
+    pub reprojection: Option<(f64, f64)>,
+    /// Median of |ln(depth carried over / depth)|.
+    pub consistency: Option<f64>,
+    /// Median of |ln(depth / depth of the mirrored image)|.
+    pub flip: Option<f64>,
+}
+
+/// A frame as the network sees it.
+struct Seen {
+    grey: GreyPyramid,
+    depth: DepthMap,
+    camera: Intrinsics,
+    /// The part of the image that the network saw.
+    window: [u32; 4],
+}
+
+impl Seen {
+    fn size(&self) -> (u32, u32) {
+        (self.depth.width as u32, self.depth.height as u32)
+    }
+
+    fn depth(&self) -> DepthImage<'_> {
+        DepthImage {
+            width: self.depth.width,
+            height: self.depth.height,
+            data: &self.depth.data,
+            intrinsics: self.camera,
+        }
+    }
+}
+
+/// Looks at a frame; `closely` also at what needs further runs of the network.
+pub(super) fn look(
+    estimator: &mut DepthEstimator,
+    dataset: &Dataset,
+    target: &Target,
+    closely: bool,
+    focal_correction: bool,
+) -> Result<Looked> {
+    let image = dataset.load_image(target.frame)?;
+    let seen = see(estimator, dataset, target.frame, &image, focal_correction)?;
+    let mut looked = Looked::default();
+    let mut views: Vec<(GreyPyramid, Se3)> = Vec::new();
+    // How much longer the way is through the depth, from the nearest frame on.
+    let mut factor = 1.0;
+    for (place, (frame, measured)) in target.sources.iter().enumerate() {
+        let before = dataset.load_image(*frame)?;
+        let grey = GreyPyramid::new(grey_like(&before, seen.window, seen.size()));
+        let found = aligned(&seen, &grey, measured, factor);
+        if place == 0 {
+            looked.reprojection = reprojection(&seen, grey.full(), measured);
+            if closely {
+                let motion = found.map_or(*measured, |f| f.source_from_target);
+                let other = see(estimator, dataset, *frame, &before, focal_correction)?;
+                looked.consistency = consistency(&seen, &other.depth, &motion);
+            }
+        }
+        let Some(found) = found else { continue };
+        let (way, measured_way) = (
+            found.source_from_target.translation(),
+            measured.translation().norm(),
+        );
+        factor = way.norm() / measured_way;
+        // The shortest way is the least sure one; a longer one replaces it.
+        looked.log_way = Some(factor.ln());
+        let metric = Se3::from_parts(&found.source_from_target.rotation(), way / factor);
+        views.push((grey, metric));
+    }
+    let views: Vec<View<'_>> = views
+        .iter()
+        .map(|(grey, motion)| View {
+            image: grey.full(),
+            source_from_target: *motion,
+        })
+        .collect();
+    let points = scene_points(seen.grey.full(), &seen.depth(), &views);
+    looked.points = points
+        .iter()
+        .map(|p| (f64::from(p.depth_m), p.log_factor))
+        .collect();
+    if closely {
+        let mirrored = flip_horizontal(&image);
+        let camera = dataset.intrinsics(target.frame).flipped();
+        let other = estimator.predict(&mirrored, Some(&camera), focal_correction, false)?;
+        looked.flip = flip(&seen.depth, &other.network_depth(&camera).0);
+    }
+    Ok(looked)
+}
+
+fn see(
+    estimator: &mut DepthEstimator,
+    dataset: &Dataset,
+    frame: usize,
+    image: &RgbImage,
+    focal_correction: bool,
+) -> Result<Seen> {
+    let camera = dataset.intrinsics(frame);
+    let prediction = estimator.predict(image, Some(&camera), focal_correction, false)?;
+    let window = prediction.window;
+    let (depth, camera) = prediction.network_depth(&camera);
+    let grey = grey_like(image, window, (depth.width as u32, depth.height as u32));
+    Ok(Seen {
+        grey: GreyPyramid::new(grey),
+        depth,
+        camera,
+        window,
+    })
+}
+
+/// Another frame's image, as [`see`] makes it, without its depth.
+fn grey_like(image: &RgbImage, window: [u32; 4], (width, height): (u32, u32)) -> GreyImage {
+    let [x, y, w, h] = window;
+    if [0, 0, image.width(), image.height()] == window {
+        grey_image(image, width, height)
+    } else {
+        grey_image(&crop_imm(image, x, y, w, h).to_image(), width, height)
+    }
+}
+
+/// The motion to the frame before by the depth, from what was measured on; `None` where it goes astray.
+fn aligned(seen: &Seen, before: &GreyPyramid, measured: &Se3, factor: f64) -> Option<Alignment> {
+    let guess = Se3::from_parts(&measured.rotation(), measured.translation() * factor);
+    let found = align(&seen.grey, &seen.depth(), before, &guess)?;
+    let turned = (found.source_from_target * measured.inverse()).angle();
+    let (way, expected) = (
+        found.source_from_target.translation(),
+        measured.translation(),
+    );
+    let good = found.seen >= SEEN && turned <= ASTRAY_TURN && way.angle(&expected) <= ASTRAY_WAY;
+    good.then_some(found)
+}
+
+/// Photometric errors of the frame before, carried over by depth and measured motion, and as it is, over the pixels that are seen.
+fn reprojection(seen: &Seen, before: &GreyImage, source_from_target: &Se3) -> Option<(f64, f64)> {
+    let here = seen.grey.full();
+    let (width, height) = (here.width, here.height);
+    let share = |v: &f32| v / 255.0;
+    let target: Vec<f32> = here.data.iter().map(share).collect();
+    let unwarped: Vec<f32> = before.data.iter().map(share).collect();
+    let mut warped = vec![0.0; target.len()];
+    let mut inside = vec![false; target.len()];
+    for i in 0..target.len() {
+        let (x, y) = (i % width, i / width);
+        if let Some((u, v, _)) = carried(seen, source_from_target, x, y)
+            && u >= 0.0
+            && v >= 0.0
+            && u <= (width - 1) as f64
+            && v <= (height - 1) as f64
+        {
+            warped[i] = before.sample(u as f32, v as f32) / 255.0;
+            inside[i] = true;
+        }
+    }
+    let shape = PhotometricShape {
+        channels: 1,
+        height,
+        width,
+        alpha: 0.85,
+    };
+    let seen_pixels = inside.iter().filter(|i| **i).count();
+    if seen_pixels * 4 < target.len() {
+        return None;
+    }
+    let mut error = vec![0.0; target.len()];
+    let mut mean = |of: &[f32]| {
+        photometric_error(&shape, of, &target, &mut error);
+        let counted = error.iter().zip(&inside).filter(|(_, inside)| **inside);
+        counted.map(|(e, _)| f64::from(*e)).sum::<f64>() / seen_pixels as f64
+    };
+    Some((mean(&warped), mean(&unwarped)))
+}
+
+/// Where a pixel is seen in the other frame, and its depth there.
+fn carried(seen: &Seen, source_from_target: &Se3, x: usize, y: usize) -> Option<(f64, f64, f64)> {
+    let depth = seen.depth.get(x, y)?;
+    let here = seen
+        .camera
+        .back_project(x as f64, y as f64, f64::from(depth));
+    let there: Vector3<f64> = source_from_target.transform(&here);
+    let pixel = seen.camera.project(&there)?;
+    Some((pixel.x, pixel.y, there.z))
+}
+
+/// By how much depth carried over to the other frame differs from its own, the median of pixels.
+fn consistency(seen: &Seen, other: &DepthMap, source_from_target: &Se3) -> Option<f64> {
+    let mut differences = Vec::new();
+    for y in (0..seen.depth.height).step_by(2) {
+        for x in (0..seen.depth.width).step_by(2) {
+            if let Some((u, v, z)) = carried(seen, source_from_target, x, y)
+                && u >= 0.0
+                && v >= 0.0
+                && let Some(depth) = other.get(u.round() as usize, v.round() as usize)
+            {
+                differences.push((z / f64::from(depth)).ln().abs());
+            }
+        }
+    }
+    median(&differences)
+}
+
+/// By how much the depth of the mirrored image differs, the median of pixels.
+fn flip(depth: &DepthMap, mirrored: &DepthMap) -> Option<f64> {
+    if (depth.width, depth.height) != (mirrored.width, mirrored.height) {
+        return None;
+    }
+    let pixels = (0..depth.width * depth.height).filter_map(|i| {
+        let (x, y) = (i % depth.width, i / depth.width);
+        let (a, b) = (depth.get(x, y)?, mirrored.get(depth.width - 1 - x, y)?);
+        Some(f64::from(a / b).ln().abs())
+    });
+    median(&pixels.collect::<Vec<_>>())
+}

@@ -1,0 +1,189 @@
+//! What a drive with speeds says of a network's depth, without ground truth.
+//!
+//! Frames that training did not see are taken in blocks along each drive ([`plan`]). Each is predicted, and compared with frames
+//! before it (`look`): how the scene moved tells depth in metres, how well one frame explains the other tells whether depth and
+//! motion fit, and what the mirrored image gives tells how much of it is chance. [`verdict`] puts it together.
+
+mod look;
+mod plan;
+
+use std::collections::HashSet;
+
+use deepfusion_data::Dataset;
+use deepfusion_eval::median;
+use deepfusion_eval::verdict::{
+    BlockScale, Evidence, NoCertificate, Reprojection, ScaleCertificate, Verdict, scale_rows,
+    speed_rows,
+};
+use deepfusion_runtime::DepthEstimator;
+
+pub use self::plan::{Block, Plan, Target, plan};
+
+use self::look::{Looked, look};
+use crate::Result;
+
+/// The standard error of a vehicle's speed where nobody says better, as a share: tyres wear and warm, wheels slip, GPS is smoothed.
+pub const SPEED_SD: f64 = 0.03;
+/// Fewest scene points of a block that count.
+const LEAST_POINTS: usize = 40;
+
+/// How the verdict is found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct VerdictOptions {
+    /// Standard error of the vehicle's speed, as a share of it.
+    pub speed_sd: f64,
+    /// Whether depth is corrected for another focal length than the one trained with.
+    pub focal_correction: bool,
+    /// Blocks at most, over all drives.
+    pub blocks: usize,
+}
+
+impl VerdictOptions {
+    /// With a standard error of the speed as a share of it, and with or without the correction for the focal length; 40 blocks.
+    #[must_use]
+    pub fn new(speed_sd: f64, focal_correction: bool) -> Self {
+        Self {
+            speed_sd,
+            focal_correction,
+            blocks: 40,
+        }
+    }
+}
+
+impl Default for VerdictOptions {
+    fn default() -> Self {
+        Self::new(SPEED_SD, true)
+    }
+}
+
+/// Which frames training has not seen.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Unseen {
+    /// None of them was seen.
+    All,
+    /// These were seen: data set and frame.
+    Except(HashSet<(usize, usize)>),
+    /// Nobody knows.
+    NotKnown,
+}
+
+/// Looks at `datasets` with a network. `progress` takes the frames done and in all.
+///
+/// # Errors
+/// An image that cannot be read, and what the network's engine says. That nothing can be told is no error: the verdict says why.
+pub fn verdict(
+    estimator: &mut DepthEstimator,
+    datasets: &[Dataset],
+    unseen: &Unseen,
+    options: &VerdictOptions,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Verdict> {
+    let plan = plan(datasets, unseen, options.blocks);
+    let total = plan.frames();
+    let mut gathered = Gathered::default();
+    let mut done = 0;
+    for block in &plan.blocks {
+        let dataset = &datasets[block.dataset];
+        let mut points = Vec::new();
+        for (i, target) in block.targets.iter().enumerate() {
+            // What costs a further run of the network is looked at once in a block.
+            let looked = look(estimator, dataset, target, i == 0, options.focal_correction)?;
+            gathered.add(&looked, target.speed_mps);
+            points.extend(looked.points);
+            done += 1;
+            progress(done, total);
+        }
+        gathered.close_block(points);
+    }
+    Ok(gathered.verdict(&plan, unseen, total, options))
+}
+
+#[derive(Default)]
+struct Gathered {
+    blocks: Vec<BlockScale>,
+    points: Vec<(f64, f64)>,
+    speeds: Vec<(f64, f64)>,
+    warped: Vec<(f64, f64)>,
+    consistency: Vec<f64>,
+    flip: Vec<f64>,
+}
+
+impl Gathered {
+    fn add(&mut self, looked: &Looked, speed_mps: f64) {
+        self.speeds
+            .extend(looked.log_way.map(|log| (speed_mps, log)));
+        self.warped.extend(looked.reprojection);
+        self.consistency.extend(looked.consistency);
+        self.flip.extend(looked.flip);
+    }
+
+    /// `points`: depth as predicted, and the logarithm of the factor that it wants.
+    fn close_block(&mut self, points: Vec<(f64, f64)>) {
+        if points.len() >= LEAST_POINTS
+            && let Some(block) = block_scale(&points)
+        {
+            self.blocks.push(block);
+        }
+        self.points.extend(points);
+    }
+
+    fn verdict(
+        self,
+        plan: &Plan,
+        unseen: &Unseen,
+        frames: usize,
+        options: &VerdictOptions,
+    ) -> Verdict {
+        let held_out = match unseen {
+            Unseen::NotKnown => None,
+            _ => Some(!plan.all_seen()),
+        };
+        let certificate = match unseen {
+            Unseen::NotKnown => None,
+            _ => ScaleCertificate::of(&self.blocks, options.speed_sd),
+        };
+        let no_certificate = certificate
+            .is_none()
+            .then_some(match (unseen, plan.nothing) {
+                (_, Some(nothing)) => nothing,
+                (Unseen::NotKnown, None) => NoCertificate::SeenNotKnown,
+                (_, None) => NoCertificate::FewPoints,
+            });
+        let mean = |of: fn(&(f64, f64)) -> f64| {
+            self.warped.iter().map(of).sum::<f64>() / self.warped.len() as f64
+        };
+        Verdict {
+            scale_certificate: certificate,
+            no_certificate,
+            without_truth: Evidence {
+                held_out,
+                frames,
+                reprojection: (!self.warped.is_empty()).then(|| Reprojection {
+                    warped: mean(|w| w.0),
+                    unwarped: mean(|w| w.1),
+                    pairs: self.warped.len(),
+                }),
+                consistency: median(&self.consistency),
+                flip: median(&self.flip),
+                speeds: speed_rows(&self.speeds),
+                ranges: scale_rows(&self.points),
+            },
+        }
+    }
+}
+
+/// The medians of a block's points: all of them, and the nearer half less the farther one.
+fn block_scale(points: &[(f64, f64)]) -> Option<BlockScale> {
+    let logs: Vec<f64> = points.iter().map(|p| p.1).collect();
+    let mut by_depth = points.to_vec();
+    by_depth.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (near, far) = by_depth.split_at(points.len() / 2);
+    let middle = |half: &[(f64, f64)]| median(&half.iter().map(|p| p.1).collect::<Vec<_>>());
+    Some(BlockScale {
+        log_scale: median(&logs)?,
+        near_less_far: middle(near)? - middle(far)?,
+        points: points.len(),
+    })
+}

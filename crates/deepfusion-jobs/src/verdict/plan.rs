@@ -1,0 +1,201 @@
+//! Which frames are looked at, and which ones before them they are compared with.
+
+use deepfusion_data::Dataset;
+use deepfusion_eval::verdict::NoCertificate;
+use deepfusion_geometry::Se3;
+
+use super::Unseen;
+
+/// Ways from a frame to the ones before it that it is compared with, metres: near things move enough by the first, far ones by the last.
+const WAYS_M: [f64; 3] = [0.6, 2.5, 7.0];
+/// A way this many times longer than asked for is too long: frames are too far apart.
+const TOO_LONG: f64 = 4.0;
+/// Largest turn between two frames, radians.
+const TURN: f64 = 0.2;
+/// Frames before the one that are tried.
+const BEFORE: usize = 60;
+/// Length of a block, metres of way.
+const BLOCK_M: f64 = 10.0;
+/// Frames at most of a block.
+const TARGETS: usize = 4;
+
+/// A frame that is looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Target {
+    /// Its index.
+    pub frame: usize,
+    /// The vehicle's speed, m/s.
+    pub speed_mps: f64,
+    /// The frames before it, nearest first, and the measured motion: a point of this frame's camera in theirs.
+    pub sources: Vec<(usize, Se3)>,
+}
+
+/// Frames of some metres of road.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    /// The data set they are of.
+    pub dataset: usize,
+    /// In their order.
+    pub targets: Vec<Target>,
+}
+
+/// What is looked at.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Plan {
+    /// Along each drive.
+    pub blocks: Vec<Block>,
+    /// Why there are none.
+    pub nothing: Option<NoCertificate>,
+}
+
+impl Plan {
+    /// Frames that are looked at.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.blocks.iter().map(|b| b.targets.len()).sum()
+    }
+
+    pub(super) fn all_seen(&self) -> bool {
+        self.nothing == Some(NoCertificate::AllSeen)
+    }
+}
+
+/// Divides the drives' unseen frames into blocks of ten metres, and takes at most `most` of them, evenly.
+#[must_use]
+pub fn plan(datasets: &[Dataset], unseen: &Unseen, most: usize) -> Plan {
+    let mut nothing = NoCertificate::MotionUnknown;
+    let mut blocks = Vec::new();
+    for (number, dataset) in datasets.iter().enumerate() {
+        if dataset.track().is_none() || !dataset.yaw_known() {
+            continue;
+        }
+        if nothing == NoCertificate::MotionUnknown {
+            nothing = NoCertificate::NoMovement;
+        }
+        let fresh = |frame: usize| match unseen {
+            Unseen::Except(seen) => !seen.contains(&(number, frame)),
+            Unseen::All | Unseen::NotKnown => true,
+        };
+        for stretch in dataset.stretches() {
+            let moving = Targets::of(dataset, &stretch);
+            let before = moving.0.len();
+            let kept: Vec<(f64, Target)> = moving
+                .0
+                .into_iter()
+                .filter(|(_, target)| fresh(target.frame))
+                .collect();
+            if before > 0 && kept.is_empty() {
+                nothing = NoCertificate::AllSeen;
+            }
+            blocks.extend(in_blocks(number, kept));
+        }
+    }
+    let blocks = evenly(blocks, most);
+    Plan {
+        nothing: blocks.is_empty().then_some(nothing),
+        blocks,
+    }
+}
+
+/// Frames of a stretch that can be looked at, with the way up to each.
+struct Targets(Vec<(f64, Target)>);
+
+impl Targets {
+    fn of(dataset: &Dataset, stretch: &[usize]) -> Self {
+        let mut way = 0.0;
+        let mut targets = Vec::new();
+        for (place, &frame) in stretch.iter().enumerate().skip(1) {
+            let Some(step) = dataset.camera_motion(frame, stretch[place - 1]) else {
+                continue;
+            };
+            way += step.translation().norm();
+            let earlier = &stretch[place.saturating_sub(BEFORE)..place];
+            let sources = sources(dataset, frame, earlier);
+            if !sources.is_empty() {
+                let speed_mps = dataset.frames()[frame].speed_mps.map_or(f64::NAN, f64::abs);
+                targets.push((
+                    way,
+                    Target {
+                        frame,
+                        speed_mps,
+                        sources,
+                    },
+                ));
+            }
+        }
+        Self(targets)
+    }
+}
+
+/// For each of [`WAYS_M`] the latest frame that is so far behind.
+fn sources(dataset: &Dataset, frame: usize, earlier: &[usize]) -> Vec<(usize, Se3)> {
+    let mut found: Vec<(usize, Se3)> = Vec::new();
+    let mut wanted = WAYS_M.iter().peekable();
+    for &source in earlier.iter().rev() {
+        // A point of the target's camera in the source's.
+        let Some(motion) = dataset.camera_motion(source, frame) else {
+            break;
+        };
+        let way = motion.translation().norm();
+        if motion.angle() > TURN {
+            break;
+        }
+        let Some(&&least) = wanted.peek() else {
+            break;
+        };
+        if way >= least {
+            if way > TOO_LONG * least.max(1.0) {
+                break;
+            }
+            found.push((source, motion));
+            while wanted.peek().is_some_and(|least| way >= **least) {
+                wanted.next();
+            }
+        }
+    }
+    found
+}
+
+/// Targets of ten metres each, thinned.
+fn in_blocks(dataset: usize, targets: Vec<(f64, Target)>) -> Vec<Block> {
+    let number = |way: f64| (way / BLOCK_M) as u64;
+    let chunks = targets.chunk_by(|a, b| number(a.0) == number(b.0));
+    chunks
+        .map(|chunk| {
+            let chunk = chunk.iter().map(|(_, target)| target.clone()).collect();
+            Block {
+                dataset,
+                targets: evenly(chunk, TARGETS),
+            }
+        })
+        .collect()
+}
+
+/// At most `most` of the items, from the first to the last.
+fn evenly<T>(items: Vec<T>, most: usize) -> Vec<T> {
+    let n = items.len();
+    if n <= most {
+        return items;
+    }
+    let mut wanted = (0..most).map(|i| (2 * i + 1) * n / (2 * most)).peekable();
+    let kept = items.into_iter().enumerate().filter(|(i, _)| {
+        let keep = wanted.peek() == Some(i);
+        if keep {
+            wanted.next();
+        }
+        keep
+    });
+    kept.map(|(_, item)| item).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_even_choice() {
+        assert_eq!(evenly((0..10).collect(), 3), [1, 5, 8]);
+        assert_eq!(evenly(vec![1, 2], 3), [1, 2]);
+        assert_eq!(evenly((0..7).collect(), 7).len(), 7);
+    }
+}

@@ -1,0 +1,332 @@
+//! CAN frames of Vector's binary log, BLF. The layout is that which python-can's documentation and Vector's own header file of the
+//! format name; numbers are little-endian.
+//!
+//! A file's header (`LOGG`) says when the measurement began. Objects (`LOBJ`) follow: containers, whose bytes, inflated and put
+//! behind each other, are objects again, of which one may begin in one container and end in the next. Objects of other kinds than
+//! CAN frames are passed over.
+
+use crate::error::{Error, Result};
+use deepfusion_motion::can::CanId;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+/// The first bytes of a file.
+pub(crate) const MARK: [u8; 4] = *b"LOGG";
+const OBJECT: [u8; 4] = *b"LOBJ";
+/// Of an object's header, what all versions have; and what has the time.
+const BASE: usize = 16;
+const TIMED: usize = 32;
+/// The part of the file's header that is read.
+const HEADER: usize = 56;
+/// A container's own header behind the object's.
+const CONTAINER: usize = 16;
+/// The most that one object is believed to hold; Vector's containers have 128 kB.
+const MOST: usize = 1 << 28;
+
+const CAN_MESSAGE: u32 = 1;
+const LOG_CONTAINER: u32 = 10;
+const CAN_MESSAGE2: u32 = 86;
+const CAN_FD_MESSAGE: u32 = 100;
+const CAN_FD_MESSAGE_64: u32 = 101;
+
+/// A CAN frame of a file.
+pub(crate) struct BlfFrame<'a> {
+    /// Since the measurement's start, in nanoseconds.
+    pub(crate) ns: i64,
+    pub(crate) id: CanId,
+    pub(crate) data: &'a [u8],
+}
+
+/// Hands over every CAN frame with data of a file. Gives back when the measurement began: its recorder's date in nanoseconds since
+/// 1970, whose zone the format does not say; `None` where the file has none.
+///
+/// # Errors
+/// [`Error::File`]; [`Error::Bytes`] for a file that was cut off or is damaged, with the place in the file.
+pub(crate) fn read(path: &Path, mut found: impl FnMut(BlfFrame<'_>)) -> Result<Option<i64>> {
+    let file = File::open(path).map_err(|e| Error::file(path, e))?;
+    let length = file.metadata().map_err(|e| Error::file(path, e))?.len();
+    let mut file = Objects {
+        path,
+        length,
+        at: 0,
+        input: BufReader::new(file),
+    };
+    let start_ns = file.header()?;
+    // What of the containers' bytes has not been read yet: the beginning of an object.
+    let mut rest: Vec<u8> = Vec::new();
+    while let Some((offset, object)) = file.next()? {
+        if u32_at(&object, 12) != LOG_CONTAINER {
+            frame(&object, &mut found).map_err(|why| file.bad(offset, "object", why))?;
+            continue;
+        }
+        let begun = rest.len();
+        inflate(&object, &mut rest).map_err(|why| file.bad(offset, "LOG_CONTAINER", why))?;
+        let used = objects(&rest, &mut found).map_err(|(at, why)| {
+            let place = format!(
+                "at byte {} of what it holds: {why}",
+                at as i64 - begun as i64
+            );
+            file.bad(offset, "LOG_CONTAINER", place)
+        })?;
+        rest.drain(..used);
+    }
+    if rest.iter().any(|byte| *byte != 0) {
+        let why = "the file ends within an object".to_owned();
+        return Err(file.bad(length, "LOG_CONTAINER", why));
+    }
+    Ok(start_ns)
+}
+
+/// The objects of a file.
+struct Objects<'a> {
+    path: &'a Path,
+    length: u64,
+    at: u64,
+    input: BufReader<File>,
+}
+
+impl Objects<'_> {
+    fn bad(&self, offset: u64, field: &str, problem: String) -> Error {
+        Error::Bytes {
+            path: self.path.to_owned(),
+            offset,
+            field: field.to_owned(),
+            problem,
+        }
+    }
+
+    /// The next `count` bytes.
+    fn take(&mut self, field: &str, count: usize, into: &mut Vec<u8>) -> Result<()> {
+        let left = self.length.saturating_sub(self.at);
+        if (count as u64) > left {
+            let why = format!("the file ends after {left} of {count} bytes");
+            return Err(self.bad(self.at, field, why));
+        }
+        let before = into.len();
+        into.resize(before + count, 0);
+        self.input
+            .read_exact(&mut into[before..])
+            .map_err(|e| Error::file(self.path, e))?;
+        self.at += count as u64;
+        Ok(())
+    }
+
+    /// The file's header: when the measurement began.
+    fn header(&mut self) -> Result<Option<i64>> {
+        let mut header = Vec::new();
+        self.take("LOGG", HEADER, &mut header)?;
+        if header[..4] != MARK {
+            return Err(self.bad(0, "LOGG", "no binary log of Vector's begins so".into()));
+        }
+        let size = u32_at(&header, 4) as usize;
+        if !(HEADER..=MOST).contains(&size) {
+            return Err(self.bad(4, "LOGG", format!("a header of {size} bytes")));
+        }
+        // A recorder that was switched off left the size of the header alone.
+        let whole = u64_at(&header, 16);
+        if whole > self.length {
+            let why = format!(
+                "the header says {whole} bytes, the file has {}",
+                self.length
+            );
+            return Err(self.bad(self.length, "LOGG", why));
+        }
+        self.take("LOGG", size - HEADER, &mut header)?;
+        let date: [u16; 8] = std::array::from_fn(|i| u16_at(&header, 40 + 2 * i));
+        if date == [0; 8] {
+            return Ok(None);
+        }
+        let ns = start_of(date).ok_or_else(|| {
+            let why = format!("{date:?} is no date (year, month, day of the week, day, hour, minute, second, millisecond)");
+            self.bad(40, "measurement start", why)
+        })?;
+        Ok(Some(ns))
+    }
+
+    /// The next object, and where it begins; `None` at the end.
+    fn next(&mut self) -> Result<Option<(u64, Vec<u8>)>> {
+        let mut object = Vec::new();
+        // Up to three bytes, in some files seven, fill up an object to a whole number of words.
+        let mut begun = self.at;
+        loop {
+            let left = self.length - self.at;
+            let missing = 4 - object.len();
+            if left < missing as u64 {
+                let mut end = Vec::new();
+                self.take("LOBJ", left as usize, &mut end)?;
+                if object.iter().chain(&end).any(|byte| *byte != 0) {
+                    return Err(self.bad(begun, "LOBJ", "the file ends within an object".into()));
+                }
+                return Ok(None);
+            }
+            self.take("LOBJ", missing, &mut object)?;
+            if object == OBJECT {
+                break;
+            }
+            if object[0] != 0 {
+                return Err(self.bad(self.at - 4, "LOBJ", "no object begins here".into()));
+            }
+            object.remove(0);
+            begun += 1;
+        }
+        self.take("LOBJ", BASE - 4, &mut object)?;
+        let size = u32_at(&object, 8) as usize;
+        if !(BASE..=MOST).contains(&size) {
+            return Err(self.bad(begun, "LOBJ", format!("an object of {size} bytes")));
+        }
+        self.take("LOBJ", size - BASE, &mut object)?;
+        Ok(Some((begun, object)))
+    }
+}
+
+/// Adds what a container holds.
+fn inflate(object: &[u8], into: &mut Vec<u8>) -> std::result::Result<(), String> {
+    let (Some(head), Some(bytes)) = (
+        object.get(BASE..BASE + CONTAINER),
+        object.get(BASE + CONTAINER..),
+    ) else {
+        return Err(format!("{} bytes", object.len()));
+    };
+    let (method, size) = (u16_at(head, 0), u32_at(head, 8) as usize);
+    let before = into.len();
+    match method {
+        0 => into.extend_from_slice(bytes),
+        2 if size > MOST => return Err(format!("it says that it holds {size} bytes")),
+        2 => {
+            // One more than it should be tells a longer one.
+            let mut inflated = flate2::read::ZlibDecoder::new(bytes).take(size as u64 + 1);
+            inflated
+                .read_to_end(into)
+                .map_err(|e| format!("zlib: {e}"))?;
+        }
+        other => {
+            return Err(format!(
+                "compression {other}; 0 (none) and 2 (zlib) are known"
+            ));
+        }
+    }
+    let found = into.len() - before;
+    if found == size {
+        Ok(())
+    } else {
+        Err(format!("it holds {found} bytes and says {size}"))
+    }
+}
+
+/// Reads the whole objects of a stream; gives back how many of its bytes they are. The error has its place.
+fn objects(
+    bytes: &[u8],
+    found: &mut impl FnMut(BlfFrame<'_>),
+) -> std::result::Result<usize, (usize, String)> {
+    let mut at = 0;
+    loop {
+        let mut begin = at;
+        while bytes.get(begin) == Some(&0) {
+            begin += 1;
+        }
+        let Some(head) = bytes.get(begin..begin + BASE) else {
+            // The rest is checked with the next container's bytes.
+            return Ok(begin.min(bytes.len()));
+        };
+        if head[..4] != OBJECT {
+            return Err((begin, "no object begins here".into()));
+        }
+        let size = u32_at(head, 8) as usize;
+        if !(BASE..=MOST).contains(&size) {
+            return Err((begin, format!("an object of {size} bytes")));
+        }
+        let Some(object) = bytes.get(begin..begin + size) else {
+            return Ok(begin);
+        };
+        frame(object, found).map_err(|why| (begin, why))?;
+        at = begin + size;
+    }
+}
+
+/// Hands over an object's CAN frame, where it is one.
+fn frame(object: &[u8], found: &mut impl FnMut(BlfFrame<'_>)) -> std::result::Result<(), String> {
+    let kind = u32_at(object, 12);
+    if !matches!(
+        kind,
+        CAN_MESSAGE | CAN_MESSAGE2 | CAN_FD_MESSAGE | CAN_FD_MESSAGE_64
+    ) {
+        return Ok(());
+    }
+    let short = || format!("a CAN frame of {} bytes", object.len());
+    let header = usize::from(u16_at(object, 4));
+    if header < TIMED || object.len() < header + 8 {
+        return Err(short());
+    }
+    let unit_ns = match u32_at(object, 16) & 3 {
+        1 => 10_000,
+        2 => 1,
+        other => {
+            return Err(format!(
+                "a time in unit {other}; 1 (10 µs) and 2 (1 ns) are known"
+            ));
+        }
+    };
+    let ticks = i64::try_from(u64_at(object, 24)).ok();
+    let ns = ticks
+        .and_then(|ticks| ticks.checked_mul(unit_ns))
+        .ok_or("a time of more than 292 years")?;
+    let body = &object[header..];
+    let identifier = u32_at(body, 4);
+    let byte = |at: usize| body.get(at).copied().ok_or_else(short);
+    let (first, length, remote) = match kind {
+        CAN_FD_MESSAGE => (20, usize::from(byte(14)?), byte(2)? & 0x80 != 0),
+        CAN_FD_MESSAGE_64 => (40, usize::from(byte(2)?), byte(12)? & 0x10 != 0),
+        _ => (8, usize::from(byte(3)?).min(8), byte(2)? & 0x80 != 0),
+    };
+    // A remote request carries nothing.
+    if remote {
+        return Ok(());
+    }
+    // Vector's own files may say more bytes than there are: those are zeros, which no signal is read from.
+    let Some(data) = body.get(first..body.len().min(first + length)) else {
+        return Err(short());
+    };
+    let id = if identifier & 0x8000_0000 != 0 {
+        CanId::Extended {
+            extended: identifier & 0x1fff_ffff,
+        }
+    } else if identifier < 0x800 {
+        CanId::Standard(identifier as u16)
+    } else {
+        return Err(format!("identifier {identifier:X} has more than 11 bits"));
+    };
+    found(BlfFrame { ns, id, data });
+    Ok(())
+}
+
+/// Windows' SYSTEMTIME in nanoseconds since 1970, as if it were UTC.
+fn start_of(date: [u16; 8]) -> Option<i64> {
+    let [year, month, _, day, hour, minute, second, millisecond] =
+        date.map(|part| i16::try_from(part).unwrap_or(-1));
+    let small = |part: i16| i8::try_from(part).ok();
+    let date = jiff::civil::DateTime::new(
+        year,
+        small(month)?,
+        small(day)?,
+        small(hour)?,
+        small(minute)?,
+        small(second)?,
+        i32::from(millisecond) * 1_000_000,
+    );
+    let stamp = date.ok()?.to_zoned(jiff::tz::TimeZone::UTC).ok()?;
+    i64::try_from(stamp.timestamp().as_nanosecond()).ok()
+}
+
+/// Two bytes of what is long enough.
+fn u16_at(bytes: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes([bytes[at], bytes[at + 1]])
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from(u16_at(bytes, at)) | u32::from(u16_at(bytes, at + 2)) << 16
+}
+
+fn u64_at(bytes: &[u8], at: usize) -> u64 {
+    u64::from(u32_at(bytes, at)) | u64::from(u32_at(bytes, at + 4)) << 32
+}

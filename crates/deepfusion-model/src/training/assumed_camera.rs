@@ -1,0 +1,209 @@
+//! The camera of recordings that do not say theirs.
+
+use deepfusion_geometry::{HFOV_DEG, Intrinsics};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, TrainConfig};
+
+/// The camera of recordings of which nothing says it, and whether its focal length is learned: the last resort. Absent: such
+/// recordings are an error. The principal point is the middle of the images, and stays there.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct AssumedCamera {
+    /// The field of view along the images' longer side in degrees: where it begins, if it is learned.
+    pub hfov_deg: f64,
+    /// fy/fx, which is not learned: turns to the side say nothing about fy. 1 of square pixels, which nearly every camera has.
+    pub aspect: f64,
+    /// Whether the focal length is learned with the networks, from the photometric error of the warped images.
+    pub learn: bool,
+    /// Adam's step size of ln f, which follows the run's schedule: the largest relative change a step.
+    pub learning_rate: f64,
+}
+
+/// The narrowest and the widest view that is learned, along the longer side: no lens without a calibration sees more or less.
+const LEARNED_HFOV_DEG: [f64; 2] = [10.0, 160.0];
+
+impl Default for AssumedCamera {
+    fn default() -> Self {
+        Self {
+            hfov_deg: 60.0,
+            aspect: 1.0,
+            learn: true,
+            learning_rate: 0.005,
+        }
+    }
+}
+
+impl AssumedCamera {
+    /// As wide as a camera that was learned, and held.
+    #[must_use]
+    pub fn held(k: &Intrinsics) -> Self {
+        let half = f64::from(k.width.max(k.height)) / 2.0 / k.fx;
+        Self {
+            hfov_deg: 2.0 * half.atan().to_degrees(),
+            aspect: k.fy / k.fx,
+            learn: false,
+            ..Self::default()
+        }
+    }
+
+    /// The camera, of images of some size: only its view along the longer side is meant.
+    #[must_use]
+    pub fn intrinsics(&self) -> Intrinsics {
+        let square = Intrinsics::from_hfov(self.hfov_deg, (1024, 768));
+        Intrinsics {
+            fy: square.fy * self.aspect,
+            ..square
+        }
+    }
+
+    /// How many times its focal length the shortest and the longest that is learned are: views of 10 and 160 degrees.
+    #[must_use]
+    pub fn ratios(&self) -> (f64, f64) {
+        let half = |degrees: f64| (degrees / 2.0).to_radians().tan();
+        let [most, least] = LEARNED_HFOV_DEG.map(|degrees| half(self.hfov_deg) / half(degrees));
+        (least.min(1.0), most.max(1.0))
+    }
+
+    /// # Errors
+    /// [`Error::Config`] naming the first value that means nothing.
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        let fail = |field, expected: String, found: f64| {
+            Err(Error::Config {
+                field,
+                expected,
+                found: found.to_string(),
+            })
+        };
+        let (least, most) = HFOV_DEG;
+        if !(self.hfov_deg > least && self.hfov_deg < most) {
+            let expected = format!("above {least} and below {most} degrees");
+            return fail("assumed_camera.hfov_deg", expected, self.hfov_deg);
+        }
+        if !(0.2..=5.0).contains(&self.aspect) {
+            return fail("assumed_camera.aspect", "0.2 to 5".into(), self.aspect);
+        }
+        let rate = self.learning_rate;
+        if !(rate > 0.0 && rate <= 0.1) {
+            let expected = "above 0, at most 0.1".into();
+            return fail("assumed_camera.learning_rate", expected, rate);
+        }
+        Ok(())
+    }
+}
+
+/// The focal length that a run learned, of the camera that it assumed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LearnedCamera {
+    /// fx and fy in pixels of the run's images.
+    pub focal_px: [f64; 2],
+    /// One standard deviation of each, in pixels: how far parts of the drives disagree, and how far the loss is off its minimum. Absent
+    /// where the drives do not tell the focal length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_px: Option<[f64; 2]>,
+    /// After this step.
+    pub step: usize,
+}
+
+/// A standard deviation, as a share of the focal length, above which a learned camera is not to be relied on.
+const MOST_SIGMA_SHARE: f64 = 0.1;
+
+impl LearnedCamera {
+    /// Whether the drives told the focal length, to 10 %.
+    #[must_use]
+    pub fn is_told(&self) -> bool {
+        let sure = |(sigma, focal): (&f64, &f64)| *sigma <= MOST_SIGMA_SHARE * focal;
+        self.sigma_px
+            .is_some_and(|sigmas| sigmas.iter().zip(&self.focal_px).all(sure))
+    }
+}
+
+impl TrainConfig {
+    /// The camera that a run has learned of images of a size, by f/f₀ of a checkpoint ([`crate::Checkpoint::focal_ratio`]). `None` of a
+    /// run that learns none.
+    #[must_use]
+    pub fn camera_learned(&self, ratio: f64, size: (u32, u32)) -> Option<Intrinsics> {
+        let assumed = self.learned_camera()?.intrinsics().centred_at(size);
+        Some(Intrinsics {
+            fx: assumed.fx * ratio,
+            fy: assumed.fy * ratio,
+            ..assumed
+        })
+    }
+
+    /// The assumed camera of a run that learns it.
+    #[must_use]
+    pub fn learned_camera(&self) -> Option<&AssumedCamera> {
+        self.assumed_camera.as_ref().filter(|camera| camera.learn)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Preset;
+
+    #[test]
+    fn a_learned_camera_can_be_held() {
+        let camera = Intrinsics {
+            fx: 400.0,
+            fy: 420.0,
+            cx: 319.5,
+            cy: 95.5,
+            width: 640,
+            height: 192,
+        };
+        let held = AssumedCamera::held(&camera);
+        assert!(!held.learn);
+        let again = held.intrinsics();
+        let scale = 640.0 / f64::from(again.width);
+        assert!((again.fx * scale - 400.0).abs() < 1e-9, "{again:?}");
+        assert!((again.fy * scale - 420.0).abs() < 1e-9, "{again:?}");
+    }
+
+    #[test]
+    fn what_is_learned_stays_a_camera() {
+        for hfov_deg in [5.0, 60.0, 165.0] {
+            let camera = AssumedCamera {
+                hfov_deg,
+                ..AssumedCamera::default()
+            };
+            let (least, most) = camera.ratios();
+            assert!(least <= 1.0 && most >= 1.0, "{hfov_deg}: {least} {most}");
+            let k = camera.intrinsics();
+            for ratio in [least, most] {
+                let learned = Intrinsics {
+                    fx: k.fx * ratio,
+                    ..k
+                };
+                let view = AssumedCamera::held(&learned).hfov_deg;
+                let (from, to) = (hfov_deg.min(10.0), hfov_deg.max(160.0));
+                assert!((from - 1e-9..=to + 1e-9).contains(&view), "{view}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_camera_is_refused() {
+        let mut config = Preset::Tiny.config();
+        assert!(!config.to_toml().unwrap().contains("assumed_camera"));
+        config.set("assumed_camera.hfov_deg=75").unwrap();
+        assert_eq!(config.learned_camera().map(|c| c.hfov_deg), Some(75.0));
+        config.validate().unwrap();
+        for (assignment, field) in [
+            ("assumed_camera.hfov_deg=200", "assumed_camera.hfov_deg"),
+            ("assumed_camera.aspect=0", "assumed_camera.aspect"),
+            (
+                "assumed_camera.learning_rate=1",
+                "assumed_camera.learning_rate",
+            ),
+        ] {
+            let mut wrong = config.clone();
+            wrong.set(assignment).unwrap();
+            let error = wrong.validate().unwrap_err().to_string();
+            assert!(error.contains(field), "{error}");
+        }
+    }
+}

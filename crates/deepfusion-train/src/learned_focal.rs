@@ -1,0 +1,142 @@
+//! The focal length of a camera that nobody gave, as a parameter.
+
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor, TensorData};
+
+use crate::{AssumedCamera, Error, SampleSet, SnippetBatch, TrainConfig, ViewMotion};
+
+/// How far the focal length is from the one that was assumed, ln(f/f₀): of both axes, since turns to the side say nothing about fy. All
+/// recordings of a run share it.
+#[derive(Module, Debug)]
+pub struct LearnedFocal {
+    /// ln(f/f₀), one number.
+    pub log_ratio: Param<Tensor<1>>,
+}
+
+impl LearnedFocal {
+    /// That of the assumed camera itself.
+    #[must_use]
+    pub fn new(device: &Device) -> Self {
+        Self {
+            log_ratio: Param::from_data(TensorData::from([0.0_f32]), device),
+        }
+    }
+
+    /// The same within what a camera may be: where nothing tells it, it walks off.
+    #[must_use]
+    pub(crate) fn held_to(self, camera: &AssumedCamera) -> Self {
+        let (least, most) = camera.ratios();
+        let bound = self.ratio().clamp(least, most);
+        if bound == self.ratio() {
+            return self;
+        }
+        let device = self.log_ratio.val().device();
+        Self {
+            log_ratio: Param::from_data(TensorData::from([bound.ln() as f32]), &device),
+        }
+    }
+
+    /// f/f₀.
+    #[must_use]
+    pub fn ratio(&self) -> f64 {
+        f64::from(self.log_ratio.val().into_scalar::<f32>()).exp()
+    }
+}
+
+/// A batch seen through another focal length, by ln(f/f₀), one number. Differentiable: K·diag(r, r, 1) and its inverse. The depths of a
+/// network with a `canonical` focal length are brought to this one, but have no gradient by it: f would else be drawn to wherever it makes
+/// up for metres that the network has wrong, which it could learn as well.
+pub(crate) fn refocused(
+    batch: &SnippetBatch,
+    log_ratio: Tensor<1>,
+    canonical: bool,
+) -> SnippetBatch {
+    let logs = Tensor::cat(
+        vec![log_ratio.clone(), log_ratio.clone(), log_ratio.zeros_like()],
+        0,
+    );
+    // A row beside K scales its columns, a column beside its inverse its rows: the principal point is left alone.
+    let columns = logs.clone().exp().reshape([1, 1, 3]);
+    let rows = logs.neg().exp().reshape([1, 3, 1]);
+    SnippetBatch {
+        intrinsics: batch.intrinsics.clone().mul(columns),
+        inverse_intrinsics: batch.inverse_intrinsics.clone().mul(rows),
+        factors: match &batch.factors {
+            Some(factors) if canonical => Some(factors.refocused(log_ratio.detach().exp())),
+            factors => factors.clone(),
+        },
+        ..batch.clone()
+    }
+}
+
+/// That there is one camera to learn, and none that is known.
+///
+/// # Errors
+/// [`Error::CameraKnown`], [`Error::SeveralCameras`].
+pub(crate) fn check_camera(config: &TrainConfig, sets: [&SampleSet; 2]) -> Result<(), Error> {
+    if config.learned_camera().is_none() {
+        return Ok(());
+    }
+    let mut first: Option<(String, (u32, u32))> = None;
+    for samples in sets {
+        for sample in &samples.samples {
+            let dataset = &samples.datasets[sample.dataset];
+            let drive = || dataset.name().to_owned();
+            if !dataset.camera_assumed() {
+                return Err(Error::CameraKnown { drive: drive() });
+            }
+            let k = dataset.intrinsics(sample.snippet.target);
+            let size = (k.width, k.height);
+            let (other, expected) = first.get_or_insert_with(|| (drive(), size));
+            if size != *expected {
+                return Err(Error::SeveralCameras {
+                    drives: [other.clone(), drive()],
+                    sizes: [*expected, size],
+                });
+            }
+        }
+    }
+    if first.is_none() {
+        return Err(Error::NoSamples {
+            data: "the data to learn a camera from".into(),
+            reason: "nothing is learned from video".into(),
+        });
+    }
+    Ok(())
+}
+
+/// Turns that move the image by less than this many pixels of the network's input, as a mean over pairs, tell no focal length.
+const LEAST_TURN_PX: f64 = 0.3;
+
+/// What should be known before a camera is learned: that the vehicle hardly turns, or that its turns are not used.
+pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<String> {
+    config.learned_camera()?;
+    let k = samples.camera()?;
+    let (width, height) = (config.size.width as u32, config.size.height as u32);
+    let focal_px = k.resized(width, height).fx;
+    let sources = samples.samples.iter().flat_map(|s| &s.snippet.sources);
+    // Known of all pairs of a drive with a yaw rate, and of none without.
+    let turns: Vec<f64> = sources
+        .filter_map(|s| Some(s.motion.source_from_target?.angle()))
+        .collect();
+    if turns.is_empty() {
+        return Some(
+            "the camera is learned without measured turns: only strong ones tell the focal length then; a yaw rate and view_motion \
+             vehicle tell it much better"
+                .into(),
+        );
+    }
+    let mean = turns.iter().sum::<f64>() / turns.len() as f64;
+    if mean * focal_px < LEAST_TURN_PX {
+        return Some(format!(
+            "the vehicle hardly turns, {:.2} degrees from image to image: these drives will not tell the camera's focal length; add \
+             some with bends",
+            mean.to_degrees()
+        ));
+    }
+    (config.view_motion != ViewMotion::Vehicle).then(|| {
+        "the camera is learned with the turns that PoseNet finds, which tell it only where they are strong; the measured ones, \
+         view_motion vehicle, tell it much better"
+            .into()
+    })
+}

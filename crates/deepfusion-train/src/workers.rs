@@ -1,0 +1,229 @@
+//! Several processes that learn one network together: synchronous data parallelism.
+//!
+//! Each worker holds the same networks and takes its own part of every step's samples. The gradients are averaged over the workers by
+//! whatever connects them (MPI, NCCL, gloo, …), behind one operation: the sum of a flat array ([`Workers::sum`]). K workers with batches of
+//! B and `accumulate` a learn what one worker learns with batches of B and `accumulate` K·a, to rounding.
+
+use std::error::Error as StdError;
+
+use deepfusion_nn::weights::Weights;
+
+use crate::{Error, LossTerms, NamedGradients};
+
+/// What connects one trainer with the others.
+pub trait Workers: Send {
+    /// Which this is, from 0. Worker 0 validates, logs and writes the checkpoints.
+    fn rank(&self) -> usize;
+
+    /// How many there are.
+    fn count(&self) -> usize;
+
+    /// Replaces the values by their sums over all workers, the same on each. All workers call it in the same order with equally
+    /// many values.
+    ///
+    /// # Errors
+    /// Where the others cannot be reached: training ends, and what was saved stays.
+    fn sum(&mut self, values: &mut [f32]) -> Result<(), Box<dyn StdError + Send + Sync>>;
+}
+
+/// A trainer without others.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Alone;
+
+impl Workers for Alone {
+    fn rank(&self) -> usize {
+        0
+    }
+
+    fn count(&self) -> usize {
+        1
+    }
+
+    fn sum(&mut self, _: &mut [f32]) -> Result<(), Box<dyn StdError + Send + Sync>> {
+        Ok(())
+    }
+}
+
+/// The workers of a trainer, and what they have to agree on.
+pub(crate) struct Crew(Box<dyn Workers>);
+
+impl Crew {
+    pub(crate) fn of(workers: Box<dyn Workers>) -> Self {
+        Self(workers)
+    }
+
+    pub(crate) fn rank(&self) -> usize {
+        self.0.rank()
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.0.count().max(1)
+    }
+
+    pub(crate) fn leads(&self) -> bool {
+        self.rank() == 0
+    }
+
+    fn sum(&mut self, values: &mut [f32]) -> Result<(), Error> {
+        if self.count() == 1 {
+            return Ok(());
+        }
+        let (rank, count) = (self.rank(), self.count());
+        let failed = |reason: Box<dyn StdError + Send + Sync>| Error::Workers {
+            rank,
+            count,
+            reason: reason.to_string(),
+        };
+        self.0.sum(values).map_err(failed)
+    }
+
+    /// Replaces the values by their means.
+    pub(crate) fn mean(&mut self, values: &mut [f32]) -> Result<(), Error> {
+        self.sum(values)?;
+        let count = self.count() as f32;
+        if count > 1.0 {
+            values.iter_mut().for_each(|value| *value /= count);
+        }
+        Ok(())
+    }
+
+    /// For each flag, whether any worker has it up.
+    pub(crate) fn any<const N: usize>(&mut self, flags: [bool; N]) -> Result<[bool; N], Error> {
+        let mut sums = flags.map(|flag| f32::from(u8::from(flag)));
+        self.sum(&mut sums)?;
+        Ok(sums.map(|sum| sum > 0.0))
+    }
+
+    /// Fails where the workers do not hold the same: numbers of which each is compared in its lowest 16 bits, so that their sums are
+    /// exact.
+    pub(crate) fn hold_the_same(&mut self, what: [u64; 3]) -> Result<(), Error> {
+        let own = what.map(|number| (number & 0xffff) as f32);
+        let mut sums = own;
+        self.sum(&mut sums)?;
+        let count = self.count() as f32;
+        let differs = own
+            .iter()
+            .zip(sums)
+            .position(|(own, sum)| own * count != sum);
+        // A worker whose own is by chance the mean of all sees no difference: those that differ from it do.
+        let [differs_here] = self.any([differs.is_some()])?;
+        if !differs_here {
+            return Ok(());
+        }
+        let reason = match differs {
+            Some(0) => "they begin from other weights",
+            Some(1) => "they have other samples",
+            _ => "they have other settings",
+        };
+        Err(Error::Workers {
+            rank: self.rank(),
+            count: self.count(),
+            reason: reason.into(),
+        })
+    }
+
+    /// A network's tensors, the running statistics of its batch norms averaged over the workers.
+    pub(crate) fn mean_statistics(&mut self, mut weights: Weights) -> Result<Weights, Error> {
+        let is_running =
+            |name: &str| name.ends_with("running_mean") || name.ends_with("running_var");
+        let mut flat = Vec::new();
+        for (name, tensor) in &weights.tensors {
+            if is_running(name) {
+                flat.extend_from_slice(&tensor.values);
+            }
+        }
+        self.mean(&mut flat)?;
+        let mut rest = flat.as_slice();
+        for (name, tensor) in &mut weights.tensors {
+            if is_running(name) {
+                let (own, others) = rest.split_at(tensor.values.len());
+                tensor.values.copy_from_slice(own);
+                rest = others;
+            }
+        }
+        Ok(weights)
+    }
+
+    /// A step's gradients and losses, averaged over the workers.
+    pub(crate) fn average(
+        &mut self,
+        gradients: &mut NamedGradients,
+        losses: &mut LossTerms,
+    ) -> Result<(), Error> {
+        if self.count() == 1 {
+            return Ok(());
+        }
+        let mut flat: Vec<f32> = losses
+            .named()
+            .iter()
+            .map(|(_, value)| *value as f32)
+            .collect();
+        let terms = flat.len();
+        gradients.append_to(&mut flat);
+        self.mean(&mut flat)?;
+        gradients.take_from(&flat[terms..]);
+        let mean: Vec<f64> = flat[..terms]
+            .iter()
+            .map(|value| f64::from(*value))
+            .collect();
+        losses.set_from(&mean);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A worker among others that say what they are told to.
+    struct Among {
+        rank: usize,
+        others: Vec<f32>,
+    }
+
+    impl Workers for Among {
+        fn rank(&self) -> usize {
+            self.rank
+        }
+
+        fn count(&self) -> usize {
+            2
+        }
+
+        fn sum(&mut self, values: &mut [f32]) -> Result<(), Box<dyn StdError + Send + Sync>> {
+            if self.others.is_empty() {
+                return Err("the other is gone".into());
+            }
+            let others = self.others.iter().cycle();
+            values.iter_mut().zip(others).for_each(|(v, o)| *v += o);
+            Ok(())
+        }
+    }
+
+    fn among(others: &[f32]) -> Crew {
+        Crew::of(Box::new(Among {
+            rank: 1,
+            others: others.to_vec(),
+        }))
+    }
+
+    #[test]
+    fn means_flags_and_differences() {
+        let mut values = [1.0, 3.0];
+        among(&[3.0, 5.0]).mean(&mut values).unwrap();
+        assert_eq!(values, [2.0, 4.0]);
+        assert_eq!(among(&[0.0]).any([false, true]).unwrap(), [false, true]);
+        assert_eq!(among(&[1.0]).any([false]).unwrap(), [true]);
+        let error = among(&[]).any([true]).unwrap_err().to_string();
+        for part in ["worker 1 of 2", "the other is gone"] {
+            assert!(error.contains(part), "{part}: {error}");
+        }
+        let error = among(&[7.0]).hold_the_same([7, 8, 7]).unwrap_err();
+        assert!(error.to_string().contains("other samples"), "{error}");
+        let alone = &mut Crew::of(Box::new(Alone));
+        alone.hold_the_same([1, 2, 3]).unwrap();
+        let mut values = [1.0];
+        alone.mean(&mut values).unwrap();
+        assert_eq!(values, [1.0]);
+    }
+}

