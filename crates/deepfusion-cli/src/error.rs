@@ -43,6 +43,16 @@ pub(crate) enum CliError {
         /// The second log.
         path: PathBuf,
     },
+    /// An option of `doctor` that says nothing of what is looked at.
+    #[error("{}: {option} does not apply to {}", path.display(), if *is_log { "a log of speeds by itself" } else { "a recording" })]
+    OutOfPlace {
+        /// What is looked at.
+        path: PathBuf,
+        /// The option.
+        option: &'static str,
+        /// Whether it is a log of speeds by itself.
+        is_log: bool,
+    },
     /// A log without anything that saw the drive.
     #[error("neither a video nor images are given for the log")]
     NoMedia,
@@ -375,6 +385,12 @@ impl Reportable for CliError {
             }
             Self::NotOnClock { .. } => Some("give seconds, a time of day or a date, as the log has them".into()),
             Self::OtherClock { .. } => Some("give the log that has both speeds and turns, or the first alone".into()),
+            Self::OutOfPlace { is_log: true, .. } => Some(
+                "leave it out; a log by itself takes --time, --speed, --unit and --dbc, and becomes a recording by deepfusion data import".into(),
+            ),
+            Self::OutOfPlace { .. } => Some(
+                "leave it out; the columns of a recording's own log stand in its dataset.toml (time_column, speed_column, speed_unit, dbc)".into(),
+            ),
             Self::NoMedia => Some("give --video FILE or --images DIR".into()),
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
             Self::NoUncertainty => Some(

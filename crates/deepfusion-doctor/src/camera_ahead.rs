@@ -79,15 +79,33 @@ pub enum NoCameraAhead {
         /// The largest that is applied.
         most_s: f64,
     },
-    /// Drives whose clocks are differently far apart.
+    /// A drive whose clocks are not as far apart as those of the others.
     #[error(
-        "the clocks of {} are {:+.3} ± {:.3} s apart, those of {} {:+.3} ± {:.3} s", first.0, first.1, first.2, other.0, other.1, other.2
+        "{drive}: the clocks are {ahead_s:+.3} ± {std_error_s:.3} s apart, those of all drives together {mean_s:+.3} ± {mean_error_s:.3} s"
     )]
     Differ {
-        /// A drive, its offset and standard error in seconds.
-        first: (String, f64, f64),
-        /// Another one.
-        other: (String, f64, f64),
+        /// The drive.
+        drive: String,
+        /// Its offset, in seconds.
+        ahead_s: f64,
+        /// Its standard error, in seconds.
+        std_error_s: f64,
+        /// The mean of all drives, in seconds.
+        mean_s: f64,
+        /// Its standard error, in seconds.
+        mean_error_s: f64,
+    },
+    /// A drive that does not show its offset, and says another one than the others show.
+    #[error(
+        "{drive}: it says that its camera's clock is {said_s:+.3} s ahead, which its pictures do not show; those of the other drives show {mean_s:+.3} s"
+    )]
+    SaysOther {
+        /// The drive.
+        drive: String,
+        /// What it says, in seconds.
+        said_s: f64,
+        /// The mean of the others, in seconds.
+        mean_s: f64,
     },
     /// No drive.
     #[error("no recording to compare clocks of")]
@@ -105,7 +123,7 @@ impl Hint for NoCameraAhead {
             Self::Weak { .. } | Self::Unsure { .. } => {
                 "use a longer drive with more bends, or a log with a gyroscope; or give the offset in milliseconds".into()
             }
-            Self::Differ { .. } => {
+            Self::Differ { .. } | Self::SaysOther { .. } => {
                 "write clock.camera_ahead_s beside each recording (dataset.toml), or give them one by one".into()
             }
             Self::Nothing => "name a recording".into(),
@@ -119,6 +137,16 @@ impl Hint for NoCameraAhead {
 /// # Errors
 /// Why it is not known well enough to be applied.
 pub fn camera_ahead(dataset: &Dataset) -> Result<CameraAhead, NoCameraAhead> {
+    let offset = offset(dataset)?;
+    Ok(CameraAhead {
+        ahead_s: dataset.camera_ahead_s() - offset.vehicle_minus_camera_s,
+        std_error_s: offset.std_error_s,
+        correlation: correlation(&offset),
+    })
+}
+
+/// The offset that [`camera_ahead`] applies, against what the recording says itself.
+pub(super) fn offset(dataset: &Dataset) -> Result<TimeOffset, NoCameraAhead> {
     let drive = || dataset.name().to_owned();
     let turning = dataset.turning_as_its_course();
     let by_course = turning.is_some();
@@ -155,16 +183,13 @@ pub fn camera_ahead(dataset: &Dataset) -> Result<CameraAhead, NoCameraAhead> {
         drive: drive(),
         source,
     })?;
-    let ahead = CameraAhead {
-        ahead_s: dataset.camera_ahead_s() - offset.vehicle_minus_camera_s,
-        std_error_s: offset.std_error_s,
-        correlation: correlation(&offset),
-    };
-    if ahead.correlation < LEAST_CORRELATION {
+    let ahead_s = dataset.camera_ahead_s() - offset.vehicle_minus_camera_s;
+    let (std_error_s, correlation) = (offset.std_error_s, correlation(&offset));
+    if correlation < LEAST_CORRELATION {
         return Err(NoCameraAhead::Weak {
             drive: drive(),
-            ahead_s: ahead.ahead_s,
-            correlation: ahead.correlation,
+            ahead_s,
+            correlation,
         });
     }
     let most_s = if by_course {
@@ -172,15 +197,15 @@ pub fn camera_ahead(dataset: &Dataset) -> Result<CameraAhead, NoCameraAhead> {
     } else {
         MOST_STD_ERROR_S
     };
-    if ahead.std_error_s.is_nan() || ahead.std_error_s > most_s {
+    if std_error_s.is_nan() || std_error_s > most_s {
         return Err(NoCameraAhead::Unsure {
             drive: drive(),
             most_s,
-            ahead_s: ahead.ahead_s,
-            std_error_s: ahead.std_error_s,
+            ahead_s,
+            std_error_s,
         });
     }
-    Ok(ahead)
+    Ok(offset)
 }
 
 /// The best of the correlations.
@@ -194,40 +219,83 @@ fn correlation(offset: &TimeOffset) -> f64 {
     all.into_iter().flatten().fold(0.0, f64::max)
 }
 
-/// [`camera_ahead`] of drives that were recorded by one setup: the mean, weighted by the inverse squares of the standard errors.
+/// What drives that were recorded by one setup show together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommonCameraAhead {
+    /// The mean, weighted by the inverse squares of the standard errors.
+    pub ahead: CameraAhead,
+    /// Why drives do not show it themselves: they get the mean of the others.
+    pub unmeasured: Vec<NoCameraAhead>,
+}
+
+/// [`camera_ahead`] of drives that were recorded by one setup. Of two cameras on one clock, the first is looked at.
 ///
 /// # Errors
-/// As [`camera_ahead`], where no drive shows it; [`NoCameraAhead::Differ`] where two drives contradict each other.
+/// As [`camera_ahead`], where no drive shows it; [`NoCameraAhead::Differ`] and [`NoCameraAhead::SaysOther`] where a drive contradicts the
+/// others.
 pub fn common_camera_ahead<'a>(
     datasets: impl IntoIterator<Item = &'a Dataset>,
-) -> Result<CameraAhead, NoCameraAhead> {
-    let mut found: Vec<(String, CameraAhead)> = Vec::new();
-    let mut problem = NoCameraAhead::Nothing;
+) -> Result<CommonCameraAhead, NoCameraAhead> {
+    let mut drives: Vec<&Dataset> = Vec::new();
     for dataset in datasets {
-        match camera_ahead(dataset) {
-            Ok(ahead) => found.push((dataset.name().to_owned(), ahead)),
-            Err(why) => problem = why,
+        let same = |d: &&Dataset| d.folder() == dataset.folder() && d.name() == dataset.name();
+        if !drives.iter().any(same) {
+            drives.push(dataset);
         }
     }
-    let Some((name, first)) = found.first() else {
-        return Err(problem);
+    let (mut found, mut unmeasured) = (Vec::new(), Vec::new());
+    for drive in drives {
+        match camera_ahead(drive) {
+            Ok(ahead) => found.push((drive, ahead)),
+            Err(why) => unmeasured.push((drive, why)),
+        }
+    }
+    let measured: Vec<CameraAhead> = found.iter().map(|(_, ahead)| *ahead).collect();
+    let Some(mean) = weighted_mean(&measured) else {
+        let last = unmeasured.pop().map(|(_, why)| why);
+        return Err(last.unwrap_or(NoCameraAhead::Nothing));
     };
-    for (other, ahead) in &found[1..] {
-        let most = SIGMAS * first.std_error_s.hypot(ahead.std_error_s);
-        if (ahead.ahead_s - first.ahead_s).abs() > most.max(AGREE_S) {
+    let apart = |ahead_s: f64, error_s: f64| {
+        (ahead_s - mean.ahead_s).abs() > (SIGMAS * error_s).max(AGREE_S)
+    };
+    for (drive, ahead) in &found {
+        if apart(ahead.ahead_s, ahead.std_error_s.hypot(mean.std_error_s)) {
             return Err(NoCameraAhead::Differ {
-                first: (name.clone(), first.ahead_s, first.std_error_s),
-                other: (other.clone(), ahead.ahead_s, ahead.std_error_s),
+                drive: drive.name().to_owned(),
+                ahead_s: ahead.ahead_s,
+                std_error_s: ahead.std_error_s,
+                mean_s: mean.ahead_s,
+                mean_error_s: mean.std_error_s,
             });
         }
     }
+    for (drive, _) in &unmeasured {
+        let said_s = drive.camera_ahead_s();
+        if said_s != 0.0 && apart(said_s, mean.std_error_s) {
+            return Err(NoCameraAhead::SaysOther {
+                drive: drive.name().to_owned(),
+                said_s,
+                mean_s: mean.ahead_s,
+            });
+        }
+    }
+    Ok(CommonCameraAhead {
+        ahead: mean,
+        unmeasured: unmeasured.into_iter().map(|(_, why)| why).collect(),
+    })
+}
+
+/// `None` of none.
+fn weighted_mean(all: &[CameraAhead]) -> Option<CameraAhead> {
     let weight = |ahead: &CameraAhead| ahead.std_error_s.max(1e-3).powi(-2);
-    let all = || found.iter().map(|(_, ahead)| ahead);
-    let sum: f64 = all().map(weight).sum();
-    let mean: f64 = all().map(|a| weight(a) * a.ahead_s).sum::<f64>() / sum;
-    Ok(CameraAhead {
-        ahead_s: mean,
+    let sum: f64 = all.iter().map(weight).sum();
+    let ahead_s = all.iter().map(|a| weight(a) * a.ahead_s).sum::<f64>() / sum;
+    (!all.is_empty()).then(|| CameraAhead {
+        ahead_s,
         std_error_s: sum.sqrt().recip(),
-        correlation: all().map(|a| a.correlation).fold(f64::INFINITY, f64::min),
+        correlation: all
+            .iter()
+            .map(|a| a.correlation)
+            .fold(f64::INFINITY, f64::min),
     })
 }

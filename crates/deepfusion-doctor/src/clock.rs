@@ -1,5 +1,6 @@
 //! The camera's clock against the vehicle's.
 
+use super::camera_ahead;
 use super::epipolar::EpipolarPair;
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::survey::Survey;
@@ -12,6 +13,8 @@ use rayon::prelude::*;
 
 /// Offset that matters, in seconds: at 10 m/s² of braking 20 ms are 0.2 m/s.
 const MOST_S: f64 = 0.020;
+/// The same where positions alone show the turns: a receiver's own delay is of that size.
+const MOST_BY_COURSE_S: f64 = 0.1;
 /// An estimate counts where it is so many standard errors from 0, and these are below `SURE_S`.
 const SIGMAS: f64 = 4.0;
 const SURE_S: f64 = 0.05;
@@ -22,16 +25,14 @@ const ROUNDS: usize = 4;
 const SETTLED_S: f64 = 0.001;
 
 pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
-    let Estimate { offset, rates } = match estimate(survey, pairs) {
+    let Estimate { offset, least_s } = match estimate(survey, pairs) {
         Ok(estimate) => estimate,
         Err(why) => return Outcome::skipped("clock", why),
     };
     let (value, error) = (offset.vehicle_minus_camera_s, offset.std_error_s);
     let mut outcome = Outcome::new("clock");
-    // What the estimate cannot tell from 0 holds; nor is a stream placed better than its own interval (KITTI's
-    // oxts, at 10 Hz, come out 60 ms late).
-    let interval_s = rates.speed_mps.as_ref().and_then(Signal::interval_s);
-    let limit = MOST_S.max(SIGMAS * error).max(interval_s.unwrap_or(0.0));
+    // What the estimate cannot tell from 0 holds.
+    let limit = least_s.max(SIGMAS * error);
     let figure = Figure::new(
         "offset, vehicle less camera",
         value,
@@ -57,16 +58,23 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
     outcome
 }
 
-/// An offset that is sure enough, and what it was measured against.
+/// An offset that is sure enough.
 pub(super) struct Estimate {
     pub(super) offset: TimeOffset,
-    rates: VehicleRates,
+    /// What is smaller does not count, in seconds.
+    least_s: f64,
 }
 
 /// The offset of the clocks; else why there is none.
 pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Estimate, String> {
     let rates = rates(survey.dataset).filter(|rates| rates.yaw_rate_radps.is_some());
     let rates = rates.ok_or("no speed and yaw rate to compare the picture with")?;
+    if !survey.dataset.yaw_known() {
+        // A course takes more pictures and other settings than a yaw rate.
+        let offset = camera_ahead::offset(survey.dataset).map_err(|why| why.to_string())?;
+        let least_s = MOST_BY_COURSE_S;
+        return Ok(Estimate { offset, least_s });
+    }
     let offset = settled(survey, pairs, &rates, &OffsetConfig::default());
     let offset = offset.map_err(|why| why.to_string())?;
     let (value, error) = (offset.vehicle_minus_camera_s, offset.std_error_s);
@@ -75,7 +83,10 @@ pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Es
             "the estimate {value:.2} s has a standard error of {error:.2} s"
         ))
     } else {
-        Ok(Estimate { offset, rates })
+        // A stream is not placed better than its own interval (KITTI's oxts, at 10 Hz, come out 60 ms late).
+        let interval_s = rates.speed_mps.as_ref().and_then(Signal::interval_s);
+        let least_s = MOST_S.max(interval_s.unwrap_or(0.0));
+        Ok(Estimate { offset, least_s })
     }
 }
 

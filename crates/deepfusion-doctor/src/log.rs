@@ -4,7 +4,7 @@ use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::{Diagnosis, opening};
 use deepfusion_data::{Dataset, DatasetKind, Error as DataError};
 use deepfusion_hint::Hint;
-use deepfusion_logs::{Clock, DriveLog, Error, Format, ReadOptions, read};
+use deepfusion_logs::{Clock, DriveLog, Error, Format, ReadOptions, may_hold_log, read};
 use std::path::Path;
 
 /// Names of the files that are looked at as logs where they are no recording.
@@ -34,18 +34,23 @@ pub fn is_log(path: &Path) -> bool {
 /// Examines a log by itself. One that cannot be read is a finding, not an error.
 #[must_use]
 pub fn doctor_log(path: &Path, options: &ReadOptions) -> Diagnosis {
+    let recording = match read(path, options) {
+        Ok(log) => outcomes(path, &log),
+        Err(error) => vec![opening::failed(error.to_string(), remedy(&error))],
+    };
     Diagnosis {
-        recording: outcomes(path, options),
+        recording,
         drives: Vec::new(),
     }
 }
 
 /// What a GoPro's video holds beside its pictures; nothing where it holds no log.
 pub(super) fn within(path: &Path) -> Vec<Outcome> {
-    let is_video =
-        path.is_file() && Dataset::kind_at(path).is_ok_and(|kind| kind == DatasetKind::Video);
+    let is_video = may_hold_log(path)
+        && path.is_file()
+        && Dataset::kind_at(path).is_ok_and(|kind| kind == DatasetKind::Video);
     match is_video.then(|| read(path, &ReadOptions::default())) {
-        Some(Ok(_)) => outcomes(path, &ReadOptions::default()),
+        Some(Ok(log)) => outcomes(path, &log),
         // The camera's own track without a fix is worth a word; a video of another camera is not.
         Some(Err(Error::NoSpeed { problem, .. })) if problem.contains("GPS") => {
             let mut outcome = Outcome::new("log");
@@ -62,19 +67,15 @@ pub(super) fn within(path: &Path) -> Vec<Outcome> {
 }
 
 /// Check by check.
-fn outcomes(path: &Path, options: &ReadOptions) -> Vec<Outcome> {
-    let log = match read(path, options) {
-        Ok(log) => log,
-        Err(error) => return vec![opening::failed(error.to_string(), remedy(&error))],
-    };
+fn outcomes(path: &Path, log: &DriveLog) -> Vec<Outcome> {
     vec![
-        opened(path, &log),
-        rate(&log),
-        gaps(&log),
-        moving(&log),
-        sure(&log),
-        turns(&log),
-        clock(&log),
+        opened(path, log),
+        rate(log),
+        gaps(log),
+        moving(log),
+        sure(log),
+        turns(log),
+        clock(log),
     ]
 }
 

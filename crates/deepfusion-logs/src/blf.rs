@@ -34,6 +34,7 @@ const CAN_FD_MESSAGE_64: u32 = 101;
 pub(crate) struct BlfFrame<'a> {
     /// Since the measurement's start, in nanoseconds.
     pub(crate) ns: i64,
+    pub(crate) channel: u16,
     pub(crate) id: CanId,
     pub(crate) data: &'a [u8],
 }
@@ -191,7 +192,11 @@ fn inflate(object: &[u8], into: &mut Vec<u8>) -> std::result::Result<(), String>
     let (method, size) = (u16_at(head, 0), u32_at(head, 8) as usize);
     let before = into.len();
     match method {
-        0 => into.extend_from_slice(bytes),
+        // Not every writer says the size of what is not compressed.
+        0 => {
+            into.extend_from_slice(bytes);
+            return Ok(());
+        }
         2 if size > MOST => return Err(format!("it says that it holds {size} bytes")),
         2 => {
             // One more than it should be tells a longer one.
@@ -273,6 +278,10 @@ fn frame(object: &[u8], found: &mut impl FnMut(BlfFrame<'_>)) -> std::result::Re
         .ok_or("a time of more than 292 years")?;
     let body = &object[header..];
     let identifier = u32_at(body, 4);
+    let channel = match kind {
+        CAN_FD_MESSAGE_64 => u16::from(body[0]),
+        _ => u16_at(body, 0),
+    };
     let byte = |at: usize| body.get(at).copied().ok_or_else(short);
     let (first, length, remote) = match kind {
         CAN_FD_MESSAGE => (20, usize::from(byte(14)?), byte(2)? & 0x80 != 0),
@@ -296,7 +305,12 @@ fn frame(object: &[u8], found: &mut impl FnMut(BlfFrame<'_>)) -> std::result::Re
     } else {
         return Err(format!("identifier {identifier:X} has more than 11 bits"));
     };
-    found(BlfFrame { ns, id, data });
+    found(BlfFrame {
+        ns,
+        channel,
+        id,
+        data,
+    });
     Ok(())
 }
 

@@ -12,6 +12,8 @@ use std::path::Path;
 /// A frame of a trace.
 struct Frame {
     ns: i64,
+    /// The bus, as the trace names it.
+    channel: String,
     id: CanId,
     data: Vec<u8>,
 }
@@ -58,7 +60,12 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
                 "the DBC file's unit of {name}, '{written}', is not one of speed"
             ))
         })?;
-    let Trace { frames, all, clock } = trace(path, signal.id)?;
+    let Trace {
+        mut frames,
+        all,
+        clock,
+    } = trace(path, signal.id)?;
+    let several = one_channel(&mut frames);
     let (mut speeds, mut of_signal, mut repeated) = (Vec::<Speed>::new(), 0, 0);
     for frame in &frames {
         let Some(value) = signal.decode(&frame.data) else {
@@ -86,6 +93,7 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
         "speed from the signal {name} in {unit}: {} of {all} frames",
         speeds.len()
     )];
+    notes.extend(several);
     if repeated > 0 {
         notes.push(format!(
             "{repeated} frames are not later than the one before and are left out"
@@ -99,6 +107,32 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
         course_rates: Vec::new(),
         notes,
     })
+}
+
+/// Keeps the frames of one bus, the one with the most: a gateway repeats a message on another, later. A note where there are several.
+fn one_channel(frames: &mut Vec<Frame>) -> Option<String> {
+    let mut counts: Vec<(String, usize)> = Vec::new();
+    for frame in frames.iter() {
+        match counts.iter_mut().find(|(name, _)| *name == frame.channel) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((frame.channel.clone(), 1)),
+        }
+    }
+    if counts.len() < 2 {
+        return None;
+    }
+    let told: Vec<String> = counts
+        .iter()
+        .map(|(name, count)| format!("{name} ({count} frames)"))
+        .collect();
+    // Of as many, the first.
+    counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    let (kept, _) = counts.swap_remove(0);
+    frames.retain(|frame| frame.channel == kept);
+    Some(format!(
+        "its message comes on the channels {}: {kept} is read",
+        told.join(", ")
+    ))
 }
 
 /// What of a trace is used.
@@ -124,6 +158,7 @@ fn trace(path: &Path, id: CanId) -> Result<Trace> {
         if frame.id == id {
             frames.push(Frame {
                 ns: frame.ns,
+                channel: frame.channel.to_string(),
                 id,
                 data: frame.data.to_vec(),
             });
@@ -190,7 +225,7 @@ fn candump(line: &str) -> Option<std::result::Result<Frame, String>> {
     let rest = line.trim().strip_prefix('(')?;
     let (time, rest) = rest.split_once(')')?;
     let mut words = rest.split_whitespace();
-    let (_, frame) = (words.next()?, words.next()?);
+    let (channel, frame) = (words.next()?, words.next()?);
     let (id, data) = frame.split_once('#')?;
     // A remote request carries nothing; `##` and a digit of flags is CAN FD.
     let data = match data.strip_prefix('#') {
@@ -206,6 +241,7 @@ fn candump(line: &str) -> Option<std::result::Result<Frame, String>> {
         let id = can_id(number, id.len() > 3)?;
         Ok(Frame {
             ns,
+            channel: channel.to_owned(),
             id,
             data: hex(data)?,
         })
@@ -221,11 +257,12 @@ fn asc(line: &str, decimal: bool) -> Option<std::result::Result<Frame, String>> 
         return None;
     }
     let radix = if decimal { 10 } else { 16 };
-    let (id, length, data) = if words.get(1) == Some(&"CANFD") {
+    let (channel, id, length, data) = if words.get(1) == Some(&"CANFD") {
         // CANFD channel direction identifier [name] brs esi dlc length data…
         let named = words.get(5)?.parse::<u8>().is_err() || words.get(5)?.len() > 1;
         let shift = usize::from(named);
         (
+            *words.get(2)?,
             *words.get(4)?,
             words.get(8 + shift)?.parse::<usize>().ok()?,
             words.get(9 + shift..)?,
@@ -235,7 +272,12 @@ fn asc(line: &str, decimal: bool) -> Option<std::result::Result<Frame, String>> 
             return None;
         }
         let length = usize::from_str_radix(words.get(5)?, radix).ok()?;
-        (*words.get(2)?, length, words.get(6..)?)
+        (
+            *words.get(1)?,
+            *words.get(2)?,
+            length,
+            words.get(6..)?,
+        )
     };
     let parsed = || {
         let (digits, extended) = match id.strip_suffix(['x', 'X']) {
@@ -252,6 +294,7 @@ fn asc(line: &str, decimal: bool) -> Option<std::result::Result<Frame, String>> 
         };
         Ok(Frame {
             ns: seconds(time)?,
+            channel: channel.to_owned(),
             id: can_id(number, extended)?,
             data: bytes
                 .iter()
@@ -338,6 +381,26 @@ mod tests {
         );
         assert!(asc("   0.5 1  123 Rx d 8 01 02", false).unwrap().is_err());
         assert!(asc("// a comment", false).is_none());
+    }
+
+    #[test]
+    fn of_a_message_on_two_buses_one_is_read() {
+        let frame = |ns: i64, channel: &str| Frame {
+            ns,
+            channel: channel.into(),
+            id: CanId::Standard(1),
+            data: Vec::new(),
+        };
+        let mut one = vec![frame(0, "can0"), frame(1, "can0")];
+        assert_eq!(one_channel(&mut one), None);
+        let mut two = vec![frame(0, "can1"), frame(1, "can0"), frame(2, "can0")];
+        let note = one_channel(&mut two).unwrap();
+        assert!(note.contains("can1 (1 frames), can0 (2 frames): can0 is read"), "{note}");
+        assert_eq!(two.iter().map(|f| f.ns).collect::<Vec<_>>(), [1, 2]);
+        // A gateway's copies: the bus that was heard first.
+        let mut gateway = vec![frame(0, "2"), frame(1, "1"), frame(2, "2"), frame(3, "1")];
+        one_channel(&mut gateway);
+        assert_eq!(gateway.iter().map(|f| f.ns).collect::<Vec<_>>(), [0, 2]);
     }
 
     proptest! {

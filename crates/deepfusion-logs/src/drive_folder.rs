@@ -49,6 +49,18 @@ impl DriveFolder<'_> {
     /// What a folder may be made of, `dataset.toml` the last.
     pub const FILES: [&'static str; 4] = ["speed.csv", "imu.csv", "course.csv", "dataset.toml"];
 
+    /// Whether [`Self::write`] would write into a folder: the clocks are connected, and nothing of it is there yet.
+    ///
+    /// # Errors
+    /// [`Error::NoStart`], [`Error::Exists`] as [`Self::write`].
+    pub fn check(&self, out: &Path) -> Result<()> {
+        self.start()?;
+        match Self::FILES.map(|name| out.join(name)).into_iter().find(|path| path.exists()) {
+            Some(path) => Err(Error::Exists { path }),
+            None => Ok(()),
+        }
+    }
+
     /// Writes the folder, which is made where it is not there; the files in it, `dataset.toml` the last. Gives notes on what was taken for
     /// granted.
     ///
@@ -56,11 +68,9 @@ impl DriveFolder<'_> {
     /// [`Error::NoStart`] where nothing connects the log's clock with the video's; [`Error::Exists`] for a folder with files of these
     /// names; [`Error::File`].
     pub fn write(&self, out: &Path) -> Result<Vec<String>> {
+        self.check(out)?;
         let (start_ns, notes) = self.start()?;
         let files = Self::FILES.map(|name| out.join(name));
-        if let Some(path) = files.iter().find(|p| p.exists()) {
-            return Err(Error::Exists { path: path.clone() });
-        }
         std::fs::create_dir_all(out).map_err(|e| Error::file(out, e))?;
         let [speed, imu, course, config] = &files;
         save(speed, &speeds(&self.log.speeds))?;

@@ -40,5 +40,5 @@ pub use dates::time_on_clock;
 pub use drive_folder::{Camera, DriveFolder, Media};
 pub use error::{ColumnProblem, Error, Result};
 pub use log::{Clock, DriveLog, Format, Speed, YawRate};
-pub use read::{ReadOptions, is_gps_track, read};
+pub use read::{ReadOptions, is_gps_track, may_hold_log, read};
 pub use units::{SpeedUnit, UnknownUnit};

@@ -30,6 +30,12 @@ pub fn is_gps_track(path: &Path) -> bool {
     ["gpx", "nmea"].contains(&extension(path).as_str())
 }
 
+/// Whether a file is a video of a kind that may hold a log of the camera's own, as a GoPro's do; [`read`] tells whether it does.
+#[must_use]
+pub fn may_hold_log(path: &Path) -> bool {
+    ["mp4", "mov", "360", "lrv"].contains(&extension(path).as_str())
+}
+
 /// Reads a log.
 ///
 /// # Errors
@@ -40,8 +46,10 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
     if path.is_dir() {
         return export_folder::read(path, options);
     }
+    if may_hold_log(path) {
+        return gpmf::read(path);
+    }
     match extension(path).as_str() {
-        "mp4" | "mov" | "360" | "lrv" => return gpmf::read(path),
         "gpx" => return gpx::read(path),
         "nmea" => return receiver::read(path),
         "asc" => return can_trace::read(path, options),

@@ -131,7 +131,8 @@ impl SampleSet {
         skipped: &mut Vec<String>,
     ) -> Result<(Vec<Sample>, Vec<Sample>), Error> {
         let (mut train, mut held) = (Vec::new(), Vec::new());
-        let mut last = None;
+        // Why drives have no sample: an error, the last, or unsure distances.
+        let (mut last, mut unsure) = (None, Vec::<String>::new());
         let learns = |dataset: &usize| config.learn(set_of[*dataset]);
         for (dataset, recording) in datasets.iter().enumerate() {
             if learns(&dataset) == Learn::Depth {
@@ -154,6 +155,9 @@ impl SampleSet {
                             all - snippets.len(),
                             100.0 * MOST_SIGMA_SHARE
                         );
+                        if snippets.is_empty() {
+                            unsure.push(reason.clone());
+                        }
                         if !skipped.contains(&reason) {
                             skipped.push(reason);
                         }
@@ -175,12 +179,22 @@ impl SampleSet {
         }
         let depth_alone =
             (0..config.data.sets.len().max(1)).all(|s| !config.learn(s).from_motion());
+        unsure.truncate(3);
+        let reasons: Vec<String> = unsure
+            .iter()
+            .cloned()
+            .chain(last.as_ref().map(ToString::to_string))
+            .collect();
         match (train.is_empty() && !depth_alone, last) {
             (false, _) => Ok((train, held)),
-            (true, Some(error)) => Err(error.into()),
-            (true, None) => Err(Error::NoSamples {
+            (true, Some(error)) if unsure.is_empty() => Err(error.into()),
+            (true, _) => Err(Error::NoSamples {
                 data: "the data given".into(),
-                reason: skipped.last().cloned().unwrap_or("it has no drive".into()),
+                reason: if reasons.is_empty() {
+                    "it has no drive".into()
+                } else {
+                    reasons.join("; ")
+                },
             }),
         }
     }

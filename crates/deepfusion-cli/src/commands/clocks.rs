@@ -43,7 +43,13 @@ pub(super) fn seconds_of(
 
 /// Measures the offset of open recordings, and says it.
 pub(super) fn measured<'a>(datasets: impl IntoIterator<Item = &'a Dataset>) -> Result<f64> {
-    let found = common_camera_ahead(datasets)?;
+    let common = common_camera_ahead(datasets)?;
+    for why in &common.unmeasured {
+        say(&format!(
+            "warning: {why}; it gets what the other recordings show"
+        ));
+    }
+    let found = common.ahead;
     let (ahead_ms, error_ms) = (1e3 * found.ahead_s, 1e3 * found.std_error_s);
     say(&format!(
         "the camera's clock is {ahead_ms:+.0} ± {error_ms:.0} ms ahead of the vehicle's by how the pictures turn (correlation {:.2}); \

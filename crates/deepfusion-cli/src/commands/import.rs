@@ -1,4 +1,3 @@
-use std::io::ErrorKind;
 use std::path::Path;
 
 use deepfusion_data::OpenOptions;
@@ -29,7 +28,7 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
             Some(ns.ok_or_else(|| CliError::NotOnClock { word: word.clone() })?)
         }
     };
-    let folder = DriveFolder {
+    let mut folder = DriveFolder {
         log: &log,
         media: media(args, log.clock)?,
         camera: match (&args.calibration, args.intrinsics, args.hfov) {
@@ -44,10 +43,11 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
             _ => None,
         },
     };
-    let notes = folder.write(&args.out)?;
-    if args.clock_offset == Some(ClockOffset::Auto) {
-        measure_clock(folder, &args.out)?;
-    }
+    let notes = if args.clock_offset == Some(ClockOffset::Auto) {
+        write_measured(&mut folder, &args.out)?
+    } else {
+        folder.write(&args.out)?
+    };
     let (first, last) = (log.speeds.first(), log.speeds.last());
     let duration_s = first
         .zip(last)
@@ -112,19 +112,33 @@ fn merged(args: &ImportArgs) -> Result<DriveLog> {
     merged.ok_or_else(|| CliError::NoMedia.into())
 }
 
-/// Measures how far the camera's clock is ahead of the log's in a drive that was just written, and writes it again with that; where it
-/// is not found nothing is left.
-fn measure_clock(mut folder: DriveFolder<'_>, out: &Path) -> Result<()> {
-    let measured = clocks::seconds_of(Some(ClockOffset::Auto), out, &OpenOptions::default());
-    for file in DriveFolder::FILES.map(|name| out.join(name)) {
-        match std::fs::remove_file(&file) {
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error.into()),
-            _ => {}
+/// Writes the folder with how far the camera's clock is ahead of the log's, measured in a copy beside it: where that is not found, or
+/// somebody interrupts it, no folder is left that looks finished.
+fn write_measured(folder: &mut DriveFolder<'_>, out: &Path) -> Result<Vec<String>> {
+    folder.check(out)?;
+    let absolute = std::path::absolute(out)?;
+    let (Some(parent), Some(name)) = (absolute.parent(), absolute.file_name()) else {
+        return Ok(folder.write(out)?);
+    };
+    std::fs::create_dir_all(parent)?;
+    let beside = tempfile::Builder::new()
+        .prefix(".deepfusion-import-")
+        .tempdir_in(parent)?;
+    // Messages name the drive by its folder.
+    let copy = beside.path().join(name);
+    folder.write(&copy)?;
+    folder.camera_ahead_s =
+        clocks::seconds_of(Some(ClockOffset::Auto), &copy, &OpenOptions::default())?;
+    let notes = folder.write(out)?;
+    // Frames that were decoded of the video need not be decoded again.
+    for entry in std::fs::read_dir(&copy)? {
+        let entry = entry?;
+        let to = out.join(entry.file_name());
+        if entry.file_type()?.is_dir() && !to.exists() {
+            std::fs::rename(entry.path(), to)?;
         }
     }
-    folder.camera_ahead_s = measured?;
-    folder.write(out)?;
-    Ok(())
+    Ok(notes)
 }
 
 fn media(args: &ImportArgs, clock: Clock) -> Result<Media> {

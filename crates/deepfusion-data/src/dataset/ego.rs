@@ -93,7 +93,9 @@ impl Ego<'_> {
             distance_m: earlier_from_later.translation().norm(),
             distance_sigma_m: self
                 .speed_sigma_mps
-                .and_then(|sigma| Some(sigma.at(0.5 * (from_s + to_s))? * dt_s)),
+                .and_then(|sigma| Some(sigma.at(0.5 * (from_s + to_s))? * dt_s))
+                // A log's own NaN says no more than an empty cell.
+                .filter(|sigma_m| sigma_m.is_finite()),
             speed_mps: vehicle.distance_m.abs() / dt_s,
             source_from_target: self.yaw_known.then(|| {
                 if source == earlier {

@@ -25,6 +25,7 @@ const YAW_RATES: [&str; 6] = [
     "omega_z",
     "angular_velocity_z",
 ];
+const COURSE_RATES: [&str; 1] = ["course_rate"];
 
 /// A recording's speeds.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,7 +65,7 @@ impl SpeedLog {
         };
         let mut remarks = Vec::new();
         let (mut yaw_rates_radps, mut vehicle) = (None, None);
-        let (mut course_rates_radps, mut sigmas_mps) = (course_table(folder, config)?, None);
+        let (mut course_rates_radps, mut sigmas_mps) = (None, None);
         let (measured, table) = match own_or_foreign(&path, config)? {
             Either::Own(table) => {
                 let ns = times(&table, config, &mut remarks, &name(&path))?;
@@ -124,6 +125,10 @@ impl SpeedLog {
                  view_motion = \"vehicle\" and a rotation loss need",
                 name(&path)
             ));
+        }
+        let turns_known = yaw_rates_radps.is_some() || vehicle.is_some();
+        if course_rates_radps.is_none() && !turns_known {
+            course_rates_radps = course_table(folder, config, &mut remarks)?;
         }
         let speeds_mps = measured.bridged(
             config.max_gap_s,
@@ -295,14 +300,26 @@ fn sigmas(log: &DriveLog, scale: f64) -> Option<Samples> {
     (!ns.is_empty()).then_some(Samples { ns, values })
 }
 
-/// `course.csv`, which `deepfusion-logs` writes of a track of positions.
-fn course_table(folder: &Path, config: &FolderConfig) -> Result<Option<Samples>> {
+/// `course.csv`, which `deepfusion-logs` writes of a track of positions; a table of that name without its column is somebody else's.
+fn course_table(
+    folder: &Path,
+    config: &FolderConfig,
+    remarks: &mut Vec<String>,
+) -> Result<Option<Samples>> {
     let Some(path) = config.find(folder, "course", None, &["course.csv"])? else {
         return Ok(None);
     };
-    let table = Table::read(&path)?;
-    let ns = times(&table, config, &mut Vec::new(), &name(&path))?;
-    let column = table.require(&["course_rate"], "time_s,course_rate_radps")?;
+    let table = match Table::read(&path) {
+        Ok(table) if table.column(&COURSE_RATES).is_some() => table,
+        _ => {
+            remarks.push(
+                "course.csv: not read, as it is no table with time_s and course_rate_radps".into(),
+            );
+            return Ok(None);
+        }
+    };
+    let ns = times(&table, config, remarks, &name(&path))?;
+    let column = table.require(&COURSE_RATES, "time_s,course_rate_radps")?;
     let factor = yaw_factor(&table, column, config)?;
     let values = scaled(table.numbers(column)?, factor);
     Ok(Some(Samples { ns, values }))

@@ -23,7 +23,16 @@ pub(super) fn run(args: &DoctorArgs) -> Result<()> {
     let Some(path) = &args.path else {
         return machine::run(args.json);
     };
-    if is_log(path) {
+    let is_log = is_log(path);
+    if let Some(option) = out_of_place(is_log, args) {
+        return Err(CliError::OutOfPlace {
+            path: path.clone(),
+            option,
+            is_log,
+        }
+        .into());
+    }
+    if is_log {
         return log(path, args);
     }
     let mut options = OpenOptions {
@@ -44,6 +53,26 @@ pub(super) fn run(args: &DoctorArgs) -> Result<()> {
     verdict(path, &diagnosis)
 }
 
+/// An option that says nothing of what is looked at: a recording has a camera and its own file of settings, a log has columns.
+fn out_of_place(is_log: bool, args: &DoctorArgs) -> Option<&'static str> {
+    let of_logs = [
+        ("--time", args.time.is_some()),
+        ("--speed", args.speed.is_some()),
+        ("--unit", args.unit.is_some()),
+        ("--dbc", args.dbc.is_some()),
+    ];
+    let of_recordings = [
+        ("--intrinsics", args.intrinsics.is_some()),
+        ("--hfov", args.hfov.is_some()),
+        ("--topic", !args.topics.is_empty()),
+        ("--clock-offset", args.clock_offset.is_some()),
+        ("--report", args.report.is_some()),
+    ];
+    let others: &[_] = if is_log { &of_recordings } else { &of_logs };
+    let given = others.iter().find(|(_, given)| *given);
+    given.map(|(option, _)| *option)
+}
+
 /// A log of speeds by itself.
 fn log(path: &Path, args: &DoctorArgs) -> Result<()> {
     let options = ReadOptions {
@@ -54,9 +83,6 @@ fn log(path: &Path, args: &DoctorArgs) -> Result<()> {
     };
     let diagnosis = doctor_log(path, &options);
     show(&diagnosis, args)?;
-    if args.report.is_some() {
-        say("no report: a log by itself has nothing to be drawn");
-    }
     verdict(path, &diagnosis)
 }
 
