@@ -1,6 +1,9 @@
+//! What can go wrong with a recording.
+
 use crate::{DatasetKind, NamedTopic};
-use deepfusion_hint::Hint;
 use std::path::{Path, PathBuf};
+
+mod hint;
 
 /// What can go wrong with a recording.
 #[derive(Debug, thiserror::Error)]
@@ -545,140 +548,6 @@ impl Error {
     }
 }
 
-impl Hint for Error {
-    fn hint(&self) -> Option<String> {
-        use std::io::ErrorKind;
-        let text = match self {
-            Self::NoSuchPath { .. } => "check the spelling, and that the disk is mounted",
-            Self::File { source, .. } => match source.kind() {
-                ErrorKind::StorageFull => "the disk is full: free some space and run again",
-                ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
-                _ => return None,
-            },
-            Self::UnknownLayout { .. } if self.needs_ros2() => {
-                "build with the feature `ros2` to read the bags of ROS 2, with `ros2-sqlite` those with .db3 files"
-            }
-            Self::UnknownLayout { .. } => {
-                "give the folder or the video file itself; docs/guides/train-on-your-own-video.md shows each layout"
-            }
-            Self::Exists { .. } => "choose another place, or remove it first",
-            Self::Cameras { .. } => "convert them one by one, each into a folder of its own",
-            Self::NoTimes { .. } => "give the frames times: timestamps.txt, or fps in dataset.toml",
-            Self::Bag(error) => return error.hint(),
-            Self::Video(error) => return error.hint(),
-            Self::Log(error) => return error.hint(),
-            Self::Motion { source, .. } => return source.hint(),
-            Self::NotABag { .. } => {
-                "only bags have such a file; folders and videos have dataset.toml: docs/reference/dataset-toml.md"
-            }
-            Self::NoTopics { .. } => "name topics for bags alone",
-            Self::OneCamera { .. } => "ask for camera 2",
-            Self::NoCameraFile {
-                layout: DatasetKind::RgbD,
-                ..
-            } => {
-                "put camera-intrinsics.txt there; 7-Scenes publishes 585, 585, 320, 240 for its 640x480 images: \
-                 intrinsics = [585, 585, 320, 240] in dataset.toml"
-            }
-            Self::NoCameraFile {
-                layout: DatasetKind::Comma2k19,
-                ..
-            } => {
-                "comma2k19's own code gives 910, 910, 582, 437 for its 1164x874 videos: set \
-                 intrinsics = [910, 910, 582, 437] in dataset.toml"
-            }
-            Self::NoCameraFile { .. } => {
-                "put calibration.yaml (OpenCV, ROS or Kalibr) or intrinsics.txt (fx, fy, cx, cy) there, or set \
-                 intrinsics = [fx, fy, cx, cy] or hfov_deg = DEGREES (from left to right) in dataset.toml; photographs \
-                 with EXIF's focal length in 35 mm need none of these"
-            }
-            Self::NoBagCamera { config, .. } => {
-                return Some(format!(
-                    "[camera] fx, fy, cx, cy, width, height or calibration = \"camera.yaml\" in {}",
-                    config.display()
-                ));
-            }
-            Self::OwnCalibration { .. } => "open it without intrinsics",
-            Self::CameraFile { remedy, .. }
-            | Self::Columns { remedy, .. }
-            | Self::NoTrack { remedy, .. }
-            | Self::Topic { remedy, .. }
-            | Self::Frames { remedy, .. }
-            | Self::NoFrames { remedy, .. } => remedy,
-            Self::Config { .. } => "docs/reference/ lists every key of dataset.toml and bag.toml",
-            Self::Table { .. } => "correct the row or delete it",
-            Self::Clocks { .. } => {
-                "both must count from the same moment; start_s in dataset.toml is the first frame's time on the speeds' clock"
-            }
-            Self::NoPath { .. } => {
-                "KITTI raw with oxts, and what has poses (KITTI odometry, KITTI-360, nuScenes, RGB-D folders) have one"
-            }
-            Self::DepthKind { .. } => "take camera z from them",
-            Self::Program { remedy, .. } => remedy,
-            Self::Missing { remedy, .. } => remedy,
-            Self::NoImages { .. } => {
-                "fetch the images, or choose the other camera (2 is left, 3 is right)"
-            }
-            Self::Image {
-                truncated: true, ..
-            } => {
-                "the file was cut off while copying or unpacking: fetch it again, or delete it to leave the frame out"
-            }
-            Self::Image { .. } => "PNG and JPEG are read",
-            Self::FrameSize { .. } => {
-                "use the images and the calibration of one recording; resized images need their own calibration"
-            }
-            Self::Calibration { .. } => {
-                "take the calibration files that belong to the recording (KITTI raw: those of the drive's own date)"
-            }
-            Self::Json { .. } => "unpack the data set's metadata (v1.0-*_meta.tgz) again",
-            Self::SeveralVersions { .. } => "give the folder of one of them",
-            Self::Pose { .. } => {
-                "a line has the upper three rows of world_from_camera or world_from_vehicle, 12 numbers, in KITTI-360 after the \
-                 frame's number: fetch the poses again"
-            }
-            Self::TimeStamp { .. } => {
-                "lines look like 2011-09-26 13:04:32.345808896 (or, outside of KITTI raw, like 12.345), one for each frame"
-            }
-            Self::NoTimeStamp { .. } => {
-                "the file lists the whole drive, a frame's number being its line counted from 0: fetch it again"
-            }
-            Self::Oxts { .. } => {
-                "a packet is 30 numbers (oxts/dataformat.txt): repair it, or delete the file to leave the sample out"
-            }
-            Self::Tracklets { .. } => {
-                "fetch the drive's tracklets again, or move the file away to evaluate without them"
-            }
-            Self::Split { .. } => {
-                "lines look like: 2011_09_26/2011_09_26_drive_0009_sync 16 l, or: scenario = garage"
-            }
-            Self::SplitSelectsNothing { .. } => {
-                "give the folder that holds the dates named in the split, and the camera its sides ask for"
-            }
-            Self::Offsets { .. } => "use [1] for pairs or [-1, 1] for three frames",
-            Self::OneFrame { .. } => "evaluate on it, but train on a longer drive",
-            Self::Standing { .. } => {
-                "a standing camera shows no parallax: leave the drive out, or lower the smallest speed"
-            }
-            Self::NoPairs {
-                frame_distance_m, ..
-            } if *frame_distance_m > 0.0 => {
-                "the drive is too short for frames so far apart: lower frame_distance_m, or the offsets"
-            }
-            Self::NoPairs { .. } => {
-                "train on a drive with consecutive frames and speeds about their times, at least every 0.5 s"
-            }
-            Self::Cloud(inner) => return inner.hint(),
-            Self::Array { .. } => "check the free space and the permissions of the folder",
-            Self::NoScans { .. } => {
-                "velodyne_points/data/<frame>.bin is needed: fetch the drive's velodyne_points"
-            }
-            Self::Size { .. } => return None,
-        };
-        Some(text.to_owned())
-    }
-}
-
 /// How far apart the frames of a step were to be, if they were.
 fn a_step(frame_distance_m: f64) -> String {
     if frame_distance_m > 0.0 {
@@ -691,6 +560,7 @@ fn a_step(frame_distance_m: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_hint::Hint;
 
     #[test]
     #[cfg(target_os = "linux")]

@@ -33,8 +33,8 @@ mod timing;
 mod turn;
 
 pub use camera_ahead::{
-    CameraAhead, CommonCameraAhead, LEAST_CORRELATION, MOST_STD_ERROR_S, MOST_TRACK_STD_ERROR_S, NoCameraAhead,
-    camera_ahead, common_camera_ahead,
+    CameraAhead, CommonCameraAhead, LEAST_CORRELATION, MOST_STD_ERROR_S, MOST_TRACK_STD_ERROR_S,
+    NoCameraAhead, camera_ahead, common_camera_ahead,
 };
 pub use finding::{Figure, Finding, Limit, Outcome, Severity, Status};
 pub use log::{doctor_log, is_log};

@@ -272,12 +272,7 @@ fn asc(line: &str, decimal: bool) -> Option<std::result::Result<Frame, String>> 
             return None;
         }
         let length = usize::from_str_radix(words.get(5)?, radix).ok()?;
-        (
-            *words.get(1)?,
-            *words.get(2)?,
-            length,
-            words.get(6..)?,
-        )
+        (*words.get(1)?, *words.get(2)?, length, words.get(6..)?)
     };
     let parsed = || {
         let (digits, extended) = match id.strip_suffix(['x', 'X']) {
@@ -395,7 +390,10 @@ mod tests {
         assert_eq!(one_channel(&mut one), None);
         let mut two = vec![frame(0, "can1"), frame(1, "can0"), frame(2, "can0")];
         let note = one_channel(&mut two).unwrap();
-        assert!(note.contains("can1 (1 frames), can0 (2 frames): can0 is read"), "{note}");
+        assert!(
+            note.contains("can1 (1 frames), can0 (2 frames): can0 is read"),
+            "{note}"
+        );
         assert_eq!(two.iter().map(|f| f.ns).collect::<Vec<_>>(), [1, 2]);
         // A gateway's copies: the bus that was heard first.
         let mut gateway = vec![frame(0, "2"), frame(1, "1"), frame(2, "2"), frame(3, "1")];

@@ -55,7 +55,11 @@ impl DriveFolder<'_> {
     /// [`Error::NoStart`], [`Error::Exists`] as [`Self::write`].
     pub fn check(&self, out: &Path) -> Result<()> {
         self.start()?;
-        match Self::FILES.map(|name| out.join(name)).into_iter().find(|path| path.exists()) {
+        match Self::FILES
+            .map(|name| out.join(name))
+            .into_iter()
+            .find(|path| path.exists())
+        {
             Some(path) => Err(Error::Exists { path }),
             None => Ok(()),
         }

@@ -1,0 +1,67 @@
+//! What several workers hold in common.
+
+use super::Trainer;
+use crate::Error;
+use crate::learned_focal::LearnedFocal;
+use deepfusion_nn::weights::{apply, collect};
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+impl Trainer {
+    /// That all workers begin from the same.
+    pub(super) fn agree(&mut self) -> Result<(), Error> {
+        if self.workers.count() == 1 {
+            return Ok(());
+        }
+        let mut weights = DefaultHasher::new();
+        let focal = self.model.focal.as_ref().map(LearnedFocal::ratio);
+        focal.map(f64::to_bits).hash(&mut weights);
+        for (prefix, values) in [
+            ("depth", collect(&self.model.depth_net)),
+            ("pose", collect(&self.model.pose_net)),
+        ] {
+            prefix.hash(&mut weights);
+            for tensor in values.tensors.values() {
+                tensor
+                    .values
+                    .iter()
+                    .for_each(|v| v.to_bits().hash(&mut weights));
+            }
+        }
+        let mut samples = DefaultHasher::new();
+        (self.train.samples.len(), self.train.depth.len()).hash(&mut samples);
+        let mut settings = DefaultHasher::new();
+        let config = &self.config;
+        let rate = config.learning_rate.to_bits();
+        (config.batch, config.accumulate, config.seed, rate).hash(&mut settings);
+        (self.state.step, self.steps()).hash(&mut settings);
+        // Of another assumed camera the same ln(f/f₀) is another f.
+        let camera = config.assumed_camera.map(|camera| {
+            let numbers = [camera.hfov_deg, camera.aspect, camera.learning_rate];
+            (numbers.map(f64::to_bits), camera.learn)
+        });
+        camera.hash(&mut settings);
+        self.workers
+            .hold_the_same([weights.finish(), samples.finish(), settings.finish()])
+    }
+
+    /// Running statistics of batch norms are each worker's own between checkpoints; now they become their means.
+    pub(super) fn share_statistics(&mut self) -> Result<(), Error> {
+        if self.workers.count() == 1 {
+            return Ok(());
+        }
+        let (depth, pose) = (self.model.depth_net.clone(), self.model.pose_net.clone());
+        self.model.depth_net = apply(
+            depth,
+            &self
+                .workers
+                .mean_statistics(collect(&self.model.depth_net))?,
+        )?;
+        self.model.pose_net = apply(
+            pose,
+            &self
+                .workers
+                .mean_statistics(collect(&self.model.pose_net))?,
+        )?;
+        Ok(())
+    }
+}

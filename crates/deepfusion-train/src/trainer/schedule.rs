@@ -1,0 +1,59 @@
+//! What changes over a run: learning rate, weights of the losses, when a checkpoint is due.
+
+use super::Trainer;
+use crate::losses::speed_weight;
+use crate::{LearningRateSchedule, Schedule};
+use deepfusion_kernels::AdamStep;
+use std::time::Duration;
+
+/// Share of the learning rate at which the cosine schedule ends.
+const COSINE_END: f64 = 0.01;
+
+impl Trainer {
+    /// Whether enough time has passed since the last checkpoint to write one between validations.
+    pub(super) fn checkpoint_is_due(&self, passed: Duration) -> bool {
+        let minutes = self.config.checkpoint_minutes;
+        minutes > 0.0 && passed.as_secs_f64() >= 60.0 * minutes
+    }
+
+    /// The schedule at the current step.
+    pub(super) fn schedule(&self, steps: usize) -> Schedule {
+        let (step, loss) = (self.state.step, &self.config.loss);
+        Schedule {
+            speed_weight: speed_weight(
+                loss.speed,
+                step,
+                steps,
+                self.epoch_steps(),
+                loss.speed_warmup_steps,
+            ),
+            masks_active: step as f64 >= loss.moving.warmup_share * steps as f64,
+        }
+    }
+
+    pub(super) fn learning_rate(&self, steps: usize) -> f64 {
+        let done = self.state.step as f64 / steps as f64;
+        let factor = match self.config.learning_rate_schedule {
+            LearningRateSchedule::Drop if done < self.config.learning_rate_drop => 1.0,
+            LearningRateSchedule::Drop => 0.1,
+            LearningRateSchedule::Cosine => {
+                let end = COSINE_END;
+                end + (1.0 - end) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos())
+            }
+        };
+        let warmup = self.config.learning_rate_warmup_steps.max(1) as f64;
+        let rise = ((self.state.step + 1) as f64 / warmup).min(1.0);
+        self.config.learning_rate * rise * factor
+    }
+
+    /// A step of the optimiser at the focal length's own step size, as far into its schedule as the networks'.
+    pub(super) fn focal_step(&self, step: AdamStep) -> AdamStep {
+        let own = self.config.learned_camera();
+        let share = f64::from(step.learning_rate) / self.config.learning_rate;
+        AdamStep {
+            learning_rate: own.map_or(0.0, |camera| share * camera.learning_rate) as f32,
+            weight_decay: 0.0,
+            ..step
+        }
+    }
+}

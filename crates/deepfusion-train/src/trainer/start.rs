@@ -1,0 +1,66 @@
+//! What must hold before a run begins, and what its samples say.
+
+use super::validation::no_samples;
+use crate::{Error, SampleSet, TrainConfig};
+use burn::tensor::Device;
+use deepfusion_model::{SetFindings, TrainFindings};
+use deepfusion_nn::ops::{Precision, supports};
+
+/// Metres per unit of PoseNet's translation; 1 without video, where it does not matter.
+fn first_unit(config: &TrainConfig, set: &SampleSet) -> f64 {
+    if set.samples.is_empty() {
+        1.0
+    } else {
+        config.first_unit(set.mean_displacement_m())
+    }
+}
+
+/// What the training samples say: their cameras, and the units that the configuration leaves open.
+pub(super) fn findings(config: &TrainConfig, train: &SampleSet) -> TrainFindings {
+    let unit = |set: f64, samples: &SampleSet| (set == 0.0).then(|| first_unit(config, samples));
+    let sets = config.data.sets.iter().enumerate().map(|(i, set)| {
+        let own = train.of_set(i);
+        SetFindings {
+            name: set.name.clone(),
+            metres_per_unit: unit(set.metres_per_unit, &own),
+            camera: own.camera(),
+        }
+    });
+    TrainFindings {
+        metres_per_unit: unit(config.pose_net.metres_per_unit, train),
+        camera: train.camera(),
+        learned_camera: None,
+        sets: sets.collect(),
+    }
+}
+
+/// # Errors
+/// [`Error::Precision`] for a number format that the device does not compute in.
+pub(super) fn check_precision(config: &TrainConfig, device: &Device) -> Result<(), Error> {
+    if supports(device, config.precision) {
+        return Ok(());
+    }
+    Err(Error::Precision {
+        found: match config.precision {
+            Precision::F32 => "f32",
+            Precision::Bf16 => "bf16",
+        },
+    })
+}
+
+/// # Errors
+/// [`Error::NoSamples`] without anything to train on, [`Error::NoValidation`] if samples should be held out and
+/// none are.
+pub(super) fn check_samples(
+    config: &TrainConfig,
+    train: &SampleSet,
+    validation: &SampleSet,
+) -> Result<(), Error> {
+    if train.is_empty() {
+        return Err(no_samples("the training data"));
+    }
+    if validation.is_empty() && config.validation_share > 0.0 {
+        return Err(Error::NoValidation);
+    }
+    Ok(())
+}

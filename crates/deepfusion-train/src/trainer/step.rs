@@ -1,0 +1,180 @@
+//! What one worker learns from its part of a step, and the step of the optimiser.
+
+use super::{FOCAL, Trainer};
+use crate::model::displacement_ratio;
+use crate::workers::Crew;
+use crate::{
+    BatchLoader, BatchLoss, DepthBatch, DepthLoader, DepthPass, Error, ForwardPass, LossTerms,
+    Model, NamedGradients, SamplePanel, SampleSet, Schedule, TrainConfig,
+};
+use burn::tensor::Tensor;
+use deepfusion_kernels::AdamStep;
+use deepfusion_nn::ops::autocast;
+
+impl Trainer {
+    /// Losses and gradients of this worker's part of a step: the means over its `accumulate` batches.
+    pub(super) fn learn(&self, loaders: &Loaders, schedule: Schedule) -> Result<Learned, Error> {
+        let mut learned = Learned::default();
+        let scale = 1.0 / self.config.accumulate as f64;
+        for _ in 0..self.config.accumulate {
+            if let Some(loader) = &loaders.video {
+                let batch = self.model.see(next(|| loader.next(&self.device))?);
+                learned.images += batch.len() * (1 + batch.offsets.len());
+                let (pass, loss) = autocast(self.config.precision, || {
+                    let pass = self.model.forward(&batch);
+                    let loss = self.model.loss(&pass, &batch, schedule);
+                    (pass, loss)
+                });
+                self.check_finite(&loss.terms, &batch.names)?;
+                learned.losses.add(&loss.terms, scale);
+                learned.monitors.valid.push(loss.terms.valid_share);
+                learned.monitors.moving.push(loss.terms.moving_share);
+                learned
+                    .monitors
+                    .ratio
+                    .push(displacement_ratio(&pass, &batch));
+                self.add_gradients(&mut learned.gradients, &loss.total, scale);
+                // The pass's first target is the batch's first sample.
+                let shown = batch.names.first().cloned().unwrap_or_default();
+                learned.names.extend(batch.names);
+                learned.panel = Some(Shown::View(Box::new((pass, loss, shown))));
+            }
+            if let Some(loader) = &loaders.depth {
+                let batch = next(|| loader.next(&self.device))?;
+                learned.images += batch.len();
+                let pass = autocast(self.config.precision, || self.model.learn_depth(&batch));
+                self.check_finite(&pass.terms, &batch.names)?;
+                learned.losses.add(&pass.terms, scale);
+                if loaders.video.is_none() {
+                    learned.monitors.ratio.push(pass.scale_ratio);
+                }
+                self.add_gradients(&mut learned.gradients, &pass.total, scale);
+                learned.names.extend(batch.names.iter().cloned());
+                let panel = learned.panel.take();
+                learned.panel = panel.or(Some(Shown::Depth(Box::new((pass, batch)))));
+            }
+        }
+        Ok(learned)
+    }
+
+    /// # Errors
+    /// [`Error::NotFinite`] naming the first term that is not finite.
+    fn check_finite(&self, terms: &LossTerms, names: &[String]) -> Result<(), Error> {
+        match terms.not_finite() {
+            None => Ok(()),
+            Some((term, value)) => Err(Error::NotFinite {
+                step: self.state.step + 1,
+                term,
+                value,
+                frames: names.join(", "),
+            }),
+        }
+    }
+
+    /// Adds a loss' gradients, `scale` times.
+    fn add_gradients(&self, gradients: &mut NamedGradients, total: &Tensor<1>, scale: f64) {
+        let (mut raw, scale) = (total.backward(), scale as f32);
+        gradients.add("depth", &self.model.depth_net, &mut raw, scale);
+        gradients.add("pose", &self.model.pose_net, &mut raw, scale);
+        if let Some(decoder) = &self.model.flow_decoder {
+            gradients.add("flow", decoder, &mut raw, scale);
+        }
+        if let Some(focal) = &self.model.focal {
+            gradients.add(FOCAL, focal, &mut raw, scale);
+        }
+    }
+
+    /// A step of the optimiser on everything that learns.
+    pub(super) fn apply(&mut self, step: AdamStep, gradients: &NamedGradients) {
+        let Model {
+            depth_net,
+            pose_net,
+            flow_decoder,
+            focal,
+            ..
+        } = self.model.clone();
+        self.model.depth_net = self.adam.apply(&step, "depth", depth_net, gradients);
+        self.model.pose_net = self.adam.apply(&step, "pose", pose_net, gradients);
+        self.model.flow_decoder =
+            flow_decoder.map(|decoder| self.adam.apply(&step, "flow", decoder, gradients));
+        let step = self.focal_step(step);
+        let applied = focal.map(|focal| self.adam.apply(&step, FOCAL, focal, gradients));
+        self.model.focal = match self.config.learned_camera() {
+            Some(camera) => applied.map(|focal| focal.held_to(camera)),
+            None => applied,
+        };
+    }
+}
+
+/// The loaders of the training data.
+pub(super) struct Loaders {
+    video: Option<BatchLoader>,
+    depth: Option<DepthLoader>,
+}
+
+impl Loaders {
+    /// From a step on, this worker's batches: of K workers every K-th.
+    pub(super) fn training(
+        config: &TrainConfig,
+        set: &SampleSet,
+        step: usize,
+        workers: &Crew,
+    ) -> Self {
+        let (rank, count) = (workers.rank(), workers.count());
+        let first = step * config.accumulate * count + rank;
+        let numbers = move || (first..).step_by(count);
+        let video = !set.samples.is_empty();
+        Self {
+            video: video.then(|| BatchLoader::training_batches(config, set.clone(), numbers())),
+            depth: (!set.depth.is_empty())
+                .then(|| DepthLoader::training_batches(config, set.depth.clone(), numbers())),
+        }
+    }
+}
+
+/// What a worker has learned from its part of a step.
+#[derive(Default)]
+pub(super) struct Learned {
+    pub(super) gradients: NamedGradients,
+    pub(super) losses: LossTerms,
+    /// Drives and frames.
+    pub(super) names: Vec<String>,
+    pub(super) images: usize,
+    pub(super) panel: Option<Shown>,
+    pub(super) monitors: Monitors,
+}
+
+/// Figures of each batch that are smoothed over the steps.
+#[derive(Default)]
+pub(super) struct Monitors {
+    pub(super) ratio: Vec<f64>,
+    pub(super) valid: Vec<f64>,
+    pub(super) moving: Vec<f64>,
+}
+
+/// What a panel shows.
+pub(super) enum Shown {
+    View(Box<(ForwardPass, BatchLoss, String)>),
+    Depth(Box<(DepthPass, DepthBatch)>),
+}
+
+impl Shown {
+    pub(super) fn panel(self) -> SamplePanel {
+        match self {
+            Self::View(parts) => {
+                let (pass, loss, name) = *parts;
+                SamplePanel::first(&pass, &loss, name)
+            }
+            Self::Depth(parts) => SamplePanel::of_depth(&parts.0, &parts.1),
+        }
+    }
+}
+
+/// The next batch of a loader that never ends.
+fn next<T>(batch: impl FnOnce() -> Option<Result<T, Error>>) -> Result<T, Error> {
+    batch().unwrap_or_else(|| {
+        Err(Error::Loader {
+            reason: "it has no further batch".into(),
+        })
+    })
+}
