@@ -291,8 +291,8 @@ impl Reportable for CliError {
     fn exit(&self) -> Exit {
         match self {
             Self::Interrupted { .. } | Self::Stopped { .. } | Self::Ended { .. } => Exit::Stopped,
-            // Clap could not miss it: whether it is needed depends on what is embedded.
-            Self::NoModelGiven => Exit::WrongArguments,
+            // Clap could not see it: what is needed depends on what is embedded, what applies on what lies at the path.
+            Self::NoModelGiven | Self::OutOfPlace { .. } => Exit::WrongArguments,
             _ => Exit::Failed,
         }
     }

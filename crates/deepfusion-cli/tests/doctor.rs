@@ -248,6 +248,14 @@ fn a_log_by_itself_is_told_with_what_to_do() {
     let told = run(&at, &format!("doctor vector.blf {can}"));
     assert_eq!(told.code, 0, "{}", told.stderr);
     assert_eq!(run(&at, "doctor vector.blf").code, 1);
+    // A log has no camera and no picture.
+    for option in ["--hfov 60", "--clock-offset auto", "--report page.html"] {
+        let name = option.split(' ').next().unwrap();
+        let told = run(&at, &format!("doctor phone.gpx {option}"));
+        assert_eq!(told.code, 2);
+        let expected = format!("{name} does not apply to a log of speeds by itself");
+        assert!(told.stderr.contains(&expected), "{}", told.stderr);
+    }
 }
 
 #[test]

@@ -304,3 +304,30 @@ fn units_of_an_inertial_unit_are_never_guessed() {
     );
     assert!(error.hint().unwrap().contains("accel_x_mps2"), "{error}");
 }
+
+#[test]
+fn the_course_of_positions_is_read_where_no_yaw_rate_is() {
+    let speed = ("speed.csv", "time_s,speed_mps\n0,10\n1,10\n");
+    let course = ("course.csv", "time_s,course_rate_radps\n0,0.1\n1,0.2\n");
+    let rates = |files: &[(&str, &str)]| {
+        let log = read(files).unwrap();
+        (log.course_rates_radps.map(|c| c.values), log.remarks)
+    };
+    assert_eq!(rates(&[speed, course]).0, Some(vec![0.1, 0.2]));
+    let with_yaw = (
+        "speed.csv",
+        "time_s,speed_mps,yaw_rate_radps\n0,10,0\n1,10,0\n",
+    );
+    assert_eq!(rates(&[with_yaw, course]).0, None);
+    // Somebody's own table of that name stops nothing.
+    for other in ["lesson,room\nA,1\n", "time_s,course_deg\n0,10\n", ""] {
+        let (found, remarks) = rates(&[speed, ("course.csv", other)]);
+        assert_eq!(found, None, "{other}");
+        assert!(
+            remarks
+                .iter()
+                .any(|r| r.starts_with("course.csv: not read")),
+            "{remarks:?}"
+        );
+    }
+}
