@@ -152,6 +152,53 @@ fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
     assert!(at.join("given/course.csv").exists());
     let speeds = fs::read_to_string(at.join("given/speed.csv")).unwrap();
     assert!(speeds.starts_with("time_s,speed_mps,speed_sigma_mps\n"));
+    let import = "data import track.gpx --images images --intrinsics 139.43,277.07,117.13,65.82 --clock-offset auto --out measured";
+    let told = ok(at, import);
+    is_within(&told.stderr, 240.0);
+    let config = fs::read_to_string(at.join("measured/dataset.toml")).unwrap();
+    let written = config.split("camera_ahead_s = ").nth(1).unwrap().trim();
+    assert!(
+        (written.parse::<f64>().unwrap() - 0.24).abs() < 0.05,
+        "{config}"
+    );
+    fails(at, import, &["speed.csv: is there already"]);
+    // Clocks that were not set together are not one clock.
+    fails(
+        at,
+        "data convert ahead behind --out both --clock-offset auto",
+        &["those of all drives together", "one by one"],
+    );
+    // One that shows nothing gets what the others show, unless it says something else.
+    folder(at, "straight", &readings[..80], 0.24);
+    let straight = readings[..80].iter().fold(
+        String::from("time_s,speed_mps,yaw_rate_radps\n"),
+        |text, reading| text + &format!("{:.6},8.0,0.0\n", reading.time_s),
+    );
+    fs::write(at.join("straight/speed.csv"), straight).unwrap();
+    let both = "data convert ahead straight --out both --clock-offset auto";
+    let told = ok(at, both);
+    assert!(
+        told.stderr
+            .contains("it gets what the other recordings show"),
+        "{}",
+        told.stderr
+    );
+    let mut config = fs::read_to_string(at.join("straight/dataset.toml")).unwrap();
+    config += "[clock]\ncamera_ahead_s = 0.7\n";
+    fs::write(at.join("straight/dataset.toml"), config).unwrap();
+    fails(
+        at,
+        &both.replace("both", "again"),
+        &["straight: it says", "+0.700 s"],
+    );
+    let left = fs::read_dir(at).unwrap();
+    let left: Vec<_> = left.map(|entry| entry.unwrap().file_name()).collect();
+    assert!(
+        !left
+            .iter()
+            .any(|name| name.to_string_lossy().starts_with(".deepfusion")),
+        "{left:?}"
+    );
 }
 
 #[test]
@@ -171,6 +218,14 @@ fn an_offset_that_cannot_be_found_is_refused() {
         "data inspect straight --clock-offset auto",
         &["nothing measured changes", "--clock-offset MS"],
     );
+    // A log whose clock cannot be measured becomes no drive.
+    fs::copy(at.join("straight/frames.csv"), at.join("images/frames.csv")).unwrap();
+    fails(
+        at,
+        "data import straight/speed.csv --images images --hfov 80 --clock-offset auto --out drive",
+        &["--clock-offset MS"],
+    );
+    assert!(!at.join("drive").exists());
     // Turns of another drive.
     folder(at, "other", &readings, 0.2);
     let mut table = String::from("time_s,speed_mps,yaw_rate_radps\n");
