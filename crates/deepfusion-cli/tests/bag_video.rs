@@ -388,9 +388,9 @@ fn what_comes_before_the_first_key_frame_is_left_out_and_said() {
     late[..3].fill(None);
     let bag = drive.bag("late.bag", Kind::Packet, "h264", &late);
     drive.came_back(&bag, KEYS);
-    let remarks = open(&bag).unwrap().remarks().join("\n");
+    let warnings = open(&bag).unwrap().warnings().join("\n");
     let said = format!("/camera/image_rect/ffmpeg: the first {} messages", KEYS - 3);
-    assert!(remarks.contains(&said), "{remarks}");
+    assert!(warnings.contains(&said), "{warnings}");
 
     // None at all: nothing can be seen.
     let mut none = some(&packets);

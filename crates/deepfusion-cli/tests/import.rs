@@ -89,8 +89,8 @@ fn a_log_beside_its_images_is_a_drive() {
     fs::write(at.join("beside/dataset.toml"), config).unwrap();
     let beside = json(at, "data inspect beside --json");
     assert!((mean(&beside) - mean(&imported)).abs() < 1e-4);
-    let remarks = beside["drives"][0]["remarks"].to_string();
-    assert!(remarks.contains("taken for UTC"), "{remarks}");
+    let warnings = beside["drives"][0]["remarks"].to_string();
+    assert!(warnings.contains("taken for UTC"), "{warnings}");
 
     // The camera by its field of view, 160 pixels of 90 degrees; as an option, too.
     let import_by_view = "data import torque.csv --zone +01:00 --images images";

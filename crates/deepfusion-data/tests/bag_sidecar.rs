@@ -290,7 +290,7 @@ fn a_signal_without_a_frame_is_told() {
     });
     let dataset = open(&drive.bag).unwrap();
     assert_eq!(dataset.frames()[12].speed_mps, None);
-    says(&dataset.remarks().join("\n"), &["can.speed", "0x158"]);
+    says(&dataset.warnings().join("\n"), &["can.speed", "0x158"]);
 }
 
 const CALIBRATION: &str = "%YAML:1.0\n---\n\
@@ -386,10 +386,10 @@ fn a_bag_without_a_camera_is_left_out_of_a_folder_and_named() {
     bag.finish().unwrap();
     let all = Dataset::open(drive.folder.path(), &OpenOptions::default()).unwrap();
     assert_eq!(all.len(), 1);
-    let remarks = all[0].remarks().join("\n");
+    let warnings = all[0].warnings().join("\n");
     assert!(
-        remarks.contains("left out") && remarks.contains("lidar"),
-        "{remarks}"
+        warnings.contains("left out") && warnings.contains("lidar"),
+        "{warnings}"
     );
     let seen = inspect(drive.folder.path()).unwrap();
     assert_eq!((seen.frames, seen.drives.len()), (all[0].frames().len(), 1));
@@ -450,21 +450,21 @@ fn messages_without_a_time_have_that_of_their_recording() {
         "{}",
         drive.turn_rad()
     );
-    let remarks = dataset.remarks().join("\n");
+    let warnings = dataset.warnings().join("\n");
     for topic in ["/twist", "/imu", "/drive"] {
         says(
-            &remarks,
+            &warnings,
             &[&format!(
                 "{topic}: 25 messages have no time in their header"
             )],
         );
     }
-    assert!(!remarks.contains("/camera"), "{remarks}");
+    assert!(!warnings.contains("/camera"), "{warnings}");
     let stamped = Drive::new(sidecar, |bag| {
         bag.twist("/twist", 10.0).float("/bare", 1.0);
     });
-    let remarks = open(&stamped.bag).unwrap().remarks().join("\n");
-    assert!(!remarks.contains("no time"), "{remarks}");
+    let warnings = open(&stamped.bag).unwrap().warnings().join("\n");
+    assert!(!warnings.contains("no time"), "{warnings}");
 }
 
 /// Of CAN frames, too.
@@ -475,7 +475,7 @@ fn frames_of_the_bus_without_a_time_have_that_of_their_recording() {
     });
     near(drive.speed(), 10.0);
     says(
-        &open(&drive.bag).unwrap().remarks().join("\n"),
+        &open(&drive.bag).unwrap().warnings().join("\n"),
         &["/can: 25 messages"],
     );
 }

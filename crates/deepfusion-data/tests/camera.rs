@@ -192,9 +192,9 @@ fn photographs_say_what_their_camera_is() {
             "{name} {k:?}"
         );
         assert_eq!((k.fx, k.cx, k.cy), (k.fy, 31.5, 23.5));
-        let remarks = dataset.remarks();
-        let remark = remarks.iter().find(|r| r.contains("EXIF")).unwrap();
-        assert!(remark.contains(told), "{remark}");
+        let warnings = dataset.warnings();
+        let warning = warnings.iter().find(|r| r.contains("EXIF")).unwrap();
+        assert!(warning.contains(told), "{warning}");
         // A single picture knows the same.
         let photo = load_photo(&folder.join("images/000.jpg")).unwrap();
         assert_eq!(photo.intrinsics.unwrap().fx, k.fx);

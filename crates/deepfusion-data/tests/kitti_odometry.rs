@@ -126,7 +126,7 @@ fn a_sequence_has_the_simulator_s_camera_motion_path_and_depth() {
     assert_eq!(json["kind"], "kitti_odometry");
     assert!(
         seen.drives[0]
-            .remarks
+            .warnings
             .iter()
             .any(|r| r.contains("KITTI raw's calibration"))
     );

@@ -158,7 +158,7 @@ fn a_scene_has_the_simulator_s_camera_motion_path_and_depth() {
     assert_eq!(serde_json::to_value(&seen).unwrap()["kind"], "nuscenes");
     let scans = seen.streams.iter().find(|s| s.name == "LIDAR_TOP").unwrap();
     assert!((scans.rate_hz.unwrap() - 12.0).abs() < 0.5);
-    assert!(dataset.remarks().iter().all(|r| !r.contains("not there")));
+    assert!(dataset.warnings().iter().all(|r| !r.contains("not there")));
 }
 
 #[test]
@@ -174,11 +174,11 @@ fn scenes_and_frames_whose_files_are_elsewhere_are_left_out() {
     assert_eq!(keyframes.frames()[1].time_s, frames[6].time_s);
     assert!(
         keyframes
-            .remarks()
+            .warnings()
             .iter()
             .any(|r| r.contains("6 of 8 images are not there")),
         "{:?}",
-        keyframes.remarks()
+        keyframes.warnings()
     );
     assert!(
         keyframes

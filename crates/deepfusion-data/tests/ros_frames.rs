@@ -98,10 +98,10 @@ fn is_the_drive(dataset: &Dataset, known: &Known) {
     let rms = (of(|p| (p.0 - p.1).powi(2)) / pairs.len() as f64).sqrt();
     assert!(rms < 0.5, "{rms} m/s");
 
-    let remarks = dataset.remarks().join("\n");
-    assert!(!remarks.contains("nothing says"), "{remarks}");
+    let warnings = dataset.warnings().join("\n");
+    assert!(!warnings.contains("nothing says"), "{warnings}");
     says(
-        &remarks,
+        &warnings,
         &[
             "/gnss/fix: 1 of 10 messages have no position",
             "smoothed, sure to 0.",
@@ -232,8 +232,8 @@ fn the_file_goes_before_the_frames_and_a_disagreement_is_told() {
     let alone = Drive::new("", frames).opened();
     is_near(&camera(&alone).0, place);
     is_near(&camera(&alone).1, [1.0, 0.0, 0.0]);
-    let remarks = alone.remarks().join("\n");
-    assert!(!remarks.contains("cam_from_vehicle"), "{remarks}");
+    let warnings = alone.warnings().join("\n");
+    assert!(!warnings.contains("cam_from_vehicle"), "{warnings}");
 
     let file = |x: f64| {
         format!(
@@ -242,11 +242,11 @@ fn the_file_goes_before_the_frames_and_a_disagreement_is_told() {
     };
     let same = Drive::new(&file(-1.501), frames).opened();
     is_near(&camera(&same).0, [1.501, 0.0, 1.2]);
-    assert!(!same.remarks().join("\n").contains("apart"));
+    assert!(!same.warnings().join("\n").contains("apart"));
     let other = Drive::new(&file(-1.9), frames).opened();
     is_near(&camera(&other).0, [1.9, 0.0, 1.2]);
     says(
-        &other.remarks().join("\n"),
+        &other.warnings().join("\n"),
         &[
             "cam_from_vehicle",
             "drive.toml and frames base_link → camera are 0.400 m and 0.00° apart",
@@ -281,7 +281,7 @@ fn the_frames_go_before_a_profile() {
     // 0.3 m above the camera, where its y looks down.
     is_near(&mount(&both).translation.into(), [0.0, -0.3, 0.0]);
     assert_eq!(mount(&both).source, "frames lidar → base_link → camera");
-    says(&both.remarks().join("\n"), &["the profile umad", "apart"]);
+    says(&both.warnings().join("\n"), &["the profile umad", "apart"]);
     assert!(both.has_ground_truth(3));
 }
 
@@ -384,9 +384,9 @@ fn a_camera_that_pans_has_no_mount() {
         });
     });
     let dataset = drive.opened();
-    let remarks = dataset.remarks().join("\n");
+    let warnings = dataset.warnings().join("\n");
     says(
-        &remarks,
+        &warnings,
         &[
             "cam_from_vehicle: the frames base_link and camera are not fixed to each other",
             "27.50°",
@@ -427,8 +427,8 @@ fn a_frame_that_is_not_optical_is_told_and_turned() {
         ahead.x > 0.99 && ahead.y > 0.05 && ahead.z < -0.03,
         "{ahead}"
     );
-    let remarks = dataset.remarks().join("\n");
-    says(&remarks, &["the images' frame camera has its z axis up"]);
+    let warnings = dataset.warnings().join("\n");
+    says(&warnings, &["the images' frame camera has its z axis up"]);
     // The scan's point is 10 m ahead of the LiDAR, 0.4 m higher than the camera: in the picture, or it were not seen.
     let lidar = dataset.mounts().iter().find(|m| m.name == "cam_from_lidar");
     let cam_from_lidar = Se3::from_axis_angle(
@@ -447,9 +447,9 @@ fn frames_that_lead_nowhere_are_told() {
             vec![("base_link", "cam0", [1.0, 0.0, 1.0], OPTICAL)]
         });
     });
-    let remarks = missing.opened().remarks().join("\n");
+    let warnings = missing.opened().warnings().join("\n");
     says(
-        &remarks,
+        &warnings,
         &[
             "the frame of the images, camera, is in no transform",
             "frames.camera in",
@@ -472,9 +472,9 @@ fn frames_that_lead_nowhere_are_told() {
             vec![("chassis", "camera", [1.0, 0.0, 1.0], OPTICAL)]
         });
     });
-    let remarks = nameless.opened().remarks().join("\n");
+    let warnings = nameless.opened().warnings().join("\n");
     says(
-        &remarks,
+        &warnings,
         &[
             "camera, chassis is known as the vehicle's",
             "frames.vehicle",
@@ -663,8 +663,8 @@ fn the_file_that_is_written_says_what_was_found() {
     }
     assert_eq!(before.mounts().len(), 3);
     assert_eq!(
-        before.remarks(),
-        after.remarks(),
+        before.warnings(),
+        after.warnings(),
         "nothing contradicts anything"
     );
     let speeds = |dataset: &Dataset| -> Vec<Option<f64>> {

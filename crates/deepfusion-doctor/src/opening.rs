@@ -67,8 +67,8 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
             "record an inertial unit or the steering angle",
         );
     }
-    for remark in survey.dataset.remarks() {
-        let damaged = remark.contains("damaged") || remark.contains("cannot be read");
+    for warning in survey.dataset.warnings() {
+        let damaged = warning.contains("damaged") || warning.contains("cannot be read");
         let severity = if damaged {
             Severity::Warning
         } else {
@@ -79,7 +79,7 @@ pub(super) fn check(survey: &Survey<'_>, others_train: bool) -> Outcome {
         } else {
             "see that it is so, or say otherwise in the file beside the recording"
         };
-        outcome.find(severity, None, remark.clone(), remedy);
+        outcome.find(severity, None, warning.clone(), remedy);
     }
     outcome
 }

@@ -37,7 +37,7 @@ fn the_data_set_is_that_of_the_ros1_bag() {
         assert_eq!(found.intrinsics(0), expected.intrinsics(0));
         assert_eq!(found.cam_from_vehicle(), expected.cam_from_vehicle());
         assert_eq!(found.origin_ns(), expected.origin_ns());
-        assert_eq!(found.remarks(), expected.remarks());
+        assert_eq!(found.warnings(), expected.warnings());
         assert_eq!(found.streams().unwrap(), expected.streams().unwrap());
         let (labels, expected_labels) = (found.moving_labels(), expected.moving_labels());
         assert!(labels.unwrap().is_some() && expected_labels.unwrap().is_some());

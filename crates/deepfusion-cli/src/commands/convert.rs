@@ -4,7 +4,7 @@ use deepfusion_data::{Converted, Dataset, OpenOptions, convert_to_bag, convert_t
 
 use super::clocks;
 use super::recordings::open_recordings;
-use super::remarks;
+use super::warnings;
 use crate::cli::{CameraIntrinsics, ConvertArgs};
 use crate::error::CliError;
 use crate::failure::Result;
@@ -80,7 +80,7 @@ fn tell_missing(dataset: &Dataset) {
         (false, true) => "no times",
         (false, false) => "no times and no speeds",
     };
-    remarks::warn_once(format!(
+    warnings::warn_once(format!(
         "{}: {missing}, so none were written: evaluate and predict on it, training needs both",
         dataset.name()
     ));

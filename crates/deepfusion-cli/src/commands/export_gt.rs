@@ -4,7 +4,7 @@ use deepfusion_jobs::recordings::read_split;
 
 use super::clocks;
 use super::recordings::open_recordings;
-use super::remarks;
+use super::warnings;
 use crate::cli::ExportGtArgs;
 use crate::error::CliError;
 use crate::failure::Result;
@@ -51,7 +51,7 @@ pub(super) fn run(args: &ExportGtArgs) -> Result<()> {
     })?;
     drop(progress);
     if let Some(shortfall) = check_used(&options, &datasets, written, args.strict)? {
-        remarks::warn_once(shortfall.to_string());
+        warnings::warn_once(shortfall.to_string());
     }
     if args.json {
         let file = &args.out;

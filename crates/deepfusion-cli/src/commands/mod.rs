@@ -33,7 +33,6 @@ mod predict;
 #[cfg(feature = "train")]
 mod recorder;
 mod recordings;
-mod remarks;
 #[cfg(feature = "train")]
 mod resume;
 mod run_report;
@@ -45,6 +44,7 @@ mod train;
 mod used_checkpoint;
 mod view;
 mod view_rerun;
+mod warnings;
 mod weights;
 
 use crate::cli::{Command, ConfigCommand, DataCommand, WeightsCommand};

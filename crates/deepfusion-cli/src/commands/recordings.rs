@@ -13,7 +13,7 @@ use deepfusion_model::TrainConfig;
 #[cfg(feature = "train")]
 use deepfusion_train::SampleSet;
 
-use super::remarks;
+use super::warnings;
 use crate::jobs;
 
 /// Opens the recordings at several paths, each drive and camera a data set.
@@ -41,14 +41,14 @@ pub(super) fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Resul
 /// validation frames that are seen in training.
 #[cfg(feature = "train")]
 pub(super) fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
-    let mut warn = |warning: SampleWarning| remarks::warn_once(warning.to_string());
+    let mut warn = |warning: SampleWarning| warnings::warn_once(warning.to_string());
     samples::open_samples(config, &mut tell, &mut warn).map_err(jobs::in_words)
 }
 
 /// What was noticed, and that frames of the split are missing.
 fn tell(options: &OpenOptions, datasets: &[Dataset]) {
-    remarks::tell(datasets);
+    warnings::tell(datasets);
     if let Some(missing) = missing_frames(options, datasets) {
-        remarks::warn_once(missing.to_string());
+        warnings::warn_once(missing.to_string());
     }
 }

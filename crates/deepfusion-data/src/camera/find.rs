@@ -1,7 +1,7 @@
 //! Where a recording's camera is looked for.
 
 use super::calibration::CameraCalibration;
-use crate::dataset::{assumed_remark, numbers_of_hfov};
+use crate::dataset::{assumed_warning, numbers_of_hfov};
 use crate::dataset_toml::FolderConfig;
 use crate::pictures::{ExifCamera, exif_camera};
 use crate::{DatasetKind, Error, OpenOptions, Result};
@@ -24,7 +24,7 @@ const NAMES: [&str; 8] = [
 pub const GIVEN_INTRINSICS: &str = "given intrinsics";
 
 /// The camera of images of a size: given by the caller or in `dataset.toml`, or read from a file beside
-/// them, or in the folder above, or what EXIF says in `images`, which becomes one of the `remarks`; where nothing says it, the one
+/// them, or in the folder above, or what EXIF says in `images`, which becomes one of the `warnings`; where nothing says it, the one
 /// that is to be assumed, which does too.
 ///
 /// # Errors
@@ -36,7 +36,7 @@ pub(crate) fn find_camera(
     size: (u32, u32),
     layout: DatasetKind,
     images: &[PathBuf],
-    remarks: &mut Vec<String>,
+    warnings: &mut Vec<String>,
 ) -> Result<CameraCalibration> {
     if let Some(given) = options.given_camera(size) {
         let given = CameraCalibration::given(given, size, Path::new(GIVEN_INTRINSICS))?;
@@ -60,13 +60,13 @@ pub(crate) fn find_camera(
     if let Some(file) = file {
         return CameraCalibration::read(&file, size);
     }
-    if let Some((calibration, remark)) = by_exif(images, size)? {
-        remarks.push(remark);
+    if let Some((calibration, warning)) = by_exif(images, size)? {
+        warnings.push(warning);
         return Ok(calibration);
     }
     match options.assumed_numbers(size) {
         Some(assumed) => {
-            remarks.push(assumed_remark(assumed));
+            warnings.push(assumed_warning(assumed));
             let calibration = CameraCalibration::given(assumed, size, folder)?;
             Ok(CameraCalibration {
                 assumed: true,
@@ -110,16 +110,17 @@ fn by_exif(images: &[PathBuf], size: (u32, u32)) -> Result<Option<(CameraCalibra
         by,
         turned,
     } = first;
-    let mut remark = format!(
+    let mut warning = format!(
         "the camera is taken from EXIF in {}: {by}, so fx = fy = {:.1}, the principal point in the middle; a calibration is better",
         name(path),
         k.fx
     );
     if turned {
-        remark += "; the images are used as they are stored, not turned as EXIF's orientation says";
+        warning +=
+            "; the images are used as they are stored, not turned as EXIF's orientation says";
     }
     let calibration = CameraCalibration::given([k.fx, k.fy, k.cx, k.cy], size, path)?;
-    Ok(Some((calibration, remark)))
+    Ok(Some((calibration, warning)))
 }
 
 fn name(path: &Path) -> String {

@@ -53,7 +53,7 @@ pub struct Dataset {
     receiver: Receiver,
     camera_assumed: bool,
     /// The recording's, and what was noticed about its neighbours.
-    remarks: Vec<String>,
+    warnings: Vec<String>,
 }
 
 /// Between the samples of a track whose turns are those of a course, in seconds.
@@ -67,7 +67,7 @@ impl Dataset {
         Self {
             selected: (0..parts.frames.len()).collect(),
             parts,
-            remarks: recording.remarks().to_vec(),
+            warnings: recording.warnings().to_vec(),
             recording,
             receiver: Receiver::default(),
             camera_assumed: false,
@@ -396,13 +396,13 @@ impl Dataset {
 
     /// What was taken for granted or looks odd, in sentences.
     #[must_use]
-    pub fn remarks(&self) -> &[String] {
-        &self.remarks
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// Adds what was noticed beside it.
-    pub(crate) fn remark(&mut self, remark: String) {
-        self.remarks.push(remark);
+    pub(crate) fn warning(&mut self, warning: String) {
+        self.warnings.push(warning);
     }
 
     /// Stretches of at least two frames whose numbers follow each other, by index.

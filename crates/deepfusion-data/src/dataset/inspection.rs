@@ -60,8 +60,9 @@ pub struct DriveInspection {
     pub time_offset: Option<ClockOffset>,
     /// Where its sensors are, and by whom; of a bag.
     pub mounts: Vec<Mount>,
-    /// What was taken for granted or looks odd.
-    pub remarks: Vec<String>,
+    /// What was taken for granted or looks odd; `remarks` in JSON.
+    #[serde(rename = "remarks")]
+    pub warnings: Vec<String>,
 }
 
 /// Where a sensor is, as the file beside a bag has it.

@@ -84,8 +84,8 @@ impl fmt::Display for Inspection {
                     mount.source
                 )?;
             }
-            for remark in &drive.remarks {
-                writeln!(f, "  note      {remark}")?;
+            for warning in &drive.warnings {
+                writeln!(f, "  note      {warning}")?;
             }
         }
         let width = self.streams.iter().map(|s| s.name.len()).max().unwrap_or(0);

@@ -30,7 +30,7 @@ pub use inspection::{
 };
 pub use kind::DatasetKind;
 pub use options::OpenOptions;
-pub(crate) use options::{assumed_remark, numbers_of_hfov};
+pub(crate) use options::{assumed_warning, numbers_of_hfov};
 pub use receiver::Receiver;
 pub use recording::{CalibrationPlace, CameraPath, Recording};
 pub use snippet::{Snippet, Source, hold_out};

@@ -51,7 +51,7 @@ impl OpenOptions {
 }
 
 /// What is said of a camera that is assumed.
-pub(crate) fn assumed_remark([fx, fy, ..]: [f64; 4]) -> String {
+pub(crate) fn assumed_warning([fx, fy, ..]: [f64; 4]) -> String {
     format!(
         "nothing says what the camera is: fx = {fx:.1}, fy = {fy:.1} are assumed, the principal point in the middle"
     )

@@ -41,7 +41,7 @@ pub trait Recording: fmt::Debug + Send + Sync {
     fn no_motion(&self) -> Error;
 
     /// What was taken for granted or looks odd, in sentences for the inspection.
-    fn remarks(&self) -> &[String] {
+    fn warnings(&self) -> &[String] {
         &[]
     }
 

@@ -52,7 +52,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     }
     let config = FolderConfig::read(folder)?;
     let video = frames_of(&folder.join(VIDEO), &config)?;
-    let mut remarks = Vec::new();
+    let mut warnings = Vec::new();
     let calibration = find_camera(
         folder,
         &config,
@@ -60,11 +60,11 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         video.size(),
         DatasetKind::Comma2k19,
         &[],
-        &mut remarks,
+        &mut warnings,
     )?;
     let times = frame_times(folder)?;
     if times.len() != video.count() {
-        remarks.push(format!(
+        warnings.push(format!(
             "{FRAME_TIMES} has {} times, {VIDEO} {} frames: the first {} are taken",
             times.len(),
             video.count(),
@@ -79,7 +79,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         ns: Some(*ns),
     };
     if config.mount.is_none() {
-        remarks.push(NO_MOUNT.into());
+        warnings.push(NO_MOUNT.into());
     }
     let mut streams = streams(folder)?;
     // That of the speeds comes with the speeds.
@@ -99,7 +99,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         truth: None,
         world_from_cam: BTreeMap::new(),
         streams,
-        remarks,
+        warnings,
         speed_remedy: "fetch processed_log/CAN/speed of the segment",
     }
     .into_dataset()
@@ -162,7 +162,7 @@ pub(crate) fn inspect(folder: &Path, options: &OpenOptions) -> Result<Inspection
             duration_s,
             camera_ahead_s,
             time_offset: None,
-            remarks: Vec::new(),
+            warnings: Vec::new(),
         }],
     })
 }
@@ -203,7 +203,7 @@ fn speeds(folder: &Path, config: &FolderConfig) -> Result<Option<SpeedLog>> {
     let at: Vec<f64> = ns.iter().map(|t| seconds(*t, origin)).collect();
     let values = values.iter().map(|v| v * config.speed_scale()).collect();
     let vehicle = vehicle(folder, config)?;
-    let remarks = match &vehicle {
+    let warnings = match &vehicle {
         Some(_) => Vec::new(),
         None => vec![
             "the segment has neither gyroscope and accelerometer nor a steering angle of a known vehicle: how the car \
@@ -220,7 +220,7 @@ fn speeds(folder: &Path, config: &FolderConfig) -> Result<Option<SpeedLog>> {
         course_rates_radps: None,
         sigmas_mps: None,
         tilts_rad: Vec::new(),
-        remarks,
+        warnings,
     }))
 }
 

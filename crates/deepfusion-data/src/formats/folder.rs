@@ -25,7 +25,7 @@ pub(crate) fn has_images(folder: &Path) -> Result<bool> {
 /// Opens a folder of images.
 pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
     let config = FolderConfig::read(folder)?;
-    let mut remarks = Vec::new();
+    let mut warnings = Vec::new();
     let place = images_folder(folder, &config)?;
     let images = images_in(&place)?;
     let Some(first) = images.first() else {
@@ -43,15 +43,15 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         size,
         DatasetKind::Folder,
         &images,
-        &mut remarks,
+        &mut warnings,
     )?;
-    let images = timed_images(folder, images, &config, &mut remarks)?;
+    let images = timed_images(folder, images, &config, &mut warnings)?;
     let stems = images
         .iter()
         .filter_map(|i| Some((i.path.file_stem()?, i.number)));
     let depth = depth_images(folder, &config, stems.collect())?;
     if config.mount.is_none() {
-        remarks.push(NO_MOUNT.into());
+        warnings.push(NO_MOUNT.into());
     }
     PlainParts {
         kind: DatasetKind::Folder,
@@ -68,7 +68,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         truth: depth.map(MeasuredDepth::Images),
         world_from_cam: BTreeMap::new(),
         streams: Vec::new(),
-        remarks,
+        warnings,
         speed_remedy: SPEED_REMEDY,
     }
     .into_dataset()

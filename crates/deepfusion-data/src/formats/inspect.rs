@@ -126,7 +126,7 @@ fn look_at(dataset: &Dataset) -> Result<DriveInspection> {
         duration_s: ends.and_then(|(first, last)| Some(last.time_s? - first.time_s?)),
         camera_ahead_s: dataset.camera_ahead_s(),
         time_offset: None,
-        remarks: dataset.remarks().to_vec(),
+        warnings: dataset.warnings().to_vec(),
     })
 }
 

@@ -165,7 +165,7 @@ impl Drive {
                 .map(|(number, pose)| (number, pose * vehicle_from_cam))
                 .collect(),
             streams: Vec::new(),
-            remarks: Vec::new(),
+            warnings: Vec::new(),
             speed_remedy: "speeds come from data_poses/<drive>/poses.txt and timestamps.txt: train on drives that have them; \
                  evaluation and prediction need none",
         }

@@ -183,7 +183,7 @@ impl<'a> Sequence<'a> {
             },
             camera_ahead_s: options.camera_ahead_s.unwrap_or(0.0),
             image_size: size,
-            remarks: speeds.iter().map(|_| MOUNT.to_owned()).collect(),
+            warnings: speeds.iter().map(|_| MOUNT.to_owned()).collect(),
             speeds,
             cam_from_vehicle: cam_from_cam0 * cam0_from_vehicle,
             camera: self.camera,

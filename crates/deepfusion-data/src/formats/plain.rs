@@ -59,7 +59,7 @@ pub(crate) struct PlainRecording {
     truth: Option<MeasuredDepth>,
     world_from_cam: BTreeMap<u64, Se3>,
     streams: Vec<Stream>,
-    remarks: Vec<String>,
+    warnings: Vec<String>,
     /// Why there is no ego-motion, where there is none.
     no_motion: (String, String),
 }
@@ -84,7 +84,7 @@ pub(crate) struct PlainParts {
     pub(crate) world_from_cam: BTreeMap<u64, Se3>,
     /// Beside those of the images, the speeds, the poses and the measured depth.
     pub(crate) streams: Vec<Stream>,
-    pub(crate) remarks: Vec<String>,
+    pub(crate) warnings: Vec<String>,
     /// What to do about missing speeds.
     pub(crate) speed_remedy: &'static str,
 }
@@ -142,7 +142,7 @@ impl PlainParts {
         let mut streams = vec![Stream::new("frames", "image", frames.len(), &times)];
         if let Some(log) = &self.speeds {
             streams.extend(log.streams.iter().cloned());
-            self.remarks.extend(log.remarks.iter().cloned());
+            self.warnings.extend(log.warnings.iter().cloned());
         }
         streams.extend(self.truth.as_ref().map(MeasuredDepth::stream));
         if !self.world_from_cam.is_empty() {
@@ -175,7 +175,7 @@ impl PlainParts {
                 truth: self.truth,
                 world_from_cam: self.world_from_cam,
                 streams,
-                remarks: self.remarks,
+                warnings: self.warnings,
                 no_motion,
             }),
         )
@@ -227,7 +227,7 @@ impl PlainParts {
             });
         }
         if known < timed {
-            self.remarks.push(format!(
+            self.warnings.push(format!(
                 "{} of {timed} frames have no speed measured about their time",
                 timed - known
             ));
@@ -243,13 +243,13 @@ impl PlainParts {
         let known = self.calibration.size_in_file || self.calibration.assumed;
         if !known && !self.kind.brings_calibration() {
             let k = &self.calibration.intrinsics;
-            self.remarks.push(format!(
+            self.warnings.push(format!(
                 "{file} does not say for which size its camera is: taken for the images' {}x{}",
                 k.width, k.height
             ));
         }
         if lens.distorts() {
-            self.remarks.push(
+            self.warnings.push(
                 "the lens' distortion is taken out of the images; fx, fy, cx, cy are those of the result".into(),
             );
         }
@@ -296,8 +296,8 @@ impl Recording for PlainRecording {
         }
     }
 
-    fn remarks(&self) -> &[String] {
-        &self.remarks
+    fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     fn has_ground_truth(&self, frame: &Frame) -> bool {

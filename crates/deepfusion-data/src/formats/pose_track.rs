@@ -80,7 +80,7 @@ pub(crate) fn speed_log(path: &Path, world_from_vehicle: &[(i64, Se3)]) -> Speed
         vehicle: None,
         // The poses are told as a stream of their own.
         streams: Vec::new(),
-        remarks: Vec::new(),
+        warnings: Vec::new(),
     }
 }
 

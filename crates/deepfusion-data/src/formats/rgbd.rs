@@ -101,7 +101,7 @@ fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         })),
         world_from_cam,
         streams: Vec::new(),
-        remarks: Vec::new(),
+        warnings: Vec::new(),
         speed_remedy: "an RGB-D camera is carried by hand: evaluate and predict on it, train on a vehicle's recording",
     }
     .into_dataset()

@@ -71,7 +71,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     };
     let config = FolderConfig::read(&folder)?;
     let video = frames_of(&file, &config)?;
-    let mut remarks = Vec::new();
+    let mut warnings = Vec::new();
     let calibration = find_camera(
         &folder,
         &config,
@@ -79,7 +79,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         video.size(),
         DatasetKind::Video,
         &[],
-        &mut remarks,
+        &mut warnings,
     )?;
     let times = match (video.times_ns(), config.fps) {
         (_, Some(fps)) => {
@@ -88,7 +88,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         }
         (Some(times), None) => times.iter().copied().map(Some).collect(),
         (None, None) => {
-            remarks.push("the video has no time stamps: set fps in dataset.toml".into());
+            warnings.push("the video has no time stamps: set fps in dataset.toml".into());
             vec![None; video.count()]
         }
     };
@@ -97,7 +97,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         let (created, log) = (video.created_ns()?, speeds.as_ref()?);
         let ns = &log.speeds_mps.ns;
         let start = begun(created, &times, (*ns.first()?, *ns.last()?))?;
-        remarks.push(format!(
+        warnings.push(format!(
             "the video is taken to begin at {}, as its recorder says (start_s = {:.3} in dataset.toml; another moves it)",
             jiff::Timestamp::from_nanosecond(start.into()).map_or_else(|_| "?".into(), |t| t.to_string()),
             seconds(start, 0)
@@ -111,13 +111,13 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         None => (0..video.count() as u64).collect(),
     };
     if start_s.is_none() {
-        remarks.push(
+        warnings.push(
             "the video's time stamps are taken to be on the tables' clock (start_s in dataset.toml moves them)"
                 .into(),
         );
     }
     if config.mount.is_none() {
-        remarks.push(NO_MOUNT.into());
+        warnings.push(NO_MOUNT.into());
     }
     let image = |(number, ns): (u64, Option<i64>)| TimedImage {
         number,
@@ -138,7 +138,7 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         truth: None,
         world_from_cam: BTreeMap::new(),
         streams: Vec::new(),
-        remarks,
+        warnings,
         speed_remedy: SPEED_REMEDY,
         video: Some(video),
         folder,

@@ -33,14 +33,14 @@ pub(crate) fn timed_images(
     folder: &Path,
     images: Vec<PathBuf>,
     config: &FolderConfig,
-    remarks: &mut Vec<String>,
+    warnings: &mut Vec<String>,
 ) -> Result<Vec<TimedImage>> {
     let mut images = in_order(images);
     let table = folder.join(TABLE);
     let list = LISTS.map(|name| folder.join(name));
     let dates = name_dates(&images);
     let times: Vec<Option<i64>> = if table.is_file() {
-        let (listed, ns) = from_table(&table, &images, config, remarks)?;
+        let (listed, ns) = from_table(&table, &images, config, warnings)?;
         images = listed;
         ns
     } else if let Some(list) = list.iter().find(|l| l.is_file()) {
@@ -53,13 +53,13 @@ pub(crate) fn timed_images(
         let ns = |n: &u64| Some((*n as f64 / fps * 1e9).round() as i64);
         numbers.iter().map(ns).collect()
     } else if let Some((dates, unit)) = &dates {
-        remarks.push(format!(
+        warnings.push(format!(
             "the images' names are their times, in {}",
             unit.symbol()
         ));
         dates.iter().copied().map(Some).collect()
     } else {
-        remarks.push(
+        warnings.push(
             "nothing says when the images were taken: no frames.csv, no timestamps.txt, no fps in dataset.toml"
                 .into(),
         );
@@ -158,10 +158,10 @@ fn from_table(
     path: &Path,
     images: &[PathBuf],
     config: &FolderConfig,
-    remarks: &mut Vec<String>,
+    warnings: &mut Vec<String>,
 ) -> Result<(Vec<PathBuf>, Vec<Option<i64>>)> {
     let table = Table::read(path)?;
-    let ns = times(&table, config, remarks, TABLE)?;
+    let ns = times(&table, config, warnings, TABLE)?;
     let column = table.require(
         &["file", "filename", "image", "name", "path"],
         "time_s,file",
@@ -184,7 +184,7 @@ fn from_table(
     }
     let unlisted = images.len().saturating_sub(listed.len());
     if unlisted > 0 {
-        remarks.push(format!("{TABLE} leaves {unlisted} of the images out"));
+        warnings.push(format!("{TABLE} leaves {unlisted} of the images out"));
     }
     Ok((listed, ns.into_iter().map(Some).collect()))
 }

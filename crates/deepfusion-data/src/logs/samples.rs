@@ -21,12 +21,12 @@ pub(crate) struct Samples {
 impl Samples {
     /// The same with steps that are longer than [`SLOW_S`] and not too long filled in a straight line: to `most` seconds, else to
     /// three times the usual step where that is long, a few seconds at most. Steps of half a second are filled, too: whoever reads the samples bridges [`MAX_GAP_S`] at
-    /// most, and rounded times are on either side of it. What was done is added to the remarks, with the samples'
+    /// most, and rounded times are on either side of it. What was done is added to the warnings, with the samples'
     /// name and the setting that `most` is of.
     pub(crate) fn bridged(
         mut self,
         most: Option<f64>,
-        remarks: Option<(&mut Vec<String>, &str, &str)>,
+        warnings: Option<(&mut Vec<String>, &str, &str)>,
     ) -> Self {
         let steps = self.ns.windows(2).map(|w| seconds(w[1], w[0]));
         let mut steps: Vec<f64> = steps.collect();
@@ -61,7 +61,7 @@ impl Samples {
             ns.push(self.ns[i]);
             values.push(self.values[i]);
         }
-        if let Some((remarks, name, setting)) = remarks {
+        if let Some((warnings, name, setting)) = warnings {
             let gaps = |n: usize| {
                 if n == 1 {
                     "1 gap".into()
@@ -70,13 +70,13 @@ impl Samples {
                 }
             };
             if filled > 0 {
-                remarks.push(format!(
+                warnings.push(format!(
                     "{name}: {} of up to {longest:.1} s between speeds are bridged in a straight line ({setting})",
                     gaps(filled)
                 ));
             }
             if left > 0 {
-                remarks.push(format!(
+                warnings.push(format!(
                     "{name}: {} of more than {most:.1} s, across which the speed counts as unknown ({setting})",
                     gaps(left)
                 ));
@@ -112,13 +112,13 @@ mod tests {
             .map(|i| 1_777_636_800_000_000_000 + i * 500_000_000)
             .collect();
         let values = (0..20).map(f64::from).collect();
-        let mut remarks = Vec::new();
+        let mut warnings = Vec::new();
         let bridged = Samples {
             ns: ns.clone(),
             values,
         }
-        .bridged(None, Some((&mut remarks, "log", "max_gap_s")));
-        assert!(remarks.is_empty(), "{remarks:?}");
+        .bridged(None, Some((&mut warnings, "log", "max_gap_s")));
+        assert!(warnings.is_empty(), "{warnings:?}");
         let steps = bridged.ns.windows(2).map(|w| seconds(w[1], w[0]));
         assert!(steps.fold(0.0, f64::max) <= SLOW_S);
         assert_eq!(bridged.at(ns[7] + 100_000_000), Some(7.2));

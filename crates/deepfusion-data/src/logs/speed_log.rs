@@ -43,7 +43,7 @@ pub(crate) struct SpeedLog {
     pub(crate) vehicle: Option<VehicleLog>,
     /// What was found, for the inspection.
     pub(crate) streams: Vec<Stream>,
-    pub(crate) remarks: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 impl SpeedLog {
@@ -63,12 +63,12 @@ impl SpeedLog {
         let Some(path) = speed else {
             return Ok(None);
         };
-        let mut remarks = Vec::new();
+        let mut warnings = Vec::new();
         let (mut yaw_rates_radps, mut vehicle) = (None, None);
         let (mut course_rates_radps, mut sigmas_mps) = (None, None);
         let (measured, table) = match own_or_foreign(&path, config)? {
             Either::Own(table) => {
-                let ns = times(&table, config, &mut remarks, &name(&path))?;
+                let ns = times(&table, config, &mut warnings, &name(&path))?;
                 let column = table.require(&SPEEDS, "time_s,speed_mps")?;
                 let factor = speed_factor(&table, column, config)? * config.speed_scale();
                 let values = scaled(table.numbers(column)?, factor);
@@ -84,7 +84,7 @@ impl SpeedLog {
                 yaw_rates_radps = turns(&log.yaw_rates);
                 course_rates_radps = turns(&log.course_rates);
                 sigmas_mps = sigmas(&log, config.speed_scale());
-                (speeds(&path, &log, config, &mut remarks), None)
+                (speeds(&path, &log, config, &mut warnings), None)
             }
         };
         let mut streams = vec![stream(&path, "speed", &measured.ns)];
@@ -102,7 +102,7 @@ impl SpeedLog {
             yaw_rates_radps = Some(yaw_rates.bridged(config.max_gap_s, None));
         } else if let Some(imu) = imu {
             let table = Table::read(&imu)?;
-            let ns = times(&table, config, &mut remarks, &name(&imu))?;
+            let ns = times(&table, config, &mut warnings, &name(&imu))?;
             streams.push(stream(&imu, "imu", &ns));
             let readings = imu_readings(&table, &ns, |column| yaw_factor(&table, column, config))?;
             if let Some(imu) = readings {
@@ -120,7 +120,7 @@ impl SpeedLog {
         } else if let Some(turns) = &yaw_rates_radps {
             streams.push(stream(&path, "imu", &turns.ns));
         } else {
-            remarks.push(format!(
+            warnings.push(format!(
                 "{}: no yaw rate, here or in imu.csv: how the car turned is unknown, which \
                  view_motion = \"vehicle\" and a rotation loss need",
                 name(&path)
@@ -128,11 +128,11 @@ impl SpeedLog {
         }
         let turns_known = yaw_rates_radps.is_some() || vehicle.is_some();
         if course_rates_radps.is_none() && !turns_known {
-            course_rates_radps = course_table(folder, config, &mut remarks)?;
+            course_rates_radps = course_table(folder, config, &mut warnings)?;
         }
         let speeds_mps = measured.bridged(
             config.max_gap_s,
-            Some((&mut remarks, &name(&path), "max_gap_s in dataset.toml")),
+            Some((&mut warnings, &name(&path), "max_gap_s in dataset.toml")),
         );
         Ok(Some(Self {
             path,
@@ -143,7 +143,7 @@ impl SpeedLog {
             tilts_rad: Vec::new(),
             vehicle,
             streams,
-            remarks,
+            warnings,
         }))
     }
 
@@ -261,17 +261,17 @@ fn only_track(folder: &Path, config: &FolderConfig) -> Result<Option<PathBuf>> {
     }
 }
 
-/// The speeds of another program's log; how it was understood is added to the remarks.
+/// The speeds of another program's log; how it was understood is added to the warnings.
 fn speeds(
     path: &Path,
     log: &DriveLog,
     config: &FolderConfig,
-    remarks: &mut Vec<String>,
+    warnings: &mut Vec<String>,
 ) -> Samples {
     let name = name(path);
-    remarks.extend(log.notes.iter().map(|note| format!("{name}: {note}")));
+    warnings.extend(log.notes.iter().map(|note| format!("{name}: {note}")));
     if log.clock == Clock::LocalDate {
-        remarks.push(format!(
+        warnings.push(format!(
             "{name}: its dates have no zone and are taken for UTC (start_s in dataset.toml moves the frames)"
         ));
     }
@@ -304,7 +304,7 @@ fn sigmas(log: &DriveLog, scale: f64) -> Option<Samples> {
 fn course_table(
     folder: &Path,
     config: &FolderConfig,
-    remarks: &mut Vec<String>,
+    warnings: &mut Vec<String>,
 ) -> Result<Option<Samples>> {
     let Some(path) = config.find(folder, "course", None, &["course.csv"])? else {
         return Ok(None);
@@ -312,13 +312,13 @@ fn course_table(
     let table = match Table::read(&path) {
         Ok(table) if table.column(&COURSE_RATES).is_some() => table,
         _ => {
-            remarks.push(
+            warnings.push(
                 "course.csv: not read, as it is no table with time_s and course_rate_radps".into(),
             );
             return Ok(None);
         }
     };
-    let ns = times(&table, config, remarks, &name(&path))?;
+    let ns = times(&table, config, warnings, &name(&path))?;
     let column = table.require(&COURSE_RATES, "time_s,course_rate_radps")?;
     let factor = yaw_factor(&table, column, config)?;
     let values = scaled(table.numbers(column)?, factor);

@@ -75,7 +75,11 @@ fn a_unit_is_never_guessed() {
     )]);
     let log = log.unwrap();
     assert_eq!(log.speeds_mps.ns[0], 1_403_636_579_763_555_584);
-    assert!(log.remarks[0].contains("taken as ns"), "{:?}", log.remarks);
+    assert!(
+        log.warnings[0].contains("taken as ns"),
+        "{:?}",
+        log.warnings
+    );
 }
 
 #[test]
@@ -119,15 +123,15 @@ fn bad_rows_are_named() {
 fn repeated_times_and_slow_clocks_are_told() {
     let log = read(&[("speed.csv", "time_s,speed_mps\n0,1\n0,2\n0.1,1\n")]).unwrap();
     assert!(
-        log.remarks.iter().any(|r| r.contains("first in line 3")),
+        log.warnings.iter().any(|r| r.contains("first in line 3")),
         "{:?}",
-        log.remarks
+        log.warnings
     );
     assert_eq!(log.track(0).times_s(), [0.0, 0.1]);
     assert!(
-        !log.remarks.iter().any(|r| r.contains("gap")),
+        !log.warnings.iter().any(|r| r.contains("gap")),
         "{:?}",
-        log.remarks
+        log.warnings
     );
 }
 
@@ -139,16 +143,16 @@ fn slow_logs_are_bridged() {
         let log = read(&[("speed.csv", text), ("dataset.toml", config)]).unwrap();
         let track = log.track(0);
         let known: Vec<Option<f64>> = at.iter().map(|t| track.speed_at(*t)).collect();
-        (known, log.remarks.join("; "))
+        (known, log.warnings.join("; "))
     };
     let slow = "time_s,speed_mps\n0,1\n1,2\n2,1\n3,1\n7,1\n8,1\n";
-    let (speeds, remarks) = known(slow, "", &[0.5, 1.25, 5.0]);
+    let (speeds, warnings) = known(slow, "", &[0.5, 1.25, 5.0]);
     assert_eq!(speeds, [Some(1.5), Some(1.75), None]);
     assert!(
-        remarks.contains("4 gaps of up to 1.0 s between speeds are bridged"),
-        "{remarks}"
+        warnings.contains("4 gaps of up to 1.0 s between speeds are bridged"),
+        "{warnings}"
     );
-    assert!(remarks.contains("1 gap of more than 3.0 s"), "{remarks}");
+    assert!(warnings.contains("1 gap of more than 3.0 s"), "{warnings}");
     assert_eq!(known(slow, "max_gap_s = 4", &[5.0]).0, [Some(1.0)]);
     assert_eq!(known(slow, "max_gap_s = 0.4", &[0.5]).0, [None]);
 
@@ -182,11 +186,11 @@ fn a_track_stands_for_speeds() {
     let speed = log.speeds_mps.at(1_777_636_805_400_000_000).unwrap();
     assert!((speed - 0.5 * 11.12).abs() < 0.02, "{speed}");
     assert!(
-        log.remarks
+        log.warnings
             .iter()
             .any(|r| r.contains("from its positions, smoothed")),
         "{:?}",
-        log.remarks
+        log.warnings
     );
     let error = refusal(&[("a.gpx", &gpx), ("b.gpx", &gpx)]);
     assert!(error.to_string().contains("2 tracks are there"), "{error}");
@@ -311,7 +315,7 @@ fn the_course_of_positions_is_read_where_no_yaw_rate_is() {
     let course = ("course.csv", "time_s,course_rate_radps\n0,0.1\n1,0.2\n");
     let rates = |files: &[(&str, &str)]| {
         let log = read(files).unwrap();
-        (log.course_rates_radps.map(|c| c.values), log.remarks)
+        (log.course_rates_radps.map(|c| c.values), log.warnings)
     };
     assert_eq!(rates(&[speed, course]).0, Some(vec![0.1, 0.2]));
     let with_yaw = (
@@ -321,13 +325,13 @@ fn the_course_of_positions_is_read_where_no_yaw_rate_is() {
     assert_eq!(rates(&[with_yaw, course]).0, None);
     // Somebody's own table of that name stops nothing.
     for other in ["lesson,room\nA,1\n", "time_s,course_deg\n0,10\n", ""] {
-        let (found, remarks) = rates(&[speed, ("course.csv", other)]);
+        let (found, warnings) = rates(&[speed, ("course.csv", other)]);
         assert_eq!(found, None, "{other}");
         assert!(
-            remarks
+            warnings
                 .iter()
                 .any(|r| r.starts_with("course.csv: not read")),
-            "{remarks:?}"
+            "{warnings:?}"
         );
     }
 }

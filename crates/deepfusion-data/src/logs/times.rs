@@ -11,7 +11,7 @@ pub(super) const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timesta
 pub(crate) fn times(
     table: &Table,
     config: &FolderConfig,
-    remarks: &mut Vec<String>,
+    warnings: &mut Vec<String>,
     name: &str,
 ) -> Result<Vec<i64>> {
     let column = table.require(&TIMES, "time_s,speed_mps")?;
@@ -23,7 +23,7 @@ pub(crate) fn times(
         (None, None) => {
             let unit = TimeUnit::of_numbers(&table.numbers(column)?);
             if let Some(unit) = unit {
-                remarks.push(format!(
+                warnings.push(format!(
                     "{name}: column {} has no unit, taken as {} by its numbers",
                     column.header,
                     unit.symbol()
@@ -56,7 +56,7 @@ pub(crate) fn times(
         all.push(ns);
     }
     if let Some(first) = repeated.first() {
-        remarks.push(format!(
+        warnings.push(format!(
             "{name}: {} rows repeat the time of the row above (first in line {first}) and are left out",
             repeated.len()
         ));

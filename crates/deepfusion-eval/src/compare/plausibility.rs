@@ -29,7 +29,7 @@ pub enum Severity {
     /// Possible, but only by an odd spread of the errors, or a sign of a slip.
     Implausible,
     /// No fault of the row: something that a reader must know.
-    Remark,
+    Note,
 }
 
 impl Severity {
@@ -39,7 +39,7 @@ impl Severity {
         match self {
             Self::Impossible => "impossible",
             Self::Implausible => "implausible",
-            Self::Remark => "note",
+            Self::Note => "note",
         }
     }
 }
@@ -56,9 +56,9 @@ pub struct Flag {
 impl Flag {
     /// Something a reader must know.
     #[must_use]
-    pub fn remark(what: impl Into<String>) -> Self {
+    pub fn note(what: impl Into<String>) -> Self {
         Self {
-            severity: Severity::Remark,
+            severity: Severity::Note,
             what: what.into(),
         }
     }

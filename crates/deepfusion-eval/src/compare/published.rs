@@ -154,7 +154,7 @@ impl Published {
         let figures = row.seven();
         let mut flags = check(&figures, THREE_DECIMALS, CAP_M);
         flags.extend(twin);
-        flags.extend(row.note.iter().map(Flag::remark));
+        flags.extend(row.note.iter().map(Flag::note));
         let source = self.source.iter().find(|s| s.id == row.source);
         let place = row
             .place

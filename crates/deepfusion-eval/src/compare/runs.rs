@@ -195,10 +195,10 @@ fn metric_table(
         let figures = metrics(&member.report).to_array();
         let mut flags = check(&figures.map(Some), 0.0, member.report.protocol.cap_m);
         flags.extend(twin.map(|t| Flag {
-            severity: Severity::Remark,
+            severity: Severity::Note,
             ..t
         }));
-        flags.extend(remarks(member));
+        flags.extend(notes(member));
         let mut cells = vec![Value::from(member.name.as_str())];
         cells.extend(figures.map(Value::Number));
         cells.push(Value::Number(member.report.scale.median));
@@ -238,7 +238,7 @@ fn metric_table(
 }
 
 /// What a reader must know of an evaluation.
-fn remarks(member: &Evaluation) -> Vec<Flag> {
+fn notes(member: &Evaluation) -> Vec<Flag> {
     let mut flags = Vec::new();
     if let Origin::Saved {
         outdated: true,
@@ -246,13 +246,13 @@ fn remarks(member: &Evaluation) -> Vec<Flag> {
         ..
     } = &member.origin
     {
-        flags.push(Flag::remark(format!(
+        flags.push(Flag::note(format!(
             "{} is another file by now than the one that was measured: evaluate again",
             model.checkpoint
         )));
     }
     if let Some(rate) = member.report.missing_rate.filter(|r| *r > 0.0) {
-        flags.push(Flag::remark(format!(
+        flags.push(Flag::note(format!(
             "{:.2} % of the ground truth has no prediction and is left out",
             100.0 * rate
         )));
@@ -346,7 +346,7 @@ fn point_table(ground: &str, members: &[&Evaluation]) -> Option<Table> {
             flags: if points.in_space {
                 Vec::new()
             } else {
-                vec![Flag::remark("distances along z: the camera was not known")]
+                vec![Flag::note("distances along z: the camera was not known")]
             },
             source: None,
         })

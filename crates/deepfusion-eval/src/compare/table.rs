@@ -132,7 +132,7 @@ impl Row {
     /// Whether a reader must be warned of it.
     #[must_use]
     pub fn is_doubtful(&self) -> bool {
-        self.flags.iter().any(|f| f.severity != Severity::Remark)
+        self.flags.iter().any(|f| f.severity != Severity::Note)
     }
 
     /// Whether it takes part in the ranking: rows that cannot be right do not.
@@ -317,7 +317,7 @@ mod tests {
         for row in &mut table.rows {
             row.source = Some("a paper".into());
         }
-        table.rows[1].flags.push(Flag::remark("x"));
+        table.rows[1].flags.push(Flag::note("x"));
         let (notes, numbers) = table.footnotes();
         assert_eq!(notes, ["from a paper", "note: x"]);
         assert_eq!(numbers, [vec![1], vec![2, 1]]);

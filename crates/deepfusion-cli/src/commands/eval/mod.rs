@@ -25,9 +25,9 @@ use serde::Serialize;
 
 use super::clocks;
 use super::recordings::open_recordings;
-use super::remarks;
 use super::run_report::{self, Choice};
 use super::used_checkpoint::UsedCheckpoint;
+use super::warnings;
 use crate::cli::{CameraIntrinsics, EvalArgs, PredKind};
 use crate::engine;
 use crate::error::CliError;
@@ -165,7 +165,7 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
     )?;
     evaluated.report.expected = expected;
     if let Some(shortfall) = check_used(&options, &datasets, evaluated.report.n, args.strict)? {
-        remarks::warn_once(shortfall.to_string());
+        warnings::warn_once(shortfall.to_string());
     }
     if estimator.knows_uncertainty() && args.gt.is_none() {
         let kept = intervals::measure(

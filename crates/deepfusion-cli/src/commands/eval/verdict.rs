@@ -11,7 +11,7 @@ use deepfusion_runtime::{DepthEstimator, ModelSource};
 use super::Found;
 use crate::cli::EvalArgs;
 use crate::commands::used_checkpoint::UsedCheckpoint;
-use crate::commands::{remarks, run_report};
+use crate::commands::{run_report, warnings};
 use crate::failure::Result;
 use crate::model::ModelFacts;
 use crate::output;
@@ -60,7 +60,7 @@ pub(super) fn of_model(
     if found.no_certificate == Some(NoCertificate::SeenNotKnown) {
         let warning = "whether training saw these frames is not known, so there is no scale certificate; --assume-unseen takes it that \
                        it did not";
-        remarks::warn_once(warning.to_owned());
+        warnings::warn_once(warning.to_owned());
     }
     Ok(Some(found))
 }

@@ -12,7 +12,7 @@ use deepfusion_runtime::ModelSource;
 use serde::Serialize;
 
 use super::perceive::read_config;
-use super::remarks;
+use super::warnings;
 use crate::cli::{EvalTargetsArgs, TargetDepth};
 use crate::failure::Result;
 use crate::model::ModelFacts;
@@ -54,7 +54,7 @@ pub(super) fn run(args: &EvalTargetsArgs) -> Result<()> {
             continue;
         }
         let datasets = Dataset::open(path, &OpenOptions::default())?;
-        remarks::tell(&datasets);
+        warnings::tell(&datasets);
         for dataset in datasets {
             evaluation.drive(&Arc::new(dataset), &mut |frame| {
                 let (done, total) = frame.progress;

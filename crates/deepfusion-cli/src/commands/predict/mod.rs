@@ -30,7 +30,7 @@ use deepfusion_video::{Address, can_write_video};
 
 use super::live as sources;
 use super::perceive::pictures;
-use super::remarks;
+use super::warnings;
 use crate::cli::{CameraIntrinsics, Outputs, PredictArgs, PredictionArgs, Save, Shard};
 use crate::error::CliError;
 use crate::failure::{Context, Result};
@@ -186,7 +186,7 @@ pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<
     Ok(deepfusion_jobs::find_inputs(
         &args.inputs,
         &options,
-        remarks::tell,
+        warnings::tell,
     )?)
 }
 

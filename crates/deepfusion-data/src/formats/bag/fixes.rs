@@ -38,17 +38,17 @@ impl Fixes {
     }
 
     /// Speeds over ground in m/s, of all positions together, with those between that a slow receiver leaves out: gaps of up to
-    /// `max_gap_s` are bridged, or of a few seconds. How that was done goes to the remarks.
+    /// `max_gap_s` are bridged, or of a few seconds. How that was done goes to the warnings.
     pub(super) fn speeds(
         &mut self,
         topic: &str,
         max_gap_s: Option<f64>,
-        remarks: &mut Vec<String>,
+        warnings: &mut Vec<String>,
     ) -> Vec<(i64, f64)> {
         self.places.sort_by_key(|(ns, _)| *ns);
         if self.without > 0 {
             let all = self.without + self.places.len();
-            remarks.push(format!(
+            warnings.push(format!(
                 "{topic}: {} of {all} messages have no position and are left out",
                 self.without
             ));
@@ -66,13 +66,13 @@ impl Fixes {
         let mut sigmas: Vec<f64> = smoothed.iter().map(|s| s.sigma_mps).collect();
         sigmas.sort_by(f64::total_cmp);
         let Some(usual) = sigmas.get(sigmas.len() / 2) else {
-            remarks.push(format!(
+            warnings.push(format!(
                 "{topic}: {} positions give no speed, at least two in ten seconds are needed",
                 self.places.len()
             ));
             return Vec::new();
         };
-        remarks.push(format!(
+        warnings.push(format!(
             "{topic}: speeds are those of its positions, smoothed, sure to {usual:.2} m/s in the middle"
         ));
         let ns = |s: f64| origin_ns + (s * 1e9).round() as i64;
@@ -81,7 +81,7 @@ impl Fixes {
             values: smoothed.iter().map(|s| s.speed_mps).collect(),
         };
         let setting = "vehicle.max_gap_s in the file beside the bag";
-        let bridged = samples.bridged(max_gap_s, Some((remarks, topic, setting)));
+        let bridged = samples.bridged(max_gap_s, Some((warnings, topic, setting)));
         bridged.ns.into_iter().zip(bridged.values).collect()
     }
 }
@@ -116,22 +116,22 @@ mod tests {
             };
             fixes.add(second * 1_000_000_000, &fix(metres, status));
         }
-        let mut remarks = Vec::new();
-        let speeds = fixes.speeds("/fix", None, &mut remarks);
+        let mut warnings = Vec::new();
+        let speeds = fixes.speeds("/fix", None, &mut warnings);
         assert!(
             speeds.iter().all(|(_, v)| (v - 10.0).abs() < 0.05),
             "{speeds:?}"
         );
         let steps = speeds.windows(2).map(|w| w[1].0 - w[0].0);
         assert_eq!(steps.max(), Some(250_000_000), "3 s are bridged too");
-        let remarks = remarks.join("\n");
+        let warnings = warnings.join("\n");
         for said in [
             "2 of 20 messages have no position",
             "sure to 0.",
             "vehicle.max_gap_s",
             "up to 3.0 s",
         ] {
-            assert!(remarks.contains(said), "{said}: {remarks}");
+            assert!(warnings.contains(said), "{said}: {warnings}");
         }
         // Not across more than is allowed.
         let speeds = fixes.speeds("/fix", Some(2.0), &mut Vec::new());
@@ -140,8 +140,8 @@ mod tests {
         // One position alone is no speed, and none at all is none.
         let mut lone = Fixes::default();
         lone.add(0, &fix(0.0, 0));
-        let mut remarks = Vec::new();
-        assert!(lone.speeds("/fix", None, &mut remarks).is_empty());
-        assert!(remarks[0].contains("at least two"), "{remarks:?}");
+        let mut warnings = Vec::new();
+        assert!(lone.speeds("/fix", None, &mut warnings).is_empty());
+        assert!(warnings[0].contains("at least two"), "{warnings:?}");
     }
 }

@@ -34,7 +34,7 @@ pub(super) struct Mounts {
 }
 
 impl Mounts {
-    /// The mounts of a bag; what is taken for granted, or contradicts another source, goes to the remarks.
+    /// The mounts of a bag; what is taken for granted, or contradicts another source, goes to the warnings.
     ///
     /// # Errors
     /// [`Error::Frames`] where the frames say two things of a mount that the file does not say.
@@ -42,16 +42,16 @@ impl Mounts {
         bag: &Path,
         config: &BagConfig,
         index: &Index,
-        remarks: &mut Vec<String>,
+        warnings: &mut Vec<String>,
     ) -> Result<Self> {
         let by_frames = ByFrames::new(bag, config, index)?;
         let mut search = Search {
             config,
-            remarks,
+            warnings,
             said: Vec::new(),
         };
         if index.frames.broken > 0 {
-            search.remarks.push(format!(
+            search.warnings.push(format!(
                 "{} transforms of frames have no rotation, or no numbers, and are left out",
                 index.frames.broken
             ));
@@ -82,12 +82,12 @@ impl Mounts {
             .as_ref()
             .filter(|_| by_frames.body_axes && by_tf)
         {
-            search.remarks.push(format!(
+            search.warnings.push(format!(
                 "the images' frame {name} has its z axis up, so it is no optical frame: its x is taken to look ahead and its y to the left"
             ));
         }
         if cam_from_vehicle.is_none() {
-            search.remarks.push(
+            search.warnings.push(
                 "nothing says where the camera is on the vehicle: it is taken to look ahead and to move as the rear axle does".into(),
             );
         }
@@ -106,7 +106,7 @@ const BY_FRAMES: &str = "frames ";
 /// Sources in their order, for one mount after the other.
 struct Search<'a> {
     config: &'a BagConfig,
-    remarks: &'a mut Vec<String>,
+    warnings: &'a mut Vec<String>,
     said: Vec<Mount>,
 }
 
@@ -142,7 +142,7 @@ impl Search<'_> {
             }
             (None, other) => {
                 if let Said::No(why) = other {
-                    self.remarks.push(format!("{name}: {why}"));
+                    self.warnings.push(format!("{name}: {why}"));
                 }
                 match profile {
                     Some(profile) => (profile, format!("profile {of_profile}")),
@@ -163,7 +163,7 @@ impl Search<'_> {
     fn compare(&mut self, name: &str, taken: (&Se3, &str), other: (&Se3, &str)) {
         let change = Change::between(taken.0, other.0);
         if !change.is_small() {
-            self.remarks.push(format!(
+            self.warnings.push(format!(
                 "{name}: {} and {} are {change} apart; the former is taken",
                 taken.1, other.1
             ));

@@ -6,11 +6,11 @@ use super::index::{Index, Place};
 use super::mounts::Mounts;
 use super::recording::BagRecording;
 use super::scans::BagScans;
-use super::streams::{remarks_on, streams};
+use super::streams::{streams, warnings_on};
 use super::topics::{Role, Topics};
 use super::video::{BagVideo, Seen};
 use super::{camera, image, sensors, source};
-use crate::dataset::assumed_remark;
+use crate::dataset::assumed_warning;
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
 use crate::{
     Camera, Dataset, DatasetParts, Error, Frame, FrameImage, MotionModel, OpenOptions, Result,
@@ -44,7 +44,7 @@ pub(crate) fn open(path: &Path, bags: &[PathBuf], options: &OpenOptions) -> Resu
         (None, Some(error)) => Err(error),
         (Some(first), _) if !without_camera.is_empty() => {
             let names = without_camera.join(", ");
-            first.remark(format!(
+            first.warning(format!(
                 "left out, as none of their topics holds images: {names}"
             ));
             Ok(datasets)
@@ -64,7 +64,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
     let index = Index::read(bag.as_ref(), &topics, &config)?;
     let first = first_image(bag.as_ref(), &index)?;
     let clock = Clock::from_image(&first, &config, options);
-    let mut remarks = remarks_on(bag.as_ref(), &index);
+    let mut warnings = warnings_on(bag.as_ref(), &index);
 
     let video = BagVideo::of(path, &index, &config)?;
     let picture = match &video {
@@ -79,10 +79,10 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         camera::find(bag.as_ref(), &topics, &index, size, &config, options)?;
     if assumed {
         let k = lens.intrinsics();
-        remarks.push(assumed_remark([k.fx, k.fy, k.cx, k.cy]));
+        warnings.push(assumed_warning([k.fx, k.fy, k.cx, k.cy]));
     }
-    remarks.extend(lens.intrinsics().implausible());
-    let mounts = Mounts::find(path, &config, &index, &mut remarks)?;
+    warnings.extend(lens.intrinsics().implausible());
+    let mounts = Mounts::find(path, &config, &index, &mut warnings)?;
     let cam_from_vehicle = mounts.cam_from_vehicle;
     let imu = mounts.vehicle_from_imu.as_ref();
     let motion = sensors::motion(path, &index, &config, imu, clock.origin_ns)?;
@@ -120,7 +120,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
             track,
         })),
         (Some(_), None) => {
-            remarks.push(
+            warnings.push(
                 "nothing says where the LiDAR is (cam_from_lidar): its scans give no ground truth"
                     .into(),
             );
@@ -142,7 +142,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
         video,
         lens,
         mounts: mounts.said,
-        remarks,
+        warnings,
         cam_from_vehicle,
         scans,
         calibration,

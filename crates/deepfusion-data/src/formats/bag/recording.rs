@@ -27,7 +27,7 @@ pub(super) struct BagRecording {
     pub(super) lens: Lens,
     pub(super) streams: Vec<Stream>,
     pub(super) mounts: Vec<Mount>,
-    pub(super) remarks: Vec<String>,
+    pub(super) warnings: Vec<String>,
     /// Where the vehicle was, exactly, on the vehicle's clock.
     pub(super) truth: Trajectory,
     pub(super) cam_from_vehicle: Se3,
@@ -84,8 +84,8 @@ impl Recording for BagRecording {
         }
     }
 
-    fn remarks(&self) -> &[String] {
-        &self.remarks
+    fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     fn mounts(&self) -> &[Mount] {

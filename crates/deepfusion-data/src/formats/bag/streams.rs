@@ -45,25 +45,25 @@ pub(super) fn streams(
 }
 
 /// What of a bag cannot be read, in sentences.
-pub(super) fn remarks_on(bag: &dyn MessageSource, index: &Index) -> Vec<String> {
-    let mut remarks: Vec<String> = Vec::new();
-    remarks.extend(index.video.iter().filter_map(|video| video.remark()));
+pub(super) fn warnings_on(bag: &dyn MessageSource, index: &Index) -> Vec<String> {
+    let mut warnings: Vec<String> = Vec::new();
+    warnings.extend(index.video.iter().filter_map(|video| video.warning()));
     let damage = bag.damage();
-    remarks.extend(damage.map(|damage| format!("the bag is damaged: {damage}")));
+    warnings.extend(damage.map(|damage| format!("the bag is damaged: {damage}")));
     if let Some(lost) = index.lost.first() {
-        remarks.push(format!(
+        warnings.push(format!(
             "{} messages or chunks cannot be read; the first: {lost}",
             index.lost.len()
         ));
     }
-    remarks.extend(index.silent.iter().cloned());
-    remarks.extend(index.computed.iter().cloned());
+    warnings.extend(index.silent.iter().cloned());
+    warnings.extend(index.computed.iter().cloned());
     let unstamped = index.unstamped.iter();
-    remarks.extend(unstamped.map(|(topic, messages)| {
+    warnings.extend(unstamped.map(|(topic, messages)| {
         format!(
             "{topic}: {messages} messages have no time in their header; that of their recording is taken, which is as late as the \
              message was on its way"
         )
     }));
-    remarks
+    warnings
 }

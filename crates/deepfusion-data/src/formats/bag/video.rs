@@ -55,7 +55,7 @@ impl Seen {
     }
 
     /// What is left out, in a sentence.
-    pub(super) fn remark(&self) -> Option<String> {
+    pub(super) fn warning(&self) -> Option<String> {
         let Self { topic, before, .. } = self;
         (*before > 0).then(|| {
             format!("{topic}: the first {before} messages come before the first key frame and cannot be decoded: they are left out")

@@ -110,11 +110,11 @@ impl Place {
         let numbered = numbers_by_time(&times).into_iter().zip(&images);
         let here = numbered.zip(there).filter(|(_, there)| **there);
         let here: Vec<(u64, &Taken)> = here.map(|(image, _)| image).collect();
-        let mut remarks = Vec::new();
+        let mut warnings = Vec::new();
         let lost = images.len() - here.len();
         if lost > 0 {
             let gone = images.iter().zip(there).find(|(_, there)| !**there);
-            remarks.push(format!(
+            warnings.push(format!(
                 "{lost} of {} images are not there, such as {}",
                 images.len(),
                 gone.map_or("", |(image, _)| &image.file)
@@ -161,7 +161,7 @@ impl Place {
                 .map(|(number, taken)| (*number, taken.world_from_vehicle * vehicle_from_cam))
                 .collect(),
             streams: Vec::new(),
-            remarks,
+            warnings,
             speed_remedy: "",
         }
         .into_dataset()

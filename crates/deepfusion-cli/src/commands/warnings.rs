@@ -5,7 +5,7 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 
 use deepfusion_data::Dataset;
 
-/// What was told already: both cameras of a drive, and a recording that is opened again, have the same remarks.
+/// What was told already: both cameras of a drive, and a recording that is opened again, have the same warnings.
 static TOLD: LazyLock<Mutex<HashSet<String>>> = LazyLock::new(Mutex::default);
 
 /// Warns on stderr, unless the same was warned of before.
@@ -18,16 +18,16 @@ pub(super) fn warn_once(warning: String) {
 /// Warns on stderr of what was taken for granted, looks odd or cannot be read: one line for what several recordings have
 /// in common.
 pub(super) fn tell(datasets: &[Dataset]) {
-    for (remark, places) in by_remark(datasets.iter().flat_map(remarks)) {
+    for (warning, places) in by_warning(datasets.iter().flat_map(warnings)) {
         let new: Vec<String> = places
             .into_iter()
-            .filter(|place| is_new(&format!("{place}: {remark}")))
+            .filter(|place| is_new(&format!("{place}: {warning}")))
             .collect();
         match new.as_slice() {
             [] => {}
-            [only] => tracing::warn!("{only}: {remark}"),
+            [only] => tracing::warn!("{only}: {warning}"),
             [first, others @ ..] => {
-                tracing::warn!("{first} and {} more: {remark}", others.len());
+                tracing::warn!("{first} and {} more: {warning}", others.len());
             }
         }
     }
@@ -39,26 +39,26 @@ fn is_new(text: &str) -> bool {
     told.insert(text.to_owned())
 }
 
-/// Each remark with the places it is about, each place once, in the order in which they come.
-fn by_remark(remarks: impl Iterator<Item = (String, String)>) -> Vec<(String, Vec<String>)> {
+/// Each warning with the places it is about, each place once, in the order in which they come.
+fn by_warning(warnings: impl Iterator<Item = (String, String)>) -> Vec<(String, Vec<String>)> {
     let mut found: Vec<(String, Vec<String>)> = Vec::new();
-    for (place, remark) in remarks {
-        match found.iter_mut().find(|(known, _)| *known == remark) {
+    for (place, warning) in warnings {
+        match found.iter_mut().find(|(known, _)| *known == warning) {
             Some((_, places)) if places.contains(&place) => {}
             Some((_, places)) => places.push(place),
-            None => found.push((remark, vec![place])),
+            None => found.push((warning, vec![place])),
         }
     }
     found
 }
 
-/// The remarks on a recording, each with its file, or its folder where every image is a file.
-fn remarks(dataset: &Dataset) -> impl Iterator<Item = (String, String)> {
+/// The warnings on a recording, each with its file, or its folder where every image is a file.
+fn warnings(dataset: &Dataset) -> impl Iterator<Item = (String, String)> {
     let image = dataset.frames().first().map(|frame| &frame.image);
     let container = image.filter(|i| i.file().is_none()).map(|i| i.path());
     let place = container.unwrap_or(dataset.folder()).display();
-    let remarks = dataset.remarks().iter();
-    remarks.map(move |remark| (place.to_string(), remark.clone()))
+    let warnings = dataset.warnings().iter();
+    warnings.map(move |warning| (place.to_string(), warning.clone()))
 }
 
 #[cfg(test)]
@@ -67,14 +67,14 @@ mod tests {
 
     #[test]
     fn what_several_recordings_have_in_common_is_one_line() {
-        let of = |place: &str, remark: &str| (place.to_owned(), remark.to_owned());
-        let remarks = [
+        let of = |place: &str, warning: &str| (place.to_owned(), warning.to_owned());
+        let warnings = [
             of("a.bag", "no mount"),
             of("a.bag", "damaged"),
             of("b.bag", "no mount"),
             of("a.bag", "no mount"),
         ];
-        let found = by_remark(remarks.into_iter());
+        let found = by_warning(warnings.into_iter());
         assert_eq!(
             found,
             [
