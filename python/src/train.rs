@@ -395,7 +395,7 @@ fn same_layers(a: &DepthNetConfig, b: &DepthNetConfig) -> bool {
     bare(a) == bare(b)
 }
 
-/// Hears the trainer's events, logs them as the command does, and tells Python.
+/// Hears the trainer's events, logs them as the command does, and calls Python.
 struct Listener {
     callback: Option<Py<PyAny>>,
     log: Option<CsvLog>,
@@ -419,7 +419,7 @@ impl Listener {
     }
 
     fn hear(&mut self, event: TrainEvent, stop: &Stop) -> Control {
-        match self.told(event) {
+        match self.handle(event) {
             Ok(true) if !stop.asked() => Control::Continue,
             Ok(_) => Control::Stop,
             Err(error) => {
@@ -430,7 +430,7 @@ impl Listener {
     }
 
     /// Whether to go on.
-    fn told(&mut self, event: TrainEvent) -> PyResult<bool> {
+    fn handle(&mut self, event: TrainEvent) -> PyResult<bool> {
         self.record(&event).map_err(raise)?;
         let Some(callback) = &self.callback else {
             return Ok(true);

@@ -235,7 +235,7 @@ fn a_bad_view_is_left_out() {
 
 /// Boards that are all parallel to the image leave the focal length open, and it is said so.
 #[test]
-fn boards_parallel_to_the_image_do_not_tell_the_focal_length() {
+fn boards_parallel_to_the_image_do_not_determine_the_focal_length() {
     let board = board();
     let seen = |x: f64, y: f64, z: f64, turn: f64| {
         let turned = nalgebra::Rotation3::from_euler_angles(0.0, 0.0, turn);
@@ -271,7 +271,7 @@ fn boards_parallel_to_the_image_do_not_tell_the_focal_length() {
 }
 
 #[test]
-fn another_board_is_told() {
+fn another_board_is_an_error() {
     let image = picture("brown/00.jpg");
     // A part of the board is not the board.
     for (columns, rows) in [(8, 6), (9, 7), (7, 5)] {

@@ -91,15 +91,15 @@ fn shards_started_at_once_make_what_one_run_makes() {
         assert!(shard.wait().unwrap().success());
     }
     assert_same(&outputs(&at.join("parts")), &whole);
-    let mut told = 0;
+    let mut done = 0;
     for i in 1..=3 {
         let path = at.join(format!("parts/predict-{i}-of-3.manifest.json"));
         let manifest = json(&path);
         let images = manifest["images"].as_array().unwrap();
         assert!(images.iter().all(|image| image["state"] == "done"));
-        told += images.len();
+        done += images.len();
     }
-    assert_eq!(told, 34);
+    assert_eq!(done, 34);
     // A shard of other inputs would leave images out.
     fails(
         at,

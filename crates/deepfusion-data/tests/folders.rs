@@ -207,7 +207,7 @@ fn without_a_yaw_rate_distances_are_known_and_turns_are_not() {
 }
 
 #[test]
-fn an_inspection_tells_streams_and_what_is_assumed() {
+fn an_inspection_reports_streams_and_what_is_assumed() {
     let root = tempfile::tempdir().unwrap();
     write_drive(root.path(), 8, 10.0, 0.1);
     let seen = inspect(root.path()).unwrap();

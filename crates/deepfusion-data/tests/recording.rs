@@ -119,7 +119,7 @@ fn images_are_decoded_when_they_are_asked_for() {
 }
 
 #[test]
-fn an_image_of_another_size_and_missing_speeds_are_told_by_place() {
+fn an_image_of_another_size_and_missing_speeds_are_reported_by_place() {
     let recording = Messages {
         width: 41,
         ..Messages::default()

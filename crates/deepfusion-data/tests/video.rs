@@ -182,7 +182,7 @@ fn a_comma_segment_takes_its_frames_times_from_the_log() {
 }
 
 #[test]
-fn what_is_no_video_is_told() {
+fn what_is_no_video_is_an_error() {
     let root = tempfile::tempdir().unwrap();
     let video = root.path().join("x.mp4");
     fs::write(&video, "no video").unwrap();

@@ -254,7 +254,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_figure_is_told_with_its_limit() {
+    fn a_figure_is_printed_with_its_limit() {
         let figure = Figure::new("offset", 0.30049, "s", Limit::Within(-0.02, 0.02));
         assert!(!figure.holds());
         assert_eq!(figure.to_string(), "offset 0.3 s (-0.02 to 0.02)");

@@ -123,7 +123,7 @@ impl Diagnosis {
     }
 }
 
-/// Every check by its name, in the order in which they are told: those of a drive, and that of both cameras.
+/// Every check by its name, in the order in which they are reported: those of a drive, and that of both cameras.
 const CHECKS: [&str; 18] = [
     "opening",
     "timing",

@@ -121,7 +121,7 @@ fn one_channel(frames: &mut Vec<Frame>) -> Option<String> {
     if counts.len() < 2 {
         return None;
     }
-    let told: Vec<String> = counts
+    let channels: Vec<String> = counts
         .iter()
         .map(|(name, count)| format!("{name} ({count} frames)"))
         .collect();
@@ -131,7 +131,7 @@ fn one_channel(frames: &mut Vec<Frame>) -> Option<String> {
     frames.retain(|frame| frame.channel == kept);
     Some(format!(
         "its message comes on the channels {}: {kept} is read",
-        told.join(", ")
+        channels.join(", ")
     ))
 }
 

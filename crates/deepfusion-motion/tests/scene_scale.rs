@@ -173,7 +173,7 @@ fn a_wrong_focal_length_does_not_hide_a_wrong_depth() {
 }
 
 #[test]
-fn images_without_texture_tell_nothing() {
+fn images_without_texture_say_nothing() {
     let flat = GreyPyramid::new(GreyImage {
         width: 128,
         height: 64,

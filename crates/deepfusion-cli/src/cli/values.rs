@@ -79,7 +79,7 @@ pub(super) fn learned(text: &str) -> Result<Learned, String> {
     if text == "learn" {
         return Ok(Learned);
     }
-    Err("expected learn; a camera that is known is told beside its recording, in calibration.yaml or dataset.toml \
+    Err("expected learn; a camera that is known is given beside its recording, in calibration.yaml or dataset.toml \
          (intrinsics = [fx, fy, cx, cy] or hfov_deg)"
         .into())
 }

@@ -42,7 +42,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<()> {
         convert_to_kitti(&datasets, &args.out, &mut report)?
     };
     drop(progress);
-    datasets.iter().for_each(tell_missing);
+    datasets.iter().for_each(warn_of_missing);
     let Converted { paths, moved_s } = written;
     if moved_s > 0 {
         tracing::warn!(
@@ -72,7 +72,7 @@ fn has_ending(path: &Path, ending: &str) -> bool {
 }
 
 /// Warns of what the recording does not have, and so what was written has not either.
-fn tell_missing(dataset: &Dataset) {
+fn warn_of_missing(dataset: &Dataset) {
     let timed = dataset.frames().iter().any(|f| f.time_s.is_some());
     let missing = match (timed, dataset.track().is_some()) {
         (true, true) => return,

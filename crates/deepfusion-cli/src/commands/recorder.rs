@@ -13,7 +13,7 @@ use crate::failure::{Context, Failure, Result};
 use crate::interrupt;
 use crate::progress::{Progress, say};
 
-/// How often a line tells of the losses where there is no bar.
+/// How often a line has the losses where there is no bar.
 const LINE_EVERY: Duration = Duration::from_secs(20);
 
 /// Writes the logs of a run and shows its progress.
@@ -176,7 +176,7 @@ impl Recorder {
                 let [fx, fy] = learned.focal_px;
                 let spread = match learned.sigma_px {
                     Some([x, y]) => format!("standard deviations {x:.1} and {y:.1}"),
-                    None => "not told by these drives".into(),
+                    None => "not determined by these drives".into(),
                 };
                 self.events
                     .scalars(learned.step, &[("camera/fx", fx), ("camera/fy", fy)])?;

@@ -42,7 +42,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<()> {
     Ok(())
 }
 
-/// Opens the page where there is a screen; that it cannot is no failure, the address was told.
+/// Opens the page where there is a screen; that it cannot is no failure, the address was printed.
 fn open_browser(url: &str) {
     let mut command = if cfg!(target_os = "macos") {
         Command::new("open")

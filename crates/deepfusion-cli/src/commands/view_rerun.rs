@@ -54,12 +54,12 @@ pub(super) fn run(_args: &ViewArgs, _file: &Path) -> Result<()> {
 /// The problems of frames, as many as a person reads; the file has them all.
 #[cfg(feature = "rerun")]
 fn warn(problems: &[(String, String)]) {
-    const TOLD: usize = 20;
-    for (frame, problem) in problems.iter().take(TOLD) {
+    const SHOWN: usize = 20;
+    for (frame, problem) in problems.iter().take(SHOWN) {
         tracing::warn!("{frame}: {problem}");
     }
-    if problems.len() > TOLD {
-        let more = problems.len() - TOLD;
+    if problems.len() > SHOWN {
+        let more = problems.len() - SHOWN;
         tracing::warn!("and {more} more, at the entity `frames` of the file");
     }
 }

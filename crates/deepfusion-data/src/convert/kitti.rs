@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Writes data sets as drives of a KITTI date folder below `out`, which must be new or empty, and tells the drives'
+/// Writes data sets as drives of a KITTI date folder below `out`, which must be new or empty, and returns the drives'
 /// folders. All must have one camera: KITTI's calibration is that of a date. Times are the vehicle's clock's, for all
 /// sensors.
 ///

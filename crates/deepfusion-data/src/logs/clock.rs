@@ -65,7 +65,7 @@ impl TimeUnit {
         if let Some(unit) = Self::of_date(first) {
             return Some(unit);
         }
-        // Of either sign: that times go back is told elsewhere.
+        // Of either sign: that times go back is reported elsewhere.
         let steps = numbers.windows(2).map(|w| (w[1] - w[0]).abs());
         let mut steps: Vec<f64> = steps.collect();
         steps.sort_by(f64::total_cmp);

@@ -7,7 +7,7 @@ use crate::dataset_toml::FolderConfig;
 
 pub(super) const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timestamps"];
 
-/// The table's times in nanoseconds, which must rise; equal ones are told once.
+/// The table's times in nanoseconds, which must rise; equal ones are warned of once.
 pub(crate) fn times(
     table: &Table,
     config: &FolderConfig,

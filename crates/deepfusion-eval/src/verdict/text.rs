@@ -115,7 +115,7 @@ impl fmt::Display for SourceName {
 impl fmt::Display for NoCertificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::MotionUnknown => "the recordings do not tell speed and turns",
+            Self::MotionUnknown => "the recordings do not measure speed and turns",
             Self::NoMovement => "the camera hardly moves between the frames",
             Self::AllSeen => "training saw all of these frames: measure on another drive",
             Self::SeenNotKnown => "whether training saw these frames is not known",

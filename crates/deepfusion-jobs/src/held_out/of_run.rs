@@ -18,7 +18,7 @@ use crate::verdict::Unseen;
 type Seen = (String, u64, u64);
 
 /// Whether none of the frames measured was a target or a source in training, of this run and of those it began from. `None` where
-/// that cannot be told: recordings that are not there any more, or a network that was learned elsewhere.
+/// that cannot be known: recordings that are not there any more, or a network that was learned elsewhere.
 #[must_use]
 pub fn held_out(config: &TrainConfig, datasets: &[Dataset], places: &[Place]) -> Option<bool> {
     let seen = seen_by(config, datasets, &mut HashSet::new())?;

@@ -25,7 +25,7 @@ const WIDTH: u32 = 320;
 pub enum Unwatched {
     /// It is a single image.
     SingleImage,
-    /// The recording does not tell speed and yaw rate.
+    /// The recording does not measure speed and yaw rate.
     MotionUnknown,
 }
 

@@ -72,7 +72,7 @@ pub enum Unseen {
 /// Looks at `datasets` with a network. `progress` takes the frames done and in all.
 ///
 /// # Errors
-/// An image that cannot be read, and what the network's engine says. That nothing can be told is no error: the verdict says why.
+/// An image that cannot be read, and what the network's engine says. That nothing can be said is no error: the verdict says why.
 pub fn verdict(
     estimator: &mut DepthEstimator,
     datasets: &[Dataset],

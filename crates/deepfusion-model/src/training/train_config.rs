@@ -296,7 +296,7 @@ impl TrainConfig {
         }
     }
 
-    /// Reads a TOML file. Of a run's, what it was told, not what it found out ([`crate::RunFolder::read_findings`]).
+    /// Reads a TOML file. Of a run's, what it was given, not what it found out ([`crate::RunFolder::read_findings`]).
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::ConfigFile`] naming the line, or what [`Self::validate`] says.
@@ -645,7 +645,7 @@ mod tests {
     }
 
     /// Without the speed term the views follow PoseNet: `without` sees to it, and whoever says otherwise
-    /// afterwards is told.
+    /// afterwards gets an error.
     #[test]
     fn without_speed_the_views_follow_posenet() {
         let mut config = Preset::Tiny.config();

@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Lines of ffmpeg's complaints that are kept: the last ones tell why it ended.
+/// Lines of ffmpeg's complaints that are kept: the last ones say why it ended.
 const LINES: usize = 6;
 /// How long an ffmpeg that has closed its pipe may take to end.
 const GRACE: Duration = Duration::from_secs(2);
@@ -200,7 +200,7 @@ impl End {
     }
 
     /// Its exit code and last words.
-    pub(super) fn told(&self) -> String {
+    pub(super) fn text(&self) -> String {
         let code = match self.code {
             Some(code) => format!("ended with code {code}"),
             None => "was ended".into(),
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loss_is_told_from_an_end() {
+    fn a_loss_is_distinguished_from_an_end() {
         assert!(end(0, &[]).is_clean());
         assert!(end(0, &["[h264 @ 0x1] error while decoding MB 12 3"]).is_clean());
         assert!(!end(1, &[]).is_clean());

@@ -104,12 +104,12 @@ impl LiveSource {
         if came > 0 && end.is_clean() && self.address.may_end() {
             return Ok(Taken::Ended);
         }
-        let told = match came {
+        let happened = match came {
             0 => "gave no frame".to_owned(),
             n => format!("lost the connection after {}", frames(n)),
         };
         Err(self.error(
-            format!("{told}: {}", self.address.without_password(&end.told())),
+            format!("{happened}: {}", self.address.without_password(&end.text())),
             remedy(&self.address, came, &end),
         ))
     }

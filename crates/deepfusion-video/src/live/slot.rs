@@ -90,7 +90,7 @@ impl Slot {
         self.changed.notify_all();
     }
 
-    /// Takes the frame out, waiting no longer than `wait` for one. What is left is given before the end is told.
+    /// Takes the frame out, waiting no longer than `wait` for one. What is left is given before the end is reported.
     pub(super) fn take(&self, wait: Duration) -> Got {
         let empty = |state: &mut State| state.newest.is_none() && state.closed.is_none();
         let waited = self.changed.wait_timeout_while(self.lock(), wait, empty);

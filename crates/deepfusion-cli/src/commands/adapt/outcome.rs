@@ -77,7 +77,7 @@ impl Outcome {
         Some(CliError::Refused {
             path: self.run.clone(),
             worse: if worse.is_empty() {
-                "the frames that are held out tell nothing of it any more".into()
+                "the frames that are held out say nothing about it any more".into()
             } else {
                 worse.join(", ")
             },
@@ -103,8 +103,8 @@ impl fmt::Display for Outcome {
             "after"
         )?;
         let mut row = |name: &str, before: Option<String>, after: Option<String>| {
-            let told = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
-            writeln!(f, "{name:<36}{:>10}{:>10}", told(before), told(after))
+            let shown = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
+            writeln!(f, "{name:<36}{:>10}{:>10}", shown(before), shown(after))
         };
         for check in [
             Check::Reprojection,

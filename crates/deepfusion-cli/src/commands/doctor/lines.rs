@@ -26,13 +26,13 @@ pub(super) fn rows<'a>(checks: &[Checked<'a>]) -> Vec<(&'a str, String)> {
     }
     let row = |name: &'a str| {
         let of_name = checks.iter().filter(|(_, outcome)| outcome.check == name);
-        (name, told(&of_name.copied().collect::<Vec<_>>()))
+        (name, summary(&of_name.copied().collect::<Vec<_>>()))
     };
     names.into_iter().map(row).collect()
 }
 
 /// How one check came out.
-fn told(checks: &[Checked<'_>]) -> String {
+fn summary(checks: &[Checked<'_>]) -> String {
     if let [(_, only)] = checks {
         return match (only.status(), &only.skipped) {
             (Status::Ok, None) => "ok".into(),

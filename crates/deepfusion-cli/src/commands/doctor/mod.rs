@@ -90,7 +90,7 @@ fn show(diagnosis: &Diagnosis, args: &DoctorArgs) -> Result<()> {
     if args.json {
         output::print_json(&serde_json::json!(diagnosis.record()))
     } else {
-        output::print(&told(diagnosis, args.verbose))
+        output::print(&text(diagnosis, args.verbose))
     }
 }
 
@@ -110,7 +110,7 @@ fn unfit(path: &Path, errors: usize) -> CliError {
 }
 
 /// A line for each check, the findings, the worst first; then what was measured, if asked for.
-fn told(diagnosis: &Diagnosis, verbose: bool) -> String {
+fn text(diagnosis: &Diagnosis, verbose: bool) -> String {
     let mut text = String::new();
     for drive in &diagnosis.drives {
         // Only KITTI numbers its cameras.

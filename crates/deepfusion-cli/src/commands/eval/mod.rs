@@ -54,7 +54,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<()> {
     output::print(&found.to_string())
 }
 
-/// What was found, as far as the data tell.
+/// What was found, as far as the data show it.
 #[derive(Default)]
 struct Found {
     checkpoint: Option<UsedCheckpoint>,
@@ -204,7 +204,7 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
             !args.no_focal_correction,
             folder,
         )?
-        .map(tell_calibrated),
+        .map(print_calibrated),
         _ => None,
     };
     if let Some(path) = &args.report {
@@ -264,7 +264,7 @@ fn check_calibration(model: &ModelSource, estimator: &DepthEstimator) -> Result<
 }
 
 /// Says what the confidence was learned from; gives how it holds.
-fn tell_calibrated(calibrated: Calibrated) -> Vec<Reliability> {
+fn print_calibrated(calibrated: Calibrated) -> Vec<Reliability> {
     let Calibrated {
         confidence,
         path,

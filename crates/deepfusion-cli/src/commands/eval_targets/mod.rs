@@ -54,7 +54,7 @@ pub(super) fn run(args: &EvalTargetsArgs) -> Result<()> {
             continue;
         }
         let datasets = Dataset::open(path, &OpenOptions::default())?;
-        warnings::tell(&datasets);
+        warnings::print(&datasets);
         for dataset in datasets {
             evaluation.drive(&Arc::new(dataset), &mut |frame| {
                 let (done, total) = frame.progress;

@@ -16,7 +16,7 @@ use deepfusion_runtime::{DepthEstimator, PreparedImage};
 use super::instances::Spotter;
 use super::pictures::{self, Picture};
 use crate::cli::{PerceiveArgs, PerceiveSave};
-use crate::commands::predict::{Loaded, Seen, tell_drift};
+use crate::commands::predict::{Loaded, Seen, warn_of_drift};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::model::ModelFacts;
@@ -110,7 +110,7 @@ impl<'a> Eyes<'a> {
         let (image, ground) = (&loaded.image, surroundings.ground.as_ref());
         let scale = self.watch.add(image, &camera, &motion, ground);
         if let Some(ratio) = self.watch.first_drift() {
-            tell_drift(&input.name, ratio);
+            warn_of_drift(&input.name, ratio);
         }
         let record = FrameRecord {
             scale_monitor: scale,

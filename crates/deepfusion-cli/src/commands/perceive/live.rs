@@ -55,8 +55,10 @@ impl Work<'_> {
             0 => lines.discard(),
             _ => lines.finish()?,
         }
-        if let Some(figures) = feed.told() {
-            let ended = ending.as_ref().map_or("the source was lost", |e| e.told());
+        if let Some(figures) = feed.summary() {
+            let ended = ending
+                .as_ref()
+                .map_or("the source was lost", |e| e.as_str());
             say(&format!(
                 "{} frames, {} targets written to {} ({ended}): {figures}",
                 outcome.done,
@@ -69,7 +71,7 @@ impl Work<'_> {
 }
 
 /// The way of a camera that looks straight ahead from a vehicle that drives straight on. The scale is not watched: a speed
-/// that is told once for all says nothing of the metres.
+/// that is given once for all says nothing of the metres.
 struct StraightWay {
     speed_mps: Option<f64>,
     first: Option<Instant>,
@@ -111,7 +113,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn a_told_speed_is_a_way_straight_ahead() {
+    fn a_given_speed_is_a_way_straight_ahead() {
         let mut way = StraightWay::new(Some(8.0));
         let start = Instant::now();
         assert!(!way.at(start).goes_on);

@@ -56,7 +56,7 @@ pub(super) struct Job<'a> {
     /// How the intervals are stretched that the network says.
     intervals: IntervalFactors,
     /// Warns once of cameras that nobody gave.
-    tell_assumed: Once,
+    camera_warning: Once,
 }
 
 /// An image on its way through the network.
@@ -121,7 +121,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     drop(shown);
     let sidecars = std::mem::take(&mut summary.sidecars);
     let (there, done) = (mine.len() - todo.len(), summary.done);
-    // A full disk is told once, as the reason for stopping.
+    // A full disk is reported once, as the reason for stopping.
     let outcome = outcome(summary)?;
     say(&format!(
         "{} images written to {}{}",
@@ -139,7 +139,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     outcome?;
     if args.video() {
         let written = write_videos(out, &all, outputs::ending(Save::SideBySide));
-        tell_videos(&written?);
+        print_videos(&written?);
     }
     Ok(())
 }
@@ -177,7 +177,7 @@ fn outcome(summary: Summary<crate::failure::Failure>) -> Result<Result<()>> {
     Ok(Ok(()))
 }
 
-/// The images that the arguments mean; what was noticed of recordings among them is told.
+/// The images that the arguments mean; warnings of recordings among them are printed.
 pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<Vec<Input>> {
     let options = OpenOptions {
         assumed_camera: model.assumed_camera(args.engine.set.as_deref())?,
@@ -186,7 +186,7 @@ pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<
     Ok(deepfusion_jobs::find_inputs(
         &args.inputs,
         &options,
-        warnings::tell,
+        warnings::print,
     )?)
 }
 
@@ -210,7 +210,10 @@ pub(super) fn check_watched(
         why: why.to_string(),
     };
     if let Some(address) = source {
-        return Err(unwatched_for(address, &"a live source tells no motion"));
+        return Err(unwatched_for(
+            address,
+            &"a live source has no measured motion",
+        ));
     }
     match unwatched(inputs) {
         Some((input, why)) => Err(unwatched_for(&input, &why)),
@@ -219,7 +222,7 @@ pub(super) fn check_watched(
 }
 
 /// Says that the metres have changed.
-pub(super) fn tell_drift(frame: &str, ratio: f64) {
+pub(super) fn warn_of_drift(frame: &str, ratio: f64) {
     tracing::warn!(
         "{frame}: the road says that metres are {ratio:.2} times what they were: were the images zoomed, the camera \
          moved, or is the speed wrong? (scale_monitor in each frame's JSON; --correct-scale brings depth back)"
@@ -238,14 +241,14 @@ fn check_videos(args: &PredictArgs) -> Result<()> {
 }
 
 /// Says which videos were written, and how many frames each has.
-fn tell_videos(videos: &[(PathBuf, usize)]) {
+fn print_videos(videos: &[(PathBuf, usize)]) {
     for (path, frames) in videos {
         say(&format!("{}: {frames} frames", path.display()));
     }
 }
 
 /// Warns of a camera that nobody gave.
-fn tell_assumed() {
+fn warn_of_assumed_camera() {
     tracing::warn!(
         "no intrinsics given, and none in the image's EXIF: the training camera's field of view is assumed, so the metres are \
          only as right as that is (camera_known: false; give --intrinsics, --hfov or --calib)"
@@ -253,7 +256,7 @@ fn tell_assumed() {
 }
 
 /// Warns of a camera that nobody gave, and that training found.
-fn tell_learned() {
+fn warn_of_learned_camera() {
     tracing::warn!(
         "no intrinsics given: the camera that the run learned is taken, so the metres are only as right as that is \
          (camera_known: false; give --intrinsics, --hfov or --calib)"
@@ -282,7 +285,7 @@ fn predict(
             let (input, image) = (mine[todo[i]], &loaded.image);
             seen.scale = watch.look(input, image, loaded.camera, &mut seen.prediction);
             if let Some(ratio) = watch.first_drift() {
-                tell_drift(&input.name, ratio);
+                warn_of_drift(&input.name, ratio);
             }
             seen
         });
@@ -340,7 +343,7 @@ impl<'a> Job<'a> {
             preparer: estimator.preparer(),
             step: estimator.step,
             intervals: model.interval_factors()?,
-            tell_assumed: Once::new(),
+            camera_warning: Once::new(),
             scale: model.scale(set, !args.no_focal_correction, estimator.step)?,
             inspector: if outputs.save.contains(&Save::Features) {
                 Some(inspection::open(&model.load(set)?, args.engine.device)?)
@@ -386,8 +389,8 @@ impl<'a> Job<'a> {
             }
         };
         match taken.from {
-            "assumed" => self.tell_assumed.call_once(tell_assumed),
-            "learned" => self.tell_assumed.call_once(tell_learned),
+            "assumed" => self.camera_warning.call_once(warn_of_assumed_camera),
+            "learned" => self.camera_warning.call_once(warn_of_learned_camera),
             _ => {}
         }
         Ok(self.prepare(mark, taken))

@@ -97,7 +97,7 @@ pub(crate) fn run(json: bool) -> Result<()> {
         text += "  none in this build; `weights pack` makes one of a run\n";
     }
     for network in &networks {
-        text += &told(&network.card);
+        text += &network_text(&network.card);
     }
     text += "\nTo be imported, with `weights import`:\n";
     for [name, files, gives, terms] in KNOWN {
@@ -107,8 +107,8 @@ pub(crate) fn run(json: bool) -> Result<()> {
 }
 
 /// A network in lines.
-fn told(card: &Card) -> String {
-    /// Recordings that are told by name.
+fn network_text(card: &Card) -> String {
+    /// Recordings that are named.
     const NAMED: usize = 6;
     let size = card
         .size()
@@ -147,7 +147,7 @@ fn told(card: &Card) -> String {
         ("sha256", Some(card.sha256.as_str())),
     ];
     for figure in &card.figures {
-        text += &format!("    measured  {}\n", told_figure(figure));
+        text += &format!("    measured  {}\n", figure_text(figure));
     }
     for (key, value) in rest {
         if let Some(value) = value {
@@ -157,7 +157,7 @@ fn told(card: &Card) -> String {
     text
 }
 
-fn told_figure(figure: &Figure) -> String {
+fn figure_text(figure: &Figure) -> String {
     let seen = match figure.held_out {
         Some(true) => "not seen in training",
         Some(false) => "seen in training",

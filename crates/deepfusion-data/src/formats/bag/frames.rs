@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn two_parents_are_told_unless_they_agree() {
+    fn two_parents_are_an_error_unless_they_agree() {
         let with = |x| {
             frames(&[
                 link("base", "a", 1.0, 0.0),

@@ -332,7 +332,7 @@ impl<'a> ByFrames<'a> {
                         Some(_) => {}
                         None => found = Some((name, chain)),
                     },
-                    // Told as what it is by the caller, who asks for this way again.
+                    // Reported as what it is by the caller, who asks for this way again.
                     Way::Several(_) => return Ok(Some(name.to_owned())),
                     Way::Moves(..) => moving = moving.or(Some(name)),
                     Way::Unknown => {}

@@ -96,7 +96,7 @@ pub(super) fn packet<'m>(
     }
 }
 
-/// Both layouts of a packet have one name; that of ROS 1's first version is told by its MD5, which ROS 2 has none of.
+/// Both layouts of a packet have one name; that of ROS 1's first version is recognised by its MD5, which ROS 2 has none of.
 fn is_old(message: &Message<'_>) -> bool {
     message.serialization() == Serialization::Ros1 && message.is::<OldFfmpegPacket<'_>>()
 }
