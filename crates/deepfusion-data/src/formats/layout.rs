@@ -58,7 +58,7 @@ pub(crate) enum Layout {
     Kitti(Vec<Drive>),
     KittiOdometry(Vec<PathBuf>),
     Kitti360(Vec<kitti360::Drive>),
-    NuScenes(nuscenes::Place),
+    NuScenes(nuscenes::TableFolder),
     Comma(PathBuf),
     RgbD(Vec<PathBuf>),
     Bags(Vec<PathBuf>),

@@ -6,7 +6,7 @@ use deepfusion_eval::{
     Evaluator, MeanDepthBaseline, Prediction, Protocol, Report, Sample, ScenarioRow,
 };
 
-use super::{Evaluated, Place};
+use super::{Evaluated, ImageRef};
 use crate::Result;
 
 /// Evaluates a method and, beside it, the mean-depth baseline on the same images.
@@ -69,7 +69,7 @@ impl Comparison {
     ///
     /// # Errors
     /// Where no image had a pixel to compare.
-    pub fn evaluated(&self, places: Vec<Place>) -> Result<Evaluated> {
+    pub fn evaluated(&self, places: Vec<ImageRef>) -> Result<Evaluated> {
         Ok(Evaluated {
             report: self.report()?,
             images: self.method.images().to_vec(),

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::division::divide;
 use super::known_pixels::known_pixels;
-use super::{Evaluated, Place, Truth};
+use super::{Evaluated, ImageRef, Truth};
 use crate::{Error, Result};
 
 /// The file in a run's folder.
@@ -101,7 +101,7 @@ pub fn calibrate(
     let division = divide(&images);
     let mut sampled = |part: &[usize]| -> Result<Vec<Sampled>> {
         let mut samples = Vec::new();
-        for Place(set, frame) in part.iter().map(|i| evaluated.places[*i]) {
+        for ImageRef(set, frame) in part.iter().map(|i| evaluated.places[*i]) {
             let dataset = &datasets[set];
             samples.extend(of_frame(estimator, dataset, frame, truth, correct_focal)?);
         }
@@ -137,7 +137,7 @@ pub fn calibrate(
 }
 
 /// The drive that an image is of, and its frame's number. The drives of a folder of bags share the folder.
-fn image(datasets: &[Dataset], Place(set, frame): Place) -> ((&Path, &str), u64) {
+fn image(datasets: &[Dataset], ImageRef(set, frame): ImageRef) -> ((&Path, &str), u64) {
     let dataset = &datasets[set];
     let drive = (dataset.folder(), dataset.split_name());
     (drive, dataset.frames()[frame].number)

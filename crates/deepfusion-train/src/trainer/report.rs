@@ -1,7 +1,7 @@
 //! What a run says of itself, and its checkpoints.
 
 use super::Trainer;
-use super::step::Shown;
+use super::step::PanelInput;
 use super::validation::validation_loss;
 use crate::focal_spread::focal_spread;
 use crate::selection::selection;
@@ -21,7 +21,7 @@ impl Trainer {
     pub(super) fn report(
         &mut self,
         listen: &mut dyn FnMut(TrainEvent) -> Control,
-        shown: Option<Shown>,
+        shown: Option<PanelInput>,
         [valid_share, moving_share]: [f64; 2],
         validate: bool,
     ) -> Result<(), Error> {

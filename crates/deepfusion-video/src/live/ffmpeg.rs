@@ -30,7 +30,7 @@ pub(super) struct Ffmpeg {
 
 /// How an ffmpeg ended.
 #[derive(Debug)]
-pub(super) struct End {
+pub(super) struct FfmpegExit {
     code: Option<i32>,
     said: Vec<String>,
 }
@@ -94,7 +94,7 @@ impl Ffmpeg {
     }
 
     /// Waits for its end after its pipe was closed, and sees to it where it takes too long.
-    pub(super) fn end(&mut self) -> End {
+    pub(super) fn end(&mut self) -> FfmpegExit {
         let begun = Instant::now();
         let mut code = None;
         while begun.elapsed() < GRACE {
@@ -109,7 +109,7 @@ impl Ffmpeg {
             std::thread::sleep(Duration::from_millis(5));
         }
         let said = self.said();
-        End { code, said }
+        FfmpegExit { code, said }
     }
 
     /// Its last words so far.
@@ -182,7 +182,7 @@ const LOSSES: [&str; 7] = [
     "Error during demuxing",
 ];
 
-impl End {
+impl FfmpegExit {
     /// Whether it ended because its source did.
     pub(super) fn is_clean(&self) -> bool {
         self.code == Some(0) && !self.said_one_of(&LOSSES)
@@ -222,8 +222,8 @@ pub(super) fn quoted(said: &[String]) -> String {
 mod tests {
     use super::*;
 
-    fn end(code: i32, said: &[&str]) -> End {
-        End {
+    fn end(code: i32, said: &[&str]) -> FfmpegExit {
+        FfmpegExit {
             code: Some(code),
             said: said.iter().map(|s| (*s).to_owned()).collect(),
         }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use deepfusion_eval::verdict::{Check, Verdict, Worse};
+use deepfusion_eval::verdict::{Check, Verdict, WorsenedCheck};
 use serde::Serialize;
 
 use crate::error::CliError;
@@ -23,7 +23,7 @@ pub(super) struct Outcome {
     /// Whether it may take the given one's place.
     pub kept: bool,
     /// The checks that became worse.
-    pub worse: Vec<Worse>,
+    pub worse: Vec<WorsenedCheck>,
     /// The given network on the held-out frames.
     pub before: Verdict,
     /// The adapted one on the same.
@@ -62,7 +62,7 @@ impl Outcome {
             return None;
         }
         let rows = self.worse.iter().map(|worse| {
-            let Worse {
+            let WorsenedCheck {
                 check,
                 before,
                 after,

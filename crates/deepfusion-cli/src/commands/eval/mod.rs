@@ -11,7 +11,7 @@ use deepfusion_geometry::Intrinsics;
 use deepfusion_jobs::evaluation::confidence::{self, Calibrated};
 pub(super) use deepfusion_jobs::evaluation::predict;
 use deepfusion_jobs::evaluation::{
-    Evaluated, Place, Truth, array_places, baseline_from_arrays, baseline_from_training,
+    Evaluated, ImageRef, Truth, array_places, baseline_from_arrays, baseline_from_training,
     check_used, default_crop, depth_map, evaluate_arrays, evaluate_datasets, expected_frames,
 };
 use deepfusion_jobs::held_out::{held_out, unseen};
@@ -213,7 +213,7 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
             Truth::Scans(_) => Default::default(),
             Truth::Arrays(arrays) => array_places(arrays, &names),
         };
-        let shown = shown(&evaluated, |Place(number, frame)| {
+        let shown = shown(&evaluated, |ImageRef(number, frame)| {
             let dataset = &datasets[number];
             let place = dataset.selected().iter().position(|f| *f == frame);
             let name = place.and_then(|p| names[number].get(p));
@@ -311,7 +311,7 @@ fn from_arrays(
         &mut |done, total| progress.set(done, total),
     )?;
     if let Some(path) = &args.report {
-        let shown = shown(&evaluated, |Place(prediction, depth)| {
+        let shown = shown(&evaluated, |ImageRef(prediction, depth)| {
             Ok(Some(Seen {
                 image: None,
                 prediction: of_kind(predicted.read(prediction)?),
@@ -343,7 +343,7 @@ struct Seen {
 /// The frames worth showing, looked at again.
 fn shown(
     evaluated: &Evaluated,
-    mut see: impl FnMut(Place) -> Result<Option<Seen>>,
+    mut see: impl FnMut(ImageRef) -> Result<Option<Seen>>,
 ) -> Result<Vec<(Choice, ShownFrame)>> {
     let mut frames = Vec::new();
     for choice in run_report::choose(evaluated) {

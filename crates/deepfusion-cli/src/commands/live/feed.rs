@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::bounded;
-use deepfusion_video::{Address, LiveFrame, LiveSource, Taken};
+use deepfusion_video::{Address, LiveFrame, LiveSource, NextFrame};
 
 use super::figures::Figures;
 use crate::cli::LiveArgs;
@@ -83,13 +83,13 @@ impl Feed {
                 return Ok(Err(Ending::Enough));
             }
             match self.source.take(LOOK_UP)? {
-                Taken::Frame(frame) => {
+                NextFrame::Frame(frame) => {
                     self.frames -= 1;
                     self.first.get_or_insert(frame.arrived);
                     return Ok(Ok(frame));
                 }
-                Taken::NotYet => {}
-                Taken::Ended => {
+                NextFrame::NotYet => {}
+                NextFrame::Ended => {
                     self.warn_of_end();
                     return Ok(Err(Ending::Stream));
                 }

@@ -11,7 +11,7 @@ use deepfusion_video::{Address, LiveFrame};
 use nalgebra::Vector3;
 
 use super::Work;
-use super::eyes::{Begun, Eyes, Found};
+use super::frame_processor::{FrameProcessor, PerceivedFrame, StartedFrame};
 use crate::commands::live::{self, Feed};
 use crate::failure::Result;
 use crate::output;
@@ -19,7 +19,7 @@ use crate::progress::say;
 
 impl Work<'_> {
     /// Looks at a live source until it ends.
-    pub(super) fn go_live(self, address: &Address, mut eyes: Eyes) -> Result<()> {
+    pub(super) fn go_live(self, address: &Address, mut processor: FrameProcessor) -> Result<()> {
         let mut way = StraightWay::new(self.args.speed);
         let mut feed = Feed::open(address, &self.args.prediction.live)?;
         let look = |frame: LiveFrame| {
@@ -29,14 +29,14 @@ impl Work<'_> {
                 LiveMark::of_arrival(frame.arrived_at, frame.dropped),
             );
             let (loaded, prepared) = self.job.load_live(frame)?;
-            let begun = Begun {
+            let started = StartedFrame {
                 input,
                 loaded,
                 prepared,
                 start,
             };
             let motion = way.at(start);
-            let mut found = eyes.look(begun, motion)?;
+            let mut found = processor.process(started, motion)?;
             let latency_ms = found.latency_ms;
             found.loaded.live = Some(LiveMark { latency_ms, ..mark });
             found.record.arrived_unix_s = Some(mark.arrived_unix_s);
@@ -47,7 +47,7 @@ impl Work<'_> {
             }
             Ok((found, latency_ms))
         };
-        let ending = live::run(&mut feed, look, |found: Found| self.write(&found));
+        let ending = live::run(&mut feed, look, |found: PerceivedFrame| self.write(&found));
         // What is there stays, also where the source was lost.
         let outcome = self.outcome.into_inner().unwrap_or_else(|e| e.into_inner());
         let lines = self.lines.into_inner().unwrap_or_else(|e| e.into_inner());

@@ -16,8 +16,8 @@ use deepfusion_eval::compare::MetricScale;
 use deepfusion_geometry::Intrinsics;
 use deepfusion_jobs::bulk::pipeline::{self, Threads};
 use deepfusion_jobs::bulk::{
-    Begun, BulkJob, BulkProgress, CameraSource, Lock, PinholeImage, Summary, add_output, commit,
-    queue, write_unsynced, write_videos,
+    BulkJob, BulkProgress, CameraSource, Lock, PinholeImage, StartedJob, Summary, add_output,
+    commit, queue, write_unsynced, write_videos,
 };
 use deepfusion_jobs::scene::{DepthWatch, unwatched};
 use deepfusion_jobs::{Input, intervals};
@@ -108,7 +108,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     interrupt::catch("stopping after the images at work; the same command goes on from there");
     let _lock = Lock::take(out, *shard)?;
     let begun = job.bulk(args).begin(&all, &mine, args.json);
-    let Begun {
+    let StartedJob {
         manifest,
         sidecars,
         todo,

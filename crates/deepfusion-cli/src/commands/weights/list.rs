@@ -28,7 +28,7 @@ const KNOWN: [[&str; 4]; 3] = [
 
 /// What `--json` prints of a packed network: its card without the configuration, and what of that one asks for first.
 #[derive(Debug, Serialize)]
-pub(crate) struct Listed<'a> {
+pub(crate) struct WeightsRow<'a> {
     name: &'a str,
     /// Whether it is meant where no `--model` is given.
     default: bool,
@@ -51,7 +51,7 @@ pub(crate) struct Listed<'a> {
     format_version: u32,
 }
 
-impl<'a> From<&'a Card> for Listed<'a> {
+impl<'a> From<&'a Card> for WeightsRow<'a> {
     fn from(card: &'a Card) -> Self {
         Self {
             name: &card.name,
@@ -81,7 +81,8 @@ impl<'a> From<&'a Card> for Listed<'a> {
 pub(crate) fn run(json: bool) -> Result<()> {
     let networks = deepfusion_weights::all()?;
     if json {
-        let embedded: Vec<Listed> = networks.iter().map(|n| Listed::from(&n.card)).collect();
+        let embedded: Vec<WeightsRow> =
+            networks.iter().map(|n| WeightsRow::from(&n.card)).collect();
         let importable: Vec<_> = KNOWN
             .iter()
             .map(|[name, files, gives, terms]| {
