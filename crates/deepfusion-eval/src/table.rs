@@ -77,9 +77,9 @@ impl Report {
                 metrics,
             )?;
         }
-        if let Some(trivial) = &self.trivial {
-            row(f, "mean-depth baseline", &trivial.unscaled)?;
-            row(f, "  median-scaled", &trivial.median_scaled)?;
+        if let Some(mean_depth_baseline) = &self.mean_depth_baseline {
+            row(f, "mean-depth baseline", &mean_depth_baseline.unscaled)?;
+            row(f, "  median-scaled", &mean_depth_baseline.median_scaled)?;
         }
         for scenario in &self.scenarios {
             let label = format!("{}, scale {:.3}", scenario.name, scenario.scale.median);
@@ -112,7 +112,7 @@ impl Report {
                 100.0 * rate
             )?;
             match self.hole_rate_moving {
-                Some(rate) => writeln!(f, "; {:.2} % of what moves", 100.0 * rate)?,
+                Some(rate) => writeln!(f, "; {:.2} % of dynamic pixels", 100.0 * rate)?,
                 None => writeln!(f)?,
             }
         }

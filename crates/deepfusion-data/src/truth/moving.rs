@@ -1,4 +1,4 @@
-//! Which pixels of a frame's ground truth belong to what moves over the ground.
+//! Which pixels of a frame's ground truth belong to dynamic objects, which move over the ground.
 
 use super::scan::GtKind;
 use crate::Result;
@@ -21,7 +21,7 @@ pub enum MovingSource {
     DynamicPoints,
 }
 
-/// What moves in a recording.
+/// The dynamic pixels of a recording.
 #[derive(Debug, Clone)]
 pub struct MovingLabels {
     source: MovingSource,

@@ -53,7 +53,7 @@ impl Verdict {
                 continue;
             };
             compared = true;
-            // What is no number is worse than any.
+            // NaN is worse than any.
             if after.is_nan() || after > check.most(before) {
                 worse.push(WorsenedCheck {
                     check,
@@ -135,7 +135,7 @@ mod tests {
             names(before.worse(&verdict(0.08, 0.05, -0.2))),
             [Check::Flip, Check::Scale]
         );
-        // What is no number is no better.
+        // NaN is no better.
         assert_eq!(
             names(before.worse(&verdict(f64::NAN, 0.03, 0.05))),
             [Check::Reprojection]

@@ -17,7 +17,7 @@ pub struct AssumedCamera {
     pub aspect: f64,
     /// Whether the focal length is learned with the networks, from the photometric error of the warped images.
     pub learn: bool,
-    /// Adam's step size of ln f, which follows the run's schedule: the largest relative change a step.
+    /// Adam's learning rate of ln f, which follows the run's schedule: the largest relative change a step.
     pub learning_rate: f64,
 }
 

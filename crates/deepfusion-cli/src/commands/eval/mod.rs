@@ -372,7 +372,10 @@ fn page(
 ) -> Result<HtmlReport> {
     let report = &evaluated.report;
     let number = |v: f64| format!("{v:.3}");
-    let trivial = report.trivial.as_ref().map(|t| t.unscaled.abs_rel);
+    let mean_depth_baseline = report
+        .mean_depth_baseline
+        .as_ref()
+        .map(|t| t.unscaled.abs_rel);
     let names: Vec<_> = args.data.iter().map(|p| output::name_of(p)).collect();
     let on = if names.is_empty() {
         String::new()
@@ -388,7 +391,7 @@ fn page(
             ("Abs Rel, unscaled", &number(report.unscaled.abs_rel)),
             (
                 "Abs Rel, mean-depth baseline",
-                &trivial.map_or("–".into(), number),
+                &mean_depth_baseline.map_or("–".into(), number),
             ),
             ("scale (1 is metric)", &number(report.scale.median)),
             (

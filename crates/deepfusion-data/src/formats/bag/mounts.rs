@@ -52,7 +52,7 @@ impl Mounts {
         };
         if index.frames.broken > 0 {
             search.warnings.push(format!(
-                "{} transforms of frames have no rotation, or no numbers, and are left out",
+                "{} transforms of frames have no rotation, or NaN, and are left out",
                 index.frames.broken
             ));
         }

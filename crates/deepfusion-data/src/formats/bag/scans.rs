@@ -1,4 +1,4 @@
-//! The scans of a bag as its camera sees them: depth, velocities, what moves.
+//! The scans of a bag as its camera sees them: depth, velocities, dynamic points.
 
 use super::config::LidarConfig;
 use super::doppler::ego_velocity;
@@ -210,7 +210,7 @@ impl BagScans {
     }
 }
 
-/// Scans as labels of what moves.
+/// Scans as labels of dynamic pixels.
 #[derive(Debug)]
 pub(super) struct MovingPoints {
     pub(super) scans: Arc<BagScans>,
