@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use deepfusion_data::{Converted, Dataset, OpenOptions, convert_to_bag, convert_to_kitti};
+use deepfusion_hint::count_of;
 
 use super::clocks;
 use super::recordings::open_recordings;
@@ -59,7 +60,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<()> {
             "moved_s": moved_s,
         }));
     }
-    say(&format!("{frames} frames written"));
+    say(&format!("{} written", count_of(frames, "frame")));
     for path in &paths {
         output::print(&format!("{}\n", path.display()))?;
     }

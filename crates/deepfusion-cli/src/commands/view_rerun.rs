@@ -32,10 +32,7 @@ pub fn run(args: &ViewArgs, file: &Path) -> Result<()> {
     drop(bar);
     let report = report?;
     warn(&report.problems);
-    let frames = match report.frames {
-        1 => "1 frame".to_owned(),
-        n => format!("{n} frames"),
-    };
+    let frames = deepfusion_hint::count_of(report.frames, "frame");
     say(&format!(
         "{}: {frames}; open it with `rerun {}` (version {})",
         file.display(),

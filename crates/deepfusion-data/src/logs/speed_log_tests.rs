@@ -123,7 +123,9 @@ fn bad_rows_are_named() {
 fn repeated_times_and_slow_clocks_are_reported() {
     let log = read(&[("speed.csv", "time_s,speed_mps\n0,1\n0,2\n0.1,1\n")]).unwrap();
     assert!(
-        log.warnings.iter().any(|r| r.contains("first in line 3")),
+        log.warnings
+            .iter()
+            .any(|r| r.contains("1 row repeats the time of the row above (in line 3)")),
         "{:?}",
         log.warnings
     );

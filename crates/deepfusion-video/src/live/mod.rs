@@ -15,6 +15,7 @@ pub use slot::LiveFrame;
 use self::ffmpeg::{Ffmpeg, FfmpegExit, quoted};
 use self::slot::SlotState;
 use crate::{Error, Result};
+use deepfusion_hint::count_of;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -106,7 +107,7 @@ impl LiveSource {
         }
         let happened = match came {
             0 => "gave no frame".to_owned(),
-            n => format!("lost the connection after {}", frames(n)),
+            n => format!("lost the connection after {}", count_of(n, "frame")),
         };
         Err(self.error(
             format!("{happened}: {}", self.address.without_password(&end.text())),
@@ -118,7 +119,7 @@ impl LiveSource {
     fn silent(&self) -> Error {
         let before = match self.ffmpeg.slot().arrived() {
             0 => String::new(),
-            n => format!(", after {}", frames(n)),
+            n => format!(", after {}", count_of(n, "frame")),
         };
         let said = self.address.without_password(&quoted(&self.ffmpeg.said()));
         let seconds = self.timeout.as_secs_f64();
@@ -135,13 +136,6 @@ impl LiveSource {
             problem,
             remedy,
         }
-    }
-}
-
-fn frames(n: u64) -> String {
-    match n {
-        1 => "1 frame".into(),
-        n => format!("{n} frames"),
     }
 }
 

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use deepfusion_eval::verdict::{Check, Verdict, WorsenedCheck};
+use deepfusion_hint::count_of;
 use serde::Serialize;
 
 use crate::error::CliError;
@@ -98,7 +99,10 @@ impl fmt::Display for Outcome {
         writeln!(
             f,
             "{:<36}{:>10}{:>10}",
-            format!("held out ({} frames)", self.after.without_truth.frames),
+            format!(
+                "held out ({})",
+                count_of(self.after.without_truth.frames, "frame")
+            ),
             "before",
             "after"
         )?;

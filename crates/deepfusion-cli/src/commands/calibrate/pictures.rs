@@ -7,6 +7,7 @@ use deepfusion_calibrate::{
     Board, BoardDetection, Candidate, Error, View, find_board, pick, sharpness,
 };
 use deepfusion_data::{OpenOptions, load_photo, load_rgb};
+use deepfusion_hint::count_of;
 use deepfusion_jobs::find_inputs;
 use deepfusion_video::VideoFrames;
 use image::GrayImage;
@@ -135,7 +136,7 @@ impl Seen {
         let frames = video.count();
         let parts = frames.min(PARTS);
         let name = file.display().to_string();
-        say(&format!("{name}: {frames} frames"));
+        say(&format!("{name}: {}", count_of(frames, "frame")));
         if frames > 0 {
             // The first look decodes all of them.
             video.frame(0)?;

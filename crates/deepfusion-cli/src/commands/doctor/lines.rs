@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use deepfusion_doctor::{Outcome, Severity, Status};
+use deepfusion_hint::count_of;
 
 /// A check and the drive it looked at; no drive where it looked at the whole recording.
 type Checked<'a> = (Option<&'a str>, &'a Outcome);
@@ -82,8 +83,7 @@ fn counts(outcome: &Outcome) -> String {
         let of_kind = outcome.findings.iter().filter(|f| f.severity == severity);
         match of_kind.count() {
             0 => None,
-            1 => Some(format!("1 {severity}")),
-            n => Some(format!("{n} {severity}s")),
+            n => Some(count_of(n, &severity.to_string())),
         }
     });
     counted.collect::<Vec<_>>().join(", ")

@@ -9,6 +9,7 @@ use std::path::Path;
 
 use deepfusion_data::{DatasetKind, OpenOptions};
 use deepfusion_doctor::{Diagnosis, Severity, doctor_log, doctor_with, is_log};
+use deepfusion_hint::count_of;
 use deepfusion_logs::ReadOptions;
 
 use crate::cli::{CameraIntrinsics, DoctorArgs};
@@ -122,8 +123,10 @@ fn text(diagnosis: &Diagnosis, verbose: bool) -> String {
         };
         let _ = writeln!(
             text,
-            "{}{camera}: {} frames, {} looked at",
-            drive.name, drive.frames, drive.looked_at
+            "{}{camera}: {}, {} looked at",
+            drive.name,
+            count_of(drive.frames, "frame"),
+            drive.looked_at
         );
     }
     if !text.is_empty() {
@@ -147,10 +150,10 @@ fn text(diagnosis: &Diagnosis, verbose: bool) -> String {
         }
         let _ = writeln!(text, "  remedy: {}", finding.remedy);
     }
-    let number = |severity| diagnosis.count(severity);
+    let number = |severity: Severity| count_of(diagnosis.count(severity), &severity.to_string());
     let _ = writeln!(
         text,
-        "\n{} errors, {} warnings, {} notes",
+        "\n{}, {}, {}",
         number(Severity::Error),
         number(Severity::Warning),
         number(Severity::Note)

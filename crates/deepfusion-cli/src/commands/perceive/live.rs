@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use deepfusion_geometry::Se3;
+use deepfusion_hint::count_of;
 use deepfusion_jobs::bulk::record_line;
 use deepfusion_jobs::scene::Motion;
 use deepfusion_perception::Stamp;
@@ -60,9 +61,9 @@ impl Work<'_> {
                 .as_ref()
                 .map_or("the source was lost", |e| e.as_str());
             say(&format!(
-                "{} frames, {} targets written to {} ({ended}): {figures}",
-                outcome.done,
-                outcome.targets,
+                "{}, {} written to {} ({ended}): {figures}",
+                count_of(outcome.done, "frame"),
+                count_of(outcome.targets, "target"),
                 self.args.prediction.out.display()
             ));
         }

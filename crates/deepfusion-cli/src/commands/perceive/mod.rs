@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
 
+use deepfusion_hint::count_of;
 use deepfusion_jobs::Input;
 use deepfusion_jobs::bulk::pipeline::{self, Threads};
 use deepfusion_jobs::bulk::{RecordLines, record_line, write_record};
@@ -212,9 +213,9 @@ impl Work<'_> {
         outcome.latency_ms.sort_by(f64::total_cmp);
         let median = outcome.latency_ms.get(outcome.done / 2).copied();
         say(&format!(
-            "{} frames, {} targets written to {}{}",
-            outcome.done,
-            outcome.targets,
+            "{}, {} written to {}{}",
+            count_of(outcome.done, "frame"),
+            count_of(outcome.targets, "target"),
             self.args.prediction.out.display(),
             median.map_or(String::new(), |ms| format!(
                 ", {ms:.0} ms from file to targets (median)"

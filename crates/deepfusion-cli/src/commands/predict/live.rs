@@ -2,6 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use deepfusion_hint::count_of;
 use deepfusion_jobs::bulk::{CameraSource, Lock, write_one_video};
 use deepfusion_records::LiveMark;
 use deepfusion_runtime::ModelSource;
@@ -63,8 +64,8 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
             .as_ref()
             .map_or("the source was lost", |e| e.as_str());
         say(&format!(
-            "{} images written to {} ({ended}): {figures}",
-            done.len(),
+            "{} written to {} ({ended}): {figures}",
+            count_of(done.len(), "image"),
             out.display()
         ));
     }

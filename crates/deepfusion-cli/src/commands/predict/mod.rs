@@ -14,6 +14,7 @@ use deepfusion_data::{OpenOptions, RgbImage, load_photo};
 use deepfusion_eval::IntervalFactors;
 use deepfusion_eval::compare::MetricScale;
 use deepfusion_geometry::Intrinsics;
+use deepfusion_hint::count_of;
 use deepfusion_jobs::bulk::pipeline::{self, Threads};
 use deepfusion_jobs::bulk::{
     BulkJob, BulkProgress, CameraSource, Lock, PinholeImage, StartedJob, Summary, add_output,
@@ -124,8 +125,8 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     // A full disk is reported once, as the reason for stopping.
     let outcome = outcome(summary)?;
     say(&format!(
-        "{} images written to {}{}",
-        done - there,
+        "{} written to {}{}",
+        count_of(done - there, "image"),
         out.display(),
         if there > 0 {
             format!(", {there} were there already")
@@ -243,7 +244,11 @@ fn check_videos(args: &PredictArgs) -> Result<()> {
 /// Says which videos were written, and how many frames each has.
 fn print_videos(videos: &[(PathBuf, usize)]) {
     for (path, frames) in videos {
-        say(&format!("{}: {frames} frames", path.display()));
+        say(&format!(
+            "{}: {}",
+            path.display(),
+            count_of(*frames, "frame")
+        ));
     }
 }
 

@@ -57,9 +57,15 @@ impl Seen {
     /// What is left out, in a sentence.
     pub(super) fn warning(&self) -> Option<String> {
         let Self { topic, before, .. } = self;
-        (*before > 0).then(|| {
-            format!("{topic}: the first {before} messages come before the first key frame and cannot be decoded: they are left out")
-        })
+        match before {
+            0 => None,
+            1 => Some(format!(
+                "{topic}: the first message comes before the first key frame and cannot be decoded: it is left out"
+            )),
+            _ => Some(format!(
+                "{topic}: the first {before} messages come before the first key frame and cannot be decoded: they are left out"
+            )),
+        }
     }
 }
 
