@@ -7,7 +7,7 @@ python benches/peers/torch_full_step.py [--threads 2] [--size 320x96] [--batch 4
 Prints the median of ten steps on random images, in both memory layouts. Beside torch_light_step.py's step it decodes the
 optical flow of both directions from the depth network's features (torch_flow.py's decoder, its correlation compiled into
 one loop, since PyTorch has none), and adds the flow's photometric, consistency and smoothness terms, the affine
-invariant loss, the masks of what moves, and the agreement of flow and rigid flow.
+invariant loss, the masks of dynamic pixels, and the agreement of flow and rigid flow.
 """
 import argparse
 

@@ -33,7 +33,7 @@ class Target:
     velocity_mps: Vector | None
     """Over ground, in the camera's axes; None before it could be measured."""
     moving: bool | None
-    """Whether it moves over ground; None before that could be told."""
+    """Whether it moves over ground; None before that is known."""
     confidence: float
     """How sure it is that something of this kind is there, 0 to 1."""
     pixels: int
@@ -129,7 +129,7 @@ class Perception:
         """The targets in a depth image: H x W metres, 0 where there is none; `intrinsics` of that size, `sigma` its standard deviation.
 
         With `time_s` (seconds, on any clock) and `world_from_cam` (4 x 4, the camera to a frame that stays where it is) targets are
-        followed: they keep their id, are told once they were seen twice, and get a velocity. `speed_mps` and `yaw_rate_radps` (positive
+        followed: they keep their id, are reported once they were seen twice, and get a velocity. `speed_mps` and `yaw_rate_radps` (positive
         to the left) are the vehicle's, for `Surroundings.collision`.
         """
         as_f32 = lambda a: np.ascontiguousarray(a, dtype=np.float32)  # noqa: E731

@@ -18,7 +18,7 @@ use crate::error::Failure;
 use crate::model::{Prediction, Source};
 
 /// What is asked of the network.
-pub struct Many {
+pub struct BulkRequest {
     pub images: Py<PyIterator>,
     pub intrinsics: Option<[f64; 4]>,
     pub focal_correction: bool,
@@ -29,7 +29,7 @@ pub struct Many {
 type Answer = Sender<Result<Prediction, Failure>>;
 
 /// An image that is read, on its way to the network.
-struct Read {
+struct LoadedImage {
     image: RgbImage,
     camera: Option<Intrinsics>,
     prepared: PreparedImage,
@@ -39,7 +39,7 @@ struct Read {
 /// The predictions of many images, in their order.
 #[pyclass(module = "deepfusion")]
 pub struct Predictions {
-    many: Many,
+    request: BulkRequest,
     /// None once the images have ended.
     to_read: Option<Sender<(Source, Answer)>>,
     /// In the images' order. Nobody waits for the lock: it makes what may be used by one thread a part of what Python may share.
@@ -50,14 +50,14 @@ pub struct Predictions {
 
 impl Predictions {
     /// The threads end when this goes.
-    pub fn begin(many: Many, estimator: DepthEstimator) -> PyResult<Self> {
+    pub fn begin(request: BulkRequest, estimator: DepthEstimator) -> PyResult<Self> {
         let cores = thread::available_parallelism().map_or(1, NonZero::get);
         let readers = (cores / 4).clamp(1, 8);
         let (to_read, images) = channel::<(Source, Answer)>();
-        let (to_network, read) = sync_channel::<Read>(readers);
+        let (to_network, read) = sync_channel::<LoadedImage>(readers);
         let (to_finish, seen) = sync_channel(2);
         let images = Arc::new(Mutex::new(images));
-        let settings = (many.intrinsics, many.focal_correction, many.crop);
+        let settings = (request.intrinsics, request.focal_correction, request.crop);
         for _ in 0..readers {
             let (images, to_network) = (Arc::clone(&images), to_network.clone());
             let preparer = estimator.preparer();
@@ -73,7 +73,7 @@ impl Predictions {
             }
         })?;
         Ok(Self {
-            many,
+            request,
             to_read: Some(to_read),
             waiting: Mutex::default(),
             ahead: 2 * readers + 4,
@@ -87,7 +87,7 @@ impl Predictions {
         while let Some(to_read) = &self.to_read
             && waiting.len() < self.ahead
         {
-            let Some(image) = self.many.images.bind(py).clone().next() else {
+            let Some(image) = self.request.images.bind(py).clone().next() else {
                 self.to_read = None;
                 break;
             };
@@ -133,7 +133,7 @@ fn spawn(work: impl FnOnce() + Send + 'static) -> PyResult<()> {
 
 fn read_images(
     images: &Mutex<Receiver<(Source, Answer)>>,
-    to_network: &SyncSender<Read>,
+    to_network: &SyncSender<LoadedImage>,
     preparer: Preparer,
     (intrinsics, focal_correction, crop): (Option<[f64; 4]>, bool, bool),
 ) {
@@ -144,7 +144,7 @@ fn read_images(
             Err(failure) => drop(answer.send(Err(failure))),
             Ok((image, camera)) => {
                 let prepared = preparer.prepare(&image, camera.as_ref(), focal_correction, crop);
-                let read = Read {
+                let read = LoadedImage {
                     image,
                     camera,
                     prepared,
@@ -160,10 +160,10 @@ fn read_images(
 
 fn see(
     mut estimator: DepthEstimator,
-    read: &Receiver<Read>,
+    read: &Receiver<LoadedImage>,
     to_finish: &SyncSender<(Prediction, Answer)>,
 ) {
-    for Read {
+    for LoadedImage {
         image,
         camera,
         prepared,

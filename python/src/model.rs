@@ -18,7 +18,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 
-use crate::bulk::{Many, Predictions};
+use crate::bulk::{BulkRequest, Predictions};
 use crate::error::{Failure, raise, with_hint};
 
 /// The names of the networks inside the package.
@@ -115,14 +115,14 @@ impl Model {
         focal_correction: bool,
         stretch: bool,
     ) -> PyResult<Predictions> {
-        let many = Many {
+        let request = BulkRequest {
             images: images.try_iter()?.unbind(),
             intrinsics,
             focal_correction,
             crop: !stretch,
         };
         let own = py.detach(|| self.with(|estimator| estimator.another()));
-        Predictions::begin(many, own.map_err(raise)?)
+        Predictions::begin(request, own.map_err(raise)?)
     }
 
     fn another(&self, py: Python<'_>) -> PyResult<Self> {

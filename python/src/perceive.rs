@@ -109,11 +109,11 @@ impl Perception {
             let mut perceiver = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
             perceiver.detect_with_sigma(&small, sigma.as_ref(), &k, stamp, &[])
         });
-        told(&found.map_err(raise)?, speed_mps, yaw_rate_radps)
+        to_json(&found.map_err(raise)?, speed_mps, yaw_rate_radps)
     }
 }
 
-fn told(found: &Surroundings, speed_mps: Option<f64>, yaw_rate: f64) -> PyResult<String> {
+fn to_json(found: &Surroundings, speed_mps: Option<f64>, yaw_rate: f64) -> PyResult<String> {
     let targets = found.targets.iter();
     let found = Found {
         targets: targets

@@ -8,8 +8,8 @@ use deepfusion::model::{Compute, DepthNetConfig, Preset, RunFolder, TrainConfig}
 use deepfusion::runtime::{ModelSource, embedded_names};
 use deepfusion::train::log::{CsvLog, CsvRecord};
 use deepfusion::train::{
-    Alone, Checkpoints, Control, Device, Error, LossTerms, Model, SampleSet, TrainEvent, Trainer,
-    Workers,
+    Checkpoints, Control, Device, Error, LossTerms, Model, SampleSet, SingleWorker, TrainEvent,
+    Trainer, Workers,
 };
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods};
@@ -23,7 +23,7 @@ use crate::interrupt::{Stop, interruptible};
 /// What was asked for, as `deepfusion/__init__.py` arranges it.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Asked {
+struct TrainRequest {
     /// A preset's name, or a TOML file.
     config: PathBuf,
     /// `key=value` over it.
@@ -34,19 +34,19 @@ struct Asked {
     out: PathBuf,
     init: Option<PathBuf>,
     resume: bool,
-    workers: Option<Others>,
+    workers: Option<PythonWorkers>,
 }
 
 /// The other workers, as an object of Python's connects them: `rank`, `count` and `sum(array)`.
 #[derive(FromPyObject)]
-struct Others {
+struct PythonWorkers {
     rank: usize,
     count: usize,
     #[pyo3(attribute)]
     sum: Py<PyAny>,
 }
 
-impl Others {
+impl PythonWorkers {
     fn another(&self) -> Box<dyn Workers> {
         Box::new(Self {
             rank: self.rank,
@@ -56,7 +56,7 @@ impl Others {
     }
 }
 
-impl Workers for Others {
+impl Workers for PythonWorkers {
     fn rank(&self) -> usize {
         self.rank
     }
@@ -82,7 +82,7 @@ pub fn train<'py>(
     asked: Bound<'py, PyDict>,
     callback: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let asked: Asked = asked.extract()?;
+    let asked: TrainRequest = asked.extract()?;
     let mut listener = Listener::new(callback);
     // As the command does: every operation needs again what the one before freed.
     deepfusion_cli::keep_memory();
@@ -118,11 +118,11 @@ pub fn train<'py>(
 }
 
 /// The trainer that is asked for, and why drives were left out.
-fn opened(asked: &Asked) -> Result<(Trainer, Vec<String>), Failure> {
+fn opened(asked: &TrainRequest) -> Result<(Trainer, Vec<String>), Failure> {
     let device = Device::flex();
     let workers: Box<dyn Workers> = match &asked.workers {
         Some(others) => others.another(),
-        None => Box::new(Alone),
+        None => Box::new(SingleWorker),
     };
     let leads = workers.rank() == 0;
     if asked.resume {
@@ -158,7 +158,7 @@ fn opened(asked: &Asked) -> Result<(Trainer, Vec<String>), Failure> {
     Ok((trainer, skipped))
 }
 
-fn configuration(asked: &Asked) -> Result<TrainConfig, Failure> {
+fn configuration(asked: &TrainRequest) -> Result<TrainConfig, Failure> {
     let preset = Preset::ALL
         .into_iter()
         .find(|preset| Path::new(preset.name()) == asked.config);
@@ -190,7 +190,7 @@ fn configuration(asked: &Asked) -> Result<TrainConfig, Failure> {
 }
 
 /// The recordings that are given, in place of the configuration's own.
-fn choose_data(config: &mut TrainConfig, asked: &Asked) -> Result<(), Failure> {
+fn choose_data(config: &mut TrainConfig, asked: &TrainRequest) -> Result<(), Failure> {
     let given = !asked.data.is_empty() || !asked.validation.is_empty();
     if given && !config.data.sets.is_empty() {
         return Err(Failure {
@@ -303,7 +303,7 @@ enum Start {
 
 impl Start {
     /// What is asked for, else what the configuration says, else for a preset the embedded network with the same layers: as the command.
-    fn of(asked: &Asked, config: &TrainConfig) -> Result<Self, Failure> {
+    fn of(asked: &TrainRequest, config: &TrainConfig) -> Result<Self, Failure> {
         if let Some(init) = asked.init.as_ref().or(config.init.as_ref()) {
             if init == Path::new("none") {
                 return Ok(Self::Nothing);
@@ -395,7 +395,7 @@ fn same_layers(a: &DepthNetConfig, b: &DepthNetConfig) -> bool {
     bare(a) == bare(b)
 }
 
-/// Hears the trainer's events, logs them as the command does, and tells Python.
+/// Hears the trainer's events, logs them as the command does, and calls Python.
 struct Listener {
     callback: Option<Py<PyAny>>,
     log: Option<CsvLog>,
@@ -419,7 +419,7 @@ impl Listener {
     }
 
     fn hear(&mut self, event: TrainEvent, stop: &Stop) -> Control {
-        match self.told(event) {
+        match self.handle(event) {
             Ok(true) if !stop.asked() => Control::Continue,
             Ok(_) => Control::Stop,
             Err(error) => {
@@ -430,7 +430,7 @@ impl Listener {
     }
 
     /// Whether to go on.
-    fn told(&mut self, event: TrainEvent) -> PyResult<bool> {
+    fn handle(&mut self, event: TrainEvent) -> PyResult<bool> {
         self.record(&event).map_err(raise)?;
         let Some(callback) = &self.callback else {
             return Ok(true);

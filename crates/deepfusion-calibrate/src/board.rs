@@ -16,7 +16,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// Fewest inner corners along a side: fewer cannot be told from a pattern on a wall.
+    /// Fewest inner corners along a side: fewer cannot be distinguished from a pattern on a wall.
     pub const LEAST: usize = 3;
     /// Most of them; more are not resolved by any camera.
     pub const MOST: usize = 100;

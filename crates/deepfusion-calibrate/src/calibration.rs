@@ -78,7 +78,7 @@ pub struct ViewFit {
     pub name: String,
     /// Whether it was used; else its corners disagree with all others.
     pub used: bool,
-    /// Root mean square distance of its corners, in pixels; none where the board's pose cannot be told.
+    /// Root mean square distance of its corners, in pixels; none where the board's pose is unknown.
     pub rms_px: Option<f64>,
     /// The board's distance from the camera, in metres.
     pub distance_m: Option<f64>,

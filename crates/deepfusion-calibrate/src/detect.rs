@@ -17,7 +17,7 @@ const HALF_WINDOW: f64 = 0.01;
 
 /// What was seen in a picture.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Look {
+pub enum BoardDetection {
     /// The whole board: its inner corners in pixels, row after row as [`Board::points`] has them. Where the board looks the same turned,
     /// as every board does by half a turn, it may begin at another corner; x to y turns as in the image.
     Board(Vec<Vector2<f64>>),
@@ -36,10 +36,10 @@ pub enum Look {
 
 /// Finds the board's inner corners, to some hundredths of a pixel. The whole board must be seen.
 #[must_use]
-pub fn find_board(image: &GrayImage, board: &Board) -> Look {
+pub fn find_board(image: &GrayImage, board: &Board) -> BoardDetection {
     let (width, height) = image.dimensions();
     if width < 16 || height < 16 {
-        return Look::Nothing;
+        return BoardDetection::Nothing;
     }
     let first = width.max(height).div_ceil(LOOKED_AT).max(1);
     // Smaller for what is blurred, larger for small squares.
@@ -49,7 +49,7 @@ pub fn find_board(image: &GrayImage, board: &Board) -> Look {
     } else {
         tries.push((1, true));
     }
-    let mut best = Look::Nothing;
+    let mut best = BoardDetection::Nothing;
     for (factor, doubled) in tries {
         let small = reduced(image, factor);
         let mut corners = corners::find(&small, doubled);
@@ -62,7 +62,7 @@ pub fn find_board(image: &GrayImage, board: &Board) -> Look {
             Some(order) => {
                 let start: Vec<_> = order.iter().map(|i| corners[*i].at).collect();
                 if let Some(placed) = placed(image, &start, board) {
-                    return Look::Board(placed);
+                    return BoardDetection::Board(placed);
                 }
             }
             None => best = larger(best, &grid),
@@ -155,12 +155,12 @@ fn placed(image: &GrayImage, start: &[Vector2<f64>], board: &Board) -> Option<Ve
     Some(placed)
 }
 
-fn larger(best: Look, grid: &Grid) -> Look {
+fn larger(best: BoardDetection, grid: &Grid) -> BoardDetection {
     let (_, columns, rows) = grid::extent(grid);
     let corners = grid.len();
     match best {
-        Look::Other { corners: n, .. } if n >= corners => best,
-        _ => Look::Other {
+        BoardDetection::Other { corners: n, .. } if n >= corners => best,
+        _ => BoardDetection::Other {
             columns: columns.max(rows),
             rows: columns.min(rows),
             corners,

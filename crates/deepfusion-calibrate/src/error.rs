@@ -76,7 +76,7 @@ pub enum Error {
         expected: usize,
     },
     /// Many cameras explain the views equally well.
-    #[error("the views do not tell the camera: {problem}")]
+    #[error("the views do not determine the camera: {problem}")]
     Undetermined {
         /// In what respect.
         problem: String,

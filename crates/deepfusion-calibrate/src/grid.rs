@@ -39,7 +39,7 @@ pub(crate) fn grow(corners: &[Corner], enough: usize) -> Option<Grid> {
 }
 
 /// A corner in the grid, with the steps to its right and lower neighbours as its own neighbours have them.
-struct Placed {
+struct GridCorner {
     corner: usize,
     steps: [Vector2<f64>; 2],
 }
@@ -50,8 +50,8 @@ fn grow_from(corners: &[Corner], seed: usize) -> Option<Grid> {
     let [Some(right), Some(down)] = steps else {
         return None;
     };
-    let mut placed: HashMap<(i32, i32), Placed> = HashMap::new();
-    let start = Placed {
+    let mut placed: HashMap<(i32, i32), GridCorner> = HashMap::new();
+    let start = GridCorner {
         corner: seed,
         steps: [right, down],
     };
@@ -82,7 +82,7 @@ fn grow_from(corners: &[Corner], seed: usize) -> Option<Grid> {
                 steps[side] = (corners[found].at - corner.at) * f64::from(sign);
                 used.insert(found);
                 let corner = found;
-                placed.insert(next, Placed { corner, steps });
+                placed.insert(next, GridCorner { corner, steps });
                 queue.push_back(next);
             }
         }

@@ -45,7 +45,7 @@ mod zhang;
 pub use board::Board;
 pub use calibration::{Calibration, StandardErrors, View, ViewFit};
 pub use coverage::Coverage;
-pub use detect::{Look, find_board};
+pub use detect::{BoardDetection, find_board};
 pub use error::{Error, Result};
 pub use model::LensModel;
 pub use pick::{Candidate, pick, sharpness};

@@ -97,7 +97,7 @@ impl Fit {
         Some((self, cost))
     }
 
-    /// (JᵀJ)⁻¹ of the camera's numbers, the poses free; `None` where the views do not tell them.
+    /// (JᵀJ)⁻¹ of the camera's numbers, the poses free; `None` where the views do not determine them.
     pub(crate) fn camera_covariance(
         &self,
         views: &[&[Vector2<f64>]],

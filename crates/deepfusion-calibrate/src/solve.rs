@@ -8,7 +8,7 @@ use crate::{
 };
 use nalgebra::{Vector2, Vector3};
 
-/// Fewest views. Three have as many equations as the camera has numbers; with five, a bad one can be told.
+/// Fewest views. Three have as many equations as the camera has numbers; with five, a bad one can be found.
 pub const LEAST_VIEWS: usize = 5;
 /// Beginnings that are tried, and for how many steps before the best goes on.
 const TRIED: usize = 4;
@@ -71,7 +71,7 @@ pub fn calibrate(
         used = kept.map(|(_, view)| *view).collect();
         fitted = fit(&chosen(views, &used), &points, image_size, model)?;
     }
-    told(&fitted, views, &used, &points, image_size)
+    calibration(&fitted, views, &used, &points, image_size)
 }
 
 fn chosen<'a>(views: &'a [View], used: &[usize]) -> Vec<&'a [Vector2<f64>]> {
@@ -134,7 +134,7 @@ fn outlying(fit: &Fit, views: &[&[Vector2<f64>]], board: &[Vector3<f64>]) -> Vec
     bad
 }
 
-fn told(
+fn calibration(
     fit: &Fit,
     views: &[View],
     used: &[usize],
@@ -214,10 +214,10 @@ fn alone(fit: &Fit, view: &[Vector2<f64>], board: &[Vector3<f64>]) -> Option<Pos
 
 /// What makes it less sure than it could be.
 fn warnings(found: &Calibration) -> Vec<String> {
-    let mut told = Vec::new();
+    let mut warnings = Vec::new();
     let used = found.used();
     if used < GOOD_VIEWS {
-        told.push(format!(
+        warnings.push(format!(
             "{used} views are few: {GOOD_VIEWS} to 30, from many sides, are better"
         ));
     }
@@ -230,13 +230,13 @@ fn warnings(found: &Calibration) -> Vec<String> {
     let tilted = tilts.iter().filter(|t| **t > TILTED_DEG).count();
     if tilted < TILTED_VIEWS {
         let most = tilts.iter().copied().fold(0.0, f64::max);
-        told.push(format!(
+        warnings.push(format!(
             "the boards are all but parallel to the image (tilted by {most:.0} degrees at most): the focal length is unsure; tilt the board by 20 to 45 degrees"
         ));
     }
     let empty = found.coverage.empty_corners();
     if !empty.is_empty() {
-        told.push(format!(
+        warnings.push(format!(
             "no corner was seen in the image's {}: the lens is guessed there; show the board there, too",
             empty.join(", ")
         ));
@@ -248,7 +248,7 @@ fn warnings(found: &Calibration) -> Vec<String> {
         .map(|(edge, share)| format!("the {edge} {:.0} %", 100.0 * share))
         .collect();
     if empty.is_empty() && !margins.is_empty() {
-        told.push(format!(
+        warnings.push(format!(
             "no corner was seen in {} of the image: the lens is guessed there; show the board there, too",
             margins.join(", ")
         ));
@@ -256,23 +256,23 @@ fn warnings(found: &Calibration) -> Vec<String> {
     let k = &found.intrinsics;
     let unsure = (found.standard_errors.fx / k.fx).max(found.standard_errors.fy / k.fy);
     if unsure > UNSURE {
-        told.push(format!(
+        warnings.push(format!(
             "the focal length is known to {:.1} % only: more tilted views, and nearer ones, make it surer",
             100.0 * unsure
         ));
     }
     let side = f64::from(k.width.max(k.height)) / 1000.0;
     if found.rms_px > (ROUGH_PX.0 * side).max(ROUGH_PX.1) {
-        told.push(format!(
+        warnings.push(format!(
             "the corners are {:.2} px off (root mean square): is the board flat, the picture sharp and unmoved, and the lens model right (fisheye or not)?",
             found.rms_px
         ));
     }
     if found.hfov_deg.is_none() {
-        told.push(
+        warnings.push(
             "the lens model shows nothing at the image's left or right edge: show the board there, too"
                 .into(),
         );
     }
-    told
+    warnings
 }

@@ -7,7 +7,7 @@
 )]
 
 use deepfusion_calibrate::{
-    Board, Calibration, Error, LensModel, Look, View, calibrate, find_board,
+    Board, BoardDetection, Calibration, Error, LensModel, View, calibrate, find_board,
 };
 use image::GrayImage;
 use nalgebra::Vector2;
@@ -60,7 +60,7 @@ fn views(camera: &Value) -> Vec<View> {
     let of = |view: &Value| {
         let name = view["file"].as_str().unwrap();
         match find_board(&picture(name), &board()) {
-            Look::Board(corners) => View {
+            BoardDetection::Board(corners) => View {
                 name: name.to_owned(),
                 corners,
             },
@@ -235,7 +235,7 @@ fn a_bad_view_is_left_out() {
 
 /// Boards that are all parallel to the image leave the focal length open, and it is said so.
 #[test]
-fn boards_parallel_to_the_image_do_not_tell_the_focal_length() {
+fn boards_parallel_to_the_image_do_not_determine_the_focal_length() {
     let board = board();
     let seen = |x: f64, y: f64, z: f64, turn: f64| {
         let turned = nalgebra::Rotation3::from_euler_angles(0.0, 0.0, turn);
@@ -271,13 +271,13 @@ fn boards_parallel_to_the_image_do_not_tell_the_focal_length() {
 }
 
 #[test]
-fn another_board_is_told() {
+fn another_board_is_an_error() {
     let image = picture("brown/00.jpg");
     // A part of the board is not the board.
     for (columns, rows) in [(8, 6), (9, 7), (7, 5)] {
         let asked = Board::new(columns, rows, 0.025).unwrap();
         let look = find_board(&image, &asked);
-        let expected = Look::Other {
+        let expected = BoardDetection::Other {
             columns: 9,
             rows: 6,
             corners: 54,
@@ -285,7 +285,8 @@ fn another_board_is_told() {
         assert_eq!(look, expected, "{columns}x{rows}");
     }
     // Its rows and columns may be called the other way.
-    let Look::Board(turned) = find_board(&image, &Board::new(6, 9, 0.025).unwrap()) else {
+    let BoardDetection::Board(turned) = find_board(&image, &Board::new(6, 9, 0.025).unwrap())
+    else {
         panic!("not found");
     };
     let along = turned[5] - turned[0];
@@ -293,9 +294,12 @@ fn another_board_is_told() {
     assert!(along.perp(&down) > 0.0 && down.norm() > along.norm());
     assert_eq!(
         find_board(&GrayImage::new(300, 200), &board()),
-        Look::Nothing
+        BoardDetection::Nothing
     );
-    assert_eq!(find_board(&GrayImage::new(3, 2), &board()), Look::Nothing);
+    assert_eq!(
+        find_board(&GrayImage::new(3, 2), &board()),
+        BoardDetection::Nothing
+    );
 }
 
 /// Large pictures are looked at reduced, and their corners placed in full size; and a board lying on its side.
@@ -303,11 +307,11 @@ fn another_board_is_told() {
 fn large_and_turned_pictures() {
     use image::imageops::{FilterType, resize, rotate90};
     let image = picture("brown/01.jpg");
-    let Look::Board(small) = find_board(&image, &board()) else {
+    let BoardDetection::Board(small) = find_board(&image, &board()) else {
         panic!("not found");
     };
     let large = resize(&image, 2000, 1500, FilterType::CatmullRom);
-    let Look::Board(found) = find_board(&large, &board()) else {
+    let BoardDetection::Board(found) = find_board(&large, &board()) else {
         panic!("not found");
     };
     let back: Vec<_> = found
@@ -316,7 +320,7 @@ fn large_and_turned_pictures() {
         .collect();
     let (most, _) = apart(&back, &small);
     assert!(most < 0.2, "{most}");
-    let Look::Board(turned) = find_board(&rotate90(&image), &board()) else {
+    let BoardDetection::Board(turned) = find_board(&rotate90(&image), &board()) else {
         panic!("not found");
     };
     let last = f64::from(image.height() - 1);

@@ -214,7 +214,7 @@ pub(crate) enum CliError {
     },
     /// Drives that a network cannot be judged on, and so not adapted to.
     #[cfg(feature = "train")]
-    #[error("{frames} of the frames that are held out can tell how good a network is, too few to adapt by{}", because(*why))]
+    #[error("{frames} of the frames that are held out can show how good a network is, too few to adapt by{}", because(*why))]
     NotJudged {
         /// How many.
         frames: usize,
@@ -346,7 +346,7 @@ impl Reportable for CliError {
                 Some(hint) => format!("{hint}; then run the same again: only what is missing is done"),
                 None => "mend them and run the same again: only what is missing is done".into(),
             }),
-            Self::Unfit { .. } => Some("each finding above has its remedy; --verbose tells every figure".into()),
+            Self::Unfit { .. } => Some("each finding above has its remedy; --verbose prints every figure".into()),
             Self::Interrupted { .. } => {
                 Some("run the same again: only what is missing is done".into())
             }
@@ -408,16 +408,16 @@ fn because(why: Option<deepfusion_eval::verdict::NoCertificate>) -> String {
 
 /// The failures of a run, a line each, as many as a person reads; the manifest has them all.
 fn some_failed(failures: &[String], total: usize, interrupted: bool) -> String {
-    const TOLD: usize = 20;
+    const SHOWN: usize = 20;
     let mut text = format!("{} of {total} images failed", failures.len());
     if interrupted {
         text += " before the run was stopped";
     }
-    for failure in failures.iter().take(TOLD) {
+    for failure in failures.iter().take(SHOWN) {
         text += &format!("\n  {failure}");
     }
-    if failures.len() > TOLD {
-        let more = failures.len() - TOLD;
+    if failures.len() > SHOWN {
+        let more = failures.len() - SHOWN;
         text += &format!("\n  and {more} more, in the manifest");
     }
     text

@@ -44,7 +44,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(cli) => cli,
         // Wrong arguments end here, as help does: clap says which, suggests the near one and gives 2.
         Err(answer) => {
-            // Whom it cannot be told to, nobody reads.
+            // Where it cannot be printed, nobody reads it.
             let _ = answer.print();
             let code = u8::try_from(answer.exit_code());
             return code.map_or(ExitCode::FAILURE, ExitCode::from);

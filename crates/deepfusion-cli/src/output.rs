@@ -91,7 +91,7 @@ pub(crate) fn unused(path: &Path) -> PathBuf {
         .unwrap_or_else(|| path.to_owned())
 }
 
-/// Fails where a file could not be written for want of its folder: told before long work, not after it.
+/// Fails where a file could not be written for want of its folder: an error before long work, not after it.
 pub(crate) fn require_folder_of(file: &Path) -> Result<()> {
     match file.parent() {
         Some(folder) if folder != Path::new("") && !folder.is_dir() => {

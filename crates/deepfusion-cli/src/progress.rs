@@ -19,12 +19,12 @@ pub(crate) fn set_quiet(quiet: bool) {
 /// A line of information on stderr, unless quiet.
 pub(crate) fn say(text: &str) {
     if !QUIET.load(Ordering::Relaxed) {
-        tell(text);
+        print_line(text);
     }
 }
 
 /// A line on stderr. Where nobody reads it any more, as after the terminal was closed, the work goes on.
-fn tell(text: &str) {
+fn print_line(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
@@ -34,12 +34,12 @@ pub(crate) struct Progress {
     bar: Option<ProgressBar>,
     last_line: Instant,
     /// Short work needs no line: only what had one gets a last one.
-    told: bool,
+    printed: bool,
     quiet: bool,
 }
 
 impl Progress {
-    /// Begins; `what` is told beside the numbers.
+    /// Begins; `what` is printed beside the numbers.
     pub(crate) fn new(what: &str) -> Self {
         let quiet = QUIET.load(Ordering::Relaxed);
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
@@ -57,7 +57,7 @@ impl Progress {
             what: what.to_owned(),
             bar,
             last_line: Instant::now(),
-            told: false,
+            printed: false,
             quiet,
         }
     }
@@ -80,11 +80,11 @@ impl Progress {
             bar.set_length(total as u64);
             bar.set_position(done as u64);
         } else if !self.quiet
-            && (self.last_line.elapsed() >= LINE_EVERY || (self.told && done == total))
+            && (self.last_line.elapsed() >= LINE_EVERY || (self.printed && done == total))
         {
             self.last_line = Instant::now();
-            self.told = true;
-            tell(&format!("{}: {done}/{total}", self.what));
+            self.printed = true;
+            print_line(&format!("{}: {done}/{total}", self.what));
         }
     }
 }

@@ -91,10 +91,10 @@ fn what_gets_worse_is_refused() {
             assert!(found.stderr.contains(part), "{part}: {}", found.stderr);
         }
         assert!(found.stdout.contains("before") && !found.stdout.contains("kept"));
-        let told = fs::read_to_string(at.join(refused).join("adapt.json")).unwrap();
-        let told: Value = serde_json::from_str(&told).unwrap();
-        assert_eq!(told["kept"], false);
-        assert!(!told["worse"].as_array().unwrap().is_empty(), "{told}");
+        let report = fs::read_to_string(at.join(refused).join("adapt.json")).unwrap();
+        let report: Value = serde_json::from_str(&report).unwrap();
+        assert_eq!(report["kept"], false);
+        assert!(!report["worse"].as_array().unwrap().is_empty(), "{report}");
         assert!(!at.join("mine").exists());
     }
 }

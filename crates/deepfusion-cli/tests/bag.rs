@@ -104,7 +104,7 @@ fn a_bag_is_converted_both_ways() {
 }
 
 #[test]
-fn what_was_noticed_while_opening_is_told_once() {
+fn a_warning_of_opening_is_printed_once() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -259,7 +259,7 @@ fn a_build_without_ros_2_says_how_to_build_one_with() {
     let at = folder.path();
     std::fs::create_dir(at.join("drive")).unwrap();
     std::fs::write(at.join("drive/drive_0.mcap"), b"").unwrap();
-    // A run by its looks: what is wrong with the input is told before its network is read.
+    // A run by its looks: what is wrong with the input is an error before its network is read.
     std::fs::create_dir(at.join("run")).unwrap();
     std::fs::write(at.join("run/config.toml"), b"").unwrap();
     for place in ["drive", "drive/drive_0.mcap"] {

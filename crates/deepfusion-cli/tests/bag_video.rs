@@ -406,7 +406,7 @@ fn what_comes_before_the_first_key_frame_is_left_out_and_said() {
 }
 
 #[test]
-fn gaps_and_damage_are_told_with_the_message() {
+fn gaps_and_damage_are_reported_with_the_message() {
     let drive = Drive::new();
     let Some(packets) = drive.encode("libx264", &[]) else {
         return;

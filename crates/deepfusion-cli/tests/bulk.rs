@@ -91,15 +91,15 @@ fn shards_started_at_once_make_what_one_run_makes() {
         assert!(shard.wait().unwrap().success());
     }
     assert_same(&outputs(&at.join("parts")), &whole);
-    let mut told = 0;
+    let mut done = 0;
     for i in 1..=3 {
         let path = at.join(format!("parts/predict-{i}-of-3.manifest.json"));
         let manifest = json(&path);
         let images = manifest["images"].as_array().unwrap();
         assert!(images.iter().all(|image| image["state"] == "done"));
-        told += images.len();
+        done += images.len();
     }
-    assert_eq!(told, 34);
+    assert_eq!(done, 34);
     // A shard of other inputs would leave images out.
     fails(
         at,
@@ -244,7 +244,7 @@ fn a_broken_image_is_named_and_the_others_are_done() {
     fs::write(&broken, &whole).unwrap();
     let mended = ok(at, &predict);
     assert!(
-        mended.stderr.contains("1 images written") && mended.stderr.contains("29 were there"),
+        mended.stderr.contains("1 image written") && mended.stderr.contains("29 were there"),
         "{}",
         mended.stderr
     );
@@ -282,11 +282,7 @@ fn what_is_there_is_kept_only_where_nothing_changed() {
         &["0000000002.png has changed since"],
     );
     let again = ok(at, &predict("--save npy --overwrite"));
-    assert!(
-        again.stderr.contains("1 images written"),
-        "{}",
-        again.stderr
-    );
+    assert!(again.stderr.contains("1 image written"), "{}", again.stderr);
     assert_eq!(
         fs::read(at.join("out/0000000002_depth.npy")).unwrap(),
         fs::read(at.join("out/0000000003_depth.npy")).unwrap()

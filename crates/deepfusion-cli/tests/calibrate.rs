@@ -46,22 +46,22 @@ fn a_camera_is_measured_and_its_file_undoes_the_lens() {
     // A picture without a board is named, and no harm.
     let plain = image::RgbImage::from_pixel(400, 300, image::Rgb([90, 100, 110]));
     plain.save(at.join("pictures/wall.png")).unwrap();
-    let told = json(
+    let report = json(
         at,
         &format!("calibrate pictures {BOARD} --out camera.yaml --report camera.html --json"),
     );
     // The truth of the renderer, within four standard errors and 0.4 %; see the crate's own tests.
-    close(&told["intrinsics"]["fx"], 335.0, 1.0);
-    close(&told["intrinsics"]["fy"], 332.5, 1.0);
-    close(&told["intrinsics"]["cx"], 205.3, 0.8);
-    close(&told["intrinsics"]["cy"], 145.8, 0.8);
-    close(&told["coefficients"][0], -0.29, 0.006);
-    assert_eq!(told["coefficient_names"][4], "k3");
-    assert_eq!(told["looked_at"], 10);
-    assert_eq!(told["left_out"][0]["name"], "pictures/wall.png");
-    assert_eq!(told["left_out"][0]["why"], "no board");
-    assert_eq!(told["views"].as_array().unwrap().len(), 9);
-    assert!(told["rms_px"].as_f64().unwrap() < 0.1);
+    close(&report["intrinsics"]["fx"], 335.0, 1.0);
+    close(&report["intrinsics"]["fy"], 332.5, 1.0);
+    close(&report["intrinsics"]["cx"], 205.3, 0.8);
+    close(&report["intrinsics"]["cy"], 145.8, 0.8);
+    close(&report["coefficients"][0], -0.29, 0.006);
+    assert_eq!(report["coefficient_names"][4], "k3");
+    assert_eq!(report["looked_at"], 10);
+    assert_eq!(report["left_out"][0]["name"], "pictures/wall.png");
+    assert_eq!(report["left_out"][0]["why"], "no board");
+    assert_eq!(report["views"].as_array().unwrap().len(), 9);
+    assert!(report["rms_px"].as_f64().unwrap() < 0.1);
     let page = fs::read_to_string(at.join("camera.html")).unwrap();
     assert!(page.contains("Where corners were seen") && page.contains("pictures/08.jpg"));
     // Not twice over each other.
@@ -116,15 +116,15 @@ fn a_camera_is_measured_and_its_file_undoes_the_lens() {
 fn a_fisheye_lens_is_measured() {
     let folder = folder("fisheye", 0, 10);
     let at = folder.path();
-    let told = json(
+    let report = json(
         at,
         &format!("calibrate pictures/*.jpg {BOARD} --fisheye --out fisheye.yml --json"),
     );
-    close(&told["intrinsics"]["fx"], 158.0, 0.6);
-    close(&told["intrinsics"]["cy"], 147.5, 0.6);
-    assert_eq!(told["model"], "fisheye");
+    close(&report["intrinsics"]["fx"], 158.0, 0.6);
+    close(&report["intrinsics"]["cy"], 147.5, 0.6);
+    assert_eq!(report["model"], "fisheye");
     // 203.5 px of θ(1 + 0.031 θ² …) = 1.288 to the left, and 197 px to the right.
-    close(&told["hfov_deg"], 139.0, 6.0);
+    close(&report["hfov_deg"], 139.0, 6.0);
     let written = fs::read_to_string(at.join("fisheye.yml")).unwrap();
     assert!(
         written.contains("distortion_model: equidistant"),
@@ -137,7 +137,7 @@ fn a_fisheye_lens_is_measured() {
 }
 
 #[test]
-fn what_goes_wrong_is_told_with_what_to_do() {
+fn what_goes_wrong_is_an_error_with_a_hint() {
     let few = folder("brown", 0, 4);
     let at = few.path();
     fails(
@@ -230,14 +230,14 @@ fn a_videos_frames_are_picked() {
         .status()
         .unwrap();
     assert!(made.success());
-    let told = json(
+    let report = json(
         at,
         &format!("calibrate board.mp4 {BOARD} --out camera.yaml --json"),
     );
-    assert_eq!(told["looked_at"], 36);
-    assert_eq!(told["views"].as_array().unwrap().len(), 9);
-    assert_eq!(told["not_picked"], 27);
-    close(&told["intrinsics"]["fx"], 335.0, 1.5);
+    assert_eq!(report["looked_at"], 36);
+    assert_eq!(report["views"].as_array().unwrap().len(), 9);
+    assert_eq!(report["not_picked"], 27);
+    close(&report["intrinsics"]["fx"], 335.0, 1.5);
     let few = json(
         at,
         &format!("calibrate board.mp4 {BOARD} --frames 6 --out few.yaml --json"),

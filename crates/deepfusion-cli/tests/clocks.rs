@@ -73,8 +73,8 @@ fn folder(at: &Path, name: &str, readings: &[Reading], ahead_s: f64) {
 }
 
 /// The offset and its standard error as they are printed, milliseconds.
-fn found(told: &str) -> (f64, f64) {
-    let line = told
+fn found(printed: &str) -> (f64, f64) {
+    let line = printed
         .lines()
         .find(|line| line.contains("the camera's clock is"))
         .unwrap();
@@ -87,12 +87,12 @@ fn found(told: &str) -> (f64, f64) {
 }
 
 #[track_caller]
-fn is_within(told: &str, ahead_ms: f64) {
-    let (offset, error) = found(told);
+fn is_within(printed: &str, ahead_ms: f64) {
+    let (offset, error) = found(printed);
     println!("{ahead_ms}: {offset} ± {error}");
     assert!(
         (offset - ahead_ms).abs() <= (3.0 * error).min(50.0),
-        "{told}"
+        "{printed}"
     );
 }
 
@@ -125,24 +125,24 @@ fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
     for (name, ahead_s) in [("ahead", 0.24), ("behind", -0.31)] {
         folder(at, name, &readings, ahead_s);
         fs::write(at.join(name).join("speed.csv"), &table).unwrap();
-        let told = ok(at, &format!("data inspect {name} --clock-offset auto"));
-        is_within(&told.stderr, 1e3 * ahead_s);
+        let printed = ok(at, &format!("data inspect {name} --clock-offset auto"));
+        is_within(&printed.stderr, 1e3 * ahead_s);
     }
     folder(at, "track", &readings, 0.24);
     fs::write(at.join("track/track.gpx"), &track).unwrap();
-    let told = ok(at, "data inspect track --clock-offset auto");
-    is_within(&told.stderr, 240.0);
+    let printed = ok(at, "data inspect track --clock-offset auto");
+    is_within(&printed.stderr, 240.0);
     // A log that is imported: what was measured stands in its dataset.toml, and nothing is left to find.
     fs::copy(at.join("track/track.gpx"), at.join("track.gpx")).unwrap();
     fs::copy(at.join("track/frames.csv"), at.join("images/frames.csv")).unwrap();
-    let told = ok(
+    let printed = ok(
         at,
         "data import track.gpx --images images --intrinsics 139.43,277.07,117.13,65.82 --clock-offset -250 --out given",
     );
     assert!(
-        !told.stderr.contains("the camera's clock is"),
+        !printed.stderr.contains("the camera's clock is"),
         "{}",
-        told.stderr
+        printed.stderr
     );
     let config = fs::read_to_string(at.join("given/dataset.toml")).unwrap();
     assert!(
@@ -153,8 +153,8 @@ fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
     let speeds = fs::read_to_string(at.join("given/speed.csv")).unwrap();
     assert!(speeds.starts_with("time_s,speed_mps,speed_sigma_mps\n"));
     let import = "data import track.gpx --images images --intrinsics 139.43,277.07,117.13,65.82 --clock-offset auto --out measured";
-    let told = ok(at, import);
-    is_within(&told.stderr, 240.0);
+    let printed = ok(at, import);
+    is_within(&printed.stderr, 240.0);
     let config = fs::read_to_string(at.join("measured/dataset.toml")).unwrap();
     let written = config.split("camera_ahead_s = ").nth(1).unwrap().trim();
     assert!(
@@ -177,12 +177,13 @@ fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
     fs::write(at.join("straight/speed.csv"), straight).unwrap();
     let both = "data export-gt ahead straight --out gt.npz --clock-offset auto";
     // What was asked for is not there, but the clocks were measured first.
-    let told = run(at, both);
+    let printed = run(at, both);
     assert!(
-        told.stderr
+        printed
+            .stderr
             .contains("it gets what the other recordings show"),
         "{}",
-        told.stderr
+        printed.stderr
     );
     let mut config = fs::read_to_string(at.join("straight/dataset.toml")).unwrap();
     config += "[clock]\ncamera_ahead_s = 0.7\n";

@@ -51,10 +51,10 @@ fn every_check_has_a_line_that_says_whether_it_was_made() {
         "simulate --out sim --frames 12 --seed 3 --scan-every 0 --size 160x96",
     );
     let text = run(at, "doctor sim").stdout;
-    let told = lines(&text);
-    let names: Vec<&str> = told.iter().map(|(name, _)| *name).collect();
+    let printed = lines(&text);
+    let names: Vec<&str> = printed.iter().map(|(name, _)| *name).collect();
     assert_eq!(names, CHECKS, "{text}");
-    let line = |name: &str| told.iter().find(|(n, _)| *n == name).unwrap().1;
+    let line = |name: &str| printed.iter().find(|(n, _)| *n == name).unwrap().1;
     assert!(line("timing").ends_with(" ok"), "{text}");
     // Without a LiDAR nothing says that it is in order.
     assert!(
@@ -190,7 +190,7 @@ fn of_log(at: &std::path::Path, arguments: &str) -> Vec<(String, String, String)
 }
 
 #[test]
-fn a_log_by_itself_is_told_with_what_to_do() {
+fn a_log_by_itself_is_reported_with_what_to_do() {
     let at =
         std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../deepfusion-logs/tests/reference");
     let can = "--dbc vehicle.dbc --speed WheelSpeeds.VehicleSpeed";
@@ -245,16 +245,16 @@ fn a_log_by_itself_is_told_with_what_to_do() {
         "GoPro video with 110 speeds",
         "gopro.mp4 --out DRIVE",
     );
-    let told = run(&at, &format!("doctor vector.blf {can}"));
-    assert_eq!(told.code, 0, "{}", told.stderr);
+    let printed = run(&at, &format!("doctor vector.blf {can}"));
+    assert_eq!(printed.code, 0, "{}", printed.stderr);
     assert_eq!(run(&at, "doctor vector.blf").code, 1);
     // A log has no camera and no picture.
     for option in ["--hfov 60", "--clock-offset auto", "--report page.html"] {
         let name = option.split(' ').next().unwrap();
-        let told = run(&at, &format!("doctor phone.gpx {option}"));
-        assert_eq!(told.code, 2);
+        let printed = run(&at, &format!("doctor phone.gpx {option}"));
+        assert_eq!(printed.code, 2);
         let expected = format!("{name} does not apply to a log of speeds by itself");
-        assert!(told.stderr.contains(&expected), "{}", told.stderr);
+        assert!(printed.stderr.contains(&expected), "{}", printed.stderr);
     }
 }
 

@@ -36,10 +36,14 @@ fn a_model_is_measured_on_traffic_and_along_the_road() {
     assert!(table.contains("\nstatic ") && table.contains("\nmoving, "));
 
     let odometry = "eval-odometry --model run --data sim";
-    let told = ok(at, &format!("{odometry} --out paths --json"));
+    let printed = ok(at, &format!("{odometry} --out paths --json"));
     // The camera trained with: nothing to warn of.
-    assert!(!told.stderr.contains("focal length"), "{}", told.stderr);
-    let report: Value = serde_json::from_str(&told.stdout).unwrap();
+    assert!(
+        !printed.stderr.contains("focal length"),
+        "{}",
+        printed.stderr
+    );
+    let report: Value = serde_json::from_str(&printed.stdout).unwrap();
     assert_eq!(report["n"], 40);
     assert_eq!(report["truth"], "the simulator's exact poses");
     assert!(report["scale"].as_f64().unwrap() > 0.0);
@@ -77,7 +81,7 @@ fn a_model_is_measured_on_traffic_and_along_the_road() {
 }
 
 #[test]
-fn poses_that_cannot_be_compared_are_told() {
+fn poses_that_cannot_be_compared_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let row = |z: f64| format!("1 0 0 0 0 1 0 0 0 0 1 {z}\n");

@@ -98,10 +98,10 @@ fn a_log_beside_its_images_is_a_drive() {
     fs::copy(at.join("frames.csv"), at.join("seen/frames.csv")).unwrap();
     let config = fs::read_to_string(at.join("seen/dataset.toml")).unwrap();
     assert!(config.contains("hfov_deg = 90.0\n"), "{config}");
-    let told = ok(at, "data inspect seen").stdout;
-    assert!(told.contains("fx 80.0"), "{told}");
-    let told = ok(at, "data inspect beside --hfov 120").stdout;
-    assert!(told.contains("fx 46.19"), "{told}");
+    let printed = ok(at, "data inspect seen").stdout;
+    assert!(printed.contains("fx 80.0"), "{printed}");
+    let printed = ok(at, "data inspect beside --hfov 120").stdout;
+    assert!(printed.contains("fx 46.19"), "{printed}");
 
     fails(at, &format!("{import} --out drive"), &["speed.csv"]);
     fails(

@@ -100,10 +100,10 @@ fn a_sequence_is_learned_from_measured_and_followed() {
     assert_eq!(own["n"], 16);
     let way = |report: &serde_json::Value| report["distance_m"].as_f64().unwrap();
     assert!((way(&own) / way(&exact) - 1.0).abs() < 1e-2, "{own}");
-    let told = json(
+    let sidecars = json(
         at,
         "predict --model run odometry/sequences/09 --out depth --json",
     );
-    assert_eq!(told.as_array().unwrap().len(), 16);
-    assert_eq!(told[0]["intrinsics_from"], "recording");
+    assert_eq!(sidecars.as_array().unwrap().len(), 16);
+    assert_eq!(sidecars[0]["intrinsics_from"], "recording");
 }

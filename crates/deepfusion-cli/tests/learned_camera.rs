@@ -54,7 +54,7 @@ fn a_drive_without_a_camera_is_learned_from_and_looked_at() {
         "simulate --out sim --frames 16 --fps 5 --seed 3 --size 320x96 --scan-every 0",
     );
     without_camera(&at.join("sim"), &at.join("drive"));
-    // Whoever is stopped by a missing camera is told of this way, as the last one.
+    // Whoever is stopped by a missing camera gets this way as the last hint.
     for command in ["data inspect drive", "train --data drive --steps 2"] {
         fails(at, command, &["calibration.yaml", "--intrinsics learn"]);
     }
@@ -128,8 +128,8 @@ fn a_drive_without_a_camera_is_learned_from_and_looked_at() {
         at,
         "eval --model run/last.safetensors --data drive --assume-unseen --json",
     );
-    let told = report["checkpoint"]["learned_camera"]["focal_px"][0].as_f64();
-    assert_eq!(told, Some(last));
+    let focal_px = report["checkpoint"]["learned_camera"]["focal_px"][0].as_f64();
+    assert_eq!(focal_px, Some(last));
 
     // A network whose run knew its cameras has none to lend.
     ok(

@@ -102,10 +102,10 @@ fn a_source_that_is_too_fast_loses_frames_and_no_time() {
     network(at);
     const SENT: usize = 1000;
     let args = format!("perceive --model run - {CAMERA} --out seen --speed 5 --json");
-    let told = piped(at, &args, stream(SENT));
-    assert_eq!(told.code, 0, "{}", told.stderr);
+    let printed = piped(at, &args, stream(SENT));
+    assert_eq!(printed.code, 0, "{}", printed.stderr);
     let lines = whole(&at.join("seen"));
-    assert_eq!(told.stdout.lines().count(), lines.len());
+    assert_eq!(printed.stdout.lines().count(), lines.len());
     for (place, line) in lines.iter().enumerate() {
         // The gaps in the numbers are the frames that were skipped.
         assert_eq!(
@@ -138,9 +138,9 @@ fn a_source_that_is_too_fast_loses_frames_and_no_time() {
         "{forward} m in {took} s"
     );
     assert!(
-        told.stderr.contains("skipped") && told.stderr.contains("latency"),
+        printed.stderr.contains("skipped") && printed.stderr.contains("latency"),
         "{}",
-        told.stderr
+        printed.stderr
     );
     // Frames of another run would stand between these.
     let again = piped(at, &args, stream(2));
@@ -165,9 +165,9 @@ fn depth_of_a_stream_stops_where_it_is_told() {
     network(at);
     let args =
         format!("predict --model run - {CAMERA} --out depth --frames 2 --save npy,video --json");
-    let told = piped(at, &args, stream(2000));
-    assert_eq!(told.code, 0, "{}", told.stderr);
-    let sidecars: Vec<Value> = told
+    let printed = piped(at, &args, stream(2000));
+    assert_eq!(printed.code, 0, "{}", printed.stderr);
+    let sidecars: Vec<Value> = printed
         .stdout
         .lines()
         .map(|l| serde_json::from_str(l).unwrap())
@@ -236,7 +236,7 @@ fn what_was_seen_before_the_connection_was_lost_is_kept() {
 }
 
 #[test]
-fn what_cannot_be_opened_is_told() {
+fn what_cannot_be_opened_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     network(at);
@@ -316,7 +316,7 @@ fn an_old_ffmpeg_is_asked_in_its_own_words() {
     let mut path = at.as_os_str().to_owned();
     path.push(":/usr/bin:/bin");
     let args = format!("perceive --model run tcp://camera:1 {CAMERA} --out seen");
-    let told = with_path(at, &args, &path);
-    assert_eq!(told.code, 0, "{}", told.stderr);
+    let printed = with_path(at, &args, &path);
+    assert_eq!(printed.code, 0, "{}", printed.stderr);
     assert_eq!(whole(&at.join("seen")).len(), 1);
 }

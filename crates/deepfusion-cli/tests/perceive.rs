@@ -35,15 +35,15 @@ fn a_drive_becomes_targets_frame_by_frame() {
     let args = format!(
         "perceive --model run {DRIVE} --out targets --save depth-png,overlay,birds-eye,segments,ply,pcd --json"
     );
-    let told = ok(at, &args);
-    let lines: Vec<Value> = told
+    let printed = ok(at, &args);
+    let lines: Vec<Value> = printed
         .stdout
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
     assert_eq!(lines.len(), 12);
     let file = std::fs::read_to_string(at.join("targets/targets.jsonl")).unwrap();
-    assert_eq!(file, told.stdout);
+    assert_eq!(file, printed.stdout);
     for (i, line) in lines.iter().enumerate() {
         let name = format!("{i:010}");
         assert_eq!(line["frame"], name.as_str());
@@ -97,11 +97,11 @@ fn images_stand_for_themselves_and_bags_bring_their_pictures() {
         at,
         "simulate --out bag --format bag --frames 4 --size 96x64 --moving-cars 2",
     );
-    let told = ok(
+    let printed = ok(
         at,
         "perceive --model run bag/urban_0001.bag --out seen --json",
     );
-    assert_eq!(told.stdout.lines().count(), 4);
+    assert_eq!(printed.stdout.lines().count(), 4);
     assert!(at.join("seen/0000000002_image.jpg").is_file());
     // `predict` takes recordings too, with their cameras.
     ok(at, "predict --model run bag/urban_0001.bag --out depth");
@@ -147,7 +147,7 @@ fn a_calibrated_run_gives_its_clouds_a_confidence() {
     let page = std::fs::read_to_string(at.join("page.html")).unwrap();
     assert!(page.contains("How far to trust a pixel"));
     assert!(cloud("after").contains("property float confidence"));
-    // A file that is none is told, not passed over.
+    // A file that is none is an error, not passed over.
     std::fs::write(at.join("run/confidence.toml"), "single = 3").unwrap();
     let run_ = run(
         at,
@@ -209,11 +209,11 @@ fn exact_depth_finds_the_simulators_boxes() {
         at,
         "simulate --out street --frames 14 --seed 6 --moving-cars 6",
     );
-    let told = ok(
+    let printed = ok(
         at,
         "eval-targets --data street --depth truth --json --out pictures",
     );
-    let score: Value = serde_json::from_str(&told.stdout).unwrap();
+    let score: Value = serde_json::from_str(&printed.stdout).unwrap();
     assert_eq!(
         (&score["depth"], &score["frames"]),
         (&"truth".into(), &14.into())
@@ -273,8 +273,8 @@ fn a_users_model_names_what_stands_there() {
         !at.join("no_detector").exists(),
         "nothing is begun with a model that is none"
     );
-    let told = ok(at, &with("red_things", "--instance-score 0.5"));
-    for line in told.stdout.lines() {
+    let printed = ok(at, &with("red_things", "--instance-score 0.5"));
+    for line in printed.stdout.lines() {
         let record: Value = serde_json::from_str(line).unwrap();
         for target in record["targets"].as_array().unwrap() {
             let class = &target["class"];

@@ -48,9 +48,9 @@ fn depth_images_are_not_taken_for_pictures() {
     let at = folder.path();
     train(at);
     write_folder(&at.join("desk"));
-    let told = json(at, "predict --model run desk --out depth --json");
-    let sidecars = told.as_array().unwrap();
-    assert_eq!(sidecars.len(), 3, "a frame each: {told}");
+    let printed = json(at, "predict --model run desk --out depth --json");
+    let sidecars = printed.as_array().unwrap();
+    assert_eq!(sidecars.len(), 3, "a frame each: {printed}");
     for (n, sidecar) in sidecars.iter().enumerate() {
         let image = sidecar["image"].as_str().unwrap();
         assert!(
@@ -86,21 +86,21 @@ fn depth_images_are_not_taken_for_pictures() {
         let from = at.join("desk/frame-000000.color.png");
         std::fs::copy(from, at.join("pictures").join(name)).unwrap();
     }
-    let told = json(
+    let printed = json(
         at,
         "predict --model run pictures --intrinsics 90,91,47.5,31.5 --out plain --json",
     );
-    assert_eq!(told.as_array().unwrap().len(), 2, "{told}");
+    assert_eq!(printed.as_array().unwrap().len(), 2, "{printed}");
     // By the field of view: 96 pixels that see 90 degrees.
-    let told = json(
+    let printed = json(
         at,
         "predict --model run pictures --hfov 90 --out wide --json",
     );
-    let k: Vec<f64> = serde_json::from_value(told[0]["intrinsics"].clone()).unwrap();
-    assert!((k[0] - 48.0).abs() < 1e-9 && k[0] == k[1], "{told}");
+    let k: Vec<f64> = serde_json::from_value(printed[0]["intrinsics"].clone()).unwrap();
+    assert!((k[0] - 48.0).abs() < 1e-9 && k[0] == k[1], "{printed}");
     assert_eq!(k[2..], [47.5, 31.5]);
-    assert_eq!(told[0]["intrinsics_from"], "given");
-    assert_eq!(told[0]["made_with"]["hfov_deg"], 90.0);
+    assert_eq!(printed[0]["intrinsics_from"], "given");
+    assert_eq!(printed[0]["made_with"]["hfov_deg"], 90.0);
 }
 
 #[test]

@@ -56,15 +56,15 @@ fn a_zoom_is_noticed_and_depth_brought_back() {
         at,
         &format!("predict --model run {DRIVE} --save depth-png --out plain"),
     );
-    let told = ok(
+    let printed = ok(
         at,
         &format!("predict --model run {DRIVE} --save depth-png --correct-scale --out corrected"),
     );
     assert_eq!(
-        told.stderr.matches("the road says").count(),
+        printed.stderr.matches("the road says").count(),
         1,
         "{}",
-        told.stderr
+        printed.stderr
     );
     let (plain, corrected) = (at.join("plain"), at.join("corrected"));
     // The first frame has none before it, the next ones are learned from.
@@ -106,7 +106,7 @@ fn a_zoom_is_noticed_and_depth_brought_back() {
     fails(
         at,
         "perceive --model run tcp://127.0.0.1:9 --correct-scale --out none",
-        &["a live source tells no motion", "--correct-scale"],
+        &["a live source has no measured motion", "--correct-scale"],
     );
     fails(
         at,

@@ -59,11 +59,11 @@ fn a_packed_network_stands_for_its_run() {
     }
     let figure = &card["figures"][0];
     assert_eq!(figure["data"], "sim");
-    let (kept, told) = (
+    let (kept, found) = (
         figure["abs_rel"].as_f64().unwrap(),
         measured["unscaled"]["abs_rel"].as_f64().unwrap(),
     );
-    assert!((kept - told).abs() < 1e-9, "{kept} and {told}");
+    assert!((kept - found).abs() < 1e-9, "{kept} and {found}");
     assert!(card["depth_difference"].as_f64().unwrap() < 0.05, "{card}");
     fails(
         at,
@@ -230,7 +230,7 @@ fn starts_runs(at: &Path) {
 
 /// A name that is neither a path nor embedded, and no name at all.
 #[test]
-fn what_is_not_there_is_told_with_what_is() {
+fn what_is_not_there_is_an_error_that_names_what_is() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     ok(
@@ -323,9 +323,9 @@ fn what_is_embedded_is_listed_and_used() {
         let sha256 = network["sha256"].as_str().unwrap();
         assert!(text.contains(sha256), "{text}");
         let preset = network["preset"].as_str().unwrap();
-        let told = format!("starts from the embedded network `{name}`");
+        let expected_line = format!("starts from the embedded network `{name}`");
         let run = ok(at, &format!("{small} --preset {preset} --out from-{name}"));
-        assert!(run.stderr.contains(&told), "{}", run.stderr);
+        assert!(run.stderr.contains(&expected_line), "{}", run.stderr);
         let from = format!("from-{name}");
         assert_eq!(init(&from, "init").as_deref(), Some(name));
         assert_eq!(init(&from, "init_sha256").as_deref(), Some(sha256));

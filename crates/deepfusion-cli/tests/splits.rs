@@ -39,15 +39,15 @@ fn a_split_of_which_a_part_is_there_is_said_to_be_one() {
     write_split(at, "whole.txt", [0, 2].into_iter(), 0);
     let eval = "eval --model run --data sim --crop none";
 
-    let told = ok(at, &format!("{eval} --split part.txt"));
+    let printed = ok(at, &format!("{eval} --split part.txt"));
     assert!(
-        told.stdout.contains("\n2 of the split's 5 images, "),
+        printed.stdout.contains("\n2 of the split's 5 images, "),
         "{}",
-        told.stdout
+        printed.stdout
     );
     let warned = |part: &str| {
-        let found = told.stderr.lines().filter(|l| l.contains(part)).count();
-        assert_eq!(found, 1, "{part}: {}", told.stderr);
+        let found = printed.stderr.lines().filter(|l| l.contains(part)).count();
+        assert_eq!(found, 1, "{part}: {}", printed.stderr);
     };
     warned(
         "part.txt: 3 of its 5 frames are there (60.0 %), the first that is not: 2026_01_01/2026_01_01_drive_0009_sync 0 l",
@@ -73,16 +73,16 @@ fn a_split_of_which_a_part_is_there_is_said_to_be_one() {
     assert!(report["expected"].is_null());
 
     let export = "data export-gt sim";
-    let told = ok(at, &format!("{export} --split part.txt --out a.npz --json"));
-    let written: serde_json::Value = serde_json::from_str(&told.stdout).unwrap();
+    let printed = ok(at, &format!("{export} --split part.txt --out a.npz --json"));
+    let written: serde_json::Value = serde_json::from_str(&printed.stdout).unwrap();
     assert_eq!(
         (&written["frames"], &written["expected"]),
         (&2.into(), &5.into())
     );
     assert!(
-        told.stderr.contains("3 of its 5 frames are there"),
+        printed.stderr.contains("3 of its 5 frames are there"),
         "{}",
-        told.stderr
+        printed.stderr
     );
     for split in ["part.txt", "bare.txt"] {
         fails(

@@ -44,13 +44,13 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     );
 
     // A new run may start from another's networks; its PoseNet goes on to speak of that one's unit. What that one does
-    // not have is told.
+    // not have is printed.
     let tuned = ok(
         at,
         "train --data sim --size 96x64 --batch 2 --steps 1 --with flow --init run --out tuned",
     );
-    let told = "starts from run/best.safetensors; new: the flow decoder";
-    assert!(tuned.stderr.contains(told), "{}", tuned.stderr);
+    let line = "starts from run/best.safetensors; new: the flow decoder";
+    assert!(tuned.stderr.contains(line), "{}", tuned.stderr);
     let unit = |run: &str| {
         let config = fs::read_to_string(at.join(run).join("config.toml")).unwrap();
         // What was found stands behind what was set.
@@ -107,12 +107,12 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
     let measured = fs::read_to_string(at.join("measured/0000000001.json")).unwrap();
     let measured: Value = serde_json::from_str(&measured).unwrap();
     let near = |a: &Value, b: &Value| (a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-9;
-    let (told, found) = (&measured["scale"], &other["scale"]);
-    assert!(near(&told["bias"], &found["bias"]), "{told} {found}");
+    let (said, found) = (&measured["scale"], &other["scale"]);
+    assert!(near(&said["bias"], &found["bias"]), "{said} {found}");
     for end in 0..2 {
         assert!(
-            near(&told["ci95"][end], &found["bias_ci95"][end]),
-            "{told} {found}"
+            near(&said["ci95"][end], &found["bias_ci95"][end]),
+            "{said} {found}"
         );
     }
     // Two steps are no reason to trust it, wherever its metres happen to lie.
@@ -151,7 +151,7 @@ fn a_drive_is_learned_resumed_evaluated_and_predicted() {
         assumed.stdout
     );
 
-    // Nothing is overwritten, and wrong cameras are told.
+    // Nothing is overwritten, and wrong cameras are errors.
     fails(
         at,
         &format!("predict --model run {image} --out assumed --save npy"),
@@ -341,22 +341,22 @@ fn options_replace_their_own_part_of_a_file() {
         let text = fs::read_to_string(at.join(run).join("config.toml")).unwrap();
         text.parse::<toml::Table>().unwrap()["data"].clone()
     };
-    let told = |name: &str| toml::Value::from(at.join(name).display().to_string());
+    let path = |name: &str| toml::Value::from(at.join(name).display().to_string());
     // Without --data: the file's recordings, validated on what is asked for.
     ok(
         at,
         "train --config first/config.toml --val-data val --out second",
     );
-    assert_eq!(data("second")["paths"][0], told("sim"));
-    assert_eq!(data("second")["validation"][0], told("val"));
+    assert_eq!(data("second")["paths"][0], path("sim"));
+    assert_eq!(data("second")["validation"][0], path("val"));
     // With it: other recordings, and the file's validation.
     ok(
         at,
         "train --config second/config.toml --data more --out third",
     );
-    assert_eq!(data("third")["paths"][0], told("more"));
-    assert_eq!(data("third")["validation"][0], told("val"));
-    // A split and a camera that the file's recordings do not have are told, not left out.
+    assert_eq!(data("third")["paths"][0], path("more"));
+    assert_eq!(data("third")["validation"][0], path("val"));
+    // A split and a camera that the file's recordings do not have are errors, not left out.
     fs::write(at.join("split.txt"), "nowhere/nothing 1 l\n").unwrap();
     fails(
         at,
@@ -391,7 +391,7 @@ fn options_replace_their_own_part_of_a_file() {
 }
 
 #[test]
-fn what_cannot_be_trained_on_is_told() {
+fn what_cannot_be_trained_on_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fails(at, "train --data nowhere", &["nowhere"]);
@@ -404,8 +404,8 @@ fn what_cannot_be_trained_on_is_told() {
     );
     assert_eq!(contradiction.code, 1, "{}", contradiction.stderr);
     for part in ["`view_motion`", "posenet where loss.speed is 0", "vehicle"] {
-        let told = contradiction.stderr.contains(part);
-        assert!(told, "{part}: {}", contradiction.stderr);
+        let named = contradiction.stderr.contains(part);
+        assert!(named, "{part}: {}", contradiction.stderr);
     }
 
     ok(at, "simulate --out sim --frames 6 --seed 3 --scan-every 0");
@@ -478,8 +478,8 @@ fn imported_encoders_start_a_preset_with_other_parts() {
     let start = "train --data sim --preset light --size 96x64 --batch 1 --steps 1";
     let parts = "--with hce,attention,aggregation";
     let run = ok(at, &format!("{start} {parts} --init imported --out run"));
-    let told = "starts from imported/last.safetensors; new: everything but the encoders";
-    assert!(run.stderr.contains(told), "{}", run.stderr);
+    let line = "starts from imported/last.safetensors; new: everything but the encoders";
+    assert!(run.stderr.contains(line), "{}", run.stderr);
     let config = fs::read_to_string(at.join("run/config.toml")).unwrap();
     assert!(!config.contains("metres_per_unit = 1.0"), "{config}");
 }
@@ -505,7 +505,7 @@ fn weights_that_were_learned_otherwise_are_warned_of() {
 }
 
 #[test]
-fn weights_and_bench_tell_what_they_do() {
+fn weights_and_bench_say_what_they_do() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     assert!(ok(at, "weights list").stdout.contains("Monodepth2"));

@@ -20,7 +20,7 @@ const DRIVE: &str = "simulate --frames 80 --seed 90100 --moving-cars 2";
 fn number(value: &Value) -> f64 {
     value
         .as_f64()
-        .unwrap_or_else(|| panic!("no number: {value}"))
+        .unwrap_or_else(|| panic!("not a number: {value}"))
 }
 
 /// The files below a folder whose names end so.

@@ -11,7 +11,7 @@ use deepfusion_geometry::DepthMap;
 use support::in_folder;
 
 #[test]
-fn it_tells_its_address_answers_and_ends() {
+fn it_prints_its_address_answers_and_ends() {
     let folder = tempfile::tempdir().unwrap();
     let map = DepthMap {
         width: 4,
@@ -53,8 +53,8 @@ fn it_tells_its_address_answers_and_ends() {
     );
 
     let pid = process.id().to_string();
-    let told = Command::new("kill").args(["-INT", &pid]).status().unwrap();
-    assert!(told.success());
+    let killed = Command::new("kill").args(["-INT", &pid]).status().unwrap();
+    assert!(killed.success());
     assert_eq!(process.wait().unwrap().code(), Some(0));
     let mut said = String::new();
     process
@@ -68,7 +68,7 @@ fn it_tells_its_address_answers_and_ends() {
 
 #[cfg(not(feature = "rerun"))]
 #[test]
-fn without_the_feature_it_tells_how_to_get_rerun_files() {
+fn without_the_feature_it_says_how_to_get_rerun_files() {
     let folder = tempfile::tempdir().unwrap();
     let run = in_folder(folder.path(), &["view", ".", "--rerun", "a.rrd"]);
     assert_eq!((run.code, run.stdout.as_str()), (1, ""));

@@ -134,7 +134,7 @@ fn requests_and_error_frames_carry_no_speed() {
 }
 
 #[test]
-fn an_extended_frame_is_told_by_its_own_identifier() {
+fn an_extended_frame_is_recognised_by_its_own_identifier() {
     let sidecar = INLINE.replace("id = 0x158", "id = { extended = 0x18fef100 }");
     let drive = Drive::new(&sidecar, |bag| {
         let extended = Frame {
@@ -284,7 +284,7 @@ fn a_bus_that_was_not_recorded_is_an_error() {
 }
 
 #[test]
-fn a_signal_without_a_frame_is_told() {
+fn a_signal_without_a_frame_is_an_error() {
     let drive = Drive::new(INLINE, |bag| {
         bag.can("/can", &frame(0x159, 3600)).twist("/twist", 5.0);
     });

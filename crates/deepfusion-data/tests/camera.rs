@@ -161,7 +161,7 @@ fn photographs_say_what_their_camera_is() {
         short(Tag::FocalLengthIn35mmFilm, 26),
         short(Tag::Orientation, 6),
     ];
-    for (name, block, film_mm, told) in [
+    for (name, block, film_mm, part) in [
         ("film", film, 26.0, "000.jpg: 26 mm in 35 mm film"),
         (
             "turned",
@@ -194,7 +194,7 @@ fn photographs_say_what_their_camera_is() {
         assert_eq!((k.fx, k.cx, k.cy), (k.fy, 31.5, 23.5));
         let warnings = dataset.warnings();
         let warning = warnings.iter().find(|r| r.contains("EXIF")).unwrap();
-        assert!(warning.contains(told), "{warning}");
+        assert!(warning.contains(part), "{warning}");
         // A single picture knows the same.
         let photo = load_photo(&folder.join("images/000.jpg")).unwrap();
         assert_eq!(photo.intrinsics.unwrap().fx, k.fx);

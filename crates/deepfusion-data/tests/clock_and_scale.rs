@@ -214,10 +214,10 @@ fn what_cannot_be_a_clock_or_a_scale_is_refused_by_its_file() {
             write_config(&drive, text);
             let error = Dataset::open(&drive.path, &OpenOptions::default()).unwrap_err();
             let file = drive.config.file_name().unwrap().to_str().unwrap();
-            let told = error.to_string();
+            let text = error.to_string();
             assert!(
-                told.contains(file) && told.contains(problem),
-                "{}: {told}",
+                text.contains(file) && text.contains(problem),
+                "{}: {text}",
                 drive.layout
             );
             assert!(error.hint().is_some());

@@ -94,7 +94,7 @@ fn a_kitti_drive_and_a_folder_of_it_give_the_same_snippets() {
 }
 
 /// KITTI's drive 0005 again as a folder with tables, made from its oxts: every pair's motion is the same but for the
-/// body's lean, which a table of speeds and yaw rates does not know.
+/// body's roll and pitch, which a table of speeds and yaw rates does not know.
 #[cfg(unix)]
 #[test]
 fn a_real_drive_and_a_folder_of_it_give_the_same_snippets() {
@@ -139,20 +139,20 @@ fn a_real_drive_and_a_folder_of_it_give_the_same_snippets() {
         own.snippets(&[1], 0.5).unwrap(),
     );
     assert_eq!((a.len(), b.len()), (153, 153));
-    let leaned: f64 = a.iter().zip(&b).map(|(a, b)| same(&kitti, a, b)).sum();
+    let tilted: f64 = a.iter().zip(&b).map(|(a, b)| same(&kitti, a, b)).sum();
     // A tenth of a degree a pair and more, by the satellite-fused pose.
-    assert!(leaned / 153.0 > 1e-3, "{leaned}");
+    assert!(tilted / 153.0 > 1e-3, "{tilted}");
     let warning = deepfusion_data::speed_unit_warning(&own).unwrap();
     assert!(warning.is_none(), "{warning:?}");
 }
 
-/// Asserts that the folder's motions `b` are those of KITTI's `a` on a body that does not lean; how far it leans, in
+/// Asserts that the folder's motions `b` are those of KITTI's `a` on a body that does not roll and pitch; how far it does, in
 /// radians.
 fn same(kitti: &Dataset, a: &Snippet, b: &Snippet) -> f64 {
     assert_eq!(a.target, b.target);
     let time_s = |frame: usize| kitti.frames()[frame].time_s.unwrap();
     let (mount, track) = (kitti.cam_from_vehicle().unwrap(), kitti.track().unwrap());
-    let mut leaned = 0.0;
+    let mut tilted = 0.0;
     for (x, y) in a.sources.iter().zip(&b.sources) {
         assert_eq!((x.offset, x.frame), (y.offset, y.frame));
         let (from, to) = (a.target.min(x.frame), a.target.max(x.frame));
@@ -172,9 +172,9 @@ fn same(kitti: &Dataset, a: &Snippet, b: &Snippet) -> f64 {
         };
         assert!(apart(x.source_from_target.unwrap(), vehicle) < 1e-8);
         assert!(apart(y.source_from_target.unwrap(), vehicle.level()) < 1e-8);
-        leaned += apart(y.source_from_target.unwrap(), vehicle);
+        tilted += apart(y.source_from_target.unwrap(), vehicle);
     }
-    leaned
+    tilted
 }
 
 #[test]
@@ -207,7 +207,7 @@ fn without_a_yaw_rate_distances_are_known_and_turns_are_not() {
 }
 
 #[test]
-fn an_inspection_tells_streams_and_what_is_assumed() {
+fn an_inspection_reports_streams_and_what_is_assumed() {
     let root = tempfile::tempdir().unwrap();
     write_drive(root.path(), 8, 10.0, 0.1);
     let seen = inspect(root.path()).unwrap();

@@ -143,11 +143,11 @@ fn cameras_fall_back_on_grey_and_every_sequence_is_opened() {
         ..OpenOptions::default()
     };
     let all = Dataset::open(root.path(), &options).unwrap();
-    let told: Vec<_> = all
+    let found: Vec<_> = all
         .iter()
         .map(|d| (d.name(), d.camera(), d.frames()[0].image.to_string()))
         .collect();
-    for ((name, camera, image), (expected, side, folder)) in told.iter().zip([
+    for ((name, camera, image), (expected, side, folder)) in found.iter().zip([
         ("04", Camera::Left, "image_0"),
         ("04", Camera::Right, "image_1"),
         ("11", Camera::Left, "image_2"),

@@ -1,4 +1,4 @@
-//! What moves: KITTI's tracklets beside the car's own motion, and the simulator's masks.
+//! Dynamic pixels: KITTI's tracklets beside the car's own motion, and the simulator's masks.
 
 #![allow(
     clippy::unwrap_used,

@@ -83,7 +83,7 @@ fn whole_images_are_read_by_content() {
         assert_eq!(image_size(&path).unwrap(), (40, 30));
         for length in [3, 20] {
             std::fs::write(&path, &bytes[..length]).unwrap();
-            image_size(&path).expect_err("ends before its size is told");
+            image_size(&path).expect_err("ends before its size is known");
         }
     }
 }

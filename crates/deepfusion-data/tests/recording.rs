@@ -119,7 +119,7 @@ fn images_are_decoded_when_they_are_asked_for() {
 }
 
 #[test]
-fn an_image_of_another_size_and_missing_speeds_are_told_by_place() {
+fn an_image_of_another_size_and_missing_speeds_are_reported_by_place() {
     let recording = Messages {
         width: 41,
         ..Messages::default()
@@ -140,7 +140,7 @@ fn an_image_of_another_size_and_missing_speeds_are_told_by_place() {
 }
 
 #[test]
-fn a_layout_says_what_moves() {
+fn a_layout_says_which_pixels_are_dynamic() {
     let labels = dataset(Messages::default(), None).moving_labels();
     let labels = labels.unwrap().unwrap();
     let truth = DepthMap {

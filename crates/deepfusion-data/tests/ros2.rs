@@ -1,4 +1,4 @@
-//! ROS 2 bags by their path; told where the feature is off.
+//! ROS 2 bags by their path; an error where the feature is off.
 
 use deepfusion_data::{Dataset, OpenOptions};
 use std::path::{Path, PathBuf};

@@ -94,7 +94,7 @@ fn is_the_drive(dataset: &Dataset, known: &Known) {
     let of = |part: fn(&(f64, f64)) -> f64| pairs.iter().map(part).sum::<f64>();
     let ratio = of(|p| p.0) / of(|p| p.1);
     assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
-    // It brakes at 1.7 m/s² where the positions end, which they cannot tell.
+    // It brakes at 1.7 m/s² where the positions end, which they cannot show.
     let rms = (of(|p| (p.0 - p.1).powi(2)) / pairs.len() as f64).sqrt();
     assert!(rms < 0.5, "{rms} m/s");
 
@@ -221,7 +221,7 @@ fn is_near(found: &Vector3<f64>, expected: [f64; 3]) {
 }
 
 #[test]
-fn the_file_goes_before_the_frames_and_a_disagreement_is_told() {
+fn the_file_goes_before_the_frames_and_a_disagreement_is_reported() {
     // The camera 1.5 m ahead and 1.2 m up.
     let place = [1.5, 0.0, 1.2];
     let frames = |bag: &mut TinyBag| {
@@ -409,7 +409,7 @@ fn a_camera_that_pans_has_no_mount() {
 }
 
 #[test]
-fn a_frame_that_is_not_optical_is_told_and_turned() {
+fn a_frame_that_is_not_optical_is_reported_and_turned() {
     let drive = Drive::new("", |bag| {
         bag.within("lidar").scans("/points");
         bag.transforms("/tf_static", |_| {
@@ -440,7 +440,7 @@ fn a_frame_that_is_not_optical_is_told_and_turned() {
 }
 
 #[test]
-fn frames_that_lead_nowhere_are_told() {
+fn frames_that_lead_nowhere_are_errors() {
     // The images' frame is in no transform.
     let missing = Drive::new("", |bag| {
         bag.transforms("/tf_static", |_| {

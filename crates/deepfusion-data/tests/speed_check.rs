@@ -103,7 +103,7 @@ fn a_wrong_unit_scales_the_height_and_is_named() {
 }
 
 #[test]
-fn images_that_tell_nothing_give_no_height() {
+fn images_without_information_give_no_height() {
     let mut flat = pairs(1.0);
     for pair in &mut flat {
         let mut flat = render(0.0);
@@ -140,7 +140,7 @@ fn a_frozen_image_is_warned_of() {
 
 /// Real drives are silent as they are, and warned of when their OXTS speeds are rewritten as km/h.
 #[test]
-fn real_drives_are_told_from_the_same_in_kmh() {
+fn real_drives_are_distinguished_from_the_same_in_kmh() {
     for drive in ["2011_09_26_drive_0005_sync", "2011_09_26_drive_0009_sync"] {
         let Some(folder) = common::real_data(&format!("kitti_raw/2011_09_26/{drive}")) else {
             return;

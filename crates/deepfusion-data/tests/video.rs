@@ -12,7 +12,7 @@ mod folder;
 
 use deepfusion_data::{Dataset, DatasetKind, FrameImage, OpenOptions, RgbImage, inspect};
 use deepfusion_hint::Hint;
-use deepfusion_video::{Shown, shown_for};
+use deepfusion_video::{VideoPicture, shown_for};
 use image::Rgb;
 use ndarray::Array1;
 use ndarray_npy::WriteNpyExt;
@@ -182,7 +182,7 @@ fn a_comma_segment_takes_its_frames_times_from_the_log() {
 }
 
 #[test]
-fn what_is_no_video_is_told() {
+fn what_is_no_video_is_an_error() {
     let root = tempfile::tempdir().unwrap();
     let video = root.path().join("x.mp4");
     fs::write(&video, "no video").unwrap();
@@ -206,7 +206,7 @@ fn pictures_become_a_video_at_their_own_times() {
     // Thirty and sixty a second, and a pause.
     let times = [0.0, 1.0 / 30.0, 2.0 / 30.0, 0.2, 0.2 + 1.0 / 60.0, 0.25];
     let seconds = shown_for(&times.map(Some));
-    let shown: Vec<Shown> = seconds
+    let shown: Vec<VideoPicture> = seconds
         .into_iter()
         .enumerate()
         .map(|(i, seconds)| {
@@ -216,7 +216,7 @@ fn pictures_become_a_video_at_their_own_times() {
             let (w, h) = if i == 3 { (32, 24) } else { (65, 49) };
             let grey = RgbImage::from_pixel(w, h, Rgb([40 + 30 * i as u8; 3]));
             grey.save(folder.join(&file)).unwrap();
-            Shown { file, seconds }
+            VideoPicture { file, seconds }
         })
         .collect();
     let made = |name: &str| deepfusion_video::write_video(&folder, &shown, name);

@@ -13,7 +13,7 @@ const LEAST: f64 = 0.06;
 pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let seen = survey.frames.iter();
     let seen: Vec<(u64, f64)> = seen
-        .filter_map(|f| Some((f.number, f.look.sharpness?)))
+        .filter_map(|f| Some((f.number, f.quality.sharpness?)))
         .collect();
     if seen.is_empty() {
         return Outcome::skipped("blur", "no image has any detail");

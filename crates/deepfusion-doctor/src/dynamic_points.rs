@@ -8,7 +8,7 @@ const CHECK: &str = "dynamic-points";
 const MOST_SCANS: usize = 40;
 /// Fewer moving points, by either, tell no share.
 const LEAST_POINTS: usize = 200;
-/// The driver's threshold need not be ours: what moves slowly may be in one alone.
+/// The driver's threshold need not be ours: slow objects may be in one alone.
 const LEAST_SHARE: Limit = Limit::AtLeast(0.7);
 
 pub(super) fn check(dataset: &Dataset) -> Outcome {

@@ -21,7 +21,7 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
     let (mut neighbours, mut jumps) = (0, Vec::new());
     for (a, b) in survey.neighbours() {
         neighbours += 1;
-        let ratio = (b.look.mean + FLOOR) / (a.look.mean + FLOOR);
+        let ratio = (b.quality.mean + FLOOR) / (a.quality.mean + FLOOR);
         if ratio.ln().abs() > JUMP.ln_1p() {
             jumps.push((b.number, ratio));
         }
@@ -48,8 +48,8 @@ pub(super) fn check(survey: &Survey<'_>) -> Outcome {
             )
         });
     }
-    let typical = |of: fn(&super::look::Look) -> f64| {
-        100.0 * median(survey.frames.iter().map(|f| of(&f.look)).collect())
+    let typical = |of: fn(&super::image_quality::ImageQuality) -> f64| {
+        100.0 * median(survey.frames.iter().map(|f| of(&f.quality)).collect())
     };
     let dark = Figure::new(
         "black pixels",

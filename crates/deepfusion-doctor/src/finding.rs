@@ -84,7 +84,7 @@ pub struct Outcome {
 }
 
 impl Limit {
-    /// Whether a value keeps to it. What is no number does not.
+    /// Whether a value keeps to it. NaN does not.
     #[must_use]
     pub fn holds(&self, value: f64) -> bool {
         match *self {
@@ -238,7 +238,7 @@ fn short(value: f64) -> String {
     }
 }
 
-/// JSON has no infinity; `null` says that there is no number.
+/// JSON has no infinity; `null` stands for what is not finite.
 fn finite<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     value.is_finite().then_some(*value).serialize(serializer)
 }
@@ -254,7 +254,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_figure_is_told_with_its_limit() {
+    fn a_figure_is_printed_with_its_limit() {
         let figure = Figure::new("offset", 0.30049, "s", Limit::Within(-0.02, 0.02));
         assert!(!figure.holds());
         assert_eq!(figure.to_string(), "offset 0.3 s (-0.02 to 0.02)");
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_never_holds() {
+    fn nan_never_holds() {
         for limit in [
             Limit::AtMost(1.0),
             Limit::AtLeast(0.0),

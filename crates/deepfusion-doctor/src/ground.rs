@@ -13,7 +13,7 @@ const AHEAD_M: std::ops::Range<f64> = 3.0..18.0;
 const ASIDE_M: f64 = 4.0;
 const BELOW_M: std::ops::Range<f64> = 0.5..3.5;
 const LEAST_POINTS: usize = 60;
-/// How far the road has to be seen, metres along and across: what is shorter is a car's roof or bonnet as well as a road.
+/// How far the road has to be seen, metres along and across: what is shorter is a car's roof or hood as well as a road.
 const LEAST_LENGTH_M: f64 = 5.0;
 const LEAST_WIDTH_M: f64 = 2.5;
 /// Frames that have to show it, and by how much their angles may scatter about the median, as a share of the limit.

@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_matrix_of_another_size_is_told_by_name() {
+    fn a_matrix_of_another_size_is_named() {
         let wrong = Intrinsics {
             width: 640,
             height: 192,

@@ -5,7 +5,6 @@
 //! at hand (KITTI 0005 and 0009, the simulator's five places) keep to all of them.
 
 mod blur;
-mod bonnet;
 mod camera_ahead;
 mod clock;
 mod duplicates;
@@ -16,10 +15,11 @@ mod finding;
 mod flow;
 mod ground;
 mod heading;
+mod hood;
+mod image_quality;
 mod intrinsics;
 mod lidar_speed;
 mod log;
-mod look;
 mod opening;
 mod parallax;
 mod plots;
@@ -123,7 +123,7 @@ impl Diagnosis {
     }
 }
 
-/// Every check by its name, in the order in which they are told: those of a drive, and that of both cameras.
+/// Every check by its name, in the order in which they are reported: those of a drive, and that of both cameras.
 const CHECKS: [&str; 18] = [
     "opening",
     "timing",
@@ -211,7 +211,7 @@ fn examine_among(dataset: &Dataset, others_train: bool) -> DriveDiagnosis {
         parallax::check(&survey, &pairs),
         exposure::check(&survey),
         blur::check(&survey),
-        bonnet::check(&survey),
+        hood::check(&survey),
     ];
     DriveDiagnosis {
         name: dataset.name().to_owned(),

@@ -3,7 +3,7 @@
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use super::{Diagnosis, opening};
 use deepfusion_data::{Dataset, DatasetKind, Error as DataError};
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use deepfusion_logs::{Clock, DriveLog, Error, Format, ReadOptions, may_hold_log, read};
 use std::path::Path;
 
@@ -101,10 +101,10 @@ fn opened(path: &Path, log: &DriveLog) -> Outcome {
         Severity::Note,
         None,
         format!(
-            "{} with {} speeds and {} yaw rates: {}",
+            "{} with {} and {}: {}",
             log.format,
-            log.speeds.len(),
-            log.yaw_rates.len(),
+            count_of(log.speeds.len(), "speed"),
+            count_of(log.yaw_rates.len(), "yaw rate"),
             log.notes.join("; ")
         ),
         format!(

@@ -36,9 +36,9 @@ const MOST_SCANS: usize = 40;
 impl DrivePlots {
     pub(super) fn of(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Self {
         let dataset = survey.dataset;
-        let times = |of: fn(&super::look::Look) -> Option<f64>| {
+        let times = |of: fn(&super::image_quality::ImageQuality) -> Option<f64>| {
             let seen = survey.frames.iter();
-            seen.filter_map(|f| Some((dataset.frames()[f.index].time_s?, of(&f.look)?)))
+            seen.filter_map(|f| Some((dataset.frames()[f.index].time_s?, of(&f.quality)?)))
                 .collect()
         };
         let line = |name, points: Vec<(f64, f64)>| Line { name, points };

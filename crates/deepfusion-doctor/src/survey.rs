@@ -1,7 +1,7 @@
 //! What the checks look at: a sample of a drive's frames, small and grey, and how they move.
 
 use super::flow::{Flow, flow};
-use super::look::Look;
+use super::image_quality::ImageQuality;
 use deepfusion_data::{Dataset, Ego, EgoMotion, grey_image};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_motion::GreyImage;
@@ -42,7 +42,7 @@ pub(crate) struct SeenFrame {
     pub(crate) index: usize,
     pub(crate) number: u64,
     pub(crate) small: GreyImage,
-    pub(crate) look: Look,
+    pub(crate) quality: ImageQuality,
     coarse: Option<GreyFrame>,
 }
 
@@ -164,7 +164,7 @@ impl SeenFrame {
         Ok(Self {
             index,
             number: frame.number,
-            look: Look::of(&image),
+            quality: ImageQuality::of(&image),
             small,
             coarse,
         })

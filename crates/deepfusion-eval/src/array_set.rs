@@ -41,7 +41,7 @@ impl std::fmt::Debug for Source {
 }
 
 impl ArraySet {
-    /// Opens a file; what it is is told by its content, not its name.
+    /// Opens a file; what it is is recognised by its content, not its name.
     ///
     /// # Errors
     /// [`Error::Io`] where it cannot be read, [`Error::ArrayFile`] where it is no such file.

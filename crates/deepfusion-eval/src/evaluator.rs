@@ -259,7 +259,7 @@ impl Evaluator {
             sharpness: Sharpness::mean(images.iter().filter_map(|i| i.sharpness.as_ref())),
             intervals: None,
             points: self.point_statistics(),
-            trivial: None,
+            mean_depth_baseline: None,
             scenarios: Vec::new(),
             skipped: self.skipped.clone(),
             truth_sha256: Some(hex(&self.truth.clone().finalize())),

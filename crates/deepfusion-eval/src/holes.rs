@@ -1,6 +1,6 @@
 //! Holes: near things that a method sees far away.
 //!
-//! Depth learned from motion has a failure of its own. What moves along with the camera keeps its place in
+//! Depth learned from motion has a failure of its own. An object that moves along with the camera keeps its place in
 //! the image, which is what infinitely far things do, and the photometric loss rewards the network for
 //! saying so. The seven metrics blur that: a car ahead is a few hundred pixels, each as wrong as the clamp
 //! allows. The hole rate counts it.

@@ -25,10 +25,10 @@ pub struct Report {
     pub scale: Scale,
     /// Unscaled, by distance; pooled over pixels.
     pub ranges: Vec<RangeBin>,
-    /// Unscaled metrics of what does not move, where labels tell; means over the images that have such pixels.
+    /// Unscaled metrics of static pixels, where labels say which; means over the images that have such pixels.
     #[serde(default, rename = "static", skip_serializing_if = "Option::is_none")]
     pub still: Option<Metrics>,
-    /// Unscaled metrics of what moves, where labels tell; means over the images in which something does.
+    /// Unscaled metrics of dynamic pixels, where labels say which; means over the images that have some.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moving: Option<Metrics>,
     /// How many images these are.
@@ -38,7 +38,7 @@ pub struct Report {
     /// or more), more than three times too far, or absent; the mean over images with near ground truth. Unscaled.
     #[serde(default)]
     pub hole_rate: Option<f64>,
-    /// The same of what moves, where labels tell.
+    /// The same of dynamic pixels, where labels say which.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hole_rate_moving: Option<f64>,
     /// Share of the ground truth without prediction, where predictions may be absent; pooled over pixels.
@@ -54,8 +54,8 @@ pub struct Report {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points: Option<Points>,
     /// The mean depth of each pixel over the training scans, on the same images: what a useful network must beat.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub trivial: Option<MeanDepthRow>,
+    #[serde(default, rename = "trivial", skip_serializing_if = "Option::is_none")]
+    pub mean_depth_baseline: Option<MeanDepthRow>,
     /// The same of each kind of drive, where the recordings say theirs and there is more than one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub scenarios: Vec<ScenarioRow>,
@@ -77,7 +77,7 @@ impl Report {
     /// Puts the mean-depth baseline beside the method's: `baseline` is the report of its predictions on the same images.
     #[must_use]
     pub fn with_mean_depth_baseline(mut self, baseline: &Report) -> Self {
-        self.trivial = Some(MeanDepthRow {
+        self.mean_depth_baseline = Some(MeanDepthRow {
             unscaled: baseline.unscaled,
             median_scaled: baseline.median_scaled,
         });

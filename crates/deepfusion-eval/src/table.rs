@@ -1,6 +1,7 @@
 use std::fmt;
 
 use crate::{Crop, GroundTruth, Intervals, Metrics, PointErrors, Points, Report, Sharpness};
+use deepfusion_hint::count_of;
 
 const LABEL: usize = 22;
 
@@ -17,8 +18,7 @@ impl fmt::Display for Report {
         };
         let images = match (self.expected, self.n) {
             (Some(expected), n) => format!("{n} of the split's {expected} images"),
-            (None, 1) => "1 image".to_owned(),
-            (None, n) => format!("{n} images"),
+            (None, n) => count_of(n, "image"),
         };
         let (min, cap) = (self.protocol.min_m, self.protocol.cap_m);
         writeln!(f, "{images}, {crop}, {min} to {cap} m, ground truth: {gt}")?;
@@ -77,9 +77,9 @@ impl Report {
                 metrics,
             )?;
         }
-        if let Some(trivial) = &self.trivial {
-            row(f, "mean-depth baseline", &trivial.unscaled)?;
-            row(f, "  median-scaled", &trivial.median_scaled)?;
+        if let Some(mean_depth_baseline) = &self.mean_depth_baseline {
+            row(f, "mean-depth baseline", &mean_depth_baseline.unscaled)?;
+            row(f, "  median-scaled", &mean_depth_baseline.median_scaled)?;
         }
         for scenario in &self.scenarios {
             let label = format!("{}, scale {:.3}", scenario.name, scenario.scale.median);
@@ -112,7 +112,7 @@ impl Report {
                 100.0 * rate
             )?;
             match self.hole_rate_moving {
-                Some(rate) => writeln!(f, "; {:.2} % of what moves", 100.0 * rate)?,
+                Some(rate) => writeln!(f, "; {:.2} % of dynamic pixels", 100.0 * rate)?,
                 None => writeln!(f)?,
             }
         }
@@ -153,10 +153,6 @@ fn interval_lines(f: &mut fmt::Formatter<'_>, intervals: &Intervals) -> fmt::Res
 
 /// What truth without a boundary leaves open is not printed.
 fn sharp_lines(f: &mut fmt::Formatter<'_>, sharpness: &Sharpness) -> fmt::Result {
-    let images = |n: usize| match n {
-        1 => "1 image".to_owned(),
-        n => format!("{n} images"),
-    };
     if let (Some(accuracy), Some(completeness)) = (
         sharpness.boundary_accuracy_px,
         sharpness.boundary_completeness_px,
@@ -164,7 +160,7 @@ fn sharp_lines(f: &mut fmt::Formatter<'_>, sharpness: &Sharpness) -> fmt::Result
         writeln!(
             f,
             "edges   {accuracy:.2} px from the true ones (accuracy), {completeness:.2} px with those missed (completeness); {}",
-            images(sharpness.boundary_images)
+            count_of(sharpness.boundary_images, "image")
         )?;
     }
     if let Some(share) = sharpness.flying_share {
@@ -172,7 +168,7 @@ fn sharp_lines(f: &mut fmt::Formatter<'_>, sharpness: &Sharpness) -> fmt::Result
             f,
             "flying  {:.1} % of the pixels at depth jumps lie between the two sides; {}",
             100.0 * share,
-            images(sharpness.flying_images)
+            count_of(sharpness.flying_images, "image")
         )?;
     }
     Ok(())

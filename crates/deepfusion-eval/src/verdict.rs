@@ -7,7 +7,7 @@ mod text;
 pub use certificate::{
     BlockScale, ErrorSource, ScaleCertificate, ScaleVerdict, SourceName, TOLERANCE,
 };
-pub use gate::{Check, Worse};
+pub use gate::{Check, WorsenedCheck};
 
 use serde::{Deserialize, Serialize};
 

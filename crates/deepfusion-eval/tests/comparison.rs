@@ -191,7 +191,7 @@ fn plain_files_are_read_and_said_to_be_plain() {
 }
 
 #[test]
-fn an_evaluation_of_other_weights_is_told() {
+fn an_evaluation_of_other_weights_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let run = run(
         folder.path(),
@@ -226,7 +226,7 @@ fn measuring_again_replaces_and_measuring_otherwise_adds() {
 }
 
 #[test]
-fn what_is_no_evaluation_is_told() {
+fn what_is_no_evaluation_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let fails = |path: PathBuf| Evaluation::collect(&[path]).unwrap_err();

@@ -60,7 +60,7 @@ proptest! {
         prop_assert_eq!(report(&depth, &grid(&truth)), report(&disparity, &grid(&truth)));
     }
 
-    /// However wild the prediction, no number is NaN or infinite: serde_json would write `null` for it.
+    /// However wild the prediction, none of the numbers is NaN or infinite: serde_json would write `null` for it.
     #[test]
     fn reports_have_no_nan(truth in depths(), exponents in prop::collection::vec(-300.0..300.0f64, WIDTH * HEIGHT)) {
         let pred: Vec<f64> = exponents.iter().map(|e| 10f64.powf(*e)).collect();

@@ -13,6 +13,32 @@
 //!     }
 //! }
 //! ```
+//!
+//! [`count_of`] writes the counts of a message: `1 frame`, `2 frames`.
+
+/// A count with its noun, in the plural where it is not one; for nouns with a regular plural.
+///
+/// ```
+/// use deepfusion_hint::count_of;
+///
+/// assert_eq!(count_of(1, "frame"), "1 frame");
+/// assert_eq!(count_of(0_u64, "yaw rate"), "0 yaw rates");
+/// assert_eq!(count_of(2_usize, "fix"), "2 fixes");
+/// ```
+#[must_use]
+pub fn count_of<N>(count: N, noun: &str) -> String
+where
+    N: Copy + PartialEq + From<u8> + std::fmt::Display,
+{
+    let ending = if count == N::from(1) {
+        ""
+    } else if noun.ends_with(['s', 'x']) || noun.ends_with("ch") {
+        "es"
+    } else {
+        "s"
+    };
+    format!("{count} {noun}{ending}")
+}
 
 /// An error that may know its remedy.
 ///

@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bf16_rounds_to_the_nearest_and_keeps_what_is_no_number() {
+    fn bf16_rounds_to_the_nearest_and_keeps_nan() {
         let rounded = |v: f32| Bf16::of(v).value();
         // Between 1 and 2 the step is 2⁻⁷; halfway goes to the even one.
         assert_eq!(rounded(1.0 + 0.6 / 128.0), 1.0 + 1.0 / 128.0);

@@ -8,21 +8,21 @@ use crate::tile::Pixel;
 /// Buffers that only grow; each task overwrites what it takes.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    pub(crate) first: Growing,
-    pub(crate) second: Growing,
+    pub(crate) first: GrowingBuffer,
+    pub(crate) second: GrowingBuffer,
     pub(crate) pixels: Vec<Pixel>,
 }
 
 /// Numbers as many as were ever asked for at once.
-pub(crate) struct Growing(Aligned<f32>);
+pub(crate) struct GrowingBuffer(Aligned<f32>);
 
-impl Default for Growing {
+impl Default for GrowingBuffer {
     fn default() -> Self {
         Self(Aligned::zeros(0))
     }
 }
 
-impl Growing {
+impl GrowingBuffer {
     /// The first `len` numbers, whatever they are.
     pub(crate) fn take(&mut self, len: usize) -> &mut [f32] {
         if self.0.len() < len {

@@ -36,7 +36,7 @@ pub fn unseen(card: &Card, datasets: &[Dataset]) -> bool {
 pub fn held_out(
     _: &deepfusion_model::TrainConfig,
     _: &[Dataset],
-    _: &[crate::evaluation::Place],
+    _: &[crate::evaluation::ImageRef],
 ) -> Option<bool> {
     None
 }

@@ -62,7 +62,7 @@ pub fn find_inputs(
         } else if path.exists() && has_ending(&path, &RECORDINGS) {
             recordings.extend(open(&path, argument, options)?);
         } else if path.exists() || !argument.contains(['*', '?', '[']) {
-            // A file that is not there is told by whoever opens it.
+            // A file that is not there is an error of whoever opens it.
             found.push(path);
         } else {
             let paths = glob::glob(argument)?.filter_map(Result::ok);

@@ -7,7 +7,7 @@ use deepfusion_eval::{IntervalFactors, IntervalSample, Protocol};
 use deepfusion_geometry::DepthMap;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Prediction};
 
-use crate::evaluation::{Evaluated, Place, Truth, known_pixels};
+use crate::evaluation::{Evaluated, ImageRef, Truth, known_pixels};
 use crate::{Error, ModelFacts, Result};
 
 /// The file in a run's folder.
@@ -92,7 +92,7 @@ pub fn measure(
     calibrate: bool,
 ) -> Result<Option<(IntervalFactors, PathBuf)>> {
     let mut samples = Vec::new();
-    for Place(set, frame) in &evaluated.places {
+    for ImageRef(set, frame) in &evaluated.places {
         let dataset = &datasets[*set];
         let Some(depth) = truth.of(dataset, *frame, None)? else {
             continue;

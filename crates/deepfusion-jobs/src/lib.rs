@@ -15,7 +15,7 @@
     doc = "| [`samples`] | the samples that a configuration is trained and validated with |"
 )]
 //!
-//! Nothing here prints. What a person should know is returned, or told to a callback.
+//! Nothing here prints. What a person should know is returned, or passed to a callback.
 
 pub mod bulk;
 pub mod dates;

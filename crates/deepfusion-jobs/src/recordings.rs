@@ -42,12 +42,12 @@ pub fn camera_word(camera: Cameras) -> &'static str {
 /// # Errors
 /// As [`open_recordings`].
 pub fn training_recordings(config: &TrainConfig) -> Result<Vec<(usize, Dataset)>> {
-    open_part(config, Part::Training, &mut |_, _| ())
+    open_for(config, RecordingRole::Training, &mut |_, _| ())
 }
 
 /// What recordings are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
+pub enum RecordingRole {
     /// To learn from.
     Training,
     /// To judge by.
@@ -62,20 +62,20 @@ pub fn validates(config: &TrainConfig) -> bool {
     own || data.sets.iter().any(DataSetConfig::validates)
 }
 
-/// The recordings of one part, with the place of their set in `data.sets`; `opened` sees those of each set, with how they were
+/// The recordings for training or validation, with the place of their set in `data.sets`; `opened` sees those of each set, with how they were
 /// opened.
 ///
 /// # Errors
 /// As [`open_recordings`].
-pub fn open_part(
+pub fn open_for(
     config: &TrainConfig,
-    part: Part,
+    role: RecordingRole,
     opened: &mut dyn FnMut(&OpenOptions, &[Dataset]),
 ) -> Result<Vec<(usize, Dataset)>> {
     let data = &config.data;
     if data.sets.is_empty() {
         let validation = (&data.validation, &data.validation_split);
-        let (paths, split) = of_part(part, (&data.paths, &data.split), validation);
+        let (paths, split) = of_role(role, (&data.paths, &data.split), validation);
         let options = open_options(
             config,
             split,
@@ -90,7 +90,7 @@ pub fn open_part(
     let mut all = Vec::new();
     for (i, set) in data.sets.iter().enumerate() {
         let validation = (&set.validation, &set.validation_split);
-        let (paths, split) = of_part(part, (&set.paths, &set.split), validation);
+        let (paths, split) = of_role(role, (&set.paths, &set.split), validation);
         let camera = match set.camera.as_str() {
             "" => &data.camera,
             own => own,
@@ -111,16 +111,16 @@ pub fn open_part(
 /// Paths and the split file that selects their frames.
 type Frames<'a> = (&'a Vec<PathBuf>, &'a Option<PathBuf>);
 
-/// Those of one part. A split of training frames says nothing about which to validate on, nor the other way round.
-fn of_part<'a>(
-    part: Part,
+/// Those for one role. A split of training frames says nothing about which to validate on, nor the other way round.
+fn of_role<'a>(
+    role: RecordingRole,
     training: Frames<'a>,
     validation: Frames<'a>,
 ) -> (&'a [PathBuf], Option<&'a Path>) {
-    let (paths, split) = match part {
-        Part::Training => training,
-        Part::Validation if validation.0.is_empty() => (training.0, validation.1),
-        Part::Validation => validation,
+    let (paths, split) = match role {
+        RecordingRole::Training => training,
+        RecordingRole::Validation if validation.0.is_empty() => (training.0, validation.1),
+        RecordingRole::Validation => validation,
     };
     (paths, split.as_deref())
 }

@@ -8,7 +8,7 @@ use deepfusion_model::TrainConfig;
 use deepfusion_train::{SampleSet, SharedFrames, shared_frames};
 
 use crate::Result;
-use crate::recordings::{Part, open_part, validates};
+use crate::recordings::{RecordingRole, open_for, validates};
 
 /// Something that training goes on with, and that may not be meant.
 #[derive(Debug, Clone)]
@@ -46,7 +46,7 @@ pub fn open_samples(
     opened: &mut dyn FnMut(&OpenOptions, &[Dataset]),
     warn: &mut dyn FnMut(SampleWarning),
 ) -> Result<(SampleSet, SampleSet)> {
-    let train = open_part(config, Part::Training, opened)?;
+    let train = open_for(config, RecordingRole::Training, opened)?;
     let mut checked = HashSet::new();
     for (_, dataset) in &train {
         // Both cameras of a drive have one speed.
@@ -57,7 +57,7 @@ pub fn open_samples(
         }
     }
     let validation = if validates(config) {
-        Some(open_part(config, Part::Validation, opened)?)
+        Some(open_for(config, RecordingRole::Validation, opened)?)
     } else {
         None
     };

@@ -5,6 +5,7 @@ use crate::error::{BadLine, Error, Result};
 use crate::log::{Clock, DriveLog, Format, Speed};
 use crate::read::{ReadOptions, enough, text_of};
 use crate::units::SpeedUnit;
+use deepfusion_hint::count_of;
 use deepfusion_motion::can::{CanId, Dbc};
 use std::io::Read;
 use std::path::Path;
@@ -90,13 +91,15 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
     }
     enough(path, &speeds)?;
     let mut notes = vec![format!(
-        "speed from the signal {name} in {unit}: {} of {all} frames",
-        speeds.len()
+        "speed from the signal {name} in {unit}: {} of {}",
+        speeds.len(),
+        count_of(all, "frame")
     )];
     notes.extend(several);
     if repeated > 0 {
+        let left_out = count_of(repeated, "frame");
         notes.push(format!(
-            "{repeated} frames are not later than the one before and are left out"
+            "left out, not later than the one before: {left_out}"
         ));
     }
     Ok(DriveLog {
@@ -121,9 +124,9 @@ fn one_channel(frames: &mut Vec<Frame>) -> Option<String> {
     if counts.len() < 2 {
         return None;
     }
-    let told: Vec<String> = counts
+    let channels: Vec<String> = counts
         .iter()
-        .map(|(name, count)| format!("{name} ({count} frames)"))
+        .map(|(name, count)| format!("{name} ({})", count_of(*count, "frame")))
         .collect();
     // Of as many, the first.
     counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
@@ -131,7 +134,7 @@ fn one_channel(frames: &mut Vec<Frame>) -> Option<String> {
     frames.retain(|frame| frame.channel == kept);
     Some(format!(
         "its message comes on the channels {}: {kept} is read",
-        told.join(", ")
+        channels.join(", ")
     ))
 }
 
@@ -391,7 +394,7 @@ mod tests {
         let mut two = vec![frame(0, "can1"), frame(1, "can0"), frame(2, "can0")];
         let note = one_channel(&mut two).unwrap();
         assert!(
-            note.contains("can1 (1 frames), can0 (2 frames): can0 is read"),
+            note.contains("can1 (1 frame), can0 (2 frames): can0 is read"),
             "{note}"
         );
         assert_eq!(two.iter().map(|f| f.ns).collect::<Vec<_>>(), [1, 2]);

@@ -39,7 +39,7 @@ pub(crate) fn unit_ns(name: &str) -> Option<i64> {
     }
 }
 
-/// How the first times of a column are written; `unit` is what its header says. `None` where it cannot be told: plain numbers
+/// How the first times of a column are written; `unit` is what its header says. `None` where it cannot be known: plain numbers
 /// that are no dates, and farther apart than seconds would be.
 pub(crate) fn style_of(words: &[&str], unit: Option<&str>) -> Option<TimeStyle> {
     let first = *words.first()?;
@@ -77,7 +77,7 @@ pub(crate) fn nanoseconds(word: &str, style: TimeStyle, after: Option<i64>) -> O
             let Some(after) = after else { return Some(ns) };
             let days = after.div_euclid(DAY_NS);
             let same_day = days * DAY_NS + ns;
-            // Half a day back is midnight passed; less is a clock that went back, which is told elsewhere.
+            // Half a day back is midnight passed; less is a clock that went back, which is reported elsewhere.
             let passed = same_day < after - DAY_NS / 2;
             Some(same_day + if passed { DAY_NS } else { 0 })
         }

@@ -304,7 +304,7 @@ impl Entry<'_> {
     fn numbers(&self) -> std::result::Result<Vec<f64>, Broken> {
         let Some(width) = width(self.kind) else {
             return Err(self.broken(format!(
-                "values of kind '{}' are no numbers",
+                "values of kind '{}' are not numbers",
                 char::from(self.kind)
             )));
         };

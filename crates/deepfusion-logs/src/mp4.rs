@@ -19,14 +19,14 @@ pub(crate) struct Broken {
 }
 
 /// A box: what stands in it, as a range of the file.
-struct Inside<'a> {
+struct BoxContent<'a> {
     file: &'a [u8],
     range: Range<usize>,
 }
 
 /// The samples of the first track whose format is `format`; `None` where there is no such track.
 pub(crate) fn samples(file: &[u8], format: &[u8; 4]) -> Result<Option<Vec<Sample>>, Broken> {
-    let whole = Inside {
+    let whole = BoxContent {
         file,
         range: 0..file.len(),
     };
@@ -60,7 +60,7 @@ pub(crate) fn samples(file: &[u8], format: &[u8; 4]) -> Result<Option<Vec<Sample
     Ok(None)
 }
 
-impl Inside<'_> {
+impl BoxContent<'_> {
     fn broken(&self, field: &'static str, problem: &str) -> Broken {
         Broken {
             offset: self.range.start,
@@ -90,7 +90,7 @@ impl Inside<'_> {
     }
 
     /// The boxes in this one of a kind.
-    fn all(&self, kind: &[u8; 4]) -> Result<Vec<Inside<'_>>, Broken> {
+    fn all(&self, kind: &[u8; 4]) -> Result<Vec<BoxContent<'_>>, Broken> {
         let (mut found, mut at) = (Vec::new(), 0);
         let length = self.range.len();
         while at + 8 <= length {
@@ -113,7 +113,7 @@ impl Inside<'_> {
             };
             if self.bytes(at + 4, 4)? == kind {
                 let range = self.range.start + at + header..self.range.start + end;
-                found.push(Inside {
+                found.push(BoxContent {
                     file: self.file,
                     range,
                 });
@@ -123,23 +123,23 @@ impl Inside<'_> {
         Ok(found)
     }
 
-    fn first(&self, kind: &[u8; 4]) -> Result<Option<Inside<'_>>, Broken> {
+    fn first(&self, kind: &[u8; 4]) -> Result<Option<BoxContent<'_>>, Broken> {
         let all = self.all(kind)?;
-        Ok(all.into_iter().next().map(|found| Inside {
+        Ok(all.into_iter().next().map(|found| BoxContent {
             file: self.file,
             range: found.range,
         }))
     }
 
-    fn path(&self, kinds: &[&[u8; 4]]) -> Result<Option<Inside<'_>>, Broken> {
-        let mut at = Inside {
+    fn path(&self, kinds: &[&[u8; 4]]) -> Result<Option<BoxContent<'_>>, Broken> {
+        let mut at = BoxContent {
             file: self.file,
             range: self.range.clone(),
         };
         for kind in kinds {
             let next = at.first(kind)?.map(|found| found.range);
             let Some(range) = next else { return Ok(None) };
-            at = Inside {
+            at = BoxContent {
                 file: self.file,
                 range,
             };

@@ -8,6 +8,7 @@ use crate::log::{Clock, DriveLog, Format, Speed};
 use crate::table::{Table, short};
 use crate::track::{self, TimedFix};
 use crate::{SpeedUnit, can_trace, gnss_logger, gpmf, gpx, receiver, tall_table};
+use deepfusion_hint::count_of;
 use deepfusion_motion::Fix;
 use std::path::{Path, PathBuf};
 
@@ -277,8 +278,8 @@ pub(crate) fn enough(path: &Path, speeds: &[Speed]) -> Result<()> {
         0 | 1 => Err(Error::NoSpeed {
             path: path.to_owned(),
             problem: format!(
-                "{} rows with a time and a speed, at least two are needed",
-                speeds.len()
+                "{} with a time and a speed, at least two are needed",
+                count_of(speeds.len(), "row")
             ),
         }),
         _ => Ok(()),

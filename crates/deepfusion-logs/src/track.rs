@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::log::{Clock, DriveLog, Format, Speed, YawRate};
+use deepfusion_hint::count_of;
 use deepfusion_motion::{Fix, course_rates, speeds_of_fixes};
 use std::path::Path;
 
@@ -27,8 +28,8 @@ pub(crate) fn log_of_fixes(path: &Path, format: Format, timed: &[TimedFix]) -> R
         return Err(Error::NoSpeed {
             path: path.to_owned(),
             problem: format!(
-                "{} fixes with a time, at least two in ten seconds are needed",
-                fixes.len()
+                "{} with a time, at least two in ten seconds are needed",
+                count_of(fixes.len(), "fix")
             ),
         });
     }

@@ -315,11 +315,11 @@ fn a_video_that_was_cut_off_says_where() {
             .to_string();
         assert!(error.contains("cut.mp4"), "{length}: {error}");
     }
-    // Bytes spoilt anywhere are an error or another number, never a panic.
+    // Bytes damaged anywhere are an error or another number, never a panic.
     for at in (0..bytes.len()).step_by(13) {
-        let mut spoilt = bytes.clone();
-        spoilt[at] ^= 0xa5;
-        std::fs::write(&path, &spoilt).unwrap();
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 0xa5;
+        std::fs::write(&path, &damaged).unwrap();
         let _ = read(&path, &ReadOptions::default());
     }
 }

@@ -96,7 +96,7 @@ fn what_is_wrong_with_a_track_is_named_by_line() {
         (good[..good.len() - 100].to_owned(), "a.gpx:"),
         ("<html></html>".to_owned(), "it is no GPX file"),
         (good.replacen("<ele>", "</ele>", 1), "a.gpx:3: XML: "),
-        (track(1, 0.0, |_| String::new()), "1 fixes with a time"),
+        (track(1, 0.0, |_| String::new()), "1 fix with a time"),
         (good.replace("time>", "clock>"), "0 fixes with a time"),
     ] {
         let error = refusal("a.gpx", &bad);

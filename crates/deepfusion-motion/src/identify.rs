@@ -106,7 +106,7 @@ impl Identified {
 #[error("not identifiable: {why} ({figure:.3}, needed {needed:.3})")]
 pub struct Unidentifiable {
     /// The reason.
-    pub why: Why,
+    pub why: UnidentifiableReason,
     /// The insufficient figure: seconds of turning, or a relative standard error.
     pub figure: f64,
     /// The required figure.
@@ -118,7 +118,7 @@ pub struct Unidentifiable {
 /// A reason of [`Unidentifiable`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Why {
+pub enum UnidentifiableReason {
     /// The drive is too straight: the figure is the seconds of turning.
     Straight,
     /// Wheelbase and ratio cannot be separated: there are no large steering angles. The figure is the
@@ -128,7 +128,7 @@ pub enum Why {
     TooUncertain,
 }
 
-impl std::fmt::Display for Why {
+impl std::fmt::Display for UnidentifiableReason {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Straight => "the drive is too straight, seconds of turning",
@@ -143,9 +143,15 @@ impl std::fmt::Display for Why {
 impl Hint for Unidentifiable {
     fn hint(&self) -> Option<String> {
         let text = match self.why {
-            Why::Straight => "use a drive with bends, or give wheelbase and steering ratio",
-            Why::OnlyTheProduct => "give one of the two, or add a parking manoeuvre to the drive",
-            Why::TooUncertain => "check the streams' clocks and units, or use a longer drive",
+            UnidentifiableReason::Straight => {
+                "use a drive with bends, or give wheelbase and steering ratio"
+            }
+            UnidentifiableReason::OnlyTheProduct => {
+                "give one of the two, or add a parking manoeuvre to the drive"
+            }
+            UnidentifiableReason::TooUncertain => {
+                "check the streams' clocks and units, or use a longer drive"
+            }
         };
         Some(text.to_owned())
     }
@@ -166,7 +172,7 @@ pub fn identify(
     let observations = fit::observations(speed, steering, yaw_rate);
     let turning_s = fit::turning_s(&observations);
     let straight = |turning_s: f64| Unidentifiable {
-        why: Why::Straight,
+        why: UnidentifiableReason::Straight,
         figure: turning_s,
         needed: config.least_turning_s,
         product_m: None,
@@ -178,7 +184,7 @@ pub fn identify(
     }
     let Some(fit) = Fit::best(&observations, config) else {
         return Err(Unidentifiable {
-            why: Why::TooUncertain,
+            why: UnidentifiableReason::TooUncertain,
             figure: f64::INFINITY,
             needed: config.largest_relative_error,
             product_m: None,
@@ -209,7 +215,7 @@ fn judge(fit: &Fit, config: &IdentifyConfig, turning_s: f64) -> Result<Identifie
     let product = found.product_m.relative_error();
     let product_is_known = product <= limit;
     if !product_is_known {
-        return fail(Why::TooUncertain, product, None);
+        return fail(UnidentifiableReason::TooUncertain, product, None);
     }
     let worst = found
         .wheelbase_m
@@ -223,7 +229,11 @@ fn judge(fit: &Fit, config: &IdentifyConfig, turning_s: f64) -> Result<Identifie
         } else {
             worst
         };
-        return fail(Why::OnlyTheProduct, figure, Some(found.product_m));
+        return fail(
+            UnidentifiableReason::OnlyTheProduct,
+            figure,
+            Some(found.product_m),
+        );
     }
     Ok(found)
 }

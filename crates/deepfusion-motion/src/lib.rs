@@ -62,7 +62,9 @@ pub use error::{Error, Result};
 pub use fusion::{
     FusedTrack, FusionConfig, MotionConfig, MotionParts, SPEED_SCALES, VehicleSensors,
 };
-pub use identify::{Estimate, Identified, IdentifyConfig, Unidentifiable, Why, identify};
+pub use identify::{
+    Estimate, Identified, IdentifyConfig, Unidentifiable, UnidentifiableReason, identify,
+};
 pub use image_motion::{GreyFrame, ImageMotion, image_motions};
 pub use imu::{
     ImuConfig, ImuMount, ImuSample, ImuTrack, Standstill, StandstillConfig, standstills,

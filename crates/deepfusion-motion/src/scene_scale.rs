@@ -8,7 +8,7 @@
 //! s\* = argmax over s of ZNCC(I₁(p), I₀(π(K (R s·D(p) K⁻¹ p + t))))
 //!
 //! with the length of t that was *measured*. Depth is right in metres where ln s\* is 0, and too near where it is positive. Nothing is
-//! averaged over the image before the factor is found, so that what moves by itself is an outlier and not a bias. For a camera that
+//! averaged over the image before the factor is found, so that a dynamic object is an outlier and not a bias. For a camera that
 //! goes where it looks, the movement does not depend on its focal length: a wrong calibration shows as a wrong scale of the depth.
 
 mod align;

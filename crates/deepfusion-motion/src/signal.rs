@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn times_that_are_no_numbers_are_not_covered() {
+    fn times_that_are_nan_are_not_covered() {
         let signal = Signal::new([(0.0, 1.0), (0.1, 2.0)]);
         assert_eq!(signal.at(f64::NAN), None);
         assert_eq!(signal.integral(f64::NAN, 0.1), None);

@@ -1,7 +1,9 @@
 //! Wheelbase and steering ratio from drives whose parameters are known.
 
 use deepfusion_hint::Hint;
-use deepfusion_motion::{Bicycle, IdentifyConfig, Signal, Unidentifiable, Why, identify};
+use deepfusion_motion::{
+    Bicycle, IdentifyConfig, Signal, Unidentifiable, UnidentifiableReason, identify,
+};
 use proptest::prelude::*;
 
 /// The streams of a drive: speed and steering at 50 Hz, a gyro at 100 Hz with noise and bias.
@@ -107,7 +109,7 @@ fn parking_shows_wheelbase_and_ratio() {
 fn a_road_shows_only_the_product_and_one_when_the_other_is_known() {
     let drive = road(&car());
     let error = drive.identify(&IdentifyConfig::default()).unwrap_err();
-    assert_eq!(error.why, Why::OnlyTheProduct, "{error}");
+    assert_eq!(error.why, UnidentifiableReason::OnlyTheProduct, "{error}");
     let product = error.product_m.unwrap();
     assert!(
         (product.value / (2.7 * 15.4) - 1.0).abs() < 0.01,
@@ -144,7 +146,7 @@ fn a_road_shows_only_the_product_and_one_when_the_other_is_known() {
 fn a_straight_drive_shows_nothing() {
     let drive = Drive::new(&car(), 120.0, |_| 15.0, |t| 0.001 * t.sin());
     let error = drive.identify(&IdentifyConfig::default()).unwrap_err();
-    assert_eq!(error.why, Why::Straight, "{error}");
+    assert_eq!(error.why, UnidentifiableReason::Straight, "{error}");
     assert!(error.figure < 5.0 && error.to_string().contains("straight"));
 }
 
@@ -193,7 +195,7 @@ fn a_yaw_rate_that_does_not_follow_the_steering_is_refused() {
     drive.yaw_rate =
         Signal::new((0..12_000).map(|i| (f64::from(i) * 0.01, 0.2 * noise(i as usize / 50, 3))));
     let error = drive.identify(&IdentifyConfig::default()).unwrap_err();
-    assert_eq!(error.why, Why::TooUncertain, "{error}");
+    assert_eq!(error.why, UnidentifiableReason::TooUncertain, "{error}");
     let empty = Signal::default();
     assert!(identify(&empty, &empty, &empty, &IdentifyConfig::default()).is_err());
 }

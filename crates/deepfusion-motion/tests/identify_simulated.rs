@@ -9,7 +9,7 @@
 
 use deepfusion_motion::{
     Estimate, Identified, IdentifyConfig, ImuConfig, ImuSample, ImuTrack, Signal, Unidentifiable,
-    Why, identify,
+    UnidentifiableReason, identify,
 };
 use deepfusion_sim::{Scene, Sensors, SimConfig, Simulation, WHEELBASE_M};
 
@@ -156,7 +156,7 @@ fn without_either_the_streets_show_only_the_product() {
     for seed in [1, 4] {
         let drive = Drive::simulate(Scene::Urban, seed);
         let error = drive.identify(RATIO, None, None).unwrap_err();
-        assert_eq!(error.why, Why::OnlyTheProduct, "{error}");
+        assert_eq!(error.why, UnidentifiableReason::OnlyTheProduct, "{error}");
         is_near(error.product_m.unwrap(), WHEELBASE_M * RATIO, &drive);
     }
 }
@@ -167,7 +167,12 @@ fn the_straight_parts_of_the_same_drives_show_nothing() {
         let (straight, seconds) = drive.straight_parts(0.006, 1.0);
         let refused = |factor, wheelbase, ratio| {
             let error = straight.identify(factor, wheelbase, ratio).unwrap_err();
-            assert_eq!(error.why, Why::Straight, "{}: {error}", drive.name);
+            assert_eq!(
+                error.why,
+                UnidentifiableReason::Straight,
+                "{}: {error}",
+                drive.name
+            );
             assert!(error.product_m.is_none(), "{error}");
             error.figure
         };

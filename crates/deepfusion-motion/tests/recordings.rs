@@ -9,7 +9,7 @@
 mod support;
 
 use deepfusion_motion::comma::CommaSegment;
-use deepfusion_motion::{FusedTrack, IdentifyConfig, MotionConfig, Why, identify};
+use deepfusion_motion::{FusedTrack, IdentifyConfig, MotionConfig, UnidentifiableReason, identify};
 use support::{errors, halves, kitti, real_data, rows, speed_scale, windows};
 
 fn rav4() -> MotionConfig {
@@ -131,7 +131,7 @@ fn a_motorway_minute_is_too_straight_to_identify_the_car() {
     let steering = sensors.steering_rad.as_ref().unwrap();
     let yaw_rate = track.imu().unwrap().yaw_rate();
     let error = identify(&sensors.speed_mps, steering, yaw_rate, &known).unwrap_err();
-    assert_eq!(error.why, Why::Straight, "{error}");
+    assert_eq!(error.why, UnidentifiableReason::Straight, "{error}");
 }
 
 #[test]

@@ -173,7 +173,7 @@ fn a_wrong_focal_length_does_not_hide_a_wrong_depth() {
 }
 
 #[test]
-fn images_without_texture_tell_nothing() {
+fn images_without_texture_say_nothing() {
     let flat = GreyPyramid::new(GreyImage {
         width: 128,
         height: 64,
@@ -195,7 +195,7 @@ fn images_without_texture_tell_nothing() {
 }
 
 #[test]
-fn depth_that_is_no_number_is_left_out() {
+fn depth_that_is_nan_is_left_out() {
     let street = Street::new(6);
     let (target, depth) = street.frame(30);
     let (before, _) = street.frame(28);

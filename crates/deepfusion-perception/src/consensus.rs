@@ -22,13 +22,13 @@ pub(crate) fn consensus(
     if level.len() < FEWEST {
         return None;
     }
-    let witnesses = [Witnesses::of(level), Witnesses::of(samples)];
+    let blocks = [SampleBlocks::of(level), SampleBlocks::of(samples)];
     let mut best: Option<(f32, DisparityPlane)> = None;
     let mut consider = |plane: DisparityPlane| {
         let plausible = plane_of(&plane)
             .is_some_and(|(up, height)| Ground::plane(up, height).is_plausible(config));
         if plausible {
-            let score = score(&witnesses, &plane);
+            let score = score(&blocks, &plane);
             if best.is_none_or(|(highest, _)| score > highest) {
                 best = Some((score, plane));
             }
@@ -52,7 +52,7 @@ pub(crate) fn consensus(
 }
 
 /// Level points on the plane count for it, all points below it against it: nothing is below the ground.
-fn score([level, all]: &[Witnesses; 2], plane: &DisparityPlane) -> f32 {
+fn score([level, all]: &[SampleBlocks; 2], plane: &DisparityPlane) -> f32 {
     let on = level.sum(plane, |above| {
         let off = 1.0 - above * above;
         if off > 0.0 { off } else { 0.0 }
@@ -61,12 +61,12 @@ fn score([level, all]: &[Witnesses; 2], plane: &DisparityPlane) -> f32 {
 }
 
 /// Samples in SIMD lanes; the last block is padded with samples above every plane, which have no effect.
-struct Witnesses {
+struct SampleBlocks {
     /// Disparity, the ray's x and y, and 1, each scaled to tolerances, 1 m below the camera.
     blocks: Vec<[[f32; LANES]; 4]>,
 }
 
-impl Witnesses {
+impl SampleBlocks {
     fn of(samples: &[Sample]) -> Self {
         let block = |samples: &[Sample]| {
             let mut block = [[0.0; LANES]; 4];

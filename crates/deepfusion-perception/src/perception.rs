@@ -1,7 +1,7 @@
 use crate::detect::detect_turned;
 use crate::edges::without_flying_pixels;
 use crate::parking::{Parking, View};
-use crate::tracking::{Now, Tracker};
+use crate::tracking::{FrameContext, Tracker};
 use crate::{
     Detection, Error, Ground, Instance, Obstacles, PerceptionConfig, Rays, Result, Target,
 };
@@ -184,7 +184,7 @@ impl Perception {
         let mut targets = match stamp {
             Some(stamp) => self.tracker.step(
                 &detections,
-                &Now {
+                &FrameContext {
                     time_s: stamp.time_s,
                     world_from_cam: stamp.world_from_cam,
                     depth: &depth.data,

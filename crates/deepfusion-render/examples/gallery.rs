@@ -86,7 +86,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     save("cloud_oblique.png", &oblique)?;
 
     let mut baseline = MeanDepthBaseline::new();
-    let (mut evaluator, mut trivial) = (Evaluator::new(protocol())?, Evaluator::new(protocol())?);
+    let (mut evaluator, mut mean_depth_baseline) =
+        (Evaluator::new(protocol())?, Evaluator::new(protocol())?);
     baseline.add_scan(&Grid::from(&first.depth));
     for i in 4..9 {
         let depth = simulation.frame(i).depth;
@@ -100,7 +101,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .collect();
         let prediction = Prediction::Depth(Grid::new(depth.width, depth.height, filled)?);
         evaluator.add(&name, &prediction, &truth)?;
-        trivial.add(
+        mean_depth_baseline.add(
             &name,
             &Prediction::Depth(baseline.depth_for(Some(&truth))?),
             &truth,
@@ -108,7 +109,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let report = evaluator
         .report()?
-        .with_mean_depth_baseline(&trivial.report()?);
+        .with_mean_depth_baseline(&mean_depth_baseline.report()?);
     let steps = |f: fn(f64) -> f64| {
         (0..400)
             .map(|i| (f64::from(i) * 5.0, f(f64::from(i))))
@@ -127,7 +128,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             "mean-depth baseline",
             &format!(
                 "{:.3}",
-                report.trivial.map_or(f64::NAN, |t| t.unscaled.abs_rel)
+                report
+                    .mean_depth_baseline
+                    .map_or(f64::NAN, |t| t.unscaled.abs_rel)
             ),
         ),
         ("scale ratio", &format!("{:.3}", report.scale.median)),

@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_are_no_numbers_are_left_out() {
+    fn points_that_are_nan_are_left_out() {
         let odd = cloud(&[
             ([f32::NAN, 0.0, 5.0], RED),
             ([f32::INFINITY, 1.0, f32::INFINITY], RED),

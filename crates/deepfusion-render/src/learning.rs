@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_that_are_no_numbers_leave_gaps() {
+    fn cells_that_are_not_numbers_leave_gaps() {
         let log = LearningLog::parse("step,split,total\n1,train,\n2,train,x\n").unwrap();
         assert!(log.series("total", false).iter().all(|p| p.1.is_nan()));
         assert!(log.is_zero("total"));

@@ -53,7 +53,7 @@ where
     let mut again = Vec::new();
     message.encode(&mut again);
     assert_eq!(again, written, "{}", T::TYPE);
-    // One byte short is told, wherever it is missing.
+    // One byte short is an error, wherever it is missing.
     for end in 0..written.len() {
         T::decode(&written[..end]).unwrap_err();
     }

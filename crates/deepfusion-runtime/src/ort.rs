@@ -60,7 +60,7 @@ impl DepthRunner for OrtRunner {
     }
 
     /// An exported model outputs depth alone.
-    fn tells_uncertainty(&self) -> bool {
+    fn predicts_uncertainty(&self) -> bool {
         false
     }
 

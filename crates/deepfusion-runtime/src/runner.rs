@@ -38,7 +38,7 @@ pub trait DepthRunner: Debug + Send + Sync {
     }
 
     /// Whether [`NetworkOutput::log_scale`] is set for a network with an uncertainty head.
-    fn tells_uncertainty(&self) -> bool {
+    fn predicts_uncertainty(&self) -> bool {
         true
     }
 

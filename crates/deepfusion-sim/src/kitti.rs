@@ -58,7 +58,7 @@ struct Staging<'a> {
 
 impl Drop for Staging<'_> {
     fn drop(&mut self) {
-        // Best effort: what went wrong is told by the error; after a success there is nothing here, and `made` is not empty.
+        // Best effort: what went wrong is in the error; after a success there is nothing here, and `made` is not empty.
         let _ = fs::remove_dir_all(&self.folder);
         if let Some(made) = self.made {
             let _ = fs::remove_dir(made);

@@ -123,7 +123,7 @@ fn every_place_is_clean_as_a_bag() {
             "{scene:?}: {:#?}",
             complaints(&diagnosis)
         );
-        // The road begins 14 m ahead for such a LiDAR: too far to be told from a slope ("ground" is left open).
+        // The road begins 14 m ahead for such a LiDAR: too far to be distinguished from a slope ("ground" is left open).
         for check in ["lidar-speed", "speed", "parallax"] {
             let outcome = outcome(&diagnosis, check);
             assert!(outcome.skipped.is_none(), "{scene:?} {outcome:?}");

@@ -1,4 +1,4 @@
-//! What moves in a bag: velocities at pixels, and the topic of dynamic points.
+//! Dynamic points of a bag: velocities at pixels, and the topic of dynamic points.
 
 #![allow(
     clippy::unwrap_used,

@@ -51,7 +51,7 @@ fn standing_points_come_nearer_as_fast_as_the_sensor_moves() {
     assert!((0.04..0.07).contains(&rms), "{rms}");
 }
 
-/// What moves does so at the speed of its object.
+/// A dynamic point has the speed of its object.
 #[test]
 fn moving_points_have_their_car_s_velocity() {
     let simulation = drive(10, 80);

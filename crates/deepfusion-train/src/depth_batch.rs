@@ -1,4 +1,4 @@
-use crate::depth_set::Pick;
+use crate::depth_set::ViewRef;
 use crate::fit_depth::fit_depth;
 use crate::loader::Ahead;
 use crate::losses::DepthTruth;
@@ -76,7 +76,7 @@ impl DepthLoader {
     #[must_use]
     pub fn validation(config: &TrainConfig, set: DepthSet) -> Self {
         let picks = set.all();
-        let plans: Vec<Vec<Pick>> = picks
+        let plans: Vec<Vec<ViewRef>> = picks
             .chunks(config.depth_batch())
             .map(<[_]>::to_vec)
             .collect();
@@ -87,10 +87,10 @@ impl DepthLoader {
         config: &TrainConfig,
         set: DepthSet,
         augment: bool,
-        plans: impl Iterator<Item = (usize, Vec<Pick>)> + Send + 'static,
+        plans: impl Iterator<Item = (usize, Vec<ViewRef>)> + Send + 'static,
     ) -> Self {
         let own = config.clone();
-        let make = move |number: usize, picks: &Vec<Pick>| {
+        let make = move |number: usize, picks: &Vec<ViewRef>| {
             let mut own = own.clone();
             if augment {
                 own.size = own.size_of_depth_batch(number);

@@ -66,7 +66,7 @@ pub struct DepthView {
 
 /// Which view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Pick {
+pub(crate) enum ViewRef {
     /// A frame of a recording, by its index in [`DepthSet::frames`].
     Frame(usize),
     /// A view of [`DepthSet::simulated`], by its index there and its number.
@@ -141,40 +141,40 @@ impl DepthSet {
     }
 
     /// All views of a pass in order, for validation.
-    pub(crate) fn all(&self) -> Vec<Pick> {
-        let frames = (0..self.frames.len()).map(Pick::Frame);
+    pub(crate) fn all(&self) -> Vec<ViewRef> {
+        let frames = (0..self.frames.len()).map(ViewRef::Frame);
         let views = self.simulated.iter().enumerate();
         let views =
-            views.flat_map(|(i, s)| (0..s.views as u64).map(move |view| Pick::View(i, view)));
+            views.flat_map(|(i, s)| (0..s.views as u64).map(move |view| ViewRef::View(i, view)));
         frames.chain(views).collect()
     }
 
     /// The `draw`-th view of training: each set is drawn in proportion to its number of views. Simulated views come in
     /// the order of their numbers, since neighbours share a world; frames in a new order each epoch.
-    pub(crate) fn pick(&self, seed: u64, draw: usize) -> Pick {
+    pub(crate) fn pick(&self, seed: u64, draw: usize) -> ViewRef {
         let mut place = stream(seed, 2, draw).random_range(0..self.len().max(1));
         if place < self.frames.len() {
             let order = Sampler::new(self.frames.len(), 1, seed);
-            return Pick::Frame(order.batch(draw)[0]);
+            return ViewRef::Frame(order.batch(draw)[0]);
         }
         place -= self.frames.len();
         for (i, simulated) in self.simulated.iter().enumerate() {
             if place < simulated.views {
-                return Pick::View(i, draw as u64);
+                return ViewRef::View(i, draw as u64);
             }
             place -= simulated.views;
         }
-        Pick::Frame(0)
+        ViewRef::Frame(0)
     }
 
     /// A view; a simulated one by a camera of the given size.
     ///
     /// # Errors
     /// [`Error::Data`] if an image or its depth cannot be read; [`Error::NoDepth`] if it has disappeared.
-    pub(crate) fn view(&self, pick: Pick, size: InputSize) -> Result<DepthView, Error> {
+    pub(crate) fn view(&self, pick: ViewRef, size: InputSize) -> Result<DepthView, Error> {
         match pick {
-            Pick::Frame(index) => self.frame(self.frames[index]),
-            Pick::View(index, number) => {
+            ViewRef::Frame(index) => self.frame(self.frames[index]),
+            ViewRef::View(index, number) => {
                 let source = &self.simulated[index];
                 let size = (size.width as u32, size.height as u32);
                 let view = source.endless.view_sized(number, size);

@@ -26,7 +26,7 @@ pub enum Error {
         drive: String,
     },
     /// Validation frames that are learned from: their loss would say how well they are known by heart.
-    #[error("validation frames are training frames: {}", told(shared))]
+    #[error("validation frames are training frames: {}", frames_by_drive(shared))]
     SharedFrames {
         /// The drives with such frames.
         shared: Vec<SharedFrames>,
@@ -192,7 +192,7 @@ impl From<deepfusion_nn::Error> for Error {
 }
 
 /// Each drive that has such frames, with their number.
-fn told(shared: &[SharedFrames]) -> String {
+fn frames_by_drive(shared: &[SharedFrames]) -> String {
     let drives = shared.iter().filter(|s| s.targets > 0);
     let drives = drives.map(|s| format!("{} of {}", s.targets, s.drive));
     drives.collect::<Vec<_>>().join(", ")

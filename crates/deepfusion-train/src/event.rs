@@ -70,7 +70,7 @@ pub enum TrainEvent {
     Camera {
         /// The camera, at the size of the images.
         camera: Intrinsics,
-        /// Its focal lengths, and how well the drives told them.
+        /// Its focal lengths, and how well the drives determined them.
         learned: LearnedCamera,
     },
     /// Something looks wrong but training goes on.

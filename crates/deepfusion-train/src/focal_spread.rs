@@ -1,4 +1,4 @@
-//! How well the drives of a run tell the focal length that it learned.
+//! How well the drives of a run determine the focal length that it learned.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_geometry::Se3;
@@ -90,7 +90,7 @@ fn of_blocks(samples: &SampleSet) -> SampleSet {
 fn loss_at(model: &Model, (batch, pass): (&SnippetBatch, &ForwardPass), step: f64) -> f64 {
     let device = batch.intrinsics.device();
     let batch = SnippetBatch {
-        // Depth is the networks': that it would follow another f tells nothing of f.
+        // Depth is the networks': that it would follow another f says nothing about f.
         factors: batch.factors.clone(),
         ..model.refocused(batch, Tensor::from_data([step as f32], &device))
     };
@@ -163,7 +163,7 @@ mod tests {
 
     /// Small turns and shifts move the middle of the image alike through both lenses.
     #[test]
-    fn the_middle_of_the_image_does_not_tell() {
+    fn the_middle_of_the_image_does_not_determine_it() {
         let device = Device::flex();
         let motion = Motion::new(
             Tensor::from_data([[0.004_f32, -0.006, 0.003]], &device),

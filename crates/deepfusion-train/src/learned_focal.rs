@@ -22,7 +22,7 @@ impl LearnedFocal {
         }
     }
 
-    /// The same within what a camera may be: where nothing tells it, it walks off.
+    /// The same within what a camera may be: where nothing determines it, it walks off.
     #[must_use]
     pub(crate) fn held_to(self, camera: &AssumedCamera) -> Self {
         let (least, most) = camera.ratios();
@@ -105,7 +105,7 @@ pub(crate) fn check_camera(config: &TrainConfig, sets: [&SampleSet; 2]) -> Resul
     Ok(())
 }
 
-/// Turns that move the image by less than this many pixels of the network's input, as a mean over pairs, tell no focal length.
+/// Turns that move the image by less than this many pixels of the network's input, as a mean over pairs, determine no focal length.
 const LEAST_TURN_PX: f64 = 0.3;
 
 /// What should be known before a camera is learned: that the vehicle hardly turns, or that its turns are not used.
@@ -121,22 +121,22 @@ pub(crate) fn warning(config: &TrainConfig, samples: &SampleSet) -> Option<Strin
         .collect();
     if turns.is_empty() {
         return Some(
-            "the camera is learned without measured turns: only strong ones tell the focal length then; a yaw rate and view_motion \
-             vehicle tell it much better"
+            "the camera is learned without measured turns: only strong ones determine the focal length then; a yaw rate and view_motion \
+             vehicle determine it much better"
                 .into(),
         );
     }
     let mean = turns.iter().sum::<f64>() / turns.len() as f64;
     if mean * focal_px < LEAST_TURN_PX {
         return Some(format!(
-            "the vehicle hardly turns, {:.2} degrees from image to image: these drives will not tell the camera's focal length; add \
+            "the vehicle hardly turns, {:.2} degrees from image to image: these drives will not determine the camera's focal length; add \
              some with bends",
             mean.to_degrees()
         ));
     }
     (config.view_motion != ViewMotion::Vehicle).then(|| {
-        "the camera is learned with the turns that PoseNet finds, which tell it only where they are strong; the measured ones, \
-         view_motion vehicle, tell it much better"
+        "the camera is learned with the turns that PoseNet finds, which determine it only where they are strong; the measured ones, \
+         view_motion vehicle, determine it much better"
             .into()
     })
 }

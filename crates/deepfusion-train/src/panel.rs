@@ -16,12 +16,12 @@ pub struct SamplePanel {
     /// Its disparity at the finest scale, H×W: the sigmoid's, or in 1/m beside known depth.
     pub disparity: Vec<f32>,
     /// Its supervision.
-    pub lesson: Lesson,
+    pub supervision: Supervision,
 }
 
 /// The supervision of a panel's image.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Lesson {
+pub enum Supervision {
     /// Its neighbour in the video.
     View {
         /// The source warped to the image, 3×H×W.
@@ -54,7 +54,7 @@ impl SamplePanel {
             name,
             image: first(&pass.targets),
             disparity: first(&pass.disparities[0]),
-            lesson: Lesson::View {
+            supervision: Supervision::View {
                 warped: first(&loss.warped),
                 error: first(&loss.finest.error),
                 mask: first(&loss.finest.explained.clone().float()),
@@ -82,7 +82,7 @@ impl SamplePanel {
             name: batch.names.first().cloned().unwrap_or_default(),
             image: first(&batch.network),
             disparity: first(&pass.inverse_depth),
-            lesson: Lesson::Depth {
+            supervision: Supervision::Depth {
                 truth: (0..known.len()).map(disparity).collect(),
                 error: first(&error),
             },

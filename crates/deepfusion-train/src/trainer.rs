@@ -11,7 +11,7 @@ mod validation;
 pub use validation::validation_loss;
 
 use crate::learned_focal::{self, check_camera};
-use crate::workers::{Alone, Crew, Workers};
+use crate::workers::{SingleWorker, WorkerGroup, Workers};
 use crate::{
     Adam, Checkpoint, CheckpointKind, Checkpoints, Control, Error, Model, RunFolder, SampleSet,
     Sampler, StepOutcome, TrainConfig, TrainEvent,
@@ -22,7 +22,7 @@ use pace::{Pace, Smoothed};
 use start::{check_precision, check_samples, findings};
 use std::path::Path;
 use std::time::Instant;
-use step::{Learned, Loaders};
+use step::{Loaders, WorkerStep};
 
 /// The name of the focal length among parameters and moments.
 pub(crate) const FOCAL: &str = "focal";
@@ -39,7 +39,7 @@ pub struct Trainer {
     state: Checkpoint,
     train: SampleSet,
     validation: SampleSet,
-    workers: Crew,
+    workers: WorkerGroup,
 }
 
 /// How a run ended.
@@ -80,7 +80,7 @@ impl Trainer {
         device: &Device,
         init: impl FnOnce(Model) -> Result<Model, Error>,
     ) -> Result<Self, Error> {
-        Self::create_among(Box::new(Alone), config, folder, sets, device, init)
+        Self::create_among(Box::new(SingleWorker), config, folder, sets, device, init)
     }
 
     /// As [`Self::create`], one of several [`Workers`]; `config.batch` and `config.accumulate` are each worker's. Worker 0 alone writes
@@ -96,7 +96,7 @@ impl Trainer {
         device: &Device,
         init: impl FnOnce(Model) -> Result<Model, Error>,
     ) -> Result<Self, Error> {
-        let workers = Crew::of(workers);
+        let workers = WorkerGroup::of(workers);
         config.validate()?;
         check_precision(&config, device)?;
         config.make_absolute();
@@ -139,7 +139,7 @@ impl Trainer {
         sets: (SampleSet, SampleSet),
         device: &Device,
     ) -> Result<Self, Error> {
-        Self::resume_among(Box::new(Alone), config, folder, sets, device)
+        Self::resume_among(Box::new(SingleWorker), config, folder, sets, device)
     }
 
     /// As [`Self::resume`], one of several [`Workers`]: each reads the folder's last checkpoint.
@@ -172,7 +172,7 @@ impl Trainer {
             state,
             train,
             validation,
-            workers: Crew::of(workers),
+            workers: WorkerGroup::of(workers),
         })
     }
 
@@ -256,7 +256,7 @@ impl Trainer {
             let learned = self.learn(&loaders, self.schedule(steps));
             // One that failed does not leave the others waiting for its gradients.
             let [failed] = self.workers.any([learned.is_err()])?;
-            let Learned {
+            let WorkerStep {
                 mut gradients,
                 mut losses,
                 names,

@@ -28,9 +28,9 @@ pub trait Workers: Send {
 
 /// A trainer without others.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Alone;
+pub struct SingleWorker;
 
-impl Workers for Alone {
+impl Workers for SingleWorker {
     fn rank(&self) -> usize {
         0
     }
@@ -45,9 +45,9 @@ impl Workers for Alone {
 }
 
 /// The workers of a trainer, and what they have to agree on.
-pub(crate) struct Crew(Box<dyn Workers>);
+pub(crate) struct WorkerGroup(Box<dyn Workers>);
 
-impl Crew {
+impl WorkerGroup {
     pub(crate) fn of(workers: Box<dyn Workers>) -> Self {
         Self(workers)
     }
@@ -200,8 +200,8 @@ mod tests {
         }
     }
 
-    fn among(others: &[f32]) -> Crew {
-        Crew::of(Box::new(Among {
+    fn among(others: &[f32]) -> WorkerGroup {
+        WorkerGroup::of(Box::new(Among {
             rank: 1,
             others: others.to_vec(),
         }))
@@ -220,7 +220,7 @@ mod tests {
         }
         let error = among(&[7.0]).hold_the_same([7, 8, 7]).unwrap_err();
         assert!(error.to_string().contains("other samples"), "{error}");
-        let alone = &mut Crew::of(Box::new(Alone));
+        let alone = &mut WorkerGroup::of(Box::new(SingleWorker));
         alone.hold_the_same([1, 2, 3]).unwrap();
         let mut values = [1.0];
         alone.mean(&mut values).unwrap();

@@ -15,8 +15,8 @@ use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_nn::{InputSize, weights};
 use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{
-    Control, DataSetConfig, DepthBatch, DepthLoader, Error, Learn, Lesson, LossTerms, Preset,
-    RunFolder, SampleSet, SimulatedConfig, TrainConfig, TrainEvent, Trainer, validation_loss,
+    Control, DataSetConfig, DepthBatch, DepthLoader, Error, Learn, LossTerms, Preset, RunFolder,
+    SampleSet, SimulatedConfig, Supervision, TrainConfig, TrainEvent, Trainer, validation_loss,
 };
 use std::path::{Path, PathBuf};
 use support::drive;
@@ -78,9 +78,9 @@ fn trainer(config: &TrainConfig, at: &Path) -> Trainer {
     Trainer::create(config.clone(), folder, sets, &Device::flex(), Ok).unwrap()
 }
 
-/// The losses of the steps, and the last panel's lesson.
-fn run(trainer: &mut Trainer, until: Option<usize>) -> (Vec<LossTerms>, Option<Lesson>) {
-    let (mut steps, mut lesson) = (Vec::new(), None);
+/// The losses of the steps, and the last panel's supervision.
+fn run(trainer: &mut Trainer, until: Option<usize>) -> (Vec<LossTerms>, Option<Supervision>) {
+    let (mut steps, mut supervision) = (Vec::new(), None);
     let mut listen = |event| {
         match event {
             TrainEvent::Step { losses, step, .. } => {
@@ -89,14 +89,14 @@ fn run(trainer: &mut Trainer, until: Option<usize>) -> (Vec<LossTerms>, Option<L
                     return Control::Stop;
                 }
             }
-            TrainEvent::Panel { panel, .. } => lesson = Some(panel.lesson),
+            TrainEvent::Panel { panel, .. } => supervision = Some(panel.supervision),
             TrainEvent::Warning { message, .. } => panic!("{message}"),
             _ => {}
         }
         Control::Continue
     };
     trainer.run(&mut listen).unwrap();
-    (steps, lesson)
+    (steps, supervision)
 }
 
 /// The held-out error falls by more than a tenth within forty steps, and a run that was stopped goes on as if it had not been.
@@ -112,7 +112,7 @@ fn simulated_views_teach_depth_and_resume_exactly() {
         validation_loss(model, config, &validation, &device).unwrap()
     };
     let (before, _) = held_out(&whole);
-    let (steps, lesson) = run(&mut whole, None);
+    let (steps, supervision) = run(&mut whole, None);
     let (after, scale_ratio) = held_out(&whole);
     assert!(
         after.depth < 0.9 * before.depth,
@@ -127,8 +127,8 @@ fn simulated_views_teach_depth_and_resume_exactly() {
             .iter()
             .all(|l| l.reprojection == 0.0 && l.depth == l.total)
     );
-    let Some(Lesson::Depth { truth, error }) = lesson else {
-        panic!("{lesson:?}");
+    let Some(Supervision::Depth { truth, error }) = supervision else {
+        panic!("{supervision:?}");
     };
     assert!(truth.iter().any(|d| *d > 0.0) && error.iter().any(|e| *e != 0.0));
     let camera = RunFolder::open(whole.folder())

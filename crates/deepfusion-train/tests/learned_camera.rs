@@ -278,14 +278,14 @@ fn the_photometric_error_of_bends_finds_the_focal_length() {
 
 /// What a run said: its losses, how the focal length went, and its camera at the end.
 #[derive(Debug, PartialEq)]
-struct Told {
+struct Outcome {
     losses: Vec<(usize, LossTerms)>,
     camera: Option<LearnedCamera>,
     warnings: Vec<String>,
 }
 
-fn run(trainer: &mut Trainer, stop: Option<usize>) -> Told {
-    let mut told = Told {
+fn run(trainer: &mut Trainer, stop: Option<usize>) -> Outcome {
+    let mut outcome = Outcome {
         losses: Vec::new(),
         camera: None,
         warnings: Vec::new(),
@@ -294,20 +294,20 @@ fn run(trainer: &mut Trainer, stop: Option<usize>) -> Told {
         .run(&mut |event| {
             match event {
                 TrainEvent::Step { step, losses, .. } => {
-                    told.losses.push((step, losses));
+                    outcome.losses.push((step, losses));
                     if stop == Some(step) {
                         return Control::Stop;
                     }
                 }
-                TrainEvent::Validated { step, losses, .. } => told.losses.push((step, losses)),
-                TrainEvent::Camera { learned, .. } => told.camera = Some(learned),
-                TrainEvent::Warning { message, .. } => told.warnings.push(message),
+                TrainEvent::Validated { step, losses, .. } => outcome.losses.push((step, losses)),
+                TrainEvent::Camera { learned, .. } => outcome.camera = Some(learned),
+                TrainEvent::Warning { message, .. } => outcome.warnings.push(message),
                 _ => {}
             }
             Control::Continue
         })
         .unwrap();
-    told
+    outcome
 }
 
 fn start(config: &TrainConfig, run: &Path, sets: (SampleSet, SampleSet)) -> Trainer {
@@ -331,13 +331,13 @@ fn a_short_run_finds_the_camera_of_bends() {
     let off = assumed.fx / truth.fx;
     assert!((off - 1.32).abs() < 0.02, "{off}");
     let mut trainer = start(&config, &at("run"), sets);
-    let told = run(&mut trainer, None);
-    let learned = told.camera.unwrap();
+    let outcome = run(&mut trainer, None);
+    let learned = outcome.camera.unwrap();
     let [fx, fy] = learned.focal_px;
     assert!((fx / truth.fx - 1.0).abs() < 0.04, "{learned:?} {truth:?}");
     assert!((fx / fy - 1.0).abs() < 1e-6, "square pixels");
-    assert!(learned.is_told(), "{learned:?}");
-    assert!(told.warnings.is_empty(), "{:?}", told.warnings);
+    assert!(learned.is_reliable(), "{learned:?}");
+    assert!(outcome.warnings.is_empty(), "{:?}", outcome.warnings);
 
     // Whoever uses the run has this camera.
     let (run, _) = RunFolder::open(&at("run")).unwrap();
@@ -352,7 +352,7 @@ fn a_short_run_finds_the_camera_of_bends() {
 
 /// Driving straight ahead, every focal length explains the images.
 #[test]
-fn a_straight_drive_says_that_it_does_not_tell() {
+fn a_straight_drive_says_that_it_does_not_determine_the_focal_length() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     folder_without_camera(&straight(40), &at("drive"));
@@ -363,11 +363,17 @@ fn a_straight_drive_says_that_it_does_not_tell() {
         config.canonical_focal_px = canonical_focal_px;
         let sets = samples(&config, &[&at("drive")]);
         let name = format!("run-{canonical_focal_px:?}");
-        let told = run(&mut start(&config, &at(&name), sets), None);
-        let learned = told.camera.unwrap();
-        assert!(!learned.is_told(), "{canonical_focal_px:?}: {learned:?}");
-        let warned = told.warnings.iter().any(|w| w.contains("do not tell"));
-        assert!(warned, "{:?}", told.warnings);
+        let outcome = run(&mut start(&config, &at(&name), sets), None);
+        let learned = outcome.camera.unwrap();
+        assert!(
+            !learned.is_reliable(),
+            "{canonical_focal_px:?}: {learned:?}"
+        );
+        let warned = outcome
+            .warnings
+            .iter()
+            .any(|w| w.contains("do not determine"));
+        assert!(warned, "{:?}", outcome.warnings);
     }
 }
 

@@ -107,9 +107,9 @@ fn nothing_held_out_is_an_error_unless_it_was_asked_for() {
     assert!(!events.iter().any(validated));
 }
 
-/// A step of two batches tells the mean of both, and its panel names the sample that it shows.
+/// A step of two batches reports the mean of both, and its panel names the sample that it shows.
 #[test]
-fn a_step_of_several_batches_tells_of_all_of_them() {
+fn a_step_of_several_batches_reports_all_of_them() {
     let folder = tempfile::tempdir().unwrap();
     let (mut config, train, validation) = small(&drive(&folder.path().join("street"), 14), 1);
     config.accumulate = 2;

@@ -155,7 +155,7 @@ fn two_workers_learn_what_one_learns_with_twice_the_batches() {
     let [first, second] = &shared.try_into().unwrap();
     let (first, second) = (first.as_ref().unwrap(), second.as_ref().unwrap());
     assert_eq!(first.len(), 4);
-    // All of them are told of the whole step.
+    // All of them report the whole step.
     assert!(apart(first, second) == 0.0);
     // Only the first one writes.
     assert!(!at("two").join("unused/config.toml").exists());
@@ -233,10 +233,10 @@ trait Errors {
 
 impl Errors for Vec<Result<Vec<LossTerms>, Error>> {
     fn map_errors(self) -> [String; 2] {
-        let told: Vec<String> = self
+        let errors: Vec<String> = self
             .into_iter()
             .map(|r| r.unwrap_err().to_string())
             .collect();
-        told.try_into().unwrap()
+        errors.try_into().unwrap()
     }
 }

@@ -117,7 +117,7 @@ pub(crate) fn keep<E: From<Error>>(
     };
     let made = filled();
     if made.is_err() {
-        // Best effort: the error that counts is told.
+        // Best effort: the error that counts is returned.
         let _ = std::fs::remove_dir_all(&part);
     }
     // Another process may have been quicker.

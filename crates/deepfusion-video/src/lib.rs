@@ -14,6 +14,6 @@ mod write;
 
 pub use error::{Error, Result};
 pub use frames::VideoFrames;
-pub use live::{Address, LiveFrame, LiveSource, Taken};
+pub use live::{Address, LiveFrame, LiveSource, NextFrame};
 pub use packets::{Codec, PacketFrames, PacketStream};
-pub use write::{Shown, can_write_video, shown_for, write_video};
+pub use write::{VideoPicture, can_write_video, shown_for, write_video};

@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn no_video_is_told() {
+    fn what_is_no_video_is_an_error() {
         for (json, problem) in [
             ("{}", "no video stream"),
             (r#"{"streams": [{}]}"#, "images' size"),

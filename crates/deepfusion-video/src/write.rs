@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// A picture of a video, and for how long it is shown.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shown {
+pub struct VideoPicture {
     /// Its name in the folder of all.
     pub file: String,
     /// Seconds, above 0.
@@ -25,13 +25,13 @@ const FINER: f64 = 1000.0;
 /// # Errors
 /// [`Error::Program`] where ffmpeg is not installed, or fails at any of the pictures; [`Error::File`] where the folder
 /// cannot be written; [`Error::Picture`] where the first picture is none.
-pub fn write_video(folder: &Path, pictures: &[Shown], name: &str) -> Result<()> {
+pub fn write_video(folder: &Path, pictures: &[VideoPicture], name: &str) -> Result<()> {
     let Some(first) = pictures.first() else {
         return Ok(());
     };
     let size = picture_size(&folder.join(&first.file))?;
     // Whatever a run left here that was killed is replaced.
-    let aside = Aside::new(folder.join(format!(".{name}.partial")))?;
+    let aside = ScratchFolder::new(folder.join(format!(".{name}.partial")))?;
     let list = concat_list(pictures, |i, picture| {
         aside.take(&folder.join(&picture.file), i)
     })?;
@@ -65,9 +65,9 @@ const PART: &str = "part";
 
 /// A folder of its own for what ffmpeg reads and writes: it takes colons and percent signs in names for something else. Goes
 /// away with this.
-struct Aside(PathBuf);
+struct ScratchFolder(PathBuf);
 
-impl Aside {
+impl ScratchFolder {
     fn new(path: PathBuf) -> Result<Self> {
         if path.exists() {
             std::fs::remove_dir_all(&path).map_err(|e| Error::file(&path, e))?;
@@ -93,7 +93,7 @@ impl Aside {
     }
 }
 
-impl Drop for Aside {
+impl Drop for ScratchFolder {
     fn drop(&mut self) {
         // Best effort: what counts is whether the video was made.
         let _ = std::fs::remove_dir_all(&self.0);
@@ -152,8 +152,8 @@ fn encode(aside: &Path, size: (u32, u32), video: &Path) -> Result<()> {
 /// ffmpeg's list of files, each under the name that `file` gives it; of the last one it would forget the time, were it not
 /// named again.
 fn concat_list(
-    pictures: &[Shown],
-    mut file: impl FnMut(usize, &Shown) -> Result<String>,
+    pictures: &[VideoPicture],
+    mut file: impl FnMut(usize, &VideoPicture) -> Result<String>,
 ) -> Result<String> {
     let mut text = String::from("ffconcat version 1.0\n");
     let mut last = String::new();
@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn the_last_of_a_list_is_named_twice() {
-        let shown = |file: &str| Shown {
+        let shown = |file: &str| VideoPicture {
             file: file.into(),
             seconds: 0.04,
         };

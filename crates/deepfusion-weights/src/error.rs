@@ -54,7 +54,7 @@ pub enum Error {
         name: String,
     },
     /// A value that cannot be kept.
-    #[error("tensor `{tensor}`: {value} is no number, or too large for bf16")]
+    #[error("tensor `{tensor}`: {value} is not a number, or too large for bf16")]
     Value {
         /// The tensor's name.
         tensor: String,

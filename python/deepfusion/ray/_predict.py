@@ -118,7 +118,7 @@ class _Worker:
                 if self.job.overwrite and there != ("done", ""):
                     there = None
             except Exception as error:  # Whatever a file system raises is that image's failure alone.
-                outcomes[i] = ("failed", _told(error))
+                outcomes[i] = ("failed", _reason(error))
                 continue
             if there is None:
                 todo.append((i, mark))
@@ -126,7 +126,7 @@ class _Worker:
                 outcomes[i] = there
         with self.sources.local([rows[i][0] for i, _ in todo]) as paths:
             readable = [(i, mark, path) for (i, mark), path in zip(todo, paths) if isinstance(path, str)]
-            outcomes |= {i: ("failed", _told(path)) for (i, _), path in zip(todo, paths) if not isinstance(path, str)}
+            outcomes |= {i: ("failed", _reason(path)) for (i, _), path in zip(todo, paths) if not isinstance(path, str)}
             predictions = self.model.predict_many(
                 [path for _, _, path in readable],
                 self.job.intrinsics,
@@ -140,7 +140,7 @@ class _Worker:
                     self.write(*rows[i], mark, prediction)
                     outcomes[i] = ("done", "")
                 except Exception as error:
-                    outcomes[i] = ("failed", _told(error))
+                    outcomes[i] = ("failed", _reason(error))
                 self.took.observe(time.monotonic() - begun)
         for outcome, _ in outcomes.values():
             self.counted.inc(1, {"outcome": outcome})
@@ -206,7 +206,7 @@ class _Worker:
         self.folder.write(f"{name}.json", json.dumps(sidecar, indent=2).encode())
 
 
-def _told(error: BaseException) -> str:
+def _reason(error: BaseException) -> str:
     hint = getattr(error, "hint", None)
     return f"{error}" + (f" (hint: {hint})" if hint else "") or type(error).__name__
 

@@ -118,8 +118,8 @@ def _run(
             if event["event"] == "validated":
                 value = event["selection"]
                 best = value if best is None else min(best, value)
-                told = {"step": event["step"], "selection": best, "scale_ratio": event["scale_ratio"], "path": str(out)}
-                ray_tune.report(told | dict(event["losses"] or {}))
+                figures = {"step": event["step"], "selection": best, "scale_ratio": event["scale_ratio"], "path": str(out)}
+                ray_tune.report(figures | dict(event["losses"] or {}))
 
         deepfusion.train({**fixed, **settings(drawn)}, data, report, out=out, init=init)
 

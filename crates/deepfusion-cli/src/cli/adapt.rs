@@ -43,7 +43,7 @@ pub(crate) struct AdaptArgs {
     /// Samples of simulated depth a step, which keep what the network knows already; 0: none, and no head for uncertainty.
     #[arg(long, value_name = "N", default_value_t = 2)]
     pub simulated: usize,
-    /// The largest step size.
+    /// The largest learning rate.
     #[arg(long, value_name = "RATE", default_value_t = 5e-5)]
     pub learning_rate: f64,
     /// Share of each drive's end to judge on.

@@ -54,7 +54,7 @@ pub(crate) struct DoctorArgs {
     /// Also write a page with plots over time and measured depth on images.
     #[arg(long, value_name = "FILE.html", requires = "path")]
     pub report: Option<PathBuf>,
-    /// Also tell every figure that was measured.
+    /// Also print every figure that was measured.
     #[arg(long, short, requires = "path")]
     pub verbose: bool,
     /// Print as JSON.

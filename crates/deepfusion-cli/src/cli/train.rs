@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 use deepfusion_data::{Cameras, NamedTopic};
 use deepfusion_model::{Compute, Learn, Preset, TrainConfig, ViewMotion};
 
-use super::values::{ClockOffset, Learned, learned};
+use super::values::{ClockOffset, LearnCamera, learn_camera};
 use super::{Size, names};
 
 /// `deepfusion train`.
@@ -72,8 +72,8 @@ pub(crate) struct TrainArgs {
     /// Learn the camera of recordings that do not say theirs, the last resort: one focal length for all of them, from a field of view
     /// of 60 degrees on (another one: --set assumed_camera.hfov_deg=90), the principal point in the middle. It takes drives with
     /// bends, and --view-motion vehicle where there is a yaw rate.
-    #[arg(long, value_name = "learn", value_parser = learned)]
-    pub intrinsics: Option<Learned>,
+    #[arg(long, value_name = "learn", value_parser = learn_camera)]
+    pub intrinsics: Option<LearnCamera>,
     /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
     /// can, truth. May be repeated.
     #[arg(long = "topic", value_name = "ROLE=NAME")]

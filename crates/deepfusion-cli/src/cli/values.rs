@@ -72,14 +72,14 @@ impl FromStr for CameraIntrinsics {
 
 /// That the camera is to be learned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Learned;
+pub(crate) struct LearnCamera;
 
 /// The one word that training takes for a camera.
-pub(super) fn learned(text: &str) -> Result<Learned, String> {
+pub(super) fn learn_camera(text: &str) -> Result<LearnCamera, String> {
     if text == "learn" {
-        return Ok(Learned);
+        return Ok(LearnCamera);
     }
-    Err("expected learn; a camera that is known is told beside its recording, in calibration.yaml or dataset.toml \
+    Err("expected learn; a camera that is known is given beside its recording, in calibration.yaml or dataset.toml \
          (intrinsics = [fx, fy, cx, cy] or hfov_deg)"
         .into())
 }

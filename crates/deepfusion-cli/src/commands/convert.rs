@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use deepfusion_data::{Converted, Dataset, OpenOptions, convert_to_bag, convert_to_kitti};
+use deepfusion_hint::count_of;
 
 use super::clocks;
 use super::recordings::open_recordings;
@@ -42,7 +43,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<()> {
         convert_to_kitti(&datasets, &args.out, &mut report)?
     };
     drop(progress);
-    datasets.iter().for_each(tell_missing);
+    datasets.iter().for_each(warn_of_missing);
     let Converted { paths, moved_s } = written;
     if moved_s > 0 {
         tracing::warn!(
@@ -59,7 +60,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<()> {
             "moved_s": moved_s,
         }));
     }
-    say(&format!("{frames} frames written"));
+    say(&format!("{} written", count_of(frames, "frame")));
     for path in &paths {
         output::print(&format!("{}\n", path.display()))?;
     }
@@ -72,7 +73,7 @@ fn has_ending(path: &Path, ending: &str) -> bool {
 }
 
 /// Warns of what the recording does not have, and so what was written has not either.
-fn tell_missing(dataset: &Dataset) {
+fn warn_of_missing(dataset: &Dataset) {
     let timed = dataset.frames().iter().any(|f| f.time_s.is_some());
     let missing = match (timed, dataset.track().is_some()) {
         (true, true) => return,

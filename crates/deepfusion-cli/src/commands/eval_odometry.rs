@@ -24,7 +24,7 @@ use crate::progress::Progress;
 const EXACT_POSES: &str = "poses.txt";
 /// Pairs of frames that the network sees at once.
 const PAIRS: usize = 8;
-/// Another focal length than the one trained with, at network size, by more than this share is told.
+/// Another focal length than the one trained with, at network size, by more than this share is a warning.
 const FOCAL_TOLERANCE: f64 = 0.05;
 
 /// `deepfusion eval-odometry`.
@@ -32,8 +32,8 @@ pub(super) fn run(args: &EvalOdometryArgs) -> Result<()> {
     let (tracks, truth) = match (&args.pred, &args.gt) {
         (Some(predicted), Some(truth)) => {
             let (predicted, truth) = (PoseFile::read(predicted)?, PoseFile::read(truth)?);
-            let told = truth.path.display().to_string();
-            (vec![predicted.beside(&truth)?], told)
+            let name = truth.path.display().to_string();
+            (vec![predicted.beside(&truth)?], name)
         }
         _ => from_model(args)?,
     };

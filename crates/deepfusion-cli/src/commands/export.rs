@@ -60,7 +60,7 @@ pub(super) fn run(args: &ExportArgs) -> Result<()> {
     partial
         .publish()
         .map_err(|e| deepfusion_data::Error::file(out, e))?;
-    tell(args, &model, bytes.len(), checks)
+    print_report(args, &model, bytes.len(), checks)
 }
 
 /// The network of a run, for pictures of the size asked for.
@@ -184,7 +184,12 @@ fn burn_maps(model: &DepthModel, net: &DepthNet, rgb: &[u8], device: &Device) ->
     }
 }
 
-fn tell(args: &ExportArgs, model: &DepthModel, bytes: usize, checks: Vec<Check>) -> Result<()> {
+fn print_report(
+    args: &ExportArgs,
+    model: &DepthModel,
+    bytes: usize,
+    checks: Vec<Check>,
+) -> Result<()> {
     let report = Report {
         file: args.out.display().to_string(),
         bytes,
@@ -223,7 +228,7 @@ mod tests {
                 disparity: vec![0.1, 1.0 / depth],
             }]
         };
-        let told = |depth| {
+        let compared = |depth| {
             compare(
                 Path::new("depth.onnx"),
                 "an engine".into(),
@@ -231,13 +236,13 @@ mod tests {
                 &maps(5.0),
             )
         };
-        assert!(told(5.000_1).is_ok());
-        let error = told(6.0).unwrap_err().to_string();
+        assert!(compared(5.000_1).is_ok());
+        let error = compared(6.0).unwrap_err().to_string();
         assert_eq!(
             error,
             "depth.onnx: an engine is 1.7e-1 away from the network (max |difference| / max |value|), more than 1e-4; \
              not kept"
         );
-        assert!(told(f32::NAN).is_err());
+        assert!(compared(f32::NAN).is_err());
     }
 }

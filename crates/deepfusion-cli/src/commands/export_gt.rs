@@ -1,4 +1,5 @@
 use deepfusion_data::{Dataset, OpenOptions, export_gt};
+use deepfusion_hint::count_of;
 use deepfusion_jobs::evaluation::{check_used, expected_frames};
 use deepfusion_jobs::recordings::read_split;
 
@@ -64,7 +65,7 @@ pub(super) fn run(args: &ExportGtArgs) -> Result<()> {
     }
     say(&match expected {
         Some(expected) => format!("{written} of the split's {expected} frames with ground truth"),
-        None => format!("{written} frames with ground truth"),
+        None => format!("{} with ground truth", count_of(written, "frame")),
     });
     output::print(&format!("{}\n", args.out.display()))
 }

@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use deepfusion_data::OpenOptions;
+use deepfusion_hint::count_of;
 use deepfusion_logs::{
     Camera, Clock, DriveFolder, DriveLog, Media, ReadOptions, read, time_on_clock,
 };
@@ -65,13 +66,13 @@ pub(super) fn run(args: &ImportArgs) -> Result<()> {
         }));
     }
     say(&format!(
-        "{}: {} speeds in {duration_s:.1} s, at most {fastest_mps:.1} m/s ({:.0} km/h); {}",
+        "{}: {} in {duration_s:.1} s, at most {fastest_mps:.1} m/s ({:.0} km/h); {}",
         log.format,
-        log.speeds.len(),
+        count_of(log.speeds.len(), "speed"),
         fastest_mps * 3.6,
         match log.yaw_rates.len() {
             0 => "no turns".to_owned(),
-            n => format!("{n} yaw rates"),
+            n => count_of(n, "yaw rate"),
         }
     ));
     for note in log.notes.iter().chain(&notes) {

@@ -4,6 +4,7 @@ use deepfusion_data::{
     Dataset, GtKind, OpenOptions, ground_truth_names, overlay, save_png, write_bag_config,
 };
 use deepfusion_doctor::inspect;
+use deepfusion_hint::count_of;
 
 use crate::cli::{CameraIntrinsics, InspectArgs};
 use crate::commands::clocks;
@@ -39,7 +40,11 @@ pub(super) fn run(args: &InspectArgs) -> Result<()> {
     if args.overlay {
         let folder = output::run_folder(args.out.as_deref(), "inspect")?;
         let pictures = write_overlays(&args.path, &options, &folder)?;
-        say(&format!("{pictures} pictures in {}", folder.display()));
+        say(&format!(
+            "{} in {}",
+            count_of(pictures, "picture"),
+            folder.display()
+        ));
     }
     Ok(())
 }

@@ -25,8 +25,6 @@ mod export_gt;
 mod import;
 mod inspect;
 mod live;
-#[cfg(feature = "train")]
-mod outlook;
 mod overview;
 mod perceive;
 mod predict;
@@ -39,6 +37,8 @@ mod run_report;
 mod simulate;
 #[cfg(feature = "train")]
 mod start;
+#[cfg(feature = "train")]
+mod time_estimate;
 #[cfg(feature = "train")]
 mod train;
 mod used_checkpoint;

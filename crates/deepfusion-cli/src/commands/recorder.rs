@@ -6,14 +6,14 @@ use std::time::{Duration, Instant};
 use deepfusion_data::RgbImage;
 use deepfusion_render::{DepthPanel, depth_panel, sample_panel};
 use deepfusion_train::log::{CsvLog, CsvRecord, TensorBoardLog};
-use deepfusion_train::{Control, Lesson, LossTerms, SamplePanel, TrainEvent};
+use deepfusion_train::{Control, LossTerms, SamplePanel, Supervision, TrainEvent};
 
-use super::outlook::Outlook;
+use super::time_estimate::TimeEstimate;
 use crate::failure::{Context, Failure, Result};
 use crate::interrupt;
 use crate::progress::{Progress, say};
 
-/// How often a line tells of the losses where there is no bar.
+/// How often a line has the losses where there is no bar.
 const LINE_EVERY: Duration = Duration::from_secs(20);
 
 /// Writes the logs of a run and shows its progress.
@@ -23,14 +23,18 @@ pub(super) struct Recorder {
     panels: PathBuf,
     progress: Progress,
     last_line: Instant,
-    outlook: Option<Outlook>,
+    time_estimate: Option<TimeEstimate>,
     /// The first failure to write a log: training goes on, the command ends with it.
     failure: Option<Failure>,
 }
 
 impl Recorder {
-    /// For the run in `folder`, going on after `step`; with an `outlook` it says how long the run will take.
-    pub(super) fn open(folder: &Path, step: usize, outlook: Option<Outlook>) -> Result<Self> {
+    /// For the run in `folder`, going on after `step`; with a `time_estimate` it says how long the run will take.
+    pub(super) fn open(
+        folder: &Path,
+        step: usize,
+        time_estimate: Option<TimeEstimate>,
+    ) -> Result<Self> {
         let panels = folder.join("panels");
         std::fs::create_dir_all(&panels)
             .with_context(|| format!("{}: cannot be made", panels.display()))?;
@@ -40,7 +44,7 @@ impl Recorder {
             panels,
             progress: Progress::new("training"),
             last_line: Instant::now(),
-            outlook,
+            time_estimate,
             failure: None,
         })
     }
@@ -133,8 +137,8 @@ impl Recorder {
                     self.last_line = Instant::now();
                     say(&format!("step {step}/{steps}: {line}"));
                 }
-                if let Some(outlook) = &mut self.outlook
-                    && let Some(line) = outlook.after_step(step, steps)
+                if let Some(time_estimate) = &mut self.time_estimate
+                    && let Some(line) = time_estimate.after_step(step, steps)
                 {
                     say(&line);
                 }
@@ -176,7 +180,7 @@ impl Recorder {
                 let [fx, fy] = learned.focal_px;
                 let spread = match learned.sigma_px {
                     Some([x, y]) => format!("standard deviations {x:.1} and {y:.1}"),
-                    None => "not told by these drives".into(),
+                    None => "not determined by these drives".into(),
                 };
                 self.events
                     .scalars(learned.step, &[("camera/fx", fx), ("camera/fy", fy)])?;
@@ -232,8 +236,8 @@ fn held_out_terms(losses: &LossTerms) -> String {
 fn drawn(panel: &SamplePanel) -> deepfusion_render::Result<RgbImage> {
     let (width, height) = (panel.width as u32, panel.height as u32);
     let (image, disparity) = (&panel.image[..], &panel.disparity[..]);
-    match &panel.lesson {
-        Lesson::View {
+    match &panel.supervision {
+        Supervision::View {
             warped,
             error,
             mask,
@@ -250,7 +254,7 @@ fn drawn(panel: &SamplePanel) -> deepfusion_render::Result<RgbImage> {
             flow: flow.as_deref(),
             moving: moving.as_deref(),
         }),
-        Lesson::Depth { truth, error } => depth_panel(&DepthPanel {
+        Supervision::Depth { truth, error } => depth_panel(&DepthPanel {
             width,
             height,
             image,

@@ -1,4 +1,4 @@
-//! Recordings opened, and what was noticed of them told.
+//! Opens recordings and prints their warnings.
 
 use std::path::{Path, PathBuf};
 
@@ -33,7 +33,7 @@ pub(super) fn open_datasets(
 /// As [`open_datasets`], as the options say.
 pub(super) fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Result<Vec<Dataset>> {
     let datasets = recordings::open_recordings(paths, options).map_err(jobs::in_words)?;
-    tell(options, &datasets);
+    print_warnings(options, &datasets);
     Ok(datasets)
 }
 
@@ -42,12 +42,12 @@ pub(super) fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Resul
 #[cfg(feature = "train")]
 pub(super) fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
     let mut warn = |warning: SampleWarning| warnings::warn_once(warning.to_string());
-    samples::open_samples(config, &mut tell, &mut warn).map_err(jobs::in_words)
+    samples::open_samples(config, &mut print_warnings, &mut warn).map_err(jobs::in_words)
 }
 
-/// What was noticed, and that frames of the split are missing.
-fn tell(options: &OpenOptions, datasets: &[Dataset]) {
-    warnings::tell(datasets);
+/// Their warnings, and that frames of the split are missing.
+fn print_warnings(options: &OpenOptions, datasets: &[Dataset]) {
+    warnings::print(datasets);
     if let Some(missing) = missing_frames(options, datasets) {
         warnings::warn_once(missing.to_string());
     }

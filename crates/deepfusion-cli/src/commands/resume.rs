@@ -104,18 +104,18 @@ pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainC
             (true, _) | (false, Some(_)) => asked.clone(),
             (false, None) => std::path::absolute(asked).unwrap_or_else(|_| asked.clone()),
         };
-        let found = run.init.as_deref().map_or("none".into(), told);
-        same("--init", told(&asked), found)?;
+        let found = run.init.as_deref().map_or("none".into(), path_text);
+        same("--init", path_text(&asked), found)?;
     }
-    let told = |s: f64| format!("{} ms", 1000.0 * s);
-    let found = run.data.camera_ahead_s.map(told);
+    let in_ms = |s: f64| format!("{} ms", 1000.0 * s);
+    let found = run.data.camera_ahead_s.map(in_ms);
     match clock_offset {
         // What was measured when the run began holds.
         Some(ClockOffset::Auto) if found.is_some() => {}
         Some(ClockOffset::Auto) => same("--clock-offset", "auto".into(), "none".into())?,
         Some(ClockOffset::Seconds(ahead_s)) => {
             let found = found.unwrap_or("none".into());
-            same("--clock-offset", told(*ahead_s), found)?;
+            same("--clock-offset", in_ms(*ahead_s), found)?;
         }
         None => {}
     }
@@ -180,7 +180,7 @@ fn move_recordings(
             } else {
                 "has none".into()
             };
-            return contradicts(option, told(split), found);
+            return contradicts(option, path_text(split), found);
         }
         *kept = Some(split.to_owned());
     }
@@ -281,15 +281,15 @@ fn contradicts<T>(option: &str, asked: String, run: String) -> Result<T> {
 }
 
 fn list(paths: &[PathBuf]) -> String {
-    let paths: Vec<String> = paths.iter().map(|p| told(p)).collect();
+    let paths: Vec<String> = paths.iter().map(|p| path_text(p)).collect();
     paths.join(" ")
 }
 
-fn told(path: &Path) -> String {
+fn path_text(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// Where an error is that one of the run's recordings is not there, one that says how to tell where it is now.
+/// Where an error is that one of the run's recordings is not there, one whose hint is the option that says where it is now.
 pub(super) fn where_recordings_are(error: Failure, config: &TrainConfig, run: &Path) -> Failure {
     let Some(path) = error.missing().map(Path::to_owned) else {
         return error;
@@ -428,7 +428,7 @@ mod tests {
             }
         }
         // An option that is added has its place in one of the tables.
-        let told: Vec<&str> = used
+        let tested: Vec<&str> = used
             .iter()
             .map(|(o, _)| o[0])
             .chain(refused.iter().map(|(o, ..)| o[0]))
@@ -436,8 +436,8 @@ mod tests {
         let command = Alone::command();
         for long in command.get_arguments().filter_map(clap::Arg::get_long) {
             let option = format!("--{long}");
-            let known =
-                ["--out", "--resume"].contains(&option.as_str()) || told.contains(&option.as_str());
+            let known = ["--out", "--resume"].contains(&option.as_str())
+                || tested.contains(&option.as_str());
             assert!(known, "{option}: what becomes of it with --resume?");
         }
     }
@@ -496,23 +496,23 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_that_is_gone_is_told_with_its_option() {
+    fn the_error_of_a_recording_that_is_gone_names_its_option() {
         let mut config = a_run();
         config.data.validation = vec!["/data/val".into()];
-        let told = |path: &str| {
+        let explained = |path: &str| {
             let missing = std::io::Error::from(std::io::ErrorKind::NotFound);
             let error = deepfusion_data::Error::file(Path::new(path), missing);
             let error = where_recordings_are(error.into(), &config, Path::new("runs/a"));
             (error.to_string(), error.hint().unwrap_or_default())
         };
-        let (text, hint) = told("/data/street");
+        let (text, hint) = explained("/data/street");
         assert!(
             text.contains("/data/street") && text.contains("runs/a"),
             "{text}"
         );
         assert!(hint.contains("--data PATH"), "{hint}");
-        assert!(told("/data/val/x").1.contains("--val-data PATH"));
+        assert!(explained("/data/val/x").1.contains("--val-data PATH"));
         // Another file is another matter.
-        assert!(!told("/etc/x").0.contains("runs/a"));
+        assert!(!explained("/etc/x").0.contains("runs/a"));
     }
 }

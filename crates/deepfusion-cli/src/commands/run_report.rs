@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use deepfusion_eval::verdict::Verdict;
+use deepfusion_hint::count_of;
 use deepfusion_jobs::evaluation::Evaluated;
 use deepfusion_perception::Reliability;
 use deepfusion_render::{HtmlReport, LearningLog, ReliabilityBin, ShownFrame};
@@ -85,7 +86,11 @@ pub(super) fn verdict(page: HtmlReport, verdict: &Verdict) -> HtmlReport {
             let (blocks, points) = (certificate.blocks, certificate.points);
             row(
                 "from",
-                format!("{blocks} blocks of road, {points} scene points"),
+                format!(
+                    "{} of road, {}",
+                    count_of(blocks, "block"),
+                    count_of(points, "scene point")
+                ),
             );
             for source in &certificate.sources {
                 row(
@@ -105,7 +110,7 @@ pub(super) fn verdict(page: HtmlReport, verdict: &Verdict) -> HtmlReport {
     if let Some(r) = &found.reprojection {
         row(
             "reprojection error",
-            format!("{:.4} of {} pairs", r.warped, r.pairs),
+            format!("{:.4} of {}", r.warped, count_of(r.pairs, "pair")),
         );
         row("unwarped", format!("{:.4}", r.unwarped));
     }

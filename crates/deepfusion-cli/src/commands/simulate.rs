@@ -2,6 +2,7 @@ use crate::cli::{SimulateArgs, SimulateFormat, Size};
 use crate::failure::Result;
 use crate::output;
 use crate::progress::{Progress, say};
+use deepfusion_hint::count_of;
 use deepfusion_sim::{BagSettings, Sensors, SimConfig, Simulation, write_bag, write_kitti};
 
 /// `deepfusion simulate`.
@@ -31,8 +32,10 @@ pub(super) fn run(args: &SimulateArgs) -> Result<()> {
         }));
     }
     say(&format!(
-        "{} frames of {}x{} written",
-        config.frames, config.width, config.height
+        "{} of {}x{} written",
+        count_of(config.frames, "frame"),
+        config.width,
+        config.height
     ));
     output::print(&format!("{}\n", drive.display()))
 }

@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_neither_there_nor_embedded_is_told_with_both() {
+    fn what_is_neither_there_nor_embedded_is_an_error_that_names_both() {
         let error = Start::named(Path::new("no-such-network")).unwrap_err();
         assert!(error.to_string().contains("no-such-network"), "{error}");
         let hint = error.hint().unwrap();

@@ -5,10 +5,10 @@ use deepfusion_model::{
 };
 use deepfusion_train::{TrainSummary, Trainer};
 
-use super::outlook::Outlook;
 use super::recorder::{Recorder, clock};
 use super::recordings::open_samples;
 use super::start::Start;
+use super::time_estimate::TimeEstimate;
 use super::{clocks, device, resume};
 use crate::allocator;
 use crate::cli::{ClockOffset, TrainArgs};
@@ -49,8 +49,8 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
         }
     };
     say(&plan(&trainer));
-    let outlook = Outlook::new(trainer.config().clone(), args.device.compute());
-    let summary = train(&mut trainer, Some(outlook))?;
+    let time_estimate = TimeEstimate::new(trainer.config().clone(), args.device.compute());
+    let summary = train(&mut trainer, Some(time_estimate))?;
     if summary.step < summary.steps {
         let folder = trainer.folder().display();
         return Err(CliError::Stopped {
@@ -99,12 +99,15 @@ fn plan(trainer: &Trainer) -> String {
     )
 }
 
-/// Runs a trainer with its logs, to its last step or until it is asked to stop; with an `outlook`, how long it will
+/// Runs a trainer with its logs, to its last step or until it is asked to stop; with a `time_estimate`, how long it will
 /// take is said.
-pub(super) fn train(trainer: &mut Trainer, outlook: Option<Outlook>) -> Result<TrainSummary> {
+pub(super) fn train(
+    trainer: &mut Trainer,
+    time_estimate: Option<TimeEstimate>,
+) -> Result<TrainSummary> {
     allocator::keep_memory();
     interrupt::catch("stopping after this step; the run is saved");
-    let mut recorder = Recorder::open(trainer.folder(), trainer.step(), outlook)?;
+    let mut recorder = Recorder::open(trainer.folder(), trainer.step(), time_estimate)?;
     let summary = trainer.run(&mut |event| recorder.handle(event))?;
     recorder.finish()?;
     say(&format!(

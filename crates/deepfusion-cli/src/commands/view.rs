@@ -1,6 +1,7 @@
 use std::io::IsTerminal;
 use std::process::{Command, Stdio};
 
+use deepfusion_hint::count_of;
 use deepfusion_view::{Folder, Server, Settings};
 
 use crate::cli::ViewArgs;
@@ -18,10 +19,8 @@ pub(super) fn run(args: &ViewArgs) -> Result<()> {
     let holds = if folder.is_training_run() {
         "no predictions in this run: its learning curve and panels are shown".to_owned()
     } else {
-        match folder.frames() {
-            1 => format!("1 frame in {}", args.folder.display()),
-            n => format!("{n} frames in {}", args.folder.display()),
-        }
+        let frames = count_of(folder.frames(), "frame");
+        format!("{frames} in {}", args.folder.display())
     };
     let settings = Settings {
         host: args.host,
@@ -42,7 +41,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<()> {
     Ok(())
 }
 
-/// Opens the page where there is a screen; that it cannot is no failure, the address was told.
+/// Opens the page where there is a screen; that it cannot is no failure, the address was printed.
 fn open_browser(url: &str) {
     let mut command = if cfg!(target_os = "macos") {
         Command::new("open")

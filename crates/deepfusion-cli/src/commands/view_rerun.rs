@@ -32,10 +32,7 @@ pub fn run(args: &ViewArgs, file: &Path) -> Result<()> {
     drop(bar);
     let report = report?;
     warn(&report.problems);
-    let frames = match report.frames {
-        1 => "1 frame".to_owned(),
-        n => format!("{n} frames"),
-    };
+    let frames = deepfusion_hint::count_of(report.frames, "frame");
     say(&format!(
         "{}: {frames}; open it with `rerun {}` (version {})",
         file.display(),
@@ -54,12 +51,12 @@ pub(super) fn run(_args: &ViewArgs, _file: &Path) -> Result<()> {
 /// The problems of frames, as many as a person reads; the file has them all.
 #[cfg(feature = "rerun")]
 fn warn(problems: &[(String, String)]) {
-    const TOLD: usize = 20;
-    for (frame, problem) in problems.iter().take(TOLD) {
+    const SHOWN: usize = 20;
+    for (frame, problem) in problems.iter().take(SHOWN) {
         tracing::warn!("{frame}: {problem}");
     }
-    if problems.len() > TOLD {
-        let more = problems.len() - TOLD;
+    if problems.len() > SHOWN {
+        let more = problems.len() - SHOWN;
         tracing::warn!("and {more} more, at the entity `frames` of the file");
     }
 }

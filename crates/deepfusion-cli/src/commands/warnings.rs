@@ -1,12 +1,12 @@
-//! What was noticed while recordings were opened, told once.
+//! Warnings of recordings, each printed once.
 
 use std::collections::HashSet;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
 use deepfusion_data::Dataset;
 
-/// What was told already: both cameras of a drive, and a recording that is opened again, have the same warnings.
-static TOLD: LazyLock<Mutex<HashSet<String>>> = LazyLock::new(Mutex::default);
+/// Those that were printed: both cameras of a drive, and a recording that is opened again, have the same warnings.
+static PRINTED: LazyLock<Mutex<HashSet<String>>> = LazyLock::new(Mutex::default);
 
 /// Warns on stderr, unless the same was warned of before.
 pub(super) fn warn_once(warning: String) {
@@ -17,7 +17,7 @@ pub(super) fn warn_once(warning: String) {
 
 /// Warns on stderr of what was taken for granted, looks odd or cannot be read: one line for what several recordings have
 /// in common.
-pub(super) fn tell(datasets: &[Dataset]) {
+pub(super) fn print(datasets: &[Dataset]) {
     for (warning, places) in by_warning(datasets.iter().flat_map(warnings)) {
         let new: Vec<String> = places
             .into_iter()
@@ -33,10 +33,10 @@ pub(super) fn tell(datasets: &[Dataset]) {
     }
 }
 
-/// Whether nothing of that text was told before; from now on it was.
+/// Whether that text was not printed before; from now on it was.
 fn is_new(text: &str) -> bool {
-    let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
-    told.insert(text.to_owned())
+    let mut printed = PRINTED.lock().unwrap_or_else(PoisonError::into_inner);
+    printed.insert(text.to_owned())
 }
 
 /// Each warning with the places it is about, each place once, in the order in which they come.
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_told_is_not_told_again() {
+    fn what_was_printed_is_not_printed_again() {
         assert!(is_new("a warning of this test alone"));
         assert!(!is_new("a warning of this test alone"));
     }

@@ -40,7 +40,7 @@ pub(crate) trait Reportable: Error + Send + Sync + 'static {
     }
 }
 
-/// How the program ends. `train && eval` and a scheduler tell by the code alone.
+/// How the program ends. `train && eval` and a scheduler go by the code alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
     /// Something failed.
@@ -134,7 +134,7 @@ impl Failure {
             .hint()
             .unwrap_or_else(|| self.general_hint().to_owned());
         text += &format!("{HINT}hint:{HINT:#} {hint}\n");
-        // Where nobody reads it any more, the code still tells.
+        // Where nobody reads it any more, the code still says it.
         let _ = anstream::stderr().write_all(text.as_bytes());
         self.error.exit().into()
     }

@@ -54,17 +54,17 @@ pub(crate) fn piped(folder: &Path, args: &str, bytes: Vec<u8>) -> Run {
     let sender = std::thread::spawn(move || input.write_all(&bytes).ok());
     let output = child.wait_with_output().unwrap();
     sender.join().unwrap();
-    told(output)
+    run_of(output)
 }
 
 /// Runs the program with another search path for programs.
 pub(crate) fn with_path(folder: &Path, args: &str, path: &OsStr) -> Run {
     let mut command = Command::new(env!("CARGO_BIN_EXE_deepfusion"));
     command.current_dir(folder).args(args.split_whitespace());
-    told(command.env("PATH", path).output().unwrap())
+    run_of(command.env("PATH", path).output().unwrap())
 }
 
-fn told(output: Output) -> Run {
+fn run_of(output: Output) -> Run {
     Run {
         code: output.status.code().unwrap(),
         stdout: String::from_utf8(output.stdout).unwrap(),

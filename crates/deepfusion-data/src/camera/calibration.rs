@@ -49,17 +49,17 @@ impl CameraCalibration {
         Self::from_numbers(numbers, image_size, path)
     }
 
-    /// A pinhole camera of four given numbers; `told_by` names who gave them.
+    /// A pinhole camera of four given numbers; `source` names who gave them.
     ///
     /// # Errors
     /// [`Error::CameraFile`] where they make no camera.
-    pub fn given(pinhole: [f64; 4], image_size: (u32, u32), told_by: &Path) -> Result<Self> {
+    pub fn given(pinhole: [f64; 4], image_size: (u32, u32), source: &Path) -> Result<Self> {
         let numbers = Numbers {
             pinhole,
             distortion: Distortion::default(),
             size: None,
         };
-        Self::from_numbers(numbers, image_size, told_by)
+        Self::from_numbers(numbers, image_size, source)
     }
 
     /// The same, known to hold for images of any size where `any`, as an angle of view does.

@@ -83,7 +83,7 @@ pub(crate) fn find_camera(
 /// How many images of a recording are asked whether the camera stayed as it was.
 const ASKED: usize = 9;
 
-/// The camera that the images' EXIF blocks say, and a sentence that tells so; `None` where the first says nothing.
+/// The camera that the images' EXIF blocks say, and a sentence that says so; `None` where the first says nothing.
 ///
 /// # Errors
 /// [`Error::CameraFile`] where another image, of those asked, was taken with another focal length.

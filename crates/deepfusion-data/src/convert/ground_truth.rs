@@ -33,7 +33,7 @@ pub fn ground_truth_names(datasets: &[Dataset]) -> Vec<Vec<String>> {
 pub const VELOCITY: &str = "velocity_mps/";
 
 /// Writes the sparse depth of every selected frame that has a scan as H×W f32 arrays, metres, 0 =
-/// none, into a compressed `.npz`; returns how many. `progress` is told (done, all) after each frame.
+/// none, into a compressed `.npz`; returns how many. `progress` is called with (done, all) after each frame.
 ///
 /// A frame whose scan has radial velocities has a second array of that size, named with [`VELOCITY`] before its name:
 /// [`crate::ScanTruth::velocity_mps`].
@@ -90,7 +90,7 @@ pub fn export_gt(
     Ok(written)
 }
 
-/// The system's error inside the array writer's, so that a full disk is told as such.
+/// The system's error inside the array writer's, so that a full disk is reported as such.
 fn write_error(out: &Path, error: WriteNpzError) -> Error {
     match error {
         WriteNpzError::Npy(WriteNpyError::Io(source)) => Error::file(out, source),

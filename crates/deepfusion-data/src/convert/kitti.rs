@@ -9,12 +9,12 @@ use rayon::prelude::*;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Writes data sets as drives of a KITTI date folder below `out`, which must be new or empty, and tells the drives'
+/// Writes data sets as drives of a KITTI date folder below `out`, which must be new or empty, and returns the drives'
 /// folders. All must have one camera: KITTI's calibration is that of a date. Times are the vehicle's clock's, for all
 /// sensors.
 ///
 /// `velodyne_points` holds the measured depth as points in the camera's place (what stands still is where it was at the
-/// frame's time), not the scanner's own; `oxts` holds speed, turn and lean, and zeros for what the recording does not
+/// frame's time), not the scanner's own; `oxts` holds speed, turn, roll and pitch, and zeros for what the recording does not
 /// know: its `navstat` says that there was no fix.
 ///
 /// # Errors
@@ -138,7 +138,7 @@ fn between(dataset: &Dataset, number: u64) -> Option<f64> {
     Some(before.time_s? + share * (next.time_s? - before.time_s?))
 }
 
-/// An OXTS packet that knows speed, turn and lean alone; at rest an accelerometer reads 9.81 upwards.
+/// An OXTS packet that knows speed, turn, roll and pitch alone; at rest an accelerometer reads 9.81 upwards.
 fn packet(moving: &Moving) -> String {
     let mut values = [0.0; 30];
     values[3..5].copy_from_slice(&moving.tilt_rad);

@@ -1,7 +1,7 @@
 //! A recording of any layout written as another: KITTI raw, or a ROS 1 bag.
 //!
 //! What is written is what a [`Dataset`](crate::Dataset) gives: images freed of their lens' distortion, their times, the
-//! camera, its place on the vehicle, speeds, turns and leans, and the measured depth as points in the camera's place. The
+//! camera, its place on the vehicle, speeds, turns, roll and pitch, and the measured depth as points in the camera's place. The
 //! other layout then gives the same snippets and the same ground truth.
 
 mod bag;

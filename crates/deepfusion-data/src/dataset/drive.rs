@@ -440,7 +440,7 @@ impl Dataset {
                 yaw_known: self.parts.yaw_known,
                 cam_from_vehicle,
                 speed_sigma_mps: self.receiver.speed_sigma_mps.as_ref(),
-                leans: true,
+                rolls_and_pitches: true,
             }),
             _ => Err(self.recording.no_motion()),
         }

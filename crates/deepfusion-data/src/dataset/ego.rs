@@ -34,8 +34,8 @@ pub struct Ego<'a> {
     pub cam_from_vehicle: Se3,
     /// How sure the speeds are, where that is known.
     pub(crate) speed_sigma_mps: Option<&'a Signal>,
-    /// Whether the body's lean, where an inertial unit felt it, turns the camera.
-    pub(crate) leans: bool,
+    /// Whether the body's roll and pitch, where an inertial unit measured them, turn the camera.
+    pub(crate) rolls_and_pitches: bool,
 }
 
 /// Why the motion between two frames is unknown.
@@ -48,11 +48,11 @@ pub enum NoMotion {
 }
 
 impl Ego<'_> {
-    /// The same on a body that never leans: for what looks in the pictures for how it does.
+    /// The same on a body without roll and pitch: for what measures them in the pictures.
     #[must_use]
     pub fn level(self) -> Self {
         Self {
-            leans: false,
+            rolls_and_pitches: false,
             ..self
         }
     }
@@ -61,7 +61,11 @@ impl Ego<'_> {
     #[must_use]
     pub fn vehicle_motion(&self, from_s: f64, to_s: f64) -> Option<VehicleMotion> {
         let motion = self.track.motion(from_s, to_s)?;
-        Some(if self.leans { motion } else { motion.level() })
+        Some(if self.rolls_and_pitches {
+            motion
+        } else {
+            motion.level()
+        })
     }
 
     /// The camera's motion between two frames given by index, in either order of time.

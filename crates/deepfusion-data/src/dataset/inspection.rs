@@ -4,7 +4,7 @@ use super::kind::DatasetKind;
 use deepfusion_geometry::Intrinsics;
 use serde::Serialize;
 
-/// What `data inspect` tells, of one drive or several.
+/// What `data inspect` reports, of one drive or several.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
     /// The layout.

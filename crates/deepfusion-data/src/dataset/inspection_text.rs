@@ -2,13 +2,17 @@
 
 use super::inspection::{Inspection, SpeedRange};
 use super::kind::DatasetKind;
+use deepfusion_hint::count_of;
 use std::fmt;
 
 impl fmt::Display for Inspection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let layout = self.kind.label();
         match self.size {
-            Some([w, h]) => writeln!(f, "{layout}, {} frames of {w}x{h}", self.frames)?,
+            Some([w, h]) => {
+                let frames = count_of(self.frames, "frame");
+                writeln!(f, "{layout}, {frames} of {w}x{h}")?;
+            }
             None => writeln!(f, "{layout} without images")?,
         }
         if let Some(k) = &self.intrinsics {
@@ -69,7 +73,11 @@ impl fmt::Display for Inspection {
             if let Some(why) = &drive.why_no_pairs {
                 writeln!(f, "            {why}")?;
             }
-            writeln!(f, "  scans     {} frames with ground truth", drive.scans)?;
+            writeln!(
+                f,
+                "  scans     {} with ground truth",
+                count_of(drive.scans, "frame")
+            )?;
             for mount in &drive.mounts {
                 let three = |v: [f64; 3], digits: usize| {
                     v.map(|x| format!("{:.digits$}", unsigned_zero(x)))

@@ -47,7 +47,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         return Err(Error::NoFrames {
             path: folder.join(VIDEO),
             why: "the segment's images are absent".into(),
-            remedy: "fetch video.hevc of the segment; `deepfusion data inspect` tells of its other streams".into(),
+            remedy: "fetch video.hevc of the segment; `deepfusion data inspect` reports its other streams".into(),
         });
     }
     let config = FolderConfig::read(folder)?;

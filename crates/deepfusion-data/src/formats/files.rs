@@ -9,7 +9,7 @@ pub(crate) fn name_of(folder: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// The names of a path: as it was given, and with its links resolved, where that is another. Layouts that are told by the folders above
+/// The names of a path: as it was given, and with its links resolved, where that is another. Layouts that are recognised by the folders above
 /// look at both: a part of a data set is often a link to another disk.
 ///
 /// # Errors

@@ -9,10 +9,10 @@ use crate::{
 use std::path::Path;
 
 /// Looks into a recording of any layout that [`Dataset::open`] knows. A comma2k19 segment whose video is
-/// absent, and a bag without a camera, are told by their other streams.
+/// absent, and a bag without a camera, are reported by their other streams.
 ///
 /// # Errors
-/// As [`Dataset::open`]; times and speeds may be missing and are then told as unknown.
+/// As [`Dataset::open`]; times and speeds may be missing and are then reported as unknown.
 pub fn inspect(path: &Path) -> Result<Inspection> {
     inspect_with(path, &OpenOptions::default(), |_| None)
 }
@@ -64,7 +64,7 @@ pub fn inspect_with(
         }
         drives.push(look_at(dataset)?);
     }
-    // Measuring reads many pictures: of many drives the doctor tells it one by one.
+    // Measuring reads many pictures: of many drives the doctor reports it one by one.
     if let ([dataset], [drive]) = (datasets.as_slice(), drives.as_mut_slice()) {
         drive.time_offset = time_offset(dataset);
     }

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 impl Dataset {
-    /// Opens a recording of any known layout, told by what is there: a KITTI raw drive, date or root (one
+    /// Opens a recording of any known layout, recognised by what is there: a KITTI raw drive, date or root (one
     /// data set for each drive and camera, in order of names), KITTI odometry (one for each sequence), KITTI-360 (one for each drive), nuScenes (one for each
     /// scene), a folder of images, a
     /// video file, a comma2k19 segment, a folder of RGB-D frames. Drives without images of the camera, or without a
@@ -33,7 +33,7 @@ impl Dataset {
         Layout::of(path)?.open(path, options)
     }
 
-    /// The layout in which [`Self::open`] reads what is at a path, told without opening it.
+    /// The layout in which [`Self::open`] reads what is at a path, found without opening it.
     ///
     /// # Errors
     /// [`Error::UnknownLayout`], [`Error::NoSuchPath`], [`Error::Config`], [`Error::SeveralVersions`].
@@ -58,7 +58,7 @@ pub(crate) enum Layout {
     Kitti(Vec<Drive>),
     KittiOdometry(Vec<PathBuf>),
     Kitti360(Vec<kitti360::Drive>),
-    NuScenes(nuscenes::Place),
+    NuScenes(nuscenes::TableFolder),
     Comma(PathBuf),
     RgbD(Vec<PathBuf>),
     Bags(Vec<PathBuf>),

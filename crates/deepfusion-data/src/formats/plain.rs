@@ -204,7 +204,7 @@ impl PlainParts {
         })
     }
 
-    /// Frames without a speed are told; if none has one, the clocks differ.
+    /// Frames without a speed are a warning; if none has one, the clocks differ.
     fn check_clocks(&mut self, frames: &[Frame]) -> Result<()> {
         let Some(log) = &self.speeds else {
             return Ok(());
@@ -271,7 +271,7 @@ impl Recording for PlainRecording {
             _ => load_rgb(frame.image.path())?,
         };
         let k = self.lens.intrinsics();
-        // One of another size is told by the data set, which knows the frame.
+        // One of another size is reported by the data set, which knows the frame.
         if image.dimensions() == (k.width, k.height) {
             self.lens.correct(image)
         } else {

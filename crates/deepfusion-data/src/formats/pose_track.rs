@@ -78,7 +78,7 @@ pub(crate) fn speed_log(path: &Path, world_from_vehicle: &[(i64, Se3)]) -> Speed
         sigmas_mps: None,
         tilts_rad,
         vehicle: None,
-        // The poses are told as a stream of their own.
+        // The poses are reported as a stream of their own.
         streams: Vec::new(),
         warnings: Vec::new(),
     }

@@ -96,16 +96,16 @@ fn the_world_s_axes_do_not_matter() {
     }
 }
 
-/// A body that leans as it goes: its rotation between two poses is the poses' own, to what the yaw rate's slope leaves.
+/// A body that rolls and pitches as it goes: its rotation between two poses is the poses' own, to what the yaw rate's slope leaves.
 #[test]
 fn roll_and_pitch_are_the_poses() {
     let at = |i: i32| {
         let t = f64::from(i) * 0.1;
-        let lean = Se3::from_axis_angle(
+        let roll_and_pitch = Se3::from_axis_angle(
             Vector3::new(0.03 * (4.0 * t).sin(), 0.05 * (3.0 * t).cos(), 0.0),
             Vector3::zeros(),
         );
-        (ns(t), pose(7.0 * t, 0.0, 0.2 * t) * lean)
+        (ns(t), pose(7.0 * t, 0.0, 0.2 * t) * roll_and_pitch)
     };
     let poses: Vec<_> = (0..40).map(at).collect();
     let track = log(&poses).motion(ns(0.0)).unwrap().0;

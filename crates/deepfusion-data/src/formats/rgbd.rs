@@ -133,7 +133,7 @@ fn read_pose(path: &Path) -> Result<Option<Se3>> {
                 .into(),
     };
     let numbers: Option<Vec<f64>> = text.split_whitespace().map(|w| w.parse().ok()).collect();
-    let numbers = numbers.ok_or_else(|| bad("a word is no number"))?;
+    let numbers = numbers.ok_or_else(|| bad("a word is not a number"))?;
     if numbers.len() != 16 {
         return Err(bad(&format!("{} numbers, expected 16", numbers.len())));
     }

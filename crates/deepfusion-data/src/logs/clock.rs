@@ -65,7 +65,7 @@ impl TimeUnit {
         if let Some(unit) = Self::of_date(first) {
             return Some(unit);
         }
-        // Of either sign: that times go back is told elsewhere.
+        // Of either sign: that times go back is reported elsewhere.
         let steps = numbers.windows(2).map(|w| (w[1] - w[0]).abs());
         let mut steps: Vec<f64> = steps.collect();
         steps.sort_by(f64::total_cmp);
@@ -74,7 +74,7 @@ impl TimeUnit {
     }
 
     /// A written number as nanoseconds, to the last digit: an f64 of seconds since 1970 has a quarter of a
-    /// microsecond. `None` for what is no number, or is beyond 292 years.
+    /// microsecond. `None` for what is not a number, or is beyond 292 years.
     pub(crate) fn nanoseconds(self, word: &str) -> Option<i64> {
         let word = word.trim();
         let (negative, digits) = match word.strip_prefix('-') {

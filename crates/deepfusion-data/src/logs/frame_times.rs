@@ -233,7 +233,7 @@ fn from_list(path: &Path, images: usize, config: &FolderConfig) -> Result<Vec<i6
         let ns = if dates {
             date_time::parse(text).ok()
         } else {
-            // A line that is no number has kept the unit from being known: it is the one to be named.
+            // A line that is not a number has kept the unit from being known: it is the one to be named.
             number(text).and_then(|_| unit.unwrap_or(TimeUnit::Seconds).nanoseconds(text))
         };
         let ns = ns.ok_or_else(|| bad(*line, describe(text.trim(), "a time")))?;

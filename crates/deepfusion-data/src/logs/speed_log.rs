@@ -67,7 +67,7 @@ impl SpeedLog {
         let (mut yaw_rates_radps, mut vehicle) = (None, None);
         let (mut course_rates_radps, mut sigmas_mps) = (None, None);
         let (measured, table) = match own_or_foreign(&path, config)? {
-            Either::Own(table) => {
+            LogFile::Own(table) => {
                 let ns = times(&table, config, &mut warnings, &name(&path))?;
                 let column = table.require(&SPEEDS, "time_s,speed_mps")?;
                 let factor = speed_factor(&table, column, config)? * config.speed_scale();
@@ -80,7 +80,7 @@ impl SpeedLog {
                 }
                 (Samples { ns, values }, Some(table))
             }
-            Either::Foreign(log) => {
+            LogFile::Foreign(log) => {
                 yaw_rates_radps = turns(&log.yaw_rates);
                 course_rates_radps = turns(&log.course_rates);
                 sigmas_mps = sigmas(&log, config.speed_scale());
@@ -207,14 +207,14 @@ impl SpeedLog {
 }
 
 /// A table of this program's kind, or what another program wrote.
-enum Either {
+enum LogFile {
     Own(Table),
     Foreign(DriveLog),
 }
 
 /// Reads a table whose columns have the names that are asked for here; anything else as `deepfusion-logs` does. Where that cannot make
 /// anything of a table either, the error is this program's own, which says what a table of its kind looks like.
-fn own_or_foreign(path: &Path, config: &FolderConfig) -> Result<Either> {
+fn own_or_foreign(path: &Path, config: &FolderConfig) -> Result<LogFile> {
     let options = ReadOptions {
         time: config.time_column.clone(),
         speed: config.speed_column.clone(),
@@ -224,7 +224,7 @@ fn own_or_foreign(path: &Path, config: &FolderConfig) -> Result<Either> {
             .and_then(|unit| unit.parse().ok()),
         dbc: config.dbc.as_ref().map(|file| config.folder().join(file)),
     };
-    let foreign = || deepfusion_logs::read(path, &options).map(Either::Foreign);
+    let foreign = || deepfusion_logs::read(path, &options).map(LogFile::Foreign);
     let is_table = path
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("csv"));
@@ -237,7 +237,7 @@ fn own_or_foreign(path: &Path, config: &FolderConfig) -> Result<Either> {
         table.require(&SPEEDS, "time_s,speed_mps")?;
         Ok(table)
     });
-    own.map(Either::Own)
+    own.map(LogFile::Own)
         .or_else(|error| foreign().map_err(|_| error))
 }
 

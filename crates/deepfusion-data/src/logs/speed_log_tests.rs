@@ -120,10 +120,12 @@ fn bad_rows_are_named() {
 }
 
 #[test]
-fn repeated_times_and_slow_clocks_are_told() {
+fn repeated_times_and_slow_clocks_are_reported() {
     let log = read(&[("speed.csv", "time_s,speed_mps\n0,1\n0,2\n0.1,1\n")]).unwrap();
     assert!(
-        log.warnings.iter().any(|r| r.contains("first in line 3")),
+        log.warnings
+            .iter()
+            .any(|r| r.contains("1 row repeats the time of the row above (in line 3)")),
         "{:?}",
         log.warnings
     );
@@ -278,7 +280,7 @@ fn a_whole_inertial_unit_is_fused_with_the_speed() {
         assert!((driven.yaw_rad - 0.4).abs() < 0.01, "{driven:?}");
         assert!((driven.distance_m - 20.0).abs() < 0.2, "{driven:?}");
     }
-    // One that hangs upside down is told, not believed.
+    // One that hangs upside down is reported, not believed.
     let upside_down = "[vehicle_from_imu]\nrotation = [3.14159265, 0.0, 0.0]\n";
     let header =
         "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2";

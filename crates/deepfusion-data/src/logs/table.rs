@@ -108,7 +108,7 @@ impl Table {
     /// The finite numbers of a column.
     ///
     /// # Errors
-    /// [`Error::Table`] for a value that is empty, no number, or not finite.
+    /// [`Error::Table`] for a value that is empty, not a number, or not finite.
     pub(crate) fn numbers(&self, column: &Column) -> Result<Vec<f64>> {
         let words = self.words(column).enumerate();
         let number = |(row, word): (usize, &str)| {

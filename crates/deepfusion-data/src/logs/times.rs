@@ -7,7 +7,7 @@ use crate::dataset_toml::FolderConfig;
 
 pub(super) const TIMES: [&str; 5] = ["time", "timestamp", "t", "stamp", "timestamps"];
 
-/// The table's times in nanoseconds, which must rise; equal ones are told once.
+/// The table's times in nanoseconds, which must rise; equal ones are warned of once.
 pub(crate) fn times(
     table: &Table,
     config: &FolderConfig,
@@ -56,10 +56,10 @@ pub(crate) fn times(
         all.push(ns);
     }
     if let Some(first) = repeated.first() {
-        warnings.push(format!(
-            "{name}: {} rows repeat the time of the row above (first in line {first}) and are left out",
-            repeated.len()
-        ));
+        warnings.push(match repeated.len() {
+            1 => format!("{name}: 1 row repeats the time of the row above (in line {first}) and is left out"),
+            n => format!("{name}: {n} rows repeat the time of the row above (first in line {first}) and are left out"),
+        });
     }
     Ok(all)
 }

@@ -1,4 +1,4 @@
-//! Measured depth: what it means, what moves in it, and images of it.
+//! Measured depth: what it means, which pixels are dynamic, and images of it.
 
 pub(crate) mod depth_images;
 pub(crate) mod measured;

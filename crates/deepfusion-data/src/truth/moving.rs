@@ -1,4 +1,4 @@
-//! Which pixels of a frame's ground truth belong to what moves over the ground.
+//! Which pixels of a frame's ground truth belong to dynamic objects, which move over the ground.
 
 use super::scan::GtKind;
 use crate::Result;
@@ -21,14 +21,14 @@ pub enum MovingSource {
     DynamicPoints,
 }
 
-/// What moves in a recording.
+/// The dynamic pixels of a recording.
 #[derive(Debug, Clone)]
 pub struct MovingLabels {
     source: MovingSource,
     moving: Arc<dyn MovingPixels>,
 }
 
-/// Tells the moving pixels of a frame's ground truth; one implementation a source of labels.
+/// Finds the moving pixels of a frame's ground truth; one implementation a source of labels.
 pub trait MovingPixels: fmt::Debug + Send + Sync {
     /// As [`MovingLabels::pixels`].
     ///

@@ -1,4 +1,4 @@
-//! What a scan says of a frame: depth, velocities, what moves.
+//! What a scan says of a frame: depth, velocities, dynamic pixels.
 
 use deepfusion_geometry::DepthMap;
 use nalgebra::Vector3;

@@ -91,7 +91,7 @@ impl Evaluation {
                 return Err(Error::Version { path, found });
             }
             Some(_) => {}
-            None => return Err(not("format_version is no number".into())),
+            None => return Err(not("format_version is not a number".into())),
         }
         let saved: SavedEvaluation =
             serde_json::from_value(value).map_err(|e| not(e.to_string()))?;

@@ -30,7 +30,7 @@ pub enum Verdict {
     Wrong,
 }
 
-/// The scale of a checkpoint's metres on recordings that it has not learned from, as sidecars tell it.
+/// The scale of a checkpoint's metres on recordings that it has not learned from, as sidecars say it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct MetricScale {
     /// Mean over images of ln(median(prediction) / median(truth)): above 0 where things are seen too far away. `None` where

@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn each_bound_is_told() {
+    fn each_bound_is_reported() {
         for (row, word) in [
             ([0.1, 1.0, 5.0, 0.01, 0.8, 0.9, 0.95], "RMSE log"),
             ([0.01, 1.0, 5.0, 0.5, 0.8, 0.9, 0.95], "Abs Rel"),
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn twins_are_told_both() {
+    fn twins_are_both_reported() {
         let row = [0.392, 5.767, 10.612, 0.464, 0.449, 0.721, 0.857].map(Some);
         let mut other = row;
         other[0] = Some(0.388);

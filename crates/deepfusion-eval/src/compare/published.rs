@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_that_are_broken_are_told() {
+    fn tables_that_are_broken_are_errors() {
         let error = Published::parse("[[source]]\nid = 1\n")
             .unwrap_err()
             .to_string();

@@ -39,11 +39,11 @@ pub fn run_tables(evaluations: &[Evaluation]) -> Tables {
 }
 
 fn ground_tables(ground: &str, members: &[&Evaluation]) -> Vec<Table> {
-    let trivial = baseline_rows(members);
-    let mut unscaled = metric_table(members, &trivial, false);
+    let mean_depth_baseline = baseline_rows(members);
+    let mut unscaled = metric_table(members, &mean_depth_baseline, false);
     unscaled.title = format!("{ground}Unscaled");
     unscaled.notes.splice(0..0, about(members));
-    let mut scaled = metric_table(members, &trivial, true);
+    let mut scaled = metric_table(members, &mean_depth_baseline, true);
     scaled.title = format!("{ground}Median-scaled");
     scaled
         .notes
@@ -141,10 +141,17 @@ fn eigen_differences(report: &Report) -> Vec<String> {
 fn baseline_rows(members: &[&Evaluation]) -> Vec<(String, Metrics, Metrics)> {
     let mut rows: Vec<(Vec<&str>, Metrics, Metrics)> = Vec::new();
     for member in members {
-        if let Some(trivial) = &member.report.trivial {
-            match rows.iter_mut().find(|r| r.1 == trivial.unscaled) {
+        if let Some(mean_depth_baseline) = &member.report.mean_depth_baseline {
+            match rows
+                .iter_mut()
+                .find(|r| r.1 == mean_depth_baseline.unscaled)
+            {
                 Some(row) => row.0.push(&member.name),
-                None => rows.push((vec![&member.name], trivial.unscaled, trivial.median_scaled)),
+                None => rows.push((
+                    vec![&member.name],
+                    mean_depth_baseline.unscaled,
+                    mean_depth_baseline.median_scaled,
+                )),
             }
         }
     }
@@ -165,7 +172,7 @@ fn baseline_rows(members: &[&Evaluation]) -> Vec<(String, Metrics, Metrics)> {
 
 fn metric_table(
     members: &[&Evaluation],
-    trivial: &[(String, Metrics, Metrics)],
+    mean_depth_baseline: &[(String, Metrics, Metrics)],
     median_scaled: bool,
 ) -> Table {
     let metrics = |r: &Report| {
@@ -211,7 +218,7 @@ fn metric_table(
             source: None,
         });
     }
-    for (name, unscaled, scaled) in trivial {
+    for (name, unscaled, scaled) in mean_depth_baseline {
         let figures = if median_scaled { scaled } else { unscaled };
         let mut cells = vec![Value::from(name.as_str())];
         cells.extend(figures.to_array().map(Value::Number));
@@ -221,7 +228,7 @@ fn metric_table(
             ..Row::default()
         });
     }
-    let notes = if trivial.is_empty() || median_scaled {
+    let notes = if mean_depth_baseline.is_empty() || median_scaled {
         Vec::new()
     } else {
         vec![

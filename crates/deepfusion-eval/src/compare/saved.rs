@@ -48,7 +48,7 @@ pub struct Measured {
     pub set: Option<String>,
     /// Whether depth was corrected for another focal length than the one trained on.
     pub focal_correction: bool,
-    /// Whether training saw none of these frames; absent where that cannot be told.
+    /// Whether training saw none of these frames; absent where that is unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<bool>,
     /// The program's version.

@@ -20,7 +20,7 @@ pub enum PoseFormat {
 pub struct PoseFile {
     /// Where it was read.
     pub path: PathBuf,
-    /// How it is written, told by the number of columns.
+    /// How it is written, recognised by the number of columns.
     pub format: PoseFormat,
     /// `world_from_cam`, in the file's order.
     pub poses: Vec<Se3>,

@@ -19,7 +19,7 @@ pub(super) fn share(pair: &Pair) -> Option<f64> {
             if !pair.known[here] {
                 continue;
             }
-            let around = Around::of(pair, x, y);
+            let around = Neighbourhood::of(pair, x, y);
             if around.most > JUMP * around.least && around.jumps(pair) {
                 near += 1;
                 flying += usize::from(around.is_between(pair, pair.prediction[here]));
@@ -30,14 +30,14 @@ pub(super) fn share(pair: &Pair) -> Option<f64> {
 }
 
 /// A pixel's neighbourhood, cut at the image's border.
-struct Around {
+struct Neighbourhood {
     columns: std::ops::Range<usize>,
     rows: std::ops::Range<usize>,
     least: f64,
     most: f64,
 }
 
-impl Around {
+impl Neighbourhood {
     fn of(pair: &Pair, x: usize, y: usize) -> Self {
         let reach = |at: usize, size: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(size);
         let mut around = Self {

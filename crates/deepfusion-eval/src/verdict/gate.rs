@@ -13,7 +13,7 @@ const BIAS: f64 = 0.02;
 
 /// A check that a network does not pass as well as the one before it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Worse {
+pub struct WorsenedCheck {
     /// The check.
     pub check: Check,
     /// What it gave before.
@@ -39,7 +39,7 @@ pub enum Check {
 impl Verdict {
     /// The checks that `after` passes less well than this one, of the same frames; `None` where none of them can be compared.
     #[must_use]
-    pub fn worse(&self, after: &Self) -> Option<Vec<Worse>> {
+    pub fn worse(&self, after: &Self) -> Option<Vec<WorsenedCheck>> {
         let checks = [
             Check::Reprojection,
             Check::Consistency,
@@ -53,9 +53,9 @@ impl Verdict {
                 continue;
             };
             compared = true;
-            // What is no number is worse than any.
+            // NaN is worse than any.
             if after.is_nan() || after > check.most(before) {
-                worse.push(Worse {
+                worse.push(WorsenedCheck {
                     check,
                     before,
                     after,
@@ -118,7 +118,7 @@ mod tests {
         }
     }
 
-    fn names(worse: Option<Vec<Worse>>) -> Vec<Check> {
+    fn names(worse: Option<Vec<WorsenedCheck>>) -> Vec<Check> {
         worse.unwrap().iter().map(|w| w.check).collect()
     }
 
@@ -135,7 +135,7 @@ mod tests {
             names(before.worse(&verdict(0.08, 0.05, -0.2))),
             [Check::Flip, Check::Scale]
         );
-        // What is no number is no better.
+        // NaN is no better.
         assert_eq!(
             names(before.worse(&verdict(f64::NAN, 0.03, 0.05))),
             [Check::Reprojection]

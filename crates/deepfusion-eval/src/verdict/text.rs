@@ -5,11 +5,12 @@ use std::fmt;
 use super::{
     Check, Evidence, NoCertificate, ScaleCertificate, ScaleVerdict, SourceName, TOLERANCE, Verdict,
 };
+use deepfusion_hint::count_of;
 
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let frames = self.without_truth.frames;
-        writeln!(f, "without ground truth ({frames} frames)")?;
+        let frames = count_of(self.without_truth.frames, "frame");
+        writeln!(f, "without ground truth ({frames})")?;
         match (&self.scale_certificate, &self.no_certificate) {
             (Some(certificate), _) => write!(f, "{certificate}")?,
             (None, Some(why)) => writeln!(f, "  scale           no certificate: {why}")?,
@@ -25,8 +26,10 @@ impl fmt::Display for Evidence {
             let share = 100.0 * (1.0 - r.warped / r.unwarped);
             writeln!(
                 f,
-                "  reprojection    {:.4}, unwarped {:.4} ({share:.0} % explained), {} pairs",
-                r.warped, r.unwarped, r.pairs
+                "  reprojection    {:.4}, unwarped {:.4} ({share:.0} % explained), {}",
+                r.warped,
+                r.unwarped,
+                count_of(r.pairs, "pair")
             )?;
         }
         if let Some(consistency) = self.consistency {
@@ -79,8 +82,10 @@ impl fmt::Display for ScaleCertificate {
         };
         writeln!(
             f,
-            "  scale           {:.3}{between}, {verdict}; {} blocks, {} points",
-            self.scale, self.blocks, self.points
+            "  scale           {:.3}{between}, {verdict}; {}, {}",
+            self.scale,
+            count_of(self.blocks, "block"),
+            count_of(self.points, "point")
         )?;
         let sources: Vec<String> = self
             .sources
@@ -115,7 +120,7 @@ impl fmt::Display for SourceName {
 impl fmt::Display for NoCertificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::MotionUnknown => "the recordings do not tell speed and turns",
+            Self::MotionUnknown => "the recordings do not measure speed and turns",
             Self::NoMovement => "the camera hardly moves between the frames",
             Self::AllSeen => "training saw all of these frames: measure on another drive",
             Self::SeenNotKnown => "whether training saw these frames is not known",

@@ -8,7 +8,7 @@ use std::arch::asm;
 
 use deepfusion_kernels::matrix_unit::{TileSizes, configured};
 
-use super::{Finish, OutputPixel};
+use super::{Epilogue, OutputPixel};
 use crate::Conv;
 use crate::aligned::Aligned;
 use crate::conv::{Geometry, Runs, Tasks, padded_bias, weight};
@@ -185,7 +185,7 @@ impl Amx {
         first: usize,
         width: usize,
     ) {
-        let finish = Finish::new(&self.geometry, &self.bias, arena);
+        let finish = Epilogue::new(&self.geometry, &self.bias, arena);
         for (i, strip) in strips.iter().enumerate() {
             let tiles = &sums[2 * i * TILE_SUMS..];
             if self.geometry.out.result {

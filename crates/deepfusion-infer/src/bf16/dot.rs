@@ -6,7 +6,7 @@ use std::arch::x86_64::{
 };
 use std::mem::transmute;
 
-use super::{Finish, OutputPixel};
+use super::{Epilogue, OutputPixel};
 use crate::Conv;
 use crate::aligned::Aligned;
 use crate::conv::{Geometry, Runs, Tasks, padded_bias, weight};
@@ -164,7 +164,7 @@ impl Dot {
         sums: &[f32],
     ) {
         let g = &self.geometry;
-        let finish = Finish::new(g, &self.bias, arena);
+        let finish = Epilogue::new(g, &self.bias, arena);
         let place = |p: usize| OutputPixel::new(g, p % g.out.width, p / g.out.width);
         if g.out.result {
             for first in pixels.clone().step_by(LANES) {

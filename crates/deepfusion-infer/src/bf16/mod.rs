@@ -48,14 +48,14 @@ impl OutputPixel {
 }
 
 /// The end of a pixel's sums: bias, residual and activation, rounded to bf16.
-struct Finish<'a> {
+struct Epilogue<'a> {
     simd: V4,
     geometry: &'a Geometry,
     bias: &'a [f32],
     arena: Shared<'a, Bf16>,
 }
 
-impl<'a> Finish<'a> {
+impl<'a> Epilogue<'a> {
     /// # Panics
     /// Without AVX-512; [`has_dot`] must hold.
     #[expect(clippy::expect_used, reason = "asked before an engine of bf16 is made")]

@@ -188,7 +188,7 @@ fn large_dilated_convolutions_take_the_winograd_form_and_agree_too() {
 }
 
 #[test]
-fn what_is_no_number_reaches_the_output_and_not_the_next_image() {
+fn nan_reaches_the_output_and_not_the_next_image() {
     let graph = small_network();
     let mut engine = Engine::new(graph.clone(), 64, 64, Precision::F32).unwrap();
     engine.run(&vec![f32::NAN; 3 * 64 * 64]);

@@ -20,7 +20,7 @@ pub use committer::{Written, commit, queue};
 pub use manifest::{Entry, Lock, Manifest, State};
 pub use progress::{BulkProgress, Summary};
 pub use records::{RecordLines, record_line, write_record};
-pub use resume::{Begun, BulkJob};
+pub use resume::{BulkJob, StartedJob};
 pub use shard::Shard;
 pub use sidecars::{add_output, sidecar_path, write_json, write_unsynced};
 pub use video::{VIDEO_ENDING, write_one_video, write_videos};

@@ -31,7 +31,7 @@ pub struct BulkJob<'a> {
 }
 
 /// A job that has begun.
-pub struct Begun {
+pub struct StartedJob {
     /// What there is to do and what is done, written into the folder.
     pub manifest: Manifest,
     /// Sidecars of what is done, by place, where they were asked for.
@@ -45,7 +45,7 @@ impl BulkJob<'_> {
     ///
     /// # Errors
     /// [`Error::OtherJob`], [`Error::Stale`], [`Error::Exists`], and what cannot be read or written.
-    pub fn begin(&self, all: &[Input], mine: &[&Input], keep_sidecars: bool) -> Result<Begun> {
+    pub fn begin(&self, all: &[Input], mine: &[&Input], keep_sidecars: bool) -> Result<StartedJob> {
         let mut manifest = Manifest::new(self.shard, all, mine, self.made_with.clone());
         let before = Manifest::all(self.folder)?;
         if !self.overwrite {
@@ -87,7 +87,7 @@ impl BulkJob<'_> {
             std::fs::remove_file(&path).map_err(|e| deepfusion_data::Error::file(&path, e))?;
             return Err(error);
         }
-        Ok(Begun {
+        Ok(StartedJob {
             manifest,
             sidecars,
             todo,

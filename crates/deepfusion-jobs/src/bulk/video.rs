@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use deepfusion_video::{Shown, shown_for, write_video};
+use deepfusion_video::{VideoPicture, shown_for, write_video};
 
 use super::manifest::Manifest;
 use crate::{Error, Input, Result};
@@ -67,11 +67,11 @@ pub fn write_one_video<'a>(
     pictures: &str,
     name: &str,
 ) -> Result<Option<(PathBuf, usize)>> {
-    let picture = |(name, seconds): (&str, f64)| Shown {
+    let picture = |(name, seconds): (&str, f64)| VideoPicture {
         file: format!("{name}{pictures}"),
         seconds,
     };
-    let pictures: Vec<Shown> = shown.map(picture).collect();
+    let pictures: Vec<VideoPicture> = shown.map(picture).collect();
     if pictures.is_empty() {
         return Ok(None);
     }

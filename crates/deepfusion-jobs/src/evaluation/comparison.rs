@@ -6,13 +6,13 @@ use deepfusion_eval::{
     Evaluator, MeanDepthBaseline, Prediction, Protocol, Report, Sample, ScenarioRow,
 };
 
-use super::{Evaluated, Place};
+use super::{Evaluated, ImageRef};
 use crate::Result;
 
 /// Evaluates a method and, beside it, the mean-depth baseline on the same images.
 pub struct Comparison {
     method: Evaluator,
-    trivial: Option<(Evaluator, MeanDepthBaseline)>,
+    mean_depth_baseline: Option<(Evaluator, MeanDepthBaseline)>,
     /// By kind of drive, where the recordings say theirs.
     scenarios: BTreeMap<String, Evaluator>,
     protocol: Protocol,
@@ -27,7 +27,7 @@ impl Comparison {
         let baseline = baseline.filter(|b| b.scans() > 0);
         Ok(Self {
             method: Evaluator::new(protocol.clone())?,
-            trivial: match baseline {
+            mean_depth_baseline: match baseline {
                 Some(baseline) => Some((Evaluator::new(protocol.clone())?, baseline)),
                 None => None,
             },
@@ -42,7 +42,7 @@ impl Comparison {
     /// A prediction that is none, or of another shape than the truth.
     pub fn add(&mut self, image: &Sample<'_>) -> Result<bool> {
         let counted = self.method.add_sample(image)?.is_some();
-        if let Some((evaluator, baseline)) = &mut self.trivial {
+        if let Some((evaluator, baseline)) = &mut self.mean_depth_baseline {
             // A baseline of this one scan alone has nothing else to say than "80 m": that is its score.
             let depth = baseline.depth_for(Some(image.ground_truth))?;
             evaluator.add(image.name, &Prediction::Depth(depth), image.ground_truth)?;
@@ -69,7 +69,7 @@ impl Comparison {
     ///
     /// # Errors
     /// Where no image had a pixel to compare.
-    pub fn evaluated(&self, places: Vec<Place>) -> Result<Evaluated> {
+    pub fn evaluated(&self, places: Vec<ImageRef>) -> Result<Evaluated> {
         Ok(Evaluated {
             report: self.report()?,
             images: self.method.images().to_vec(),
@@ -87,7 +87,7 @@ impl Comparison {
                 report.scenarios.push(row);
             }
         }
-        Ok(match &self.trivial {
+        Ok(match &self.mean_depth_baseline {
             Some((evaluator, _)) => report.with_mean_depth_baseline(&evaluator.report()?),
             None => report,
         })

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::division::divide;
 use super::known_pixels::known_pixels;
-use super::{Evaluated, Place, Truth};
+use super::{Evaluated, ImageRef, Truth};
 use crate::{Error, Result};
 
 /// The file in a run's folder.
@@ -101,7 +101,7 @@ pub fn calibrate(
     let division = divide(&images);
     let mut sampled = |part: &[usize]| -> Result<Vec<Sampled>> {
         let mut samples = Vec::new();
-        for Place(set, frame) in part.iter().map(|i| evaluated.places[*i]) {
+        for ImageRef(set, frame) in part.iter().map(|i| evaluated.places[*i]) {
             let dataset = &datasets[set];
             samples.extend(of_frame(estimator, dataset, frame, truth, correct_focal)?);
         }
@@ -109,7 +109,7 @@ pub fn calibrate(
     };
     let learned = sampled(&division.learned)?;
     let held_out = sampled(&division.held_out)?;
-    let fit = |flip: bool| ConfidenceModel::fit(&told(&learned, flip));
+    let fit = |flip: bool| ConfidenceModel::fit(&with_flip(&learned, flip));
     let (Some(single), Some(mirrored)) = (fit(false), fit(true)) else {
         return Ok(None);
     };
@@ -121,13 +121,13 @@ pub fn calibrate(
         pixels: learned.len(),
     };
     let path = confidence.write(run)?;
-    // One frame has no other half: it is told of itself.
+    // One frame has no other half: it is judged by itself.
     let judged = if held_out.is_empty() {
         &learned
     } else {
         &held_out
     };
-    let reliability = mirrored.reliability(&told(judged, true), BINS);
+    let reliability = mirrored.reliability(&with_flip(judged, true), BINS);
     Ok(Some(Calibrated {
         confidence,
         path,
@@ -137,7 +137,7 @@ pub fn calibrate(
 }
 
 /// The drive that an image is of, and its frame's number. The drives of a folder of bags share the folder.
-fn image(datasets: &[Dataset], Place(set, frame): Place) -> ((&Path, &str), u64) {
+fn image(datasets: &[Dataset], ImageRef(set, frame): ImageRef) -> ((&Path, &str), u64) {
     let dataset = &datasets[set];
     let drive = (dataset.folder(), dataset.split_name());
     (drive, dataset.frames()[frame].number)
@@ -146,7 +146,7 @@ fn image(datasets: &[Dataset], Place(set, frame): Place) -> ((&Path, &str), u64)
 /// A pixel's evidence, and its relative error.
 type Sampled = (Evidence, f64);
 
-fn told(samples: &[Sampled], flip: bool) -> Vec<Sampled> {
+fn with_flip(samples: &[Sampled], flip: bool) -> Vec<Sampled> {
     let without = |e: Evidence| Evidence { flip: 0.0, ..e };
     samples
         .iter()

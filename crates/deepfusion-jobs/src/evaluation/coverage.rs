@@ -17,13 +17,13 @@ pub struct Shortfall {
     /// Frames that the file lists.
     pub expected: usize,
     /// Why not all.
-    pub why: Why,
+    pub why: MissingReason,
 }
 
 /// Why not all frames of a split are used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Why {
+pub enum MissingReason {
     /// The recordings do not hold them; the first that is missing.
     NotThere(String),
     /// So many are there without ground truth.
@@ -35,11 +35,11 @@ impl fmt::Display for Shortfall {
         let Self { used, expected, .. } = self;
         let (split, percent) = (self.split.display(), percent(*used, *expected));
         match &self.why {
-            Why::NotThere(first) => write!(
+            MissingReason::NotThere(first) => write!(
                 f,
                 "{split}: {used} of its {expected} frames are there ({percent:.1} %), the first that is not: {first}"
             ),
-            Why::NoTruth(without) => write!(
+            MissingReason::NoTruth(without) => write!(
                 f,
                 "{split}: {used} of its {expected} frames have ground truth ({percent:.1} %), {without} more are there without"
             ),
@@ -57,7 +57,7 @@ pub fn missing_frames(options: &OpenOptions, datasets: &[Dataset]) -> Option<Sho
         split: split.path.clone(),
         used: coverage.found,
         expected: coverage.expected,
-        why: Why::NotThere(first.to_string()),
+        why: MissingReason::NotThere(first.to_string()),
     })
 }
 
@@ -117,7 +117,7 @@ pub fn check_used(
         split: split.path.clone(),
         used,
         expected,
-        why: Why::NoTruth(found - used),
+        why: MissingReason::NoTruth(found - used),
     }))
 }
 

@@ -20,7 +20,7 @@ use deepfusion_runtime::DepthEstimator;
 use crate::{Error, Result};
 
 pub use self::comparison::Comparison;
-pub use self::coverage::{Shortfall, Why, check_used, expected_frames, missing_frames};
+pub use self::coverage::{MissingReason, Shortfall, check_used, expected_frames, missing_frames};
 pub use self::division::{Division, divide};
 pub use self::known_pixels::known_pixels;
 pub use self::truth::{
@@ -41,7 +41,7 @@ pub fn default_crop(datasets: &[Dataset]) -> Crop {
 
 /// Where an evaluated image is: the data set and its frame, or the place of its prediction and truth in array files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place(pub usize, pub usize);
+pub struct ImageRef(pub usize, pub usize);
 
 /// What an evaluation found.
 pub struct Evaluated {
@@ -52,7 +52,7 @@ pub struct Evaluated {
     /// The points that were drawn.
     pub points: Vec<DrawnPoint>,
     /// Where each image is.
-    pub places: Vec<Place>,
+    pub places: Vec<ImageRef>,
 }
 
 /// The disparity of an image, as the protocol wants it. An image of another aspect ratio is stretched, so that all of its ground
@@ -121,7 +121,7 @@ pub fn evaluate_datasets<E: From<Error>>(
                     dense: dense.as_ref(),
                 };
                 if comparison.add(&sample)? {
-                    places.push(Place(number, frame));
+                    places.push(ImageRef(number, frame));
                 }
                 if let Some(scenario) = dataset.scenario() {
                     comparison.add_to_scenario(scenario, &sample)?;
@@ -166,7 +166,7 @@ pub fn evaluate_arrays(
             dense: None,
         })?;
         if counted {
-            places.push(Place(*prediction, *depth));
+            places.push(ImageRef(*prediction, *depth));
         }
         progress(i + 1, matched.len());
     }

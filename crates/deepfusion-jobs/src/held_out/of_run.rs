@@ -10,7 +10,7 @@ use deepfusion_train::SampleSet;
 use deepfusion_weights::Shipped;
 
 use super::{is_run, unseen};
-use crate::evaluation::Place;
+use crate::evaluation::ImageRef;
 use crate::recordings::{training_recordings, validates};
 use crate::verdict::Unseen;
 
@@ -18,13 +18,13 @@ use crate::verdict::Unseen;
 type Seen = (String, u64, u64);
 
 /// Whether none of the frames measured was a target or a source in training, of this run and of those it began from. `None` where
-/// that cannot be told: recordings that are not there any more, or a network that was learned elsewhere.
+/// that cannot be known: recordings that are not there any more, or a network that was learned elsewhere.
 #[must_use]
-pub fn held_out(config: &TrainConfig, datasets: &[Dataset], places: &[Place]) -> Option<bool> {
+pub fn held_out(config: &TrainConfig, datasets: &[Dataset], places: &[ImageRef]) -> Option<bool> {
     let seen = seen_by(config, datasets, &mut HashSet::new())?;
     let mut measured = places
         .iter()
-        .map(|Place(number, frame)| &datasets[*number].frames()[*frame]);
+        .map(|ImageRef(number, frame)| &datasets[*number].frames()[*frame]);
     Some(measured.all(|frame| !seen.contains(&key(frame))))
 }
 

@@ -32,7 +32,7 @@ pub struct TargetEvaluation {
 }
 
 /// A frame that was looked at.
-pub struct LookedAt<'a> {
+pub struct EvaluatedFrame<'a> {
     /// What a picture of it is called.
     pub name: String,
     /// What was found.
@@ -75,7 +75,7 @@ impl TargetEvaluation {
     pub fn drive<E: From<Error>>(
         &mut self,
         dataset: &Arc<Dataset>,
-        each: &mut dyn FnMut(LookedAt) -> Result<(), E>,
+        each: &mut dyn FnMut(EvaluatedFrame) -> Result<(), E>,
     ) -> Result<(), E> {
         let labels = Labels::read(dataset)?;
         let mut motions = MotionTracker::default();
@@ -83,8 +83,8 @@ impl TargetEvaluation {
         self.scorer.begin_drive();
         let frames = dataset.selected();
         for (done, index) in frames.iter().enumerate() {
-            let witness = witness(dataset, *index)?;
-            let seen = self.source.of_frame(dataset, *index, witness.as_ref())?;
+            let visibility = visibility(dataset, *index)?;
+            let seen = self.source.of_frame(dataset, *index, visibility.as_ref())?;
             let Some(measured) = seen else {
                 continue;
             };
@@ -93,14 +93,14 @@ impl TargetEvaluation {
                 self.perception.reset();
             }
             let targets = measured.targets(&mut self.perception, motion.stamp)?;
-            // Without a witness nothing says which boxes are seen: such a frame is followed, but not scored.
-            if let Some(witness) = &witness {
-                let labels = labels.of(dataset, *index, witness);
+            // Without such depth nothing says which boxes are seen: such a frame is followed, but not scored.
+            if let Some(visibility) = &visibility {
+                let labels = labels.of(dataset, *index, visibility);
                 let time_s = motion.stamp.map_or(0.0, |stamp| stamp.time_s);
                 self.scorer.add(time_s, &targets, &labels);
             }
             let number = dataset.frames()[*index].number;
-            each(LookedAt {
+            each(EvaluatedFrame {
                 name: format!("{}-{number:010}.png", dataset.name()),
                 targets: &targets,
                 camera: dataset.intrinsics(*index),
@@ -118,7 +118,7 @@ impl TargetEvaluation {
     pub fn object_frames<E: From<Error>>(
         &mut self,
         folder: &Path,
-        each: &mut dyn FnMut(LookedAt) -> Result<(), E>,
+        each: &mut dyn FnMut(EvaluatedFrame) -> Result<(), E>,
     ) -> Result<(), E> {
         let before = self.score().frames;
         let frames = read_object_frames(folder)?;
@@ -133,7 +133,7 @@ impl TargetEvaluation {
             self.scorer.add(0.0, &targets, &frame.labels);
             let name = frame.image.with_extension("png");
             let name = name.file_name().unwrap_or_default().to_string_lossy();
-            each(LookedAt {
+            each(EvaluatedFrame {
                 name: name.into_owned(),
                 targets: &targets,
                 camera: frame.camera,
@@ -155,7 +155,7 @@ impl TargetEvaluation {
 }
 
 /// Depth that says how much of a box is seen.
-pub struct Witness {
+pub struct VisibilityDepth {
     /// At the image's size.
     pub depth: DepthMap,
     /// Every pixel, or a scan's points only.
@@ -163,7 +163,7 @@ pub struct Witness {
 }
 
 /// The exact depth of a simulated frame, else its scan; `None` where there is neither.
-fn witness(dataset: &Dataset, index: usize) -> Result<Option<Witness>> {
+fn visibility(dataset: &Dataset, index: usize) -> Result<Option<VisibilityDepth>> {
     let frame = &dataset.frames()[index];
     let exact = dataset
         .folder()
@@ -171,10 +171,10 @@ fn witness(dataset: &Dataset, index: usize) -> Result<Option<Witness>> {
         .join(format!("{:010}.png", frame.number));
     if exact.is_file() {
         let depth = read_depth_png(&exact)?;
-        return Ok(Some(Witness { depth, dense: true }));
+        return Ok(Some(VisibilityDepth { depth, dense: true }));
     }
     let scan = dataset.ground_truth(index, GtKind::Z)?;
-    Ok(scan.map(|depth| Witness {
+    Ok(scan.map(|depth| VisibilityDepth {
         depth,
         dense: false,
     }))
@@ -182,7 +182,7 @@ fn witness(dataset: &Dataset, index: usize) -> Result<Option<Witness>> {
 
 /// Whether a label is to be found: a free-standing thing of a target's size of which enough is seen.
 #[must_use]
-pub fn counts(label: &Label, class: &str, witnesses: usize, least: usize) -> bool {
+pub fn counts(label: &Label, class: &str, points: usize, least: usize) -> bool {
     /// The simulator's things that are no targets, and KITTI's regions without labels.
     const NEITHER: [&str; 5] = ["Pole", "Tree", "Building", "Fence", "DontCare"];
     let [length, width, height] = label.size_m;
@@ -190,5 +190,5 @@ pub fn counts(label: &Label, class: &str, witnesses: usize, least: usize) -> boo
         && (0.4..=4.5).contains(&height)
         && length <= 13.0
         && width <= 3.5
-        && witnesses >= least
+        && points >= least
 }

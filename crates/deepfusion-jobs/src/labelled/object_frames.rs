@@ -9,7 +9,7 @@ use deepfusion_perception::Label;
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
 
 use super::tracklets::pixels_within;
-use super::{Witness, counts};
+use super::{VisibilityDepth, counts};
 use crate::Result;
 
 /// Points of the scan from which on a label counts.
@@ -78,7 +78,7 @@ fn frame(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
             }
         }
     }
-    let witness = Witness {
+    let visibility = VisibilityDepth {
         depth: scan,
         dense: false,
     };
@@ -97,14 +97,14 @@ fn frame(folder: &Path, labels: &Path) -> Result<ObjectFrame> {
         if class == "DontCare" {
             continue;
         }
-        let seen = pixels_within(&label, &witness, &camera, LEAST_POINTS);
+        let seen = pixels_within(&label, &visibility, &camera, LEAST_POINTS);
         label.counts = counts(&label, class, seen, LEAST_POINTS);
         found.push(label);
     }
     Ok(ObjectFrame {
         image,
         camera,
-        scan: witness.depth,
+        scan: visibility.depth,
         labels: found,
     })
 }

@@ -6,7 +6,7 @@ use deepfusion_geometry::{DepthMap, Intrinsics};
 use deepfusion_perception::{Perception, PerceptionConfig, Stamp, Target, working_depth};
 use deepfusion_runtime::DepthEstimator;
 
-use super::{ObjectFrame, Witness, gathered};
+use super::{ObjectFrame, VisibilityDepth, gathered};
 use crate::{Result, intervals};
 
 /// Where the measured depth comes from.
@@ -44,13 +44,13 @@ impl DepthSource {
         &mut self,
         dataset: &Dataset,
         index: usize,
-        witness: Option<&Witness>,
+        visibility: Option<&VisibilityDepth>,
     ) -> Result<Option<Measured>> {
         let camera = dataset.intrinsics(index);
         Ok(match self {
-            Self::Truth => witness
-                .filter(|witness| witness.dense)
-                .map(|witness| Measured::exact(working_depth(&witness.depth, &camera))),
+            Self::Truth => visibility
+                .filter(|visibility| visibility.dense)
+                .map(|visibility| Measured::exact(working_depth(&visibility.depth, &camera))),
             Self::Lidar => dataset
                 .ground_truth(index, GtKind::Z)?
                 .map(|scan| Measured::exact(gathered(&scan, &camera))),

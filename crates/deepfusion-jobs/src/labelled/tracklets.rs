@@ -6,7 +6,7 @@ use deepfusion_geometry::{Intrinsics, Se3};
 use deepfusion_perception::Label;
 use nalgebra::Vector3;
 
-use super::{Witness, counts};
+use super::{VisibilityDepth, counts};
 use crate::Result;
 
 /// Pixels of a box in an image of 640×192 from which on it counts, where every pixel's depth is known.
@@ -45,7 +45,7 @@ impl Labels {
 
     /// The boxes of a frame.
     #[must_use]
-    pub fn of(&self, dataset: &Dataset, index: usize, witness: &Witness) -> Vec<Label> {
+    pub fn of(&self, dataset: &Dataset, index: usize, visibility: &VisibilityDepth) -> Vec<Label> {
         let number = dataset.frames()[index].number;
         let k = dataset.intrinsics(index);
         let of_tracklet = |(object, tracklet): (usize, &Tracklet)| {
@@ -58,13 +58,13 @@ impl Labels {
                 velocity_mps: self.velocity(dataset, index, tracklet),
                 counts: true,
             };
-            let least = if witness.dense {
+            let least = if visibility.dense {
                 let area = f64::from(k.width) * f64::from(k.height) / (640.0 * 192.0);
                 (LEAST_PIXELS * area) as usize
             } else {
                 LEAST_POINTS
             };
-            let seen = pixels_within(&label, witness, &k, least);
+            let seen = pixels_within(&label, visibility, &k, least);
             label.counts = counts(&label, &tracklet.object, seen, least);
             Some(label)
         };
@@ -108,8 +108,13 @@ impl Labels {
 
 /// How many pixels with depth lie in a box, up to `enough`. The box's lowest 2 cm are the road.
 #[must_use]
-pub fn pixels_within(label: &Label, witness: &Witness, k: &Intrinsics, enough: usize) -> usize {
-    let depth = &witness.depth;
+pub fn pixels_within(
+    label: &Label,
+    visibility: &VisibilityDepth,
+    k: &Intrinsics,
+    enough: usize,
+) -> usize {
+    let depth = &visibility.depth;
     let [x, y, z] = label.center_m;
     let reach = 0.5 * label.size_m.iter().map(|s| s * s).sum::<f64>().sqrt() + 0.1;
     if z + reach < 0.5 {

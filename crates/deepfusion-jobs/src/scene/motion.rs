@@ -28,7 +28,7 @@ pub struct Motion {
     pub down_in_cam: Option<Vector3<f64>>,
 }
 
-/// Whether a recording tells how its camera moved.
+/// Whether a recording says how its camera moved.
 #[must_use]
 pub fn motion_known(dataset: &Dataset) -> bool {
     dataset.track().is_some() && dataset.yaw_known()

@@ -25,7 +25,7 @@ const WIDTH: u32 = 320;
 pub enum Unwatched {
     /// It is a single image.
     SingleImage,
-    /// The recording does not tell speed and yaw rate.
+    /// The recording does not measure speed and yaw rate.
     MotionUnknown,
 }
 
@@ -81,7 +81,7 @@ impl ScaleWatch {
     }
 
     /// Begins anew where another camera begins: nothing that was learned of the last one holds for it.
-    fn meet(&mut self, camera: &Intrinsics) {
+    fn reset_for_new_camera(&mut self, camera: &Intrinsics) {
         if self
             .camera
             .replace(*camera)
@@ -114,7 +114,7 @@ impl ScaleWatch {
         }
         // A frame that stands for itself moves by nothing that is known.
         motion.stamp?;
-        self.meet(camera);
+        self.reset_for_new_camera(camera);
         let width = WIDTH.min(camera.width);
         let height = (width * camera.height).div_ceil(camera.width).max(1);
         let later = Arc::new(RoadTexture::from(&grey_image(image, width, height)));

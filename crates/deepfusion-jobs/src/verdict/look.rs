@@ -21,7 +21,7 @@ const SEEN: f64 = 0.4;
 
 /// What a frame says.
 #[derive(Default)]
-pub(super) struct Looked {
+pub(super) struct FrameEvidence {
     /// Scene points: depth as predicted, and the logarithm of the factor that it wants.
     pub points: Vec<(f64, f64)>,
     /// ln(way through the depth / way measured).
@@ -65,10 +65,10 @@ pub(super) fn look(
     target: &Target,
     closely: bool,
     focal_correction: bool,
-) -> Result<Looked> {
+) -> Result<FrameEvidence> {
     let image = dataset.load_image(target.frame)?;
     let seen = see(estimator, dataset, target.frame, &image, focal_correction)?;
-    let mut looked = Looked::default();
+    let mut looked = FrameEvidence::default();
     let mut views: Vec<(GreyPyramid, Se3)> = Vec::new();
     // How much longer the way is through the depth, from the nearest frame on.
     let mut factor = 1.0;

@@ -19,7 +19,7 @@ use deepfusion_runtime::DepthEstimator;
 
 pub use self::plan::{Block, Plan, Target, plan};
 
-use self::look::{Looked, look};
+use self::look::{FrameEvidence, look};
 use crate::Result;
 
 /// The standard error of a vehicle's speed where nobody says better, as a share: tyres wear and warm, wheels slip, GPS is smoothed.
@@ -72,7 +72,7 @@ pub enum Unseen {
 /// Looks at `datasets` with a network. `progress` takes the frames done and in all.
 ///
 /// # Errors
-/// An image that cannot be read, and what the network's engine says. That nothing can be told is no error: the verdict says why.
+/// An image that cannot be read, and what the network's engine says. That nothing can be said is no error: the verdict says why.
 pub fn verdict(
     estimator: &mut DepthEstimator,
     datasets: &[Dataset],
@@ -89,9 +89,9 @@ pub fn verdict(
         let mut points = Vec::new();
         for (i, target) in block.targets.iter().enumerate() {
             // What costs a further run of the network is looked at once in a block.
-            let looked = look(estimator, dataset, target, i == 0, options.focal_correction)?;
-            gathered.add(&looked, target.speed_mps);
-            points.extend(looked.points);
+            let evidence = look(estimator, dataset, target, i == 0, options.focal_correction)?;
+            gathered.add(&evidence, target.speed_mps);
+            points.extend(evidence.points);
             done += 1;
             progress(done, total);
         }
@@ -111,12 +111,12 @@ struct Gathered {
 }
 
 impl Gathered {
-    fn add(&mut self, looked: &Looked, speed_mps: f64) {
+    fn add(&mut self, evidence: &FrameEvidence, speed_mps: f64) {
         self.speeds
-            .extend(looked.log_way.map(|log| (speed_mps, log)));
-        self.warped.extend(looked.reprojection);
-        self.consistency.extend(looked.consistency);
-        self.flip.extend(looked.flip);
+            .extend(evidence.log_way.map(|log| (speed_mps, log)));
+        self.warped.extend(evidence.reprojection);
+        self.consistency.extend(evidence.consistency);
+        self.flip.extend(evidence.flip);
     }
 
     /// `points`: depth as predicted, and the logarithm of the factor that it wants.

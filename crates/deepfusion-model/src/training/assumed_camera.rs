@@ -17,7 +17,7 @@ pub struct AssumedCamera {
     pub aspect: f64,
     /// Whether the focal length is learned with the networks, from the photometric error of the warped images.
     pub learn: bool,
-    /// Adam's step size of ln f, which follows the run's schedule: the largest relative change a step.
+    /// Adam's learning rate of ln f, which follows the run's schedule: the largest relative change a step.
     pub learning_rate: f64,
 }
 
@@ -100,7 +100,7 @@ pub struct LearnedCamera {
     /// fx and fy in pixels of the run's images.
     pub focal_px: [f64; 2],
     /// One standard deviation of each, in pixels: how far parts of the drives disagree, and how far the loss is off its minimum. Absent
-    /// where the drives do not tell the focal length.
+    /// where the drives do not determine the focal length.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_px: Option<[f64; 2]>,
     /// After this step.
@@ -111,9 +111,9 @@ pub struct LearnedCamera {
 const MOST_SIGMA_SHARE: f64 = 0.1;
 
 impl LearnedCamera {
-    /// Whether the drives told the focal length, to 10 %.
+    /// Whether the drives determined the focal length, to 10 %.
     #[must_use]
-    pub fn is_told(&self) -> bool {
+    pub fn is_reliable(&self) -> bool {
         let sure = |(sigma, focal): (&f64, &f64)| *sigma <= MOST_SIGMA_SHARE * focal;
         self.sigma_px
             .is_some_and(|sigmas| sigmas.iter().zip(&self.focal_px).all(sure))

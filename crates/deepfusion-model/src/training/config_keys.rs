@@ -170,28 +170,28 @@ impl TrainConfig {
     /// As [`TrainConfig::to_toml`].
     pub fn to_commented_toml(&self) -> Result<String, Error> {
         let all = config_keys();
-        let mut told = BTreeSet::new();
+        let mut written = BTreeSet::new();
         let mut text = String::new();
         let mut table = String::new();
         for line in self.to_toml()?.lines() {
             let header = line.strip_prefix('[').and_then(|l| l.strip_suffix(']'));
             if let Some(header) = header {
-                unset(&mut text, &all, &mut told, &table);
+                unset(&mut text, &all, &mut written, &table);
                 table = header.to_owned();
             } else if let Some((name, _)) = line.split_once(" = ")
                 && let Some(key) = all.iter().find(|k| k.table() == table && k.name() == name)
             {
                 // `writeln!` into a string does not fail.
                 let _ = writeln!(text, "# {}", key.line());
-                told.insert(key.key.clone());
+                written.insert(key.key.clone());
             }
             text += line;
             text.push('\n');
         }
-        unset(&mut text, &all, &mut told, &table);
+        unset(&mut text, &all, &mut written, &table);
         // Tables that are not there at all.
         let mut left: Vec<&str> = Vec::new();
-        for key in all.iter().filter(|k| !told.contains(&k.key)) {
+        for key in all.iter().filter(|k| !written.contains(&k.key)) {
             if !left.contains(&key.table()) {
                 left.push(key.table());
             }
@@ -207,14 +207,14 @@ impl TrainConfig {
     }
 }
 
-/// The keys of a table that are not told yet, as comments, before the empty line that ends it.
-fn unset(text: &mut String, all: &[ConfigKey], told: &mut BTreeSet<String>, table: &str) {
+/// The keys of a table that are not written yet, as comments, before the empty line that ends it.
+fn unset(text: &mut String, all: &[ConfigKey], written: &mut BTreeSet<String>, table: &str) {
     let ends_empty = text.ends_with("\n\n");
     if ends_empty {
         text.pop();
     }
     for key in all.iter().filter(|k| k.table() == table) {
-        if told.insert(key.key.clone()) {
+        if written.insert(key.key.clone()) {
             let _ = writeln!(text, "# {}: {}", key.name(), key.line());
         }
     }

@@ -245,7 +245,7 @@ impl LossConfig {
             }
         }
         if self.moving.enabled && self.flow.weight == 0.0 {
-            let expected = "false where loss.flow.weight is 0: the flow tells what moves";
+            let expected = "false where loss.flow.weight is 0: the flow shows what is dynamic";
             return Err(wrong("loss.moving.enabled", expected, "true".into()));
         }
         Ok(())

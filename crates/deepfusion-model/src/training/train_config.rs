@@ -38,7 +38,7 @@ pub enum ViewMotion {
     PoseNet,
     /// PoseNet's rotation and direction, with the length that the vehicle's speed gives.
     Distance,
-    /// The vehicle's own, from speed and yaw rate, and the body's lean where it is known. PoseNet learns
+    /// The vehicle's own, from speed and yaw rate, and the body's roll and pitch where they are known. PoseNet learns
     /// that motion beside it.
     Vehicle,
 }
@@ -76,7 +76,7 @@ pub struct Augmentation {
     pub sizes: Vec<InputSize>,
 }
 
-/// How the step size changes over a run, after its rise.
+/// How the learning rate changes over a run, after its rise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum LearningRateSchedule {
@@ -151,14 +151,14 @@ pub struct TrainConfig {
     /// The least steps of the optimiser where `steps` is not given: the epochs of a short drive are too few to learn from.
     #[serde(default)]
     pub min_steps: usize,
-    /// Adam's step size.
+    /// Adam's learning rate.
     pub learning_rate: f64,
-    /// Steps over which the step size rises from 0: large first steps can flatten the depth for good.
+    /// Steps over which the learning rate rises from 0: large first steps can flatten the depth for good.
     pub learning_rate_warmup_steps: usize,
     /// How it falls.
     #[serde(default)]
     pub learning_rate_schedule: LearningRateSchedule,
-    /// Share of the run after which the step size is divided by ten, where it falls by `drop`.
+    /// Share of the run after which the learning rate is divided by ten, where it falls by `drop`.
     pub learning_rate_drop: f64,
     /// Share of each weight, not of biases and norms, that a step of size 1 takes away beside Adam's own (AdamW).
     #[serde(default)]
@@ -296,7 +296,7 @@ impl TrainConfig {
         }
     }
 
-    /// Reads a TOML file. Of a run's, what it was told, not what it found out ([`crate::RunFolder::read_findings`]).
+    /// Reads a TOML file. Of a run's, what it was given, not what it found out ([`crate::RunFolder::read_findings`]).
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::ConfigFile`] naming the line, or what [`Self::validate`] says.
@@ -645,7 +645,7 @@ mod tests {
     }
 
     /// Without the speed term the views follow PoseNet: `without` sees to it, and whoever says otherwise
-    /// afterwards is told.
+    /// afterwards gets an error.
     #[test]
     fn without_speed_the_views_follow_posenet() {
         let mut config = Preset::Tiny.config();

@@ -22,7 +22,7 @@ pub enum FileKind {
 }
 
 impl FileKind {
-    /// Told by content, not by name: PyTorch writes a zip archive ("PK"), before version 1.6 a bare pickle (0x80, protocol);
+    /// Recognised by content, not by name: PyTorch writes a zip archive ("PK"), before version 1.6 a bare pickle (0x80, protocol);
     /// a safetensors file starts with the length of its JSON header, whose first byte stands at offset 8.
     ///
     /// # Errors

@@ -47,7 +47,7 @@ impl<'a> Attitude<'a> {
     pub(super) fn advance(&mut self, sample: &ImuSample) -> Vector3<f64> {
         let dt = sample.time_s - self.last_s;
         self.last_s = sample.time_s;
-        // Trapezoidal: by the sample's own rate alone the lean would be half an interval early.
+        // Trapezoidal: by the sample's own rate alone roll and pitch would be half an interval early.
         let rate = 0.5 * (self.last_rate + sample.angular_rate_radps);
         self.last_rate = sample.angular_rate_radps;
         // A direction fixed to the world, seen from a body that turns at ω, changes by −ω × it.

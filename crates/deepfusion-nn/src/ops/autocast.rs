@@ -11,9 +11,9 @@ thread_local! {
 }
 
 /// Restores the previous precision when dropped.
-struct Before(Option<Precision>);
+struct PrecisionGuard(Option<Precision>);
 
-impl Drop for Before {
+impl Drop for PrecisionGuard {
     fn drop(&mut self) {
         PRECISION.set(self.0);
     }
@@ -22,7 +22,7 @@ impl Drop for Before {
 /// Runs `work` with the convolutions of this thread in `precision`. Their backward passes use the same precision, even if they
 /// run later. As `torch.autocast`, except that all tensors stay f32: only the factors of the products are rounded.
 pub fn autocast<R>(precision: Precision, work: impl FnOnce() -> R) -> R {
-    let _before = Before(PRECISION.replace(Some(precision)));
+    let _guard = PrecisionGuard(PRECISION.replace(Some(precision)));
     work()
 }
 

@@ -5,4 +5,4 @@ mod measurement;
 mod track;
 mod tracker;
 
-pub(crate) use tracker::{Now, Tracker};
+pub(crate) use tracker::{FrameContext, Tracker};

@@ -180,7 +180,7 @@ impl Track {
         self.relative_error = measurement.detection.relative_error;
         self.seen = Some(Seen::of(measurement));
         self.vote(measurement.detection.kind.as_ref());
-        self.tell_motion();
+        self.judge_motion();
     }
 
     /// Adds a vote for a class; the class with the most votes stays.
@@ -195,7 +195,7 @@ impl Track {
         }
     }
 
-    fn tell_motion(&mut self) {
+    fn judge_motion(&mut self) {
         let doubt = self.filter.speed_deviation();
         if doubt > MAX_SPEED_SIGMA_MPS {
             return;

@@ -16,7 +16,7 @@ const CONFIRMED: u32 = 3;
 const LONGEST_PAUSE_S: f64 = 2.0;
 
 /// Time, pose and content of a frame.
-pub(crate) struct Now<'a> {
+pub(crate) struct FrameContext<'a> {
     pub time_s: f64,
     pub world_from_cam: Se3,
     pub depth: &'a [f32],
@@ -55,7 +55,7 @@ impl Tracker {
     pub(crate) fn step(
         &mut self,
         detections: &[Detection],
-        now: &Now,
+        now: &FrameContext,
         config: &PerceptionConfig,
     ) -> Vec<Target> {
         let dt = self.time_s.map_or(0.0, |before| now.time_s - before);
@@ -68,25 +68,30 @@ impl Tracker {
         }
         self.associate(detections, now, config);
         let cam_from_world = now.world_from_cam.inverse();
-        let whereabouts = |track: &Track| Whereabouts::of(track, &cam_from_world, now);
+        let visibility = |track: &Track| Visibility::of(track, &cam_from_world, now);
         self.tracks.retain(|track| {
-            let limit = match whereabouts(track) {
-                Whereabouts::InSight => MISSED_S,
-                Whereabouts::Hidden | Whereabouts::OutOfView => HIDDEN_S,
+            let limit = match visibility(track) {
+                Visibility::InSight => MISSED_S,
+                Visibility::Hidden | Visibility::OutOfView => HIDDEN_S,
             };
             track.unseen_s == 0.0 || (track.hits >= CONFIRMED && track.unseen_s <= limit)
         });
         self.tracks
             .iter()
             .filter(|track| track.hits >= config.confirm_frames)
-            .filter(|track| track.seen.is_some() || whereabouts(track) != Whereabouts::OutOfView)
+            .filter(|track| track.seen.is_some() || visibility(track) != Visibility::OutOfView)
             .map(|track| track.target(&cam_from_world))
             .filter(|target| target.center_m[2] > 0.0 && target.confidence >= config.min_confidence)
             .collect()
     }
 
     /// Greedy association, nearest pairs first; unmatched detections start tracks.
-    fn associate(&mut self, detections: &[Detection], now: &Now, config: &PerceptionConfig) {
+    fn associate(
+        &mut self,
+        detections: &[Detection],
+        now: &FrameContext,
+        config: &PerceptionConfig,
+    ) {
         let measurements: Vec<Measurement> = detections
             .iter()
             .enumerate()
@@ -126,7 +131,7 @@ impl Tracker {
 
 /// The visibility of the position where a track should be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Whereabouts {
+enum Visibility {
     /// Nothing stands before it.
     InSight,
     /// Something nearer does, or the image ends before its middle.
@@ -135,8 +140,8 @@ enum Whereabouts {
     OutOfView,
 }
 
-impl Whereabouts {
-    fn of(track: &Track, cam_from_world: &Se3, now: &Now) -> Self {
+impl Visibility {
+    fn of(track: &Track, cam_from_world: &Se3, now: &FrameContext) -> Self {
         let centre = cam_from_world.transform(&track.centre());
         if centre.z < 0.5 {
             return Self::OutOfView;

@@ -126,7 +126,7 @@ pub(super) fn evaluation(report: &Report) -> String {
         if report.n == 1 { "" } else { "s" },
         report.protocol.min_m,
         report.protocol.cap_m,
-        if report.trivial.is_some() {
+        if report.mean_depth_baseline.is_some() {
             " The mean-depth baseline predicts each pixel's mean depth over the training scans, without looking at the image."
         } else {
             ""
@@ -181,11 +181,11 @@ fn metric_rows(report: &Report) -> Vec<Vec<String>> {
         let label = format!("moving, {} image{plural}", report.moving_images);
         rows.push(row(&label, metrics));
     }
-    if let Some(trivial) = &report.trivial {
-        rows.push(row("mean-depth baseline", &trivial.unscaled));
+    if let Some(mean_depth_baseline) = &report.mean_depth_baseline {
+        rows.push(row("mean-depth baseline", &mean_depth_baseline.unscaled));
         rows.push(row(
             "mean-depth baseline, median-scaled",
-            &trivial.median_scaled,
+            &mean_depth_baseline.median_scaled,
         ));
     }
     for scenario in &report.scenarios {

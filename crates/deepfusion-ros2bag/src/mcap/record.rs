@@ -39,7 +39,7 @@ impl Record<'_> {
 
 /// A record that is not whole.
 #[derive(Debug, PartialEq)]
-pub(super) struct Cut<'a> {
+pub(super) struct TruncatedRecord<'a> {
     pub op: Option<u8>,
     /// Where it begins.
     pub at: usize,
@@ -49,7 +49,7 @@ pub(super) struct Cut<'a> {
     pub missing: u64,
 }
 
-impl Cut<'_> {
+impl TruncatedRecord<'_> {
     pub(super) fn problem(&self) -> String {
         match self.op {
             Some(op) => format!(
@@ -62,14 +62,14 @@ impl Cut<'_> {
 }
 
 /// The record at `at`; `None` at the end.
-pub(super) fn record(bytes: &[u8], at: usize) -> Result<Option<Record<'_>>, Cut<'_>> {
+pub(super) fn record(bytes: &[u8], at: usize) -> Result<Option<Record<'_>>, TruncatedRecord<'_>> {
     let rest = bytes.get(at..).unwrap_or_default();
     if rest.is_empty() {
         return Ok(None);
     }
     let head = rest.first_chunk::<HEAD>();
     let Some([op, length @ ..]) = head else {
-        return Err(Cut {
+        return Err(TruncatedRecord {
             op: None,
             at,
             start: bytes.len(),
@@ -86,7 +86,7 @@ pub(super) fn record(bytes: &[u8], at: usize) -> Result<Option<Record<'_>>, Cut<
             start,
             content,
         })),
-        None => Err(Cut {
+        None => Err(TruncatedRecord {
             op: Some(*op),
             at,
             start,

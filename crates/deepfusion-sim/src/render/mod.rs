@@ -193,7 +193,7 @@ pub(crate) struct Exposure {
 
 /// The input of a rendering.
 #[derive(Clone, Copy)]
-pub(crate) struct Shot<'a> {
+pub(crate) struct RenderInput<'a> {
     /// The world.
     pub world: &'a World,
     /// Light on its ground.
@@ -218,7 +218,7 @@ pub(crate) fn render(
     k: &Intrinsics,
 ) -> Picture {
     let air = Air::of(world);
-    let shot = Shot {
+    let input = RenderInput {
         world,
         light,
         air: &air,
@@ -227,7 +227,7 @@ pub(crate) fn render(
         intrinsics: k,
     };
     let solids = gather(world, moving, &world_from_cam.translation());
-    let exposure = expose(&shot, solids, Cores::All, Edges::EachRay);
+    let exposure = expose(&input, solids, Cores::All, Edges::EachRay);
     Picture {
         rgb: encode(&exposure.light, k.width, k.height),
         depth: exposure.depth,
@@ -283,15 +283,20 @@ pub(crate) enum Edges {
 }
 
 /// The light that falls on each pixel, and the exact depth.
-pub(crate) fn expose(shot: &Shot, solids: Vec<Primitive>, cores: Cores, edges: Edges) -> Exposure {
-    let (world, k) = (shot.world, shot.intrinsics);
-    let (tiles, solids) = Tiles::bin(world, solids, shot.world_from_cam, k);
+pub(crate) fn expose(
+    input: &RenderInput,
+    solids: Vec<Primitive>,
+    cores: Cores,
+    edges: Edges,
+) -> Exposure {
+    let (world, k) = (input.world, input.intrinsics);
+    let (tiles, solids) = Tiles::bin(world, solids, input.world_from_cam, k);
     let eye = Eye {
         world,
-        position: shot.world_from_cam.translation(),
+        position: input.world_from_cam.translation(),
         solids,
     };
-    let camera = Camera::new(shot.world_from_cam, k);
+    let camera = Camera::new(input.world_from_cam, k);
     let (width, height) = (k.width as usize, k.height as usize);
     let mut hits = vec![
         Hit {
@@ -309,11 +314,11 @@ pub(crate) fn expose(shot: &Shot, solids: Vec<Primitive>, cores: Cores, edges: E
             }
         }
     });
-    let feet: Vec<Foot> = shot.cars.iter().map(|car| Foot::of(world, car)).collect();
+    let feet: Vec<Foot> = input.cars.iter().map(|car| Foot::of(world, car)).collect();
     let shader = Shader {
         eye: &eye,
-        light: shot.light,
-        air: shot.air,
+        light: input.light,
+        air: input.air,
         pixel: camera.pixel,
         samples: 3.0,
         moving: &feet,

@@ -28,7 +28,7 @@ const TRIES: usize = 40;
 
 /// The camera's pose in a world.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stand {
+pub(super) struct Viewpoint {
     /// World (z up) from the camera.
     pub world_from_cam: Se3,
     /// Height above the ground below it, metres.
@@ -195,12 +195,12 @@ fn in_room(rng: &mut ChaCha8Rng, place: &BuiltWorld, s: f64) -> (f64, f64, f64) 
 
 /// Draws a free place for a camera among the traffic around `anchor`, metres along the street: not within a solid nor
 /// close to one, and not with most of its view within arm's length of one.
-pub(super) fn stand(
+pub(super) fn viewpoint(
     rng: &mut ChaCha8Rng,
     place: &BuiltWorld,
     (moving, anchor): (&[Primitive], f64),
     k: &Intrinsics,
-) -> Stand {
+) -> Viewpoint {
     let height = height(rng);
     let (mut pitch, roll) = tilt(rng, height);
     if !place.world.rooms.is_empty() {
@@ -209,15 +209,15 @@ pub(super) fn stand(
     }
     for _ in 0..TRIES {
         let (spot, ahead) = spot(rng, place, anchor);
-        let stand = pose(place, spot, (height, pitch, roll));
-        if is_free(place, moving, &stand.world_from_cam, k, ahead) {
-            return stand;
+        let viewpoint = pose(place, spot, (height, pitch, roll));
+        if is_free(place, moving, &viewpoint.world_from_cam, k, ahead) {
+            return viewpoint;
         }
     }
     // A lane is free of everything that stands, and from here on of dynamic objects.
     let lane = place.world.lanes().into_iter().find(|lane| lane.forward);
     let lateral = lane.map_or(-1.65, |lane| lane.lateral);
-    Stand {
+    Viewpoint {
         alone: true,
         ..pose(place, (anchor, lateral, 0.0), (height, pitch, roll))
     }
@@ -227,7 +227,7 @@ fn pose(
     place: &BuiltWorld,
     (s, lateral, turn): (f64, f64, f64),
     (height, pitch, roll): (f64, f64, f64),
-) -> Stand {
+) -> Viewpoint {
     let road = &place.world.road;
     let (x, y, heading) = road.world(s, lateral);
     let ground = if road.kerb_distance(&road.locate(x, y)) < 0.0 {
@@ -238,7 +238,7 @@ fn pose(
     // Camera axes (right, down, forward) in the vehicle's (forward, left, up).
     let axes = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let rotation = rotation(heading + turn, pitch, roll) * axes;
-    Stand {
+    Viewpoint {
         world_from_cam: Se3::from_parts(&rotation, Vector3::new(x, y, ground + height)),
         height,
         alone: false,

@@ -42,9 +42,9 @@ pub(super) fn weighted<T: Copy>(rng: &mut ChaCha8Rng, choices: &[(f64, T)]) -> T
 }
 
 /// A fast stream of approximately normal numbers for noise in pixels: the sum of four uniform ones.
-pub(super) struct Hiss(u64);
+pub(super) struct FastNoise(u64);
 
-impl Hiss {
+impl FastNoise {
     /// The stream of a seed.
     pub(super) fn new(seed: u64) -> Self {
         Self(mix(seed))
@@ -70,8 +70,8 @@ mod tests {
 
     #[test]
     fn hiss_is_standard() {
-        let mut hiss = Hiss::new(3);
-        let draws: Vec<f64> = (0..100_000).map(|_| f64::from(hiss.next())).collect();
+        let mut noise = FastNoise::new(3);
+        let draws: Vec<f64> = (0..100_000).map(|_| f64::from(noise.next())).collect();
         let mean = draws.iter().sum::<f64>() / 1e5;
         let variance = draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 1e5;
         assert!(

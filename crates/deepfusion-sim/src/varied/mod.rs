@@ -15,7 +15,7 @@ mod wet;
 
 use crate::Result;
 use crate::config::Scene;
-use crate::render::{self, Air, Cores, Edges, Shot};
+use crate::render::{self, Air, Cores, Edges, RenderInput};
 use built_world::BuiltWorld;
 use cache::Cache;
 pub use config::EndlessConfig;
@@ -97,7 +97,7 @@ impl Endless {
     #[must_use]
     pub fn view_sized(&self, index: u64, size: (u32, u32)) -> View {
         let config = &self.config;
-        let world_number = self.schedule.turn(index).world;
+        let world_number = self.schedule.view_at(index).world;
         let place = self
             .worlds
             .get(world_number, || BuiltWorld::build(config, world_number));
@@ -111,8 +111,8 @@ impl Endless {
         let mut cars = traffic.objects(world, 0.0);
         let indoors = !world.rooms.is_empty();
         let intrinsics = camera::intrinsics(&mut rng, size, indoors);
-        let stand = camera::stand(&mut rng, &place, (&moving, anchor), &intrinsics);
-        if stand.alone {
+        let viewpoint = camera::viewpoint(&mut rng, &place, (&moving, anchor), &intrinsics);
+        if viewpoint.alone {
             moving.clear();
             cars.clear();
         }
@@ -123,18 +123,18 @@ impl Endless {
         } else {
             weather::draw(&mut rng, world)
         };
-        let shot = Shot {
+        let input = RenderInput {
             world,
             light: &place.light,
             air: &air,
             cars: &cars,
-            world_from_cam: &stand.world_from_cam,
+            world_from_cam: &viewpoint.world_from_cam,
             intrinsics: &intrinsics,
         };
         let standing = world.primitives.iter().chain(&world.far);
         let solids = standing.chain(&moving).copied().collect();
-        let mut exposure = render::expose(&shot, solids, Cores::One, Edges::EachSurface);
-        wet::reflect(&shot, &mut exposure);
+        let mut exposure = render::expose(&input, solids, Cores::One, Edges::EachSurface);
+        wet::reflect(&input, &mut exposure);
 
         let mut rng = generator(config.seed, index, 0xF11);
         let brightness = match weather {
@@ -154,11 +154,11 @@ impl Endless {
             depth: exposure.depth,
             intrinsics,
             moving: exposure.moving,
-            world_from_cam: stand.world_from_cam,
+            world_from_cam: viewpoint.world_from_cam,
             world: world_number,
             scene: world.scene,
             weather,
-            height_m: stand.height,
+            height_m: viewpoint.height,
             grey: formed && formation.is_grey(),
         }
     }

@@ -11,7 +11,7 @@ pub(super) struct Schedule {
 
 /// A view of a world.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Turn {
+pub(super) struct ScheduledView {
     /// Number of the world, from 0.
     pub world: u64,
     /// Number of the view among those of its world.
@@ -28,10 +28,10 @@ impl Schedule {
     }
 
     /// The world and the view of an index.
-    pub(super) fn turn(&self, index: u64) -> Turn {
+    pub(super) fn view_at(&self, index: u64) -> ScheduledView {
         let (slot, round) = (index % self.worlds, index / self.worlds);
         let shifted = round + slot * self.views / self.worlds;
-        Turn {
+        ScheduledView {
             world: shifted / self.views * self.worlds + slot,
             view: shifted % self.views,
         }
@@ -46,14 +46,14 @@ mod tests {
     #[test]
     fn neighbours_are_of_different_worlds_and_each_world_has_its_views() {
         let schedule = Schedule::new(16, 24);
-        let turns: Vec<Turn> = (0..16 * 24 * 5).map(|i| schedule.turn(i)).collect();
+        let turns: Vec<ScheduledView> = (0..16 * 24 * 5).map(|i| schedule.view_at(i)).collect();
         for window in turns.windows(16) {
             let worlds: HashSet<u64> = window.iter().map(|t| t.world).collect();
             assert_eq!(worlds.len(), 16);
         }
         let mut seen: HashMap<u64, Vec<u64>> = HashMap::new();
-        for turn in &turns {
-            seen.entry(turn.world).or_default().push(turn.view);
+        for view in &turns {
+            seen.entry(view.world).or_default().push(view.view);
         }
         let whole = seen.values().filter(|views| views.len() == 24).count();
         assert!(whole >= 16 * 4);
@@ -66,10 +66,10 @@ mod tests {
     #[test]
     fn worlds_change_one_after_another() {
         let schedule = Schedule::new(16, 24);
-        let mut known: HashSet<u64> = (0..64).map(|i| schedule.turn(i).world).collect();
+        let mut known: HashSet<u64> = (0..64).map(|i| schedule.view_at(i).world).collect();
         for start in (64..64 + 16 * 48).step_by(16) {
             let new = (start..start + 16)
-                .filter(|i| known.insert(schedule.turn(*i).world))
+                .filter(|i| known.insert(schedule.view_at(*i).world))
                 .count();
             assert!(new <= 1, "{new} new worlds from view {start}");
         }

@@ -1,7 +1,7 @@
 //! Reflections of wet ground.
 
 use crate::primitive::V3;
-use crate::render::{Camera, Exposure, Shot, Surface};
+use crate::render::{Camera, Exposure, RenderInput, Surface};
 use crate::texture::Rgb;
 use crate::texture::noise::smoothstep;
 
@@ -13,16 +13,20 @@ const GRAZING: f32 = 0.55;
 
 /// Adds to the ground of a wet street what it mirrors: the picture's own colour in the mirrored direction, as if what
 /// is mirrored were far away, and the sky's where that is not in the picture. Depth is not touched.
-pub(super) fn reflect(shot: &Shot, exposure: &mut Exposure) {
-    let wet = shot.air.wet;
+pub(super) fn reflect(input: &RenderInput, exposure: &mut Exposure) {
+    let wet = input.air.wet;
     if wet <= 0.0 {
         return;
     }
-    let k = shot.intrinsics;
+    let k = input.intrinsics;
     let (width, height) = (k.width as usize, k.height as usize);
-    let camera = Camera::new(shot.world_from_cam, k);
-    let cam_from_world = shot.world_from_cam.rotation().transpose().map(|x| x as f32);
-    let eye = shot.world_from_cam.translation();
+    let camera = Camera::new(input.world_from_cam, k);
+    let cam_from_world = input
+        .world_from_cam
+        .rotation()
+        .transpose()
+        .map(|x| x as f32);
+    let eye = input.world_from_cam.translation();
     let source = exposure.light.clone();
     for v in 0..height {
         for u in 0..width {
@@ -35,7 +39,7 @@ pub(super) fn reflect(shot: &Shot, exposure: &mut Exposure) {
             let place = (eye.x as f32 + d.x * hit.t, eye.y as f32 + d.y * hit.t);
             // Puddles and films: where water stands, in the ground's own coordinates.
             let minor = hit.t / k.fx as f32;
-            let stands = shot
+            let stands = input
                 .world
                 .noise
                 .fractal(place.0 + 31.0, place.1, 3.1, 3, 0.5, minor);
@@ -51,8 +55,8 @@ pub(super) fn reflect(shot: &Shot, exposure: &mut Exposure) {
                 &(cam_from_world * up),
                 k,
             )
-            .unwrap_or_else(|| shot.air.radiance(&shot.world.noise, &up));
-            let kept = shot
+            .unwrap_or_else(|| input.air.radiance(&input.world.noise, &up));
+            let kept = input
                 .air
                 .fog
                 .map_or(1.0, |fog| (-fog.extinction * hit.t * length).exp());

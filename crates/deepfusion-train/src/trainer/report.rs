@@ -1,7 +1,7 @@
 //! What a run says of itself, and its checkpoints.
 
 use super::Trainer;
-use super::step::Shown;
+use super::step::PanelInput;
 use super::validation::validation_loss;
 use crate::focal_spread::focal_spread;
 use crate::selection::selection;
@@ -9,7 +9,7 @@ use crate::{CheckpointKind, Checkpoints, Control, Error, TrainEvent};
 use deepfusion_model::LearnedCamera;
 
 /// Said where the spread is large.
-const CAMERA_NOT_TOLD: &str = "the drives do not tell the camera's focal length: without turns (and, with the turns of a network, without strong ones) \
+const CAMERA_UNRELIABLE: &str = "the drives do not determine the camera's focal length: without turns (and, with the turns of a network, without strong ones) \
      another focal length explains the images as well; depth of what is not straight ahead is not to be relied on, nor its metres";
 /// Below this share of pixels in view the geometry has diverged: a warning.
 const MIN_VALID_SHARE: f64 = 0.2;
@@ -21,7 +21,7 @@ impl Trainer {
     pub(super) fn report(
         &mut self,
         listen: &mut dyn FnMut(TrainEvent) -> Control,
-        shown: Option<Shown>,
+        shown: Option<PanelInput>,
         [valid_share, moving_share]: [f64; 2],
         validate: bool,
     ) -> Result<(), Error> {
@@ -101,8 +101,8 @@ impl Trainer {
         self.folder
             .write_config(&self.folder.read_settings()?, &findings)?;
         listen(TrainEvent::Camera { camera, learned });
-        if !learned.is_told() {
-            let message = CAMERA_NOT_TOLD.to_owned();
+        if !learned.is_reliable() {
+            let message = CAMERA_UNRELIABLE.to_owned();
             listen(TrainEvent::Warning { step, message });
         }
         Ok(())

@@ -46,7 +46,7 @@ impl Trainer {
         self.config.learning_rate * rise * factor
     }
 
-    /// A step of the optimiser at the focal length's own step size, as far into its schedule as the networks'.
+    /// A step of the optimiser at the focal length's own learning rate, as far into its schedule as the networks'.
     pub(super) fn focal_step(&self, step: AdamStep) -> AdamStep {
         let own = self.config.learned_camera();
         let share = f64::from(step.learning_rate) / self.config.learning_rate;

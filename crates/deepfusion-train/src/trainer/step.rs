@@ -2,7 +2,7 @@
 
 use super::{FOCAL, Trainer};
 use crate::model::displacement_ratio;
-use crate::workers::Crew;
+use crate::workers::WorkerGroup;
 use crate::{
     BatchLoader, BatchLoss, DepthBatch, DepthLoader, DepthPass, Error, ForwardPass, LossTerms,
     Model, NamedGradients, SamplePanel, SampleSet, Schedule, TrainConfig,
@@ -13,8 +13,8 @@ use deepfusion_nn::ops::autocast;
 
 impl Trainer {
     /// Losses and gradients of this worker's part of a step: the means over its `accumulate` batches.
-    pub(super) fn learn(&self, loaders: &Loaders, schedule: Schedule) -> Result<Learned, Error> {
-        let mut learned = Learned::default();
+    pub(super) fn learn(&self, loaders: &Loaders, schedule: Schedule) -> Result<WorkerStep, Error> {
+        let mut learned = WorkerStep::default();
         let scale = 1.0 / self.config.accumulate as f64;
         for _ in 0..self.config.accumulate {
             if let Some(loader) = &loaders.video {
@@ -37,7 +37,7 @@ impl Trainer {
                 // The pass's first target is the batch's first sample.
                 let shown = batch.names.first().cloned().unwrap_or_default();
                 learned.names.extend(batch.names);
-                learned.panel = Some(Shown::View(Box::new((pass, loss, shown))));
+                learned.panel = Some(PanelInput::View(Box::new((pass, loss, shown))));
             }
             if let Some(loader) = &loaders.depth {
                 let batch = next(|| loader.next(&self.device))?;
@@ -51,7 +51,7 @@ impl Trainer {
                 self.add_gradients(&mut learned.gradients, &pass.total, scale);
                 learned.names.extend(batch.names.iter().cloned());
                 let panel = learned.panel.take();
-                learned.panel = panel.or(Some(Shown::Depth(Box::new((pass, batch)))));
+                learned.panel = panel.or(Some(PanelInput::Depth(Box::new((pass, batch)))));
             }
         }
         Ok(learned)
@@ -118,7 +118,7 @@ impl Loaders {
         config: &TrainConfig,
         set: &SampleSet,
         step: usize,
-        workers: &Crew,
+        workers: &WorkerGroup,
     ) -> Self {
         let (rank, count) = (workers.rank(), workers.count());
         let first = step * config.accumulate * count + rank;
@@ -134,13 +134,13 @@ impl Loaders {
 
 /// What a worker has learned from its part of a step.
 #[derive(Default)]
-pub(super) struct Learned {
+pub(super) struct WorkerStep {
     pub(super) gradients: NamedGradients,
     pub(super) losses: LossTerms,
     /// Drives and frames.
     pub(super) names: Vec<String>,
     pub(super) images: usize,
-    pub(super) panel: Option<Shown>,
+    pub(super) panel: Option<PanelInput>,
     pub(super) monitors: Monitors,
 }
 
@@ -153,12 +153,12 @@ pub(super) struct Monitors {
 }
 
 /// What a panel shows.
-pub(super) enum Shown {
+pub(super) enum PanelInput {
     View(Box<(ForwardPass, BatchLoss, String)>),
     Depth(Box<(DepthPass, DepthBatch)>),
 }
 
-impl Shown {
+impl PanelInput {
     pub(super) fn panel(self) -> SamplePanel {
         match self {
             Self::View(parts) => {

@@ -1,4 +1,4 @@
-//! What names a live source, and how ffmpeg is told of it.
+//! What names a live source, and how it is passed to ffmpeg.
 
 use crate::{Error, Result};
 use std::fmt;
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn addresses_are_told_from_files() {
+    fn addresses_are_distinguished_from_files() {
         for live in [
             "-",
             "camera:0",

@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Lines of ffmpeg's complaints that are kept: the last ones tell why it ended.
+/// Lines of ffmpeg's complaints that are kept: the last ones say why it ended.
 const LINES: usize = 6;
 /// How long an ffmpeg that has closed its pipe may take to end.
 const GRACE: Duration = Duration::from_secs(2);
@@ -30,7 +30,7 @@ pub(super) struct Ffmpeg {
 
 /// How an ffmpeg ended.
 #[derive(Debug)]
-pub(super) struct End {
+pub(super) struct FfmpegExit {
     code: Option<i32>,
     said: Vec<String>,
 }
@@ -94,7 +94,7 @@ impl Ffmpeg {
     }
 
     /// Waits for its end after its pipe was closed, and sees to it where it takes too long.
-    pub(super) fn end(&mut self) -> End {
+    pub(super) fn end(&mut self) -> FfmpegExit {
         let begun = Instant::now();
         let mut code = None;
         while begun.elapsed() < GRACE {
@@ -109,7 +109,7 @@ impl Ffmpeg {
             std::thread::sleep(Duration::from_millis(5));
         }
         let said = self.said();
-        End { code, said }
+        FfmpegExit { code, said }
     }
 
     /// Its last words so far.
@@ -182,7 +182,7 @@ const LOSSES: [&str; 7] = [
     "Error during demuxing",
 ];
 
-impl End {
+impl FfmpegExit {
     /// Whether it ended because its source did.
     pub(super) fn is_clean(&self) -> bool {
         self.code == Some(0) && !self.said_one_of(&LOSSES)
@@ -200,7 +200,7 @@ impl End {
     }
 
     /// Its exit code and last words.
-    pub(super) fn told(&self) -> String {
+    pub(super) fn text(&self) -> String {
         let code = match self.code {
             Some(code) => format!("ended with code {code}"),
             None => "was ended".into(),
@@ -222,15 +222,15 @@ pub(super) fn quoted(said: &[String]) -> String {
 mod tests {
     use super::*;
 
-    fn end(code: i32, said: &[&str]) -> End {
-        End {
+    fn end(code: i32, said: &[&str]) -> FfmpegExit {
+        FfmpegExit {
             code: Some(code),
             said: said.iter().map(|s| (*s).to_owned()).collect(),
         }
     }
 
     #[test]
-    fn a_loss_is_told_from_an_end() {
+    fn a_loss_is_distinguished_from_an_end() {
         assert!(end(0, &[]).is_clean());
         assert!(end(0, &["[h264 @ 0x1] error while decoding MB 12 3"]).is_clean());
         assert!(!end(1, &[]).is_clean());

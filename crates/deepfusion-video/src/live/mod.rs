@@ -12,15 +12,16 @@ mod slot;
 pub use address::Address;
 pub use slot::LiveFrame;
 
-use self::ffmpeg::{End, Ffmpeg, quoted};
-use self::slot::Got;
+use self::ffmpeg::{Ffmpeg, FfmpegExit, quoted};
+use self::slot::SlotState;
 use crate::{Error, Result};
+use deepfusion_hint::count_of;
 use std::path::PathBuf;
 use std::time::Duration;
 
 /// What [`LiveSource::take`] found.
 #[derive(Debug)]
-pub enum Taken {
+pub enum NextFrame {
     /// The newest frame.
     Frame(LiveFrame),
     /// None came while it waited.
@@ -68,13 +69,13 @@ impl LiveSource {
     /// # Errors
     /// [`Error::Program`] where the connection is refused or lost, nothing comes for the timeout, or the frames change
     /// their size; it says how many frames had come, and what ffmpeg said.
-    pub fn take(&mut self, wait: Duration) -> Result<Taken> {
+    pub fn take(&mut self, wait: Duration) -> Result<NextFrame> {
         match self.ffmpeg.slot().take(wait) {
-            Got::Frame(frame) => {
+            SlotState::Frame(frame) => {
                 let size = frame.image.dimensions();
                 let first = *self.size.get_or_insert(size);
                 if first == size {
-                    return Ok(Taken::Frame(frame));
+                    return Ok(NextFrame::Frame(frame));
                 }
                 let ((w, h), (width, height)) = (first, size);
                 Err(self.error(
@@ -82,34 +83,34 @@ impl LiveSource {
                     "start again: a camera of another size has other intrinsics",
                 ))
             }
-            Got::Nothing { silence } if silence >= self.timeout => Err(self.silent()),
-            Got::Nothing { .. } => Ok(Taken::NotYet),
-            Got::Closed(problem) => self.ended(problem),
+            SlotState::Nothing { silence } if silence >= self.timeout => Err(self.silent()),
+            SlotState::Nothing { .. } => Ok(NextFrame::NotYet),
+            SlotState::Closed(problem) => self.ended(problem),
         }
     }
 
     /// The pipe was closed: by the stream's end, or by what went wrong.
-    fn ended(&mut self, problem: Option<String>) -> Result<Taken> {
+    fn ended(&mut self, problem: Option<String>) -> Result<NextFrame> {
         let end = self.ffmpeg.end();
         let came = self.ffmpeg.slot().arrived();
         if came == 0 && !self.old_names && end.knows_no_option() {
             // The arguments are looked at before anything is opened: the source has not noticed.
             self.old_names = true;
             self.ffmpeg = Ffmpeg::start(&self.address, true)?;
-            return Ok(Taken::NotYet);
+            return Ok(NextFrame::NotYet);
         }
         if let Some(problem) = problem {
             return Err(self.error(problem, "a newer ffmpeg may know the stream better"));
         }
         if came > 0 && end.is_clean() && self.address.may_end() {
-            return Ok(Taken::Ended);
+            return Ok(NextFrame::Ended);
         }
-        let told = match came {
+        let happened = match came {
             0 => "gave no frame".to_owned(),
-            n => format!("lost the connection after {}", frames(n)),
+            n => format!("lost the connection after {}", count_of(n, "frame")),
         };
         Err(self.error(
-            format!("{told}: {}", self.address.without_password(&end.told())),
+            format!("{happened}: {}", self.address.without_password(&end.text())),
             remedy(&self.address, came, &end),
         ))
     }
@@ -118,7 +119,7 @@ impl LiveSource {
     fn silent(&self) -> Error {
         let before = match self.ffmpeg.slot().arrived() {
             0 => String::new(),
-            n => format!(", after {}", frames(n)),
+            n => format!(", after {}", count_of(n, "frame")),
         };
         let said = self.address.without_password(&quoted(&self.ffmpeg.said()));
         let seconds = self.timeout.as_secs_f64();
@@ -138,14 +139,7 @@ impl LiveSource {
     }
 }
 
-fn frames(n: u64) -> String {
-    match n {
-        1 => "1 frame".into(),
-        n => format!("{n} frames"),
-    }
-}
-
-fn remedy(address: &Address, came: u64, end: &End) -> &'static str {
+fn remedy(address: &Address, came: u64, end: &FfmpegExit) -> &'static str {
     if came > 0 {
         return "what was written is whole; start again when the source is back";
     }

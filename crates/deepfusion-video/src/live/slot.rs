@@ -38,7 +38,7 @@ struct State {
 
 /// What a slot had.
 #[derive(Debug)]
-pub(super) enum Got {
+pub(super) enum SlotState {
     Frame(LiveFrame),
     Nothing {
         /// How long there has been none, taken or not.
@@ -90,15 +90,15 @@ impl Slot {
         self.changed.notify_all();
     }
 
-    /// Takes the frame out, waiting no longer than `wait` for one. What is left is given before the end is told.
-    pub(super) fn take(&self, wait: Duration) -> Got {
+    /// Takes the frame out, waiting no longer than `wait` for one. What is left is given before the end is reported.
+    pub(super) fn take(&self, wait: Duration) -> SlotState {
         let empty = |state: &mut State| state.newest.is_none() && state.closed.is_none();
         let waited = self.changed.wait_timeout_while(self.lock(), wait, empty);
         let (mut state, _) = waited.unwrap_or_else(|e| e.into_inner());
         match (state.newest.take(), &state.closed) {
-            (Some(frame), _) => Got::Frame(frame),
-            (None, Some(problem)) => Got::Closed(problem.clone()),
-            (None, None) => Got::Nothing {
+            (Some(frame), _) => SlotState::Frame(frame),
+            (None, Some(problem)) => SlotState::Closed(problem.clone()),
+            (None, None) => SlotState::Nothing {
                 silence: state.last.elapsed(),
             },
         }
@@ -125,7 +125,7 @@ mod tests {
 
     fn frame(slot: &Slot) -> LiveFrame {
         match slot.take(Duration::ZERO) {
-            Got::Frame(frame) => frame,
+            SlotState::Frame(frame) => frame,
             other => panic!("{other:?}"),
         }
     }
@@ -141,7 +141,10 @@ mod tests {
         let newest = frame(&slot);
         assert_eq!((newest.number, newest.dropped), (200, 200));
         assert_eq!(newest.image, picture(200));
-        assert!(matches!(slot.take(Duration::ZERO), Got::Nothing { .. }));
+        assert!(matches!(
+            slot.take(Duration::ZERO),
+            SlotState::Nothing { .. }
+        ));
         slot.put(picture(201));
         let next = frame(&slot);
         assert_eq!((next.number, next.dropped), (201, 200));
@@ -155,8 +158,8 @@ mod tests {
         slot.close(None);
         slot.close(Some("later".into()));
         assert_eq!(frame(&slot).number, 0);
-        assert!(matches!(slot.take(Duration::MAX), Got::Closed(None)));
-        assert!(matches!(slot.take(Duration::MAX), Got::Closed(None)));
+        assert!(matches!(slot.take(Duration::MAX), SlotState::Closed(None)));
+        assert!(matches!(slot.take(Duration::MAX), SlotState::Closed(None)));
     }
 
     #[test]
@@ -165,10 +168,13 @@ mod tests {
         std::thread::scope(|scope| {
             let waiting = scope.spawn(|| slot.take(Duration::from_secs(60)));
             slot.put(picture(1));
-            assert!(matches!(waiting.join().unwrap(), Got::Frame(_)));
+            assert!(matches!(waiting.join().unwrap(), SlotState::Frame(_)));
             let waiting = scope.spawn(|| slot.take(Duration::from_secs(60)));
             slot.close(Some("broken".into()));
-            assert!(matches!(waiting.join().unwrap(), Got::Closed(Some(_))));
+            assert!(matches!(
+                waiting.join().unwrap(),
+                SlotState::Closed(Some(_))
+            ));
         });
     }
 }

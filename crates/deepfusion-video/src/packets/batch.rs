@@ -177,7 +177,7 @@ enum Source<'a> {
     Bytes(&'a [u8]),
 }
 
-/// Runs it on a file of packets; what it complains of tells whether all is well.
+/// Runs it on a file of packets; what it complains of says whether all is well.
 fn ffmpeg(codec: Codec, source: &Source<'_>, (of, folder): (&Path, &Path)) -> Result<Printed> {
     let (name, bytes) = match source {
         Source::File(name) => (*name, None),
@@ -224,7 +224,7 @@ fn ffmpeg(codec: Codec, source: &Source<'_>, (of, folder): (&Path, &Path)) -> Re
         });
         let arguments: Vec<&OsStr> = arguments.iter().map(OsStr::new).collect();
         let printed = outcome("ffmpeg", &arguments, (of, READ), folder, bytes)?;
-        // Before ffmpeg 5.1, which `in_either_words` tells by this.
+        // Before ffmpeg 5.1, which `in_either_words` recognises by this.
         if !printed.succeeded && printed.complaint.contains("fps_mode") {
             return Err(Error::Program {
                 path: PathBuf::from(of),

@@ -73,7 +73,7 @@ impl Codec {
         }
     }
 
-    /// ffmpeg's decoder, where an IVF file does not tell: those two codecs are not usual in one.
+    /// ffmpeg's decoder, where an IVF file does not say it: those two codecs are not usual in one.
     pub(super) fn decoder(self) -> Option<&'static str> {
         match self {
             Self::H264 => Some("h264"),
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn key_frames_are_told_by_their_headers() {
+    fn key_frames_are_recognised_by_their_headers() {
         let start = [0, 0, 0, 1];
         let of = |kinds: &[u8]| -> Vec<u8> {
             kinds

@@ -1,4 +1,4 @@
-//! What of H.264 tells that a packet is missing, or that pictures change places: the count of its frames and the kind of its slices
+//! What of H.264 shows that a packet is missing, or that pictures change places: the count of its frames and the kind of its slices
 //! (ITU-T H.264, 7.3.2.1 and 7.3.3). ffmpeg conceals the one and allows the other.
 
 use super::nal::units;
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn a_count_that_jumps_tells_of_a_gap() {
+    fn a_count_that_jumps_shows_a_gap() {
         let first = |gaps| {
             let mut watch = Watch::default();
             let packet = [baseline(gaps), picture(0, 0x65, 0)].concat();

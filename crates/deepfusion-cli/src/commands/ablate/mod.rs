@@ -123,7 +123,7 @@ fn new_plan(args: &AblateArgs) -> Result<Plan> {
         None => {
             let preset = args.preset.unwrap_or(Preset::Light);
             let mut config = preset.config_on(args.device.compute());
-            // A measured motion in the warp would teach the rows without the speed loss, too; and masks of what moves
+            // A measured motion in the warp would teach the rows without the speed loss, too; and masks of dynamic pixels
             // are no part of the flow loss.
             config.view_motion = ViewMotion::PoseNet;
             config.loss.moving.enabled = false;
@@ -348,10 +348,13 @@ fn write_tables(out: &Path, plan: &Plan, results: &[RunResult]) -> Result<()> {
         the seven metrics unscaled, abs_rel_scaled after median scaling; parameters of the depth network\n",
         plan.budget
     ));
-    if let Some(trivial) = results.iter().find_map(|r| r.report.trivial.as_ref()) {
+    if let Some(mean_depth_baseline) = results
+        .iter()
+        .find_map(|r| r.report.mean_depth_baseline.as_ref())
+    {
         text.push_str(&format!(
             "mean-depth baseline: abs_rel {:.3} unscaled, {:.3} median-scaled\n",
-            trivial.unscaled.abs_rel, trivial.median_scaled.abs_rel
+            mean_depth_baseline.unscaled.abs_rel, mean_depth_baseline.median_scaled.abs_rel
         ));
     }
     write(&out.join("table.txt"), &text)?;

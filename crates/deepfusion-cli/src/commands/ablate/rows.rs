@@ -62,7 +62,7 @@ impl Row {
 
     /// The settings of the row, from those that all rows share. It differs from them by its parts alone: the pose used
     /// for warping is the same in every row, so that what a row without the speed loss lacks is that loss. Only the
-    /// masks of what moves go with the flow, which they are made of.
+    /// masks of dynamic pixels go with the flow, which they are made of.
     ///
     /// # Errors
     /// [`Error::Config`] where the shared settings and the row's cannot be together.
@@ -149,7 +149,7 @@ mod tests {
         }
     }
 
-    /// Masks of what moves that all rows share are made of the flow: without it they are off.
+    /// Masks of dynamic pixels that all rows share are made of the flow: without it they are off.
     #[test]
     fn masks_go_with_the_flow_that_they_are_made_of() {
         let shared = shared(Preset::Paper);

@@ -17,9 +17,9 @@ use deepfusion_train::{TrainSummary, Trainer};
 
 use self::folders::Folders;
 use self::outcome::Outcome;
-use super::outlook::Outlook;
 use super::recordings::{open_recordings, open_samples};
 use super::start::Start;
+use super::time_estimate::TimeEstimate;
 use super::{clocks, device, train};
 use crate::cli::{AdaptArgs, EngineArgs};
 use crate::error::CliError;
@@ -170,6 +170,6 @@ fn learn(
             })?
         }
     };
-    let outlook = Outlook::new(trainer.config().clone(), args.device.compute());
-    train::train(&mut trainer, Some(outlook))
+    let time_estimate = TimeEstimate::new(trainer.config().clone(), args.device.compute());
+    train::train(&mut trainer, Some(time_estimate))
 }

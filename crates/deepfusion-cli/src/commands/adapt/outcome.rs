@@ -3,7 +3,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use deepfusion_eval::verdict::{Check, Verdict, Worse};
+use deepfusion_eval::verdict::{Check, Verdict, WorsenedCheck};
+use deepfusion_hint::count_of;
 use serde::Serialize;
 
 use crate::error::CliError;
@@ -23,7 +24,7 @@ pub(super) struct Outcome {
     /// Whether it may take the given one's place.
     pub kept: bool,
     /// The checks that became worse.
-    pub worse: Vec<Worse>,
+    pub worse: Vec<WorsenedCheck>,
     /// The given network on the held-out frames.
     pub before: Verdict,
     /// The adapted one on the same.
@@ -62,7 +63,7 @@ impl Outcome {
             return None;
         }
         let rows = self.worse.iter().map(|worse| {
-            let Worse {
+            let WorsenedCheck {
                 check,
                 before,
                 after,
@@ -77,7 +78,7 @@ impl Outcome {
         Some(CliError::Refused {
             path: self.run.clone(),
             worse: if worse.is_empty() {
-                "the frames that are held out tell nothing of it any more".into()
+                "the frames that are held out say nothing about it any more".into()
             } else {
                 worse.join(", ")
             },
@@ -98,13 +99,16 @@ impl fmt::Display for Outcome {
         writeln!(
             f,
             "{:<36}{:>10}{:>10}",
-            format!("held out ({} frames)", self.after.without_truth.frames),
+            format!(
+                "held out ({})",
+                count_of(self.after.without_truth.frames, "frame")
+            ),
             "before",
             "after"
         )?;
         let mut row = |name: &str, before: Option<String>, after: Option<String>| {
-            let told = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
-            writeln!(f, "{name:<36}{:>10}{:>10}", told(before), told(after))
+            let shown = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
+            writeln!(f, "{name:<36}{:>10}{:>10}", shown(before), shown(after))
         };
         for check in [
             Check::Reprojection,

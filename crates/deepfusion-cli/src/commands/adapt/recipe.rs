@@ -12,7 +12,7 @@ use deepfusion_runtime::DepthEstimator;
 use crate::cli::AdaptArgs;
 use crate::failure::Result;
 
-/// Steps over which the step size rises: the optimiser knows nothing of the gradients' sizes yet.
+/// Steps over which the learning rate rises: the optimiser knows nothing of the gradients' sizes yet.
 const WARMUP: usize = 30;
 /// Simulated worlds that no recipe has used.
 const SEED: u64 = 91;

@@ -292,7 +292,7 @@ impl Bench {
         let mut least: Vec<(String, f64)> = Vec::new();
         for _ in 0..repeats {
             let Some(steps) = runner.profile(&input) else {
-                tracing::warn!("only the fused engine tells what its steps take");
+                tracing::warn!("only the fused engine can time its steps");
                 break;
             };
             let steps = steps
@@ -363,7 +363,7 @@ fn median<T>(repeats: usize, mut work: impl FnMut() -> Result<T>) -> Result<f64>
     Ok(times[times.len() / 2])
 }
 
-/// The most memory this process ever had, where the system tells (Linux).
+/// The most memory this process ever had, where the system reports it (Linux).
 pub(super) fn peak_rss_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;

@@ -2,7 +2,7 @@
 
 mod page;
 mod pictures;
-mod told;
+mod summary;
 
 use deepfusion_calibrate::{Board, Calibration, Error, LEAST_VIEWS, calibrate};
 use deepfusion_data::{Lens, camera_info_yaml};
@@ -16,9 +16,9 @@ use crate::progress::say;
 
 use pictures::{LeftOut, Seen};
 
-/// What is told of a calibration.
+/// What is reported of a calibration.
 #[derive(Debug, Serialize)]
-struct Told<'a> {
+struct Report<'a> {
     #[serde(flatten)]
     calibration: &'a Calibration,
     /// Names of `coefficients`.
@@ -65,7 +65,7 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
     let name = output::name_of(args.inputs[0].as_ref());
     let yaml = camera_info_yaml(&name, &found.intrinsics, &lens, &warnings(&found, &board));
     output::write(&args.out, yaml)?;
-    let told = Told {
+    let report = Report {
         calibration: &found,
         coefficient_names: found.model.coefficients(),
         board,
@@ -75,16 +75,16 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
         written: &args.out,
     };
     if let Some(path) = &args.report {
-        page::write(path, &told, &seen.views)?;
+        page::write(path, &report, &seen.views)?;
         say(&format!("report    {}", path.display()));
     }
     for warning in &found.warnings {
         tracing::warn!("{warning}");
     }
     if args.json {
-        return output::print_json(&told);
+        return output::print_json(&report);
     }
-    output::print(&told::text(&told))?;
+    output::print(&summary::text(&report))?;
     say(&format!(
         "use it: deepfusion predict --calib {} IMAGES --out DIR, or as calibration.yaml in a drive's folder",
         args.out.display()

@@ -7,7 +7,7 @@ use deepfusion_data::RgbImage;
 use deepfusion_render::{HtmlReport, PictureFormat};
 use image::Rgb;
 
-use super::{Told, told};
+use super::{Report, summary};
 use crate::commands::run_report;
 use crate::failure::Result;
 
@@ -15,10 +15,11 @@ use crate::failure::Result;
 const WIDTH: u32 = 720;
 
 /// Writes it.
-pub(super) fn write(path: &Path, told: &Told, views: &[View]) -> Result<()> {
-    let found = told.calibration;
-    let subtitle = format!("{}, error {:.3} px", told.written.display(), found.rms_px);
-    let mut page = HtmlReport::new("Camera calibration", subtitle).properties(&told::rows(told));
+pub(super) fn write(path: &Path, report: &Report, views: &[View]) -> Result<()> {
+    let found = report.calibration;
+    let subtitle = format!("{}, error {:.3} px", report.written.display(), found.rms_px);
+    let mut page =
+        HtmlReport::new("Camera calibration", subtitle).properties(&summary::rows(report));
     if !found.warnings.is_empty() {
         page = page
             .section("What would make it surer")
@@ -26,7 +27,7 @@ pub(super) fn write(path: &Path, told: &Told, views: &[View]) -> Result<()> {
     }
     page = page.section("Where corners were seen").picture(
         "All corners of the views used, in the image; those of views left out are red",
-        &corners(told, views),
+        &corners(report, views),
         PictureFormat::Png,
     )?;
     let number =
@@ -53,12 +54,12 @@ pub(super) fn write(path: &Path, told: &Told, views: &[View]) -> Result<()> {
 }
 
 /// The image's frame, with a dot for each corner.
-fn corners(told: &Told, views: &[View]) -> RgbImage {
-    let camera = &told.calibration.intrinsics;
+fn corners(report: &Report, views: &[View]) -> RgbImage {
+    let camera = &report.calibration.intrinsics;
     let scale = f64::from(WIDTH) / f64::from(camera.width);
     let height = ((f64::from(camera.height) * scale).round() as u32).max(1);
     let mut picture = RgbImage::from_pixel(WIDTH, height, Rgb([246, 246, 246]));
-    for (view, fit) in views.iter().zip(&told.calibration.views) {
+    for (view, fit) in views.iter().zip(&report.calibration.views) {
         let colour = if fit.used {
             [31, 119, 180]
         } else {

@@ -3,8 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use deepfusion_calibrate::{Board, Candidate, Error, Look, View, find_board, pick, sharpness};
+use deepfusion_calibrate::{
+    Board, BoardDetection, Candidate, Error, View, find_board, pick, sharpness,
+};
 use deepfusion_data::{OpenOptions, load_photo, load_rgb};
+use deepfusion_hint::count_of;
 use deepfusion_jobs::find_inputs;
 use deepfusion_video::VideoFrames;
 use image::GrayImage;
@@ -102,7 +105,7 @@ impl Seen {
     fn look_at_pictures(&mut self, files: &[PathBuf], board: &Board) -> Result<()> {
         let mut progress = Progress::new("looking for the board");
         for (done, batch) in files.chunks(BATCH).enumerate() {
-            let looked: Vec<Result<(GrayImage, u8, Look)>> = batch
+            let looked: Vec<Result<(GrayImage, u8, BoardDetection)>> = batch
                 .par_iter()
                 .map(|file| {
                     let photo = load_photo(file)?;
@@ -117,7 +120,7 @@ impl Seen {
                 self.fits(&name, image.dimensions(), orientation)?;
                 self.looked_at += 1;
                 match look {
-                    Look::Board(corners) => self.views.push(View { name, corners }),
+                    BoardDetection::Board(corners) => self.views.push(View { name, corners }),
                     other => self.leave_out(name, &other, board),
                 }
             }
@@ -133,7 +136,7 @@ impl Seen {
         let frames = video.count();
         let parts = frames.min(PARTS);
         let name = file.display().to_string();
-        say(&format!("{name}: {frames} frames"));
+        say(&format!("{name}: {}", count_of(frames, "frame")));
         if frames > 0 {
             // The first look decodes all of them.
             video.frame(0)?;
@@ -143,7 +146,7 @@ impl Seen {
         let mut candidates: Vec<(Candidate, String)> = Vec::new();
         let numbers: Vec<usize> = (0..parts).collect();
         for batch in numbers.chunks(BATCH) {
-            let looked: Vec<Result<(usize, GrayImage, f64, Look)>> = batch
+            let looked: Vec<Result<(usize, GrayImage, f64, BoardDetection)>> = batch
                 .par_iter()
                 .map(|i| {
                     let (number, image, sharp) = sharpest(&video, part(*i))?;
@@ -157,7 +160,7 @@ impl Seen {
                 self.fits(&name, image.dimensions(), 1)?;
                 self.looked_at += 1;
                 match look {
-                    Look::Board(corners) => {
+                    BoardDetection::Board(corners) => {
                         let candidate = Candidate { corners, sharpness };
                         candidates.push((candidate, name));
                     }
@@ -208,9 +211,9 @@ impl Seen {
         Ok(())
     }
 
-    fn leave_out(&mut self, name: String, look: &Look, board: &Board) {
+    fn leave_out(&mut self, name: String, look: &BoardDetection, board: &Board) {
         let why = match look {
-            Look::Other {
+            BoardDetection::Other {
                 columns,
                 rows,
                 corners,

@@ -207,7 +207,10 @@ fn report(
 ) -> Result<()> {
     let number = |v: f64| format!("{v:.3}");
     let (before, after) = (&at_first_sight.report, &learned.report);
-    let trivial = after.trivial.as_ref().map(|t| t.unscaled.abs_rel);
+    let mean_depth_baseline = after
+        .mean_depth_baseline
+        .as_ref()
+        .map(|t| t.unscaled.abs_rel);
     let mut page = HtmlReport::new(
         "DeepFusion: metric depth from one camera and a speed signal",
         "A simulated street that the embedded network has never seen: at first sight, and after learning on its first part from \
@@ -216,7 +219,7 @@ fn report(
     .facts(&[
         ("Abs Rel at first sight", &number(before.unscaled.abs_rel)),
         ("after learning", &number(after.unscaled.abs_rel)),
-        ("mean-depth baseline", &trivial.map_or("-".into(), number)),
+        ("mean-depth baseline", &mean_depth_baseline.map_or("-".into(), number)),
         ("scale (1 is metric)", &number(after.scale.median)),
         ("first image to depth", &format!("{first_ms:.0} ms")),
         ("time", &clock(demo.start.elapsed().as_secs_f64())),

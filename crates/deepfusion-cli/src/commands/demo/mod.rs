@@ -33,7 +33,7 @@ use crate::{engine, interrupt, output};
 /// Far from any seed a user is likely to choose for training.
 const TEST_SEED: u64 = 1_000_003;
 
-/// What is told of one that was stopped.
+/// Its name in the message that it was stopped.
 const DEMO: &str = "the demo";
 
 /// `deepfusion demo`.

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use deepfusion_doctor::{Outcome, Severity, Status};
+use deepfusion_hint::count_of;
 
 /// A check and the drive it looked at; no drive where it looked at the whole recording.
 type Checked<'a> = (Option<&'a str>, &'a Outcome);
@@ -26,13 +27,13 @@ pub(super) fn rows<'a>(checks: &[Checked<'a>]) -> Vec<(&'a str, String)> {
     }
     let row = |name: &'a str| {
         let of_name = checks.iter().filter(|(_, outcome)| outcome.check == name);
-        (name, told(&of_name.copied().collect::<Vec<_>>()))
+        (name, summary(&of_name.copied().collect::<Vec<_>>()))
     };
     names.into_iter().map(row).collect()
 }
 
 /// How one check came out.
-fn told(checks: &[Checked<'_>]) -> String {
+fn summary(checks: &[Checked<'_>]) -> String {
     if let [(_, only)] = checks {
         return match (only.status(), &only.skipped) {
             (Status::Ok, None) => "ok".into(),
@@ -82,8 +83,7 @@ fn counts(outcome: &Outcome) -> String {
         let of_kind = outcome.findings.iter().filter(|f| f.severity == severity);
         match of_kind.count() {
             0 => None,
-            1 => Some(format!("1 {severity}")),
-            n => Some(format!("{n} {severity}s")),
+            n => Some(count_of(n, &severity.to_string())),
         }
     });
     counted.collect::<Vec<_>>().join(", ")

@@ -34,13 +34,13 @@ struct Tool {
     what: String,
 }
 
-/// Tells it.
+/// Prints it.
 pub(super) fn run(json: bool) -> Result<()> {
     let machine = Machine::look();
     if json {
         output::print_json(&machine)
     } else {
-        output::print(&machine.told())
+        output::print(&machine.text())
     }
 }
 
@@ -61,7 +61,7 @@ impl Machine {
         }
     }
 
-    fn told(&self) -> String {
+    fn text(&self) -> String {
         let mut text = format!("deepfusion {}\n", self.version);
         let mut line = |name: &str, what: String| {
             let _ = writeln!(text, "{name:14}{what}");
@@ -164,7 +164,7 @@ fn devices() -> Vec<&'static str> {
         .collect()
 }
 
-/// Whole and available memory, MB, as Linux tells it.
+/// Whole and available memory, MB, as Linux reports it.
 fn memory_mb() -> (Option<u64>, Option<u64>) {
     let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
     let of = |key: &str| {
@@ -219,7 +219,7 @@ fn onnx_runtime() -> Tool {
     }
 }
 
-/// Free space of the current folder's disk, MB, as `df` tells it.
+/// Free space of the current folder's disk, MB, as `df` reports it.
 fn disk_free_mb() -> Option<u64> {
     let output = Command::new("df").args(["-Pk", "."]).output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;

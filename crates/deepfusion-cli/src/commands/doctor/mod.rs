@@ -9,6 +9,7 @@ use std::path::Path;
 
 use deepfusion_data::{DatasetKind, OpenOptions};
 use deepfusion_doctor::{Diagnosis, Severity, doctor_log, doctor_with, is_log};
+use deepfusion_hint::count_of;
 use deepfusion_logs::ReadOptions;
 
 use crate::cli::{CameraIntrinsics, DoctorArgs};
@@ -90,7 +91,7 @@ fn show(diagnosis: &Diagnosis, args: &DoctorArgs) -> Result<()> {
     if args.json {
         output::print_json(&serde_json::json!(diagnosis.record()))
     } else {
-        output::print(&told(diagnosis, args.verbose))
+        output::print(&text(diagnosis, args.verbose))
     }
 }
 
@@ -110,7 +111,7 @@ fn unfit(path: &Path, errors: usize) -> CliError {
 }
 
 /// A line for each check, the findings, the worst first; then what was measured, if asked for.
-fn told(diagnosis: &Diagnosis, verbose: bool) -> String {
+fn text(diagnosis: &Diagnosis, verbose: bool) -> String {
     let mut text = String::new();
     for drive in &diagnosis.drives {
         // Only KITTI numbers its cameras.
@@ -122,8 +123,10 @@ fn told(diagnosis: &Diagnosis, verbose: bool) -> String {
         };
         let _ = writeln!(
             text,
-            "{}{camera}: {} frames, {} looked at",
-            drive.name, drive.frames, drive.looked_at
+            "{}{camera}: {}, {} looked at",
+            drive.name,
+            count_of(drive.frames, "frame"),
+            drive.looked_at
         );
     }
     if !text.is_empty() {
@@ -147,10 +150,10 @@ fn told(diagnosis: &Diagnosis, verbose: bool) -> String {
         }
         let _ = writeln!(text, "  remedy: {}", finding.remedy);
     }
-    let number = |severity| diagnosis.count(severity);
+    let number = |severity: Severity| count_of(diagnosis.count(severity), &severity.to_string());
     let _ = writeln!(
         text,
-        "\n{} errors, {} warnings, {} notes",
+        "\n{}, {}, {}",
         number(Severity::Error),
         number(Severity::Warning),
         number(Severity::Note)

@@ -11,7 +11,7 @@ use deepfusion_geometry::Intrinsics;
 use deepfusion_jobs::evaluation::confidence::{self, Calibrated};
 pub(super) use deepfusion_jobs::evaluation::predict;
 use deepfusion_jobs::evaluation::{
-    Evaluated, Place, Truth, array_places, baseline_from_arrays, baseline_from_training,
+    Evaluated, ImageRef, Truth, array_places, baseline_from_arrays, baseline_from_training,
     check_used, default_crop, depth_map, evaluate_arrays, evaluate_datasets, expected_frames,
 };
 use deepfusion_jobs::held_out::{held_out, unseen};
@@ -54,7 +54,7 @@ pub(super) fn run(args: &EvalArgs) -> Result<()> {
     output::print(&found.to_string())
 }
 
-/// What was found, as far as the data tell.
+/// What was found, as far as the data show it.
 #[derive(Default)]
 struct Found {
     checkpoint: Option<UsedCheckpoint>,
@@ -204,7 +204,7 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
             !args.no_focal_correction,
             folder,
         )?
-        .map(tell_calibrated),
+        .map(print_calibrated),
         _ => None,
     };
     if let Some(path) = &args.report {
@@ -213,7 +213,7 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
             Truth::Scans(_) => Default::default(),
             Truth::Arrays(arrays) => array_places(arrays, &names),
         };
-        let shown = shown(&evaluated, |Place(number, frame)| {
+        let shown = shown(&evaluated, |ImageRef(number, frame)| {
             let dataset = &datasets[number];
             let place = dataset.selected().iter().position(|f| *f == frame);
             let name = place.and_then(|p| names[number].get(p));
@@ -264,7 +264,7 @@ fn check_calibration(model: &ModelSource, estimator: &DepthEstimator) -> Result<
 }
 
 /// Says what the confidence was learned from; gives how it holds.
-fn tell_calibrated(calibrated: Calibrated) -> Vec<Reliability> {
+fn print_calibrated(calibrated: Calibrated) -> Vec<Reliability> {
     let Calibrated {
         confidence,
         path,
@@ -311,7 +311,7 @@ fn from_arrays(
         &mut |done, total| progress.set(done, total),
     )?;
     if let Some(path) = &args.report {
-        let shown = shown(&evaluated, |Place(prediction, depth)| {
+        let shown = shown(&evaluated, |ImageRef(prediction, depth)| {
             Ok(Some(Seen {
                 image: None,
                 prediction: of_kind(predicted.read(prediction)?),
@@ -343,7 +343,7 @@ struct Seen {
 /// The frames worth showing, looked at again.
 fn shown(
     evaluated: &Evaluated,
-    mut see: impl FnMut(Place) -> Result<Option<Seen>>,
+    mut see: impl FnMut(ImageRef) -> Result<Option<Seen>>,
 ) -> Result<Vec<(Choice, ShownFrame)>> {
     let mut frames = Vec::new();
     for choice in run_report::choose(evaluated) {
@@ -372,7 +372,10 @@ fn page(
 ) -> Result<HtmlReport> {
     let report = &evaluated.report;
     let number = |v: f64| format!("{v:.3}");
-    let trivial = report.trivial.as_ref().map(|t| t.unscaled.abs_rel);
+    let mean_depth_baseline = report
+        .mean_depth_baseline
+        .as_ref()
+        .map(|t| t.unscaled.abs_rel);
     let names: Vec<_> = args.data.iter().map(|p| output::name_of(p)).collect();
     let on = if names.is_empty() {
         String::new()
@@ -388,7 +391,7 @@ fn page(
             ("Abs Rel, unscaled", &number(report.unscaled.abs_rel)),
             (
                 "Abs Rel, mean-depth baseline",
-                &trivial.map_or("–".into(), number),
+                &mean_depth_baseline.map_or("–".into(), number),
             ),
             ("scale (1 is metric)", &number(report.scale.median)),
             (

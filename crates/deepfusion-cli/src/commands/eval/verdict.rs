@@ -26,7 +26,7 @@ pub(super) fn has_truth(args: &EvalArgs, datasets: &[Dataset]) -> bool {
     args.gt.is_some() || datasets.iter().any(known)
 }
 
-/// The verdict, where the recordings tell how the camera moved and it was not declined; a split asks for its frames alone.
+/// The verdict, where the recordings say how the camera moved and it was not declined; a split asks for its frames alone.
 pub(super) fn of_model(
     args: &EvalArgs,
     model: &ModelSource,

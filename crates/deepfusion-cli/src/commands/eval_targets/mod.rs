@@ -5,7 +5,7 @@ mod table;
 use std::sync::Arc;
 
 use deepfusion_data::{Dataset, OpenOptions, save_png};
-use deepfusion_jobs::labelled::{DepthSource, LookedAt, TargetEvaluation, is_folder_of};
+use deepfusion_jobs::labelled::{DepthSource, EvaluatedFrame, TargetEvaluation, is_folder_of};
 use deepfusion_perception::{ScoringRules, TargetScore};
 use deepfusion_render::box_overlay;
 use deepfusion_runtime::ModelSource;
@@ -39,7 +39,7 @@ pub(super) fn run(args: &EvalTargetsArgs) -> Result<()> {
         None => None,
     };
     // The image with the targets on it, where it was asked for.
-    let save = |frame: &LookedAt| -> Result<()> {
+    let save = |frame: &EvaluatedFrame| -> Result<()> {
         if let Some(out) = &out {
             let picture = box_overlay(&(frame.image)()?, &frame.camera, frame.targets);
             save_png(&picture, &out.join(&frame.name))?;
@@ -54,7 +54,7 @@ pub(super) fn run(args: &EvalTargetsArgs) -> Result<()> {
             continue;
         }
         let datasets = Dataset::open(path, &OpenOptions::default())?;
-        warnings::tell(&datasets);
+        warnings::print(&datasets);
         for dataset in datasets {
             evaluation.drive(&Arc::new(dataset), &mut |frame| {
                 let (done, total) = frame.progress;

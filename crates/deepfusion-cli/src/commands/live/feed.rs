@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::bounded;
-use deepfusion_video::{Address, LiveFrame, LiveSource, Taken};
+use deepfusion_video::{Address, LiveFrame, LiveSource, NextFrame};
 
 use super::figures::Figures;
 use crate::cli::LiveArgs;
@@ -26,7 +26,7 @@ pub(crate) enum Ending {
 
 impl Ending {
     /// In words.
-    pub(crate) fn told(self) -> &'static str {
+    pub(crate) fn as_str(self) -> &'static str {
         match self {
             Self::Stream => "the stream ended",
             Self::Enough => "as many as were asked for",
@@ -58,7 +58,7 @@ impl Feed {
     }
 
     /// A connection that was closed in good order is an end, and may be a loss.
-    fn tell_end(&self) {
+    fn warn_of_end(&self) {
         let address = self.source.address();
         if !address.is_stdin() {
             tracing::warn!(
@@ -68,8 +68,8 @@ impl Feed {
     }
 
     /// The whole run's figures; `None` where nothing came.
-    pub(crate) fn told(&self) -> Option<String> {
-        self.figures.told()
+    pub(crate) fn summary(&self) -> Option<String> {
+        self.figures.summary()
     }
 
     /// The next frame: the newest there is, or why there is none.
@@ -83,14 +83,14 @@ impl Feed {
                 return Ok(Err(Ending::Enough));
             }
             match self.source.take(LOOK_UP)? {
-                Taken::Frame(frame) => {
+                NextFrame::Frame(frame) => {
                     self.frames -= 1;
                     self.first.get_or_insert(frame.arrived);
                     return Ok(Ok(frame));
                 }
-                Taken::NotYet => {}
-                Taken::Ended => {
-                    self.tell_end();
+                NextFrame::NotYet => {}
+                NextFrame::Ended => {
+                    self.warn_of_end();
                     return Ok(Err(Ending::Stream));
                 }
             }
@@ -103,7 +103,7 @@ fn seconds(s: f64) -> Duration {
     Duration::try_from_secs_f64(s).unwrap_or(Duration::MAX)
 }
 
-/// Looks at frame after frame, always the newest, and writes what comes of it on a thread of its own. `look` also tells the
+/// Looks at frame after frame, always the newest, and writes what comes of it on a thread of its own. `look` also returns the
 /// latency, in milliseconds. One result may wait for the writer: beyond that the network waits, the source's frames are
 /// skipped, and none is late.
 ///

@@ -45,7 +45,7 @@ impl Latencies {
         self.counts.iter().position(reached).unwrap_or(0)
     }
 
-    fn told(&self) -> String {
+    fn summary(&self) -> String {
         format!(
             "latency {} ms (median), {:.0} ms (longest)",
             self.median_ms(),
@@ -93,7 +93,7 @@ impl Figures {
             say(&format!(
                 "{:.1} frames/s, {}, {} skipped so far",
                 self.lately.count() as f64 / period.as_secs_f64(),
-                self.lately.told(),
+                self.lately.summary(),
                 self.dropped
             ));
             (self.lately, self.since) = (Latencies::new(), now);
@@ -101,7 +101,7 @@ impl Figures {
     }
 
     /// The whole run in a few words; `None` where nothing came.
-    pub(super) fn told(&self) -> Option<String> {
+    pub(super) fn summary(&self) -> Option<String> {
         let (first, last) = self.span?;
         let took = last.duration_since(first).as_secs_f64();
         let rate = match self.all.count() {
@@ -111,7 +111,7 @@ impl Figures {
         };
         Some(format!(
             "{rate}{}, {} skipped",
-            self.all.told(),
+            self.all.summary(),
             self.dropped
         ))
     }
@@ -130,6 +130,6 @@ mod tests {
         }
         assert_eq!((latencies.median_ms(), latencies.count()), (30, 5));
         assert_eq!(latencies.longest_ms, 90_000.0);
-        assert_eq!(Figures::new().told(), None);
+        assert_eq!(Figures::new().summary(), None);
     }
 }

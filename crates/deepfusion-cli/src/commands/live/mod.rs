@@ -1,4 +1,4 @@
-//! What `predict` and `perceive` do alike with a camera or a stream: always the newest frame, told how late it is.
+//! What `predict` and `perceive` do alike with a camera or a stream: always the newest frame, and how late it is.
 
 mod feed;
 mod figures;

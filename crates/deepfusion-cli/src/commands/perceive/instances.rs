@@ -11,9 +11,9 @@ use crate::cli::InstanceArgs;
 use crate::failure::Result;
 
 /// Finds things by their look, where the user gave a model for that.
-pub(super) struct Spotter(Option<InstanceModel>);
+pub(super) struct InstanceFinder(Option<InstanceModel>);
 
-impl Spotter {
+impl InstanceFinder {
     /// Loads the model; `library` is the ONNX Runtime library that was named.
     pub(super) fn of(args: &InstanceArgs, library: Option<&Path>) -> Result<Self> {
         let load = |path: &Path| InstanceModel::load(path, library, 0, args.limits());

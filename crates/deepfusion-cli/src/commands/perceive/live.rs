@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use deepfusion_geometry::Se3;
+use deepfusion_hint::count_of;
 use deepfusion_jobs::bulk::record_line;
 use deepfusion_jobs::scene::Motion;
 use deepfusion_perception::Stamp;
@@ -11,7 +12,7 @@ use deepfusion_video::{Address, LiveFrame};
 use nalgebra::Vector3;
 
 use super::Work;
-use super::eyes::{Begun, Eyes, Found};
+use super::frame_processor::{FrameProcessor, PerceivedFrame, StartedFrame};
 use crate::commands::live::{self, Feed};
 use crate::failure::Result;
 use crate::output;
@@ -19,7 +20,7 @@ use crate::progress::say;
 
 impl Work<'_> {
     /// Looks at a live source until it ends.
-    pub(super) fn go_live(self, address: &Address, mut eyes: Eyes) -> Result<()> {
+    pub(super) fn go_live(self, address: &Address, mut processor: FrameProcessor) -> Result<()> {
         let mut way = StraightWay::new(self.args.speed);
         let mut feed = Feed::open(address, &self.args.prediction.live)?;
         let look = |frame: LiveFrame| {
@@ -29,14 +30,14 @@ impl Work<'_> {
                 LiveMark::of_arrival(frame.arrived_at, frame.dropped),
             );
             let (loaded, prepared) = self.job.load_live(frame)?;
-            let begun = Begun {
+            let started = StartedFrame {
                 input,
                 loaded,
                 prepared,
                 start,
             };
             let motion = way.at(start);
-            let mut found = eyes.look(begun, motion)?;
+            let mut found = processor.process(started, motion)?;
             let latency_ms = found.latency_ms;
             found.loaded.live = Some(LiveMark { latency_ms, ..mark });
             found.record.arrived_unix_s = Some(mark.arrived_unix_s);
@@ -47,7 +48,7 @@ impl Work<'_> {
             }
             Ok((found, latency_ms))
         };
-        let ending = live::run(&mut feed, look, |found: Found| self.write(&found));
+        let ending = live::run(&mut feed, look, |found: PerceivedFrame| self.write(&found));
         // What is there stays, also where the source was lost.
         let outcome = self.outcome.into_inner().unwrap_or_else(|e| e.into_inner());
         let lines = self.lines.into_inner().unwrap_or_else(|e| e.into_inner());
@@ -55,12 +56,14 @@ impl Work<'_> {
             0 => lines.discard(),
             _ => lines.finish()?,
         }
-        if let Some(figures) = feed.told() {
-            let ended = ending.as_ref().map_or("the source was lost", |e| e.told());
+        if let Some(figures) = feed.summary() {
+            let ended = ending
+                .as_ref()
+                .map_or("the source was lost", |e| e.as_str());
             say(&format!(
-                "{} frames, {} targets written to {} ({ended}): {figures}",
-                outcome.done,
-                outcome.targets,
+                "{}, {} written to {} ({ended}): {figures}",
+                count_of(outcome.done, "frame"),
+                count_of(outcome.targets, "target"),
                 self.args.prediction.out.display()
             ));
         }
@@ -69,7 +72,7 @@ impl Work<'_> {
 }
 
 /// The way of a camera that looks straight ahead from a vehicle that drives straight on. The scale is not watched: a speed
-/// that is told once for all says nothing of the metres.
+/// that is given once for all says nothing of the metres.
 struct StraightWay {
     speed_mps: Option<f64>,
     first: Option<Instant>,
@@ -111,7 +114,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn a_told_speed_is_a_way_straight_ahead() {
+    fn a_given_speed_is_a_way_straight_ahead() {
         let mut way = StraightWay::new(Some(8.0));
         let start = Instant::now();
         assert!(!way.at(start).goes_on);

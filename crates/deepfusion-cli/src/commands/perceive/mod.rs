@@ -1,6 +1,6 @@
 //! `deepfusion perceive`: images to 3D targets, followed over time.
 
-mod eyes;
+mod frame_processor;
 mod instances;
 mod live;
 pub(super) mod pictures;
@@ -9,13 +9,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
 
+use deepfusion_hint::count_of;
 use deepfusion_jobs::Input;
 use deepfusion_jobs::bulk::pipeline::{self, Threads};
 use deepfusion_jobs::bulk::{RecordLines, record_line, write_record};
 use deepfusion_jobs::scene::MotionTracker;
 use deepfusion_perception::PerceptionConfig;
 
-use self::eyes::{Begun, Eyes, Found};
+use self::frame_processor::{FrameProcessor, PerceivedFrame, StartedFrame};
 use super::live as sources;
 use super::predict::{Job, check_watched, find_inputs};
 use crate::cli::{PerceiveArgs, PredictionArgs};
@@ -48,7 +49,7 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
         &model,
         &estimator,
     )?;
-    let eyes = Eyes::open(args, &model, &mut estimator, config)?;
+    let processor = FrameProcessor::open(args, &model, &mut estimator, config)?;
     std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
     if source.is_some() {
         sources::make_room(out, prediction.overwrite)?;
@@ -63,8 +64,8 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
         outcome: Mutex::new(Outcome::default()),
     };
     match source {
-        Some(address) => work.go_live(&address, eyes),
-        None => work.go(eyes),
+        Some(address) => work.go_live(&address, processor),
+        None => work.go(processor),
     }
 }
 
@@ -122,13 +123,13 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    fn go(self, mut eyes: Eyes) -> Result<()> {
+    fn go(self, mut processor: FrameProcessor) -> Result<()> {
         let mut motions = MotionTracker::default();
         let load = |index: usize| {
             let start = Instant::now();
             let input = self.all[index].clone();
             match self.job.load(&input) {
-                Ok((loaded, prepared)) => Some(Begun {
+                Ok((loaded, prepared)) => Some(StartedFrame {
                     input,
                     loaded,
                     prepared,
@@ -140,11 +141,11 @@ impl Work<'_> {
                 }
             }
         };
-        let look = |begun: Begun| {
-            let motion = motions.next(&begun.input);
-            eyes.look(begun, motion)
+        let look = |started: StartedFrame| {
+            let motion = motions.next(&started.input);
+            processor.process(started, motion)
         };
-        let write = |_: usize, found: Result<Found>| {
+        let write = |_: usize, found: Result<PerceivedFrame>| {
             if let Err(error) = found.and_then(|found| self.write(&found)) {
                 self.outcome().fatal.get_or_insert(error);
             }
@@ -164,7 +165,7 @@ impl Work<'_> {
         self.outcome.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    fn write(&self, found: &Found) -> Result<()> {
+    fn write(&self, found: &PerceivedFrame) -> Result<()> {
         let (out, input) = (&self.args.prediction.out, &found.input);
         for (save, picture) in &found.pictures {
             picture.save(&pictures::path(out, &input.name, *save))?;
@@ -212,9 +213,9 @@ impl Work<'_> {
         outcome.latency_ms.sort_by(f64::total_cmp);
         let median = outcome.latency_ms.get(outcome.done / 2).copied();
         say(&format!(
-            "{} frames, {} targets written to {}{}",
-            outcome.done,
-            outcome.targets,
+            "{}, {} written to {}{}",
+            count_of(outcome.done, "frame"),
+            count_of(outcome.targets, "target"),
             self.args.prediction.out.display(),
             median.map_or(String::new(), |ms| format!(
                 ", {ms:.0} ms from file to targets (median)"

@@ -2,12 +2,13 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use deepfusion_hint::count_of;
 use deepfusion_jobs::bulk::{CameraSource, Lock, write_one_video};
 use deepfusion_records::LiveMark;
 use deepfusion_runtime::ModelSource;
 use deepfusion_video::{Address, LiveFrame, shown_for};
 
-use super::{Job, check_watched, outputs, tell_videos};
+use super::{Job, check_watched, outputs, print_videos};
 use crate::cli::{PredictArgs, Save, Shard};
 use crate::commands::live::{self, Feed};
 use crate::error::CliError;
@@ -58,11 +59,13 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
         }
     });
     let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-    if let Some(figures) = feed.told() {
-        let ended = ending.as_ref().map_or("the source was lost", |e| e.told());
+    if let Some(figures) = feed.summary() {
+        let ended = ending
+            .as_ref()
+            .map_or("the source was lost", |e| e.as_str());
         say(&format!(
-            "{} images written to {} ({ended}): {figures}",
-            done.len(),
+            "{} written to {} ({ended}): {figures}",
+            count_of(done.len(), "image"),
             out.display()
         ));
     }
@@ -72,7 +75,7 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
         let shown = done.iter().map(|(name, _)| name.as_str());
         let pictures = outputs::ending(Save::SideBySide);
         filmed = write_one_video(out, shown.zip(shown_for(&times)), pictures, live::VIDEO)
-            .map(|video| tell_videos(video.as_slice()))
+            .map(|video| print_videos(video.as_slice()))
             .map_err(Into::into);
     }
     // Why the source ended comes first: a full disk ends the video, too.

@@ -14,10 +14,11 @@ use deepfusion_data::{OpenOptions, RgbImage, load_photo};
 use deepfusion_eval::IntervalFactors;
 use deepfusion_eval::compare::MetricScale;
 use deepfusion_geometry::Intrinsics;
+use deepfusion_hint::count_of;
 use deepfusion_jobs::bulk::pipeline::{self, Threads};
 use deepfusion_jobs::bulk::{
-    Begun, BulkJob, BulkProgress, CameraSource, Lock, PinholeImage, Summary, add_output, commit,
-    queue, write_unsynced, write_videos,
+    BulkJob, BulkProgress, CameraSource, Lock, PinholeImage, StartedJob, Summary, add_output,
+    commit, queue, write_unsynced, write_videos,
 };
 use deepfusion_jobs::scene::{DepthWatch, unwatched};
 use deepfusion_jobs::{Input, intervals};
@@ -56,7 +57,7 @@ pub(super) struct Job<'a> {
     /// How the intervals are stretched that the network says.
     intervals: IntervalFactors,
     /// Warns once of cameras that nobody gave.
-    tell_assumed: Once,
+    camera_warning: Once,
 }
 
 /// An image on its way through the network.
@@ -108,7 +109,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     interrupt::catch("stopping after the images at work; the same command goes on from there");
     let _lock = Lock::take(out, *shard)?;
     let begun = job.bulk(args).begin(&all, &mine, args.json);
-    let Begun {
+    let StartedJob {
         manifest,
         sidecars,
         todo,
@@ -121,11 +122,11 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     drop(shown);
     let sidecars = std::mem::take(&mut summary.sidecars);
     let (there, done) = (mine.len() - todo.len(), summary.done);
-    // A full disk is told once, as the reason for stopping.
+    // A full disk is reported once, as the reason for stopping.
     let outcome = outcome(summary)?;
     say(&format!(
-        "{} images written to {}{}",
-        done - there,
+        "{} written to {}{}",
+        count_of(done - there, "image"),
         out.display(),
         if there > 0 {
             format!(", {there} were there already")
@@ -139,7 +140,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     outcome?;
     if args.video() {
         let written = write_videos(out, &all, outputs::ending(Save::SideBySide));
-        tell_videos(&written?);
+        print_videos(&written?);
     }
     Ok(())
 }
@@ -177,7 +178,7 @@ fn outcome(summary: Summary<crate::failure::Failure>) -> Result<Result<()>> {
     Ok(Ok(()))
 }
 
-/// The images that the arguments mean; what was noticed of recordings among them is told.
+/// The images that the arguments mean; warnings of recordings among them are printed.
 pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<Vec<Input>> {
     let options = OpenOptions {
         assumed_camera: model.assumed_camera(args.engine.set.as_deref())?,
@@ -186,7 +187,7 @@ pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<
     Ok(deepfusion_jobs::find_inputs(
         &args.inputs,
         &options,
-        warnings::tell,
+        warnings::print,
     )?)
 }
 
@@ -210,7 +211,10 @@ pub(super) fn check_watched(
         why: why.to_string(),
     };
     if let Some(address) = source {
-        return Err(unwatched_for(address, &"a live source tells no motion"));
+        return Err(unwatched_for(
+            address,
+            &"a live source has no measured motion",
+        ));
     }
     match unwatched(inputs) {
         Some((input, why)) => Err(unwatched_for(&input, &why)),
@@ -219,7 +223,7 @@ pub(super) fn check_watched(
 }
 
 /// Says that the metres have changed.
-pub(super) fn tell_drift(frame: &str, ratio: f64) {
+pub(super) fn warn_of_drift(frame: &str, ratio: f64) {
     tracing::warn!(
         "{frame}: the road says that metres are {ratio:.2} times what they were: were the images zoomed, the camera \
          moved, or is the speed wrong? (scale_monitor in each frame's JSON; --correct-scale brings depth back)"
@@ -238,14 +242,18 @@ fn check_videos(args: &PredictArgs) -> Result<()> {
 }
 
 /// Says which videos were written, and how many frames each has.
-fn tell_videos(videos: &[(PathBuf, usize)]) {
+fn print_videos(videos: &[(PathBuf, usize)]) {
     for (path, frames) in videos {
-        say(&format!("{}: {frames} frames", path.display()));
+        say(&format!(
+            "{}: {}",
+            path.display(),
+            count_of(*frames, "frame")
+        ));
     }
 }
 
 /// Warns of a camera that nobody gave.
-fn tell_assumed() {
+fn warn_of_assumed_camera() {
     tracing::warn!(
         "no intrinsics given, and none in the image's EXIF: the training camera's field of view is assumed, so the metres are \
          only as right as that is (camera_known: false; give --intrinsics, --hfov or --calib)"
@@ -253,7 +261,7 @@ fn tell_assumed() {
 }
 
 /// Warns of a camera that nobody gave, and that training found.
-fn tell_learned() {
+fn warn_of_learned_camera() {
     tracing::warn!(
         "no intrinsics given: the camera that the run learned is taken, so the metres are only as right as that is \
          (camera_known: false; give --intrinsics, --hfov or --calib)"
@@ -282,7 +290,7 @@ fn predict(
             let (input, image) = (mine[todo[i]], &loaded.image);
             seen.scale = watch.look(input, image, loaded.camera, &mut seen.prediction);
             if let Some(ratio) = watch.first_drift() {
-                tell_drift(&input.name, ratio);
+                warn_of_drift(&input.name, ratio);
             }
             seen
         });
@@ -340,7 +348,7 @@ impl<'a> Job<'a> {
             preparer: estimator.preparer(),
             step: estimator.step,
             intervals: model.interval_factors()?,
-            tell_assumed: Once::new(),
+            camera_warning: Once::new(),
             scale: model.scale(set, !args.no_focal_correction, estimator.step)?,
             inspector: if outputs.save.contains(&Save::Features) {
                 Some(inspection::open(&model.load(set)?, args.engine.device)?)
@@ -386,8 +394,8 @@ impl<'a> Job<'a> {
             }
         };
         match taken.from {
-            "assumed" => self.tell_assumed.call_once(tell_assumed),
-            "learned" => self.tell_assumed.call_once(tell_learned),
+            "assumed" => self.camera_warning.call_once(warn_of_assumed_camera),
+            "learned" => self.camera_warning.call_once(warn_of_learned_camera),
             _ => {}
         }
         Ok(self.prepare(mark, taken))

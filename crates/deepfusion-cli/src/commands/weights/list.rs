@@ -28,7 +28,7 @@ const KNOWN: [[&str; 4]; 3] = [
 
 /// What `--json` prints of a packed network: its card without the configuration, and what of that one asks for first.
 #[derive(Debug, Serialize)]
-pub(crate) struct Listed<'a> {
+pub(crate) struct WeightsRow<'a> {
     name: &'a str,
     /// Whether it is meant where no `--model` is given.
     default: bool,
@@ -51,7 +51,7 @@ pub(crate) struct Listed<'a> {
     format_version: u32,
 }
 
-impl<'a> From<&'a Card> for Listed<'a> {
+impl<'a> From<&'a Card> for WeightsRow<'a> {
     fn from(card: &'a Card) -> Self {
         Self {
             name: &card.name,
@@ -81,7 +81,8 @@ impl<'a> From<&'a Card> for Listed<'a> {
 pub(crate) fn run(json: bool) -> Result<()> {
     let networks = deepfusion_weights::all()?;
     if json {
-        let embedded: Vec<Listed> = networks.iter().map(|n| Listed::from(&n.card)).collect();
+        let embedded: Vec<WeightsRow> =
+            networks.iter().map(|n| WeightsRow::from(&n.card)).collect();
         let importable: Vec<_> = KNOWN
             .iter()
             .map(|[name, files, gives, terms]| {
@@ -97,7 +98,7 @@ pub(crate) fn run(json: bool) -> Result<()> {
         text += "  none in this build; `weights pack` makes one of a run\n";
     }
     for network in &networks {
-        text += &told(&network.card);
+        text += &network_text(&network.card);
     }
     text += "\nTo be imported, with `weights import`:\n";
     for [name, files, gives, terms] in KNOWN {
@@ -107,8 +108,8 @@ pub(crate) fn run(json: bool) -> Result<()> {
 }
 
 /// A network in lines.
-fn told(card: &Card) -> String {
-    /// Recordings that are told by name.
+fn network_text(card: &Card) -> String {
+    /// Recordings that are named.
     const NAMED: usize = 6;
     let size = card
         .size()
@@ -147,7 +148,7 @@ fn told(card: &Card) -> String {
         ("sha256", Some(card.sha256.as_str())),
     ];
     for figure in &card.figures {
-        text += &format!("    measured  {}\n", told_figure(figure));
+        text += &format!("    measured  {}\n", figure_text(figure));
     }
     for (key, value) in rest {
         if let Some(value) = value {
@@ -157,7 +158,7 @@ fn told(card: &Card) -> String {
     text
 }
 
-fn told_figure(figure: &Figure) -> String {
+fn figure_text(figure: &Figure) -> String {
     let seen = match figure.held_out {
         Some(true) => "not seen in training",
         Some(false) => "seen in training",

@@ -1,7 +1,7 @@
 use deepfusion_jobs::packing::{PackOptions, pack_run};
 use deepfusion_weights::MAX_BYTES;
 
-use super::list::Listed;
+use super::list::WeightsRow;
 use crate::cli::PackArgs;
 use crate::failure::Result;
 use crate::output;
@@ -34,7 +34,7 @@ pub(crate) fn run(args: &PackArgs) -> Result<()> {
         );
     }
     if args.json {
-        return output::print_json(&Listed::from(card));
+        return output::print_json(&WeightsRow::from(card));
     }
     let (card, weights) = (card_path.display(), weights_path.display());
     output::print(&format!("{weights}\n{card}\n"))

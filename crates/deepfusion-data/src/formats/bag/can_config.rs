@@ -70,9 +70,9 @@ fn unit_of(text: &str) -> Option<SpeedUnit> {
 /// By hand, as an untagged enum says nothing of the field that is wrong.
 impl<'de> Deserialize<'de> for SignalConfig {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
-        struct Either;
+        struct SignalVisitor;
 
-        impl<'de> Visitor<'de> for Either {
+        impl<'de> Visitor<'de> for SignalVisitor {
             type Value = SignalConfig;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -100,6 +100,6 @@ impl<'de> Deserialize<'de> for SignalConfig {
             }
         }
 
-        deserializer.deserialize_any(Either)
+        deserializer.deserialize_any(SignalVisitor)
     }
 }

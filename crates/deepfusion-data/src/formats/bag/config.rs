@@ -21,7 +21,7 @@ pub(super) struct BagConfig {
     pub(super) profile: Option<String>,
     /// The kind of drive, for one row each in the evaluation.
     pub(super) scenario: Option<String>,
-    /// Topics by name, where the type does not tell.
+    /// Topics by name, where the type does not decide.
     pub(super) topics: TopicNames,
     /// A camera without distortion, where there is no CameraInfo.
     pub(super) camera: Option<CameraConfig>,
@@ -29,7 +29,7 @@ pub(super) struct BagConfig {
     pub(super) cache: Option<PathBuf>,
     /// A calibration tool's file, from this one's folder.
     pub(super) calibration: Option<PathBuf>,
-    /// Frames of `/tf_static` and `/tf` by name, where neither messages nor usual names tell.
+    /// Frames of `/tf_static` and `/tf` by name, where neither messages nor usual names decide.
     pub(super) frames: FrameNames,
     /// A point of the LiDAR in the camera.
     pub(super) cam_from_lidar: Option<Transform>,
@@ -227,7 +227,7 @@ impl BagConfig {
         let there = candidates.iter().find(|path| path.is_file());
         // Where there is none, the first is where one would be looked for.
         let path = there.or(candidates.first()).cloned().unwrap_or_default();
-        // Read alone first: what is wrong with it is then told with its line.
+        // Read alone first: what is wrong with it is then reported with its line.
         let mut config: Self = crate::dataset_toml::read_or_default(&path)?;
         if let Some(name) = &config.profile {
             let own = crate::dataset_toml::read_or_default(&path)?;

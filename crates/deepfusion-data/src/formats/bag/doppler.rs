@@ -1,4 +1,4 @@
-//! What moves, from the radial velocities of a frequency-modulated LiDAR.
+//! Dynamic points, from the radial velocities of a frequency-modulated LiDAR.
 //!
 //! A point that stands still comes nearer as fast as the sensor moves towards it: v_r = −v·d̂, v the sensor's velocity
 //! over ground and d̂ the ray. Most of a scan stands still, so v follows from the scan itself by least squares; what

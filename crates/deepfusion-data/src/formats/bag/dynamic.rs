@@ -1,6 +1,6 @@
 //! The topic of dynamic points beside a LiDAR: those points of a scan that its driver calls moving.
 
-use super::index::{Place, nearest};
+use super::index::{MessageRef, nearest};
 use super::{image, scan};
 use crate::Result;
 use deepfusion_rosbag::MessageSource;
@@ -16,12 +16,12 @@ const LEAST_FOUND: f64 = 0.5;
 pub(super) struct DynamicPoints {
     pub(super) topic: String,
     /// Each message's place and its time on the frames' clock.
-    pub(super) places: Vec<(Place, f64)>,
+    pub(super) places: Vec<(MessageRef, f64)>,
 }
 
 /// Which points of a scan are listed.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Listed {
+pub(super) struct MatchedPoints {
     /// One a point of the scan.
     pub(super) moves: Vec<bool>,
     /// Points of the topic's message.
@@ -41,16 +41,19 @@ impl DynamicPoints {
         xyz: &[[f32; 3]],
         scan_s: f64,
         within_s: f64,
-    ) -> Result<Option<Listed>> {
+    ) -> Result<Option<MatchedPoints>> {
         let Some((place, _)) = nearest(&self.places, scan_s, within_s) else {
             return Ok(None);
         };
         let message = image::message(bag, &self.topic, place)?;
-        Ok(Some(Listed::find(xyz, &scan::points(bag, &message)?)))
+        Ok(Some(MatchedPoints::find(
+            xyz,
+            &scan::points(bag, &message)?,
+        )))
     }
 }
 
-impl Listed {
+impl MatchedPoints {
     /// Looks for each listed point among the scan's. Both in the LiDAR's axes, metres.
     fn find(xyz: &[[f32; 3]], listed: &[[f32; 3]]) -> Self {
         let mut by_x: Vec<usize> = (0..xyz.len()).filter(|i| usable(&xyz[*i])).collect();
@@ -108,7 +111,7 @@ mod tests {
             [0.0; 3],
             [f32::NAN; 3],
         ];
-        let found = Listed::find(&scan, &listed);
+        let found = MatchedPoints::find(&scan, &listed);
         assert_eq!(found.moves, [false, true, true, false, false]);
         assert_eq!((found.points, found.found), (3, 2));
         assert!(found.is_of_scan());
@@ -117,7 +120,7 @@ mod tests {
     #[test]
     fn a_list_in_other_axes_is_of_no_scan() {
         let scan = [[5.0, 1.0, 0.0], [6.0, 1.0, 0.0]];
-        assert!(!Listed::find(&scan, &[[1.0, 5.0, 0.0], [1.0, 6.0, 0.0]]).is_of_scan());
-        assert!(Listed::find(&scan, &[]).is_of_scan());
+        assert!(!MatchedPoints::find(&scan, &[[1.0, 5.0, 0.0], [1.0, 6.0, 0.0]]).is_of_scan());
+        assert!(MatchedPoints::find(&scan, &[]).is_of_scan());
     }
 }

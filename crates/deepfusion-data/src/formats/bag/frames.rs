@@ -17,7 +17,7 @@ const MOST_WAYS: usize = 16;
 pub(super) struct Frames {
     /// By parent and child.
     links: BTreeMap<(String, String), Link>,
-    /// Transforms that are none: no rotation, or no number.
+    /// Transforms that are none: no rotation, or NaN.
     pub(super) broken: usize,
 }
 
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn two_parents_are_told_unless_they_agree() {
+    fn two_parents_are_an_error_unless_they_agree() {
         let with = |x| {
             frames(&[
                 link("base", "a", 1.0, 0.0),

@@ -1,6 +1,6 @@
 //! An image message as pixels.
 
-use super::index::Place;
+use super::index::MessageRef;
 use crate::{Error, Result, decode_rgb};
 use deepfusion_rosbag::msg::{CompressedImage, Image, RosMessage};
 use deepfusion_rosbag::{Message, MessageSource, Selection, Time};
@@ -13,7 +13,7 @@ use image::RgbImage;
 pub(super) fn message<'bag>(
     bag: &'bag dyn MessageSource,
     topic: &str,
-    place: &Place,
+    place: &MessageRef,
 ) -> Result<Message<'bag>> {
     let after = Time::from_nanos(place.recorded.nanos() + 1);
     let selection = Selection::topics([topic]).from(place.recorded).until(after);

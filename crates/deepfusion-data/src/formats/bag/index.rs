@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 
 /// A message that is read again when it is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Place {
+pub(super) struct MessageRef {
     /// When it was recorded, by which it is found again.
     pub(super) recorded: Time,
     /// When it was measured, by the sensor's clock, nanoseconds since 1970.
@@ -28,13 +28,13 @@ pub(super) struct Place {
 
 /// The message nearest to a time, no farther than `within_s`; `places` by time.
 pub(super) fn nearest(
-    places: &[(Place, f64)],
+    places: &[(MessageRef, f64)],
     time_s: f64,
     within_s: f64,
-) -> Option<&(Place, f64)> {
+) -> Option<&(MessageRef, f64)> {
     let after = places.partition_point(|p| p.1 < time_s);
     let around = places[after.saturating_sub(1)..].iter().take(2);
-    let apart = |p: &&(Place, f64)| (p.1 - time_s).abs();
+    let apart = |p: &&(MessageRef, f64)| (p.1 - time_s).abs();
     let nearest = around.min_by(|a, b| apart(a).total_cmp(&apart(b)));
     nearest.filter(|p| apart(p) <= within_s)
 }
@@ -42,12 +42,12 @@ pub(super) fn nearest(
 /// What one pass finds. Times of the vehicle's streams are nanoseconds.
 #[derive(Debug, Default)]
 pub(super) struct Index {
-    pub(super) images: Vec<Place>,
+    pub(super) images: Vec<MessageRef>,
     /// Of a camera whose messages are a video stream's.
     pub(super) video: Option<Seen>,
-    pub(super) scans: Vec<Place>,
+    pub(super) scans: Vec<MessageRef>,
     /// Messages of the points that move.
-    pub(super) dynamic: Vec<Place>,
+    pub(super) dynamic: Vec<MessageRef>,
     pub(super) camera_info: Option<CameraInfo>,
     /// Of a message each; of satellite positions what [`Fixes::speeds`] makes of them.
     pub(super) speed_mps: Vec<(i64, f64)>,
@@ -156,7 +156,7 @@ impl Index {
             timed |= !matches!(role, Role::CameraInfo | Role::Frames);
             match role {
                 Role::Image | Role::Lidar | Role::Dynamic => {
-                    let place = Place {
+                    let place = MessageRef {
                         recorded: message.time(),
                         stamp_ns: at_ns,
                     };

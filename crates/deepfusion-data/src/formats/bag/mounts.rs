@@ -51,10 +51,10 @@ impl Mounts {
             said: Vec::new(),
         };
         if index.frames.broken > 0 {
-            search.warnings.push(format!(
-                "{} transforms of frames have no rotation, or no numbers, and are left out",
-                index.frames.broken
-            ));
+            search.warnings.push(match index.frames.broken {
+                1 => "1 transform of frames has no rotation, or NaN, and is left out".to_owned(),
+                n => format!("{n} transforms of frames have no rotation, or NaN, and are left out"),
+            });
         }
         let (own, profile) = (config, &config.profile_mounts);
         let place = |t: Option<super::config::Transform>| t.map(|t| t.se3());
@@ -332,7 +332,7 @@ impl<'a> ByFrames<'a> {
                         Some(_) => {}
                         None => found = Some((name, chain)),
                     },
-                    // Told as what it is by the caller, who asks for this way again.
+                    // Reported as what it is by the caller, who asks for this way again.
                     Way::Several(_) => return Ok(Some(name.to_owned())),
                     Way::Moves(..) => moving = moving.or(Some(name)),
                     Way::Unknown => {}

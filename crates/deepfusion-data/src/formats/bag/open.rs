@@ -2,7 +2,7 @@
 
 use super::config::BagConfig;
 use super::dynamic::DynamicPoints;
-use super::index::{Index, Place};
+use super::index::{Index, MessageRef};
 use super::mounts::Mounts;
 use super::recording::BagRecording;
 use super::scans::BagScans;
@@ -151,7 +151,7 @@ pub(crate) fn open_bag(bag: Arc<dyn MessageSource>, options: &OpenOptions) -> Re
 }
 
 /// The first image, with which the data set's time begins.
-fn first_image(bag: &dyn MessageSource, index: &Index) -> Result<Place> {
+fn first_image(bag: &dyn MessageSource, index: &Index) -> Result<MessageRef> {
     if let Some(first) = index.images.first() {
         return Ok(*first);
     }
@@ -179,7 +179,7 @@ struct Clock {
 }
 
 impl Clock {
-    fn from_image(first: &Place, config: &BagConfig, options: &OpenOptions) -> Self {
+    fn from_image(first: &MessageRef, config: &BagConfig, options: &OpenOptions) -> Self {
         let said = options.camera_ahead_s;
         let camera_ahead_s = said.unwrap_or(config.clock.camera_ahead_s);
         Self {
@@ -189,8 +189,8 @@ impl Clock {
     }
 
     /// Messages of camera or LiDAR, each with its time in seconds.
-    fn timed(&self, places: &[Place]) -> Vec<(Place, f64)> {
-        let time_s = |place: &Place| {
+    fn timed(&self, places: &[MessageRef]) -> Vec<(MessageRef, f64)> {
+        let time_s = |place: &MessageRef| {
             let ns = on_the_vehicles_clock(place.stamp_ns, self.camera_ahead_s);
             seconds(ns, self.origin_ns)
         };
@@ -201,10 +201,10 @@ impl Clock {
 fn frames(
     path: &Path,
     drive: &str,
-    images: &[(Place, f64)],
+    images: &[(MessageRef, f64)],
     track: Option<&MotionModel>,
 ) -> Vec<Frame> {
-    let frame = |(number, (_, time_s)): (u64, &(Place, f64))| Frame {
+    let frame = |(number, (_, time_s)): (u64, &(MessageRef, f64))| Frame {
         drive: drive.to_owned(),
         number,
         time_s: Some(*time_s),

@@ -1,7 +1,7 @@
 //! A bag as a [`Recording`].
 
 use super::image;
-use super::index::Place;
+use super::index::MessageRef;
 use super::scans::{BagScans, MovingPoints};
 use super::topics::{Role, Topics};
 use super::video::BagVideo;
@@ -21,7 +21,7 @@ pub(super) struct BagRecording {
     pub(super) folder: PathBuf,
     pub(super) bag: Arc<dyn MessageSource>,
     pub(super) topics: Topics,
-    pub(super) images: Vec<Place>,
+    pub(super) images: Vec<MessageRef>,
     /// Where the images are packets of a stream.
     pub(super) video: Option<BagVideo>,
     pub(super) lens: Lens,

@@ -1,10 +1,10 @@
-//! The scans of a bag as its camera sees them: depth, velocities, what moves.
+//! The scans of a bag as its camera sees them: depth, velocities, dynamic points.
 
 use super::config::LidarConfig;
 use super::doppler::ego_velocity;
-use super::dynamic::{DynamicPoints, Listed};
+use super::dynamic::{DynamicPoints, MatchedPoints};
 use super::image;
-use super::index::{self, Place};
+use super::index::{self, MessageRef};
 use super::scan::{LEAST_STATIC, Scan, SeenScan};
 use crate::truth::MovingPixels;
 use crate::{DynamicAgreement, GtKind, LidarMotion, MotionModel, Result, ScanTruth};
@@ -23,7 +23,7 @@ pub(super) struct BagScans {
     pub(super) bag: Arc<dyn MessageSource>,
     pub(super) topic: String,
     /// Each scan's place and its time on the frames' clock.
-    pub(super) places: Vec<(Place, f64)>,
+    pub(super) places: Vec<(MessageRef, f64)>,
     /// Those points of the scans that move, by another topic.
     pub(super) dynamic: Option<DynamicPoints>,
     pub(super) lidar: LidarConfig,
@@ -46,7 +46,7 @@ impl BagScans {
         Ok(Some((self.decode(place)?, *time_s)))
     }
 
-    fn decode(&self, place: &Place) -> Result<Scan> {
+    fn decode(&self, place: &MessageRef) -> Result<Scan> {
         let message = image::message(self.bag.as_ref(), &self.topic, place)?;
         Scan::decode(self.bag.as_ref(), &message, &self.lidar)
     }
@@ -70,7 +70,7 @@ impl BagScans {
     }
 
     /// Which points the topic of dynamic points lists; `None` without it, or where it is not of this scan.
-    fn listed(&self, scan: &Scan, scan_s: f64) -> Result<Option<Listed>> {
+    fn listed(&self, scan: &Scan, scan_s: f64) -> Result<Option<MatchedPoints>> {
         let Some(dynamic) = &self.dynamic else {
             return Ok(None);
         };
@@ -144,7 +144,7 @@ impl BagScans {
             Some(ground) => Some(self.fast(&ground)),
             None => self
                 .listed(&scan, scan_s)?
-                .filter(Listed::is_of_scan)
+                .filter(MatchedPoints::is_of_scan)
                 .map(|listed| listed.moves),
         };
         let seen = self.seen(&scan, frame_s, scan_s);
@@ -210,7 +210,7 @@ impl BagScans {
     }
 }
 
-/// Scans as labels of what moves.
+/// Scans as labels of dynamic pixels.
 #[derive(Debug)]
 pub(super) struct MovingPoints {
     pub(super) scans: Arc<BagScans>,

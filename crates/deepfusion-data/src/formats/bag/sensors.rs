@@ -95,7 +95,7 @@ fn by_twist(index: &Index, origin_ns: i64) -> Motion {
     samples.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut track = VehicleTrack::new(&samples);
     if index.tilt_rates.iter().any(|(_, rates)| *rates != [0.0; 2]) {
-        track = track.with_tilt(&leaning(index, origin_ns));
+        track = track.with_tilt(&roll_and_pitch(index, origin_ns));
     }
     Motion {
         track: track.into(),
@@ -104,9 +104,9 @@ fn by_twist(index: &Index, origin_ns: i64) -> Motion {
 }
 
 /// Roll and pitch by their rates: from any start, since only their change counts.
-fn leaning(index: &Index, origin_ns: i64) -> Vec<(f64, f64, f64)> {
+fn roll_and_pitch(index: &Index, origin_ns: i64) -> Vec<(f64, f64, f64)> {
     let finite = |(_, rates): &&(i64, [f64; 2])| rates.iter().all(|rate| rate.is_finite());
-    // One reading that is no number would spoil the sum of all after it.
+    // One NaN would make NaN of the sum of all after it.
     let mut rates: Vec<_> = index.tilt_rates.iter().filter(finite).copied().collect();
     rates.sort_by_key(|(ns, _)| *ns);
     let mut tilt = [0.0; 2];

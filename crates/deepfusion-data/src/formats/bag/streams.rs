@@ -51,18 +51,21 @@ pub(super) fn warnings_on(bag: &dyn MessageSource, index: &Index) -> Vec<String>
     let damage = bag.damage();
     warnings.extend(damage.map(|damage| format!("the bag is damaged: {damage}")));
     if let Some(lost) = index.lost.first() {
-        warnings.push(format!(
-            "{} messages or chunks cannot be read; the first: {lost}",
-            index.lost.len()
-        ));
+        warnings.push(match index.lost.len() {
+            1 => format!("1 message or chunk cannot be read: {lost}"),
+            n => format!("{n} messages or chunks cannot be read; the first: {lost}"),
+        });
     }
     warnings.extend(index.silent.iter().cloned());
     warnings.extend(index.computed.iter().cloned());
     let unstamped = index.unstamped.iter();
     warnings.extend(unstamped.map(|(topic, messages)| {
+        let untimed = match messages {
+            1 => "1 message has no time in its header".to_owned(),
+            n => format!("{n} messages have no time in their header"),
+        };
         format!(
-            "{topic}: {messages} messages have no time in their header; that of their recording is taken, which is as late as the \
-             message was on its way"
+            "{topic}: {untimed}; the time of recording is taken, which is as late as the message was on its way"
         )
     }));
     warnings

@@ -52,7 +52,7 @@ pub(super) struct Topics {
 
 /// Exact data of a simulated drive: never taken for a sensor.
 const TRUTH: &str = "/truth/";
-/// In the name of a second cloud, of what moves only.
+/// In the name of a second cloud, of dynamic points only.
 const DYNAMIC: &str = "dynamic";
 
 impl Topics {
@@ -278,7 +278,7 @@ impl Search<'_> {
         Ok(None)
     }
 
-    /// The cloud of what moves: of several in the bag the one in the LiDAR's namespace. Without a LiDAR it is of no use.
+    /// The cloud of dynamic points: of several in the bag the one in the LiDAR's namespace. Without a LiDAR it is of no use.
     fn dynamic(&self, named: &Option<String>, lidar: Option<&str>) -> Result<Option<String>> {
         let clouds = [PointCloud2::<'_>::TYPE];
         let one = |fits: &dyn Fn(&str) -> bool| {

@@ -57,9 +57,15 @@ impl Seen {
     /// What is left out, in a sentence.
     pub(super) fn warning(&self) -> Option<String> {
         let Self { topic, before, .. } = self;
-        (*before > 0).then(|| {
-            format!("{topic}: the first {before} messages come before the first key frame and cannot be decoded: they are left out")
-        })
+        match before {
+            0 => None,
+            1 => Some(format!(
+                "{topic}: the first message comes before the first key frame and cannot be decoded: it is left out"
+            )),
+            _ => Some(format!(
+                "{topic}: the first {before} messages come before the first key frame and cannot be decoded: they are left out"
+            )),
+        }
     }
 }
 
@@ -96,7 +102,7 @@ pub(super) fn packet<'m>(
     }
 }
 
-/// Both layouts of a packet have one name; that of ROS 1's first version is told by its MD5, which ROS 2 has none of.
+/// Both layouts of a packet have one name; that of ROS 1's first version is recognised by its MD5, which ROS 2 has none of.
 fn is_old(message: &Message<'_>) -> bool {
     message.serialization() == Serialization::Ros1 && message.is::<OldFfmpegPacket<'_>>()
 }

@@ -80,7 +80,7 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
         own.remove(key);
     }
     if let Some(can) = own.get_mut("can").and_then(Value::as_table_mut) {
-        forget_named(can, &topics);
+        remove_named_signals(can, &topics);
     }
     if options.gives_camera() {
         let k = open_bag(bag.clone(), options)?.intrinsics(0);
@@ -139,7 +139,7 @@ fn described(path: &Path, options: &OpenOptions) -> Result<String> {
 }
 
 /// Takes the signals out of `[can]` that a named topic stands for now: both would contradict each other.
-fn forget_named(can: &mut Table, topics: &Topics) {
+fn remove_named_signals(can: &mut Table, topics: &Topics) {
     for (role, key) in [(Role::Speed, "speed"), (Role::Steering, "steering")] {
         if topics.of(role).is_some() {
             can.remove(key);

@@ -1,4 +1,4 @@
-//! What moves in a KITTI raw drive: by the simulator's masks, or by the tracklets and the car's own motion.
+//! Dynamic pixels of a KITTI raw drive: by the simulator's masks, or by the tracklets and the car's own motion.
 
 use super::calibration::Calibration;
 use super::tracklets::{Tracklet, TrackletPose};
@@ -19,7 +19,7 @@ const REACH: u64 = 5;
 /// How far beyond a box's sides a point still belongs to it, in metres: mirrors, and the half pixel
 /// that a projected point was rounded by.
 const MARGIN_M: f64 = 0.1;
-/// Masks of the simulator's drives, one PNG a frame beside the images: 255 on what moves.
+/// Masks of the simulator's drives, one PNG a frame beside the images: 255 on dynamic objects.
 pub(super) const MASKS: &str = "moving_02";
 
 /// A box that moves, in one frame's velodyne axes.
@@ -29,7 +29,7 @@ struct MovingBox {
     size_m: [f64; 3],
 }
 
-/// What moves in a drive; see [`Dataset::moving_labels`].
+/// The dynamic pixels of a drive; see [`Dataset::moving_labels`].
 pub(super) fn labels(calibration: &Calibration, dataset: &Dataset) -> Result<Option<MovingLabels>> {
     let masks = dataset.folder().join(MASKS);
     if dataset.camera().number() == 2 && masks.is_dir() {
@@ -102,7 +102,7 @@ impl MovingPixels for Masks {
         let size = (truth.width as u32, truth.height as u32);
         if mask.dimensions() != size {
             return Err(Error::Size {
-                what: "the mask of what moves",
+                what: "the mask of dynamic objects",
                 found: mask.dimensions(),
                 image: size,
             });

@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_is_no_number_is_named_with_file_and_field() {
+    fn a_value_that_is_not_a_number_is_named_with_file_and_field() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("0000000007.txt");
         for (bad, problem) in [("NaN", "NaN"), ("inf", "inf"), ("fast", "'fast'")] {

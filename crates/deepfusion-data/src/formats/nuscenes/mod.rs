@@ -6,7 +6,9 @@
 mod rows;
 mod tables;
 
-use self::tables::{CALIBRATED_SENSOR, CAMERA, LIDAR, SAMPLE_DATA, Scene, Taken, read_scenes};
+use self::tables::{
+    CALIBRATED_SENSOR, CAMERA, LIDAR, SAMPLE_DATA, Scene, SensorFrame, read_scenes,
+};
 use super::files::{folders, name_of};
 use super::plain::{PlainParts, open_each};
 use super::pose_track::speed_log;
@@ -27,7 +29,7 @@ const SCAN_WITHIN_NS: i64 = 60_000_000;
 
 /// A folder of tables and the files they name.
 #[derive(Debug)]
-pub(crate) struct Place {
+pub(crate) struct TableFolder {
     root: PathBuf,
     tables: PathBuf,
 }
@@ -36,14 +38,14 @@ pub(crate) struct Place {
 ///
 /// # Errors
 /// [`Error::NoSuchPath`], [`Error::File`]; [`Error::SeveralVersions`] for a root with several folders of tables.
-pub(crate) fn find(path: &Path) -> Result<Option<Place>> {
+pub(crate) fn find(path: &Path) -> Result<Option<TableFolder>> {
     let folder = path.canonicalize().map_err(|e| Error::file(path, e))?;
     if !folder.is_dir() {
         return Ok(None);
     }
     if has_tables(&folder) {
         let root = folder.parent().unwrap_or(&folder).to_owned();
-        return Ok(Some(Place {
+        return Ok(Some(TableFolder {
             root,
             tables: folder,
         }));
@@ -56,7 +58,7 @@ pub(crate) fn find(path: &Path) -> Result<Option<Place>> {
             versions: versions.iter().map(|v| name_of(v)).collect(),
         });
     }
-    Ok(versions.pop().map(|tables| Place {
+    Ok(versions.pop().map(|tables| TableFolder {
         root: folder,
         tables,
     }))
@@ -67,7 +69,11 @@ fn has_tables(folder: &Path) -> bool {
 }
 
 /// Opens the scenes of which there are images, a data set each.
-pub(crate) fn open(path: &Path, place: &Place, options: &OpenOptions) -> Result<Vec<Dataset>> {
+pub(crate) fn open(
+    path: &Path,
+    place: &TableFolder,
+    options: &OpenOptions,
+) -> Result<Vec<Dataset>> {
     let scenes = read_scenes(&place.tables)?;
     let all = scenes.len();
     let mut first = None;
@@ -98,7 +104,7 @@ pub(crate) fn open(path: &Path, place: &Place, options: &OpenOptions) -> Result<
     })
 }
 
-impl Place {
+impl TableFolder {
     /// `there` says which of the scene's images are; one is.
     fn open(&self, scene: Scene, there: &[bool], options: &OpenOptions) -> Result<Dataset> {
         let Scene {
@@ -109,7 +115,7 @@ impl Place {
         let times: Vec<i64> = images.iter().map(|image| image.ns).collect();
         let numbered = numbers_by_time(&times).into_iter().zip(&images);
         let here = numbered.zip(there).filter(|(_, there)| **there);
-        let here: Vec<(u64, &Taken)> = here.map(|(image, _)| image).collect();
+        let here: Vec<(u64, &SensorFrame)> = here.map(|(image, _)| image).collect();
         let mut warnings = Vec::new();
         let lost = images.len() - here.len();
         if lost > 0 {
@@ -138,7 +144,7 @@ impl Place {
         poses.sort_by_key(|(ns, _)| *ns);
         let speeds = speed_log(&self.tables.join("ego_pose.json"), &poses);
         let truth = self.truth(&here, &scans, &calibration.intrinsics);
-        let image = |(number, taken): &(u64, &Taken)| TimedImage {
+        let image = |(number, taken): &(u64, &SensorFrame)| TimedImage {
             number: *number,
             path: self.root.join(&taken.file),
             ns: Some(taken.ns),
@@ -170,8 +176,8 @@ impl Place {
     /// The scan of each image: the first that ended after it, in the place that the vehicle had when the image was taken.
     fn truth(
         &self,
-        images: &[(u64, &Taken)],
-        scans: &[Taken],
+        images: &[(u64, &SensorFrame)],
+        scans: &[SensorFrame],
         camera: &Intrinsics,
     ) -> Option<MeasuredDepth> {
         // The reader's axes (x forward, y left) to the LiDAR's (x right, y forward).

@@ -72,7 +72,7 @@ pub(super) fn each_row(path: &Path, mut each: impl FnMut(&Row<'_>) -> Result<()>
         _ => Error::file(path, e),
     })?;
     let mut input = BufReader::with_capacity(CHUNK, file);
-    let (mut cutter, mut text) = (Cutter::default(), Vec::new());
+    let (mut scanner, mut text) = (RowScanner::default(), Vec::new());
     let (mut line, mut row_line) = (1, 1);
     loop {
         let chunk = input.fill_buf().map_err(|e| Error::file(path, e))?;
@@ -83,7 +83,7 @@ pub(super) fn each_row(path: &Path, mut each: impl FnMut(&Row<'_>) -> Result<()>
         // Where what belongs to the row begins in this chunk, and how far its lines are counted.
         let (mut from, mut counted) = (0, 0);
         for (i, byte) in chunk.iter().enumerate() {
-            match cutter.step(*byte) {
+            match scanner.step(*byte) {
                 Step::Within => {}
                 Step::Begin => {
                     line += newlines(&chunk[counted..i]);
@@ -109,16 +109,16 @@ pub(super) fn each_row(path: &Path, mut each: impl FnMut(&Row<'_>) -> Result<()>
                 }
             }
         }
-        if cutter.in_row() {
+        if scanner.in_row() {
             text.extend_from_slice(&chunk[from..]);
         }
         line += newlines(&chunk[counted..]);
         input.consume(length);
     }
-    if cutter.place == Place::After {
+    if scanner.state == ScanState::After {
         Ok(())
     } else {
-        let line = if cutter.in_row() { row_line } else { line };
+        let line = if scanner.in_row() { row_line } else { line };
         Err(damaged(path, line, "the file ends within the table".into()))
     }
 }
@@ -145,8 +145,8 @@ fn last_key(text: &[u8]) -> String {
 
 /// Finds where the rows of an array begin and end.
 #[derive(Default)]
-struct Cutter {
-    place: Place,
+struct RowScanner {
+    state: ScanState,
     /// Open braces and brackets of a row.
     depth: usize,
     in_text: bool,
@@ -154,7 +154,7 @@ struct Cutter {
 }
 
 #[derive(Default, PartialEq)]
-enum Place {
+enum ScanState {
     #[default]
     Before,
     Between,
@@ -169,27 +169,27 @@ enum Step {
     Wrong,
 }
 
-impl Cutter {
+impl RowScanner {
     fn in_row(&self) -> bool {
-        self.place == Place::Row
+        self.state == ScanState::Row
     }
 
     fn step(&mut self, byte: u8) -> Step {
-        if self.place == Place::Row {
+        if self.state == ScanState::Row {
             return self.step_in_row(byte);
         }
-        match (&self.place, byte) {
-            (_, b' ' | b'\t' | b'\r' | b'\n') | (Place::Between, b',') => Step::Within,
-            (Place::Before, b'[') => {
-                self.place = Place::Between;
+        match (&self.state, byte) {
+            (_, b' ' | b'\t' | b'\r' | b'\n') | (ScanState::Between, b',') => Step::Within,
+            (ScanState::Before, b'[') => {
+                self.state = ScanState::Between;
                 Step::Within
             }
-            (Place::Between, b']') => {
-                self.place = Place::After;
+            (ScanState::Between, b']') => {
+                self.state = ScanState::After;
                 Step::Within
             }
-            (Place::Between, b'{') => {
-                (self.place, self.depth) = (Place::Row, 1);
+            (ScanState::Between, b'{') => {
+                (self.state, self.depth) = (ScanState::Row, 1);
                 Step::Begin
             }
             _ => Step::Wrong,
@@ -212,7 +212,7 @@ impl Cutter {
             b'}' | b']' => {
                 self.depth -= 1;
                 if self.depth == 0 {
-                    self.place = Place::Between;
+                    self.state = ScanState::Between;
                     return Step::End;
                 }
             }

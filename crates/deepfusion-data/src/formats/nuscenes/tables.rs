@@ -105,9 +105,9 @@ pub(super) struct Mounted {
     pub(super) pinhole: Option<[f64; 4]>,
 }
 
-/// A recording of one sensor.
+/// An image or a scan, with the pose of its vehicle.
 #[derive(Debug, Clone)]
-pub(super) struct Taken {
+pub(super) struct SensorFrame {
     /// Nanoseconds since 1970.
     pub(super) ns: i64,
     /// Below the root.
@@ -120,20 +120,20 @@ pub(super) struct Taken {
 #[derive(Debug, Clone)]
 pub(super) struct Scene {
     pub(super) name: String,
-    pub(super) images: Vec<Taken>,
-    pub(super) scans: Vec<Taken>,
+    pub(super) images: Vec<SensorFrame>,
+    pub(super) scans: Vec<SensorFrame>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Which {
+enum SensorKind {
     Camera,
     Lidar,
 }
 
 /// A row of `sample_data.json` before its pose is known.
-struct Found {
+struct UnposedFrame {
     scene: usize,
-    which: Which,
+    kind: SensorKind,
     ns: i64,
     file: String,
     sensor: Mounted,
@@ -177,10 +177,10 @@ pub(super) fn read_scenes(folder: &Path) -> Result<Vec<Scene>> {
     each_row(&folder.join(SAMPLE_DATA), |row| {
         let data: DataRow = row.read()?;
         let (field, token) = ("calibrated_sensor_token", data.calibrated_sensor_token);
-        let Some((which, sensor)) = named(row, field, token, &sensors, CALIBRATED_SENSOR)? else {
+        let Some((kind, sensor)) = named(row, field, token, &sensors, CALIBRATED_SENSOR)? else {
             return Ok(());
         };
-        found.push(Found {
+        found.push(UnposedFrame {
             scene: named(
                 row,
                 "sample_token",
@@ -188,7 +188,7 @@ pub(super) fn read_scenes(folder: &Path) -> Result<Vec<Scene>> {
                 &samples,
                 "sample.json",
             )?,
-            which,
+            kind,
             ns: data.timestamp.saturating_mul(1000),
             file: data.filename.into_owned(),
             sensor,
@@ -206,11 +206,11 @@ pub(super) fn read_scenes(folder: &Path) -> Result<Vec<Scene>> {
             problem: format!("ego_pose.json has no row {}", one.pose),
         })?;
         let scene = &mut scenes[one.scene];
-        let list = match one.which {
-            Which::Camera => &mut scene.images,
-            Which::Lidar => &mut scene.scans,
+        let list = match one.kind {
+            SensorKind::Camera => &mut scene.images,
+            SensorKind::Lidar => &mut scene.scans,
         };
-        list.push(Taken {
+        list.push(SensorFrame {
             ns: one.ns,
             file: one.file,
             world_from_vehicle: *pose,
@@ -238,20 +238,23 @@ fn named<T: Copy>(
 }
 
 /// The sensors on their vehicles; `None` where it is neither the camera nor the LiDAR.
-fn calibrated_sensors(folder: &Path) -> Result<HashMap<Token, Option<(Which, Mounted)>>> {
+fn calibrated_sensors(folder: &Path) -> Result<HashMap<Token, Option<(SensorKind, Mounted)>>> {
     let mut channels = HashMap::new();
     let path = folder.join("sensor.json");
     each_row(&path, |row| {
         let sensor: SensorRow = row.read()?;
-        let which = match sensor.channel.as_ref() {
-            CAMERA => Some(Which::Camera),
-            LIDAR => Some(Which::Lidar),
+        let kind = match sensor.channel.as_ref() {
+            CAMERA => Some(SensorKind::Camera),
+            LIDAR => Some(SensorKind::Lidar),
             _ => None,
         };
-        channels.insert(sensor.token, which);
+        channels.insert(sensor.token, kind);
         Ok(())
     })?;
-    if !channels.values().any(|which| *which == Some(Which::Camera)) {
+    if !channels
+        .values()
+        .any(|kind| *kind == Some(SensorKind::Camera))
+    {
         return Err(Error::Json {
             path,
             line: 1,
@@ -263,19 +266,19 @@ fn calibrated_sensors(folder: &Path) -> Result<HashMap<Token, Option<(Which, Mou
     each_row(&folder.join(CALIBRATED_SENSOR), |row| {
         let sensor: CalibratedRow = row.read()?;
         let (field, token) = ("sensor_token", sensor.sensor_token);
-        let which = named(row, field, token, &channels, "sensor.json")?;
-        let mounted = match which {
+        let kind = named(row, field, token, &channels, "sensor.json")?;
+        let mounted = match kind {
             None => None,
-            Some(which) => {
-                let pinhole = match which {
-                    Which::Camera => Some(pinhole(row, &sensor.camera_intrinsic)?),
-                    Which::Lidar => None,
+            Some(kind) => {
+                let pinhole = match kind {
+                    SensorKind::Camera => Some(pinhole(row, &sensor.camera_intrinsic)?),
+                    SensorKind::Lidar => None,
                 };
                 let mounted = Mounted {
                     vehicle_from_sensor: motion(row, sensor.rotation, sensor.translation)?,
                     pinhole,
                 };
-                Some((which, mounted))
+                Some((kind, mounted))
             }
         };
         sensors.insert(sensor.token, mounted);

@@ -8,7 +8,7 @@ mod plane;
 mod processing;
 mod sensor;
 
-use super::draw::{Hiss, log_uniform, normal};
+use super::draw::{FastNoise, log_uniform, normal};
 use crate::texture::Rgb;
 use image::RgbImage;
 use plane::Planes;
@@ -57,7 +57,7 @@ impl Formation {
     pub(super) fn image(&self, light: &[Rgb], width: usize, height: usize, seed: u64) -> RgbImage {
         let mut planes = Planes::of(light, width, height);
         self.lens.pass(&mut planes);
-        self.sensor.expose(&mut planes, &mut Hiss::new(seed));
+        self.sensor.expose(&mut planes, &mut FastNoise::new(seed));
         let image = self.processing.develop(planes);
         match self.quality {
             Some(quality) => processing::through_jpeg(image, quality),

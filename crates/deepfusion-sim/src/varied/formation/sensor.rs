@@ -2,7 +2,7 @@
 
 use super::plane::{Planes, bell, filter};
 use super::{Brightness, scale, sometimes, stops};
-use crate::varied::draw::Hiss;
+use crate::varied::draw::FastNoise;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -60,7 +60,7 @@ impl Sensor {
     }
 
     /// Linear light to the sensor's reading, 0 to 1.
-    pub(super) fn expose(&self, planes: &mut Planes, hiss: &mut Hiss) {
+    pub(super) fn expose(&self, planes: &mut Planes, stream: &mut FastNoise) {
         self.deepen(planes);
         let towards_grey = self.towards_grey(planes);
         let gain = (self.aim / self.measured(planes).max(1e-6)).min(self.gain);
@@ -69,7 +69,7 @@ impl Sensor {
         let mut work = Vec::new();
         for (number, plane) in planes.of.iter_mut().enumerate() {
             for value in &mut noise {
-                *value = hiss.next();
+                *value = stream.next();
             }
             if self.grain > 0.0 {
                 work.resize(count, 0.0);
@@ -164,7 +164,7 @@ mod tests {
     fn the_exposure_reaches_its_aim_and_no_more_than_its_gain() {
         for (light, expected) in [(0.05, 0.2), (1.7, 0.2), (0.001, 0.01)] {
             let mut planes = flat(light);
-            plain().expose(&mut planes, &mut Hiss::new(1));
+            plain().expose(&mut planes, &mut FastNoise::new(1));
             assert!((planes.of[1][77] - expected).abs() < 1e-5);
         }
     }
@@ -173,7 +173,7 @@ mod tests {
     fn what_is_too_bright_is_clipped() {
         let mut planes = flat(0.1);
         planes.of[1][5] = 9.0;
-        plain().expose(&mut planes, &mut Hiss::new(1));
+        plain().expose(&mut planes, &mut FastNoise::new(1));
         assert_eq!(planes.of[1][5], 1.0);
     }
 
@@ -190,7 +190,7 @@ mod tests {
         };
         planes.of[1] = planes.of[0].iter().map(|x| 0.5 * x).collect();
         planes.of[2] = planes.of[0].clone();
-        sensor.expose(&mut planes, &mut Hiss::new(1));
+        sensor.expose(&mut planes, &mut FastNoise::new(1));
         assert!(planes.of[1].iter().all(|x| (0.0..=1.0).contains(x)));
         let mean = |c: usize| planes.of[c].iter().sum::<f32>() / 4096.0;
         assert!(
@@ -210,7 +210,7 @@ mod tests {
             ..plain()
         };
         let mut planes = flat(0.3);
-        sensor.expose(&mut planes, &mut Hiss::new(7));
+        sensor.expose(&mut planes, &mut FastNoise::new(7));
         let n = 64.0 * 64.0;
         let mean = planes.of[0].iter().sum::<f32>() / n;
         let variance = planes.of[0].iter().map(|x| (x - mean).powi(2)).sum::<f32>() / n;

@@ -14,7 +14,7 @@ const STEPS: usize = 5;
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Watches the first steps of a run, then says once how long it will take.
-pub(super) struct Outlook {
+pub(super) struct TimeEstimate {
     config: TrainConfig,
     compute: Compute,
     /// Whether bf16 could be chosen and is not.
@@ -24,7 +24,7 @@ pub(super) struct Outlook {
     done: bool,
 }
 
-impl Outlook {
+impl TimeEstimate {
     /// Of a run with this configuration.
     pub(super) fn new(config: TrainConfig, compute: Compute) -> Self {
         let on_processor = compute == Compute::Processor && config.precision == Precision::F32;
@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn the_line_names_what_else_could_be_chosen() {
         let light = Preset::Light.config_on(Compute::Processor);
-        let line = Outlook::new(light.clone(), Compute::Processor).line(1.0, 1200);
+        let line = TimeEstimate::new(light.clone(), Compute::Processor).line(1.0, 1200);
         assert!(
             line.starts_with("about 20:00 min from here: 1200 steps of 1.00 s; "),
             "{line}"
@@ -149,26 +149,31 @@ mod tests {
         assert!(line.contains("--preset tiny about "), "{line}");
         assert!(work(&Preset::Tiny.config()) * 2 < work(&light));
 
-        let mut outlook = Outlook::new(light, Compute::Processor);
-        assert_eq!(outlook.bf16, supports(&Device::flex(), Precision::Bf16));
+        let mut time_estimate = TimeEstimate::new(light, Compute::Processor);
+        assert_eq!(
+            time_estimate.bf16,
+            supports(&Device::flex(), Precision::Bf16)
+        );
         for bf16 in [false, true] {
-            outlook.bf16 = bf16;
-            let said = outlook.line(1.0, 1200).contains("--set precision=bf16");
+            time_estimate.bf16 = bf16;
+            let said = time_estimate
+                .line(1.0, 1200)
+                .contains("--set precision=bf16");
             assert_eq!(said, bf16);
         }
 
-        let tiny = Outlook::new(Preset::Tiny.config(), Compute::Processor).line(0.2, 1200);
+        let tiny = TimeEstimate::new(Preset::Tiny.config(), Compute::Processor).line(0.2, 1200);
         assert!(!tiny.contains("--preset"), "{tiny}");
-        let full = Outlook::new(Preset::Light.config(), Compute::Gpu).line(0.2, 12_000);
+        let full = TimeEstimate::new(Preset::Light.config(), Compute::Gpu).line(0.2, 12_000);
         assert!(!full.contains("--size"), "{full}");
     }
 
     #[test]
     fn nothing_is_said_of_a_run_that_is_soon_over() {
         let light = Preset::Light.config_on(Compute::Processor);
-        let mut outlook = Outlook::new(light, Compute::Processor);
+        let mut time_estimate = TimeEstimate::new(light, Compute::Processor);
         let said: Vec<_> = (1..20)
-            .filter_map(|step| outlook.after_step(step, 20))
+            .filter_map(|step| time_estimate.after_step(step, 20))
             .collect();
         assert_eq!(said, Vec::<String>::new());
     }

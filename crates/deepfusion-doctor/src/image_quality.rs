@@ -9,9 +9,9 @@ const WHITE: f32 = 250.0;
 /// Variance of the Laplacian at half the size below which there is no detail, squared grey levels.
 const LEAST_DETAIL: f64 = 2.0;
 
-/// A picture's look.
+/// A picture's brightness and sharpness.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Look {
+pub(crate) struct ImageQuality {
     /// Mean grey level, 0 to 255.
     pub(crate) mean: f64,
     /// Share of pixels that are all but black.
@@ -24,7 +24,7 @@ pub(crate) struct Look {
     pub(crate) sharpness: Option<f64>,
 }
 
-impl Look {
+impl ImageQuality {
     pub(crate) fn of(image: &RgbImage) -> Self {
         let (width, height) = (image.width() as usize, image.height() as usize);
         let grey: Vec<f32> = image
@@ -95,8 +95,8 @@ mod tests {
             let v = ((f64::from(x) * 12.9898 + f64::from(y) * 78.233).sin() * 43758.5453).fract();
             Rgb([(128.0 + 100.0 * v) as u8; 3])
         });
-        let sharp = Look::of(&noisy);
-        let blurred = Look::of(&image::imageops::blur(&noisy, 2.0));
+        let sharp = ImageQuality::of(&noisy);
+        let blurred = ImageQuality::of(&image::imageops::blur(&noisy, 2.0));
         assert!(
             blurred.sharpness.unwrap() < 0.2 * sharp.sharpness.unwrap(),
             "{blurred:?} {sharp:?}"
@@ -107,8 +107,8 @@ mod tests {
     #[test]
     fn black_and_white_are_counted() {
         let image = RgbImage::from_fn(10, 10, |x, _| Rgb([if x < 3 { 0 } else { 255 }; 3]));
-        let look = Look::of(&image);
-        assert!((look.dark - 0.3).abs() < 1e-9 && (look.white - 0.7).abs() < 1e-9);
-        assert_eq!(Look::of(&RgbImage::new(2, 2)).sharpness, None);
+        let quality = ImageQuality::of(&image);
+        assert!((quality.dark - 0.3).abs() < 1e-9 && (quality.white - 0.7).abs() < 1e-9);
+        assert_eq!(ImageQuality::of(&RgbImage::new(2, 2)).sharpness, None);
     }
 }

@@ -1,4 +1,4 @@
-//! Parts of the picture that belong to the vehicle: a bonnet, a black frame, a dashboard's reflection.
+//! Parts of the picture that belong to the ego vehicle: its hood, a black frame, a dashboard's reflection.
 //!
 //! While the vehicle moves, such a part hardly changes, and its rim stays where it is. From each side of the picture
 //! the rows (or columns) inward are followed while they hardly change over time; the part is the vehicle's where a
@@ -18,7 +18,7 @@ const EDGE: f64 = 4.0;
 const STANDS: f64 = 0.85;
 /// A part that is this thin is the lens' shade or an encoder's rim, pixels of the small picture.
 const LEAST_DEPTH: usize = 3;
-/// Share of a side that the part may take, percent: of the bottom, where bonnets are, and of the others, where a black
+/// Share of a side that the part may take, percent: of the bottom, where hoods are, and of the others, where a black
 /// frame takes all, and a plain sky over houses that lie ahead a sixth, in four seconds of drive up to a half.
 const MOST_BOTTOM: f64 = 15.0;
 const MOST_ELSEWHERE: f64 = 75.0;

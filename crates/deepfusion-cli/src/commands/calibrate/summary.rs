@@ -4,23 +4,23 @@ use std::fmt::Write as _;
 
 use deepfusion_calibrate::LensModel;
 
-use super::Told;
+use super::Report;
 
 /// Pictures left out that are named; the others are counted.
 const NAMED: usize = 6;
 
 /// Everything that was found.
-pub(super) fn text(told: &Told) -> String {
+pub(super) fn text(report: &Report) -> String {
     let mut text = String::new();
-    for (name, what) in rows(told) {
+    for (name, what) in rows(report) {
         let _ = writeln!(text, "{name:14}{what}");
     }
     text
 }
 
 /// A name and a value each; the name is empty where the value goes on.
-pub(super) fn rows(told: &Told) -> Vec<(String, String)> {
-    let found = told.calibration;
+pub(super) fn rows(report: &Report) -> Vec<(String, String)> {
+    let found = report.calibration;
     let (k, errors) = (&found.intrinsics, &found.standard_errors);
     let mut rows = Vec::new();
     let mut row = |name: &str, what: String| rows.push((name.to_owned(), what));
@@ -38,7 +38,7 @@ pub(super) fn rows(told: &Told) -> Vec<(String, String)> {
         row(name, format!("{value:.3} ± {error:.3} px"));
     }
     let lens = found.coefficients.iter().zip(&errors.coefficients);
-    for (name, (value, error)) in told.coefficient_names.iter().zip(lens) {
+    for (name, (value, error)) in report.coefficient_names.iter().zip(lens) {
         row(name, format!("{value:.5} ± {error:.5}"));
     }
     row(
@@ -48,7 +48,7 @@ pub(super) fn rows(told: &Told) -> Vec<(String, String)> {
             None => "unknown: the lens model ends before the image does".into(),
         },
     );
-    let corners = found.used() * told.board.corners();
+    let corners = found.used() * report.board.corners();
     row(
         "error",
         format!(
@@ -56,13 +56,13 @@ pub(super) fn rows(told: &Told) -> Vec<(String, String)> {
             found.rms_px
         ),
     );
-    row("views", views(told));
+    row("views", views(report));
     let disagree = found.views.iter().filter(|v| !v.used);
     let disagree = disagree.map(|v| match v.rms_px {
         Some(px) => (v.name.as_str(), format!("{px:.2} px off")),
         None => (v.name.as_str(), "disagrees with the others".into()),
     });
-    let without = told
+    let without = report
         .left_out
         .iter()
         .map(|l| (l.name.as_str(), l.why.clone()));
@@ -87,18 +87,18 @@ pub(super) fn rows(told: &Told) -> Vec<(String, String)> {
     for [left, middle, right] in found.coverage.ninths {
         row("", format!("{left:6}{middle:6}{right:6}"));
     }
-    row("written", told.written.display().to_string());
+    row("written", report.written.display().to_string());
     rows
 }
 
-fn views(told: &Told) -> String {
-    let used = told.calibration.used();
-    let mut text = format!("{used} used of {} looked at", told.looked_at);
-    if told.not_picked > 0 {
+fn views(report: &Report) -> String {
+    let used = report.calibration.used();
+    let mut text = format!("{used} used of {} looked at", report.looked_at);
+    if report.not_picked > 0 {
         let _ = write!(
             text,
             "; {} more show the board as one of these does",
-            told.not_picked
+            report.not_picked
         );
     }
     text

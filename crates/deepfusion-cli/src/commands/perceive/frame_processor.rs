@@ -13,16 +13,16 @@ use deepfusion_records::FrameRecord;
 use deepfusion_runtime::ModelSource;
 use deepfusion_runtime::{DepthEstimator, PreparedImage};
 
-use super::instances::Spotter;
+use super::instances::InstanceFinder;
 use super::pictures::{self, Picture};
 use crate::cli::{PerceiveArgs, PerceiveSave};
-use crate::commands::predict::{Loaded, Seen, tell_drift};
+use crate::commands::predict::{Loaded, Seen, warn_of_drift};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::model::ModelFacts;
 
 /// A frame that is loaded, and when that began.
-pub(super) struct Begun {
+pub(super) struct StartedFrame {
     pub input: Input,
     pub loaded: Loaded,
     pub prepared: PreparedImage,
@@ -30,7 +30,7 @@ pub(super) struct Begun {
 }
 
 /// A frame with all that was found in it.
-pub(super) struct Found {
+pub(super) struct PerceivedFrame {
     pub input: Input,
     pub loaded: Loaded,
     pub seen: Seen,
@@ -40,20 +40,20 @@ pub(super) struct Found {
     pub pictures: Vec<(PerceiveSave, Picture)>,
 }
 
-/// Looks at frame after frame, and remembers what it saw.
-pub(super) struct Eyes<'a> {
+/// Processes frame after frame, and tracks what it finds.
+pub(super) struct FrameProcessor<'a> {
     args: &'a PerceiveArgs,
     estimator: &'a mut DepthEstimator,
     perception: Perception,
     watch: ScaleWatch,
-    spotter: Spotter,
+    instance_finder: InstanceFinder,
     /// What a pixel's depth is worth, where the run was calibrated.
     confidence: Option<ConfidenceModel>,
     /// How the intervals are stretched that the network says.
     intervals: IntervalFactors,
 }
 
-impl<'a> Eyes<'a> {
+impl<'a> FrameProcessor<'a> {
     /// Open, nothing seen yet.
     pub(super) fn open(
         args: &'a PerceiveArgs,
@@ -71,20 +71,24 @@ impl<'a> Eyes<'a> {
             estimator,
             perception: Perception::new(config),
             watch: ScaleWatch::new(prediction.scale_config(), prediction.correct_scale),
-            spotter: Spotter::of(&args.masks, prediction.engine.ort_lib.as_deref())?,
+            instance_finder: InstanceFinder::of(&args.masks, prediction.engine.ort_lib.as_deref())?,
             confidence: confidence.map(|c| c.single),
             intervals: model.interval_factors()?,
         })
     }
 
     /// The next frame, and how the camera came there.
-    pub(super) fn look(&mut self, begun: Begun, motion: Motion) -> Result<Found> {
-        let Begun {
+    pub(super) fn process(
+        &mut self,
+        started: StartedFrame,
+        motion: Motion,
+    ) -> Result<PerceivedFrame> {
+        let StartedFrame {
             input,
             loaded,
             prepared,
             start,
-        } = begun;
+        } = started;
         let mut prediction = self.estimator.infer(&prepared)?;
         if let Some(factor) = self.watch.correction() {
             prediction.scale_depth(factor);
@@ -97,7 +101,7 @@ impl<'a> Eyes<'a> {
         let sigma = intervals::sigma(&prediction, &whole, &self.intervals);
         let (depth, k) = working_depth(&whole, &camera);
         let sigma = sigma.map(|sigma| working_depth(&sigma, &camera).0);
-        let things = self.spotter.find(&loaded.image, &depth)?;
+        let things = self.instance_finder.find(&loaded.image, &depth)?;
         let perception = &mut self.perception;
         let surroundings =
             perception.detect_with_sigma(&depth, sigma.as_ref(), &k, motion.stamp, &things)?;
@@ -110,7 +114,7 @@ impl<'a> Eyes<'a> {
         let (image, ground) = (&loaded.image, surroundings.ground.as_ref());
         let scale = self.watch.add(image, &camera, &motion, ground);
         if let Some(ratio) = self.watch.first_drift() {
-            tell_drift(&input.name, ratio);
+            warn_of_drift(&input.name, ratio);
         }
         let record = FrameRecord {
             scale_monitor: scale,
@@ -131,7 +135,7 @@ impl<'a> Eyes<'a> {
             &self.perception,
             self.confidence.as_ref().map(|model| (model, &prediction)),
         );
-        Ok(Found {
+        Ok(PerceivedFrame {
             input,
             loaded,
             seen: Seen {
