@@ -6,10 +6,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::CliError;
-use crate::failure::Result;
-
-/// The exit code of work that was asked to stop before it was done: what shells give for a program that Ctrl-C ended.
-pub(crate) const EXIT_CODE: u8 = 130;
+use crate::failure::{Result, STOPPED};
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 
@@ -20,7 +17,7 @@ pub(crate) fn catch(notice: &'static str) {
         let caught = leaving_an_ignored_hangup(|| {
             ctrlc::set_handler(move || {
                 if ASKED.swap(true, Ordering::SeqCst) {
-                    std::process::exit(i32::from(EXIT_CODE));
+                    std::process::exit(i32::from(STOPPED));
                 }
                 // After a hangup nobody may be left to read it.
                 let _ = writeln!(std::io::stderr(), "{notice} (Ctrl-C again: at once)");

@@ -11,7 +11,7 @@ use deepfusion_train::{Control, LossTerms, SamplePanel, Supervision, TrainEvent}
 use super::time_estimate::TimeEstimate;
 use crate::failure::{Context, Failure, Result};
 use crate::interrupt;
-use crate::progress::{Progress, say};
+use crate::progress::{Progress, clock, say};
 
 /// How often a line has the losses where there is no bar.
 const LINE_EVERY: Duration = Duration::from_secs(20);
@@ -262,30 +262,5 @@ fn drawn(panel: &SamplePanel) -> deepfusion_render::Result<RgbImage> {
             truth,
             error,
         }),
-    }
-}
-
-/// Seconds as minutes and seconds, or hours and minutes.
-pub(super) fn clock(seconds: f64) -> String {
-    if !seconds.is_finite() {
-        return "?".into();
-    }
-    let s = seconds.max(0.0).round() as u64;
-    if s >= 3600 {
-        format!("{} h {:02} min", s / 3600, s / 60 % 60)
-    } else {
-        format!("{}:{:02} min", s / 60, s % 60)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn times_read_well() {
-        assert_eq!(clock(75.4), "1:15 min");
-        assert_eq!(clock(7_320.0), "2 h 02 min");
-        assert_eq!(clock(f64::NAN), "?");
     }
 }

@@ -6,7 +6,7 @@ use burn::tensor::Device;
 use deepfusion_model::{Compute, InputSize, Learn, Preset, Reprojection, TrainConfig};
 use deepfusion_nn::ops::{Precision, supports};
 
-use super::recorder::clock;
+use crate::progress::clock;
 
 /// Steps that the pace is taken from. The first is left out: it allocates.
 const STEPS: usize = 5;

@@ -5,7 +5,7 @@ use deepfusion_model::{
 };
 use deepfusion_train::{TrainSummary, Trainer};
 
-use super::recorder::{Recorder, clock};
+use super::recorder::Recorder;
 use super::recordings::open_samples;
 use super::start::Start;
 use super::time_estimate::TimeEstimate;
@@ -14,7 +14,7 @@ use crate::allocator;
 use crate::cli::{ClockOffset, TrainArgs};
 use crate::error::CliError;
 use crate::failure::Result;
-use crate::progress::say;
+use crate::progress::{clock, say};
 use crate::{interrupt, jobs, output};
 
 /// `deepfusion train`.

@@ -11,8 +11,6 @@ use std::process::ExitCode;
 
 use anstyle::{AnsiColor, Style};
 
-use crate::interrupt;
-
 pub(crate) use context::Context;
 
 /// What a command returns.
@@ -40,6 +38,9 @@ pub(crate) trait Reportable: Error + Send + Sync + 'static {
     }
 }
 
+/// The exit code of work that was asked to stop before it was done: what shells give for a program that Ctrl-C ended.
+pub(crate) const STOPPED: u8 = 130;
+
 /// How the program ends. `train && eval` and a scheduler go by the code alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
@@ -56,7 +57,7 @@ impl From<Exit> for ExitCode {
         match exit {
             Exit::Failed => Self::FAILURE,
             Exit::WrongArguments => Self::from(2),
-            Exit::Stopped => Self::from(interrupt::EXIT_CODE),
+            Exit::Stopped => Self::from(STOPPED),
         }
     }
 }

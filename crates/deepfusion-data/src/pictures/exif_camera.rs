@@ -7,9 +7,6 @@ use std::io::{BufRead, Seek};
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-/// Diagonal of a frame of 35 mm film, 36 mm by 24 mm, which EXIF's equivalent focal lengths refer to (CIPA DC-008).
-pub(super) const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
-
 /// Equivalent focal lengths of lenses there are, mm.
 const FOCAL_LENGTHS_MM: RangeInclusive<u32> = 5..=2000;
 

@@ -1,7 +1,8 @@
 //! Telephones whose main camera's view is published, for pictures whose EXIF block names the telephone and the lens, but not the
 //! focal length in 35 mm film.
 
-use super::exif_camera::FILM_DIAGONAL_MM;
+/// Diagonal of a frame of 35 mm film, 36 mm by 24 mm, which EXIF's equivalent focal lengths refer to (CIPA DC-008).
+pub(super) const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
 
 /// How far EXIF's focal length may be from the main lens', as a share: other lenses of the same telephone are farther away.
 const SAME_LENS: f64 = 0.03;

@@ -16,12 +16,11 @@ use deepfusion_weights::{DEFAULT, Shipped};
 use super::page::{self, Shown};
 use super::{Demo, TEST_SEED, measure};
 use crate::cli::PerceiveArgs;
-use crate::commands::recorder::clock;
 use crate::commands::start::Start;
 use crate::commands::{device, perceive, run_report};
 use crate::failure::Result;
 use crate::output;
-use crate::progress::say;
+use crate::progress::{clock, say};
 
 /// Frames of the drive along the new street, ten a second, and how many of them have a scan.
 const FRAMES: usize = 200;

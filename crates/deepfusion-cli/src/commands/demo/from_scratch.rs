@@ -7,11 +7,10 @@ use deepfusion_sim::SimConfig;
 
 use super::page::{self, Shown};
 use super::{Demo, TEST_SEED, measure};
-use crate::commands::recorder::clock;
 use crate::commands::recordings::open_datasets;
 use crate::commands::run_report;
 use crate::failure::Result;
-use crate::progress::say;
+use crate::progress::{clock, say};
 
 /// Streets that are trained on, each filmed at its own rate: one street alone is learned by heart. At few
 /// frames a second far things move enough to be measured; at many, cars parked beside the lane move

@@ -22,12 +22,11 @@ use deepfusion_sim::{SimConfig, Simulation, write_kitti};
 use deepfusion_train::{Model, Trainer};
 use deepfusion_weights::DEFAULT;
 
-use super::recorder::clock;
 use super::recordings::open_samples;
 use super::{device, train};
 use crate::cli::{DemoArgs, EngineArgs};
 use crate::failure::Result;
-use crate::progress::{Progress, say};
+use crate::progress::{Progress, clock, say};
 use crate::{engine, interrupt, output};
 
 /// Far from any seed a user is likely to choose for training.

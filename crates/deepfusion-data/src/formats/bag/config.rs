@@ -243,6 +243,23 @@ impl BagConfig {
         Ok(config)
     }
 
+    /// The table of a bag's file over the profile of this name; `None` where there is no such profile.
+    ///
+    /// # Errors
+    /// What of either is no such file.
+    pub(super) fn over_profile(
+        own: toml::Table,
+        name: &str,
+    ) -> Option<std::result::Result<Self, toml::de::Error>> {
+        let completed = profile::complete(own, name)?;
+        Some(completed.and_then(|completed| {
+            let mut config: Self = completed.table.try_into()?;
+            config.profile_camera = completed.camera.map(toml::Value::try_into).transpose()?;
+            config.profile_mounts = completed.mounts.try_into()?;
+            Ok(config)
+        }))
+    }
+
     /// Where a bag's file is looked for, in this order.
     pub(super) fn candidates(bag: &Path) -> Vec<PathBuf> {
         let shared = bag.with_file_name(OF_FOLDER);

@@ -4,8 +4,8 @@ use super::can::Can;
 use super::config::BagConfig;
 use super::fixes::Fixes;
 use super::frames::Frames;
+use super::packet::{VideoTopic, packet};
 use super::topics::{Role, Topics};
-use super::video::{self, Seen};
 use crate::{Error, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_motion::ImuSample;
@@ -44,7 +44,7 @@ pub(super) fn nearest(
 pub(super) struct Index {
     pub(super) images: Vec<MessageRef>,
     /// Of a camera whose messages are a video stream's.
-    pub(super) video: Option<Seen>,
+    pub(super) video: Option<VideoTopic>,
     pub(super) scans: Vec<MessageRef>,
     /// Messages of the points that move.
     pub(super) dynamic: Vec<MessageRef>,
@@ -120,7 +120,7 @@ impl Index {
                     path: bag.path().to_owned(),
                     problem: format!(
                         "{}: some of its messages are pictures, others packets of a video",
-                        video.topic
+                        video.name
                     ),
                     truncated: false,
                 });
@@ -148,8 +148,8 @@ impl Index {
         let mut timed = false;
         for role in topics.roles(message.topic()) {
             if role == Role::Image
-                && let Some((codec, packet)) = video::packet(bag.path(), message)?
-                && !Seen::add(&mut self.video, message.topic(), (codec, &packet))
+                && let Some((codec, packet)) = packet(bag.path(), message)?
+                && !VideoTopic::add(&mut self.video, message.topic(), (codec, &packet))
             {
                 continue;
             }

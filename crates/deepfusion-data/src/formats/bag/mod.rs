@@ -17,6 +17,7 @@ mod index;
 mod inspect;
 mod mounts;
 mod open;
+mod packet;
 mod profile;
 mod recording;
 mod scan;

@@ -4,11 +4,12 @@ use super::config::BagConfig;
 use super::dynamic::DynamicPoints;
 use super::index::{Index, MessageRef};
 use super::mounts::Mounts;
+use super::packet::VideoTopic;
 use super::recording::BagRecording;
 use super::scans::BagScans;
 use super::streams::{streams, warnings_on};
 use super::topics::{Role, Topics};
-use super::video::{BagVideo, Seen};
+use super::video::BagVideo;
 use super::{camera, image, sensors, source};
 use crate::dataset::assumed_warning;
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
@@ -155,7 +156,12 @@ fn first_image(bag: &dyn MessageSource, index: &Index) -> Result<MessageRef> {
     if let Some(first) = index.images.first() {
         return Ok(*first);
     }
-    if let Some(Seen { topic, before, .. }) = &index.video {
+    if let Some(VideoTopic {
+        name: topic,
+        before,
+        ..
+    }) = &index.video
+    {
         return Err(Error::NoFrames {
             path: bag.path().to_owned(),
             why: format!(

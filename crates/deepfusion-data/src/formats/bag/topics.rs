@@ -70,7 +70,7 @@ impl Topics {
         };
         let names = &config.topics;
         let pictures = [Image::<'_>::TYPE, CompressedImage::<'_>::TYPE];
-        let images = [&pictures[..], &super::video::TYPES].concat();
+        let images = [&pictures[..], &super::packet::TYPES].concat();
         let mut found = Vec::new();
         let mut add = |role, name: Option<String>| found.extend(name.map(|name| (role, name)));
         let image = |types: &[&str]| {
@@ -81,7 +81,7 @@ impl Topics {
         // Of a camera that was recorded as pictures and as a video the pictures count: they can be read one by one.
         let image = match names.image {
             None => image(&pictures)?
-                .map_or_else(|| image(&super::video::TYPES), |found| Ok(Some(found)))?,
+                .map_or_else(|| image(&super::packet::TYPES), |found| Ok(Some(found)))?,
             Some(_) => image(&images)?,
         };
         add(Role::Image, image.clone());

@@ -1,0 +1,101 @@
+//! The packets of a video stream among a bag's messages.
+
+use crate::{Error, Result};
+use deepfusion_rosbag::msg::{
+    CompressedImage, CompressedVideo, FfmpegPacket, OldFfmpegPacket, RosMessage,
+};
+use deepfusion_rosbag::{Message, Serialization};
+use deepfusion_video::Codec;
+use std::borrow::Cow;
+use std::path::Path;
+
+/// The message types of video streams.
+pub(super) const TYPES: [&str; 2] = [CompressedVideo::<'_>::TYPE, FfmpegPacket::<'_>::TYPE];
+
+/// What of a stream's messages the pass over the bag has seen.
+#[derive(Debug, Clone)]
+pub(super) struct VideoTopic {
+    pub(super) name: String,
+    pub(super) codec: Codec,
+    /// How many messages came before the first key frame.
+    pub(super) before: u64,
+    /// How many came from there on.
+    pub(super) count: usize,
+    /// Of each image, by time of measurement, which packet it is.
+    pub(super) order: Vec<u64>,
+}
+
+impl VideoTopic {
+    /// Takes a message in: whether it is a frame's.
+    pub(super) fn add(
+        found: &mut Option<Self>,
+        topic: &str,
+        (codec, packet): (Codec, &[u8]),
+    ) -> bool {
+        let found = found.get_or_insert_with(|| Self {
+            name: topic.to_owned(),
+            codec,
+            before: 0,
+            count: 0,
+            order: Vec::new(),
+        });
+        if found.count == 0 && !codec.begins(packet) {
+            found.before += 1;
+            return false;
+        }
+        found.count += 1;
+        true
+    }
+
+    /// What is left out, in a sentence.
+    pub(super) fn warning(&self) -> Option<String> {
+        let Self { name, before, .. } = self;
+        match before {
+            0 => None,
+            1 => Some(format!(
+                "{name}: the first message comes before the first key frame and cannot be decoded: it is left out"
+            )),
+            _ => Some(format!(
+                "{name}: the first {before} messages come before the first key frame and cannot be decoded: they are left out"
+            )),
+        }
+    }
+}
+
+/// The packet of a message, and its codec; `None` where it is a picture by itself.
+///
+/// # Errors
+/// [`Error::Bag`]; [`Error::Video`] for a codec that is not read.
+pub(super) fn packet<'m>(
+    bag: &Path,
+    message: &'m Message<'_>,
+) -> Result<Option<(Codec, Cow<'m, [u8]>)>> {
+    let (format, data) = if message.is::<CompressedVideo<'_>>() {
+        let video: CompressedVideo<'_> = message.decode()?;
+        (video.format, video.data)
+    } else if is_old(message) {
+        let old: OldFfmpegPacket<'_> = message.decode()?;
+        (old.encoding, old.data)
+    } else if message.connection().type_name == FfmpegPacket::TYPE {
+        let packet: FfmpegPacket<'_> = message.decode()?;
+        (packet.encoding, packet.data)
+    } else if message.is::<CompressedImage<'_>>() {
+        let image: CompressedImage<'_> = message.decode()?;
+        return Ok(Codec::named(&image.format).map(|codec| (codec, image.data)));
+    } else {
+        return Ok(None);
+    };
+    match Codec::named(&format) {
+        Some(codec) => Ok(Some((codec, data))),
+        None => Err(Error::Video(deepfusion_video::Error::Codec {
+            path: bag.to_owned(),
+            stream: message.topic().to_owned(),
+            format,
+        })),
+    }
+}
+
+/// Both layouts of a packet have one name; that of ROS 1's first version is recognised by its MD5, which ROS 2 has none of.
+fn is_old(message: &Message<'_>) -> bool {
+    message.serialization() == Serialization::Ros1 && message.is::<OldFfmpegPacket<'_>>()
+}

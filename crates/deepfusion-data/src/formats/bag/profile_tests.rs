@@ -1,0 +1,43 @@
+use super::super::config::BagConfig;
+use super::*;
+use nalgebra::Vector3;
+
+fn umad(own: &str) -> BagConfig {
+    let own = toml::from_str(own).unwrap();
+    BagConfig::over_profile(own, "umad").unwrap().unwrap()
+}
+
+/// Each is read as the file beside a bag is, and names no file.
+#[test]
+fn profiles_are_files_as_those_beside_bags() {
+    for (name, text) in PROFILES {
+        let config: BagConfig = toml::from_str(text).unwrap();
+        assert!(
+            config.calibration.is_none() && config.can.is_none(),
+            "{name}"
+        );
+        assert!(config.profile.is_none(), "{name}");
+    }
+}
+
+#[test]
+fn ahead_of_the_lidar_is_ahead_of_the_camera() {
+    let config = umad("");
+    assert!(config.cam_from_lidar.is_none());
+    let cam_from_lidar = config.profile_mounts.cam_from_lidar.unwrap().se3();
+    let ahead = cam_from_lidar.transform(&Vector3::new(10.0, 1.0, 2.0));
+    let expected = Vector3::new(-1.0, -2.0 + 0.08, 10.0);
+    assert!((ahead - expected).norm() < 1e-9, "{ahead}");
+}
+
+#[test]
+fn what_the_bags_file_says_goes_before_it() {
+    let config =
+        umad("[cam_from_lidar]\ntranslation = [0.0, 0.1, 0.0]\nrotation = [0.0, 0.0, 0.0]\n");
+    assert_eq!(config.cam_from_lidar.unwrap().translation, [0.0, 0.1, 0.0]);
+    assert!(config.profile_mounts.cam_from_lidar.is_none());
+    // CameraInfo goes before the profile's camera, the file's own before CameraInfo.
+    assert!(config.camera.is_none());
+    assert_eq!(config.profile_camera.unwrap().cy, 117.60);
+    assert!(BagConfig::over_profile(Table::new(), "kitti").is_none());
+}
