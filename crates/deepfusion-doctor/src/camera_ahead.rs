@@ -1,6 +1,6 @@
 //! The offset of the camera's clock, to be applied: as the check `clock` measures it, but an error where it is not sure.
 
-use super::clock::{rates, settled};
+use super::clock_offset::{rates, settled};
 use super::epipolar;
 use super::survey::Survey;
 use deepfusion_data::Dataset;

@@ -7,6 +7,7 @@
 mod blur;
 mod camera_ahead;
 mod clock;
+mod clock_offset;
 mod duplicates;
 mod dynamic_points;
 mod epipolar;
@@ -229,7 +230,7 @@ fn examine_among(dataset: &Dataset, others_train: bool) -> DriveDiagnosis {
 #[must_use]
 pub fn time_offset(dataset: &Dataset) -> Option<TimeOffset> {
     // Without them no picture need be read.
-    clock::rates(dataset)?.yaw_rate_radps?;
+    clock_offset::rates(dataset)?.yaw_rate_radps?;
     let survey = Survey::of(dataset);
     let pairs = epipolar::pairs(&survey);
     let estimate = clock::estimate(&survey, &pairs).ok()?;

@@ -3,7 +3,8 @@
 use crate::blf;
 use crate::error::{BadLine, Error, Result};
 use crate::log::{Clock, DriveLog, Format, Speed};
-use crate::read::{ReadOptions, enough, text_of};
+use crate::read_options::ReadOptions;
+use crate::rows::{enough, text_of};
 use crate::units::SpeedUnit;
 use deepfusion_hint::count_of;
 use deepfusion_motion::can::{CanId, Dbc};

@@ -2,9 +2,11 @@
 
 use crate::error::{Error, Result};
 use crate::log::{DriveLog, Format};
-use crate::read::{ReadOptions, Times, of_table, text_of};
+use crate::read_options::ReadOptions;
+use crate::rows::text_of;
 use crate::table::Table;
 use crate::turns::{Heading, Sensor, yaw_rates};
+use crate::wide_table::{self, Times};
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -37,7 +39,7 @@ pub(crate) fn read(folder: &Path, options: &ReadOptions) -> Result<DriveLog> {
             problem: format!("an export folder has one of {}", LOCATIONS.join(", ")),
         });
     };
-    let mut log = of_table(&location, options)?;
+    let mut log = wide_table::read(&location, options)?;
     log.format = Format::ExportFolder;
     let file = location
         .path

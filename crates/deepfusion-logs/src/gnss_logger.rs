@@ -3,7 +3,7 @@
 use crate::error::{BadLine, Error, Result};
 use crate::log::{Clock, DriveLog, Format, Speed};
 use crate::numbers::{Cell, cell};
-use crate::read::{enough, left_out};
+use crate::rows::{enough, left_out};
 use std::path::Path;
 
 const HEADER: &str = "# Fix,";

@@ -3,9 +3,11 @@
 use crate::columns::{Column, speed_rank};
 use crate::error::{ColumnProblem, Error, Result};
 use crate::log::{DriveLog, Format, Speed};
-use crate::read::{ReadOptions, Times, enough, left_out};
+use crate::read_options::ReadOptions;
+use crate::rows::{enough, left_out};
 use crate::table::Table;
 use crate::units::SpeedUnit;
+use crate::wide_table::Times;
 use std::collections::BTreeMap;
 
 const QUANTITIES: [&str; 4] = ["pid", "sensor", "parameter", "signal"];

@@ -1,0 +1,57 @@
+//! What all readers of text share: the text, and what is said of its rows.
+
+use crate::error::{Error, Result};
+use crate::log::Speed;
+use deepfusion_hint::count_of;
+use std::path::Path;
+
+/// A file's text: UTF-8, with a byte order mark or without.
+pub(crate) fn text_of(path: &Path) -> Result<String> {
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+    String::from_utf8(bytes).map_err(|e| {
+        let before = &e.as_bytes()[..e.utf8_error().valid_up_to()];
+        let line = memchr::memchr_iter(b'\n', before).count() as u64 + 1;
+        let utf16 = [&b"\xff\xfe"[..], b"\xfe\xff"]
+            .iter()
+            .any(|mark| e.as_bytes().starts_with(mark));
+        Error::Line {
+            path: path.to_owned(),
+            line,
+            field: "any".into(),
+            problem: if utf16 {
+                "UTF-16 text, save it as UTF-8"
+            } else {
+                "not UTF-8 text, and no binary log that is known"
+            }
+            .into(),
+        }
+    })
+}
+
+/// Says what of the rows was not used.
+pub(crate) fn left_out(notes: &mut Vec<String>, rows: usize, absent: usize, repeated: usize) {
+    if absent > 0 {
+        notes.push(format!(
+            "{absent} of {rows} rows hold no speed and are left out"
+        ));
+    }
+    if repeated > 0 {
+        notes.push(format!(
+            "{repeated} of {rows} rows repeat the time of the row above and are left out"
+        ));
+    }
+}
+
+/// An error where there are not two speeds.
+pub(crate) fn enough(path: &Path, speeds: &[Speed]) -> Result<()> {
+    match speeds.len() {
+        0 | 1 => Err(Error::NoSpeed {
+            path: path.to_owned(),
+            problem: format!(
+                "{} with a time and a speed, at least two are needed",
+                count_of(speeds.len(), "row")
+            ),
+        }),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,229 @@
+//! A table with a column for each quantity.
+
+use crate::columns::{Column, TIMES};
+use crate::dates::{TimeStyle, clock_of, nanoseconds, style_of};
+use crate::error::{ColumnProblem, Error, Result};
+use crate::log::{Clock, DriveLog, Format, Speed};
+use crate::read_options::ReadOptions;
+use crate::rows::{enough, left_out};
+use crate::table::{Table, short};
+use crate::track::{self, TimedFix};
+use crate::units::SpeedUnit;
+use deepfusion_motion::Fix;
+
+/// The times of a table's rows.
+pub(crate) struct Times<'a> {
+    pub(crate) column: &'a Column,
+    style: TimeStyle,
+    pub(crate) clock: Clock,
+}
+
+impl<'a> Times<'a> {
+    /// Finds the column, and how its times are written.
+    pub(crate) fn of(table: &'a Table, options: &ReadOptions) -> Result<Self> {
+        let column = match &options.time {
+            Some(name) => table.asked_for(name)?,
+            None => table
+                .named(&TIMES)
+                .ok_or_else(|| table.lacks(ColumnProblem::NoTime))?,
+        };
+        let words: Vec<String> = (0..table.len().min(1000))
+            .map(|row| table.plain_word(row, column))
+            .collect();
+        let words: Vec<&str> = words
+            .iter()
+            .map(String::as_str)
+            .filter(|w| !w.is_empty())
+            .collect();
+        let Some(first) = words.first() else {
+            return Err(Error::NoSpeed {
+                path: table.path.clone(),
+                problem: "no row below the header has a time".into(),
+            });
+        };
+        // A number's column may be named for its unit: "seconds", "UnixTimeMillis".
+        let unit = column.unit.as_deref().or(match column.name.as_str() {
+            "seconds" | "seconds elapsed" => Some("s"),
+            "unixtimemillis" => Some("ms"),
+            _ => None,
+        });
+        let style = style_of(&words, unit).ok_or_else(|| match first.parse::<f64>() {
+            Ok(_) => table.lacks(ColumnProblem::NoTimeUnit(column.header.clone())),
+            Err(_) => table.bad(0, column, &format!("'{}' is not a time", short(first))),
+        })?;
+        Ok(Self {
+            column,
+            style,
+            clock: clock_of(first, style),
+        })
+    }
+
+    /// The time of a row, which may not be before `after`.
+    pub(crate) fn ns(&self, table: &Table, row: usize, after: Option<i64>) -> Result<i64> {
+        let word = table.plain_word(row, self.column);
+        let ns = nanoseconds(&word, self.style, after).ok_or_else(|| {
+            table.bad(
+                row,
+                self.column,
+                &format!("'{}' is not a time", short(&word)),
+            )
+        })?;
+        match after {
+            Some(after) if ns < after => {
+                let back = (after - ns) as f64 * 1e-9;
+                Err(table.bad(
+                    row,
+                    self.column,
+                    &format!("'{}' is {back} s before the row above", short(&word)),
+                ))
+            }
+            _ => Ok(ns),
+        }
+    }
+}
+
+/// A table with a column for each quantity.
+pub(crate) fn read(table: &Table, options: &ReadOptions) -> Result<DriveLog> {
+    let times = Times::of(table, options)?;
+    let speed = match &options.speed {
+        Some(name) => Some(table.asked_for(name)?),
+        None => best_speed(table, options.unit),
+    };
+    let mut notes = Vec::new();
+    if table.repeated_headers > 0 {
+        let times = match table.repeated_headers {
+            1 => "once".to_owned(),
+            n => format!("{n} times"),
+        };
+        notes.push(format!("the header stands {times} more among the rows"));
+    }
+    let Some(column) = speed else {
+        return positions(table, &times, notes);
+    };
+    let phone_export = table.named(&["seconds elapsed"]).is_some();
+    let unit = match column.speed_unit().or(options.unit) {
+        Some(unit) => unit,
+        // Sensor Logger's documentation: metres a second.
+        None if phone_export || column.name == "speedmps" => SpeedUnit::MetresPerSecond,
+        None => return Err(table.lacks(ColumnProblem::NoSpeedUnit(column.header.clone()))),
+    };
+    notes.insert(
+        0,
+        format!(
+            "time from column '{}', speed from column '{}' in {unit}",
+            times.column.header.trim(),
+            column.header.trim()
+        ),
+    );
+    let accuracy = table.named(&["speedaccuracy", "speed accuracy"]);
+    let (mut speeds, mut last, mut absent, mut repeated) = (Vec::<Speed>::new(), None, 0, 0);
+    for row in 0..table.len() {
+        let value = table.number(row, column)?;
+        // A phone without a fix writes -1.
+        let value = value.filter(|v| !(phone_export && *v < 0.0));
+        let Some(value) = value else {
+            absent += 1;
+            continue;
+        };
+        if times_absent(table, &times, row) {
+            absent += 1;
+            continue;
+        }
+        let ns = times.ns(table, row, last)?;
+        if last == Some(ns) {
+            repeated += 1;
+            continue;
+        }
+        last = Some(ns);
+        let sigma = accuracy
+            .map(|c| table.number(row, c))
+            .transpose()?
+            .flatten();
+        speeds.push(Speed {
+            ns,
+            mps: value * unit.mps(),
+            sigma_mps: sigma.filter(|s| *s > 0.0),
+        });
+    }
+    left_out(&mut notes, table.len(), absent, repeated);
+    enough(&table.path, &speeds)?;
+    Ok(DriveLog {
+        format: Format::Table,
+        clock: times.clock,
+        speeds,
+        yaw_rates: Vec::new(),
+        course_rates: Vec::new(),
+        notes,
+    })
+}
+
+fn times_absent(table: &Table, times: &Times, row: usize) -> bool {
+    ["", "-"].contains(&table.word(row, times.column))
+}
+
+/// The column that fits a vehicle's speed best; of equal ones that whose unit is known, then the first.
+fn best_speed(table: &Table, unit: Option<SpeedUnit>) -> Option<&Column> {
+    let ranked = table
+        .columns
+        .iter()
+        .filter_map(|c| Some((c.speed_rank()?, c)));
+    // A column in which nothing stands is none: OBD apps list what the vehicle never answered.
+    let filled =
+        |c: &Column| (0..table.len()).any(|row| matches!(table.number(row, c), Ok(Some(_))));
+    let with_unit = |c: &Column| c.speed_unit().or(unit).is_some();
+    ranked
+        .filter(|(_, c)| filled(c))
+        .min_by_key(|(rank, c)| (!with_unit(c), *rank, c.index))
+        .map(|(_, c)| c)
+}
+
+/// Speeds from a table's latitudes and longitudes.
+fn positions(table: &Table, times: &Times, mut notes: Vec<String>) -> Result<DriveLog> {
+    let degrees = (
+        table.named(&["latitude", "lat", "latitudedegrees"]),
+        table.named(&[
+            "longitude",
+            "lon",
+            "lng",
+            "long",
+            "longtitude",
+            "longitudedegrees",
+        ]),
+    );
+    let (Some(latitude), Some(longitude)) = degrees else {
+        return Err(table.lacks(ColumnProblem::NoSpeed));
+    };
+    let (mut fixes, mut last) = (Vec::new(), None);
+    for row in 0..table.len() {
+        let place = (table.number(row, latitude)?, table.number(row, longitude)?);
+        let (Some(latitude_deg), Some(longitude_deg)) = place else {
+            continue;
+        };
+        // Before its first fix an app writes 0, 0.
+        if times_absent(table, times, row) || (latitude_deg == 0.0 && longitude_deg == 0.0) {
+            continue;
+        }
+        let ns = times.ns(table, row, last)?;
+        last = Some(ns);
+        let fix = Fix {
+            time_s: 0.0,
+            latitude_deg,
+            longitude_deg,
+            speed_mps: None,
+        };
+        fixes.push(TimedFix { ns, fix });
+    }
+    notes.push(format!(
+        "time from column '{}', positions from '{}' and '{}'",
+        times.column.header.trim(),
+        latitude.header.trim(),
+        longitude.header.trim()
+    ));
+    let mut log = track::log_of_fixes(&table.path, Format::Table, &fixes)?;
+    notes.append(&mut log.notes);
+    Ok(DriveLog {
+        clock: times.clock,
+        notes,
+        ..log
+    })
+}
