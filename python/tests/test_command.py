@@ -47,6 +47,8 @@ def test_ctrl_c_is_the_commands(tmp_path):
     simulating = subprocess.Popen(
         [SCRIPT, "simulate", "--out", str(tmp_path / "long"), "--frames", "3000", "--size", "320x96"],
         stderr=subprocess.DEVNULL,
+        # What a shell starts in its background ignores Ctrl-C, and so would the program.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     while not (tmp_path / "long").exists():
         time.sleep(0.05)

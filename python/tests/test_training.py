@@ -129,6 +129,8 @@ def interrupted(code, when, *arguments):
         [sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)],
         stdout=subprocess.PIPE,
         text=True,
+        # What a shell starts in its background ignores Ctrl-C, and so would the program.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     for line in program.stdout:
         if line.strip() == when:

@@ -1,6 +1,6 @@
 //! What a file is: by its name, and by what stands in it.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::log::DriveLog;
 use crate::read_options::ReadOptions;
 use crate::rows::text_of;

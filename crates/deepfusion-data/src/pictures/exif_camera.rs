@@ -1,6 +1,6 @@
 //! A picture's camera by its EXIF block.
 
-use super::known_cameras::KnownCamera;
+use super::known_cameras::{FILM_DIAGONAL_MM, KnownCamera};
 use deepfusion_geometry::Intrinsics;
 use exif::{Exif, In, Tag, Value};
 use std::io::{BufRead, Seek};
