@@ -34,6 +34,14 @@ pub struct CameraAhead {
     pub correlation: f64,
 }
 
+impl CameraAhead {
+    /// Whether two independent measurements contradict each other.
+    fn differs_from(&self, other: &Self) -> bool {
+        let error_s = self.std_error_s.hypot(other.std_error_s);
+        (self.ahead_s - other.ahead_s).abs() > (SIGMAS * error_s).max(AGREE_S)
+    }
+}
+
 /// Why no offset can be applied.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -81,7 +89,7 @@ pub enum NoCameraAhead {
     },
     /// A drive whose clocks are not as far apart as those of the others.
     #[error(
-        "{drive}: the clocks are {ahead_s:+.3} ± {std_error_s:.3} s apart, those of all drives together {mean_s:+.3} ± {mean_error_s:.3} s"
+        "{drive}: the clocks are {ahead_s:+.3} ± {std_error_s:.3} s apart, those of the other drives {others_s:+.3} ± {others_error_s:.3} s"
     )]
     Differ {
         /// The drive.
@@ -90,14 +98,14 @@ pub enum NoCameraAhead {
         ahead_s: f64,
         /// Its standard error, in seconds.
         std_error_s: f64,
-        /// The mean of all drives, in seconds.
-        mean_s: f64,
+        /// The mean of the others, in seconds.
+        others_s: f64,
         /// Its standard error, in seconds.
-        mean_error_s: f64,
+        others_error_s: f64,
     },
     /// A drive that does not show its offset, and says another one than the others show.
     #[error(
-        "{drive}: it says that its camera's clock is {said_s:+.3} s ahead, which its pictures do not show; those of the other drives show {mean_s:+.3} s"
+        "{drive}: it says that its camera's clock is {said_s:+.3} s ahead, which its pictures do not show; those of the other drives show {others_s:+.3} s"
     )]
     SaysOther {
         /// The drive.
@@ -105,7 +113,7 @@ pub enum NoCameraAhead {
         /// What it says, in seconds.
         said_s: f64,
         /// The mean of the others, in seconds.
-        mean_s: f64,
+        others_s: f64,
     },
     /// No drive.
     #[error("no recording to compare clocks of")]
@@ -123,7 +131,10 @@ impl Hint for NoCameraAhead {
             Self::Weak { .. } | Self::Unsure { .. } => {
                 "use a longer drive with more bends, or a log with a gyroscope; or give the offset in milliseconds".into()
             }
-            Self::Differ { .. } | Self::SaysOther { .. } => {
+            Self::SaysOther { .. } => {
+                "take clock.camera_ahead_s out of the file beside it where it is wrong; else give the recordings one by one".into()
+            }
+            Self::Differ { .. } => {
                 "write clock.camera_ahead_s beside each recording (dataset.toml), or give them one by one".into()
             }
             Self::Nothing => "name a recording".into(),
@@ -255,27 +266,33 @@ pub fn common_camera_ahead<'a>(
         let last = unmeasured.pop().map(|(_, why)| why);
         return Err(last.unwrap_or(NoCameraAhead::Nothing));
     };
-    let apart = |ahead_s: f64, error_s: f64| {
-        (ahead_s - mean.ahead_s).abs() > (SIGMAS * error_s).max(AGREE_S)
-    };
-    for (drive, ahead) in &found {
-        if apart(ahead.ahead_s, ahead.std_error_s.hypot(mean.std_error_s)) {
+    for (i, (drive, ahead)) in found.iter().enumerate() {
+        let others = [&measured[..i], &measured[i + 1..]].concat();
+        let Some(others) = weighted_mean(&others) else {
+            continue;
+        };
+        if ahead.differs_from(&others) {
             return Err(NoCameraAhead::Differ {
                 drive: drive.name().to_owned(),
                 ahead_s: ahead.ahead_s,
                 std_error_s: ahead.std_error_s,
-                mean_s: mean.ahead_s,
-                mean_error_s: mean.std_error_s,
+                others_s: others.ahead_s,
+                others_error_s: others.std_error_s,
             });
         }
     }
     for (drive, _) in &unmeasured {
         let said_s = drive.camera_ahead_s();
-        if said_s != 0.0 && apart(said_s, mean.std_error_s) {
+        let said = CameraAhead {
+            ahead_s: said_s,
+            std_error_s: 0.0,
+            correlation: 1.0,
+        };
+        if said_s != 0.0 && said.differs_from(&mean) {
             return Err(NoCameraAhead::SaysOther {
                 drive: drive.name().to_owned(),
                 said_s,
-                mean_s: mean.ahead_s,
+                others_s: mean.ahead_s,
             });
         }
     }

@@ -62,7 +62,11 @@ pub(super) fn estimate(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Result<Es
     let rates = rates.ok_or("no speed and yaw rate to compare the picture with")?;
     if !survey.dataset.yaw_known() {
         // A course takes more pictures and other settings than a yaw rate.
-        let offset = camera_ahead::offset(survey.dataset).map_err(|why| why.to_string())?;
+        let offset = camera_ahead::offset(survey.dataset).map_err(|why| {
+            // The line is the drive's own.
+            let (why, drive) = (why.to_string(), format!("{}: ", survey.dataset.name()));
+            why.strip_prefix(&drive).unwrap_or(&why).to_owned()
+        })?;
         let least_s = MOST_BY_COURSE_S;
         return Ok(Estimate { offset, least_s });
     }

@@ -3,7 +3,7 @@
 use super::finding::{Figure, Limit, Outcome, Severity, median};
 use deepfusion_data::{Dataset, GtKind, PLAUSIBLE_HEIGHT_M};
 use deepfusion_geometry::DepthMap;
-use deepfusion_hint::Hint;
+use deepfusion_hint::{Hint, count_of};
 use nalgebra::{Matrix3, Vector3};
 
 /// Frames looked at.
@@ -59,8 +59,8 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     planes.retain(|(n, _)| n.angle(&up).to_degrees() <= MOST_TILT_DEG);
     if planes.len() < LEAST_PLANES {
         let why = format!(
-            "the measured depth of {} frames shows the road before the camera, {LEAST_PLANES} are needed",
-            planes.len()
+            "the road before the camera is in the measured depth of {}, {LEAST_PLANES} are needed",
+            count_of(planes.len(), "frame")
         );
         return Outcome::skipped("ground", why);
     }

@@ -7,6 +7,7 @@
 use super::epipolar::{EpipolarPair, YawTrust, heading_error};
 use super::finding::{Figure, Limit, Outcome, Severity};
 use super::survey::Survey;
+use deepfusion_hint::count_of;
 use nalgebra::Vector2;
 
 /// Straight enough, rad/s, and fast enough, m/s.
@@ -32,8 +33,8 @@ pub(super) fn check(survey: &Survey<'_>, pairs: &[EpipolarPair]) -> Outcome {
         .collect();
     if straight.len() < LEAST_PAIRS {
         let why = format!(
-            "{} pairs drive straight, {LEAST_PAIRS} are needed",
-            straight.len()
+            "{} straight ahead, {LEAST_PAIRS} are needed",
+            count_of(straight.len(), "pair")
         );
         return Outcome::skipped("heading", why);
     }

@@ -5,6 +5,7 @@
 
 use super::epipolar::EpipolarPair;
 use super::finding::{Figure, Limit, Outcome, Severity};
+use deepfusion_hint::count_of;
 use nalgebra::Vector3;
 
 /// Least standard deviation of the vehicle's yaw rate that can be compared, rad/s.
@@ -16,7 +17,10 @@ const SURE: f64 = 0.9;
 pub(super) fn check(pairs: &[EpipolarPair]) -> Outcome {
     let seen: Vec<(f64, f64)> = pairs.iter().filter_map(turns).collect();
     if seen.len() < LEAST_PAIRS {
-        let why = format!("{} pairs show a turn, {LEAST_PAIRS} are needed", seen.len());
+        let why = format!(
+            "{} with a turn, {LEAST_PAIRS} are needed",
+            count_of(seen.len(), "pair")
+        );
         return Outcome::skipped("turn", why);
     }
     let n = seen.len() as f64;

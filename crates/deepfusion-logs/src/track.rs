@@ -38,8 +38,8 @@ pub(crate) fn log_of_fixes(path: &Path, format: Format, timed: &[TimedFix]) -> R
     if smoothed.len() < fixes.len() {
         let lost = fixes.len() - smoothed.len();
         notes.push(format!(
-            "{lost} of {} fixes stand alone or go back in time and are left out",
-            fixes.len()
+            "left out, as they stand alone or go back in time: {lost} of {}",
+            count_of(fixes.len(), "fix")
         ));
     }
     let mut sigmas: Vec<f64> = smoothed.iter().map(|s| s.sigma_mps).collect();
@@ -53,7 +53,7 @@ pub(crate) fn log_of_fixes(path: &Path, format: Format, timed: &[TimedFix]) -> R
         "speeds {from}, sure to {:.2} m/s in the middle",
         sigmas[sigmas.len() / 2]
     ));
-    let time = |s: f64| origin + (s * 1e9).round() as i64;
+    let time = |s: f64| origin.saturating_add((s * 1e9).round() as i64);
     let course_rates = course_rates(&smoothed);
     let course_rates = course_rates.iter().map(|(time_s, radps)| YawRate {
         ns: time(*time_s),

@@ -199,6 +199,15 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<String>) -> Result<Dri
         let (Some(latitude_deg), Some(longitude_deg)) = place else {
             continue;
         };
+        for (column, value, most) in [
+            (latitude, latitude_deg, 90.0),
+            (longitude, longitude_deg, 180.0),
+        ] {
+            if value.abs() > most {
+                let problem = format!("{value} is no angle up to {most} degrees");
+                return Err(table.bad(row, column, &problem));
+            }
+        }
         // Before its first fix an app writes 0, 0.
         if times_absent(table, times, row) || (latitude_deg == 0.0 && longitude_deg == 0.0) {
             continue;

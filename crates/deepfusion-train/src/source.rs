@@ -155,7 +155,7 @@ impl SampleSet {
                             all - snippets.len(),
                             100.0 * MOST_SIGMA_SHARE
                         );
-                        if snippets.is_empty() {
+                        if snippets.is_empty() && !unsure.contains(&reason) {
                             unsure.push(reason.clone());
                         }
                         if !skipped.contains(&reason) {

@@ -6,6 +6,7 @@ use deepfusion_data::{Dataset, OpenOptions};
 use deepfusion_doctor::common_camera_ahead;
 use deepfusion_jobs::recordings::open_recordings;
 
+use super::warnings;
 use crate::cli::ClockOffset;
 use crate::failure::Result;
 use crate::jobs;
@@ -45,9 +46,7 @@ pub(super) fn seconds_of(
 pub(super) fn measured<'a>(datasets: impl IntoIterator<Item = &'a Dataset>) -> Result<f64> {
     let common = common_camera_ahead(datasets)?;
     for why in &common.unmeasured {
-        say(&format!(
-            "warning: {why}; it gets what the other recordings show"
-        ));
+        warnings::warn_once(format!("{why}; it gets what the other recordings show"));
     }
     let found = common.ahead;
     let (ahead_ms, error_ms) = (1e3 * found.ahead_s, 1e3 * found.std_error_s);

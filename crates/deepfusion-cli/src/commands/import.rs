@@ -1,3 +1,4 @@
+use std::io::ErrorKind;
 use std::path::Path;
 
 use deepfusion_data::OpenOptions;
@@ -10,8 +11,8 @@ use super::clocks;
 use crate::cli::{CameraIntrinsics, ClockOffset, ImportArgs};
 use crate::error::CliError;
 use crate::failure::Result;
-use crate::output;
 use crate::progress::say;
+use crate::{interrupt, output};
 
 /// `deepfusion data import`.
 pub(super) fn run(args: &ImportArgs) -> Result<()> {
@@ -113,33 +114,28 @@ fn merged(args: &ImportArgs) -> Result<DriveLog> {
     merged.ok_or_else(|| CliError::NoMedia.into())
 }
 
-/// Writes the folder with how far the camera's clock is ahead of the log's, measured in a copy beside it: where that is not found, or
-/// somebody interrupts it, no folder is left that looks finished.
+/// Writes the folder, measures in it how far the camera's clock is ahead of the log's, and writes it again with that. Where that is not
+/// found, or somebody interrupts it, nothing is left that looks finished.
 fn write_measured(folder: &mut DriveFolder<'_>, out: &Path) -> Result<Vec<String>> {
     folder.check(out)?;
-    let absolute = std::path::absolute(out)?;
-    let (Some(parent), Some(name)) = (absolute.parent(), absolute.file_name()) else {
-        return Ok(folder.write(out)?);
-    };
-    std::fs::create_dir_all(parent)?;
-    let beside = tempfile::Builder::new()
-        .prefix(".deepfusion-import-")
-        .tempdir_in(parent)?;
-    // Messages name the drive by its folder.
-    let copy = beside.path().join(name);
-    folder.write(&copy)?;
-    folder.camera_ahead_s =
-        clocks::seconds_of(Some(ClockOffset::Auto), &copy, &OpenOptions::default())?;
-    let notes = folder.write(out)?;
-    // Frames that were decoded of the video need not be decoded again.
-    for entry in std::fs::read_dir(&copy)? {
-        let entry = entry?;
-        let to = out.join(entry.file_name());
-        if entry.file_type()?.is_dir() && !to.exists() {
-            std::fs::rename(entry.path(), to)?;
+    let made = !out.exists();
+    interrupt::catch("stopping once the clocks are compared; nothing is written");
+    folder.write(out)?;
+    let measured = clocks::seconds_of(Some(ClockOffset::Auto), out, &OpenOptions::default())
+        .and_then(|ahead_s| interrupt::check("comparing the clocks").map(|()| ahead_s));
+    // `dataset.toml`, which makes the folder a recording, first.
+    for file in DriveFolder::FILES.iter().rev().map(|name| out.join(name)) {
+        match std::fs::remove_file(&file) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error.into()),
+            _ => {}
         }
     }
-    Ok(notes)
+    if measured.is_err() && made {
+        // Frames that were decoded stay for the next try.
+        let _ = std::fs::remove_dir(out);
+    }
+    folder.camera_ahead_s = measured?;
+    Ok(folder.write(out)?)
 }
 
 fn media(args: &ImportArgs, clock: Clock) -> Result<Media> {

@@ -1,5 +1,6 @@
 //! What becomes of a trainer's events: log files, panels, and lines for the person who waits.
 
+use deepfusion_hint::count_of;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -92,7 +93,9 @@ impl Recorder {
                     String::new()
                 };
                 say(&format!(
-                    "{samples} training samples, {validation_samples} held out{moved}; {steps} steps{going_on}"
+                    "{}, {validation_samples} held out{moved}; {}{going_on}",
+                    count_of(samples, "training sample"),
+                    count_of(steps, "step")
                 ));
             }
             TrainEvent::Step {

@@ -4,13 +4,13 @@ use deepfusion_geometry::{Distortion, Intrinsics};
 use std::fmt::Write as _;
 
 /// A camera as ROS's `camera_info` YAML, which [`crate::CameraCalibration::read`], ROS and most tools read: model `equidistant` for a
-/// fisheye lens, `rational_polynomial` where it needs eight coefficients, else `plumb_bob`. `warnings` become comments at its top, a line each.
+/// fisheye lens, `rational_polynomial` where it needs eight coefficients, else `plumb_bob`. `comments` stand at its top, a line each.
 #[must_use]
 pub fn camera_info_yaml(
     name: &str,
     camera: &Intrinsics,
     lens: &Distortion,
-    warnings: &[String],
+    comments: &[String],
 ) -> String {
     let [k1, k2, k3] = lens.radial;
     let [p1, p2] = lens.tangential;
@@ -21,7 +21,7 @@ pub fn camera_info_yaml(
         None => ("rational_polynomial", vec![k1, k2, p1, p2, k3, k4, k5, k6]),
     };
     let mut text = String::new();
-    for line in warnings.iter().flat_map(|r| r.lines()) {
+    for line in comments.iter().flat_map(|r| r.lines()) {
         let _ = writeln!(text, "# {line}");
     }
     let (fx, fy, cx, cy) = (camera.fx, camera.fy, camera.cx, camera.cy);
@@ -82,8 +82,8 @@ mod tests {
             prop_assume!(camera.implausible().is_none());
             let folder = tempfile::tempdir().unwrap();
             let file = folder.path().join("camera.yaml");
-            let warnings = ["two\nlines: [".to_owned(), "and: another".to_owned()];
-            std::fs::write(&file, camera_info_yaml("my: \"camera\"", &camera, &lens, &warnings)).unwrap();
+            let comments = ["two\nlines: [".to_owned(), "and: another".to_owned()];
+            std::fs::write(&file, camera_info_yaml("my: \"camera\"", &camera, &lens, &comments)).unwrap();
             let read = CameraCalibration::read(&file, (1, 1)).unwrap();
             prop_assert_eq!(read.intrinsics, camera);
             prop_assert_eq!(read.distortion, lens);

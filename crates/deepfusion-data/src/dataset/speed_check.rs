@@ -9,6 +9,7 @@
 use super::snippet::Snippet;
 use crate::{Dataset, Result, resize_rgb};
 use deepfusion_geometry::Se3;
+use deepfusion_hint::count_of;
 use deepfusion_motion::{
     GreyImage, GroundPair, RoadTexture, SWEEP_M, SWEEP_RATIO, implied_camera_height,
 };
@@ -64,16 +65,16 @@ impl fmt::Display for SpeedWarning {
         if h > SWEEP_M.1 / SWEEP_RATIO.powi(2) {
             return write!(
                 f,
-                "the speeds say the car drives, but the road hardly moves in the images ({} pairs)",
-                self.pairs
+                "the speeds say the car drives, but the road hardly moves in the images ({})",
+                count_of(self.pairs, "pair")
             );
         }
         let (low, high) = (PLAUSIBLE_HEIGHT_M.start(), PLAUSIBLE_HEIGHT_M.end());
         write!(
             f,
             "the speeds do not fit the images: the road's motion would put the camera {h:.1} m above it \
-             ({} pairs; cars have it at {low} to {high} m), so depths would come out about {:.1} times ",
-            self.pairs,
+             ({}; cars have it at {low} to {high} m), so depths would come out about {:.1} times ",
+            count_of(self.pairs, "pair"),
             if h > *high {
                 h / USUAL_HEIGHT_M
             } else {

@@ -11,6 +11,7 @@ use crate::{
     load_rgb,
 };
 use deepfusion_geometry::{DepthMap, Se3};
+use deepfusion_hint::count_of;
 use deepfusion_video::VideoFrames;
 use image::RgbImage;
 use std::collections::BTreeMap;
@@ -228,8 +229,9 @@ impl PlainParts {
         }
         if known < timed {
             self.warnings.push(format!(
-                "{} of {timed} frames have no speed measured about their time",
-                timed - known
+                "no speed is measured about the time of {} of {}",
+                timed - known,
+                count_of(timed, "frame")
             ));
         }
         Ok(())

@@ -311,12 +311,16 @@ fn course_table(
     };
     let table = match Table::read(&path) {
         Ok(table) if table.column(&COURSE_RATES).is_some() => table,
-        _ => {
-            warnings.push(
-                "course.csv: not read, as it is no table with time_s and course_rate_radps".into(),
-            );
+        Ok(_) => {
+            let why = "course.csv: not read, as it has no column course_rate_radps";
+            warnings.push(why.into());
             return Ok(None);
         }
+        Err(why @ Error::Table { .. }) => {
+            warnings.push(format!("not read: {why}"));
+            return Ok(None);
+        }
+        Err(error) => return Err(error),
     };
     let ns = times(&table, config, warnings, &name(&path))?;
     let column = table.require(&COURSE_RATES, "time_s,course_rate_radps")?;

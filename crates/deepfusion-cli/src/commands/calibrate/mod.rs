@@ -63,7 +63,7 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
         ));
     }
     let name = output::name_of(args.inputs[0].as_ref());
-    let yaml = camera_info_yaml(&name, &found.intrinsics, &lens, &warnings(&found, &board));
+    let yaml = camera_info_yaml(&name, &found.intrinsics, &lens, &comments(&found, &board));
     output::write(&args.out, yaml)?;
     let report = Report {
         calibration: &found,
@@ -118,7 +118,7 @@ fn enough(seen: &Seen, board: &Board) -> Result<()> {
 }
 
 /// What the file says of itself.
-fn warnings(found: &Calibration, board: &Board) -> Vec<String> {
+fn comments(found: &Calibration, board: &Board) -> Vec<String> {
     let errors = &found.standard_errors;
     vec![
         format!(

@@ -1,5 +1,6 @@
 mod verdict;
 
+use deepfusion_hint::count_of;
 use std::fmt;
 use std::path::Path;
 
@@ -277,8 +278,8 @@ fn print_calibrated(calibrated: Calibrated) -> Vec<Reliability> {
         (n, false) => format!("judged by {n} of another part"),
     };
     say(&format!(
-        "confidence learned from {} frames, {judged_by}, kept as {}",
-        confidence.frames,
+        "confidence learned from {}, {judged_by}, kept as {}",
+        count_of(confidence.frames, "frame"),
         path.display()
     ));
     reliability

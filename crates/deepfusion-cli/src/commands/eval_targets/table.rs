@@ -1,3 +1,4 @@
+use deepfusion_hint::count_of;
 use deepfusion_perception::TargetScore;
 
 /// The score in words.
@@ -6,7 +7,10 @@ pub(super) fn text(depth: &str, score: &TargetScore) -> String {
     let number =
         |value: Option<f64>, unit: &str| value.map_or("–".into(), |v| format!("{v:.2} {unit}"));
     let mut lines = vec![
-        format!("targets from {depth} depth, {} frames", score.frames),
+        format!(
+            "targets from {depth} depth, {}",
+            count_of(score.frames, "frame")
+        ),
         String::new(),
         format!(
             "recall       {:>8}   {} of {} boxes",

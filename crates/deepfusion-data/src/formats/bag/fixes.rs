@@ -1,6 +1,7 @@
 //! The vehicle's speed by a satellite receiver's positions (NavSatFix).
 
 use crate::logs::samples::Samples;
+use deepfusion_hint::count_of;
 use deepfusion_motion::{Fix, speeds_of_fixes};
 use deepfusion_rosbag::msg::NavSatFix;
 
@@ -49,8 +50,9 @@ impl Fixes {
         if self.without > 0 {
             let all = self.without + self.places.len();
             warnings.push(format!(
-                "{topic}: {} of {all} messages have no position and are left out",
-                self.without
+                "{topic}: left out, as they have no position: {} of {}",
+                self.without,
+                count_of(all, "message")
             ));
         }
         let Some(&(origin_ns, _)) = self.places.first() else {
@@ -67,8 +69,8 @@ impl Fixes {
         sigmas.sort_by(f64::total_cmp);
         let Some(usual) = sigmas.get(sigmas.len() / 2) else {
             warnings.push(format!(
-                "{topic}: {} positions give no speed, at least two in ten seconds are needed",
-                self.places.len()
+                "{topic}: no speed from {}, at least two in ten seconds are needed",
+                count_of(self.places.len(), "position")
             ));
             return Vec::new();
         };

@@ -17,7 +17,7 @@ const MOST_WAYS: usize = 16;
 pub(super) struct Frames {
     /// By parent and child.
     links: BTreeMap<(String, String), Link>,
-    /// Transforms that are none: no rotation, or NaN.
+    /// Transforms that are none: without a rotation, or with NaN.
     pub(super) broken: usize,
 }
 

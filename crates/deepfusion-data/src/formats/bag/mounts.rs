@@ -52,8 +52,11 @@ impl Mounts {
         };
         if index.frames.broken > 0 {
             search.warnings.push(match index.frames.broken {
-                1 => "1 transform of frames has no rotation, or NaN, and is left out".to_owned(),
-                n => format!("{n} transforms of frames have no rotation, or NaN, and are left out"),
+                1 => "1 transform of frames has no rotation, or holds NaN, and is left out"
+                    .to_owned(),
+                n => format!(
+                    "{n} transforms of frames have no rotation, or hold NaN, and are left out"
+                ),
             });
         }
         let (own, profile) = (config, &config.profile_mounts);

@@ -8,6 +8,7 @@ use super::source;
 use super::topics::{Role, Topics};
 use crate::formats::layout::Layout;
 use crate::{Error, Mount, OpenOptions, Result};
+use deepfusion_hint::count_of;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -154,7 +155,7 @@ fn topics_text(topics: &Topics, all: &[deepfusion_rosbag::TopicInfo]) -> String 
         let Some(key) = role.key() else { continue };
         let about = all.iter().find(|t| t.name == *name);
         let about = about.map_or(String::new(), |t| {
-            format!("   # {}, {} messages", t.type_name, t.count)
+            format!("   # {}, {}", t.type_name, count_of(t.count, "message"))
         });
         let name = Value::String(name.clone());
         let _ = writeln!(text, "{key} = {name}{about}");
