@@ -16,7 +16,7 @@ use serde_json::Value;
 use support::{fails, json, ok, run};
 
 /// Some 60 metres along a street that no network saw, and a network that is quick to learn.
-const DRIVE: &str = "simulate --frames 60 --seed 90110 --scan-every 0 --out drive";
+const DRIVE: &str = "simulate --frames 60 --seed 90110 --size 320x96 --scan-every 0 --out drive";
 const ADAPT: &str = "adapt --model tiny --data drive --steps 4 --batch 1 --held-out 0.4";
 
 fn depth_of(at: &Path, model: &str, out: &str) -> Vec<u8> {

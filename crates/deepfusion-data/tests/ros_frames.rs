@@ -103,7 +103,7 @@ fn is_the_drive(dataset: &Dataset, known: &Known) {
     says(
         &warnings,
         &[
-            "/gnss/fix: 1 of 10 messages have no position",
+            "/gnss/fix: left out, as they have no position: 1 of 10 messages",
             "smoothed, sure to 0.",
             "bridged",
         ],

@@ -128,7 +128,7 @@ mod tests {
         assert_eq!(steps.max(), Some(250_000_000), "3 s are bridged too");
         let warnings = warnings.join("\n");
         for said in [
-            "2 of 20 messages have no position",
+            "left out, as they have no position: 2 of 20 messages",
             "sure to 0.",
             "vehicle.max_gap_s",
             "up to 3.0 s",
