@@ -1,4 +1,10 @@
 //! Files for the rerun viewer, read back with its SDK's own reader.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
 #![cfg(feature = "rerun")]
 
 mod support;

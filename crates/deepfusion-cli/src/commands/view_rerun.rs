@@ -8,7 +8,7 @@ use crate::failure::Result;
 
 /// Writes the folder's frames to `file`.
 #[cfg(feature = "rerun")]
-pub fn run(args: &ViewArgs, file: &Path) -> Result<()> {
+pub(super) fn run(args: &ViewArgs, file: &Path) -> Result<()> {
     use crate::progress::{Progress, say};
     use crate::{interrupt, output};
 

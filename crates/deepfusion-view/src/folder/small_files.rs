@@ -31,7 +31,7 @@ pub(crate) struct Small<T> {
 
 impl SmallFiles {
     /// Reads what there is of them.
-    pub(super) fn read(folder: &Path, entry: &Entry) -> Self {
+    pub(crate) fn read(folder: &Path, entry: &Entry) -> Self {
         let mut files = Self::default();
         files.sidecar = files.json(folder, entry.sidecar.as_ref()).map(|json| {
             let record = files.record(entry.sidecar.as_ref(), &json);

@@ -25,7 +25,7 @@ pub(super) struct FrameLogger {
 
 impl FrameLogger {
     /// Logs what there is of a frame, and returns what is wrong with it.
-    pub fn log<W: Write>(
+    pub(super) fn log<W: Write>(
         &mut self,
         recording: &mut Recording<W>,
         folder: &Path,

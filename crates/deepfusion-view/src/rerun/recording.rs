@@ -26,7 +26,7 @@ pub(super) struct Recording<W: Write> {
 
 impl<W: Write> Recording<W> {
     /// Begins with the static content. `name` is shown to users.
-    pub fn begin(out: W, name: &str) -> Result<Self, Problem> {
+    pub(super) fn begin(out: W, name: &str) -> Result<Self, Problem> {
         // Another id each time: two files of one folder stay two recordings.
         let store = StoreId::random(StoreKind::Recording, APPLICATION);
         let made_by = format!("deepfusion {}", env!("CARGO_PKG_VERSION"));
@@ -54,7 +54,7 @@ impl<W: Write> Recording<W> {
     }
 
     /// Logs an entity's content from then on.
-    pub fn log(
+    pub(super) fn log(
         &mut self,
         entity: &'static str,
         time: &TimePoint,
@@ -65,7 +65,7 @@ impl<W: Write> Recording<W> {
     }
 
     /// Logs an entity's content, or clears it: the viewer keeps showing the last logged content.
-    pub fn log_or_clear(
+    pub(super) fn log_or_clear(
         &mut self,
         entity: &'static str,
         time: &TimePoint,
@@ -79,7 +79,7 @@ impl<W: Write> Recording<W> {
     }
 
     /// Writes the end.
-    pub fn finish(mut self) -> Result<(), Problem> {
+    pub(super) fn finish(mut self) -> Result<(), Problem> {
         Ok(self.encoder.finish()?)
     }
 
@@ -109,7 +109,7 @@ pub(super) enum Problem {
 
 impl Problem {
     /// The failure of a file.
-    pub fn of(self, path: &Path) -> Error {
+    pub(super) fn of(self, path: &Path) -> Error {
         match self {
             Self::Encode(EncodeError::Write(source)) => Error::file(path, source),
             other => Error::Encoding {

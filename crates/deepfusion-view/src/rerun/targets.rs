@@ -21,7 +21,7 @@ pub(super) struct SeenTarget {
 
 impl SeenTarget {
     /// From `NAME_targets.json`.
-    pub fn of(target: &Target) -> Self {
+    pub(super) fn of(target: &Target) -> Self {
         let id = target.id;
         let moves = target.moving == Some(true);
         let velocity = target.velocity_mps.filter(|_| moves);
@@ -44,7 +44,7 @@ impl SeenTarget {
     }
 
     /// The same as in the pictures that `perceive` writes.
-    pub fn colour(&self) -> Color {
+    pub(super) fn colour(&self) -> Color {
         let [r, g, b] = colour_of(self.id).0;
         Color::from_rgb(r, g, b)
     }

@@ -22,7 +22,7 @@ type Way = VecDeque<(usize, [f32; 3])>;
 impl Tracks {
     /// Adds a frame and returns the paths of its targets, if there are any. Without the camera's pose there is no world to draw
     /// them in.
-    pub fn add(
+    pub(super) fn add(
         &mut self,
         targets: &[SeenTarget],
         world_from_cam: Option<[f64; 12]>,
