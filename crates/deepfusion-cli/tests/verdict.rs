@@ -102,6 +102,41 @@ fn a_drive_without_ground_truth_has_a_verdict() {
     assert_eq!(found["certificate"], found["scale_certificate"]);
     assert!(found["certificate"]["ci95"].is_array(), "{found}");
     assert!(at.join("page.html").exists());
+    // The road moves as the speeds say, at all of them.
+    let road = |found: &Value| -> Vec<(f64, f64)> {
+        let rows = found["without_truth"]["road_speeds"].as_array().unwrap();
+        rows.iter()
+            .map(|row| (number(&row["from_mps"]), number(&row["ratio"])))
+            .collect()
+    };
+    let exact = road(&found);
+    assert!(
+        !exact.is_empty() && exact.iter().all(|(_, ratio)| (ratio - 1.0).abs() < 0.1),
+        "{exact:?}"
+    );
+    // An embedded network comes without a PoseNet.
+    assert_eq!(
+        found["without_truth"]["pose_speeds"],
+        Value::Array(Vec::new())
+    );
+    // A signal that is twice too fast in the second half, at speeds of their own.
+    for path in files(&at.join("drive"), ".txt") {
+        let frame = path.file_stem().unwrap().to_string_lossy().parse::<usize>();
+        if path.parent().unwrap().ends_with("oxts/data") && frame.is_ok_and(|frame| frame >= 40) {
+            let text = fs::read_to_string(&path).unwrap();
+            let mut values: Vec<f64> = text
+                .split_whitespace()
+                .map(|v| v.parse().unwrap())
+                .collect();
+            values[6..11].iter_mut().for_each(|v| *v *= 2.0);
+            let words: Vec<String> = values.iter().map(f64::to_string).collect();
+            fs::write(&path, words.join(" ")).unwrap();
+        }
+    }
+    let uneven = road(&json(at, "eval --data drive --assume-unseen --json"));
+    let at_speed = |from: f64| uneven.iter().find(|(mps, _)| *mps == from).unwrap().1;
+    let ratio = at_speed(8.0) / at_speed(15.0);
+    assert!((1.7..2.3).contains(&ratio), "{uneven:?}");
     // A few metres of road say something, but not how sure it is.
     ok(
         at,

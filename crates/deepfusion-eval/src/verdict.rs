@@ -57,6 +57,13 @@ pub struct Evidence {
     pub flip: Option<f64>,
     /// The camera's way as seen through the depth, against the vehicle's, by speed.
     pub speeds: Vec<SpeedRow>,
+    /// The speed by the road's motion in the images, against the vehicle's, by speed; the camera's height is that which all speeds together
+    /// imply, so that only differences between speeds show. No network takes part.
+    #[serde(default)]
+    pub road_speeds: Vec<SpeedRow>,
+    /// The way between neighbouring frames as PoseNet sees it, against the vehicle's, by speed; of runs that trained one.
+    #[serde(default)]
+    pub pose_speeds: Vec<SpeedRow>,
     /// What the depth is to be multiplied by, by the depth as predicted.
     pub ranges: Vec<ScaleRow>,
 }
@@ -81,7 +88,8 @@ pub struct SpeedRow {
     pub to_mps: Option<f64>,
     /// Pairs of frames.
     pub n: usize,
-    /// The median of (way through the depth) / (way measured): 1.1 where the depth makes the vehicle 10 % faster than it says.
+    /// The median of (way through the depth) / (way measured): 1.1 where the depth makes the vehicle 10 % faster than it says. Of the road's
+    /// motion and of PoseNet likewise.
     pub ratio: f64,
 }
 
@@ -104,6 +112,8 @@ const SPEEDS_MPS: [f64; 5] = [0.0, 3.0, 8.0, 15.0, 25.0];
 const RANGES_M: [f64; 5] = [0.0, 10.0, 20.0, 40.0, 80.0];
 
 /// Rows of (speed in m/s, ln of way through the depth over way measured).
+///
+/// Rows without a pair are left out.
 #[must_use]
 pub fn speed_rows(pairs: &[(f64, f64)]) -> Vec<SpeedRow> {
     let rows = SPEEDS_MPS.iter().enumerate().filter_map(|(i, &from_mps)| {
@@ -118,6 +128,15 @@ pub fn speed_rows(pairs: &[(f64, f64)]) -> Vec<SpeedRow> {
         })
     });
     rows.collect()
+}
+
+/// Of the ranges of [`speed_rows`], the one that a speed lies in, by its number.
+#[must_use]
+pub fn speed_range(speed_mps: f64) -> usize {
+    SPEEDS_MPS
+        .iter()
+        .rposition(|from| speed_mps >= *from)
+        .unwrap_or(0)
 }
 
 /// Rows of (predicted depth in metres, ln of the factor it wants).

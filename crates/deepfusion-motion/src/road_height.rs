@@ -81,6 +81,26 @@ pub struct GroundPair {
 /// if no height is clearly better than the others, or fewer than four pairs show road.
 #[must_use]
 pub fn implied_camera_height(pairs: &[GroundPair]) -> Option<f64> {
+    let (heights, pooled, best) = swept(pairs)?;
+    (pooled[best] <= CONCLUSIVE * median(&pooled)).then(|| heights[best])
+}
+
+/// As [`implied_camera_height`], between the heights that are tried: where a parabola through the best one and its neighbours, by the
+/// logarithm of the height, is least.
+#[must_use]
+pub fn refined_camera_height(pairs: &[GroundPair]) -> Option<f64> {
+    let (heights, pooled, best) = swept(pairs)?;
+    if pooled[best] > CONCLUSIVE * median(&pooled) {
+        return None;
+    }
+    let (before, after) = (pooled.get(best.checked_sub(1)?)?, pooled.get(best + 1)?);
+    let bend = before - 2.0 * pooled[best] + after;
+    let step = 0.5 * (before - after) / bend.max(1e-12);
+    Some(heights[best] * SWEEP_RATIO.powf(step.clamp(-0.5, 0.5)))
+}
+
+/// The heights that are tried, the mean cost of each, and which is the best; `None` where fewer than four pairs show road.
+fn swept(pairs: &[GroundPair]) -> Option<(Vec<f64>, Vec<f64>, usize)> {
     let count = ((SWEEP_M.1 / SWEEP_M.0).ln() / SWEEP_RATIO.ln()).ceil() as i32;
     let heights: Vec<f64> = (0..=count)
         .map(|i| SWEEP_M.0 * SWEEP_RATIO.powi(i))
@@ -96,7 +116,7 @@ pub fn implied_camera_height(pairs: &[GroundPair]) -> Option<f64> {
         .map(|i| costs.iter().map(|c| c[i]).sum::<f64>() / costs.len() as f64)
         .collect();
     let best = (0..pooled.len()).min_by(|a, b| pooled[*a].total_cmp(&pooled[*b]))?;
-    (pooled[best] <= CONCLUSIVE * median(&pooled)).then(|| heights[best])
+    Some((heights, pooled, best))
 }
 
 impl GroundPair {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use deepfusion_eval::verdict::Verdict;
+use deepfusion_eval::verdict::{SpeedRow, Verdict};
 use deepfusion_hint::count_of;
 use deepfusion_jobs::evaluation::Evaluated;
 use deepfusion_perception::Reliability;
@@ -140,12 +140,25 @@ pub(super) fn verdict(page: HtmlReport, verdict: &Verdict) -> HtmlReport {
                 Some(to) => format!("{} to {to} m/s", r.from_mps),
                 None => format!("{} m/s and more", r.from_mps),
             };
-            vec![range, r.n.to_string(), format!("{:.3}", r.ratio)]
+            let of = |rows: &[SpeedRow]| {
+                let same = rows.iter().find(|other| other.from_mps == r.from_mps);
+                same.map_or("–".to_owned(), |other| format!("{:.3}", other.ratio))
+            };
+            let ratio = format!("{:.3}", r.ratio);
+            vec![
+                range,
+                r.n.to_string(),
+                ratio,
+                of(&found.road_speeds),
+                of(&found.pose_speeds),
+            ]
         });
         let header = [
             "vehicle's speed",
             "pairs",
             "speed seen through the depth / measured",
+            "by the road's motion / measured",
+            "by PoseNet / measured",
         ];
         page = page.table(&header, &rows.collect::<Vec<_>>());
     }

@@ -54,16 +54,31 @@ impl fmt::Display for Evidence {
             }
         }
         if !self.speeds.is_empty() {
-            writeln!(f, "\n  vehicle's speed   pairs  seen through the depth")?;
+            let others = [
+                ("by the road", &self.road_speeds),
+                ("by PoseNet", &self.pose_speeds),
+            ];
+            let others = others.into_iter().filter(|(_, rows)| !rows.is_empty());
+            let others: Vec<_> = others.collect();
+            write!(f, "\n  vehicle's speed   pairs  seen through the depth")?;
+            others
+                .iter()
+                .try_for_each(|(name, _)| write!(f, "  {name}"))?;
+            writeln!(f)?;
             for row in &self.speeds {
                 let to = row
                     .to_mps
                     .map_or("  up".to_owned(), |to| format!("{to:>4}"));
-                writeln!(
-                    f,
-                    "  {:>2} to {to} m/s    {:>5}  × {:.3}",
+                let mut line = format!(
+                    "  {:>2} to {to} m/s    {:>5}  × {:<20.3}",
                     row.from_mps, row.n, row.ratio
-                )?;
+                );
+                for (name, rows) in &others {
+                    let same = rows.iter().find(|r| r.from_mps == row.from_mps);
+                    let text = same.map_or("–".to_owned(), |r| format!("× {:.3}", r.ratio));
+                    line += &format!("  {text:<width$}", width = name.len());
+                }
+                writeln!(f, "{}", line.trim_end())?;
             }
         }
         Ok(())

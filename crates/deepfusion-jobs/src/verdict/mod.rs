@@ -6,6 +6,9 @@
 
 mod look;
 mod plan;
+#[cfg(feature = "train")]
+mod pose;
+mod speeds;
 
 use std::collections::HashSet;
 
@@ -18,6 +21,8 @@ use deepfusion_eval::verdict::{
 use deepfusion_runtime::DepthEstimator;
 
 pub use self::plan::{Block, Plan, Target, plan};
+#[cfg(feature = "train")]
+pub use self::pose::pose_speeds;
 
 use self::look::{FrameEvidence, look};
 use crate::Result;
@@ -97,7 +102,9 @@ pub fn verdict(
         }
         gathered.close_block(points);
     }
-    Ok(gathered.verdict(&plan, unseen, total, options))
+    let mut verdict = gathered.verdict(&plan, unseen, total, options);
+    verdict.without_truth.road_speeds = speeds::road_speeds(datasets, &plan)?;
+    Ok(verdict)
 }
 
 #[derive(Default)]
@@ -168,6 +175,8 @@ impl Gathered {
                 consistency: median(&self.consistency),
                 flip: median(&self.flip),
                 speeds: speed_rows(&self.speeds),
+                road_speeds: Vec::new(),
+                pose_speeds: Vec::new(),
                 ranges: scale_rows(&self.points),
             },
         }

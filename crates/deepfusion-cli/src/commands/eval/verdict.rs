@@ -48,7 +48,7 @@ pub(super) fn of_model(
     };
     let options = VerdictOptions::new(args.speed_error / 100.0, !args.no_focal_correction);
     let mut progress = Progress::new("judging without ground truth");
-    let found = verdict(
+    let mut found = verdict(
         estimator,
         datasets,
         &unseen,
@@ -57,12 +57,58 @@ pub(super) fn of_model(
             progress.set(done, total);
         },
     )?;
+    add_pose_speeds(args, model, datasets, (&unseen, &options), &mut found)?;
     if found.no_certificate == Some(NoCertificate::SeenNotKnown) {
         let warning = "whether training saw these frames is not known, so there is no scale certificate; --assume-unseen takes it that \
                        it did not";
         warnings::warn_once(warning.to_owned());
     }
     Ok(Some(found))
+}
+
+/// What the run's PoseNet makes of the vehicle's speed.
+#[cfg(feature = "train")]
+fn add_pose_speeds(
+    args: &EvalArgs,
+    model: &ModelSource,
+    datasets: &[Dataset],
+    (unseen, options): (&Unseen, &VerdictOptions),
+    found: &mut Verdict,
+) -> Result<()> {
+    let ModelSource::Run { given, .. } = model else {
+        return Ok(());
+    };
+    let device = crate::commands::device::open(args.engine.device)?;
+    let set = args.engine.set.as_deref();
+    let predictor = match deepfusion_train::PosePredictor::load(given, set, &device) {
+        Ok(predictor) => predictor,
+        // Depth is judged all the same.
+        Err(why) => {
+            warnings::warn_once(format!(
+                "PoseNet is not compared with the vehicle's speed: {why}"
+            ));
+            return Ok(());
+        }
+    };
+    // Of weights that were imported nobody knows whether theirs belongs to them.
+    if predictor.step == 0 {
+        return Ok(());
+    }
+    let speeds = deepfusion_jobs::verdict::pose_speeds(&predictor, datasets, unseen, options)?;
+    found.without_truth.pose_speeds = speeds;
+    Ok(())
+}
+
+/// Without training's framework there is no PoseNet.
+#[cfg(not(feature = "train"))]
+fn add_pose_speeds(
+    _: &EvalArgs,
+    _: &ModelSource,
+    _: &[Dataset],
+    _: (&Unseen, &VerdictOptions),
+    _: &mut Verdict,
+) -> Result<()> {
+    Ok(())
 }
 
 /// What `eval` finds where there is no ground truth.

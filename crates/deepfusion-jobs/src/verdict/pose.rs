@@ -1,0 +1,67 @@
+//! The way between neighbouring frames as PoseNet sees it.
+
+use deepfusion_data::Dataset;
+use deepfusion_eval::verdict::{SpeedRow, speed_rows};
+use deepfusion_train::PosePredictor;
+
+use super::{Unseen, VerdictOptions, plan};
+use crate::Result;
+
+/// Another focal length than the one trained with, at network size, by more than this share: PoseNet sees another motion.
+const FOCAL_TOLERANCE: f64 = 0.05;
+/// Shortest way that is compared, metres.
+const LEAST_WAY_M: f64 = 0.1;
+
+/// PoseNet's way from each frame that [`super::verdict`] looks at to the one before, against the vehicle's, by speed. Nothing of recordings with
+/// another focal length than the one trained with, and of runs that learned from frames at a distance of their own.
+///
+/// # Errors
+/// An image that cannot be read.
+pub fn pose_speeds(
+    predictor: &PosePredictor,
+    datasets: &[Dataset],
+    unseen: &Unseen,
+    options: &VerdictOptions,
+) -> Result<Vec<SpeedRow>> {
+    if predictor.config().frame_distance_m > 0.0 {
+        return Ok(Vec::new());
+    }
+    let mut logs = Vec::new();
+    let targets = plan(datasets, unseen, options.blocks);
+    for block in &targets.blocks {
+        let dataset = &datasets[block.dataset];
+        if !knows_the_camera(predictor, dataset) {
+            continue;
+        }
+        for target in block.targets.iter().filter(|target| target.frame > 0) {
+            let Some(way_m) = dataset
+                .camera_motion(target.frame - 1, target.frame)
+                .map(|motion| motion.translation().norm())
+                .filter(|way_m| *way_m >= LEAST_WAY_M)
+            else {
+                continue;
+            };
+            let images = [target.frame - 1, target.frame].map(|frame| {
+                let image = dataset.load_image(frame)?;
+                Ok(predictor.prepare(&image))
+            });
+            let images: Vec<Vec<f32>> = images.into_iter().collect::<Result<_>>()?;
+            let seen = predictor.motions(&images);
+            let seen = seen.iter().map(|motion| motion.translation().norm());
+            logs.extend(seen.map(|seen_m| (target.speed_mps, (seen_m / way_m).ln())));
+        }
+    }
+    Ok(speed_rows(&logs))
+}
+
+/// Whether a recording's camera is the one that the network learned with, as far as that is known.
+fn knows_the_camera(predictor: &PosePredictor, dataset: &Dataset) -> bool {
+    let (Some(trained), Some(&frame)) = (predictor.training_camera(), dataset.selected().first())
+    else {
+        return true;
+    };
+    let size = predictor.config().size;
+    let (width, height) = (size.width as u32, size.height as u32);
+    let here = dataset.intrinsics(frame).resized(width, height);
+    (here.fx / trained.resized(width, height).fx - 1.0).abs() <= FOCAL_TOLERANCE
+}
