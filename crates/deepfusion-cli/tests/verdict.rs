@@ -102,18 +102,14 @@ fn a_drive_without_ground_truth_has_a_verdict() {
     assert_eq!(found["certificate"], found["scale_certificate"]);
     assert!(found["certificate"]["ci95"].is_array(), "{found}");
     assert!(at.join("page.html").exists());
-    // The road moves as the speeds say, at all of them.
     let road = |found: &Value| -> Vec<(f64, f64)> {
         let rows = found["without_truth"]["road_speeds"].as_array().unwrap();
         rows.iter()
             .map(|row| (number(&row["from_mps"]), number(&row["ratio"])))
             .collect()
     };
-    let exact = road(&found);
-    assert!(
-        !exact.is_empty() && exact.iter().all(|(_, ratio)| (ratio - 1.0).abs() < 0.1),
-        "{exact:?}"
-    );
+    // A drive at one speed has nothing to compare the road's motion with.
+    assert!(road(&found).is_empty(), "{found}");
     // An embedded network comes without a PoseNet.
     assert_eq!(
         found["without_truth"]["pose_speeds"],
@@ -178,6 +174,12 @@ fn frames_that_training_saw_do_not_vouch_for_it() {
     );
     let found = json(at, "eval --model run --data drive --json");
     let looked = number(&found["without_truth"]["frames"]);
+    // After two steps PoseNet's metres are anything, but they are there.
+    let pose = found["without_truth"]["pose_speeds"].as_array().unwrap();
+    assert!(
+        !pose.is_empty() && number(&pose[0]["ratio"]) > 0.0,
+        "{found}"
+    );
     let all = json(at, "eval --model run --data drive --assume-unseen --json");
     let all = number(&all["without_truth"]["frames"]);
     assert!(looked > 0.0 && looked < all, "{looked} of {all}");

@@ -35,10 +35,10 @@ pub struct CameraAhead {
 }
 
 impl CameraAhead {
-    /// Whether two independent measurements contradict each other.
-    fn differs_from(&self, other: &Self) -> bool {
+    /// How far an independent measurement is away, as a share of what is allowed: above 1 they contradict each other.
+    fn apart(&self, other: &Self) -> f64 {
         let error_s = self.std_error_s.hypot(other.std_error_s);
-        (self.ahead_s - other.ahead_s).abs() > (SIGMAS * error_s).max(AGREE_S)
+        (self.ahead_s - other.ahead_s).abs() / (SIGMAS * error_s).max(AGREE_S)
     }
 }
 
@@ -266,20 +266,15 @@ pub fn common_camera_ahead<'a>(
         let last = unmeasured.pop().map(|(_, why)| why);
         return Err(last.unwrap_or(NoCameraAhead::Nothing));
     };
-    for (i, (drive, ahead)) in found.iter().enumerate() {
-        let others = [&measured[..i], &measured[i + 1..]].concat();
-        let Some(others) = weighted_mean(&others) else {
-            continue;
-        };
-        if ahead.differs_from(&others) {
-            return Err(NoCameraAhead::Differ {
-                drive: drive.name().to_owned(),
-                ahead_s: ahead.ahead_s,
-                std_error_s: ahead.std_error_s,
-                others_s: others.ahead_s,
-                others_error_s: others.std_error_s,
-            });
-        }
+    if let Some((i, others)) = outlier(&measured) {
+        let (drive, ahead) = &found[i];
+        return Err(NoCameraAhead::Differ {
+            drive: drive.name().to_owned(),
+            ahead_s: ahead.ahead_s,
+            std_error_s: ahead.std_error_s,
+            others_s: others.ahead_s,
+            others_error_s: others.std_error_s,
+        });
     }
     for (drive, _) in &unmeasured {
         let said_s = drive.camera_ahead_s();
@@ -288,7 +283,7 @@ pub fn common_camera_ahead<'a>(
             std_error_s: 0.0,
             correlation: 1.0,
         };
-        if said_s != 0.0 && said.differs_from(&mean) {
+        if said_s != 0.0 && said.apart(&mean) > 1.0 {
             return Err(NoCameraAhead::SaysOther {
                 drive: drive.name().to_owned(),
                 said_s,
@@ -300,6 +295,20 @@ pub fn common_camera_ahead<'a>(
         ahead: mean,
         unmeasured: unmeasured.into_iter().map(|(_, why)| why).collect(),
     })
+}
+
+/// The measurement that contradicts the mean of the others most, and that mean.
+fn outlier(all: &[CameraAhead]) -> Option<(usize, CameraAhead)> {
+    let apart = |i: usize| {
+        let others = weighted_mean(&[&all[..i], &all[i + 1..]].concat())?;
+        Some((all[i].apart(&others), i, others))
+    };
+    let worst = (0..all.len())
+        .filter_map(apart)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    worst
+        .filter(|(apart, ..)| *apart > 1.0)
+        .map(|(_, i, others)| (i, others))
 }
 
 /// `None` of none.
@@ -315,4 +324,35 @@ fn weighted_mean(all: &[CameraAhead]) -> Option<CameraAhead> {
             .map(|a| a.correlation)
             .fold(f64::INFINITY, f64::min),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ahead(ahead_s: f64) -> CameraAhead {
+        CameraAhead {
+            ahead_s,
+            std_error_s: 0.005,
+            correlation: 0.9,
+        }
+    }
+
+    #[test]
+    fn the_drive_that_differs_is_named() {
+        for (place, all) in [
+            (2, [0.0, 0.01, 0.5]),
+            (0, [0.5, 0.0, 0.01]),
+            (1, [0.0, 0.5, 0.01]),
+        ] {
+            let (found, others) = outlier(&all.map(ahead)).unwrap();
+            assert_eq!(found, place);
+            assert!((others.ahead_s - 0.005).abs() < 1e-9, "{others:?}");
+        }
+        assert_eq!(outlier(&[0.0, 0.015, -0.01].map(ahead)), None);
+        // Four standard errors of the difference of two.
+        assert!(outlier(&[0.0, 0.029].map(ahead)).is_some());
+        assert_eq!(outlier(&[0.0, 0.027].map(ahead)), None);
+        assert_eq!(outlier(&[ahead(0.3)]), None);
+    }
 }

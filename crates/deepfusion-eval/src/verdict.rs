@@ -68,6 +68,23 @@ pub struct Evidence {
     pub ranges: Vec<ScaleRow>,
 }
 
+impl Evidence {
+    /// The ranges of speeds that anything is known of: from, and below, m/s.
+    #[must_use]
+    pub fn speed_ranges(&self) -> Vec<(f64, Option<f64>)> {
+        let rows = || {
+            self.speeds
+                .iter()
+                .chain(&self.road_speeds)
+                .chain(&self.pose_speeds)
+        };
+        let mut ranges: Vec<_> = rows().map(|row| (row.from_mps, row.to_mps)).collect();
+        ranges.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ranges.dedup();
+        ranges
+    }
+}
+
 /// Photometric errors, 0.85 · (1 − SSIM)/2 + 0.15 · |difference| of grey levels in \[0, 1\], means over pairs of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reprojection {

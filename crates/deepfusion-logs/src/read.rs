@@ -23,9 +23,9 @@ pub fn may_hold_log(path: &Path) -> bool {
 /// Reads a log.
 ///
 /// # Errors
-/// [`Error::File`]; [`Error::Column`] where nothing says which column is meant or what its unit is; [`Error::Line`] and
-/// [`Error::Bytes`] for what cannot be read; [`Error::NoSpeed`] for a file of no known kind, or without a speed;
-/// [`Error::Signal`] and [`Error::Motion`] for a CAN trace.
+/// [`crate::Error::File`]; [`crate::Error::Column`] where nothing says which column is meant or what its unit is; [`crate::Error::Line`] and
+/// [`crate::Error::Bytes`] for what cannot be read; [`crate::Error::NoSpeed`] for a file of no known kind, or without a speed;
+/// [`crate::Error::Signal`] and [`crate::Error::Motion`] for a CAN trace.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<DriveLog> {
     if path.is_dir() {
         return export_folder::read(path, options);

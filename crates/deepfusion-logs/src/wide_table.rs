@@ -9,6 +9,7 @@ use crate::rows::{enough, left_out};
 use crate::table::{Table, short};
 use crate::track::{self, TimedFix};
 use crate::units::SpeedUnit;
+use deepfusion_hint::count_of;
 use deepfusion_motion::Fix;
 
 /// The times of a table's rows.
@@ -193,23 +194,19 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<String>) -> Result<Dri
     let (Some(latitude), Some(longitude)) = degrees else {
         return Err(table.lacks(ColumnProblem::NoSpeed));
     };
-    let (mut fixes, mut last) = (Vec::new(), None);
+    let (mut fixes, mut last, mut beyond) = (Vec::new(), None, Vec::new());
     for row in 0..table.len() {
         let place = (table.number(row, latitude)?, table.number(row, longitude)?);
         let (Some(latitude_deg), Some(longitude_deg)) = place else {
             continue;
         };
-        for (column, value, most) in [
-            (latitude, latitude_deg, 90.0),
-            (longitude, longitude_deg, 180.0),
-        ] {
-            if value.abs() > most {
-                let problem = format!("{value} is no angle up to {most} degrees");
-                return Err(table.bad(row, column, &problem));
-            }
-        }
         // Before its first fix an app writes 0, 0.
         if times_absent(table, times, row) || (latitude_deg == 0.0 && longitude_deg == 0.0) {
+            continue;
+        }
+        // 91, 181 or 999 where there is no fix; all of them are such where the unit is another one.
+        if latitude_deg.abs() > 90.0 || longitude_deg.abs() > 360.0 {
+            beyond.push((row, latitude_deg, longitude_deg));
             continue;
         }
         let ns = times.ns(table, row, last)?;
@@ -221,6 +218,17 @@ fn positions(table: &Table, times: &Times, mut notes: Vec<String>) -> Result<Dri
             speed_mps: None,
         };
         fixes.push(TimedFix { ns, fix });
+    }
+    if let (true, Some((row, north, east))) = (fixes.is_empty(), beyond.first()) {
+        let problem = format!("{north}, {east} are no degrees of latitude and longitude");
+        return Err(table.bad(*row, latitude, &problem));
+    }
+    if !beyond.is_empty() {
+        notes.push(format!(
+            "left out, as their degrees are none: {} of {}",
+            beyond.len(),
+            count_of(table.len(), "row")
+        ));
     }
     notes.push(format!(
         "time from column '{}', positions from '{}' and '{}'",

@@ -72,8 +72,7 @@ pub use imu::{
 pub use motion_model::MotionModel;
 pub use positions::{COURSE_MPS, Fix, FixSpeed, course_rates, speeds_of_fixes};
 pub use road_height::{
-    GreyImage, GroundPair, RoadTexture, SWEEP_M, SWEEP_RATIO, implied_camera_height,
-    refined_camera_height,
+    GreyImage, GroundPair, RoadCosts, RoadTexture, SWEEP_M, SWEEP_RATIO, implied_camera_height,
 };
 pub use scale_correction::ScaleCorrection;
 pub use scale_monitor::{ScaleMonitor, ScaleMonitorConfig, ScaleReading, ScaleState};

@@ -81,42 +81,53 @@ pub struct GroundPair {
 /// if no height is clearly better than the others, or fewer than four pairs show road.
 #[must_use]
 pub fn implied_camera_height(pairs: &[GroundPair]) -> Option<f64> {
-    let (heights, pooled, best) = swept(pairs)?;
-    (pooled[best] <= CONCLUSIVE * median(&pooled)).then(|| heights[best])
+    let costs: Vec<RoadCosts> = pairs.par_iter().filter_map(RoadCosts::of).collect();
+    let (pooled, best) = RoadCosts::pooled(&costs.iter().collect::<Vec<_>>())?;
+    (pooled[best] <= CONCLUSIVE * median(&pooled)).then(|| height_at(best as f64))
 }
 
-/// As [`implied_camera_height`], between the heights that are tried: where a parabola through the best one and its neighbours, by the
-/// logarithm of the height, is least.
-#[must_use]
-pub fn refined_camera_height(pairs: &[GroundPair]) -> Option<f64> {
-    let (heights, pooled, best) = swept(pairs)?;
-    if pooled[best] > CONCLUSIVE * median(&pooled) {
-        return None;
+/// How well each of the heights that are tried explains a pair; pairs are pooled by them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoadCosts(Vec<f64>);
+
+impl RoadCosts {
+    /// `None` if the road is not in view or has no texture.
+    #[must_use]
+    pub fn of(pair: &GroundPair) -> Option<Self> {
+        let count = ((SWEEP_M.1 / SWEEP_M.0).ln() / SWEEP_RATIO.ln()).ceil() as i32;
+        let heights: Vec<f64> = (0..=count).map(|i| height_at(f64::from(i))).collect();
+        pair.costs(&heights).map(Self)
     }
-    let (before, after) = (pooled.get(best.checked_sub(1)?)?, pooled.get(best + 1)?);
-    let bend = before - 2.0 * pooled[best] + after;
-    let step = 0.5 * (before - after) / bend.max(1e-12);
-    Some(heights[best] * SWEEP_RATIO.powf(step.clamp(-0.5, 0.5)))
+
+    /// As [`implied_camera_height`], but between the heights that are tried: where a parabola through the best one and its neighbours,
+    /// by the logarithm of the height, is least.
+    #[must_use]
+    pub fn height(of_pairs: &[&Self]) -> Option<f64> {
+        let (pooled, best) = Self::pooled(of_pairs)?;
+        if pooled[best] > CONCLUSIVE * median(&pooled) {
+            return None;
+        }
+        let (before, after) = (pooled.get(best.checked_sub(1)?)?, pooled.get(best + 1)?);
+        let bend = before - 2.0 * pooled[best] + after;
+        let step = 0.5 * (before - after) / bend.max(1e-12);
+        Some(height_at(best as f64 + step.clamp(-0.5, 0.5)))
+    }
+
+    /// The mean cost at each height, and which is the least; `None` of fewer than four pairs.
+    fn pooled(of_pairs: &[&Self]) -> Option<(Vec<f64>, usize)> {
+        if of_pairs.len() < MIN_PAIRS {
+            return None;
+        }
+        let mean = |i: usize| of_pairs.iter().map(|c| c.0[i]).sum::<f64>() / of_pairs.len() as f64;
+        let pooled: Vec<f64> = (0..of_pairs[0].0.len()).map(mean).collect();
+        let best = (0..pooled.len()).min_by(|a, b| pooled[*a].total_cmp(&pooled[*b]))?;
+        Some((pooled, best))
+    }
 }
 
-/// The heights that are tried, the mean cost of each, and which is the best; `None` where fewer than four pairs show road.
-fn swept(pairs: &[GroundPair]) -> Option<(Vec<f64>, Vec<f64>, usize)> {
-    let count = ((SWEEP_M.1 / SWEEP_M.0).ln() / SWEEP_RATIO.ln()).ceil() as i32;
-    let heights: Vec<f64> = (0..=count)
-        .map(|i| SWEEP_M.0 * SWEEP_RATIO.powi(i))
-        .collect();
-    let costs: Vec<Vec<f64>> = pairs
-        .par_iter()
-        .filter_map(|pair| pair.costs(&heights))
-        .collect();
-    if costs.len() < MIN_PAIRS {
-        return None;
-    }
-    let pooled: Vec<f64> = (0..heights.len())
-        .map(|i| costs.iter().map(|c| c[i]).sum::<f64>() / costs.len() as f64)
-        .collect();
-    let best = (0..pooled.len()).min_by(|a, b| pooled[*a].total_cmp(&pooled[*b]))?;
-    Some((heights, pooled, best))
+/// The heights that are tried, by their number, metres.
+fn height_at(number: f64) -> f64 {
+    SWEEP_M.0 * SWEEP_RATIO.powf(number)
 }
 
 impl GroundPair {

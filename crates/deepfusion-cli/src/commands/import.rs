@@ -115,7 +115,7 @@ fn merged(args: &ImportArgs) -> Result<DriveLog> {
 }
 
 /// Writes the folder, measures in it how far the camera's clock is ahead of the log's, and writes it again with that. Where that is not
-/// found, or somebody interrupts it, nothing is left that looks finished.
+/// found, or Ctrl-C asks for it to stop, nothing is left that looks finished.
 fn write_measured(folder: &mut DriveFolder<'_>, out: &Path) -> Result<Vec<String>> {
     folder.check(out)?;
     let made = !out.exists();

@@ -134,32 +134,39 @@ pub(super) fn verdict(page: HtmlReport, verdict: &Verdict) -> HtmlReport {
             &rows.collect::<Vec<_>>(),
         );
     }
-    if !found.speeds.is_empty() {
-        let rows = found.speeds.iter().map(|r| {
-            let range = match r.to_mps {
-                Some(to) => format!("{} to {to} m/s", r.from_mps),
-                None => format!("{} m/s and more", r.from_mps),
-            };
-            let of = |rows: &[SpeedRow]| {
-                let same = rows.iter().find(|other| other.from_mps == r.from_mps);
-                same.map_or("–".to_owned(), |other| format!("{:.3}", other.ratio))
-            };
-            let ratio = format!("{:.3}", r.ratio);
-            vec![
-                range,
-                r.n.to_string(),
-                ratio,
-                of(&found.road_speeds),
-                of(&found.pose_speeds),
-            ]
-        });
-        let header = [
-            "vehicle's speed",
-            "pairs",
-            "speed seen through the depth / measured",
-            "by the road's motion / measured",
-            "by PoseNet / measured",
+    let ranges = found.speed_ranges();
+    if !ranges.is_empty() {
+        let columns = [
+            ("speed seen through the depth / measured", &found.speeds),
+            ("by the road's motion / measured", &found.road_speeds),
+            ("by PoseNet / measured", &found.pose_speeds),
         ];
+        let columns: Vec<_> = columns
+            .into_iter()
+            .filter(|(_, rows)| !rows.is_empty())
+            .collect();
+        let rows = ranges.iter().map(|(from, to)| {
+            let range = match to {
+                Some(to) => format!("{from} to {to} m/s"),
+                None => format!("{from} m/s and more"),
+            };
+            let of = |rows: &[SpeedRow], text: &dyn Fn(&SpeedRow) -> String| {
+                let row = rows.iter().find(|row| row.from_mps == *from);
+                row.map_or("–".to_owned(), text)
+            };
+            let mut cells = vec![range, of(&found.speeds, &|row| row.n.to_string())];
+            cells.extend(
+                columns
+                    .iter()
+                    .map(|(_, rows)| of(rows, &|row| format!("{:.3}", row.ratio))),
+            );
+            cells
+        });
+        let names = columns.iter().map(|(name, _)| *name);
+        let header: Vec<&str> = ["vehicle's speed", "pairs"]
+            .into_iter()
+            .chain(names)
+            .collect();
         page = page.table(&header, &rows.collect::<Vec<_>>());
     }
     page

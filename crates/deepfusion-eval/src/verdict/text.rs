@@ -3,7 +3,8 @@
 use std::fmt;
 
 use super::{
-    Check, Evidence, NoCertificate, ScaleCertificate, ScaleVerdict, SourceName, TOLERANCE, Verdict,
+    Check, Evidence, NoCertificate, ScaleCertificate, ScaleVerdict, SourceName, SpeedRow,
+    TOLERANCE, Verdict,
 };
 use deepfusion_hint::count_of;
 
@@ -53,30 +54,33 @@ impl fmt::Display for Evidence {
                 )?;
             }
         }
-        if !self.speeds.is_empty() {
+        let ranges = self.speed_ranges();
+        if !ranges.is_empty() {
             let others = [
                 ("by the road", &self.road_speeds),
                 ("by PoseNet", &self.pose_speeds),
             ];
-            let others = others.into_iter().filter(|(_, rows)| !rows.is_empty());
-            let others: Vec<_> = others.collect();
+            let others: Vec<_> = others
+                .into_iter()
+                .filter(|(_, rows)| !rows.is_empty())
+                .collect();
             write!(f, "\n  vehicle's speed   pairs  seen through the depth")?;
             others
                 .iter()
                 .try_for_each(|(name, _)| write!(f, "  {name}"))?;
             writeln!(f)?;
-            for row in &self.speeds {
-                let to = row
-                    .to_mps
-                    .map_or("  up".to_owned(), |to| format!("{to:>4}"));
-                let mut line = format!(
-                    "  {:>2} to {to} m/s    {:>5}  × {:<20.3}",
-                    row.from_mps, row.n, row.ratio
-                );
+            for (from_mps, to_mps) in ranges {
+                let of = |rows: &[SpeedRow]| {
+                    let row = rows.iter().find(|row| row.from_mps == from_mps);
+                    row.map_or("–".to_owned(), |row| format!("× {:.3}", row.ratio))
+                };
+                let pairs = self.speeds.iter().find(|row| row.from_mps == from_mps);
+                let pairs = pairs.map_or("–".to_owned(), |row| row.n.to_string());
+                let to = to_mps.map_or("  up".to_owned(), |to| format!("{to:>4}"));
+                let depth = of(&self.speeds);
+                let mut line = format!("  {from_mps:>2} to {to} m/s    {pairs:>5}  {depth:<22}");
                 for (name, rows) in &others {
-                    let same = rows.iter().find(|r| r.from_mps == row.from_mps);
-                    let text = same.map_or("–".to_owned(), |r| format!("× {:.3}", r.ratio));
-                    line += &format!("  {text:<width$}", width = name.len());
+                    line += &format!("  {:<width$}", of(rows), width = name.len());
                 }
                 writeln!(f, "{}", line.trim_end())?;
             }

@@ -22,7 +22,7 @@ use deepfusion_runtime::DepthEstimator;
 
 pub use self::plan::{Block, Plan, Target, plan};
 #[cfg(feature = "train")]
-pub use self::pose::pose_speeds;
+pub use self::pose::{pose_net_is_metric, pose_speeds};
 
 use self::look::{FrameEvidence, look};
 use crate::Result;

@@ -2,6 +2,7 @@
 
 use deepfusion_data::Dataset;
 use deepfusion_eval::verdict::{SpeedRow, speed_rows};
+use deepfusion_model::TrainConfig;
 use deepfusion_train::PosePredictor;
 
 use super::{Unseen, VerdictOptions, plan};
@@ -12,8 +13,18 @@ const FOCAL_TOLERANCE: f64 = 0.05;
 /// Shortest way that is compared, metres.
 const LEAST_WAY_M: f64 = 0.1;
 
+/// Whether a run's PoseNet has learned the metres between neighbouring frames: from video, with the vehicle's speed, and not from frames at a
+/// distance of their own.
+#[must_use]
+pub fn pose_net_is_metric(config: &TrainConfig) -> bool {
+    let mut sets = 0..config.data.sets.len().max(1);
+    let from_video = sets.any(|set| config.learn(set).from_motion());
+    let neighbours = config.frames.iter().all(|offset| offset.abs() == 1);
+    from_video && neighbours && config.frame_distance_m == 0.0 && config.loss.speed > 0.0
+}
+
 /// PoseNet's way from each frame that [`super::verdict`] looks at to the one before, against the vehicle's, by speed. Nothing of recordings with
-/// another focal length than the one trained with, and of runs that learned from frames at a distance of their own.
+/// another focal length than the one trained with; for networks of which [`pose_net_is_metric`] holds.
 ///
 /// # Errors
 /// An image that cannot be read.
@@ -23,9 +34,6 @@ pub fn pose_speeds(
     unseen: &Unseen,
     options: &VerdictOptions,
 ) -> Result<Vec<SpeedRow>> {
-    if predictor.config().frame_distance_m > 0.0 {
-        return Ok(Vec::new());
-    }
     let mut logs = Vec::new();
     let targets = plan(datasets, unseen, options.blocks);
     for block in &targets.blocks {
@@ -64,4 +72,28 @@ fn knows_the_camera(predictor: &PosePredictor, dataset: &Dataset) -> bool {
     let (width, height) = (size.width as u32, size.height as u32);
     let here = dataset.intrinsics(frame).resized(width, height);
     (here.fx / trained.resized(width, height).fx - 1.0).abs() <= FOCAL_TOLERANCE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use deepfusion_model::{Learn, Preset};
+
+    #[test]
+    fn metres_are_learned_from_video_with_speeds_alone() {
+        let config = Preset::Light.config();
+        assert!(pose_net_is_metric(&config));
+        let mut from_depth = config.clone();
+        from_depth.data.learn = Learn::Depth;
+        assert!(!pose_net_is_metric(&from_depth));
+        let mut apart = config.clone();
+        apart.frame_distance_m = 1.0;
+        assert!(!pose_net_is_metric(&apart));
+        let mut far = config.clone();
+        far.frames = vec![-3, 3];
+        assert!(!pose_net_is_metric(&far));
+        let mut without_speed = config;
+        without_speed.loss.speed = 0.0;
+        assert!(!pose_net_is_metric(&without_speed));
+    }
 }

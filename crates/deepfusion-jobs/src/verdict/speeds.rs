@@ -1,11 +1,11 @@
 //! The vehicle's speed beside what the images say of it, by speed.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use deepfusion_data::{Dataset, grey_image};
 use deepfusion_eval::verdict::{SpeedRow, speed_range, speed_rows};
-use deepfusion_motion::{GroundPair, RoadTexture, refined_camera_height};
+use deepfusion_motion::{GroundPair, RoadCosts, RoadTexture};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -16,7 +16,8 @@ use crate::Result;
 const WIDTH: u32 = 320;
 
 /// The speed by the road's motion, against the vehicle's. The road tells speed over camera height: at speeds that the signal says too
-/// high the camera seems higher than at the others. Each drive's height is its own.
+/// high the camera seems higher than at the others. Each drive's height is its own, so that a drive has to show the road at two ranges
+/// of speeds or more; pairs that show none do not count.
 ///
 /// # Errors
 /// An image that cannot be read.
@@ -28,38 +29,44 @@ pub(super) fn road_speeds(datasets: &[Dataset], plan: &Plan) -> Result<Vec<Speed
         };
         let down = -cam_from_vehicle.rotate(&Vector3::z());
         let blocks = plan.blocks.iter().filter(|b| b.dataset == number);
-        let targets: Vec<&Target> = blocks.flat_map(|b| &b.targets).collect();
-        let pairs = targets
+        let targets = blocks.flat_map(|b| &b.targets);
+        let targets: Vec<&Target> = targets.filter(|t| t.speed_mps.is_finite()).collect();
+        let seen = targets
             .par_iter()
-            .filter_map(|target| ground_pair(dataset, target, down).transpose())
-            .collect::<Result<Vec<(f64, GroundPair)>>>()?;
-        let height_of = |alike: &dyn Fn(f64) -> bool| {
-            let alike = pairs.iter().filter(|(speed, _)| alike(*speed));
-            let alike: Vec<GroundPair> = alike.map(|(_, pair)| pair.clone()).collect();
-            refined_camera_height(&alike)
+            .filter_map(|target| road_costs(dataset, target, down).transpose())
+            .collect::<Result<Vec<(f64, RoadCosts)>>>()?;
+        let mut by_range: BTreeMap<usize, Vec<&(f64, RoadCosts)>> = BTreeMap::new();
+        for pair in &seen {
+            by_range.entry(speed_range(pair.0)).or_default().push(pair);
+        }
+        let height = |pairs: &[&(f64, RoadCosts)]| {
+            let costs: Vec<&RoadCosts> = pairs.iter().map(|(_, costs)| costs).collect();
+            RoadCosts::height(&costs)
         };
-        let Some(height_m) = height_of(&|_| true) else {
+        let Some(height_m) = height(&seen.iter().collect::<Vec<_>>()) else {
             continue;
         };
-        let ranges: BTreeSet<usize> = pairs.iter().map(|(speed, _)| speed_range(*speed)).collect();
-        for range in ranges {
-            let alike = |speed: f64| speed_range(speed) == range;
-            if let Some(here_m) = height_of(&alike) {
-                let log = (height_m / here_m).ln();
-                let speeds = pairs.iter().map(|(speed, _)| *speed);
-                logs.extend(speeds.filter(|s| alike(*s)).map(|speed| (speed, log)));
-            }
+        let ranges = by_range.values();
+        let ranges: Vec<_> = ranges
+            .filter_map(|pairs| Some((pairs, height(pairs)?)))
+            .collect();
+        if ranges.len() < 2 {
+            continue;
+        }
+        for (pairs, here_m) in ranges {
+            let log = (height_m / here_m).ln();
+            logs.extend(pairs.iter().map(|(speed_mps, _)| (*speed_mps, log)));
         }
     }
     Ok(speed_rows(&logs))
 }
 
-/// A frame and the nearest before it, with the vehicle's speed.
-fn ground_pair(
+/// What a frame and the nearest before it show of the road, with the vehicle's speed.
+fn road_costs(
     dataset: &Dataset,
     target: &Target,
     down_in_cam: Vector3<f64>,
-) -> Result<Option<(f64, GroundPair)>> {
+) -> Result<Option<(f64, RoadCosts)>> {
     let Some((source, earlier_from_later)) = target.sources.first() else {
         return Ok(None);
     };
@@ -79,5 +86,5 @@ fn ground_pair(
         earlier_from_later: *earlier_from_later,
         down_in_cam,
     };
-    Ok(Some((target.speed_mps, pair)))
+    Ok(RoadCosts::of(&pair).map(|costs| (target.speed_mps, costs)))
 }

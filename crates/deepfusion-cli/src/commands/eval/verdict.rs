@@ -5,6 +5,7 @@ use deepfusion_eval::verdict::{NoCertificate, Verdict};
 use deepfusion_jobs::held_out::{unseen, unseen_frames};
 use deepfusion_jobs::scene::motion_known;
 use deepfusion_jobs::verdict::{Unseen, VerdictOptions, verdict};
+use deepfusion_model::TrainConfig;
 use deepfusion_render::HtmlReport;
 use deepfusion_runtime::{DepthEstimator, ModelSource};
 
@@ -57,7 +58,13 @@ pub(super) fn of_model(
             progress.set(done, total);
         },
     )?;
-    add_pose_speeds(args, model, datasets, (&unseen, &options), &mut found)?;
+    add_pose_speeds(
+        args,
+        (model, estimator.config()),
+        datasets,
+        (&unseen, &options),
+        &mut found,
+    )?;
     if found.no_certificate == Some(NoCertificate::SeenNotKnown) {
         let warning = "whether training saw these frames is not known, so there is no scale certificate; --assume-unseen takes it that \
                        it did not";
@@ -70,32 +77,34 @@ pub(super) fn of_model(
 #[cfg(feature = "train")]
 fn add_pose_speeds(
     args: &EvalArgs,
-    model: &ModelSource,
+    (model, config): (&ModelSource, &TrainConfig),
     datasets: &[Dataset],
     (unseen, options): (&Unseen, &VerdictOptions),
     found: &mut Verdict,
 ) -> Result<()> {
+    use deepfusion_jobs::verdict::{pose_net_is_metric, pose_speeds};
+    use deepfusion_train::PosePredictor;
+
     let ModelSource::Run { given, .. } = model else {
         return Ok(());
     };
+    if !pose_net_is_metric(config) {
+        return Ok(());
+    }
     let device = crate::commands::device::open(args.engine.device)?;
-    let set = args.engine.set.as_deref();
-    let predictor = match deepfusion_train::PosePredictor::load(given, set, &device) {
-        Ok(predictor) => predictor,
+    match PosePredictor::load(given, args.engine.set.as_deref(), &device) {
+        // Of weights that were imported nobody knows whether theirs belongs to them.
+        Ok(predictor) if predictor.step == 0 => {}
+        Ok(predictor) => {
+            found.without_truth.pose_speeds = pose_speeds(&predictor, datasets, unseen, options)?;
+        }
         // Depth is judged all the same.
         Err(why) => {
             warnings::warn_once(format!(
                 "PoseNet is not compared with the vehicle's speed: {why}"
             ));
-            return Ok(());
         }
-    };
-    // Of weights that were imported nobody knows whether theirs belongs to them.
-    if predictor.step == 0 {
-        return Ok(());
     }
-    let speeds = deepfusion_jobs::verdict::pose_speeds(&predictor, datasets, unseen, options)?;
-    found.without_truth.pose_speeds = speeds;
     Ok(())
 }
 
@@ -103,7 +112,7 @@ fn add_pose_speeds(
 #[cfg(not(feature = "train"))]
 fn add_pose_speeds(
     _: &EvalArgs,
-    _: &ModelSource,
+    _: (&ModelSource, &TrainConfig),
     _: &[Dataset],
     _: (&Unseen, &VerdictOptions),
     _: &mut Verdict,
