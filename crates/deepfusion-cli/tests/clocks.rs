@@ -229,7 +229,7 @@ fn an_offset_that_cannot_be_found_is_refused() {
     fs::write(at.join("other/speed.csv"), table).unwrap();
     fails(
         at,
-        "data inspect other --clock-offset auto",
+        "data inspect other --clock auto",
         &["--clock-offset MS"],
     );
 }

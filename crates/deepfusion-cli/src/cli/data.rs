@@ -46,6 +46,7 @@ pub(crate) struct InspectArgs {
     /// does, refused where they do not show it [default: the recording's clock.camera_ahead_s].
     #[arg(
         long = "clock-offset",
+        alias = "clock",
         value_name = "MS|auto",
         allow_negative_numbers = true
     )]
@@ -99,6 +100,7 @@ pub(crate) struct ConvertArgs {
     /// does, refused where they do not show it [default: the recording's clock.camera_ahead_s].
     #[arg(
         long = "clock-offset",
+        alias = "clock",
         value_name = "MS|auto",
         allow_negative_numbers = true
     )]
@@ -157,6 +159,7 @@ pub(crate) struct ImportArgs {
     /// does, refused where they do not show it. It is written into dataset.toml [default: not at all].
     #[arg(
         long = "clock-offset",
+        alias = "clock",
         value_name = "MS|auto",
         allow_negative_numbers = true
     )]
@@ -224,6 +227,7 @@ pub(crate) struct ExportGtArgs {
     /// does, refused where they do not show it [default: the recording's clock.camera_ahead_s].
     #[arg(
         long = "clock-offset",
+        alias = "clock",
         value_name = "MS|auto",
         allow_negative_numbers = true
     )]

@@ -82,6 +82,7 @@ pub(crate) struct TrainArgs {
     /// does, refused where they do not show it [default: the recording's clock.camera_ahead_s].
     #[arg(
         long = "clock-offset",
+        alias = "clock",
         value_name = "MS|auto",
         allow_negative_numbers = true
     )]
