@@ -349,7 +349,8 @@ fn clocks_without_a_common_time_are_refused_and_can_be_joined() {
     let seen = inspect(root.path()).unwrap();
     assert!(seen.drives[0].usable_pairs > 1 && seen.drives[0].usable_pairs < 7);
     assert!(
-        seen.to_string().contains("of 8 frames have no speed"),
+        seen.to_string()
+            .contains("no speed is measured about the time of"),
         "{seen}"
     );
 }
