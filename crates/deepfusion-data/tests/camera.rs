@@ -170,6 +170,16 @@ fn photographs_say_what_their_camera_is() {
             "not turned as EXIF's orientation says",
         ),
         (
+            "action camera",
+            [
+                telephone("GoPro", "HERO8 Black", 3000),
+                vec![short(Tag::FocalLengthIn35mmFilm, 15)],
+            ]
+            .concat(),
+            15.0,
+            "calibrate it as a fisheye lens",
+        ),
+        (
             "apple",
             telephone("Apple", "iPhone 14 Pro", 6860),
             24.0,
@@ -195,6 +205,11 @@ fn photographs_say_what_their_camera_is() {
         let warnings = dataset.warnings();
         let warning = warnings.iter().find(|r| r.contains("EXIF")).unwrap();
         assert!(warning.contains(part), "{warning}");
+        assert_eq!(
+            warning.contains("fisheye"),
+            name == "action camera",
+            "{warning}"
+        );
         // A single picture knows the same.
         let photo = load_photo(&folder.join("images/000.jpg")).unwrap();
         assert_eq!(photo.intrinsics.unwrap().fx, k.fx);

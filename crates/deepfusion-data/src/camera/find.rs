@@ -108,6 +108,7 @@ fn by_exif(images: &[PathBuf], size: (u32, u32)) -> Result<Option<(CameraCalibra
     let ExifCamera {
         intrinsics: k,
         by,
+        action_camera,
         turned,
     } = first;
     let mut warning = format!(
@@ -115,6 +116,10 @@ fn by_exif(images: &[PathBuf], size: (u32, u32)) -> Result<Option<(CameraCalibra
         name(path),
         k.fx
     );
+    if action_camera {
+        warning += "; an action camera's wide lens bends lines, which no pinhole does: take pictures through its linear lens, or calibrate it as \
+                    a fisheye lens";
+    }
     if turned {
         warning +=
             "; the images are used as they are stored, not turned as EXIF's orientation says";

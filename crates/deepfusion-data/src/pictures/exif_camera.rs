@@ -1,6 +1,6 @@
 //! A picture's camera by its EXIF block.
 
-use super::known_cameras::{FILM_DIAGONAL_MM, KnownCamera};
+use super::known_cameras::{FILM_DIAGONAL_MM, KnownCamera, is_action_camera};
 use deepfusion_geometry::Intrinsics;
 use exif::{Exif, In, Tag, Value};
 use std::io::{BufRead, Seek};
@@ -17,6 +17,8 @@ pub(crate) struct ExifCamera {
     pub(crate) intrinsics: Intrinsics,
     /// What it was taken from, for people.
     pub(crate) by: String,
+    /// Whether an action camera took it, whose wide lenses are no pinhole.
+    pub(crate) action_camera: bool,
     /// Whether the picture is to be turned or mirrored to be upright.
     pub(crate) turned: bool,
 }
@@ -43,6 +45,7 @@ pub(super) fn camera_of(exif: &Exif, size: (u32, u32)) -> Option<ExifCamera> {
     Some(ExifCamera {
         intrinsics,
         by,
+        action_camera: text(exif, Tag::Make).is_some_and(|make| is_action_camera(&make)),
         turned: number(exif, Tag::Orientation).is_some_and(|turn| turn > 1),
     })
 }

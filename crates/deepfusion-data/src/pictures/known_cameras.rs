@@ -4,6 +4,16 @@
 /// Diagonal of a frame of 35 mm film, 36 mm by 24 mm, which EXIF's equivalent focal lengths refer to (CIPA DC-008).
 pub(super) const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
 
+/// Makers of action cameras, as EXIF names them. Their EXIF block has a focal length, but not which of their digital lenses was chosen, and
+/// the wide ones are no pinhole.
+const ACTION_CAMERA_MAKERS: [&str; 1] = ["GoPro"];
+
+/// Whether a picture's maker makes action cameras.
+pub(super) fn is_action_camera(make: &str) -> bool {
+    let named = |maker: &&str| make.eq_ignore_ascii_case(maker);
+    ACTION_CAMERA_MAKERS.iter().any(named)
+}
+
 /// How far EXIF's focal length may be from the main lens', as a share: other lenses of the same telephone are farther away.
 const SAME_LENS: f64 = 0.03;
 
@@ -62,8 +72,8 @@ const fn samsung(models: &'static [&'static str], lens_mm: f64, diagonal_deg: f6
 /// ("82° field of view"; support.google.com/pixelphone/answer/7158570), Samsung's ("FOV 85°"; the models' specifications on
 /// samsung.com). The lenses' own focal lengths are those that the telephones write into EXIF. No picture of each was at hand to try
 /// them: where EXIF's lens is not the one here, the table is not used, so that a wrong row is an unused one. Left out: the Galaxy S21 and S21+,
-/// whose two longer lenses are too alike to tell them apart, and action cameras, whose EXIF block does not say which of their
-/// digital lenses (wide, linear) was chosen.
+/// whose two longer lenses are too alike to tell them apart, and action cameras, of which the maker alone is known
+/// ([`is_action_camera`]).
 const KNOWN: &[KnownCamera] = &[
     apple(
         &["iPhone 11", "iPhone 11 Pro", "iPhone 11 Pro Max"],

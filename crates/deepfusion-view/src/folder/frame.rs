@@ -172,6 +172,12 @@ fn picture(
     }
     Err(match (problem, named) {
         (Some(problem), _) => problem,
+        (None, Some(named)) if places.iter().any(|path| path.is_file()) => {
+            format!(
+                "{}: one picture among others, and none is kept beside the results",
+                named.display()
+            )
+        }
         (None, Some(named)) => format!("{}: the picture is not there any more", named.display()),
         (None, None) => "no picture is known".into(),
     })
