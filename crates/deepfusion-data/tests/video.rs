@@ -65,6 +65,85 @@ fn write_tables(folder: &Path) {
     fs::write(folder.join("intrinsics.txt"), "50,50,31.5,23.5").unwrap();
 }
 
+/// An entry of GoPro's metadata, of values of `size` bytes each.
+fn entry(key: &[u8; 4], kind: u8, size: u8, value: &[u8]) -> Vec<u8> {
+    let count = (value.len() / usize::from(size)) as u16;
+    let mut bytes = [key.as_slice(), &[kind, size], &count.to_be_bytes(), value].concat();
+    bytes.resize(bytes.len().next_multiple_of(4), 0);
+    bytes
+}
+
+/// Writes into a video what a GoPro says of its lens: a letter, and the angle from corner to corner.
+fn add_gopro_lens(video: &Path, letter: u8, diagonal_deg: f32) {
+    let mut file = fs::read(video).unwrap();
+    let at = file.windows(4).position(|w| w == b"moov").unwrap() - 4;
+    let length = u32::from_be_bytes(file[at..at + 4].try_into().unwrap()) as usize;
+    assert_eq!(at + length, file.len(), "ffmpeg writes it last");
+    let size = [64_u32.to_be_bytes(), 48_u32.to_be_bytes()].concat();
+    let all = [
+        entry(b"MINF", b'c', 1, b"HERO11 Black"),
+        entry(b"VRES", b'L', 4, &size),
+        entry(b"ZFOV", b'f', 4, &diagonal_deg.to_be_bytes()),
+        entry(b"VFOV", b'c', 1, &[letter]),
+    ];
+    let boxed = |kind: &[u8; 4], content: &[u8]| {
+        let length = (content.len() + 8) as u32;
+        [length.to_be_bytes().as_slice(), kind, content].concat()
+    };
+    let ours = boxed(
+        b"udta",
+        &boxed(b"GPMF", &entry(b"DEVC", 0, 1, &all.concat())),
+    );
+    // Before those of ffmpeg, whose only user data are its own name.
+    let name = file.windows(4).rposition(|w| w == b"udta").unwrap() - 4;
+    file.splice(name..name, ours.iter().copied());
+    let grown = (length + ours.len()) as u32;
+    file[at..at + 4].copy_from_slice(&grown.to_be_bytes());
+    fs::write(video, file).unwrap();
+}
+
+#[test]
+fn a_gopros_linear_lens_is_the_camera_and_a_wide_one_is_none() {
+    let root = tempfile::tempdir().unwrap();
+    for (name, letter) in [("linear", b'L'), ("wide", b'W')] {
+        let folder = root.path().join(name);
+        fs::create_dir(&folder).unwrap();
+        let Some(video) = write_video(&folder, "drive.mp4") else {
+            return;
+        };
+        add_gopro_lens(&video, letter, 90.0);
+        let hfov = OpenOptions {
+            hfov_deg: Some(60.0),
+            ..OpenOptions::default()
+        };
+        let given = Dataset::open(&video, &hfov).unwrap();
+        let bends =
+            |dataset: &Dataset| dataset.warnings().iter().any(|w| w.contains("bends lines"));
+        if letter == b'L' {
+            // Half a diagonal of 80 pixels over tan 45°.
+            let found = &Dataset::open(&video, &OpenOptions::default()).unwrap()[0];
+            let k = found.intrinsics(0);
+            assert!(
+                (k.fx - 40.0).abs() < 1e-6 && (k.fy - 40.0).abs() < 1e-6,
+                "{k:?}"
+            );
+            assert!(!found.camera_assumed());
+            let said = found
+                .warnings()
+                .iter()
+                .any(|w| w.contains("linear lens of a HERO11 Black"));
+            assert!(said, "{:?}", found.warnings());
+            assert!(!bends(&given[0]));
+            // What is given counts more.
+            assert!((given[0].intrinsics(0).fx - 32.0 / 30_f64.to_radians().tan()).abs() < 1e-6);
+        } else {
+            let error = Dataset::open(&video, &OpenOptions::default()).unwrap_err();
+            assert!(error.to_string().contains("calibration"), "{error}");
+            assert!(bends(&given[0]), "{:?}", given[0].warnings());
+        }
+    }
+}
+
 #[test]
 fn a_video_gives_its_frames_in_any_order() {
     let root = tempfile::tempdir().unwrap();

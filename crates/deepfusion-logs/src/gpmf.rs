@@ -9,14 +9,14 @@ use nalgebra::Vector3;
 use std::path::Path;
 
 /// One key with what belongs to it.
-struct Entry<'a> {
-    key: [u8; 4],
+pub(crate) struct Entry<'a> {
+    pub(crate) key: [u8; 4],
     kind: u8,
     /// Bytes of one reading.
     size: usize,
-    value: &'a [u8],
-    /// In the payload.
-    offset: usize,
+    pub(crate) value: &'a [u8],
+    /// In the file.
+    pub(crate) offset: usize,
 }
 
 /// What all payloads hold.
@@ -35,16 +35,7 @@ pub(crate) fn read(path: &Path) -> Result<DriveLog> {
     let file = std::fs::File::open(path).map_err(|e| Error::file(path, e))?;
     // SAFETY: the file is only read; whoever cuts it meanwhile gets an error of the system's, as with every mapped file.
     let bytes = unsafe { memmap2::Mmap::map(&file) }.map_err(|e| Error::file(path, e))?;
-    let broken = |Broken {
-                      offset,
-                      field,
-                      problem,
-                  }: Broken| Error::Bytes {
-        path: path.to_owned(),
-        offset: offset as u64,
-        field: field.into(),
-        problem,
-    };
+    let broken = |broken: Broken| broken.of(path);
     let no_speed = |problem: &str| Error::NoSpeed {
         path: path.to_owned(),
         problem: problem.into(),
@@ -226,7 +217,7 @@ fn courses(places: &[(i64, f64, f64)], speeds: &[Speed]) -> Vec<Heading> {
 }
 
 /// The entries of a stretch of keys, lengths and values; each is padded to four bytes.
-fn entries(bytes: &[u8], base: usize) -> std::result::Result<Vec<Entry<'_>>, Broken> {
+pub(crate) fn entries(bytes: &[u8], base: usize) -> std::result::Result<Vec<Entry<'_>>, Broken> {
     let (mut all, mut at) = (Vec::new(), 0);
     while at + 8 <= bytes.len() {
         let key = [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]];
@@ -300,8 +291,20 @@ impl Entry<'_> {
         }
     }
 
+    /// Whether its value is entries again.
+    pub(crate) fn is_nest(&self) -> bool {
+        self.kind == 0
+    }
+
+    /// Its value as a text, without what pads it; `None` for one of numbers.
+    pub(crate) fn text(&self) -> Option<String> {
+        let text = String::from_utf8_lossy(self.value);
+        let text = text.trim_matches(|c: char| c == '\0' || c.is_whitespace());
+        matches!(self.kind, b'c' | b'F').then(|| text.to_owned())
+    }
+
     /// All numbers of an entry of one kind.
-    fn numbers(&self) -> std::result::Result<Vec<f64>, Broken> {
+    pub(crate) fn numbers(&self) -> std::result::Result<Vec<f64>, Broken> {
         let Some(width) = width(self.kind) else {
             return Err(self.broken(format!(
                 "values of kind '{}' are not numbers",

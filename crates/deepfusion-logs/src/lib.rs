@@ -13,7 +13,8 @@
 //! | GoPro's MP4 | the `gpmd` track: GPS5 or GPS9, gyroscope and gravity |
 //! | `candump`, Vector ASC and BLF | a signal of a DBC file |
 //!
-//! [`DriveFolder`] writes a log beside its video as a folder that every command reads. Nothing here knows of images.
+//! [`DriveFolder`] writes a log beside its video as a folder that every command reads. Nothing here knows of images; [`GoproLens`] is what else a GoPro
+//! writes into its videos.
 
 mod blf;
 mod can_trace;
@@ -23,6 +24,7 @@ mod drive_folder;
 mod error;
 mod export_folder;
 mod gnss_logger;
+mod gopro_lens;
 mod gpmf;
 mod gpx;
 mod log;
@@ -42,6 +44,7 @@ mod wide_table;
 pub use dates::time_on_clock;
 pub use drive_folder::{Camera, DriveFolder, Media};
 pub use error::{ColumnProblem, Error, Result};
+pub use gopro_lens::GoproLens;
 pub use log::{Clock, DriveLog, Format, Speed, YawRate};
 pub use read::{is_gps_track, may_hold_log, read};
 pub use read_options::ReadOptions;

@@ -1,6 +1,8 @@
 //! As much of MP4 as it takes to get at a track of metadata: where its samples lie, and when each begins.
 
+use crate::error::Error;
 use std::ops::Range;
+use std::path::Path;
 
 /// A sample of a track.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,10 +20,32 @@ pub(crate) struct Broken {
     pub(crate) problem: String,
 }
 
+impl Broken {
+    /// As an error of a file.
+    pub(crate) fn of(self, path: &Path) -> Error {
+        Error::Bytes {
+            path: path.to_owned(),
+            offset: self.offset as u64,
+            field: self.field.into(),
+            problem: self.problem,
+        }
+    }
+}
+
 /// A box: what stands in it, as a range of the file.
 struct BoxContent<'a> {
     file: &'a [u8],
     range: Range<usize>,
+}
+
+/// What a movie's user data hold under a name; `None` where the file is no movie or holds nothing of the kind.
+pub(crate) fn udta(file: &[u8], kind: &[u8; 4]) -> Result<Option<Range<usize>>, Broken> {
+    let whole = BoxContent {
+        file,
+        range: 0..file.len(),
+    };
+    let found = whole.path(&[b"moov", b"udta", kind])?;
+    Ok(found.map(|found| found.range))
 }
 
 /// The samples of the first track whose format is `format`; `None` where there is no such track.

@@ -6,7 +6,7 @@
     reason = "a test's panic is its message"
 )]
 
-use deepfusion_logs::{Clock, DriveLog, Format, ReadOptions, SpeedUnit, read};
+use deepfusion_logs::{Clock, DriveLog, Format, GoproLens, ReadOptions, SpeedUnit, read};
 use std::path::{Path, PathBuf};
 
 /// 2026-05-01 12:00:00 UTC.
@@ -223,6 +223,40 @@ fn a_gopros_video_holds_its_own_log() {
     }
 }
 
+#[test]
+fn a_gopros_video_says_through_which_lens_it_was_filmed() {
+    let lens = GoproLens::read(&fixture("gopro.mp4")).unwrap().unwrap();
+    assert_eq!(lens.model, "HERO11 Black");
+    assert_eq!((lens.digital, lens.size), ('L', (1920, 1080)));
+    // tan 47° = 1.0724; half a diagonal is √(960² + 540²) = 1101.5.
+    let focal = lens.focal_px((1920, 1080)).unwrap();
+    assert!((focal - 1101.454 / 1.072_369).abs() < 0.01, "{focal}");
+    // A smaller copy, one stored upright, one with sides of whole blocks.
+    let halved = lens.focal_px((960, 540)).unwrap();
+    assert!((halved - focal / 2.0).abs() < 1e-9);
+    assert_eq!(lens.focal_px((1080, 1920)), Some(focal));
+    assert!(lens.focal_px((1920, 1088)).is_some());
+    // Cut to another shape, zoomed into, or through a lens that bends lines.
+    assert_eq!(lens.focal_px((1440, 1080)), None);
+    let zoomed = GoproLens {
+        zoomed: true,
+        ..lens.clone()
+    };
+    assert_eq!(zoomed.focal_px((1920, 1080)), None);
+    let wide = GoproLens {
+        digital: 'W',
+        ..lens.clone()
+    };
+    assert_eq!(wide.focal_px((1920, 1080)), None);
+    let no_angle = GoproLens {
+        diagonal_deg: f64::NAN,
+        ..lens
+    };
+    assert_eq!(no_angle.focal_px((1920, 1080)), None);
+    // Any other file says nothing of it.
+    assert_eq!(GoproLens::read(&fixture("phone.gpx")).ok().flatten(), None);
+}
+
 /// A copy of a fixture with its text changed.
 fn changed(name: &str, change: impl Fn(&str) -> String) -> String {
     let text = std::fs::read_to_string(fixture(name)).unwrap();
@@ -321,5 +355,12 @@ fn a_video_that_was_cut_off_says_where() {
         damaged[at] ^= 0xa5;
         std::fs::write(&path, &damaged).unwrap();
         let _ = read(&path, &ReadOptions::default());
+    }
+    // What is said of the lens stands at the end.
+    for at in bytes.len() - 300..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 0xa5;
+        std::fs::write(&path, &damaged).unwrap();
+        let _ = GoproLens::read(&path);
     }
 }

@@ -25,9 +25,9 @@ pub(crate) struct PredictArgs {
     /// Which images, through which network, to where.
     #[command(flatten)]
     pub prediction: PredictionArgs,
-    /// What to write for every image.
-    #[arg(long, value_enum, value_delimiter = ',', default_values = ["depth-png", "color"])]
-    pub save: Vec<Save>,
+    /// What to write for every image [default: depth-png,color; of films and bags image, too].
+    #[arg(long, value_enum, value_delimiter = ',')]
+    pub save: Option<Vec<Save>>,
     /// Leave out points of the cloud beyond this depth, in metres.
     #[arg(long, value_name = "M", default_value_t = 80.0, value_parser = positive)]
     pub max_depth: f64,
@@ -50,29 +50,44 @@ pub(crate) struct PredictArgs {
 }
 
 impl PredictArgs {
-    /// What is kept of every image.
-    pub(crate) fn outputs(&self) -> Outputs {
+    /// What is kept of every image. `all_have_files`: the images are files of their own, and none a frame of a film or bag.
+    pub(crate) fn outputs(&self, all_have_files: bool) -> Outputs {
         // A video is made of pictures, when they are all there.
         let of_an_image = |save: &Save| match save {
             Save::Video => Save::SideBySide,
             other => *other,
         };
         let mut save: Vec<Save> = Vec::new();
-        for each in self.save.iter().map(of_an_image) {
+        for each in self.asked().iter().map(of_an_image) {
             if !save.contains(&each) {
                 save.push(each);
             }
         }
-        Outputs {
+        let outputs = Outputs {
             save,
             max_depth_m: self.max_depth,
             max_sigma: self.max_sigma,
+        };
+        match self.save {
+            None if !all_have_files => outputs.with_image(),
+            _ => outputs,
         }
+    }
+
+    /// What `--save` says.
+    fn asked(&self) -> &[Save] {
+        let default = &[Save::DepthPng, Save::Color];
+        self.save.as_deref().unwrap_or(default)
+    }
+
+    /// Whether a cloud is wanted.
+    pub(crate) fn cloud(&self) -> bool {
+        self.asked().iter().any(|save| save.is_cloud())
     }
 
     /// Whether videos are wanted.
     pub(crate) fn video(&self) -> bool {
-        self.save.contains(&Save::Video)
+        self.asked().contains(&Save::Video)
     }
 }
 
@@ -87,6 +102,8 @@ pub(crate) enum Save {
     Sigma,
     /// Depth in colours with a legend in metres.
     Color,
+    /// The image itself as JPEG: `view` shows it where it is no file of its own.
+    Image,
     /// The image and its depth in colours.
     SideBySide,
     /// Coloured point cloud in the camera's axes, as PLY.

@@ -90,3 +90,13 @@ pub(crate) struct Outputs {
     /// Points whose standard deviation is above this share of their depth are left out, too.
     pub max_sigma: Option<f64>,
 }
+
+impl Outputs {
+    /// The images themselves, too.
+    pub(crate) fn with_image(mut self) -> Self {
+        if !self.save.contains(&Save::Image) {
+            self.save.push(Save::Image);
+        }
+        self
+    }
+}

@@ -5,6 +5,7 @@ use crate::dataset::{assumed_warning, numbers_of_hfov};
 use crate::dataset_toml::FolderConfig;
 use crate::pictures::{ExifCamera, exif_camera};
 use crate::{DatasetKind, Error, OpenOptions, Result};
+use deepfusion_logs::GoproLens;
 use std::path::{Path, PathBuf};
 
 /// Names under which a calibration is looked for beside the images, in this order.
@@ -23,9 +24,18 @@ const NAMES: [&str; 8] = [
 /// ([`OpenOptions::intrinsics`], [`OpenOptions::hfov_deg`]).
 pub const GIVEN_INTRINSICS: &str = "given intrinsics";
 
+/// What a camera made, and may have described itself in.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Pictures<'a> {
+    /// Images, which may have an EXIF block.
+    Images(&'a [PathBuf]),
+    /// A video, and what it says of a GoPro's lens.
+    Video(&'a Path, Option<&'a GoproLens>),
+}
+
 /// The camera of images of a size: given by the caller or in `dataset.toml`, or read from a file beside
-/// them, or in the folder above, or what EXIF says in `images`, which becomes one of the `warnings`; where nothing says it, the one
-/// that is to be assumed, which does too.
+/// them, or in the folder above, or what the `pictures` say themselves, which becomes one of the `warnings`; where nothing says it, the
+/// one that is to be assumed, which does too.
 ///
 /// # Errors
 /// [`Error::NoCameraFile`] where nothing says it; [`Error::CameraFile`], [`Error::Config`].
@@ -35,7 +45,7 @@ pub(crate) fn find_camera(
     options: &OpenOptions,
     size: (u32, u32),
     layout: DatasetKind,
-    images: &[PathBuf],
+    pictures: Pictures<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<CameraCalibration> {
     if let Some(given) = options.given_camera(size) {
@@ -60,7 +70,12 @@ pub(crate) fn find_camera(
     if let Some(file) = file {
         return CameraCalibration::read(&file, size);
     }
-    if let Some((calibration, warning)) = by_exif(images, size)? {
+    let said = match pictures {
+        Pictures::Images(images) => by_exif(images, size)?,
+        Pictures::Video(file, Some(lens)) => by_gopro(file, lens, size)?,
+        Pictures::Video(_, None) => None,
+    };
+    if let Some((calibration, warning)) = said {
         warnings.push(warning);
         return Ok(calibration);
     }
@@ -125,6 +140,27 @@ fn by_exif(images: &[PathBuf], size: (u32, u32)) -> Result<Option<(CameraCalibra
             "; the images are used as they are stored, not turned as EXIF's orientation says";
     }
     let calibration = CameraCalibration::given([k.fx, k.fy, k.cx, k.cy], size, path)?;
+    Ok(Some((calibration, warning)))
+}
+
+/// The camera that a GoPro's video says, and a sentence that says so; `None` for another than the linear lens.
+fn by_gopro(
+    file: &Path,
+    lens: &GoproLens,
+    size: (u32, u32),
+) -> Result<Option<(CameraCalibration, String)>> {
+    let Some(focal) = lens.focal_px(size) else {
+        return Ok(None);
+    };
+    let hfov_deg = 2.0 * (f64::from(size.0) / 2.0 / focal).atan().to_degrees();
+    let calibration = CameraCalibration::given(numbers_of_hfov(hfov_deg, size), size, file)?;
+    let warning = format!(
+        "the camera is taken from {}: the linear lens of a {}, {:.1}° from corner to corner, so fx = fy = {focal:.1}, the principal point in the \
+         middle; a calibration is better",
+        name(file),
+        lens.model,
+        lens.diagonal_deg
+    );
     Ok(Some((calibration, warning)))
 }
 

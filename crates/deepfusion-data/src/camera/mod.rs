@@ -9,7 +9,7 @@ mod yaml;
 
 pub use calibration::CameraCalibration;
 pub use find::GIVEN_INTRINSICS;
-pub(crate) use find::find_camera;
+pub(crate) use find::{Pictures, find_camera};
 pub use lens::Lens;
 pub use write::camera_info_yaml;
 pub(crate) use yaml::FISHEYE;

@@ -3,7 +3,7 @@
 use super::files::name_of;
 use super::plain::{NO_MOUNT, PlainParts};
 use super::video::frames_of;
-use crate::camera::find_camera;
+use crate::camera::{Pictures, find_camera};
 use crate::dataset_toml::FolderConfig;
 use crate::logs::clock::{on_the_vehicles_clock, seconds};
 use crate::logs::frame_times::{TimedImage, numbers_by_time};
@@ -59,7 +59,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         options,
         video.size(),
         DatasetKind::Comma2k19,
-        &[],
+        Pictures::Images(&[]),
         &mut warnings,
     )?;
     let times = frame_times(folder)?;

@@ -2,7 +2,7 @@
 
 use super::files::{images_in, name_of};
 use super::plain::{NO_MOUNT, PlainParts};
-use crate::camera::find_camera;
+use crate::camera::{Pictures, find_camera};
 use crate::dataset_toml::FolderConfig;
 use crate::logs::frame_times::timed_images;
 use crate::logs::speed_log::SpeedLog;
@@ -42,7 +42,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         options,
         size,
         DatasetKind::Folder,
-        &images,
+        Pictures::Images(&images),
         &mut warnings,
     )?;
     let images = timed_images(folder, images, &config, &mut warnings)?;

@@ -3,7 +3,7 @@
 use super::files::{folders, images_in, name_of};
 use super::plain::{PlainParts, open_each};
 use super::poses::motion_of_rows;
-use crate::camera::find_camera;
+use crate::camera::{Pictures, find_camera};
 use crate::dataset_toml::FolderConfig;
 use crate::logs::frame_times::TimedImage;
 use crate::truth::depth_images::DepthImages;
@@ -59,7 +59,7 @@ fn open_sequence(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         options,
         size,
         DatasetKind::RgbD,
-        &[],
+        Pictures::Images(&[]),
         &mut Vec::new(),
     )?;
     let (mut depth, mut world_from_cam) = (BTreeMap::new(), BTreeMap::new());

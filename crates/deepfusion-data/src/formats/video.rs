@@ -1,12 +1,14 @@
 //! A video file with tables and a calibration beside it.
 
 use super::plain::{NO_MOUNT, PlainParts};
-use crate::camera::find_camera;
+use crate::camera::{CameraCalibration, Pictures, find_camera};
 use crate::dataset_toml::FolderConfig;
 use crate::logs::clock::{TimeUnit, seconds};
 use crate::logs::frame_times::{TimedImage, from_start, numbers_by_time};
 use crate::logs::speed_log::SpeedLog;
 use crate::{Camera, Dataset, DatasetKind, Error, OpenOptions, Result};
+use deepfusion_geometry::Distortion;
+use deepfusion_logs::{GoproLens, may_hold_log};
 use deepfusion_video::VideoFrames;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -72,15 +74,19 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
     let config = FolderConfig::read(&folder)?;
     let video = frames_of(&file, &config)?;
     let mut warnings = Vec::new();
+    // Whether the video itself is whole, ffmpeg has said.
+    let lens = may_hold_log(&file).then(|| GoproLens::read(&file).ok().flatten());
+    let lens = lens.flatten();
     let calibration = find_camera(
         &folder,
         &config,
         options,
         video.size(),
         DatasetKind::Video,
-        &[],
+        Pictures::Video(&file, lens.as_ref()),
         &mut warnings,
     )?;
+    warnings.extend(lens.and_then(|lens| bent_warning(&lens, &calibration)));
     let times = match (video.times_ns(), config.fps) {
         (_, Some(fps)) => {
             let ns = |i: usize| Some((i as f64 / fps * 1e9).round() as i64);
@@ -144,6 +150,27 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         folder,
     }
     .into_dataset()
+}
+
+/// What is wrong with the camera of a GoPro's video that was not filmed through its linear lens; nothing where the calibration has its own
+/// model of the lens.
+fn bent_warning(lens: &GoproLens, calibration: &CameraCalibration) -> Option<String> {
+    if lens.is_linear() || calibration.distortion != Distortion::default() {
+        return None;
+    }
+    Some(format!(
+        "the video says that its lens was \"{}\" on a {}, which bends lines as no pinhole does: film through the linear lens, or calibrate this one as \
+         a fisheye lens",
+        match lens.digital {
+            'N' => "narrow".to_owned(),
+            'W' => "wide".to_owned(),
+            'S' => "SuperView".to_owned(),
+            'H' => "HyperView".to_owned(),
+            'M' => "max".to_owned(),
+            other => other.to_string(),
+        },
+        lens.model
+    ))
 }
 
 /// When a video of dates' speeds began, whose own times count from 0: recorders say when it was made, and mean its first frame or

@@ -72,8 +72,8 @@ const fn samsung(models: &'static [&'static str], lens_mm: f64, diagonal_deg: f6
 /// ("82° field of view"; support.google.com/pixelphone/answer/7158570), Samsung's ("FOV 85°"; the models' specifications on
 /// samsung.com). The lenses' own focal lengths are those that the telephones write into EXIF. No picture of each was at hand to try
 /// them: where EXIF's lens is not the one here, the table is not used, so that a wrong row is an unused one. Left out: the Galaxy S21 and S21+,
-/// whose two longer lenses are too alike to tell them apart, and action cameras, of which the maker alone is known
-/// ([`is_action_camera`]).
+/// whose two longer lenses are too alike to tell them apart, and action cameras, of whose photographs the maker alone is known
+/// ([`is_action_camera`]); their videos say more ([`deepfusion_logs::GoproLens`]).
 const KNOWN: &[KnownCamera] = &[
     apple(
         &["iPhone 11", "iPhone 11 Pro", "iPhone 11 Pro Max"],

@@ -4,7 +4,7 @@
 
 The drive: v(t) = 8 + 3 sin(0.4 t) m/s for 12 s from 2026-05-01 12:00:00 UTC, turning at 0.3 sin(0.5 t) rad/s. GPX is written by gpxpy,
 candump and ASC by python-can with frames that cantools packs; the others follow the published definitions of their formats:
-GPMF as in github.com/gopro/gpmf-parser's README, MP4 as in ISO/IEC 14496-12, GnssLogger, Sensor Logger, Torque and Car Scanner as
+GPMF as in github.com/gopro/gpmf-parser's README (settings and lens as its users print them), MP4 as in ISO/IEC 14496-12, GnssLogger, Sensor Logger, Torque and Car Scanner as
 their files' own headers say.
 """
 
@@ -231,7 +231,11 @@ def gpmf():
         box("stco", full, u32(n, *offsets)),
     )
     media = box("mdia", box("mdhd", full, u32(0, 0, 1001, n * 1001), bytes(4)), box("hdlr", full, bytes(4), b"meta", bytes(13)), box("minf", table))
-    movie = box("moov", box("trak", media))
+    # What is the same for the whole film, and what the lens saw.
+    text = lambda key, value: klv(key, "c", 1, len(value), value.encode())
+    settings = nest("DEVC", text("DVNM", "Global Settings") + text("MINF", "HERO11 Black") + text("DZOM", "N") + klv("VRES", "L", 4, 2, u32(1920, 1080)))
+    lens = nest("DEVC", text("DVNM", "Large FOV") + klv("ZFOV", "f", 4, 1, struct.pack(">f", 94.0)) + text("VFOV", "L"))
+    movie = box("moov", box("trak", media), box("udta", box("FIRM", b"H22.01"), box("GPMF", settings, lens)))
     (HERE / "gopro.mp4").write_bytes(head + data + movie)
 
 

@@ -3,7 +3,7 @@
 mod frame_processor;
 mod instances;
 mod live;
-pub(super) mod pictures;
+mod pictures;
 
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -18,7 +18,7 @@ use deepfusion_perception::PerceptionConfig;
 
 use self::frame_processor::{FrameProcessor, PerceivedFrame, StartedFrame};
 use super::live as sources;
-use super::predict::{Job, check_watched, find_inputs};
+use super::predict::{Job, all_have_files, check_watched, find_inputs};
 use crate::cli::{PerceiveArgs, PredictionArgs};
 use crate::error::CliError;
 use crate::failure::{Context, Failure, Result};
@@ -45,7 +45,10 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
     let mut estimator = engine::load(&model, &prediction.engine)?;
     let job = Job::new(
         prediction,
-        args.outputs(f64::from(config.max_depth_m)),
+        args.outputs(
+            f64::from(config.max_depth_m),
+            source.is_none() && all_have_files(&all),
+        ),
         &model,
         &estimator,
     )?;
@@ -169,16 +172,6 @@ impl Work<'_> {
         let (out, input) = (&self.args.prediction.out, &found.input);
         for (save, picture) in &found.pictures {
             picture.save(&pictures::path(out, &input.name, *save))?;
-        }
-        if input
-            .frame
-            .as_ref()
-            .is_some_and(|(dataset, index)| dataset.frames()[*index].image.file().is_none())
-        {
-            pictures::save_jpeg(
-                &found.loaded.image,
-                &out.join(format!("{}_image.jpg", input.name)),
-            )?;
         }
         self.job.write(input, &found.loaded, &found.seen)?;
         write_record(&found.record, &record_path(out, &input.name))?;

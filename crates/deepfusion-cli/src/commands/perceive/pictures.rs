@@ -154,10 +154,3 @@ impl Picture {
         Ok(())
     }
 }
-
-/// The frame's own image, where it is no file: a viewer needs it.
-pub(crate) fn save_jpeg(image: &RgbImage, path: &Path) -> Result<()> {
-    let mut bytes = Vec::new();
-    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 90).encode_image(image)?;
-    output::write_unsynced(path, bytes)
-}

@@ -24,8 +24,14 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
     }
     check_watched(prediction, Some(address), &[])?;
     let mut estimator = engine::load(model, &prediction.engine)?;
-    let job = Job::new(prediction, args.outputs(), model, &estimator)?;
-    if args.save.iter().any(|save| save.is_cloud()) && matches!(job.camera, CameraSource::Unknown) {
+    // They are nowhere else, and depth is little without them.
+    let job = Job::new(
+        prediction,
+        args.outputs(false).with_image(),
+        model,
+        &estimator,
+    )?;
+    if args.cloud() && matches!(job.camera, CameraSource::Unknown) {
         return Err(CliError::NoCamera.into());
     }
     live::make_room(out, prediction.overwrite)?;

@@ -30,7 +30,6 @@ use deepfusion_video::LiveFrame;
 use deepfusion_video::{Address, can_write_video};
 
 use super::live as sources;
-use super::perceive::pictures;
 use super::warnings;
 use crate::cli::{CameraIntrinsics, Outputs, PredictArgs, PredictionArgs, Save, Shard};
 use crate::error::CliError;
@@ -98,11 +97,14 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     }
     let mine: Vec<&Input> = shard.part_of(&all).collect();
     let mut estimator = engine::load(&model, &prediction.engine)?;
-    let job = Job::new(prediction, args.outputs(), &model, &estimator)?;
+    let job = Job::new(
+        prediction,
+        args.outputs(all_have_files(&all)),
+        &model,
+        &estimator,
+    )?;
     let camera_known = !matches!(job.camera, CameraSource::Unknown);
-    if args.save.iter().any(|save| save.is_cloud())
-        && !(camera_known || all.iter().all(|input| input.frame.is_some()))
-    {
+    if args.cloud() && !(camera_known || all.iter().all(|input| input.frame.is_some())) {
         return Err(CliError::NoCamera.into());
     }
     std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
@@ -189,6 +191,15 @@ pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<
         &options,
         warnings::print,
     )?)
+}
+
+/// Whether every image is a file of its own, which whoever looks at its depth can open.
+pub(super) fn all_have_files(inputs: &[Input]) -> bool {
+    let has_file = |input: &Input| match &input.frame {
+        Some((dataset, index)) => dataset.frames()[*index].image.file().is_some(),
+        None => true,
+    };
+    inputs.iter().all(has_file)
 }
 
 /// That the scale monitor's options are not given where it would never look: they would change nothing, silently.
@@ -473,13 +484,6 @@ impl<'a> Job<'a> {
             };
             let limits = (self.outputs.max_depth_m, self.outputs.max_sigma);
             outputs::write(*save, limits, image, loaded.camera.as_ref(), &maps, &path)?;
-            files.push(file);
-        }
-        if loaded.live.is_some() {
-            // It is nowhere else, and depth is little without it.
-            let file = format!("{}_image.jpg", input.name);
-            let path = args.out.join(&file);
-            pictures::save_jpeg(image, &path)?;
             files.push(file);
         }
         let known = depth.data.iter().copied().filter(|d| *d > 0.0);

@@ -23,6 +23,7 @@ pub(super) fn ending(save: Save) -> &'static str {
         Save::Npy => "_depth.npy",
         Save::Sigma => "_sigma.npy",
         Save::Color => "_color.png",
+        Save::Image => "_image.jpg",
         Save::SideBySide => "_side.png",
         Save::Ply => ".ply",
         Save::Pcd => ".pcd",
@@ -68,6 +69,7 @@ pub(super) fn write(
             let picture = with_depth_legend(&depth_picture(depth, &scale), &scale);
             save_png(&picture, path)?;
         }
+        Save::Image => save_jpeg(image, path)?,
         // Of all images, by `video`.
         Save::Video => {}
         Save::SideBySide => save_png(&side_by_side(image, depth, &scale)?, path)?,
@@ -97,6 +99,12 @@ pub(super) fn write(
         }
     }
     Ok(())
+}
+
+fn save_jpeg(image: &RgbImage, path: &Path) -> Result<()> {
+    let mut bytes = Vec::new();
+    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 90).encode_image(image)?;
+    output::write_unsynced(path, bytes)
 }
 
 fn write_npy(depth: &DepthMap, path: &Path) -> Result<()> {
