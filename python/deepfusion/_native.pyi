@@ -61,7 +61,7 @@ class Model:
         stretch: bool = False,
     ) -> Predictions:
         """The predictions of images of one camera, in their order, as `predict` gives them. While the network looks at one, the next
-        are read and prepared on other threads: as fast as `deepfusion predict`. What is wrong with an image is raised at its turn;
+        are read and prepared on other threads, as `deepfusion predict` does it. What is wrong with an image is raised at its turn;
         going on with `next` gives those behind it."""
     def another(self) -> Model:
         """The same network for another thread: it shares the weights."""
@@ -100,7 +100,8 @@ class Frame:
     def intrinsics(self) -> Intrinsics:
         """fx, fy, cx, cy in pixels of `image`."""
     def ground_truth(self, kind: str = "z") -> NDArray[np.float32] | None:
-        """H x W metres, 0 where nothing was measured; None where the frame has none. `kind`: "z" or "velodyne"."""
+        """H x W metres, 0 where nothing was measured; None where the frame has none. `kind`: "z", "velodyne" or
+        "annotated" (KITTI's `proj_depth`)."""
 
 class Dataset:
     """A recording of any known layout: one drive, one camera. `recording[i]` reads nothing but what is known of the frame."""

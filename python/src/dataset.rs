@@ -63,16 +63,20 @@ impl Dataset {
         })
     }
 
+    /// The drive's.
     #[getter]
     fn name(&self) -> &str {
         self.inner.name()
     }
 
+    /// Such as "KITTI raw".
     #[getter]
     fn layout(&self) -> &'static str {
         self.inner.kind().label()
     }
 
+    /// 4 x 4, target_from_source: takes a point of the camera at frame `source` to the camera at frame `target`; None where
+    /// the vehicle's motion is not known.
     fn motion<'py>(
         &self,
         py: Python<'py>,
@@ -113,6 +117,7 @@ impl Frame {
 
 #[pymethods]
 impl Frame {
+    /// H x W x 3, RGB, free of the lens's distortion. Read when asked for.
     #[getter]
     fn image<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<u8>>> {
         let image = py
@@ -125,34 +130,42 @@ impl Frame {
         Ok(array.into_pyarray(py))
     }
 
+    /// Its number in the recording's files.
     #[getter]
     fn number(&self) -> u64 {
         self.facts().number
     }
 
+    /// When it was taken, seconds from the recording's first stamp.
     #[getter]
     fn time_s(&self) -> Option<f64> {
         self.facts().time_s
     }
 
+    /// The vehicle's.
     #[getter]
     fn speed_mps(&self) -> Option<f64> {
         self.facts().speed_mps
     }
 
+    /// fx, fy, cx, cy in pixels of `image`.
     #[getter]
     fn intrinsics(&self) -> (f64, f64, f64, f64) {
         let k = self.dataset.intrinsics(self.index);
         (k.fx, k.fy, k.cx, k.cy)
     }
 
+    /// H x W metres, 0 where nothing was measured; None where the frame has none. `kind`: "z", "velodyne" or
+    /// "annotated" (KITTI's `proj_depth`).
     #[pyo3(signature = (kind="z"))]
     fn ground_truth(&self, py: Python<'_>, kind: &str) -> PyResult<Option<Py<PyArray2<f32>>>> {
         let kind = match kind {
             "z" => GtKind::Z,
             "velodyne" => GtKind::Velodyne,
+            "annotated" => GtKind::Annotated,
             other => {
-                let message = format!("kind: expected \"z\" or \"velodyne\", found {other:?}");
+                let message =
+                    format!("kind: expected \"z\", \"velodyne\" or \"annotated\", found {other:?}");
                 return Err(PyValueError::new_err(message));
             }
         };

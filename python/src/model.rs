@@ -80,6 +80,11 @@ impl Model {
 
 #[pymethods]
 impl Model {
+    /// Depth of an H x W x 3 array (uint8, RGB; NumPy's, or another's on the processor by DLPack), a PIL image, or a file. Without
+    /// `intrinsics` a file's EXIF is asked, then the lens of the training camera is assumed, and the metres are as right as that.
+    ///
+    /// `focal_correction` multiplies depth for a focal length other than the one trained with; `stretch` shows the network the whole
+    /// image where it would be cut to the aspect ratio trained with.
     #[pyo3(signature = (image, intrinsics=None, *, focal_correction=true, stretch=false))]
     fn predict(
         &self,
@@ -106,6 +111,9 @@ impl Model {
         Ok(Prediction::new(prediction, image, camera))
     }
 
+    /// The predictions of images of one camera, in their order, as `predict` gives them. While the network looks at one, the next
+    /// are read and prepared on other threads, as `deepfusion predict` does it. What is wrong with an image is raised at its turn;
+    /// going on with `next` gives those behind it.
     #[pyo3(signature = (images, intrinsics=None, *, focal_correction=true, stretch=false))]
     fn predict_many(
         &self,
@@ -125,22 +133,26 @@ impl Model {
         Predictions::begin(request, own.map_err(raise)?)
     }
 
+    /// The same network for another thread: it shares the weights.
     fn another(&self, py: Python<'_>) -> PyResult<Self> {
         let another = py.detach(|| self.with(|estimator| estimator.another()));
         another.map(Self::new).map_err(raise)
     }
 
+    /// Width and height trained with.
     #[getter]
     fn size(&self, py: Python<'_>) -> (usize, usize) {
         let size = py.detach(|| self.with(|estimator| estimator.config().size));
         (size.width, size.height)
     }
 
+    /// Steps it was trained for.
     #[getter]
     fn step(&self, py: Python<'_>) -> usize {
         py.detach(|| self.with(|estimator| estimator.step))
     }
 
+    /// What runs it: "fused".
     #[getter]
     fn engine(&self, py: Python<'_>) -> &'static str {
         py.detach(|| self.with(|estimator| estimator.engine()))
@@ -267,6 +279,7 @@ impl Prediction {
 
 #[pymethods]
 impl Prediction {
+    /// H x W metres at the image's size; 0 outside of what the network looked at. One array, made once.
     #[getter]
     fn depth(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f32>>> {
         let array = self.depth.get_or_try_init(py, || {
@@ -281,6 +294,7 @@ impl Prediction {
         Ok(array.clone_ref(py))
     }
 
+    /// Standard deviation of `depth` in metres, H x W; None of a network that does not say. Not calibrated.
     #[getter]
     fn sigma(&self, py: Python<'_>) -> PyResult<Option<Py<PyArray2<f32>>>> {
         let sigma = py.detach(|| self.prediction.sigma());
@@ -289,12 +303,14 @@ impl Prediction {
             .transpose()
     }
 
+    /// 1/m, at the network's size.
     #[getter]
     fn disparity(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f32>>> {
         let p = &self.prediction;
         image_array(py, p.height, p.width, p.disparity.clone())
     }
 
+    /// fx, fy, cx, cy of the image, where they are known.
     #[getter]
     fn intrinsics(&self) -> Option<(f64, f64, f64, f64)> {
         self.camera.map(|k| (k.fx, k.fy, k.cx, k.cy))
@@ -316,6 +332,7 @@ impl Prediction {
         self.depth(py)?.bind(py).call_method0("__dlpack_device__")
     }
 
+    /// Points N x 3 in metres (x right, y down, z ahead) and their colours N x 3; needs `intrinsics`.
     #[pyo3(signature = (max_depth=80.0))]
     fn cloud<'py>(&self, py: Python<'py>, max_depth: f32) -> PyResult<Points<'py>> {
         let Some(camera) = self.camera else {

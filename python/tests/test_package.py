@@ -1,5 +1,7 @@
 """The package on simulated streets, whose depth is known."""
 
+import ast
+import inspect
 import json
 import os
 import subprocess
@@ -165,3 +167,17 @@ def test_the_command_gives_the_same_bytes(drive, model, tmp_path):
         kind="disparity",
     )
     assert ours["unscaled"] == theirs["unscaled"]
+
+
+def test_help_says_what_the_stubs_say():
+    """`help(deepfusion.Model)` has the same sentences as an editor."""
+    stubs = ast.parse((Path(deepfusion.__file__).parent / "_native.pyi").read_text())
+    compared = 0
+    for group in (node for node in stubs.body if isinstance(node, ast.ClassDef)):
+        for method in (node for node in group.body if isinstance(node, ast.FunctionDef)):
+            said = ast.get_docstring(method)
+            if said and method.name != "__init__":
+                there = getattr(getattr(deepfusion, group.name), method.name).__doc__
+                assert there and inspect.cleandoc(there) == said, f"{group.name}.{method.name}"
+                compared += 1
+    assert compared > 20

@@ -8,7 +8,7 @@ use crate::failure::{Exit, Reportable};
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum CliError {
     /// Something that would be overwritten.
-    #[error("{}: is there already", path.display())]
+    #[error("{}: already exists", path.display())]
     Exists {
         /// The file or folder.
         path: PathBuf,
@@ -102,7 +102,7 @@ pub(crate) enum CliError {
         path: PathBuf,
     },
     /// Several drives where one is needed.
-    #[error("{}: holds {drives} drives, and a bag is one", input.display())]
+    #[error("{}: holds {drives} drives, and a bag holds one", input.display())]
     SeveralDrives {
         /// What was given.
         input: PathBuf,
@@ -133,13 +133,13 @@ pub(crate) enum CliError {
     #[error("only `--engine burn` computes on other devices than the processor")]
     OnlyOnCpu,
     /// A library for another engine.
-    #[error("`--ort-lib` is of use to `--engine ort` alone")]
+    #[error("`--ort-lib` needs `--engine ort`")]
     OnlyOrt,
     /// A precision that an engine does not have.
     #[error("`--precision bf16` is the fused engine's")]
     OnlyFused,
     /// An output that another run made, or this one of another image.
-    #[error("{}: is there already, {why}", path.display())]
+    #[error("{}: already exists, {why}", path.display())]
     Stale {
         /// The sidecar.
         path: PathBuf,
@@ -343,12 +343,12 @@ impl Reportable for CliError {
                     .into(),
             ),
             Self::SomeFailed { hint, .. } => Some(match hint {
-                Some(hint) => format!("{hint}; then run the same again: only what is missing is done"),
-                None => "mend them and run the same again: only what is missing is done".into(),
+                Some(hint) => format!("{hint}; then run the same again: finished images are kept"),
+                None => "fix them and run the same again: finished images are kept".into(),
             }),
             Self::Unfit { .. } => Some("each finding above has its remedy; --verbose prints every figure".into()),
             Self::Interrupted { .. } => {
-                Some("run the same again: only what is missing is done".into())
+                Some("run the same again: finished images are kept".into())
             }
             Self::Stopped { go_on, .. } => Some(format!("go on with: {go_on}")),
             Self::Contradicts { .. } => {

@@ -123,7 +123,7 @@ mod tests {
         let error = in_words(error);
         assert_eq!(
             error.to_string(),
-            "a.json: is there already, made with another --max-depth"
+            "a.json: already exists, made with another --max-depth"
         );
         assert!(
             error

@@ -116,7 +116,7 @@ fn an_interrupted_one_is_gone_on_with() {
     );
     let again = json(at, &command);
     assert_eq!(again, whole);
-    fails(at, &command, &["mine", "is there already"]);
+    fails(at, &command, &["mine", "already exists"]);
     // Nor is anything begun where nothing can be judged.
     ok(
         at,

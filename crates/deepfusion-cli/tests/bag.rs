@@ -96,7 +96,7 @@ fn a_bag_is_converted_both_ways() {
     let refused = run(at, "data convert kitti again.bag");
     assert_eq!(refused.code, 1);
     assert!(
-        refused.stderr.contains("again.bag: is there already"),
+        refused.stderr.contains("again.bag: already exists"),
         "{}",
         refused.stderr
     );
@@ -148,6 +148,32 @@ fn a_warning_of_opening_is_printed_once() {
     warned(&trained.stderr);
     let predicted = ok(at, "predict --model run sim/urban_0001.bag --out depth");
     warned(&predicted.stderr);
+    // Its images are in no file that a viewer could open: they are kept, unless --save says what is wanted.
+    let images = |folder: &str| {
+        let names = std::fs::read_dir(at.join(folder)).unwrap();
+        let names = names.map(|e| e.unwrap().file_name().into_string().unwrap());
+        names.filter(|name| name.ends_with("_image.jpg")).count()
+    };
+    let depths = std::fs::read_dir(at.join("depth")).unwrap();
+    let depths = depths.filter(|e| {
+        let name = e.as_ref().unwrap().file_name();
+        name.to_string_lossy().ends_with("_depth.png")
+    });
+    let count = depths.count();
+    assert!(count > 0);
+    assert_eq!(images("depth"), count);
+    let sidecar = std::fs::read_dir(at.join("depth")).unwrap().find_map(|e| {
+        let path = e.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap();
+        let is = name.ends_with(".json") && !name.contains("manifest");
+        is.then(|| std::fs::read_to_string(&path).unwrap())
+    });
+    assert!(sidecar.unwrap().contains("_image.jpg"));
+    ok(
+        at,
+        "predict --model run sim/urban_0001.bag --save depth-png --out without",
+    );
+    assert_eq!(images("without"), 0);
 }
 
 /// A bag of two seconds without a camera: an inertial unit that turns left by 0.3 rad/s, and, where asked for, odometry
@@ -372,7 +398,7 @@ fn a_bag_as_ros_records_it_is_trained_on_without_a_file_beside_it() {
     fails(
         at,
         "data inspect drive.bag --write-config",
-        &["drive.toml: is there already", "--overwrite"],
+        &["drive.toml: already exists", "--overwrite"],
     );
     let again = json(at, "data inspect drive.bag --json");
     assert_eq!(again["speed_mps"], seen["speed_mps"]);

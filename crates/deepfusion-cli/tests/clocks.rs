@@ -162,7 +162,7 @@ fn the_offset_is_found_from_a_gyroscope_and_from_a_track() {
         (written.parse::<f64>().unwrap() - 0.24).abs() < 0.05,
         "{config}"
     );
-    fails(at, import, &["speed.csv: is there already"]);
+    fails(at, import, &["speed.csv: already exists"]);
     // Clocks that were not set together are not one clock.
     fails(
         at,

@@ -8,7 +8,7 @@ use deepfusion_eval::odometry::PoseFile;
 use deepfusion_geometry::DepthRange;
 use deepfusion_train::{DataConfig, DataSetConfig, RunFolder, TrainConfig};
 use serde_json::Value;
-use support::{fails, json, ok};
+use support::{fails, json, ok, run};
 
 #[test]
 fn a_model_is_measured_on_traffic_and_along_the_road() {
@@ -78,6 +78,83 @@ fn a_model_is_measured_on_traffic_and_along_the_road() {
     let off = json(at, &format!("eval-odometry {files} --json"));
     assert!(off["ate_m"].as_f64().unwrap() < 0.01, "{off}");
     assert!((off["scale"].as_f64().unwrap() - 1.0).abs() < 2e-3, "{off}");
+}
+
+/// Post-processing, points as a table, and depth images in the place of scans.
+#[test]
+fn the_protocols_of_the_fields_tables() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    ok(
+        at,
+        "simulate --out sim --frames 4 --seed 3 --scan-every 2 --size 320x96",
+    );
+    ok(
+        at,
+        "train --data sim --size 96x64 --batch 2 --steps 2 --init none --out run",
+    );
+    let eval = "eval --model run --data sim --crop none --no-verdict --json";
+    let plain = json(at, eval);
+    let blended = json(at, &format!("{eval} --post-process flip"));
+    assert_eq!(blended["n"], plain["n"]);
+    let abs_rel = |report: &Value| report["unscaled"]["abs_rel"].as_f64().unwrap();
+    assert_ne!(abs_rel(&plain), abs_rel(&blended));
+    let kept: Vec<String> = fs::read_dir(at.join("run/eval"))
+        .unwrap()
+        .map(|entry| fs::read_to_string(entry.unwrap().path()).unwrap())
+        .collect();
+    assert_eq!(kept.len(), 2, "each under a name of its own");
+    let post_processed = kept
+        .iter()
+        .filter(|text| text.contains(r#""post_process": "flip""#));
+    assert_eq!(post_processed.count(), 1);
+
+    // Of scans every second frame, of depth images all; the simulator's are exact, and the same camera z.
+    let annotated = json(at, &format!("{eval} --gt-depth annotated"));
+    assert_eq!((&plain["n"], &annotated["n"]), (&2.into(), &4.into()));
+    assert_eq!(annotated["protocol"]["gt"], "annotated");
+    let (scans, images) = (abs_rel(&plain), abs_rel(&annotated));
+    assert!((scans / images - 1.0).abs() < 0.3, "{scans} and {images}");
+
+    let drawn = json(at, &format!("{eval} --points 50 --points-out points.csv"));
+    let table = fs::read_to_string(at.join("points.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table
+        .lines()
+        .map(|line| line.split(',').collect())
+        .collect();
+    assert_eq!((rows.len(), rows[0].len()), (51, 16));
+    let column = |name: &str| rows[0].iter().position(|head| *head == name).unwrap();
+    let number = |row: &[&str], name: &str| row[column(name)].parse::<f64>().unwrap();
+    let mean = |name: &str| rows[1..].iter().map(|row| number(row, name)).sum::<f64>() / 50.0;
+    let close = |name: &str, reported: &Value| {
+        let reported = reported.as_f64().unwrap();
+        assert!(
+            (mean(name) - reported).abs() < 1e-3,
+            "{name}: {} and {reported}",
+            mean(name)
+        );
+    };
+    close("error_m", &drawn["points"]["mean_m"]);
+    close(
+        "scaled_error_m",
+        &drawn["points"]["median_scaled"]["mean_m"],
+    );
+    for row in &rows[1..] {
+        let along: f64 = ["x", "y", "z"]
+            .map(|axis| {
+                number(row, &format!("pred_{axis}_m")) - number(row, &format!("gt_{axis}_m"))
+            })
+            .map(|off| off * off)
+            .iter()
+            .sum();
+        assert!(
+            (along.sqrt() - number(row, "error_m")).abs() < 1e-3,
+            "{row:?}"
+        );
+        assert!(number(row, "u") < 320.0 && number(row, "v") < 96.0);
+    }
+    let alone = run(at, "eval --model run --data sim --points-out points.csv");
+    assert_eq!(alone.code, 2, "{}", alone.stderr);
 }
 
 #[test]

@@ -77,7 +77,7 @@ fn a_drive_becomes_targets_frame_by_frame() {
     // Nothing is overwritten unless asked.
     let again = run(at, &args);
     assert_eq!(again.code, 1);
-    assert!(again.stderr.contains("is there already") && again.stderr.contains("--overwrite"));
+    assert!(again.stderr.contains("already exists") && again.stderr.contains("--overwrite"));
     ok(at, &format!("{args} --overwrite"));
 }
 

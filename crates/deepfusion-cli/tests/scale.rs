@@ -61,7 +61,7 @@ fn a_zoom_is_noticed_and_depth_brought_back() {
         &format!("predict --model run {DRIVE} --save depth-png --correct-scale --out corrected"),
     );
     assert_eq!(
-        printed.stderr.matches("the road says").count(),
+        printed.stderr.matches("the scale has drifted").count(),
         1,
         "{}",
         printed.stderr

@@ -68,7 +68,7 @@ fn a_packed_network_stands_for_its_run() {
     fails(
         at,
         &format!("{pack} --out packed"),
-        &["hut.toml", "is there already"],
+        &["hut.toml", "already exists"],
     );
     ok(at, &format!("{pack} --out packed --overwrite"));
 

@@ -112,7 +112,7 @@ fn a_rerun_file_is_written_once_and_bad_frames_are_named() {
     assert_eq!(second.code, 1);
     assert_eq!(
         second.stderr,
-        "error: a.rrd: is there already\n\
+        "error: a.rrd: already exists\n\
          hint: choose another name, or give --overwrite to replace a file\n"
     );
     assert_eq!(std::fs::read(folder.path().join("a.rrd")).unwrap(), bytes);

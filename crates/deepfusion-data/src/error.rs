@@ -1,6 +1,6 @@
 //! What can go wrong with a recording.
 
-use crate::{DatasetKind, NamedTopic};
+use crate::{DatasetKind, GtKind, NamedTopic};
 use std::path::{Path, PathBuf};
 
 mod hint;
@@ -219,11 +219,13 @@ pub enum Error {
         /// The layout.
         layout: &'static str,
     },
-    /// A depth image asked to be what only a scan can be.
-    #[error("{drive}: its depth images hold camera z, not the velodyne's forward distance")]
+    /// Ground truth of a kind that the recording cannot have.
+    #[error("{drive}: it has no ground truth of the kind \"{}\"", kind.name())]
     DepthKind {
         /// The drive.
         drive: String,
+        /// What was asked for.
+        kind: GtKind,
     },
     /// A ROS bag cannot be read.
     #[error(transparent)]
@@ -277,7 +279,7 @@ pub enum Error {
         source: deepfusion_motion::Error,
     },
     /// Something is there already where something is to be written.
-    #[error("{}: is there already", path.display())]
+    #[error("{}: already exists", path.display())]
     Exists {
         /// The file, or the folder that is not empty.
         path: PathBuf,

@@ -377,7 +377,7 @@ fn depth_images_are_ground_truth_in_a_unit_that_is_said() {
     .unwrap();
     let dataset = open(root.path());
     assert!(dataset.ground_truth(0, GtKind::Z).unwrap().is_none());
-    assert!(dataset.has_ground_truth(1) && !dataset.has_ground_truth(2));
+    assert!(dataset.has_ground_truth(1, GtKind::Z) && !dataset.has_ground_truth(2, GtKind::Z));
     let map = dataset.ground_truth(1, GtKind::Z).unwrap().unwrap();
     assert_eq!(map.data[5], 0.0);
     assert!((map.data[62 + 30] - 3.0).abs() < 1e-6);

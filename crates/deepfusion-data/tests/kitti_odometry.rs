@@ -116,7 +116,10 @@ fn a_sequence_has_the_simulator_s_camera_motion_path_and_depth() {
         "{mount:?}"
     );
     check_truth(dataset, 20, &street.frame(20).depth);
-    assert!(!dataset.has_ground_truth(1) && dataset.ground_truth(1, GtKind::Z).unwrap().is_none());
+    assert!(
+        !dataset.has_ground_truth(1, GtKind::Z)
+            && dataset.ground_truth(1, GtKind::Z).unwrap().is_none()
+    );
     let seen = inspect(root.path()).unwrap();
     assert_eq!(
         (seen.kind, seen.drives[0].scans),

@@ -11,7 +11,7 @@
 mod bag;
 
 use bag::{CAMERA, TinyBag};
-use deepfusion_data::{Dataset, Error, NamedTopic, OpenOptions, inspect, write_bag_config};
+use deepfusion_data::{Dataset, Error, GtKind, NamedTopic, OpenOptions, inspect, write_bag_config};
 use deepfusion_geometry::Se3;
 use deepfusion_hint::Hint;
 use nalgebra::{Matrix3, Matrix4, Vector3};
@@ -129,7 +129,7 @@ fn a_drive_needs_no_file_beside_it() {
         Vector3::from(lidar.translation),
     );
     is_transform(&found, &known.cam_from_lidar, "cam_from_lidar");
-    let truths = (0..dataset.frames().len()).filter(|i| dataset.has_ground_truth(*i));
+    let truths = (0..dataset.frames().len()).filter(|i| dataset.has_ground_truth(*i, GtKind::Z));
     assert!(truths.count() >= 10);
 
     let seen = inspect(&reference("drive.bag")).unwrap();
@@ -282,7 +282,7 @@ fn the_frames_go_before_a_profile() {
     is_near(&mount(&both).translation.into(), [0.0, -0.3, 0.0]);
     assert_eq!(mount(&both).source, "frames lidar → base_link → camera");
     says(&both.warnings().join("\n"), &["the profile umad", "apart"]);
-    assert!(both.has_ground_truth(3));
+    assert!(both.has_ground_truth(3, GtKind::Z));
 }
 
 /// A camera that hangs from two parents is in two places, unless both say the same.

@@ -33,7 +33,7 @@ pub(super) fn check(dataset: &Dataset) -> Outcome {
     };
     let up = mount.rotate(&Vector3::z());
     let with_depth: Vec<usize> = (0..dataset.frames().len())
-        .filter(|i| dataset.has_ground_truth(*i))
+        .filter(|i| dataset.has_ground_truth(*i, GtKind::Z))
         .collect();
     let step = with_depth.len().div_ceil(MOST_FRAMES).max(1);
     let mut planes = Vec::new();

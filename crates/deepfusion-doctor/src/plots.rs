@@ -3,6 +3,7 @@
 use super::epipolar::EpipolarPair;
 use super::survey::Survey;
 use super::turn::picture_yaw_rate;
+use deepfusion_data::GtKind;
 
 /// A line over time.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -51,7 +52,7 @@ impl DrivePlots {
             .iter()
             .filter_map(|p| Some((p.middle_s, picture_yaw_rate(p)?)));
         let with_depth: Vec<usize> = (0..dataset.frames().len())
-            .filter(|i| dataset.has_ground_truth(*i))
+            .filter(|i| dataset.has_ground_truth(*i, GtKind::Z))
             .collect();
         let step = with_depth.len().div_ceil(MOST_OVERLAYS).max(1);
         let keep = |lines: Vec<Line>| lines.into_iter().filter(|l| !l.points.is_empty()).collect();

@@ -22,6 +22,8 @@ mod mean_depth_baseline;
 mod metrics;
 pub mod odometry;
 mod points;
+mod points_table;
+mod post_process;
 mod protocol;
 mod report;
 mod resample;
@@ -40,6 +42,8 @@ pub use intervals::{
 pub use mean_depth_baseline::MeanDepthBaseline;
 pub use metrics::Metrics;
 pub use points::{DrawnPoint, PointErrors, PointRange, Points};
+pub use points_table::points_csv;
+pub use post_process::{PostProcess, blend_flipped};
 pub use protocol::{Crop, GroundTruth, Holes, Protocol, Scaling};
 pub use report::{
     FixedScaled, MeanDepthRow, ProtocolSummary, RangeBin, Report, Scale, ScenarioRow,

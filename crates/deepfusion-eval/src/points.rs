@@ -14,6 +14,8 @@ use crate::statistics::{mean, standard_deviation};
 pub struct DrawnPoint {
     /// The number of its image, in the order in which images came.
     pub image: usize,
+    /// Its column and row.
+    pub pixel: [usize; 2],
     /// The true place.
     pub truth: [f64; 3],
     /// The predicted place.
@@ -36,6 +38,7 @@ impl DrawnPoint {
         };
         Self {
             image,
+            pixel: [u, v],
             truth: place(truth),
             predicted: place(predicted),
             median_scaled: place(median_scaled),

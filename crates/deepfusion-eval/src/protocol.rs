@@ -75,6 +75,20 @@ pub enum GroundTruth {
     Z,
     /// The velodyne's forward distance, as in the field's `eigen` files.
     Velodyne,
+    /// KITTI's annotated depth (camera z, eleven scans gathered and checked against stereo): the field's `eigen_benchmark`.
+    Annotated,
+}
+
+impl GroundTruth {
+    /// What it is, in words.
+    #[must_use]
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Self::Z => "camera z",
+            Self::Velodyne => "the velodyne's forward distance",
+            Self::Annotated => "KITTI's annotated depth",
+        }
+    }
 }
 
 /// How predictions are compared with ground truth (docs/concepts/evaluation.md).

@@ -15,6 +15,7 @@ impl fmt::Display for Report {
         let gt = match self.protocol.gt {
             GroundTruth::Z => "camera z",
             GroundTruth::Velodyne => "velodyne forward distance",
+            GroundTruth::Annotated => "annotated depth",
         };
         let images = match (self.expected, self.n) {
             (Some(expected), n) => format!("{n} of the split's {expected} images"),
@@ -108,7 +109,7 @@ impl Report {
             let near = self.protocol.cap_m * 0.5;
             write!(
                 f,
-                "holes   {:.2} % of what is nearer than {near} m is seen at the far limit or over 3 times too far",
+                "holes   {:.2} % of pixels nearer than {near} m are predicted at the far limit or more than 3 times too far",
                 100.0 * rate
             )?;
             match self.hole_rate_moving {
@@ -183,8 +184,9 @@ fn point_table(f: &mut fmt::Formatter<'_>, points: &Points) -> fmt::Result {
     };
     writeln!(
         f,
-        "{} points drawn with seed {}: {kind}",
-        points.unscaled.n, points.seed
+        "{} drawn with seed {}: {kind}",
+        count_of(points.unscaled.n, "point"),
+        points.seed
     )?;
     writeln!(
         f,

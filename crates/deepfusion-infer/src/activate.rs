@@ -7,7 +7,7 @@ use deepfusion_kernels::{GELU_END, GELU_SERIES};
 
 /// eᵛ for v ≤ 0, to 2 units in the last place: 2ⁿ·p(r), v = n·ln2 + r.
 #[inline(always)]
-fn exp_negative<S: Simd>(simd: S, v: S::f32s) -> S::f32s {
+pub(crate) fn exp_negative<S: Simd>(simd: S, v: S::f32s) -> S::f32s {
     let by = |factor: f32| simd.splat_f32s(factor);
     let madd = |a, b, c| simd.mul_add_f32s(a, b, c);
     // Adding 1.5·2²³ rounds to the nearest integer, which then stands in the lowest bits.
@@ -49,6 +49,16 @@ impl Activation {
                 }
                 let below = simd.mul_add_f32s(near, series, simd.splat_f32s(0.5));
                 simd.mul_f32s(v, below)
+            }
+            Self::LeakyRelu => {
+                let below = simd.min_f32s(zero, v);
+                simd.mul_add_f32s(below, simd.splat_f32s(0.01), simd.max_f32s(zero, v))
+            }
+            Self::Tanh => {
+                // (1 − e^−2|x|) / (1 + e^−2|x|) near 0 loses what the subtraction cancels: 1e-7, as in a sum of f32s near 1.
+                let e = exp_negative(simd, simd.mul_f32s(simd.splat_f32s(-2.0), simd.abs_f32s(v)));
+                let t = simd.div_f32s(simd.sub_f32s(one, e), simd.add_f32s(one, e));
+                simd.select_f32s(simd.less_than_f32s(v, zero), simd.neg_f32s(t), t)
             }
             Self::Sigmoid => {
                 // e^−|x| never overflows.
@@ -124,6 +134,13 @@ mod tests {
             3e-7,
         );
         check(Activation::Sigmoid, |x| 1.0 / (1.0 + (-x).exp()), 2e-7);
+        check(Activation::Tanh, f64::tanh, 3e-7);
+        // A hundredth of up to 100, rounded to f32.
+        check(
+            Activation::LeakyRelu,
+            |x| if x > 0.0 { x } else { 0.01 * x },
+            1e-7,
+        );
         // Values of up to 100, rounded to f32.
         check(Activation::Gelu, deepfusion_kernels::gelu_exact, 6e-6);
     }
@@ -136,6 +153,8 @@ mod tests {
             Activation::Elu,
             Activation::Sigmoid,
             Activation::Gelu,
+            Activation::LeakyRelu,
+            Activation::Tanh,
         ] {
             let mut y = [f32::NAN; 16];
             Arch::new().dispatch(Apply(activation, &mut y));

@@ -12,7 +12,7 @@ use crate::movement::{self, Normalisation};
 use crate::plan::{Plan, Step};
 use crate::view::Shared;
 use crate::{Border, Error, Graph};
-use crate::{channel_norm, enlarge, masks, means};
+use crate::{channel_norm, enlarge, masks, means, recurrent};
 
 /// The precision of the network's arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -231,6 +231,9 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
                     } => channel_norm::channel_norm(arena, from, channels, *epsilon, to),
                     Step::CrossCovariance(step) => step.run(arena),
                     Step::Constants(values, to) => enlarge::constants(arena, values, to),
+                    Step::Multiply([a, b], to) => recurrent::multiply(arena, [a, b], to),
+                    Step::Blend([h, q, z], to) => recurrent::blend(arena, [h, q, z], to),
+                    Step::ConvexUpsample(step) => step.run(arena),
                 }
             }
             let kind = match step {
@@ -249,6 +252,9 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
                 Step::ChannelNorm { .. } => "norm",
                 Step::CrossCovariance(_) => "attention",
                 Step::Constants(..) => "constants",
+                Step::Multiply(..) => "multiply",
+                Step::Blend(..) => "blend",
+                Step::ConvexUpsample(_) => "convex",
             };
             after(name, kind);
         }

@@ -96,11 +96,18 @@ impl Graph {
     /// [`Error::Graph`] naming the first operation whose operand is a concatenation, an extent or the image.
     pub(crate) fn check_operands(&self) -> Result<(), Error> {
         let operands = |op: &Op| match op {
-            Op::Conv(conv) => [conv.residual, None],
-            Op::Gate { input, channel, .. } => [Some(*input), Some(*channel)],
-            Op::AddPixel { input, pixel } => [Some(*input), Some(*pixel)],
-            Op::CrossCovariance { input, .. } => [Some(*input), None],
-            _ => [None; 2],
+            Op::Conv(conv) => [conv.residual, None, None],
+            Op::Gate { input, channel, .. } => [Some(*input), Some(*channel), None],
+            Op::AddPixel { input, pixel } => [Some(*input), Some(*pixel), None],
+            Op::CrossCovariance { input, .. } => [Some(*input), None, None],
+            Op::ConvexUpsample { input, weights, .. } => [Some(*input), Some(*weights), None],
+            Op::Multiply { inputs: [a, b] } => [Some(*a), Some(*b), None],
+            Op::Blend {
+                state,
+                candidate,
+                share,
+            } => [Some(*state), Some(*candidate), Some(*share)],
+            _ => [None; 3],
         };
         let gappy = |node: &Node| {
             let mut operands = operands(&node.op).into_iter().flatten();
@@ -128,9 +135,17 @@ impl Graph {
                 | Op::GlobalMean { input }
                 | Op::ChannelNorm { input, .. }
                 | Op::Gate { input, .. }
-                | Op::AddPixel { input, .. },
+                | Op::AddPixel { input, .. }
+                | Op::Multiply { inputs: [input, _] }
+                | Op::Blend { state: input, .. },
             ) => self.is_plain(*input),
-            Some(Op::UpsampleConcat { .. } | Op::Concat { .. } | Op::ChannelExtent { .. })
+            Some(
+                Op::UpsampleConcat { .. }
+                | Op::Concat { .. }
+                | Op::ChannelExtent { .. }
+                // A single channel, not filled up.
+                | Op::ConvexUpsample { .. },
+            )
             | None => false,
         }
     }

@@ -205,7 +205,10 @@ fn channels(graph: &Graph, slots: usize) -> Vec<Vec<Option<usize>>> {
             | Op::ChannelNorm { input, .. }
             | Op::GlobalMean { input }
             | Op::Gate { input, .. }
-            | Op::AddPixel { input, .. } => all[input.0].clone(),
+            | Op::AddPixel { input, .. }
+            | Op::Multiply { inputs: [input, _] }
+            | Op::Blend { state: input, .. } => all[input.0].clone(),
+            Op::ConvexUpsample { .. } => vec![Some(0)],
             Op::ChannelExtent { .. } => (0..count).map(Some).collect(),
             Op::UpsampleConcat { .. } | Op::Concat { .. } => {
                 let mut joined = Vec::new();

@@ -15,6 +15,10 @@ pub enum Activation {
     Sigmoid,
     /// y = x·Φ(x), Φ the normal distribution.
     Gelu,
+    /// y = x where x > 0, x/100 elsewhere.
+    LeakyRelu,
+    /// y = tanh(x).
+    Tanh,
 }
 
 /// The border of a convolution's input.
@@ -143,6 +147,30 @@ pub enum Op {
         /// τ of each head.
         temperature: Vec<f32>,
     },
+    /// y = a ⊙ b, of one shape.
+    Multiply {
+        /// a and b.
+        inputs: [ValueId; 2],
+    },
+    /// y = (1 − z) ⊙ h + z ⊙ q, of one shape: how a gated recurrent unit goes on.
+    Blend {
+        /// h.
+        state: ValueId,
+        /// q.
+        candidate: ValueId,
+        /// z.
+        share: ValueId,
+    },
+    /// One channel at 2 to the `halvings` times its size, each pixel a weighted mean of the 3×3 around its place in the small image (zeros
+    /// beyond its edge): RAFT's convex upsampling. The weights of a pixel are the softmax of its nine.
+    ConvexUpsample {
+        /// One channel.
+        input: ValueId,
+        /// 9·4^`halvings` channels of the input's size: tap by tap (row by row), in each a block's pixels row by row.
+        weights: ValueId,
+        /// 1 to 3.
+        halvings: u32,
+    },
     /// Where each pixel is, in sines and cosines ([`deepfusion_kernels::position_code`]): depends on no other value.
     Position {
         /// Channels for each axis.
@@ -203,6 +231,13 @@ impl Op {
                 ..
             } => [Some(*input), Some(*spatial), Some(*channel)],
             Self::AddPixel { input, pixel } => [Some(*input), Some(*pixel), None],
+            Self::Multiply { inputs: [a, b] } => [Some(*a), Some(*b), None],
+            Self::Blend {
+                state,
+                candidate,
+                share,
+            } => [Some(*state), Some(*candidate), Some(*share)],
+            Self::ConvexUpsample { input, weights, .. } => [Some(*input), Some(*weights), None],
         };
         few.into_iter().flatten().chain(several.iter().copied())
     }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::aligned::Aligned;
 use crate::conv::Geometry;
 use crate::conv_form::ConvForm;
+use crate::convex::ConvexUpsample;
 use crate::cross_covariance::CrossCovarianceStep;
 use crate::depthwise::DepthwiseStep;
 use crate::element::Element;
@@ -49,6 +50,11 @@ pub(crate) enum Step<C> {
     CrossCovariance(CrossCovarianceStep),
     /// The same for every image, a pixel's channels after the other's.
     Constants(Vec<f32>, View),
+    /// The first two, into the last.
+    Multiply([View; 2], View),
+    /// State, candidate and share, into the last.
+    Blend([View; 3], View),
+    ConvexUpsample(ConvexUpsample),
 }
 
 /// A graph laid out for one image size.
@@ -158,6 +164,16 @@ impl<C> Plan<C> {
                     temperature,
                 })
             }
+            Outline::Multiply(from, to) => Step::Multiply(from.map(view), view(to)),
+            Outline::Blend(from, to) => Step::Blend(from.map(view), view(to)),
+            Outline::ConvexUpsample([input, weights], halvings, to) => {
+                Step::ConvexUpsample(ConvexUpsample {
+                    input: view(input),
+                    weights: view(weights),
+                    halvings,
+                    out: view(to),
+                })
+            }
             Outline::Depthwise(node) => {
                 let Some(Op::Depthwise(op)) = nodes[node].take() else {
                     unreachable!("the outline names each convolution once")
@@ -221,6 +237,10 @@ enum Outline {
     CrossCovariance(usize),
     /// With its channels for each axis.
     Position(usize, ValueId),
+    Multiply([ValueId; 2], ValueId),
+    Blend([ValueId; 3], ValueId),
+    /// A value by weights, that many times doubled.
+    ConvexUpsample([ValueId; 2], u32, ValueId),
 }
 
 impl Outline {
@@ -241,6 +261,9 @@ impl Outline {
             | Self::AddPixel(_, _, to)
             | Self::Enlarge(_, to)
             | Self::ChannelNorm(_, _, to)
+            | Self::Multiply(_, to)
+            | Self::Blend(_, to)
+            | Self::ConvexUpsample(_, _, to)
             | Self::Position(_, to) => *to,
         }
     }
@@ -288,6 +311,20 @@ fn outline(layout: &mut Layout, graph: &Graph) -> Vec<Outline> {
             Op::Gate { .. } => steps.push(Outline::Gate(index)),
             Op::AddPixel { input, pixel } => {
                 steps.push(Outline::AddPixel(*input, *pixel, value));
+            }
+            Op::Multiply { inputs } => steps.push(Outline::Multiply(*inputs, value)),
+            Op::Blend {
+                state,
+                candidate,
+                share,
+            } => steps.push(Outline::Blend([*state, *candidate, *share], value)),
+            Op::ConvexUpsample {
+                input,
+                weights,
+                halvings,
+            } => {
+                let from = [*input, *weights];
+                steps.push(Outline::ConvexUpsample(from, *halvings, value));
             }
             Op::UpsampleConcat { .. } | Op::Concat { .. } => {
                 let mut first = 0;

@@ -98,7 +98,61 @@ pub(crate) fn shape_after(shapes: &[ValueShape], op: &Op) -> Result<ValueShape, 
             with_pixel(input, shape(*channel)?)
         }
         Op::AddPixel { input, pixel } => with_pixel(image(shape(*input)?)?, shape(*pixel)?),
+        Op::Multiply { inputs } => alike(inputs.map(shape)),
+        Op::Blend {
+            state,
+            candidate,
+            share,
+        } => alike([*state, *candidate, *share].map(shape)),
+        Op::ConvexUpsample {
+            input,
+            weights,
+            halvings,
+        } => after_convex(image(shape(*input)?)?, shape(*weights)?, *halvings),
     }
+}
+
+/// The shape of all of them.
+fn alike<const N: usize>(shapes: [Result<ValueShape, String>; N]) -> Result<ValueShape, String> {
+    let mut shapes = shapes.into_iter();
+    let first = image(shapes.next().ok_or("nothing to combine")??)?;
+    for other in shapes {
+        let other = other?;
+        if other != first {
+            return Err(format!("{other:?} combined with {first:?}"));
+        }
+    }
+    Ok(first)
+}
+
+fn after_convex(
+    input: ValueShape,
+    weights: ValueShape,
+    halvings: u32,
+) -> Result<ValueShape, String> {
+    if !(1..=3).contains(&halvings) {
+        return Err(format!(
+            "an enlargement by 2 to the {halvings}, expected 1 to 3"
+        ));
+    }
+    if input.channels != 1 {
+        return Err(format!(
+            "{} channels enlarged, expected one",
+            input.channels
+        ));
+    }
+    let expected = ValueShape {
+        channels: 9 << (2 * halvings),
+        ..input
+    };
+    if weights != expected {
+        return Err(format!("weights of {weights:?}, expected {expected:?}"));
+    }
+    let large = input.halvings.checked_sub(halvings);
+    Ok(ValueShape {
+        halvings: large.ok_or("larger than the image")?,
+        ..input
+    })
 }
 
 fn after_depthwise(op: &Depthwise, input: ValueShape) -> Result<ValueShape, String> {

@@ -104,5 +104,7 @@ fn written<E: Element, C: ConvForm<E>>(step: &Step<C>, mut write: impl FnMut(usi
             all(to, to.channels);
         }
         Step::Gate(gate) => all(&gate.out, gate.out.channels),
+        Step::Multiply(_, to) | Step::Blend(_, to) => all(to, to.channels),
+        Step::ConvexUpsample(step) => all(&step.out, step.out.channels),
     }
 }

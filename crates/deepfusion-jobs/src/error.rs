@@ -43,13 +43,13 @@ pub enum Error {
         path: PathBuf,
     },
     /// Something that would be overwritten.
-    #[error("{}: is there already", path.display())]
+    #[error("{}: already exists", path.display())]
     Exists {
         /// The file.
         path: PathBuf,
     },
     /// An output that another run made, or this one of another image.
-    #[error("{}: is there already, {why}", path.display())]
+    #[error("{}: already exists, {why}", path.display())]
     Stale {
         /// The sidecar.
         path: PathBuf,

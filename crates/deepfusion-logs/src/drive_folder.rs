@@ -271,7 +271,7 @@ mod tests {
         assert!(config.contains("start_s = -1.500000000\n"), "{config}");
         let again = folder(&log, None).write(out.path()).unwrap_err();
         assert!(
-            again.to_string().contains("speed.csv: is there already"),
+            again.to_string().contains("speed.csv: already exists"),
             "{again}"
         );
     }

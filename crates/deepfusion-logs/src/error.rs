@@ -73,7 +73,7 @@ pub enum Error {
         first_ns: i64,
     },
     /// A file would be written over.
-    #[error("{}: is there already", path.display())]
+    #[error("{}: already exists", path.display())]
     Exists {
         /// The file.
         path: PathBuf,

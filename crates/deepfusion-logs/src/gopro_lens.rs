@@ -17,7 +17,7 @@ pub struct GoproLens {
     pub diagonal_deg: f64,
     /// Width and height of the film as it was taken (`VRES`), in pixels.
     pub size: (u32, u32),
-    /// Whether the picture was zoomed into while filming (`DZOM`).
+    /// Whether the picture was zoomed into (`DZST` above 0; `DZOM` only says that it could have been).
     pub zoomed: bool,
 }
 
@@ -87,7 +87,7 @@ impl Said {
                 b"MINF" => self.model = entry.text(),
                 b"VFOV" => self.digital = entry.text().and_then(|text| text.chars().next()),
                 b"ZFOV" => self.diagonal_deg = entry.numbers()?.first().copied(),
-                b"DZOM" => self.zoomed = entry.text().is_some_and(|text| text.starts_with('Y')),
+                b"DZST" => self.zoomed = entry.numbers()?.first().is_some_and(|step| *step > 0.0),
                 b"VRES" => {
                     let numbers = entry.numbers()?;
                     if let [width, height, ..] = numbers[..] {

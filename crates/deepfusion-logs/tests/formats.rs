@@ -238,10 +238,13 @@ fn a_gopros_video_says_through_which_lens_it_was_filmed() {
     assert!(lens.focal_px((1920, 1088)).is_some());
     // Cut to another shape, zoomed into, or through a lens that bends lines.
     assert_eq!(lens.focal_px((1440, 1080)), None);
-    let zoomed = GoproLens {
-        zoomed: true,
-        ..lens.clone()
-    };
+    let mut bytes = std::fs::read(fixture("gopro.mp4")).unwrap();
+    let step = bytes.windows(4).position(|w| w == b"DZST").unwrap() + 8;
+    bytes[step..step + 4].copy_from_slice(&50_u32.to_be_bytes());
+    let folder = tempfile::tempdir().unwrap();
+    let video = folder.path().join("zoomed.mp4");
+    std::fs::write(&video, bytes).unwrap();
+    let zoomed = GoproLens::read(&video).unwrap().unwrap();
     assert_eq!(zoomed.focal_px((1920, 1080)), None);
     let wide = GoproLens {
         digital: 'W',

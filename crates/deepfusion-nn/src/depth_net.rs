@@ -10,6 +10,7 @@ use crate::hce::HierarchicalContext;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig, freeze_statistics};
 use crate::lite_mono::LiteMono;
+use crate::r_msfm::RMsfm;
 use crate::resample::doubled;
 use crate::resnet::ResNet;
 use crate::weights::{self, Weights};
@@ -18,11 +19,13 @@ use crate::{DepthNetConfig, Error};
 /// Initial output of the uncertainty head: the expected error of ln depth, the same at every pixel.
 const FIRST_SCALE: f32 = 0.2;
 
-/// Disparity of a single image: a ResNet and its decoder at four scales, or Lite-Mono at three.
+/// Disparity of a single image: a ResNet and its decoder at four scales, Lite-Mono at three, or R-MSFM's refinements.
 #[derive(Module, Debug)]
 pub struct DepthNet {
     /// Lite-Mono. Where there is one, there is nothing else but the uncertainty head.
     pub lite_mono: Option<LiteMono>,
+    /// R-MSFM. Where there is one, there is nothing else.
+    pub r_msfm: Option<RMsfm>,
     /// The backbone.
     pub encoder: Option<ResNet>,
     /// Context encoding of the features of `layer1`…`layer4`; empty where there is none.
@@ -53,7 +56,7 @@ pub struct DepthOutput {
 /// What a [`DepthNet`] computes on the way from features to disparities: the paper's Fig. 5.
 #[derive(Debug, Clone)]
 pub struct Inspection {
-    /// The encoder's features, fine to coarse: five of a ResNet, three of Lite-Mono.
+    /// The encoder's features, fine to coarse: five of a ResNet, three of Lite-Mono and of R-MSFM.
     pub features: Vec<Tensor<4>>,
     /// What the decoder reads: the same with context, under their masks, aggregated.
     pub refined: Vec<Tensor<4>>,
@@ -80,21 +83,22 @@ impl DepthNet {
         let head_bias = config
             .initial_depth_m
             .map(|m| config.range.logit_of(m) as f32);
-        let mut net = match &config.lite_mono {
-            None => Self::with_resnet(config, head_bias, &mut rng, device)?,
-            Some(lite_mono) => {
-                let normalisation = config.encoder.normalisation;
-                let body = LiteMono::new(lite_mono, normalisation, head_bias, &mut rng, device)?;
-                Self {
-                    lite_mono: Some(body),
-                    encoder: None,
-                    hce: Vec::new(),
-                    attention: Vec::new(),
-                    aggregation: None,
-                    decoder: None,
-                    uncertainty: None,
-                }
+        let normalisation = config.encoder.normalisation;
+        let mut net = if let Some(r_msfm) = &config.r_msfm {
+            let start = head_bias.unwrap_or(0.0);
+            let body = RMsfm::new(r_msfm, normalisation, start, &mut rng, device)?;
+            Self {
+                r_msfm: Some(body),
+                ..Self::empty()
             }
+        } else if let Some(lite_mono) = &config.lite_mono {
+            let body = LiteMono::new(lite_mono, normalisation, head_bias, &mut rng, device)?;
+            Self {
+                lite_mono: Some(body),
+                ..Self::empty()
+            }
+        } else {
+            Self::with_resnet(config, head_bias, &mut rng, device)?
         };
         let finest = match &config.lite_mono {
             Some(lite_mono) => lite_mono.decoder_widths()[0],
@@ -113,6 +117,20 @@ impl DepthNet {
         } else {
             net
         })
+    }
+
+    /// Nothing yet.
+    fn empty() -> Self {
+        Self {
+            lite_mono: None,
+            r_msfm: None,
+            encoder: None,
+            hce: Vec::new(),
+            attention: Vec::new(),
+            aggregation: None,
+            decoder: None,
+            uncertainty: None,
+        }
     }
 
     /// A ResNet and its decoder, without the uncertainty head.
@@ -143,13 +161,12 @@ impl DepthNet {
         let decoder =
             DisparityDecoder::new(&config.decoder, refined, stride, head_bias, rng, device)?;
         Ok(Self {
-            lite_mono: None,
             encoder: Some(encoder),
             hce,
             attention,
             aggregation,
             decoder: Some(decoder),
-            uncertainty: None,
+            ..Self::empty()
         })
     }
 
@@ -158,15 +175,19 @@ impl DepthNet {
     ///
     /// # Shapes
     /// - `images`: `[batch, 3, height, width]`, RGB in [0, 1], of an [`InputSize`](crate::InputSize)
-    /// - output: `[batch, 1, height / 2ˢ, width / 2ˢ]` in (0, 1) for scales s = 0…3 (of Lite-Mono 0…2), finest first
+    /// - output: `[batch, 1, height / 2ˢ, width / 2ˢ]` in (0, 1) for scales s = 0…3 (of Lite-Mono 0…2), finest first; of R-MSFM s = 0 for
+    ///   each refinement, the last one first ([`DepthNetConfig::scales`])
     ///
     /// # Panics
     /// If the images' size is not a valid [`InputSize`](crate::InputSize); check it where it enters the program.
     pub fn forward(&self, images: Tensor<4>) -> Vec<Tensor<4>> {
-        self.forward_with_feature(images).0
+        match &self.r_msfm {
+            Some(net) => net.forward(images),
+            None => self.forward_with_feature(images).0,
+        }
     }
 
-    /// Disparities, and the feature that the finest head reads.
+    /// Disparities, and the feature that the finest head reads; R-MSFM has none.
     fn forward_with_feature(&self, images: Tensor<4>) -> (Vec<Tensor<4>>, Tensor<4>) {
         match &self.lite_mono {
             Some(net) => {
@@ -180,11 +201,14 @@ impl DepthNet {
         }
     }
 
-    #[expect(clippy::expect_used, reason = "what is not Lite-Mono has both")]
+    #[expect(
+        clippy::expect_used,
+        reason = "what is neither Lite-Mono nor R-MSFM has both"
+    )]
     fn resnet(&self) -> (&ResNet, &DisparityDecoder) {
         let (encoder, decoder) = (self.encoder.as_ref(), self.decoder.as_ref());
         let both = encoder.zip(decoder);
-        both.expect("a network has a ResNet and its decoder, or is Lite-Mono")
+        both.expect("a network has a ResNet and its decoder, or is Lite-Mono or R-MSFM")
     }
 
     /// ln b of the finest feature.
@@ -202,6 +226,12 @@ impl DepthNet {
     /// # Shapes
     /// - `images`: as for [`Self::forward`]
     pub fn forward_with_uncertainty(&self, images: Tensor<4>) -> DepthOutput {
+        if self.uncertainty.is_none() {
+            return DepthOutput {
+                disparities: self.forward(images),
+                log_scale: None,
+            };
+        }
         let (disparities, finest) = self.forward_with_feature(images);
         DepthOutput {
             disparities,
@@ -253,7 +283,7 @@ impl DepthNet {
     /// - output: as of [`ResNet::forward`]
     ///
     /// # Panics
-    /// If the network is Lite-Mono, as [`Self::forward`] else.
+    /// If the network is Lite-Mono or R-MSFM, as [`Self::forward`] else.
     pub fn encode(&self, images: Tensor<4>) -> [Tensor<4>; 5] {
         self.resnet().0.forward(images)
     }
@@ -265,7 +295,7 @@ impl DepthNet {
     /// - output: as [`Self::forward`]
     ///
     /// # Panics
-    /// If the network is Lite-Mono.
+    /// If the network is Lite-Mono or R-MSFM.
     pub fn decode(&self, features: [Tensor<4>; 5]) -> Vec<Tensor<4>> {
         self.resnet().1.forward(self.refine(features, |_| ()))
     }
@@ -273,8 +303,13 @@ impl DepthNet {
     /// The network with weights of torchvision's ResNet in its encoder.
     ///
     /// # Errors
-    /// As [`weights::load_torchvision_resnet`]; [`Error::UnknownArchitecture`] if the network is Lite-Mono.
+    /// As [`weights::load_torchvision_resnet`], or [`weights::load_torchvision_half`] for R-MSFM; [`Error::UnknownArchitecture`] if the network
+    /// is Lite-Mono.
     pub fn with_torchvision_encoder(mut self, path: &std::path::Path) -> Result<Self, Error> {
+        if let Some(net) = &mut self.r_msfm {
+            net.encoder = weights::load_torchvision_half(net.encoder.clone(), path)?;
+            return Ok(self);
+        }
         let encoder = self
             .encoder
             .take()
@@ -292,12 +327,16 @@ impl DepthNet {
     /// - `images`: as for [`Self::forward`]
     pub fn inspect(&self, images: Tensor<4>) -> Inspection {
         let mut masks = Vec::new();
-        let (features, refined) = match &self.lite_mono {
-            Some(net) => {
+        let (features, refined) = match (&self.lite_mono, &self.r_msfm) {
+            (Some(net), _) => {
                 let features = net.encoder.forward(images);
                 (features.clone(), features)
             }
-            None => {
+            (None, Some(net)) => {
+                let features = net.encoder.forward(images).to_vec();
+                (features.clone(), features)
+            }
+            (None, None) => {
                 let features = self.encode(images);
                 let refined = self.refine(features.clone(), |mask| masks.push(mask.clone()));
                 (features.to_vec(), refined.to_vec())

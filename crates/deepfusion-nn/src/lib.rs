@@ -16,6 +16,7 @@ pub mod layers;
 pub mod lite_mono;
 pub mod ops;
 mod pose_net;
+pub mod r_msfm;
 mod resample;
 mod residual_block;
 mod resnet;
@@ -24,9 +25,9 @@ pub mod weights;
 pub use attention::{Attention, AttentionMasks, GlobalAggregation};
 pub use decoder::{DecoderStage, DisparityDecoder, SCALES};
 pub use deepfusion_model::{
-    AttentionConfig, AttentionForm, DecoderConfig, DepthNetConfig, FlowDecoderConfig, HceConfig,
-    InputNormalisation, InputSize, LiteMonoConfig, LiteMonoSize, NetworkError as Error,
-    PoseNetConfig, ResNetConfig, ResNetDepth,
+    AttentionConfig, AttentionForm, DecoderConfig, DepthNetConfig, DepthScale, FlowDecoderConfig,
+    HceConfig, InputNormalisation, InputSize, LiteMonoConfig, LiteMonoSize, NetworkError as Error,
+    PoseNetConfig, R_MSFM_STATE, RMsfmConfig, ResNetConfig, ResNetDepth,
 };
 pub use depth_net::{DepthNet, DepthOutput, Inspection};
 pub use flow_decoder::{FLOW_LEVELS, FlowDecoder, FlowLevel, FlowOutput};
@@ -34,6 +35,7 @@ pub use hce::HierarchicalContext;
 pub use init::{WeightInit, WeightRng};
 pub use lite_mono::LiteMono;
 pub use pose_net::{PoseDecoder, PoseNet, PoseOutput, RADIANS_PER_UNIT};
+pub use r_msfm::RMsfm;
 pub use resample::{BilinearResize, doubled};
 pub use residual_block::ResidualBlock;
 pub use resnet::ResNet;

@@ -90,7 +90,7 @@ impl ResNet {
     }
 }
 
-fn run(layer: &[ResidualBlock], x: Tensor<4>) -> Tensor<4> {
+pub(crate) fn run(layer: &[ResidualBlock], x: Tensor<4>) -> Tensor<4> {
     layer.iter().fold(x, |x, block| block.forward(x))
 }
 

@@ -11,7 +11,7 @@ use deepfusion_infer::Op;
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{
     DepthNetConfig, HceConfig, InputSize, LiteMonoSize, ModuleCost, PoseNetConfig, ResNetDepth,
-    depth_graph_with_uncertainty,
+    depth_graph, depth_graph_with_uncertainty,
 };
 use deepfusion_nn::weights::collect;
 use deepfusion_nn::{DepthNet, PoseNet};
@@ -90,6 +90,39 @@ fn lite_monos_costs_are_those_of_its_graph_and_its_weights() {
     check(&config);
     config.uncertainty = true;
     check(&config);
+}
+
+/// Its graph has 1×3 and 3×1 kernels as parts of 3×3, of which two thirds are zeros.
+#[test]
+fn r_msfms_costs_are_those_of_its_graph_and_its_weights() {
+    for iterations in [3, 6] {
+        let config = DepthNetConfig::r_msfm(iterations);
+        let weights = collect(&DepthNet::new(&config, &Device::flex()).unwrap());
+        let graph = depth_graph(&config, weights.clone()).unwrap();
+        let products = graph.multiply_adds(SIZE.width, SIZE.height);
+        let costs = config.costs(SIZE);
+        for cost in &costs {
+            let of = match cost.name.as_str() {
+                "r_msfm.encoder.stem" => continue,
+                name => format!("{name}."),
+            };
+            assert_eq!(cost.parameters, learned(&weights, &of), "{of}");
+        }
+        let all = |of: fn(&ModuleCost) -> u64| costs.iter().map(of).sum::<u64>();
+        assert_eq!(all(|c| c.parameters), learned(&weights, ""));
+        let true_products = graph.nodes().iter().zip(&products).map(|(node, count)| {
+            let strip = [".across", ".down."].iter().any(|s| node.name.contains(s))
+                || node.name.ends_with(".down");
+            let named = node.name.starts_with("r_msfm.start") || node.name == "r_msfm.sigmoid";
+            match (strip, named) {
+                (true, _) => count / 3,
+                // What only says where the refinement starts, and the sigmoid, are no layers.
+                (_, true) => 0,
+                _ => *count,
+            }
+        });
+        assert_eq!(all(|c| c.multiply_adds), true_products.sum::<u64>());
+    }
 }
 
 #[test]

@@ -34,6 +34,11 @@ fn trained(config: &DepthNetConfig) -> Weights {
                 *value = 4.0 * spread(i);
             } else if name.starts_with("lite_mono.decoder.") && name.ends_with("weight") {
                 *value *= 3.0;
+            } else if name.starts_with("r_msfm.weights.expand") {
+                // A quarter of it is the logarithm of a weight.
+                *value *= 20.0;
+            } else if name == "r_msfm.update.change_2.weight" {
+                *value *= 20.0;
             } else if name == "decoder.heads.0.weight" {
                 // New weights give an answer that is the same everywhere.
                 *value *= 40.0;
@@ -191,6 +196,18 @@ fn lite_mono() {
     let mut large = DepthNetConfig::lite_mono(LiteMonoSize::Tiny);
     large.lite_mono = large.lite_mono.map(|c| c.for_large_images());
     check(&large, 192, 96);
+}
+
+#[test]
+fn r_msfm() {
+    for iterations in [3, 6] {
+        // From the middle of the range of disparities: there the answer is neither flat nor at the sigmoid's ends.
+        let config = DepthNetConfig {
+            initial_depth_m: None,
+            ..DepthNetConfig::r_msfm(iterations)
+        };
+        check(&config, 128, 64);
+    }
 }
 
 #[test]

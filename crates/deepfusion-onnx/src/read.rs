@@ -130,6 +130,9 @@ fn node_error(node: &NodeProto, reason: impl Into<String>) -> Error {
     }
 }
 
+/// What an activation begins with, after a convolution.
+const ACTIVATIONS: [&str; 6] = ["Relu", "Elu", "Neg", "Div", "Tanh", "LeakyRelu"];
+
 struct Reader<'a> {
     nodes: Peekable<Iter<'a, NodeProto>>,
     constants: HashMap<&'a str, &'a TensorProto>,
@@ -167,12 +170,18 @@ impl<'a> Reader<'a> {
                     graph.add_output(self.input(node, 0)?);
                     return Ok(graph);
                 }
-                "Mul" => self.gate(node)?,
+                "Mul" if node.name.ends_with(".mask") => self.gate(node)?,
+                "Mul" => {
+                    let inputs = [self.input(node, 0)?, self.input(node, 1)?];
+                    (&node.name, Op::Multiply { inputs }, node)
+                }
+                "Sub" => self.blend(node)?,
                 "Conv" if node.attribute.iter().any(|a| a.name == "group") => {
                     self.depthwise(node)?
                 }
                 "Conv" | "Pad" => self.conv(node)?,
                 "Identity" => self.position(node, width)?,
+                "Reshape" if node.name.ends_with(".apart") => self.convex(node, &graph)?,
                 "Reshape" => self.cross_covariance(node)?,
                 "ReduceMean" if self.next_is("Sub") => self.channel_norm(node)?,
                 "MaxPool" => {
@@ -239,11 +248,13 @@ impl<'a> Reader<'a> {
             None => None,
         };
         let mut activation = Activation::Identity;
-        if let Some(node) = self.after(last, &["Relu", "Elu", "Neg", "Div"]) {
+        if let Some(node) = self.after(last, &ACTIVATIONS) {
             last = node;
             activation = match node.op_type.as_str() {
                 "Relu" => Activation::Relu,
                 "Elu" => Activation::Elu,
+                "Tanh" => Activation::Tanh,
+                "LeakyRelu" => Activation::LeakyRelu,
                 "Div" => {
                     for op in ["Erf", "Add", "Mul", "Mul"] {
                         last = self.expect(op)?;
@@ -384,6 +395,44 @@ impl<'a> Reader<'a> {
             residual: pass.is_some(),
         };
         Ok((&last.name, gate, last))
+    }
+
+    /// `Sub → Mul → Add`: name, operation, last node.
+    fn blend(&mut self, node: &'a NodeProto) -> Result<(&'a String, Op, &'a NodeProto), Error> {
+        let (candidate, state) = (self.input(node, 0)?, self.input(node, 1)?);
+        let step = self.expect("Mul")?;
+        let share = self.input(step, 0)?;
+        let last = self.expect("Add")?;
+        let op = Op::Blend {
+            state,
+            candidate,
+            share,
+        };
+        Ok((&last.name, op, last))
+    }
+
+    /// From `Reshape` and `Softmax` of the weights to the last `Reshape`: name, operation, last node.
+    fn convex(
+        &mut self,
+        node: &'a NodeProto,
+        graph: &Graph,
+    ) -> Result<(&'a String, Op, &'a NodeProto), Error> {
+        let weights = self.input(node, 0)?;
+        self.expect("Softmax")?;
+        let taps = self.expect("Conv")?;
+        let input = self.input(taps, 0)?;
+        for op in ["Reshape", "Mul", "ReduceSum", "Reshape", "Transpose"] {
+            self.expect(op)?;
+        }
+        let last = self.expect("Reshape")?;
+        // Nine for each pixel of a block.
+        let block = (graph.shape(weights).channels / 9).max(1);
+        let op = Op::ConvexUpsample {
+            input,
+            weights,
+            halvings: block.ilog2() / 2,
+        };
+        Ok((&last.name, op, last))
     }
 
     fn next_is(&mut self, op: &str) -> bool {

@@ -139,6 +139,27 @@ impl Plan<'_> {
                 gated.collect()
             }
             Op::AddPixel { input, pixel } => with_pixel(&values[input.0], &values[pixel.0]),
+            Op::Multiply { inputs } => {
+                let [a, b] = inputs.map(|v| &values[v.0]);
+                a.iter().zip(b).map(|(a, b)| a * b).collect()
+            }
+            Op::Blend {
+                state,
+                candidate,
+                share,
+            } => {
+                let [h, q, z] = [state, candidate, share].map(|v| &values[v.0]);
+                let blended = h.iter().zip(q).zip(z);
+                blended.map(|((h, q), z)| h + z * (q - h)).collect()
+            }
+            Op::ConvexUpsample {
+                input,
+                weights,
+                halvings,
+            } => {
+                let (value, weights) = (&values[input.0], &values[weights.0]);
+                convex(value, weights, self.shape(*input), 1 << halvings)
+            }
             Op::Depthwise(op) => depthwise(op, &values[op.input.0], self.shape(op.input)),
             Op::Enlarge { input } => enlarged(&values[input.0], self.shape(*input)),
             Op::ChannelNorm { input, epsilon } => {
@@ -192,6 +213,8 @@ impl Plan<'_> {
             Activation::Elu => x.exp_m1(),
             Activation::Sigmoid => (1.0 + (-x).exp()).recip(),
             Activation::Gelu => gelu_exact(f64::from(x)) as f32,
+            Activation::Tanh => x.tanh(),
+            Activation::LeakyRelu => x.max(0.01 * x),
         };
         y.iter_mut().for_each(|y| *y = activate(*y));
         y
@@ -250,6 +273,33 @@ fn enlarged(x: &[f32], [_, height, width]: [usize; 3]) -> Vec<f32> {
                 let of = along(column);
                 (0.75 * of(near) + 0.25 * of(next)) as f32
             }));
+        }
+    }
+    y
+}
+
+/// Each pixel of a block of `side`×`side` by the softmax of its nine weights over the pixels around the block's.
+fn convex(value: &[f32], weights: &[f32], [_, height, width]: [usize; 3], side: usize) -> Vec<f32> {
+    let mut y = Vec::with_capacity(value.len() * side * side);
+    for row in 0..height * side {
+        for column in 0..width * side {
+            let (i, j) = (row / side, column / side);
+            let within = row % side * side + column % side;
+            let logit = |tap: usize| {
+                let channel = tap * side * side + within;
+                f64::from(weights[(channel * height + i) * width + j])
+            };
+            let most = (0..9).map(logit).fold(f64::NEG_INFINITY, f64::max);
+            let (mut sum, mut total) = (0.0, 0.0);
+            for tap in 0..9 {
+                let share = (logit(tap) - most).exp();
+                total += share;
+                let (down, across) = (i + tap / 3, j + tap % 3);
+                if (1..=height).contains(&down) && (1..=width).contains(&across) {
+                    sum += share * f64::from(value[(down - 1) * width + across - 1]);
+                }
+            }
+            y.push((sum / total) as f32);
         }
     }
     y

@@ -186,6 +186,16 @@ impl Writer {
         Ok(name)
     }
 
+    /// A convolution's weights. A recurrent network's layers run several times: their weights are in the file once.
+    fn weight(&mut self, node: &str, tensor: TensorProto) -> Result<String, Error> {
+        let same =
+            |other: &&TensorProto| other.dims == tensor.dims && other.raw_data == tensor.raw_data;
+        match self.initializers.iter().find(same) {
+            Some(other) => Ok(other.name.clone()),
+            None => self.constant(node, tensor),
+        }
+    }
+
     /// A constant that many nodes share.
     fn shared(&mut self, tensor: TensorProto) -> Result<String, Error> {
         if self.initializers.contains(&tensor) {
@@ -309,6 +319,22 @@ impl Writer {
                 let [x, pixel] = [input, pixel].map(|v| self.value(*v));
                 self.emit("Add", name, &[&x, &pixel], vec![])?
             }
+            Op::Multiply { inputs } => {
+                let [a, b] = inputs.map(|v| self.value(v));
+                self.emit("Mul", name, &[&a, &b], vec![])?
+            }
+            // h + z·(q − h).
+            Op::Blend {
+                state,
+                candidate,
+                share,
+            } => {
+                let [h, q, z] = [state, candidate, share].map(|v| self.value(*v));
+                let way = self.emit("Sub", &format!("{name}.way"), &[&q, &h], vec![])?;
+                let step = self.emit("Mul", &format!("{name}.step"), &[&z, &way], vec![])?;
+                self.emit("Add", name, &[&h, &step], vec![])?
+            }
+            Op::ConvexUpsample { input, weights, .. } => self.convex(name, *input, *weights)?,
         };
         self.values.push(value);
         Ok(())
@@ -460,6 +486,51 @@ impl Writer {
         self.emit("Div", &format!("{x}.unit"), &[x, &length], vec![])
     }
 
+    /// The nine neighbours of each pixel by a convolution that picks one each, times the softmax of their weights.
+    fn convex(&mut self, name: &str, input: ValueId, weights: ValueId) -> Result<String, Error> {
+        let [_, height, width] = self.shapes[input.0].map(|side| side as i64);
+        let block = self.shapes[weights.0][0] as i64 / 9;
+        let side = block.isqrt();
+        let (value, weights) = (self.value(input), self.value(weights));
+        let reshape = |writer: &mut Self, x: &str, to: &str, dims: &[i64]| {
+            let of = TensorProto::ints(&format!("{to}.shape"), dims);
+            let of = writer.constant(to, of)?;
+            writer.emit("Reshape", to, &[x, &of], vec![])
+        };
+        let apart = format!("{name}.apart");
+        let apart = reshape(self, &weights, &apart, &[9, block, height, width])?;
+        let over_taps = vec![AttributeProto::int("axis", 0)];
+        let shares = self.emit("Softmax", &format!("{name}.shares"), &[&apart], over_taps)?;
+        let picks: Vec<f32> = (0..81).map(|i| f32::from(u8::from(i % 10 == 0))).collect();
+        let picks = self.shared(TensorProto::floats("neighbours", &[9, 1, 3, 3], &picks))?;
+        let window = vec![
+            AttributeProto::ints("kernel_shape", &[3; 2]),
+            AttributeProto::ints("pads", &[1; 4]),
+        ];
+        let taps = self.emit("Conv", &format!("{name}.taps"), &[&value, &picks], window)?;
+        let around = reshape(
+            self,
+            &taps,
+            &format!("{name}.around"),
+            &[9, 1, height, width],
+        )?;
+        let weighted = format!("{name}.weighted");
+        let weighted = self.emit("Mul", &weighted, &[&shares, &around], vec![])?;
+        let first = self.shared(TensorProto::ints("at.0", &[0]))?;
+        let drop = vec![AttributeProto::int("keepdims", 0)];
+        let sum = self.emit(
+            "ReduceSum",
+            &format!("{name}.sum"),
+            &[&weighted, &first],
+            drop,
+        )?;
+        let blocks = format!("{name}.blocks");
+        let blocks = reshape(self, &sum, &blocks, &[side, side, height, width])?;
+        let perm = vec![AttributeProto::ints("perm", &[2, 0, 3, 1])];
+        let turned = self.emit("Transpose", &format!("{name}.turned"), &[&blocks], perm)?;
+        reshape(self, &turned, name, &[1, 1, side * height, side * width])
+    }
+
     fn conv(&mut self, name: &str, conv: &Conv) -> Result<String, Error> {
         let half = conv.reach() as i64;
         let mut x = self.value(conv.input);
@@ -478,7 +549,7 @@ impl Writer {
             conv.kernel,
         ];
         let weight = TensorProto::floats(&format!("{name}.weight"), &dims, &conv.weight);
-        let weight = self.constant(name, weight)?;
+        let weight = self.weight(name, weight)?;
         let bias = TensorProto::floats(&format!("{name}.bias"), &dims[..1], &conv.bias);
         let bias = self.constant(name, bias)?;
         let mut attributes = vec![
@@ -500,6 +571,11 @@ impl Writer {
             Activation::Relu => self.emit("Relu", &format!("{name}.relu"), &[&x], vec![]),
             Activation::Sigmoid => self.sigmoid(name, &x),
             Activation::Gelu => self.gelu(name, &x),
+            Activation::Tanh => self.emit("Tanh", &format!("{name}.tanh"), &[&x], vec![]),
+            Activation::LeakyRelu => {
+                let alpha = vec![AttributeProto::float("alpha", 0.01)];
+                self.emit("LeakyRelu", &format!("{name}.leaky"), &[&x], alpha)
+            }
             Activation::Elu => {
                 let alpha = vec![AttributeProto::float("alpha", 1.0)];
                 self.emit("Elu", &format!("{name}.elu"), &[&x], alpha)

@@ -133,7 +133,7 @@ fn the_lidar_s_depth_is_the_exact_depth() {
     let (mut errors, mut with_scan) = (Vec::new(), 0);
     for frame in 0..30 {
         assert_eq!(
-            set.has_ground_truth(frame),
+            set.has_ground_truth(frame, GtKind::Z),
             set.ground_truth(frame, GtKind::Z).unwrap().is_some()
         );
         let Some(truth) = set.ground_truth(frame, GtKind::Z).unwrap() else {
@@ -292,10 +292,5 @@ fn a_bag_becomes_a_kitti_drive_and_a_bag_again() {
         }
     }
     let refused = convert_to_kitti(std::slice::from_ref(&first), &out, &mut |_, _| {});
-    assert!(
-        refused
-            .unwrap_err()
-            .to_string()
-            .contains("is there already")
-    );
+    assert!(refused.unwrap_err().to_string().contains("already exists"));
 }

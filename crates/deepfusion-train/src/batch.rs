@@ -11,9 +11,6 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-/// Size of the cache of resized images, in bytes: a small drive is decoded once, not every epoch.
-const CACHE_BYTES: usize = 2 << 30;
-
 /// A batch of B samples with F frames each: the target, then its sources.
 #[derive(Debug, Clone)]
 pub struct SnippetBatch {
@@ -137,9 +134,11 @@ impl BatchLoader {
             cache: Mutex::default(),
         };
         Self {
-            batches: Ahead::start(batches, move |number, samples: &Vec<usize>| {
-                maker.make(number, samples)
-            }),
+            batches: Ahead::start(
+                config.data.loader_threads_here(),
+                batches,
+                move |number, samples: &Vec<usize>| maker.make(number, samples),
+            ),
             size: (config.size.height, config.size.width),
             unit_m: config.pose_net.metres_per_unit,
         }
@@ -338,7 +337,7 @@ impl Maker {
                 let small = resize_rgb(&image, size.width as u32, size.height as u32);
                 let bytes = Arc::new(small.into_raw());
                 let mut cache = self.lock();
-                if (cache.len() + 1) * bytes.len() <= CACHE_BYTES {
+                if (cache.len() + 1) * bytes.len() <= self.config.data.cache_bytes() {
                     cache.insert((dataset, frame), Arc::clone(&bytes));
                 }
                 bytes

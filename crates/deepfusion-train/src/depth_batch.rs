@@ -104,7 +104,7 @@ impl DepthLoader {
             Ok(RawBatch::of(items, own.size))
         };
         Self {
-            batches: Ahead::start(plans, make),
+            batches: Ahead::start(config.data.loader_threads_here(), plans, make),
             unit_m: config.pose_net.metres_per_unit.max(f64::MIN_POSITIVE),
         }
     }

@@ -105,7 +105,7 @@ impl DepthSet {
             }
             let selected = recording.selected().iter().copied();
             let own: Vec<DepthFrame> = selected
-                .filter(|frame| recording.has_ground_truth(*frame))
+                .filter(|frame| recording.has_ground_truth(*frame, GtKind::Z))
                 .map(|frame| DepthFrame { dataset, frame })
                 .collect();
             if own.is_empty() {

@@ -6,8 +6,6 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, sync_channel};
 
-/// Number of threads that decode, resize and render.
-const MAX_THREADS: usize = 4;
 /// Number of batches prepared ahead of the trainer.
 const AHEAD: usize = 3;
 
@@ -19,8 +17,9 @@ pub(crate) struct Ahead<T> {
 }
 
 impl<T: Send + 'static> Ahead<T> {
-    /// Makes one item for each plan; the number passed along only counts them in messages.
+    /// Makes one item for each plan, on so many threads; the number passed along only counts them in messages.
     pub(crate) fn start<P: Send + Sync + 'static>(
+        threads: usize,
         plans: impl Iterator<Item = (usize, P)> + Send + 'static,
         make: impl Fn(usize, &P) -> Result<T, Error> + Send + Sync + 'static,
     ) -> Self {
@@ -39,7 +38,7 @@ impl<T: Send + 'static> Ahead<T> {
             }
             sender.send(Ok(None)).ok();
         };
-        if let Err(error) = start_thread(run) {
+        if let Err(error) = start_thread(threads, run) {
             // The channel is empty and holds more than one; its receiver is still here.
             complaints.send(Err(error)).ok();
         }
@@ -74,11 +73,13 @@ impl<T: Send + 'static> Ahead<T> {
 
 /// Runs `make` on a thread with a pool of its own. The shared pool will not do: the trainer waits for a
 /// batch on one of its threads, which could be the only one.
-fn start_thread(make: impl FnOnce(rayon::ThreadPool) + Send + 'static) -> Result<(), Error> {
+fn start_thread(
+    threads: usize,
+    make: impl FnOnce(rayon::ThreadPool) + Send + 'static,
+) -> Result<(), Error> {
     let failed = |reason: String| Error::Threads { reason };
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads.min(MAX_THREADS))
+        .num_threads(threads)
         .build()
         .map_err(|e| failed(e.to_string()))?;
     std::thread::Builder::new()

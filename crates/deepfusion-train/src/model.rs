@@ -33,7 +33,7 @@ pub struct ViewFlow {
 /// The networks' outputs for a batch: T targets, which are frame 0 alone, or frames 0 and 1.
 #[derive(Debug, Clone)]
 pub struct ForwardPass {
-    /// Sigmoid disparities of the targets by scale, T×1×H/2ˢ×W/2ˢ: four, of Lite-Mono three.
+    /// Sigmoid disparities of the targets, T×1×H/2ˢ×W/2ˢ, as of [`DepthNet::forward`].
     pub disparities: Vec<Tensor<4>>,
     /// PoseNet's `source_from_target`, by view, T each.
     pub motions: Vec<Motion>,

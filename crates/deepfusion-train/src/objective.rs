@@ -1,4 +1,4 @@
-//! The objective: L = Σ_s ¼(L_rp + λ_s·L_smooth) + λ_v·L_speed + λ_a·L_aff + λ_f·L_flow + agreement.
+//! The objective: L = Σ_s w_s·(L_rp + λ_s·L_smooth) + λ_v·L_speed + λ_a·L_aff + λ_f·L_flow + agreement.
 
 use crate::level::{Level, levels, pyramid};
 use crate::losses::{self, FlowView, LossTerms, ReprojectionOutput, RigidView, View, share};
@@ -10,7 +10,7 @@ use crate::{Reprojection, ViewMotion};
 use burn::tensor::module::avg_pool2d;
 use burn::tensor::ops::AvgPoolOptions;
 use burn::tensor::{Bool, Tensor};
-use deepfusion_nn::{DepthOutput, ops};
+use deepfusion_nn::{DepthOutput, DepthScale, ops};
 
 /// The parts of the loss that depend on training progress.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,33 +77,30 @@ impl Model {
         let warped = finest.synthesised[0].image.clone().detach();
         let (mut reprojection, mut smooth) = (Vec::new(), Vec::new());
         let mut finest_output = None;
-        let scales = pass.disparities.len();
-        for (scale, level) in levels.iter().enumerate().take(scales) {
-            let views = match scale {
+        for (index, scale) in self.config.depth_net.scales().into_iter().enumerate() {
+            let halvings = scale.halvings as usize;
+            let level = &levels[halvings];
+            let views = match index {
                 0 => &finest,
-                _ => &self.views((pass, batch), scale, level, &motions),
+                _ => &self.views((pass, batch), index, level, &motions),
             };
             let output =
                 losses::reprojection(compared(views, level, masks.as_deref()), settings.automask);
-            reprojection.push(output.loss.clone());
+            reprojection.push(output.loss.clone().mul_scalar(scale.weight));
             finest_output.get_or_insert(output);
             if settings.smoothness > 0.0 {
-                let disparity = pass.disparities[scale].clone();
-                let weight = 1.0 / f64::from(1_u32 << scale);
-                let rough = losses::smoothness(disparity, targets[scale].clone());
-                smooth.push(rough.mul_scalar(weight));
+                let disparity = pass.disparities[index].clone();
+                let rough = losses::smoothness(disparity, targets[halvings].clone());
+                smooth.push(rough.mul_scalar(scale.smoothness));
             }
         }
         #[expect(clippy::expect_used, reason = "one for each scale")]
         let output = finest_output.expect("a decoder has a scale at least");
         sum.terms.valid_share = share(&output.valid);
         sum.terms.explained_share = share(&output.explained);
-        let mean = |terms: Vec<Tensor<1>>| {
-            let sum = terms.into_iter().reduce(|a, b| a + b);
-            sum.map(|sum| sum.mul_scalar(1.0 / scales as f64))
-        };
-        sum.terms.reprojection = sum.add(mean(reprojection), 1.0);
-        sum.terms.smoothness = sum.add(mean(smooth), settings.smoothness);
+        let added = |terms: Vec<Tensor<1>>| terms.into_iter().reduce(|a, b| a + b);
+        sum.terms.reprojection = sum.add(added(reprojection), 1.0);
+        sum.terms.smoothness = sum.add(added(smooth), settings.smoothness);
         let speed = (settings.speed > 0.0).then(|| self.motion_loss(pass, batch));
         sum.terms.speed = sum.add(speed, schedule.speed_weight);
         let affine = (settings.affine > 0.0)
@@ -144,14 +141,15 @@ impl Model {
             self.depth_net.forward_with_uncertainty(images)
         };
         let [_, _, height, width] = batch.clean.dims();
-        let full_size = |(scale, disparity): (usize, &Tensor<4>)| {
-            let disparity = match scale {
-                0 => disparity.clone(),
-                _ => self.enlarged(scale, disparity.clone(), height, width),
+        let full_size = |(scale, disparity): (DepthScale, Tensor<4>)| {
+            let disparity = match scale.halvings {
+                0 => disparity,
+                halvings => self.enlarged(halvings as usize, disparity, height, width),
             };
             batch.factors.inverse_depth(disparity)
         };
-        let inverse: Vec<_> = disparities.iter().enumerate().map(full_size).collect();
+        let scales = self.config.depth_net.scales().into_iter();
+        let inverse: Vec<_> = scales.zip(disparities).map(full_size).collect();
         let settings = &self.config.loss.depth;
         let found = losses::depth(&inverse, &batch.truth, settings);
         let mut sum = Sum::default();
@@ -170,18 +168,19 @@ impl Model {
         }
     }
 
-    /// The sources warped by a scale's disparity, and their errors.
+    /// The sources warped by one of the disparities, and their errors.
     fn views(
         &self,
         (pass, batch): (&ForwardPass, &SnippetBatch),
-        scale: usize,
+        index: usize,
         level: &Level,
         motions: &[Motion],
     ) -> ScaleViews {
         let settings = &self.config.loss;
-        let disparity = pass.disparities[scale].clone();
+        let disparity = pass.disparities[index].clone();
+        let smaller = self.config.size.width / disparity.dims()[3];
         let disparity = match settings.compare_at {
-            CompareAt::Full => self.enlarge[scale].apply(disparity),
+            CompareAt::Full => self.enlarge[smaller.ilog2() as usize].apply(disparity),
             CompareAt::Own => disparity,
         };
         let inverse_depth = self.inverse_depth(disparity, batch);

@@ -68,7 +68,7 @@ pub enum Error {
         reason: String,
     },
     /// A file that is in the way.
-    #[error("{}: is there already", path.display())]
+    #[error("{}: already exists", path.display())]
     Exists {
         /// The file.
         path: PathBuf,

@@ -26,7 +26,6 @@ def train(
     out: str | PathLike[str],
     workers: int = 2,
     cpus_per_worker: int = 1,
-    use_gpu: bool = False,
     restarts: int = 3,
     init: str | PathLike[str] | None = None,
     validation: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
@@ -36,8 +35,8 @@ def train(
 
     Needs torch, whose process group (gloo) adds the gradients. `out` is a folder that all machines see; a run that is there goes on
     with its own configuration. Where a worker dies Ray starts all of them again, at most `restarts` times, and they go on from the last
-    checkpoint (`checkpoint_minutes`, `validate_every`). `use_gpu` asks Ray for a GPU a worker, for builds that have a backend for it: its
-    process group is NCCL's.
+    checkpoint (`checkpoint_minutes`, `validate_every`). The package trains on
+    processors: no GPU is asked for.
     """
     from ray.train import FailureConfig, RunConfig, ScalingConfig
     from ray.train.torch import TorchConfig, TorchTrainer
@@ -56,10 +55,8 @@ def train(
     trainer = TorchTrainer(
         _learn,
         train_loop_config=arguments,
-        torch_config=TorchConfig(backend="nccl" if use_gpu else "gloo"),
-        scaling_config=ScalingConfig(
-            num_workers=workers, use_gpu=use_gpu, resources_per_worker={"CPU": cpus_per_worker} | ({"GPU": 1} if use_gpu else {})
-        ),
+        torch_config=TorchConfig(backend="gloo"),
+        scaling_config=ScalingConfig(num_workers=workers, resources_per_worker={"CPU": cpus_per_worker}),
         run_config=RunConfig(
             name=f"{folder.name}.ray", storage_path=str(folder.parent), failure_config=FailureConfig(max_failures=restarts)
         ),

@@ -22,7 +22,7 @@ pub(crate) struct AdaptArgs {
     /// The network to begin from: a run, a checkpoint in it, or the name of an embedded network [default: street].
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
-    /// Which of the data sets that the given network learned from its metres are of, where it learned several.
+    /// The data set whose metric scale to use, for a network trained on several.
     #[arg(long = "data-set", value_name = "NAME")]
     pub data_set: Option<String>,
     /// Drives to learn on, with speed and yaw rate.
@@ -52,8 +52,8 @@ pub(crate) struct AdaptArgs {
     /// Which cameras.
     #[arg(long, value_name = "2|3|both", default_value = "2")]
     pub camera: Cameras,
-    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
-    /// can, truth. May be repeated.
+    /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth). May be repeated.
     #[arg(long = "topic", value_name = "ROLE=NAME")]
     pub topics: Vec<NamedTopic>,
     /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle

@@ -38,8 +38,8 @@ pub(crate) struct InspectArgs {
     /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with = "intrinsics")]
     pub hfov: Option<f64>,
-    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
-    /// can, truth. May be repeated.
+    /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth). May be repeated.
     #[arg(long = "topic", value_name = "ROLE=NAME")]
     pub topics: Vec<NamedTopic>,
     /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle
@@ -72,7 +72,7 @@ pub(crate) struct InspectArgs {
 /// `deepfusion data convert`.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Images are written freed of their lens' distortion, the measured depth as points in the camera's place.\n\n\
+    after_help = "Images are written undistorted, the measured depth as points seen from the camera.\n\n\
     Examples:\n  deepfusion data convert drive.bag kitti-drive\n  \
     deepfusion data convert kitti/2011_09_26/2011_09_26_drive_0005_sync drive.bag"
 )]
@@ -92,8 +92,8 @@ pub(crate) struct ConvertArgs {
     /// Which camera.
     #[arg(long, value_name = "2|3", default_value = "2")]
     pub camera: Cameras,
-    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
-    /// can, truth. May be repeated.
+    /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth). May be repeated.
     #[arg(long = "topic", value_name = "ROLE=NAME")]
     pub topics: Vec<NamedTopic>,
     /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle
@@ -219,8 +219,8 @@ pub(crate) struct ExportGtArgs {
     /// File to write.
     #[arg(long, value_name = "FILE.npz")]
     pub out: PathBuf,
-    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
-    /// can, truth. May be repeated.
+    /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth). May be repeated.
     #[arg(long = "topic", value_name = "ROLE=NAME")]
     pub topics: Vec<NamedTopic>,
     /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle

@@ -20,7 +20,7 @@ pub(crate) struct EngineArgs {
     /// Where to compute.
     #[arg(long, value_enum, default_value_t)]
     pub device: ComputeDevice,
-    /// Which of the data sets that the run learned from its metres are of, where it learned several.
+    /// The data set whose metric scale to use, for a run trained on several.
     #[arg(long = "data-set", alias = "set", value_name = "NAME")]
     pub set: Option<String>,
 }

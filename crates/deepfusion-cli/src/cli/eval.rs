@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
 use deepfusion_data::{Cameras, GtKind, NamedTopic};
-use deepfusion_eval::{Crop, GroundTruth, Holes, Protocol, Scaling};
+use deepfusion_eval::{Crop, GroundTruth, Holes, PostProcess, Protocol, Scaling};
 
 use super::values::{ClockOffset, hfov, not_negative, positive, scaling};
 use super::{CameraIntrinsics, EngineArgs, names};
@@ -11,8 +11,8 @@ use super::{CameraIntrinsics, EngineArgs, names};
 #[derive(Debug, Args)]
 #[command(
     group(ArgGroup::new("what").args(["model", "pred"])),
-    after_help = "Metrics are means over images, unscaled and median-scaled, both always; static and moving pixels apart where \
-    the simulator's masks or KITTI's tracklets tell. Drives that tell speed and turns are also judged without ground truth: the scale \
+    after_help = "Metrics are means over images, unscaled and median-scaled, both always; static and moving pixels separately where \
+    the simulator's masks or KITTI's tracklets exist. Drives with speed and yaw rate are also judged without ground truth: the scale \
     certificate is the bias of the metre with a 95 % interval, from frames that training did not see. Array files: .npz (matched by \
     name) or N×H×W .npy (in split order), float32 or float64, any size: predictions are resized as disparity. The result \
     of a run is kept in RUN/eval, where `compare` finds it.\n\n\
@@ -48,8 +48,8 @@ pub(crate) struct EvalArgs {
     /// Fail unless every frame of --split is there and has ground truth.
     #[arg(long, requires = "split")]
     pub strict: bool,
-    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
-    /// can, truth. May be repeated.
+    /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth). May be repeated.
     #[arg(long = "topic", value_name = "ROLE=NAME")]
     pub topics: Vec<NamedTopic>,
     /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle
@@ -92,6 +92,12 @@ pub(crate) struct EvalArgs {
     /// Which points are drawn.
     #[arg(long, value_name = "S", default_value_t = 0, requires = "points")]
     pub points_seed: u64,
+    /// Also write the drawn points: image, pixel, true and predicted place in the camera's axes, error, as CSV.
+    #[arg(long, value_name = "FILE.csv", requires = "points")]
+    pub points_out: Option<PathBuf>,
+    /// Blend each prediction with that of the mirrored image, as the field's post-processed rows do; at twice the time.
+    #[arg(long, value_parser = names::post_process(), conflicts_with_all = ["pred", "calibrate_confidence", "calibrate_uncertainty"])]
+    pub post_process: Option<PostProcess>,
     /// Also write a page that opens offline: tables, charts, best and worst frames, learning curves, settings.
     #[arg(long, value_name = "FILE.html")]
     pub report: Option<PathBuf>,
@@ -104,21 +110,21 @@ pub(crate) struct EvalArgs {
     /// Do not correct depth for another focal length than the one trained on.
     #[arg(long, conflicts_with = "pred")]
     pub no_focal_correction: bool,
-    /// Learn how far a pixel's depth can be trusted, and keep that beside the run: `perceive` then gives its clouds a
+    /// Learn a confidence for each pixel, and keep it beside the run: `perceive` then gives its clouds a
     /// confidence, and --report shows whether it holds on frames not learned from: other drives, or of one drive another part.
     #[arg(long, requires = "model", conflicts_with = "gt")]
     pub calibrate_confidence: bool,
-    /// Find by how much the intervals must be stretched that a network with `depth_net.uncertainty` says, so that they hold what they
-    /// promise, and keep that beside the run. Of drives that training has not seen; measure the result on others.
+    /// Calibrate the intervals that a network with `depth_net.uncertainty` predicts, and keep the factors beside the run. Use drives that
+    /// training has not seen, and measure the result on others.
     #[arg(long, requires = "model", conflicts_with = "gt")]
     pub calibrate_uncertainty: bool,
-    /// Only compare with ground truth: do not also look for what speeds and images alone say of the depth.
+    /// Compare with ground truth only: skip the verdict from speeds and images.
     #[arg(long, conflicts_with = "pred")]
     pub no_verdict: bool,
     /// What the vehicle's speed may be off by (one standard error), which the scale certificate's interval then allows for.
     #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = not_negative, conflicts_with_all = ["pred", "no_verdict"])]
     pub speed_error: f64,
-    /// Take it that training saw none of these frames, where the program cannot know: of a network that was trained elsewhere.
+    /// Assume that training saw none of these frames, where the program cannot know: for a network that was trained elsewhere.
     #[arg(long, conflicts_with_all = ["pred", "no_verdict"])]
     pub assume_unseen: bool,
     /// What runs the network.
@@ -139,6 +145,7 @@ impl EvalArgs {
             gt: match self.gt_depth {
                 GtKind::Z => GroundTruth::Z,
                 GtKind::Velodyne => GroundTruth::Velodyne,
+                GtKind::Annotated => GroundTruth::Annotated,
             },
             scaling: self.scale,
             holes: if self.allow_holes {

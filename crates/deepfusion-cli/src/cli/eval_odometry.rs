@@ -20,7 +20,7 @@ pub(crate) struct EvalOdometryArgs {
     /// A run folder or a checkpoint in it.
     #[arg(long, value_name = "RUN", requires = "data")]
     pub model: Option<PathBuf>,
-    /// Which of the data sets that the run learned from its metres are of, where it learned several.
+    /// The data set whose metric scale to use, for a run trained on several.
     #[arg(
         long = "data-set",
         alias = "set",
@@ -39,8 +39,8 @@ pub(crate) struct EvalOdometryArgs {
         conflicts_with = "pred"
     )]
     pub camera: Cameras,
-    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
-    /// can, truth. May be repeated.
+    /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth). May be repeated.
     #[arg(long = "topic", value_name = "ROLE=NAME")]
     pub topics: Vec<NamedTopic>,
     /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle

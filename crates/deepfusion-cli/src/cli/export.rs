@@ -17,7 +17,7 @@ pub(crate) struct ExportArgs {
     /// A run folder, a checkpoint in it, or the name of an embedded network (`weights list`) [default: street].
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
-    /// Which of the data sets that the run learned from its metres are of, where it learned several.
+    /// The data set whose metric scale to use, for a run trained on several.
     #[arg(long = "data-set", alias = "set", value_name = "NAME")]
     pub set: Option<String>,
     /// File to write.

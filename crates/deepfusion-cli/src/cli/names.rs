@@ -2,7 +2,7 @@
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use deepfusion_data::GtKind;
-use deepfusion_eval::Crop;
+use deepfusion_eval::{Crop, PostProcess};
 use deepfusion_infer::Precision;
 use deepfusion_model::{CheckpointKind, Learn, Preset, ViewMotion};
 use deepfusion_rosbag::Compression;
@@ -48,12 +48,21 @@ pub(super) fn preset() -> impl TypedValueParser<Value = Preset> {
                 "Monodepth2's network and losses, with the speed term",
             ),
             (
+                Preset::Monodepth2R50,
+                "The same with ResNet-50 in both networks",
+            ),
+            (
                 Preset::LiteMono,
                 "Lite-Mono (3.1 M parameters), Monodepth2's losses with the speed term",
             ),
             (Preset::LiteMonoSmall, "Lite-Mono-small (2.5 M)"),
             (Preset::LiteMonoTiny, "Lite-Mono-tiny (2.2 M)"),
             (Preset::LiteMono8m, "Lite-Mono-8M (8.7 M)"),
+            (
+                Preset::RMsfm3,
+                "R-MSFM3 (3.5 M parameters): a disparity refined three times",
+            ),
+            (Preset::RMsfm6, "R-MSFM6 (3.8 M): refined six times"),
         ],
     )
 }
@@ -129,13 +138,28 @@ pub(super) fn gt_kind() -> impl TypedValueParser<Value = GtKind> {
         &[
             (
                 GtKind::Z,
-                "Camera z at pixel round(u), round(v), as KITTI's annotated depth",
+                "Camera z of one scan at pixel round(u), round(v)",
             ),
             (
                 GtKind::Velodyne,
                 "The velodyne's forward distance at pixel round(u) - 1, round(v) - 1: the field's eigen files",
             ),
+            (
+                GtKind::Annotated,
+                "KITTI's annotated depth, from proj_depth/groundtruth beside a drive's images: the field's eigen_benchmark",
+            ),
         ],
+    )
+}
+
+/// What is done with predictions before they are compared.
+pub(super) fn post_process() -> impl TypedValueParser<Value = PostProcess> {
+    one_of(
+        |PostProcess::Flip| "flip",
+        &[(
+            PostProcess::Flip,
+            "The mean of the prediction and the mirrored image's; near the left edge the latter alone, near the right edge the former",
+        )],
     )
 }
 
@@ -158,7 +182,7 @@ pub(super) fn compression() -> impl TypedValueParser<Value = Compression> {
     one_of(
         Compression::name,
         &[
-            (Compression::None, "Not at all"),
+            (Compression::None, "No compression"),
             (Compression::Lz4, "Fast"),
             (Compression::Bz2, "Small and slow"),
         ],
@@ -188,7 +212,7 @@ pub(super) fn scene() -> impl TypedValueParser<Value = Scene> {
             (Scene::Park, "A narrow road between lawns and trees"),
             (
                 Scene::Garage,
-                "Under ground: dark, near walls, pillars, a low ceiling",
+                "Underground: dark, near walls, pillars, a low ceiling",
             ),
             (
                 Scene::Commercial,

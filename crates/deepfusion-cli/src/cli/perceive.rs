@@ -64,23 +64,18 @@ pub(crate) enum PerceiveSave {
 }
 
 impl PerceiveArgs {
-    /// What is kept of the prediction that this stands on. `all_have_files`: the images are files of their own, and none a frame
-    /// of a film, a bag or a live source.
-    pub(crate) fn outputs(&self, max_depth_m: f64, all_have_files: bool) -> Outputs {
+    /// What is kept of the prediction that this stands on.
+    pub(crate) fn outputs(&self, max_depth_m: f64) -> Outputs {
         let both = [
             (PerceiveSave::DepthPng, Save::DepthPng),
             (PerceiveSave::Sigma, Save::Sigma),
         ];
         let asked = both.iter().filter(|(asked, _)| self.save.contains(asked));
-        let outputs = Outputs {
+        Outputs {
             save: asked.map(|(_, save)| *save).collect(),
+            frames: true,
             max_depth_m,
             max_sigma: None,
-        };
-        if all_have_files {
-            outputs
-        } else {
-            outputs.with_image()
         }
     }
 }

@@ -50,8 +50,8 @@ pub(crate) struct PredictArgs {
 }
 
 impl PredictArgs {
-    /// What is kept of every image. `all_have_files`: the images are files of their own, and none a frame of a film or bag.
-    pub(crate) fn outputs(&self, all_have_files: bool) -> Outputs {
+    /// What is kept of every image.
+    pub(crate) fn outputs(&self) -> Outputs {
         // A video is made of pictures, when they are all there.
         let of_an_image = |save: &Save| match save {
             Save::Video => Save::SideBySide,
@@ -63,14 +63,11 @@ impl PredictArgs {
                 save.push(each);
             }
         }
-        let outputs = Outputs {
+        Outputs {
             save,
+            frames: self.save.is_none(),
             max_depth_m: self.max_depth,
             max_sigma: self.max_sigma,
-        };
-        match self.save {
-            None if !all_have_files => outputs.with_image(),
-            _ => outputs,
         }
     }
 

@@ -14,7 +14,7 @@ pub(crate) struct PredictionArgs {
     #[arg(long, value_name = "RUN|NAME")]
     pub model: Option<PathBuf>,
     /// Images, folders of images, globs, or recordings: a KITTI drive, a bag, a video, an RGB-D folder, a folder with
-    /// dataset.toml. Of recordings the camera is known, and lenses are undone. Or one live source.
+    /// dataset.toml. Recordings know their camera, and lens distortion is removed. Or one live source.
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<String>,
     /// The camera, in pixels of the input images [default: the recording's, else EXIF's focal length, else the one trained with is
@@ -24,11 +24,11 @@ pub(crate) struct PredictionArgs {
     /// The camera by its field of view from left to right in degrees: square pixels, the principal point in the middle.
     #[arg(long, value_name = "DEGREES", value_parser = hfov, conflicts_with_all = ["intrinsics", "calib"])]
     pub hfov: Option<f64>,
-    /// A calibration file: KITTI's calib_cam_to_cam.txt, OpenCV's, ROS's or Kalibr's YAML, or four numbers; lenses are undone.
+    /// A calibration file: KITTI's calib_cam_to_cam.txt, OpenCV's, ROS's or Kalibr's YAML, or four numbers; lens distortion is removed.
     #[arg(long, value_name = "FILE")]
     pub calib: Option<PathBuf>,
-    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
-    /// can, truth. May be repeated.
+    /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth). May be repeated.
     #[arg(long = "topic", value_name = "ROLE=NAME")]
     pub topics: Vec<NamedTopic>,
     /// Do not correct depth for another focal length than the one trained on.
@@ -39,17 +39,17 @@ pub(crate) struct PredictionArgs {
     #[arg(long)]
     pub stretch: bool,
     /// The camera's height over the road in metres, where it was measured: the scale monitor, which watches recordings
-    /// with speed and yaw rate, then has nothing to learn.
+    /// with speed and yaw rate, otherwise learns it from the first frames.
     #[arg(long, value_name = "M", value_parser = positive)]
     pub camera_height: Option<f64>,
-    /// Where the scale monitor finds metres changed, bring depth back to those of the first hundred frames, slowly. It
-    /// holds on to the vehicle's metres: a wrong speed is followed.
+    /// When the scale monitor detects drift, slowly correct depth back to the scale of the first hundred frames. It follows the
+    /// vehicle's speed: a wrong speed corrects wrongly.
     #[arg(long)]
     pub correct_scale: bool,
     /// Folder to write.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Replace what is there, also what was made with other options or of an image that has changed.
+    /// Replace existing outputs, even those made with other options or from an image that has changed.
     #[arg(long)]
     pub overwrite: bool,
     /// Of a live source.
@@ -85,6 +85,8 @@ impl PredictionArgs {
 pub(crate) struct Outputs {
     /// Beside the sidecar.
     pub save: Vec<Save>,
+    /// The images of films and bags, too, which are no files of their own.
+    pub frames: bool,
     /// Points of a cloud beyond this depth are left out, metres.
     pub max_depth_m: f64,
     /// Points whose standard deviation is above this share of their depth are left out, too.

@@ -13,7 +13,7 @@ use super::{Size, names};
     after_help = "Learns from images and the car's speed alone (and its yaw rate, with --view-motion vehicle), or from recorded depth \
     (--learn depth). Writes config.toml, log.csv, TensorBoard events, the \
     checkpoints last and best, and sample panels. Options override a config file.\n\n\
-    Ctrl-C, and SIGTERM as schedulers send it, save after the step at work and end with code 130. --resume goes on as the run is \
+    Ctrl-C, and SIGTERM as schedulers send it, save after the step at work and end with code 130. --resume continues the run as \
     configured: --epochs or --steps may make it longer, --data, --val-data and --split say where its recordings are now, and any other \
     option that contradicts it is an error.\n\n\
     Examples:\n  deepfusion train --data kitti/2011_09_26/2011_09_26_drive_0005_sync --preset tiny\n  \
@@ -74,8 +74,8 @@ pub(crate) struct TrainArgs {
     /// bends, and --view-motion vehicle where there is a yaw rate.
     #[arg(long, value_name = "learn", value_parser = learn_camera)]
     pub intrinsics: Option<LearnCamera>,
-    /// Of a bag, the topic of a role where its type does not tell which: image, camera_info, lidar, dynamic, imu, speed, steering,
-    /// can, truth. May be repeated.
+    /// For bags: the topic for a role, where several topics match (roles: image, camera_info, lidar, dynamic, imu, speed, steering,
+    /// can, truth). May be repeated.
     #[arg(long = "topic", value_name = "ROLE=NAME")]
     pub topics: Vec<NamedTopic>,
     /// The camera's clock is so many milliseconds ahead of the vehicle's, or `auto`: measured by how the pictures turn as the vehicle

@@ -7,7 +7,7 @@ use clap::Args;
 #[derive(Debug, Args)]
 #[command(
     after_help = "The page and all it needs are in the program: nothing is installed, and nothing is fetched from elsewhere. A folder \
-    that is still being written is shown as it grows. `?` in the page tells its keys. Ctrl-C ends.\n\n\
+    that is still being written is shown as it grows. Press ? in the page for its keys; Ctrl-C stops the server.\n\n\
     Examples:\n  deepfusion view depth\n  deepfusion view depth --other depth-of-another-model\n  \
     deepfusion view depth --host 0.0.0.0        # for a phone in the same network, and for everybody else there\n  \
     deepfusion view runs/train-1                # learning curve and panels\n  \

@@ -8,21 +8,21 @@ use super::names;
 /// `deepfusion weights …`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum WeightsCommand {
-    /// Make a run of weights of torchvision's ResNet or of Monodepth2 (.pth, .safetensors).
+    /// Make a run of weights of torchvision's ResNet, of Monodepth2, Lite-Mono or R-MSFM (.pth, .safetensors).
     #[command(
         after_help = "Examples:\n  deepfusion weights import encoder.pth depth.pth pose_encoder.pth pose.pth --out runs/monodepth2\n  \
         deepfusion weights import resnet18-5c106cde.pth --out runs/imagenet18"
     )]
     #[cfg(feature = "train")]
     Import {
-        /// The files: one of a ResNet, or Monodepth2's encoder, depth, pose_encoder and pose.
+        /// The files: one of a ResNet, or another network's encoder, depth, pose_encoder and pose.
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
         /// Folder of the run to make.
         #[arg(long, value_name = "RUN")]
         out: PathBuf,
     },
-    /// Make the two files of an embedded network of a run: its depth network in bf16, and a card.
+    /// Pack a run as an embedded network: its weights in bf16, and a card.
     Pack(PackArgs),
     /// Which networks are embedded and what they were made from; which weights can be imported.
     List {
@@ -54,13 +54,13 @@ pub(crate) struct PackArgs {
     /// Folder for the two files.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// What else there is to say of it, for its card.
+    /// A note for its card.
     #[arg(long, value_name = "TEXT")]
     pub note: Option<String>,
-    /// How to make it again, for its card: a file of recipes/, or a command.
+    /// The recipe for its card: a file of recipes/, or a command.
     #[arg(long, value_name = "TEXT")]
     pub recipe: Option<String>,
-    /// Under which terms it may be used, for its card.
+    /// The licence for its card.
     #[arg(long, value_name = "TERMS", default_value = env!("CARGO_PKG_LICENSE"))]
     pub licence: String,
     /// Say in its card that it learned from no real image: real recordings then count as not seen in training.

@@ -144,7 +144,7 @@ fn spread(datasets: &[Dataset], count: usize) -> Vec<(usize, usize)> {
         })
         .collect()
     };
-    let known = all(&|dataset, frame| dataset.has_ground_truth(frame));
+    let known = all(&|dataset, frame| dataset.has_ground_truth(frame, GtKind::Z));
     let frames = if known.len() >= count {
         known
     } else {

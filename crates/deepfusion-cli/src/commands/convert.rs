@@ -72,7 +72,7 @@ fn has_ending(path: &Path, ending: &str) -> bool {
     found.is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
-/// Warns of what the recording does not have, and so what was written has not either.
+/// Warns of what the recording lacks and was therefore not written.
 fn warn_of_missing(dataset: &Dataset) {
     let timed = dataset.frames().iter().any(|f| f.time_s.is_some());
     let missing = match (timed, dataset.track().is_some()) {

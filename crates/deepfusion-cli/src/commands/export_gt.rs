@@ -36,7 +36,7 @@ pub(super) fn run(args: &ExportGtArgs) -> Result<()> {
         let with_truth = |d: &Dataset| {
             d.selected()
                 .iter()
-                .filter(|f| d.has_ground_truth(**f))
+                .filter(|f| d.has_ground_truth(**f, kind))
                 .count()
         };
         check_used(

@@ -55,7 +55,7 @@ fn write_config(args: &InspectArgs, options: &OpenOptions) -> Result<Vec<PathBuf
     write_bag_config(&args.path, options, args.overwrite).map_err(|error| match error {
         Error::Exists { path } => CliError::Exists {
             path,
-            remedy: "it holds for its bag; --overwrite writes it anew, and keeps its keys",
+            remedy: "it is this bag's already; --overwrite rewrites it and keeps its keys",
         }
         .into(),
         other => other.into(),

@@ -9,7 +9,7 @@ Try it, with no data at all (a few minutes):
 
 With recordings (KITTI raw, ROS bags, videos, folders):
   deepfusion data inspect DRIVE            what is in it, and whether it can train
-  deepfusion doctor DRIVE                  every reason why that would go wrong
+  deepfusion doctor DRIVE                  what would go wrong, before training
   deepfusion train --data DRIVE            learn from its images and speeds
   deepfusion eval --model RUN --data DRIVE measure against its LiDAR
   deepfusion predict --model RUN IMAGE --out DIR
@@ -18,16 +18,17 @@ With recordings (KITTI raw, ROS bags, videos, folders):
                                            3D targets: boxes, tracks, velocities
   deepfusion view DIR                      look at them in the browser
 
-Without:
+Without recordings:
   deepfusion simulate --out DIR            a drive with exact ground truth
 
 Numbers of any method, from arrays:
   deepfusion data export-gt DRIVE --out gt.npz
   deepfusion eval --pred depth.npz --pred-kind depth --gt gt.npz
 
-Also: calibrate (a camera, from a checkerboard), compare (runs side by side, published tables),
-ablate (the system's parts on and off), eval-odometry (the camera's path), eval-targets (boxes),
-export (ONNX), weights import, weights list, bench, completions.
+Also: adapt (a trained network to a new drive), calibrate (a camera, from a checkerboard), compare
+(runs side by side, published tables), ablate (the system's parts on and off), eval-odometry (the
+camera's path), eval-targets (boxes), export (ONNX), data import (a log beside a video), data convert,
+weights import, weights list, weights pack, bench, config show, completions.
 Every command explains itself: deepfusion train --help
 ";
 

@@ -214,8 +214,8 @@ pub(super) fn training(mut page: HtmlReport, run: &Path) -> Result<HtmlReport> {
         page = page
             .section("How it learned")
             .note(&format!(
-                "{} steps; training curves are means over stretches of steps, held out: the samples never trained on.",
-                log.steps()
+                "{}; training curves are means over stretches of steps, held out: the samples never trained on.",
+                count_of(log.steps(), "step")
             ))
             .learning(&log, images);
     }

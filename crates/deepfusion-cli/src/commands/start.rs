@@ -262,6 +262,17 @@ fn warn_of_other_meaning(theirs: &TrainConfig, own: &TrainConfig, depth_learned:
             name(was)
         );
     }
+    let of = |config: &TrainConfig| config.depth_net.initial_depth_m;
+    if own.depth_net.r_msfm.is_some() && of(theirs) != of(own) {
+        let word = |metres: Option<f64>| {
+            metres.map_or("the middle of the range".into(), |m| format!("{m} m"))
+        };
+        tracing::warn!(
+            "the weights to start from refine {}, this configuration {} (depth_net.initial_depth_m): they have to learn that anew",
+            word(of(theirs)),
+            word(of(own))
+        );
+    }
     // A range that a data set names is meant.
     let own_range = own.data.sets.iter().any(|set| set.range.is_some());
     let one_range = theirs.data.sets.len() <= 1 && !own_range;

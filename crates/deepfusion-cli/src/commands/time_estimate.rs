@@ -76,7 +76,7 @@ impl TimeEstimate {
         if self.bf16 {
             line.push_str("; on this processor --set precision=bf16 is nearly twice as fast");
         }
-        line.push_str("; --steps N ends sooner or later");
+        line.push_str("; --steps N changes the length");
         line
     }
 

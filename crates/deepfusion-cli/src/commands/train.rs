@@ -1,4 +1,5 @@
 use deepfusion_data::Cameras;
+use deepfusion_hint::count_of;
 use deepfusion_jobs::recordings::{camera_word, training_recordings};
 use deepfusion_model::{
     DataConfig, Error as ModelError, InputSize, Learn, Preset, RunFolder, TrainConfig,
@@ -70,12 +71,12 @@ fn plan(trainer: &Trainer) -> String {
     let epochs = config.epochs * trainer.epoch_steps();
     let steps = match config.steps {
         None if epochs < config.min_steps => format!(
-            "{} steps (the least: {} epochs of so few images would be {epochs})",
-            trainer.steps(),
+            "{} (the least: {} epochs of so few images would be {epochs})",
+            count_of(trainer.steps(), "step"),
             config.epochs
         ),
-        None => format!("{} epochs", config.epochs),
-        Some(steps) => format!("{steps} steps"),
+        None => count_of(config.epochs, "epoch"),
+        Some(steps) => count_of(steps, "step"),
     };
     let sets = 0..config.data.sets.len().max(1);
     let learned = |from: fn(Learn) -> bool| sets.clone().any(|set| from(config.learn(set)));

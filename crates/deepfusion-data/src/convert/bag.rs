@@ -1,5 +1,5 @@
 use super::parts::{Converted, at_ns, cam_from_scanner, moving_at, points, seconds_to_move};
-use crate::{Dataset, Error, Result};
+use crate::{Dataset, Error, GtKind, Result};
 use deepfusion_geometry::Se3;
 use deepfusion_rosbag::msg::{
     CameraInfo, CompressedImage, Header, PointCloud2, RegionOfInterest, Twist, TwistStamped,
@@ -59,7 +59,7 @@ pub fn convert_to_bag(
         Some(_) => Some(bag.add_connection::<TwistStamped>("/vehicle/speed")?),
         None => None,
     };
-    let has_depth = (0..times.len()).any(|frame| dataset.has_ground_truth(frame));
+    let has_depth = (0..times.len()).any(|frame| dataset.has_ground_truth(frame, GtKind::Z));
     let cloud_topic = if has_depth {
         Some(bag.add_connection::<PointCloud2<'_>>("/lidar/points")?)
     } else {

@@ -294,8 +294,8 @@ impl Dataset {
     /// # Panics
     /// If there is no frame of that index.
     #[must_use]
-    pub fn has_ground_truth(&self, frame: usize) -> bool {
-        self.recording.has_ground_truth(&self.frames()[frame])
+    pub fn has_ground_truth(&self, frame: usize, kind: GtKind) -> bool {
+        self.recording.has_ground_truth(&self.frames()[frame], kind)
     }
 
     /// Depth of a frame from its scan or its depth image, at the image's full size, in metres, 0 = none;
@@ -303,8 +303,8 @@ impl Dataset {
     ///
     /// # Errors
     /// [`Error::Cloud`] where a scan cannot be read, [`Error::Missing`] without the scanner's calibration,
-    /// [`Error::Image`] for a depth image that cannot be read, [`Error::DepthKind`] where the velodyne's
-    /// convention is asked of one.
+    /// [`Error::Image`] for a depth image that cannot be read, [`Error::DepthKind`] where another
+    /// kind is asked of one than it has.
     ///
     /// # Panics
     /// If there is no frame of that index.

@@ -51,7 +51,7 @@ pub trait Recording: fmt::Debug + Send + Sync {
     }
 
     /// Whether [`Self::ground_truth`] will have something for a frame.
-    fn has_ground_truth(&self, _frame: &Frame) -> bool {
+    fn has_ground_truth(&self, _frame: &Frame, _kind: GtKind) -> bool {
         false
     }
 

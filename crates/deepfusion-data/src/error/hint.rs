@@ -72,7 +72,7 @@ impl Hint for Error {
             Self::NoPath { .. } => {
                 "KITTI raw with oxts, and what has poses (KITTI odometry, KITTI-360, nuScenes, RGB-D folders) have one"
             }
-            Self::DepthKind { .. } => "take camera z from them",
+            Self::DepthKind { .. } => "camera z (kind z) is what every recording with depth has",
             Self::Program { remedy, .. } => remedy,
             Self::Missing { remedy, .. } => remedy,
             Self::NoImages { .. } => {

@@ -50,7 +50,9 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         .iter()
         .filter_map(|i| Some((i.path.file_stem()?, i.number)));
     let depth = depth_images(folder, &config, stems.collect())?;
-    if config.mount.is_none() {
+    let speeds = SpeedLog::read(folder, &config)?;
+    // The mount turns the vehicle's motion into the camera's: of no matter where there is none.
+    if config.mount.is_none() && speeds.is_some() {
         warnings.push(NO_MOUNT.into());
     }
     PlainParts {
@@ -62,7 +64,7 @@ pub(crate) fn open(folder: &Path, options: &OpenOptions) -> Result<Dataset> {
         calibration,
         camera_ahead_s: config.camera_ahead_s(options),
         image_size: size,
-        speeds: SpeedLog::read(folder, &config)?,
+        speeds,
         cam_from_vehicle: config.cam_from_vehicle(),
         camera: Camera::Left,
         truth: depth.map(MeasuredDepth::Images),

@@ -3,7 +3,7 @@
 use super::layout::Layout;
 use super::{bag, comma};
 use crate::{
-    Cameras, ClockOffset, Dataset, DriveInspection, Error, Inspection, IntrinsicsSummary,
+    Cameras, ClockOffset, Dataset, DriveInspection, Error, GtKind, Inspection, IntrinsicsSummary,
     OpenOptions, Result, SpeedRange,
 };
 use std::path::Path;
@@ -118,7 +118,7 @@ fn look_at(dataset: &Dataset) -> Result<DriveInspection> {
         usable_pairs,
         why_no_pairs,
         scans: (0..frames.len())
-            .filter(|i| dataset.has_ground_truth(*i))
+            .filter(|i| dataset.has_ground_truth(*i, GtKind::Z))
             .count(),
         speed_mps: SpeedRange::of(speeds(dataset)),
         distance_m,

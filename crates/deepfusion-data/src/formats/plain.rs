@@ -302,7 +302,7 @@ impl Recording for PlainRecording {
         &self.warnings
     }
 
-    fn has_ground_truth(&self, frame: &Frame) -> bool {
+    fn has_ground_truth(&self, frame: &Frame, _kind: GtKind) -> bool {
         let truth = self.truth.as_ref();
         truth.is_some_and(|truth| truth.has(frame.number))
     }

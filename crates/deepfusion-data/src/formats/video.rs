@@ -116,13 +116,14 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         Some(known) => numbers_by_time(&known),
         None => (0..video.count() as u64).collect(),
     };
-    if start_s.is_none() {
+    // Neither matters to a film alone.
+    if start_s.is_none() && speeds.is_some() {
         warnings.push(
             "the video's time stamps are taken to be on the tables' clock (start_s in dataset.toml moves them)"
                 .into(),
         );
     }
-    if config.mount.is_none() {
+    if config.mount.is_none() && speeds.is_some() {
         warnings.push(NO_MOUNT.into());
     }
     let image = |(number, ns): (u64, Option<i64>)| TimedImage {

@@ -109,7 +109,7 @@ impl MeasuredDepth {
                 };
                 if kind != GtKind::Z {
                     let drive = drive.to_owned();
-                    return Err(Error::DepthKind { drive });
+                    return Err(Error::DepthKind { drive, kind });
                 }
                 Ok(Some(lens.correct_depth(images.read(path)?)?))
             }
@@ -117,6 +117,10 @@ impl MeasuredDepth {
                 let Some(scan) = scans.files.get(&frame) else {
                     return Ok(None);
                 };
+                if kind == GtKind::Annotated {
+                    let drive = drive.to_owned();
+                    return Err(Error::DepthKind { drive, kind });
+                }
                 let points = (scans.read)(&scan.file)?;
                 let k = lens.intrinsics();
                 let size = (k.width as usize, k.height as usize);

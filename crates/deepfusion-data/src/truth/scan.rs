@@ -12,6 +12,9 @@ pub enum GtKind {
     /// The sensor's forward distance at pixel round(u) − 1, round(v) − 1: the field's `eigen` files,
     /// whose convention dates from a MATLAB devkit that counts pixels from 1. For published numbers.
     Velodyne,
+    /// KITTI's annotated depth (`proj_depth/groundtruth` beside a drive's images): camera z, gathered from eleven scans, without what
+    /// stereo contradicts. For the field's `eigen_benchmark`.
+    Annotated,
 }
 
 impl GtKind {
@@ -21,6 +24,7 @@ impl GtKind {
         match self {
             Self::Z => "z",
             Self::Velodyne => "velodyne",
+            Self::Annotated => "annotated",
         }
     }
 }
@@ -32,7 +36,10 @@ impl std::str::FromStr for GtKind {
         match text {
             "z" => Ok(Self::Z),
             "velodyne" => Ok(Self::Velodyne),
-            _ => Err(format!("'{text}' is no ground-truth depth: z or velodyne")),
+            "annotated" => Ok(Self::Annotated),
+            _ => Err(format!(
+                "'{text}' is no ground-truth depth: z, velodyne or annotated"
+            )),
         }
     }
 }

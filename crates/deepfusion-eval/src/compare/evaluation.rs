@@ -1,7 +1,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use crate::Report;
+use crate::{PostProcess, Report};
 use serde_json::Value;
 
 use super::saved::{Measured, ModelFile, SavedEvaluation, sha256_of_file};
@@ -135,6 +135,16 @@ impl Evaluation {
         }
     }
 
+    /// How its predictions were changed before they were compared.
+    pub(crate) fn post_process(&self) -> Option<&'static str> {
+        match &self.origin {
+            Origin::Plain => None,
+            Origin::Saved { measured, .. } => measured.post_process.map(|how| match how {
+                PostProcess::Flip => "post-processed",
+            }),
+        }
+    }
+
     /// What must agree for two rows to stand in one table: the protocol, and the ground truth to the last depth. Files that
     /// do not say the latter share a table with none that does.
     pub(crate) fn ground(&self) -> String {
@@ -151,7 +161,8 @@ impl Evaluation {
 /// Adds what tells rows of one name in one table apart: the checkpoint, then the engine, then the path.
 fn tell_apart(all: &mut [Evaluation]) {
     type Part = fn(&Evaluation) -> Option<String>;
-    let parts: [Part; 3] = [
+    let parts: [Part; 4] = [
+        |e| e.post_process().map(str::to_owned),
         |e| e.checkpoint().map(str::to_owned),
         |e| e.engine().map(str::to_owned),
         |e| Some(e.path.display().to_string()),

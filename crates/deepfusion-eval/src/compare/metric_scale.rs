@@ -63,7 +63,7 @@ impl MetricScale {
     }
 
     /// From the evaluations that a run's folder keeps: those of this very checkpoint (by the SHA-256 of its file), of the same
-    /// data set where it learned several, with the same correction for the focal length, and known to be of frames that training
+    /// data set where it learned several, with the same correction for the focal length, of predictions as they are, and known to be of frames that training
     /// did not see. Of several the bias is over all their images, and the interval spans all of theirs: metres that hold in one
     /// place and not in another are not trusted.
     ///
@@ -83,6 +83,7 @@ impl MetricScale {
             saved.model.sha256 == checkpoint_sha256
                 && saved.measured.set.as_deref() == set
                 && saved.measured.focal_correction == focal_correction
+                && saved.measured.post_process.is_none()
                 && saved.measured.held_out == Some(true)
                 && saved.report.n >= LEAST_IMAGES
         };

@@ -62,10 +62,7 @@ fn about(members: &[&Evaluation]) -> Vec<String> {
         Crop::None => "whole image",
         Crop::Garg => "Garg's crop",
     };
-    let gt = match p.gt {
-        GroundTruth::Z => "camera z",
-        GroundTruth::Velodyne => "the velodyne's forward distance",
-    };
+    let gt = p.gt.meaning();
     let plural = if report.n == 1 { "" } else { "s" };
     let mut notes = vec![format!(
         "Metres as predicted. {} image{plural}, {crop}, {} to {} m, ground truth: {gt}.",
@@ -132,7 +129,11 @@ fn eigen_differences(report: &Report) -> Vec<String> {
         ));
     }
     if p.gt != GroundTruth::Velodyne {
-        differences.push("camera z instead of the velodyne's forward distance".into());
+        differences.push(format!(
+            "{} instead of {}",
+            p.gt.meaning(),
+            GroundTruth::Velodyne.meaning()
+        ));
     }
     differences
 }
@@ -256,6 +257,11 @@ fn notes(member: &Evaluation) -> Vec<Flag> {
         flags.push(Flag::note(format!(
             "{} is another file by now than the one that was measured: evaluate again",
             model.checkpoint
+        )));
+    }
+    if let Some(how) = member.post_process() {
+        flags.push(Flag::note(format!(
+            "{how}: the mean with the mirrored image's prediction, which takes two passes of the network"
         )));
     }
     if let Some(rate) = member.report.missing_rate.filter(|r| *r > 0.0) {

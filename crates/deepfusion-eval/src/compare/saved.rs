@@ -1,7 +1,7 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use crate::{ImageScore, Report};
+use crate::{ImageScore, PostProcess, Report};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -48,6 +48,9 @@ pub struct Measured {
     pub set: Option<String>,
     /// Whether depth was corrected for another focal length than the one trained on.
     pub focal_correction: bool,
+    /// What was done with the predictions before they were compared; absent: nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub post_process: Option<PostProcess>,
     /// Whether training saw none of these frames; absent where that is unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<bool>,
@@ -127,6 +130,11 @@ impl SavedEvaluation {
             self.report.protocol,
             self.model.checkpoint,
         );
+        // Named only where it is there: files of earlier evaluations keep their names.
+        let decides = match measured.post_process {
+            Some(how) => format!("{decides} {how:?}"),
+            None => decides,
+        };
         let digest = hex(&Sha256::digest(decides));
         let checkpoint = self.model.checkpoint.trim_end_matches(".safetensors");
         names.push(slug(checkpoint));

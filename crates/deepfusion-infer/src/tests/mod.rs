@@ -5,6 +5,7 @@ mod build;
 mod lite;
 mod oracle;
 mod plain;
+mod recurrent;
 mod remains;
 
 use proptest::prelude::*;

@@ -81,6 +81,8 @@ fn conv(conv: &Conv, values: &[Image]) -> Image {
             Activation::Elu => sum,
             Activation::Sigmoid => 1.0 / (1.0 + (-sum).exp()),
             Activation::Gelu => deepfusion_kernels::gelu_exact(sum),
+            Activation::LeakyRelu => sum.max(0.01 * sum),
+            Activation::Tanh => sum.tanh(),
         }
     })
 }
@@ -118,6 +120,25 @@ fn enlarged(v: &Image) -> Image {
         let (left, right, across) = around(x, v.width);
         let along = |y| v.at(c, y, left) * (1.0 - across) + v.at(c, y, right) * across;
         along(top) * (1.0 - down) + along(bottom) * down
+    })
+}
+
+/// Each pixel by the softmax of its nine weights.
+fn convex(v: &Image, weights: &Image, side: usize) -> Image {
+    Image::from_fn(1, v.height * side, v.width * side, |_, y, x| {
+        let (row, column) = (y / side, x / side);
+        let within = y % side * side + x % side;
+        let (mut sum, mut total) = (0.0, 0.0);
+        for tap in 0..9 {
+            let share = weights.at(tap * side * side + within, row, column).exp();
+            total += share;
+            let (down, across) = (row + tap / 3, column + tap % 3);
+            let inside = (1..=v.height).contains(&down) && (1..=v.width).contains(&across);
+            if inside {
+                sum += share * v.at(0, down - 1, across - 1);
+            }
+        }
+        sum / total
     })
 }
 
@@ -239,6 +260,28 @@ pub(super) fn run(graph: &Graph, image: &[f32], height: usize, width: usize) -> 
                     v.at(c, y, x) * (shift + s.at(0, y, x) * m.at(c, 0, 0))
                 })
             }
+            Op::Multiply { inputs } => {
+                let [a, b] = inputs.map(|v| &values[v.0]);
+                Image::from_fn(a.channels, a.height, a.width, |c, y, x| {
+                    a.at(c, y, x) * b.at(c, y, x)
+                })
+            }
+            Op::Blend {
+                state,
+                candidate,
+                share,
+            } => {
+                let [h, q, z] = [state, candidate, share].map(|v| &values[v.0]);
+                Image::from_fn(h.channels, h.height, h.width, |c, y, x| {
+                    let share = z.at(c, y, x);
+                    (1.0 - share) * h.at(c, y, x) + share * q.at(c, y, x)
+                })
+            }
+            Op::ConvexUpsample {
+                input,
+                weights,
+                halvings,
+            } => convex(&values[input.0], &values[weights.0], 1 << halvings),
             Op::AddPixel { input, pixel } => {
                 let (v, p) = (&values[input.0], &values[pixel.0]);
                 Image::from_fn(v.channels, v.height, v.width, |c, y, x| {

@@ -108,5 +108,7 @@ fn activated(activation: Activation, v: f32) -> f32 {
         Activation::Elu => v,
         Activation::Sigmoid => 1.0 / (1.0 + (-v).exp()),
         Activation::Gelu => deepfusion_kernels::gelu_exact(f64::from(v)) as f32,
+        Activation::LeakyRelu => v.max(0.01 * v),
+        Activation::Tanh => v.tanh(),
     }
 }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use deepfusion_data::Dataset;
 use deepfusion_perception::{ConfidenceModel, Evidence, Reliability};
 use deepfusion_runtime::DepthEstimator;
-use image::imageops::flip_horizontal;
 use serde::{Deserialize, Serialize};
 
 use super::division::divide;
@@ -167,13 +166,7 @@ fn of_frame(
     let image = dataset.load_image(frame)?;
     let camera = dataset.intrinsics(frame);
     let seen = estimator.predict(&image, Some(&camera), correct_focal, false)?;
-    let mirror = flip_horizontal(&image);
-    let mut mirrored = estimator
-        .predict(&mirror, Some(&camera.flipped()), correct_focal, false)?
-        .disparity;
-    for row in mirrored.chunks_exact_mut(seen.width.max(1)) {
-        row.reverse();
-    }
+    let mirrored = super::mirrored_disparity(estimator, &image, &camera, correct_focal)?;
     let evidence = Evidence::of(&seen.disparity, Some(&mirrored), seen.width);
     Ok(known_pixels(&depth, &seen, &RANGE_M)
         .into_iter()

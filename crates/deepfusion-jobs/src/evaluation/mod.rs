@@ -12,10 +12,11 @@ use std::collections::HashMap;
 use deepfusion_data::{Dataset, DatasetKind, GtKind, RgbImage, ground_truth_names};
 use deepfusion_eval::{
     ArraySet, Crop, DrawnPoint, Grid, GroundTruth, ImageScore, MeanDepthBaseline, Prediction,
-    Protocol, Report, Sample, match_names,
+    Protocol, Report, Sample, blend_flipped, match_names,
 };
 use deepfusion_geometry::Intrinsics;
 use deepfusion_runtime::DepthEstimator;
+use image::imageops::flip_horizontal;
 
 use crate::{Error, Result};
 
@@ -69,6 +70,39 @@ pub fn predict(
     let prediction = estimator.predict(image, Some(camera), focal_correction, false)?;
     let grid = Grid::from_f32(prediction.width, prediction.height, &prediction.disparity)?;
     Ok(Prediction::Disparity(grid))
+}
+
+/// The disparity of an image blended with that of its mirror image ([`blend_flipped`]); else as [`predict`].
+///
+/// # Errors
+/// What the network's engine says.
+pub fn predict_post_processed(
+    estimator: &mut DepthEstimator,
+    image: &RgbImage,
+    camera: &Intrinsics,
+    focal_correction: bool,
+) -> Result<Prediction> {
+    let own = estimator.predict(image, Some(camera), focal_correction, false)?;
+    let mirrored = mirrored_disparity(estimator, image, camera, focal_correction)?;
+    let grid = |disparity: &[f32]| Grid::from_f32(own.width, own.height, disparity);
+    let blended = blend_flipped(&grid(&own.disparity)?, &grid(&mirrored)?)?;
+    Ok(Prediction::Disparity(blended))
+}
+
+/// The disparity that the mirrored image is given, mirrored back: beside the image's own, pixel by pixel.
+fn mirrored_disparity(
+    estimator: &mut DepthEstimator,
+    image: &RgbImage,
+    camera: &Intrinsics,
+    focal_correction: bool,
+) -> Result<Vec<f32>> {
+    let mirror = flip_horizontal(image);
+    let seen = estimator.predict(&mirror, Some(&camera.flipped()), focal_correction, false)?;
+    let mut disparity = seen.disparity;
+    for row in disparity.chunks_exact_mut(seen.width.max(1)) {
+        row.reverse();
+    }
+    Ok(disparity)
 }
 
 /// Evaluates `predict` (data set, frame, its image's prediction) on every selected frame that has ground truth; `progress` takes the frames done
@@ -139,6 +173,7 @@ fn gt_kind(protocol: &Protocol) -> GtKind {
     match protocol.gt {
         GroundTruth::Z => GtKind::Z,
         GroundTruth::Velodyne => GtKind::Velodyne,
+        GroundTruth::Annotated => GtKind::Annotated,
     }
 }
 

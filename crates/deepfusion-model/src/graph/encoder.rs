@@ -7,11 +7,21 @@ use crate::{NetworkError, ResNetConfig};
 
 impl Builder {
     pub(super) fn encoder(&mut self, encoder: &ResNetConfig) -> Result<[ValueId; 5], NetworkError> {
+        self.encoder_to("encoder", encoder, 4)
+    }
+
+    /// The features up to those of so many layers; what is beyond them is the last one again. Names begin with `prefix`.
+    pub(super) fn encoder_to(
+        &mut self,
+        prefix: &str,
+        encoder: &ResNetConfig,
+        layers: usize,
+    ) -> Result<[ValueId; 5], NetworkError> {
         let width = encoder.base_width;
         let expansion = encoder.depth.expansion();
         let f0 = self.conv(&Layer {
-            name: "encoder.conv1".into(),
-            offset: Offset::Norm("encoder.bn1".into()),
+            name: format!("{prefix}.conv1"),
+            offset: Offset::Norm(format!("{prefix}.bn1")),
             input: ValueId::IMAGE,
             channels: [3, width],
             kernel: 7,
@@ -22,18 +32,18 @@ impl Builder {
             activation: &Activation::Relu,
         })?;
         let mut features = [f0; 5];
-        let mut x = self.push("encoder.maxpool".into(), Op::MaxPool { input: f0 })?;
+        let mut x = self.push(format!("{prefix}.maxpool"), Op::MaxPool { input: f0 })?;
         let mut channels = width;
-        for (index, blocks) in encoder.depth.blocks().into_iter().enumerate() {
+        for (index, blocks) in encoder.depth.blocks().into_iter().take(layers).enumerate() {
             let inner = width << index;
             for block in 0..blocks {
                 let steps = encoder.steps(index, block);
-                let path = format!("encoder.layer{}.{block}", index + 1);
+                let path = format!("{prefix}.layer{}.{block}", index + 1);
                 let outer = inner * expansion;
                 x = self.block(&path, x, [channels, inner, outer], steps)?;
                 channels = outer;
             }
-            features[index + 1] = x;
+            features[index + 1..].fill(x);
         }
         Ok(features)
     }

@@ -1,10 +1,13 @@
 //! A trained depth network as a graph, batch normalisation folded into the convolutions before it.
 
+use std::collections::BTreeMap;
+
 use deepfusion_infer::{Activation, Border, Conv, Graph, Op, ValueId};
 
 mod decoder;
 mod encoder;
 mod lite_mono;
+mod r_msfm;
 mod skips;
 
 use crate::network::BATCH_NORM_EPSILON;
@@ -45,10 +48,12 @@ pub fn depth_graph_with_uncertainty(
     let mut builder = Builder {
         graph: Graph::new(normalisation.mean(), normalisation.std()),
         weights,
+        repeated: BTreeMap::new(),
     };
-    let outputs = match &config.lite_mono {
-        Some(lite_mono) => builder.lite_mono(lite_mono, config.uncertainty)?,
-        None => {
+    let outputs = match (&config.lite_mono, &config.r_msfm) {
+        (Some(lite_mono), _) => builder.lite_mono(lite_mono, config.uncertainty)?,
+        (None, Some(r_msfm)) => vec![builder.r_msfm(config, r_msfm)?],
+        (None, None) => {
             let features = builder.encoder(&config.encoder)?;
             let features = builder.skips(config, features)?;
             builder.decoder(config, features)?
@@ -65,6 +70,8 @@ struct Builder {
     graph: Graph,
     /// What was not taken yet.
     weights: Weights,
+    /// What was taken of layers that run several times.
+    repeated: BTreeMap<String, Vec<f32>>,
 }
 
 /// What is added to a convolution's sum.

@@ -56,7 +56,7 @@ impl ModuleCost {
         self.products(channels * kernel * kernel, channels, pixels, after);
     }
 
-    fn products(&mut self, weights: usize, to: usize, pixels: usize, after: After) {
+    pub(super) fn products(&mut self, weights: usize, to: usize, pixels: usize, after: After) {
         let learned = match after {
             After::Norm => weights + 2 * to,
             After::Bias => weights + to,
@@ -75,7 +75,7 @@ impl ModuleCost {
 
 impl ResNetConfig {
     /// The stem (`conv1`, `bn1`, the pooling) and `layer1`…`layer4`, their names behind `prefix`.
-    fn costs(&self, prefix: &str, size: InputSize) -> Vec<ModuleCost> {
+    pub(super) fn costs(&self, prefix: &str, size: InputSize) -> Vec<ModuleCost> {
         let channels = self.channels();
         let pixels = feature_pixels(self, size);
         let mut stem = ModuleCost::new(format!("{prefix}.stem"));
@@ -122,10 +122,13 @@ fn feature_pixels(encoder: &ResNetConfig, size: InputSize) -> [usize; 5] {
 }
 
 impl DepthNetConfig {
-    /// The network's parts in the order in which they run. Of the heads all four have parameters, and the finest
-    /// alone has multiply-adds: the others only train.
+    /// The network's parts in the order in which they run. Of the heads all have parameters, and the finest alone has
+    /// multiply-adds: the others only train. What runs several times has its parameters once.
     #[must_use]
     pub fn costs(&self, size: InputSize) -> Vec<ModuleCost> {
+        if let Some(r_msfm) = &self.r_msfm {
+            return r_msfm.costs(&self.encoder, size);
+        }
         if let Some(lite_mono) = &self.lite_mono {
             let mut costs = lite_mono.costs(size);
             if self.uncertainty {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     AttentionConfig, DecoderConfig, HceConfig, InputNormalisation, LiteMonoConfig, LiteMonoSize,
-    NetworkError, ResNetConfig, ResNetDepth,
+    NetworkError, RMsfmConfig, ResNetConfig, ResNetDepth,
 };
 
 /// ln b is held within these, in learning and in a prediction: errors of ln depth between 0.25 % and a factor of 7.
@@ -51,15 +51,29 @@ impl InputSize {
     }
 }
 
+/// One of the disparities that a depth network gives while it learns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthScale {
+    /// Its width and height are the image's divided by 2 this many times.
+    pub halvings: u32,
+    /// Weight of its reprojection error in the loss.
+    pub weight: f64,
+    /// Weight of its smoothness, which the loss's own multiplies.
+    pub smoothness: f64,
+}
+
 /// What a `DepthNet` is built from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DepthNetConfig {
-    /// The backbone. Where there is a `lite_mono`, only `normalisation` and `frozen_statistics` of it are read.
+    /// The backbone. Where there is a `lite_mono` or an `r_msfm`, only `normalisation` and `frozen_statistics` of it are read.
     pub encoder: ResNetConfig,
     /// Lite-Mono in place of the ResNet and its decoder; absent: those.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lite_mono: Option<LiteMonoConfig>,
+    /// R-MSFM in place of them; absent: those.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub r_msfm: Option<RMsfmConfig>,
     /// Hierarchical context encoding of the features of `layer1`…`layer4` on their way to the decoder;
     /// absent: the decoder reads the features as they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -77,7 +91,7 @@ pub struct DepthNetConfig {
     #[serde(default)]
     pub range: DepthRange,
     /// The depth in metres that a new network starts at everywhere, by the heads' bias; absent: the
-    /// heads start with a random bias.
+    /// heads start with a random bias. R-MSFM, a trained one too, refines from this depth; absent: from the middle of the range of disparities.
     ///
     /// With a bias near zero the first depths are about 0.2 m, and a metric pose then projects every
     /// pixel out of view: nothing is left to learn from.
@@ -95,6 +109,7 @@ impl DepthNetConfig {
         Self {
             encoder: ResNetConfig::new(depth),
             lite_mono: None,
+            r_msfm: None,
             hce: None,
             attention: None,
             aggregation: false,
@@ -142,9 +157,50 @@ impl DepthNetConfig {
         }
     }
 
-    /// Lite-Mono has an encoder and a decoder of its own; settings of others would say nothing.
-    fn validate_lite_mono(&self, lite_mono: &LiteMonoConfig) -> Result<(), NetworkError> {
-        lite_mono.validate()?;
+    /// R-MSFM: its normalisation, its range of 0.1 to 100, refining from 10 m.
+    #[must_use]
+    pub fn r_msfm(iterations: usize) -> Self {
+        Self {
+            r_msfm: Some(RMsfmConfig { iterations }),
+            initial_depth_m: Some(10.0),
+            ..Self::monodepth2(ResNetDepth::ResNet18)
+        }
+    }
+
+    /// Whether the network is a ResNet with its decoder, whose features others may share.
+    #[must_use]
+    pub fn is_resnet(&self) -> bool {
+        self.lite_mono.is_none() && self.r_msfm.is_none()
+    }
+
+    /// The disparities that the network gives while it learns, in the order in which it gives them. A decoder's scales count alike, their
+    /// smoothness by their size; each refinement counts nine tenths of the next, the last one whole.
+    #[must_use]
+    pub fn scales(&self) -> Vec<DepthScale> {
+        if let Some(r_msfm) = &self.r_msfm {
+            let refinements = 0..r_msfm.iterations;
+            let weight = |age: usize| 0.9_f64.powi(i32::try_from(age).unwrap_or(i32::MAX));
+            return refinements
+                .map(|age| DepthScale {
+                    halvings: 0,
+                    weight: weight(age),
+                    smoothness: weight(age),
+                })
+                .collect();
+        }
+        let count = if self.lite_mono.is_some() { 3 } else { 4 };
+        let weight = 1.0 / f64::from(count);
+        (0..count)
+            .map(|halvings| DepthScale {
+                halvings,
+                weight,
+                smoothness: weight / f64::from(1_u32 << halvings),
+            })
+            .collect()
+    }
+
+    /// Lite-Mono and R-MSFM have an encoder and a decoder of their own; settings of others would say nothing.
+    fn validate_own_body(&self) -> Result<(), NetworkError> {
         let read = ResNetConfig {
             normalisation: self.encoder.normalisation,
             frozen_statistics: self.encoder.frozen_statistics,
@@ -161,10 +217,26 @@ impl DepthNetConfig {
             None => Ok(()),
             Some((field, _)) => Err(NetworkError::config(
                 field,
-                "left as it is where there is a lite_mono, which does not read it",
+                "left as it is where there is a lite_mono or an r_msfm, which do not read it",
                 "another value",
             )),
         }
+    }
+
+    fn validate_r_msfm(&self, r_msfm: &RMsfmConfig) -> Result<(), NetworkError> {
+        r_msfm.validate()?;
+        let refused = |field, found: &str| {
+            let expected = "absent where there is an r_msfm";
+            Err(NetworkError::config(field, expected, found.to_owned()))
+        };
+        if self.lite_mono.is_some() {
+            return refused("lite_mono", "another network");
+        }
+        if self.uncertainty {
+            // Its finest feature has an eighth of the image's size.
+            return refused("uncertainty", "true");
+        }
+        Ok(())
     }
 
     /// # Errors
@@ -178,7 +250,13 @@ impl DepthNetConfig {
         self.decoder.validate()?;
         self.lite_mono
             .as_ref()
-            .map_or(Ok(()), |lite_mono| self.validate_lite_mono(lite_mono))?;
+            .map_or(Ok(()), LiteMonoConfig::validate)?;
+        self.r_msfm
+            .as_ref()
+            .map_or(Ok(()), |r_msfm| self.validate_r_msfm(r_msfm))?;
+        if !self.is_resnet() {
+            self.validate_own_body()?;
+        }
         if self.encoder.frames != 1 {
             return Err(NetworkError::config(
                 "encoder.frames",

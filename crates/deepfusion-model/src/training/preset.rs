@@ -25,6 +25,9 @@ pub enum Preset {
     Paper,
     /// Monodepth2's network and losses (three frames, minimum reprojection) with the speed term.
     Monodepth2,
+    /// The same with ResNet-50 in both networks.
+    #[serde(rename = "monodepth2-50")]
+    Monodepth2R50,
     /// Lite-Mono (3.1 M parameters) with the losses of `monodepth2`, 640×192.
     #[serde(rename = "lite-mono")]
     LiteMono,
@@ -37,6 +40,12 @@ pub enum Preset {
     /// Lite-Mono-8M: 8.7 M.
     #[serde(rename = "lite-mono-8m")]
     LiteMono8m,
+    /// R-MSFM3 (3.5 M parameters): a disparity refined three times, with the losses of `monodepth2`, 640×192.
+    #[serde(rename = "r-msfm3")]
+    RMsfm3,
+    /// R-MSFM6: refined six times, 3.8 M.
+    #[serde(rename = "r-msfm6")]
+    RMsfm6,
 }
 
 /// What a run computes on, as far as a preset's sizes follow it.
@@ -55,16 +64,19 @@ const MIN_STEPS: usize = 1200;
 
 impl Preset {
     /// All presets.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 12] = [
         Self::Tiny,
         Self::Light,
         Self::Resnet50,
         Self::Paper,
         Self::Monodepth2,
+        Self::Monodepth2R50,
         Self::LiteMono,
         Self::LiteMonoSmall,
         Self::LiteMonoTiny,
         Self::LiteMono8m,
+        Self::RMsfm3,
+        Self::RMsfm6,
     ];
 
     /// Its name, on the command line and in files.
@@ -76,10 +88,13 @@ impl Preset {
             Self::Resnet50 => "resnet50",
             Self::Paper => "paper",
             Self::Monodepth2 => "monodepth2",
+            Self::Monodepth2R50 => "monodepth2-50",
             Self::LiteMono => "lite-mono",
             Self::LiteMonoSmall => "lite-mono-small",
             Self::LiteMonoTiny => "lite-mono-tiny",
             Self::LiteMono8m => "lite-mono-8m",
+            Self::RMsfm3 => "r-msfm3",
+            Self::RMsfm6 => "r-msfm6",
         }
     }
 
@@ -174,7 +189,34 @@ impl Preset {
             depth_net: DepthNetConfig::lite_mono(size),
             ..Self::Monodepth2.config()
         };
+        // Their trainer's AdamW and clipping; its one-cycle schedule is nearest to a cosine with warm-up.
+        let r_msfm = |iterations: usize| TrainConfig {
+            preset: self,
+            epochs: 40,
+            learning_rate_schedule: LearningRateSchedule::Cosine,
+            weight_decay: 5e-5,
+            clip_norm: 1.0,
+            depth_net: DepthNetConfig::r_msfm(iterations),
+            ..Self::Monodepth2.config()
+        };
+        let monodepth2 = |depth: ResNetDepth| {
+            let mut config = base(depth);
+            config.frames = vec![-1, 1];
+            config.reprojection = Reprojection::Minimum;
+            config.depth_net = DepthNetConfig {
+                // A metric pose needs a first depth that keeps pixels in view.
+                initial_depth_m: Some(10.0),
+                ..DepthNetConfig::monodepth2(depth)
+            };
+            config.pose_net = PoseNetConfig {
+                metres_per_unit: 0.0,
+                ..PoseNetConfig::monodepth2(depth)
+            };
+            config
+        };
         match self {
+            Self::RMsfm3 => r_msfm(3),
+            Self::RMsfm6 => r_msfm(6),
             Self::LiteMono => lite_mono(LiteMonoSize::Full),
             Self::LiteMonoSmall => lite_mono(LiteMonoSize::Small),
             Self::LiteMonoTiny => lite_mono(LiteMonoSize::Tiny),
@@ -213,21 +255,8 @@ impl Preset {
                 config.loss = config.loss.with_every_term();
                 config
             }
-            Self::Monodepth2 => {
-                let mut config = base(ResNetDepth::ResNet18);
-                config.frames = vec![-1, 1];
-                config.reprojection = Reprojection::Minimum;
-                config.depth_net = DepthNetConfig {
-                    // A metric pose needs a first depth that keeps pixels in view.
-                    initial_depth_m: Some(10.0),
-                    ..DepthNetConfig::monodepth2(ResNetDepth::ResNet18)
-                };
-                config.pose_net = PoseNetConfig {
-                    metres_per_unit: 0.0,
-                    ..PoseNetConfig::monodepth2(ResNetDepth::ResNet18)
-                };
-                config
-            }
+            Self::Monodepth2 => monodepth2(ResNetDepth::ResNet18),
+            Self::Monodepth2R50 => monodepth2(ResNetDepth::ResNet50),
         }
     }
 }

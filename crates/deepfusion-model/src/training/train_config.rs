@@ -112,6 +112,13 @@ pub struct DataConfig {
     /// What is learned from.
     #[serde(skip_serializing_if = "Learn::is_own_motion")]
     pub learn: Learn,
+    /// Threads that decode, resize and render ahead of the training; absent: one a processor, at most 4.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loader_threads: Option<usize>,
+    /// Memory for images at the run's size, in MiB, so that they are decoded once and not every epoch; absent: 2048. Workers and trials on one
+    /// machine have one each.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cache_mib: Option<usize>,
     /// Several data sets with cameras, ranges and displacements of their own, instead of `paths`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<DataSetConfig>,
@@ -228,6 +235,24 @@ fn checkpoint_minutes() -> f64 {
 }
 
 impl DataConfig {
+    /// Most threads that load where nothing else is said.
+    const LOADER_THREADS: usize = 4;
+
+    /// How many threads load on this machine.
+    #[must_use]
+    pub fn loader_threads_here(&self) -> usize {
+        self.loader_threads.unwrap_or_else(|| {
+            let processors = std::thread::available_parallelism().map_or(1, usize::from);
+            processors.min(Self::LOADER_THREADS)
+        })
+    }
+
+    /// Bytes of images that may be kept.
+    #[must_use]
+    pub fn cache_bytes(&self) -> usize {
+        self.cache_mib.unwrap_or(2048).saturating_mul(1 << 20)
+    }
+
     /// Makes every path absolute, so that the run is gone on with and measured from any folder.
     pub fn make_absolute(&mut self) {
         // Every field by name: one that is added says whether it is a path.
@@ -240,6 +265,8 @@ impl DataConfig {
             topics: _,
             camera: _,
             learn: _,
+            loader_threads: _,
+            cache_mib: _,
             sets,
         } = self;
         let mut all: Vec<&mut PathBuf> = paths.iter_mut().chain(validation).collect();
@@ -431,15 +458,20 @@ impl TrainConfig {
             let expected = "false where nothing is learned from known depth: the head has nothing else to learn from";
             return fail("depth_net.uncertainty", expected, "true".into());
         }
-        if self.depth_net.lite_mono.is_some() && self.loss.flow.weight > 0.0 {
+        if !self.depth_net.is_resnet() && self.loss.flow.weight > 0.0 {
             return fail(
                 "loss.flow.weight",
-                "0 where there is a depth_net.lite_mono: the flow decoder reads a ResNet's features",
+                "0 where the depth network is no ResNet with its decoder: the flow decoder reads a ResNet's features",
                 self.loss.flow.weight.to_string(),
             );
         }
         if self.batch == 0 {
             return fail("batch", "at least 1", "0".into());
+        }
+        if let Some(threads) = self.data.loader_threads
+            && !(1..=1024).contains(&threads)
+        {
+            return fail("data.loader_threads", "1 to 1024", threads.to_string());
         }
         if self.accumulate == 0 {
             return fail("accumulate", "at least 1", "0".into());
@@ -563,6 +595,8 @@ mod tests {
             topics: Vec::new(),
             camera: "both".into(),
             learn: Learn::default(),
+            loader_threads: None,
+            cache_mib: None,
             sets: vec![set],
         };
         data.make_absolute();

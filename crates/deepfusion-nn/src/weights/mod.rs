@@ -8,6 +8,7 @@ mod file;
 mod lite_mono;
 mod module;
 mod monodepth2;
+mod r_msfm;
 mod torchvision;
 
 pub use deepfusion_model::weights::{
@@ -17,4 +18,5 @@ pub use file::read;
 pub use lite_mono::{ImportedLiteMono, is_lite_mono, load_lite_mono};
 pub use module::{apply, collect};
 pub use monodepth2::{Monodepth2, Monodepth2Files, Pose, load_monodepth2};
-pub use torchvision::{detect_resnet, load_torchvision_resnet};
+pub use r_msfm::{ImportedRMsfm, is_r_msfm, load_r_msfm};
+pub use torchvision::{detect_resnet, load_torchvision_half, load_torchvision_resnet};

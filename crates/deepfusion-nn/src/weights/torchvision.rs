@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{Weights, apply, read};
+use crate::r_msfm::HalfResNet;
 use crate::{Error, ResNet, ResNetDepth};
 
 /// Reads ImageNet weights, as torchvision publishes them (`resnet18-f37072fd.pth` and its like, or
@@ -16,6 +17,27 @@ pub fn load_torchvision_resnet(encoder: ResNet, path: &Path) -> Result<ResNet, E
     let weights = read(path)?;
     detect_resnet(&weights)?;
     apply_torchvision(encoder, weights)
+}
+
+/// The same for the half of a ResNet-18 that R-MSFM has: what lies behind it is left out.
+///
+/// # Errors
+/// As [`load_torchvision_resnet`].
+pub fn load_torchvision_half(encoder: HalfResNet, path: &Path) -> Result<HalfResNet, Error> {
+    let weights = read(path)?;
+    detect_resnet(&weights)?;
+    apply_half(encoder, weights)
+}
+
+/// [`load_torchvision_half`] on tensors already read, under torchvision's names.
+pub(super) fn apply_half(encoder: HalfResNet, weights: Weights) -> Result<HalfResNet, Error> {
+    let behind = |name: &str| {
+        ["layer3.", "layer4.", "fc."]
+            .iter()
+            .any(|part| name.starts_with(part))
+    };
+    let weights = weights.renamed(|name| (!behind(name)).then(|| name.to_owned()));
+    apply(encoder, &weights)
 }
 
 /// [`load_torchvision_resnet`] on tensors already read, under torchvision's names.

@@ -11,7 +11,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::module::{Module, ModuleVisitor, Param};
+use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use deepfusion_nn::weights::{self, Weights};
 use flate2::read::GzDecoder;
 use safetensors::tensor::{Dtype, TensorView};
@@ -159,4 +160,94 @@ pub(crate) fn largest_error(expected: &Weights, name: &str, actual: &[f32], step
 
 pub(crate) fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.into_data().iter::<f32>().collect()
+}
+
+/// The loss of the references' training step: Σ_k mean(σ_k · pattern_k).
+pub(crate) fn pattern_loss(
+    disparities: impl IntoIterator<Item = Tensor<4>>,
+    device: &Device,
+) -> Tensor<1> {
+    let parts = disparities
+        .into_iter()
+        .enumerate()
+        .map(|(index, disparity)| {
+            let shape = disparity.dims();
+            let pattern = uniform(&format!("pattern{index}"), shape.iter().product(), None);
+            let pattern = Tensor::<4>::from_data(TensorData::new(pattern, shape), device);
+            disparity.mul(pattern).mean()
+        });
+    parts.reduce(Tensor::add).unwrap()
+}
+
+/// The gradient of every weight of a network that has one, by its name.
+pub(crate) fn gradients(net: &impl Module, loss: Tensor<1>) -> Vec<(String, Vec<f32>)> {
+    struct Collect<'a> {
+        path: Vec<String>,
+        gradients: &'a mut Gradients,
+        found: Vec<(String, Vec<f32>)>,
+    }
+    impl ModuleVisitor for Collect<'_> {
+        fn enter_module(&mut self, name: &str, _: &str) {
+            self.path.push(name.to_owned());
+        }
+        fn exit_module(&mut self, _: &str, _: &str) {
+            self.path.pop();
+        }
+        fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+            if let Some(gradient) = param.val().grad_remove(self.gradients) {
+                self.found.push((self.path.join("."), values(gradient)));
+            }
+        }
+    }
+    let mut gradients = loss.backward();
+    let mut collect = Collect {
+        path: Vec::new(),
+        gradients: &mut gradients,
+        found: Vec::new(),
+    };
+    net.visit(&mut collect);
+    collect.found
+}
+
+/// That gradients are those of a reference, whose tensors `theirs` names: each to 1e-4 of its root mean square, and all together. Where the
+/// reference says how far PyTorch's own float32 gradient is off (`…/float32`, in the same measure), three times that is allowed.
+pub(crate) fn check_gradients(
+    expected: &Weights,
+    found: Vec<(String, Vec<f32>)>,
+    theirs: impl Fn(&str) -> String,
+) {
+    let names = expected.tensors.keys();
+    let norms = names.filter(|name| name.ends_with("/norm")).count();
+    assert_eq!(found.len(), norms);
+    let (mut worst, mut total, mut exact) = ((0.0, String::new()), 0.0, 0.0);
+    for (name, gradient) in found {
+        let theirs = theirs(&name);
+        let norm = expected.tensors[&format!("{theirs}/norm")].values[0];
+        let rms = norm / (gradient.len() as f32).sqrt();
+        let square = gradient.iter().map(|g| f64::from(*g).powi(2)).sum::<f64>();
+        total += square;
+        exact += f64::from(norm).powi(2);
+        let step = (gradient.len() / 11).max(1) | 1;
+        let name = format!("{theirs}/gradient");
+        let (off, _) = largest_difference(expected, &name, &gradient, step);
+        // What is nothing but rounding (a bias before a norm) is measured against 1e-6 of all.
+        let error = off / rms.max(1e-6 * (exact as f32).sqrt());
+        let theirs = expected.tensors.get(&format!("{theirs}/float32"));
+        let allowed = theirs.map_or(1e-4, |t| t.values[0].mul_add(3.0, 1e-4));
+        if error / allowed > worst.0 {
+            worst = (
+                error / allowed,
+                format!("{name}: {error:.1e} of {allowed:.1e}"),
+            );
+        }
+    }
+    println!("worst gradient {worst:?}");
+    assert!(worst.0 < 1.0, "{worst:?}");
+    let theirs = expected.tensors.get("float32_total");
+    let allowed = theirs.map_or(1e-4, |t| t.values[0].mul_add(3.0, 1e-4));
+    let off = (total / exact - 1.0).abs();
+    assert!(
+        off < f64::from(allowed),
+        "{total} for {exact}: {off:.1e} of {allowed:.1e}"
+    );
 }

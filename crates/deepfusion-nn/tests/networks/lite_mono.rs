@@ -12,16 +12,15 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use burn::module::{Module, ModuleVisitor, Param};
-use burn::tensor::{Device, Gradients, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 use deepfusion_nn::weights::{
     self, Monodepth2Files, Weights, collect, load_lite_mono, load_monodepth2,
 };
 use deepfusion_nn::{DepthNet, DepthNetConfig, Error, LiteMonoSize};
 
 use crate::common::{
-    BATCH, HEIGHT, Listing, WIDTH, images, largest_difference, reference, uniform, unpack, values,
-    write_listed,
+    BATCH, HEIGHT, Listing, WIDTH, check_gradients, gradients, images, largest_difference,
+    pattern_loss, reference, unpack, values, write_listed,
 };
 
 const NAMES: [(&str, LiteMonoSize); 4] = [
@@ -216,67 +215,12 @@ fn gradients_and_running_statistics_are_pytorchs() {
     let files = files(folder.path(), "lite-mono-tiny");
     let net = load_lite_mono(&files, &device).unwrap().depth_net;
     let disparities = net.forward(images("images", 3, &device)).into_iter();
-    let loss = disparities.enumerate().map(|(scale, disparity)| {
-        let shape = disparity.dims();
-        let pattern = uniform(&format!("pattern{scale}"), shape.iter().product(), None);
-        let pattern = Tensor::<4>::from_data(TensorData::new(pattern, shape), &device);
-        disparity.mul(pattern).mean()
-    });
-    let loss = loss.reduce(Tensor::add).unwrap();
+    let loss = pattern_loss(disparities, &device);
     let expected = expected().under("training/");
     let off = values(loss.clone())[0] - expected.tensors["loss"].values[0];
     assert!(off.abs() < 1e-6, "loss off by {off:e}");
 
-    struct Collect<'a> {
-        path: Vec<String>,
-        gradients: &'a mut Gradients,
-        found: Vec<(String, Vec<f32>)>,
-    }
-    impl ModuleVisitor for Collect<'_> {
-        fn enter_module(&mut self, name: &str, _: &str) {
-            self.path.push(name.to_owned());
-        }
-        fn exit_module(&mut self, _: &str, _: &str) {
-            self.path.pop();
-        }
-        fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-            if let Some(gradient) = param.val().grad_remove(self.gradients) {
-                self.found.push((self.path.join("."), values(gradient)));
-            }
-        }
-    }
-    let mut gradients = loss.backward();
-    let mut collect_gradients = Collect {
-        path: Vec::new(),
-        gradients: &mut gradients,
-        found: Vec::new(),
-    };
-    net.visit(&mut collect_gradients);
-    let norms = expected
-        .tensors
-        .keys()
-        .filter(|name| name.ends_with("/norm"));
-    assert_eq!(collect_gradients.found.len(), norms.count());
-    let (mut worst, mut total, mut exact) = ((0.0, String::new()), 0.0, 0.0);
-    for (name, gradient) in collect_gradients.found {
-        let theirs = pytorch_name(&name);
-        let norm = expected.tensors[&format!("{theirs}/norm")].values[0];
-        let rms = norm / (gradient.len() as f32).sqrt();
-        let square = gradient.iter().map(|g| f64::from(*g).powi(2)).sum::<f64>();
-        total += square;
-        exact += f64::from(norm).powi(2);
-        let step = (gradient.len() / 11).max(1) | 1;
-        let name = format!("{theirs}/gradient");
-        let (off, _) = largest_difference(&expected, &name, &gradient, step);
-        // What is nothing but rounding (a bias before a norm) is measured against 1e-6 of all.
-        let error = off / rms.max(1e-6 * (exact as f32).sqrt());
-        if error > worst.0 {
-            worst = (error, name);
-        }
-    }
-    println!("worst gradient {worst:?}");
-    assert!(worst.0 < 1e-4, "{worst:?}");
-    assert!((total / exact - 1.0).abs() < 1e-4, "{total} for {exact}");
+    check_gradients(&expected, gradients(&net, loss), pytorch_name);
 
     let mut compared = 0;
     for (name, tensor) in collect(&net).tensors {

@@ -7,5 +7,6 @@ mod depth_network;
 mod flow_decoder;
 mod lite_mono;
 mod operations;
+mod r_msfm;
 mod training_step;
 mod weight_files;

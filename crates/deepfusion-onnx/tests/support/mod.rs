@@ -166,6 +166,53 @@ fn mixed(random: &mut Random, graph: &mut Graph, x: ValueId, name: &str) -> Op {
     }
 }
 
+/// A gated unit's step from a value, and the last operation of all: its new state.
+fn gated(random: &mut Random, graph: &mut Graph, x: ValueId, name: &str) -> Op {
+    let channels = graph.shape(x).channels;
+    let mut layer = |part: &str, input: ValueId, activation: Activation, graph: &mut Graph| {
+        let op = Conv {
+            activation,
+            ..conv(random, graph, input, channels)
+        };
+        graph
+            .push(format!("{name}.{part}"), Op::Conv(Box::new(op)))
+            .unwrap()
+    };
+    let share = layer("share", x, Activation::Sigmoid, graph);
+    let reset = layer("reset", x, Activation::Tanh, graph);
+    let kept = Op::Multiply { inputs: [reset, x] };
+    let kept = graph.push(format!("{name}.kept"), kept).unwrap();
+    let candidate = layer("candidate", kept, Activation::LeakyRelu, graph);
+    Op::Blend {
+        state: x,
+        candidate,
+        share,
+    }
+}
+
+/// A value's first step to the image's size by weights, and the last operation of all.
+fn enlarged_by_weights(
+    random: &mut Random,
+    graph: &mut Graph,
+    x: ValueId,
+    name: &str,
+    halvings: u32,
+) -> Op {
+    let mut layer = |part: &str, channels: usize| {
+        let op = conv(random, graph, x, channels);
+        graph
+            .push(format!("{name}.{part}"), Op::Conv(Box::new(op)))
+            .unwrap()
+    };
+    let input = layer("small", 1);
+    let weights = layer("weights", 9 << (2 * halvings));
+    Op::ConvexUpsample {
+        input,
+        weights,
+        halvings,
+    }
+}
+
 /// A network of every operation, in an order and with connections that the seed decides.
 pub(crate) fn model(seed: u64) -> DepthModel {
     let mut random = Random(seed);
@@ -179,7 +226,7 @@ pub(crate) fn model(seed: u64) -> DepthModel {
         let shape = graph.shape(input);
         let channels_out = 1 + r.below(5);
         let name = format!("stage.{i}");
-        let op = match r.below(9) {
+        let op = match r.below(11) {
             0 if shape.halvings < 2 => Op::MaxPool { input },
             1 if shape.halvings > 0 => {
                 let fitting = |v: &&ValueId| graph.shape(**v).halvings + 1 == shape.halvings;
@@ -197,6 +244,10 @@ pub(crate) fn model(seed: u64) -> DepthModel {
             6 => depthwise(r, &graph, input),
             7 => mixed(r, &mut graph, input, &name),
             8 if shape.halvings > 0 => Op::Enlarge { input },
+            9 => gated(r, &mut graph, input, &name),
+            10 if shape.halvings > 0 => {
+                enlarged_by_weights(r, &mut graph, input, &name, shape.halvings)
+            }
             _ => {
                 let mut conv = conv(r, &graph, input, channels_out);
                 if shape.halvings < 2 && r.below(3) == 0 {

@@ -1,6 +1,6 @@
 use std::fmt::Write as _;
 
-use deepfusion_eval::{Crop, GroundTruth, IntervalRow, Intervals, Metrics, Report, Sharpness};
+use deepfusion_eval::{Crop, IntervalRow, Intervals, Metrics, Report, Sharpness};
 
 use super::escape;
 
@@ -115,10 +115,7 @@ pub(super) fn evaluation(report: &Report) -> String {
         Crop::None => "the whole image",
         Crop::Garg => "Garg's crop",
     };
-    let gt = match report.protocol.gt {
-        GroundTruth::Z => "camera z",
-        GroundTruth::Velodyne => "the velodyne's forward distance",
-    };
+    let gt = report.protocol.gt.meaning();
     let _ = write!(
         out,
         "<p class=\"note\">Means over {} image{}: {crop}, {} to {} m, ground truth: {gt}.{}</p>",
@@ -266,7 +263,7 @@ fn scale_table(report: &Report) -> String {
         });
         rows.push(vec![
             format!(
-                "holes: nearer than {} m, seen at the far limit or over 3 times too far",
+                "holes: nearer than {} m, predicted at the far limit or more than 3 times too far",
                 report.protocol.cap_m * 0.5
             ),
             format!("{:.2} %{moving}", 100.0 * rate),

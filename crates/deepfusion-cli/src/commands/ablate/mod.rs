@@ -9,6 +9,7 @@ use std::time::Instant;
 use burn::tensor::Device;
 use deepfusion_data::{Cameras, GtKind};
 use deepfusion_eval::{GroundTruth, Protocol, Report};
+use deepfusion_hint::count_of;
 use deepfusion_jobs::evaluation::{
     Truth, baseline_from_datasets, default_crop, evaluate_datasets, predict,
 };
@@ -44,7 +45,7 @@ struct Plan {
     config: TrainConfig,
 }
 
-/// A configuration; one that came from a run of before may say what that run found out.
+/// A configuration; one that an earlier run wrote may also hold that run's findings.
 fn settings<'de, D: Deserializer<'de>>(from: D) -> Result<TrainConfig, D::Error> {
     let read = TrainConfig::from_run_table(toml::Table::deserialize(from)?);
     Ok(read.map_err(serde::de::Error::custom)?.0)
@@ -153,7 +154,7 @@ fn new_plan(args: &AblateArgs) -> Result<Plan> {
     config.data.camera = camera_word(args.camera).into();
     // Every row begins anew.
     (config.init, config.init_sha256) = (None, None);
-    // It is gone on with from any folder.
+    // It may be resumed from any folder.
     config.make_absolute();
     let absolute = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
     Ok(Plan {
@@ -344,9 +345,9 @@ fn write_tables(out: &Path, plan: &Plan, results: &[RunResult]) -> Result<()> {
         "measured on other recordings than those trained on"
     };
     text.push_str(&format!(
-        "\n{} steps a run, {place}; mean ± standard deviation over seeds; \
+        "\n{} a run, {place}; mean ± standard deviation over seeds; \
         the seven metrics unscaled, abs_rel_scaled after median scaling; parameters of the depth network\n",
-        plan.budget
+        count_of(plan.budget, "step")
     ));
     if let Some(mean_depth_baseline) = results
         .iter()

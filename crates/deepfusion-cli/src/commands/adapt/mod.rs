@@ -118,7 +118,7 @@ impl HeldOut {
             (alone.init, alone.init_sha256) = (None, None);
             unseen = unseen_frames(&alone, &datasets);
             say(
-                "the given network may have learned from the frames that are held out here: before may look better than it is",
+                "the given network may have learned from the frames that are held out here: the figures before may be optimistic",
             );
         }
         Ok(Self { datasets, unseen })

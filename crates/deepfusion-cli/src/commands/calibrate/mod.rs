@@ -6,6 +6,7 @@ mod summary;
 
 use deepfusion_calibrate::{Board, Calibration, Error, LEAST_VIEWS, calibrate};
 use deepfusion_data::{Lens, camera_info_yaml};
+use deepfusion_hint::count_of;
 use serde::Serialize;
 
 use crate::cli::CalibrateArgs;
@@ -122,8 +123,8 @@ fn comments(found: &Calibration, board: &Board) -> Vec<String> {
     let errors = &found.standard_errors;
     vec![
         format!(
-            "deepfusion calibrate: {} views of a board of {}x{} inner corners, squares of {} m; error {:.3} px (root mean square)",
-            found.used(),
+            "deepfusion calibrate: {} of a board of {}x{} inner corners, squares of {} m; error {:.3} px (root mean square)",
+            count_of(found.used(), "view"),
             board.columns,
             board.rows,
             board.square_m,

@@ -4,16 +4,19 @@ use deepfusion_hint::count_of;
 use std::fmt;
 use std::path::Path;
 
-use deepfusion_data::{Cameras, Dataset, OpenOptions, RgbImage};
+use deepfusion_data::{Cameras, Dataset, GtKind, OpenOptions, RgbImage};
 use deepfusion_eval::compare::{FrameScore, Measured, ModelFile, SAVED_VERSION, SavedEvaluation};
 use deepfusion_eval::verdict::{ScaleCertificate, Verdict};
-use deepfusion_eval::{ArraySet, Crop, Grid, Prediction, Protocol, Report};
+use deepfusion_eval::{
+    ArraySet, Crop, Grid, PostProcess, Prediction, Protocol, Report, points_csv,
+};
 use deepfusion_geometry::Intrinsics;
 use deepfusion_jobs::evaluation::confidence::{self, Calibrated};
 pub(super) use deepfusion_jobs::evaluation::predict;
 use deepfusion_jobs::evaluation::{
     Evaluated, ImageRef, Truth, array_places, baseline_from_arrays, baseline_from_training,
     check_used, default_crop, depth_map, evaluate_arrays, evaluate_datasets, expected_frames,
+    predict_post_processed,
 };
 use deepfusion_jobs::held_out::{held_out, unseen};
 use deepfusion_jobs::intervals;
@@ -39,7 +42,7 @@ use crate::progress::{Progress, say};
 
 /// `deepfusion eval`.
 pub(super) fn run(args: &EvalArgs) -> Result<()> {
-    if let Some(file) = &args.report {
+    for file in [&args.report, &args.points_out].into_iter().flatten() {
         output::require_folder_of(file)?;
     }
     let found = match (&args.pred, args.pred_kind, &args.gt) {
@@ -134,7 +137,11 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
     options.camera_ahead_s = clocks::seconds(args.clock_offset, &args.data, &options)?;
     let datasets = open_recordings(&args.data, &options)?;
     let found = verdict::of_model(args, &model, &mut estimator, &datasets)?;
-    if found.is_some() && !verdict::has_truth(args, &datasets) {
+    // Who asks for a figure that needs ground truth is told where there is none.
+    let needs_truth = args.gt_depth == GtKind::Annotated
+        || args.points_out.is_some()
+        || args.post_process.is_some();
+    if found.is_some() && !needs_truth && !verdict::has_truth(args, &datasets) {
         return verdict::alone(args, &model, found, UsedCheckpoint::of(&estimator, &model));
     }
     let expected = expected_frames(&options, &datasets, args.strict)?;
@@ -153,6 +160,10 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
     let see = |estimator: &mut DepthEstimator, dataset: &Dataset, frame: usize| -> Result<_> {
         let image = dataset.load_image(frame)?;
         let camera = dataset.intrinsics(frame);
+        let predict = match args.post_process {
+            Some(PostProcess::Flip) => predict_post_processed,
+            None => predict,
+        };
         let prediction = predict(estimator, &image, &camera, !args.no_focal_correction)?;
         Ok((image, prediction))
     };
@@ -168,7 +179,8 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
     if let Some(shortfall) = check_used(&options, &datasets, evaluated.report.n, args.strict)? {
         warnings::warn_once(shortfall.to_string());
     }
-    if estimator.knows_uncertainty() && args.gt.is_none() {
+    // The intervals that a network predicts are those of its own prediction alone.
+    if estimator.knows_uncertainty() && args.gt.is_none() && args.post_process.is_none() {
         let kept = intervals::measure(
             (&model, &mut estimator),
             &datasets,
@@ -179,13 +191,14 @@ fn from_model(args: &EvalArgs) -> Result<Found> {
         )?;
         if let Some((found, path)) = kept {
             say(&format!(
-                "intervals calibrated on {} pixels of {} drives, kept as {}; what stands below is of the same pixels, measure on others",
-                found.pixels,
-                found.drives,
+                "intervals calibrated on {} of {}, kept as {}; the figures below are of the same pixels: measure on other drives",
+                count_of(found.pixels, "pixel"),
+                count_of(found.drives, "drive"),
                 path.display()
             ));
         }
     }
+    write_points(args, &evaluated)?;
     let saved = saved(args, &estimator, &model, &datasets, &evaluated)?;
     match model.folder().map(|folder| saved.write(folder)) {
         Some(Ok(path)) => say(&format!("kept as {}", path.display())),
@@ -311,6 +324,7 @@ fn from_arrays(
         baseline,
         &mut |done, total| progress.set(done, total),
     )?;
+    write_points(args, &evaluated)?;
     if let Some(path) = &args.report {
         let shown = shown(&evaluated, |ImageRef(prediction, depth)| {
             Ok(Some(Seen {
@@ -331,6 +345,18 @@ fn from_arrays(
         say(&format!("report  {}", path.display()));
     }
     Ok(evaluated.report)
+}
+
+/// Writes the drawn points where `--points-out` asks for them.
+fn write_points(args: &EvalArgs, evaluated: &Evaluated) -> Result<()> {
+    let Some(path) = &args.points_out else {
+        return Ok(());
+    };
+    let in_space = evaluated.report.points.as_ref().is_some_and(|p| p.in_space);
+    let text = points_csv(&evaluated.points, &evaluated.images, in_space)?;
+    deepfusion_fs::write(path, text).map_err(|e| deepfusion_data::Error::file(path, e))?;
+    say(&format!("points  {}", path.display()));
+    Ok(())
 }
 
 /// What there is to show of an image.
@@ -435,6 +461,7 @@ fn saved(
             engine: format!("{} {precision}", estimator.engine()),
             set: args.engine.set.clone(),
             focal_correction: !args.no_focal_correction,
+            post_process: args.post_process,
             held_out: match model {
                 ModelSource::Run { .. } => {
                     held_out(estimator.config(), datasets, &evaluated.places)
@@ -470,6 +497,7 @@ fn how_a_model_was_measured(
     let data = args.data.iter().map(|p| p.display().to_string());
     let truth = match &args.gt {
         Some(path) => path.display().to_string(),
+        None if args.gt_depth == GtKind::Annotated => "KITTI's annotated depth".into(),
         None => "the recordings' scans".into(),
     };
     let mut rows = vec![
@@ -495,6 +523,10 @@ fn how_a_model_was_measured(
         ("program", m.program.clone()),
         ("time (UTC)", m.time.clone()),
     ];
+    if m.post_process == Some(PostProcess::Flip) {
+        let how = "the mean with the mirrored image's".to_owned();
+        rows.push(("post-processing", how));
+    }
     if let Some(split) = &args.split {
         rows.insert(1, ("split", split.display().to_string()));
     }

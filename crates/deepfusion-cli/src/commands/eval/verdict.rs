@@ -22,7 +22,7 @@ use crate::progress::{Progress, say};
 pub(super) fn has_truth(args: &EvalArgs, datasets: &[Dataset]) -> bool {
     let known = |dataset: &Dataset| {
         let mut frames = dataset.selected().iter();
-        frames.any(|frame| dataset.has_ground_truth(*frame))
+        frames.any(|frame| dataset.has_ground_truth(*frame, args.gt_depth))
     };
     args.gt.is_some() || datasets.iter().any(known)
 }
@@ -93,7 +93,7 @@ fn add_pose_speeds(
     }
     let device = crate::commands::device::open(args.engine.device)?;
     match PosePredictor::load(given, args.engine.set.as_deref(), &device) {
-        // Of weights that were imported nobody knows whether theirs belongs to them.
+        // The unit of an imported PoseNet is unknown.
         Ok(predictor) if predictor.step == 0 => {}
         Ok(predictor) => {
             found.without_truth.pose_speeds = pose_speeds(&predictor, datasets, unseen, options)?;

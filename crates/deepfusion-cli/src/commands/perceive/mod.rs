@@ -18,7 +18,7 @@ use deepfusion_perception::PerceptionConfig;
 
 use self::frame_processor::{FrameProcessor, PerceivedFrame, StartedFrame};
 use super::live as sources;
-use super::predict::{Job, all_have_files, check_watched, find_inputs};
+use super::predict::{Job, check_watched, find_inputs};
 use crate::cli::{PerceiveArgs, PredictionArgs};
 use crate::error::CliError;
 use crate::failure::{Context, Failure, Result};
@@ -43,15 +43,12 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
         config.max_depth_m = far as f32;
     }
     let mut estimator = engine::load(&model, &prediction.engine)?;
-    let job = Job::new(
-        prediction,
-        args.outputs(
-            f64::from(config.max_depth_m),
-            source.is_none() && all_have_files(&all),
-        ),
-        &model,
-        &estimator,
-    )?;
+    let outputs = args.outputs(f64::from(config.max_depth_m));
+    let outputs = match source {
+        Some(_) => outputs.with_image(),
+        None => outputs,
+    };
+    let job = Job::new(prediction, outputs, &model, &estimator)?;
     let processor = FrameProcessor::open(args, &model, &mut estimator, config)?;
     std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
     if source.is_some() {

@@ -13,7 +13,6 @@ use deepfusion_runtime::Prediction;
 
 use crate::cli::PerceiveSave;
 use crate::failure::{Failure, Result};
-use crate::output;
 
 /// Cells of the free space and how far it reaches, metres.
 const GRID: (f32, f32) = (0.25, 50.0);

@@ -97,12 +97,7 @@ pub(super) fn run(args: &PredictArgs) -> Result<()> {
     }
     let mine: Vec<&Input> = shard.part_of(&all).collect();
     let mut estimator = engine::load(&model, &prediction.engine)?;
-    let job = Job::new(
-        prediction,
-        args.outputs(all_have_files(&all)),
-        &model,
-        &estimator,
-    )?;
+    let job = Job::new(prediction, args.outputs(), &model, &estimator)?;
     let camera_known = !matches!(job.camera, CameraSource::Unknown);
     if args.cloud() && !(camera_known || all.iter().all(|input| input.frame.is_some())) {
         return Err(CliError::NoCamera.into());
@@ -193,13 +188,10 @@ pub(super) fn find_inputs(args: &PredictionArgs, model: &ModelSource) -> Result<
     )?)
 }
 
-/// Whether every image is a file of its own, which whoever looks at its depth can open.
-pub(super) fn all_have_files(inputs: &[Input]) -> bool {
-    let has_file = |input: &Input| match &input.frame {
-        Some((dataset, index)) => dataset.frames()[*index].image.file().is_some(),
-        None => true,
-    };
-    inputs.iter().all(has_file)
+/// Whether an image is a file of its own, which whoever looks at its depth can open.
+fn has_file(input: &Input) -> bool {
+    let frame = input.frame.as_ref();
+    frame.is_none_or(|(dataset, index)| dataset.frames()[*index].image.file().is_some())
 }
 
 /// That the scale monitor's options are not given where it would never look: they would change nothing, silently.
@@ -236,7 +228,7 @@ pub(super) fn check_watched(
 /// Says that the metres have changed.
 pub(super) fn warn_of_drift(frame: &str, ratio: f64) {
     tracing::warn!(
-        "{frame}: the road says that metres are {ratio:.2} times what they were: were the images zoomed, the camera \
+        "{frame}: the scale has drifted: by the road, metres are {ratio:.2} times their initial size. Were the images zoomed, the camera \
          moved, or is the speed wrong? (scale_monitor in each frame's JSON; --correct-scale brings depth back)"
     );
 }
@@ -372,7 +364,11 @@ impl<'a> Job<'a> {
 
     /// What there is of the job in its folder.
     fn bulk<'b>(&'b self, command: &PredictArgs) -> BulkJob<'b> {
-        let save = self.outputs.save.iter();
+        let outputs = match self.outputs.frames {
+            true => &self.outputs.clone().with_image(),
+            false => &self.outputs,
+        };
+        let save = outputs.save.iter();
         BulkJob {
             folder: &self.args.out,
             endings: save.map(|save| outputs::ending(*save)).collect(),
@@ -472,8 +468,12 @@ impl<'a> Job<'a> {
         } else {
             None
         };
+        let outputs = match self.outputs.frames && !has_file(input) {
+            true => &self.outputs.clone().with_image(),
+            false => &self.outputs,
+        };
         let mut files = Vec::new();
-        for save in &self.outputs.save {
+        for save in &outputs.save {
             let file = format!("{}{}", input.name, outputs::ending(*save));
             let path = args.out.join(&file);
             let maps = outputs::Maps {
@@ -482,7 +482,7 @@ impl<'a> Job<'a> {
                 layers: &seen.layers,
                 sigma: sigma.as_ref(),
             };
-            let limits = (self.outputs.max_depth_m, self.outputs.max_sigma);
+            let limits = (outputs.max_depth_m, outputs.max_sigma);
             outputs::write(*save, limits, image, loaded.camera.as_ref(), &maps, &path)?;
             files.push(file);
         }

@@ -1,9 +1,12 @@
 use std::path::{Path, PathBuf};
 
 use burn::tensor::Device;
-use deepfusion_nn::weights::{Monodepth2Files, detect_resnet, load_monodepth2, read};
+use deepfusion_nn::weights::{
+    Monodepth2Files, Pose, detect_resnet, is_lite_mono, is_r_msfm, load_lite_mono, load_monodepth2,
+    load_r_msfm, load_torchvision_resnet, read,
+};
 use deepfusion_nn::{
-    DepthNet, DepthNetConfig, PoseNet, PoseNetConfig, weights::load_torchvision_resnet,
+    DepthNet, DepthNetConfig, InputSize, LiteMonoSize, PoseNet, PoseNetConfig, ResNetDepth,
 };
 use deepfusion_train::{
     Checkpoint, CheckpointKind, Checkpoints, Model, Preset, RunFolder, TrainConfig, TrainFindings,
@@ -19,8 +22,8 @@ pub(crate) fn run(files: &[PathBuf], out: &Path) -> Result<()> {
     let encoders_only = matches!(files, [file] if !file.is_dir());
     let (config, model) = match files {
         [file] if encoders_only => from_resnet(file, &device)?,
-        [folder] => from_monodepth2(&Monodepth2Files::in_folder(folder), &device)?,
-        files => from_monodepth2(&named(files), &device)?,
+        [folder] => from_files(&Monodepth2Files::in_folder(folder), &device)?,
+        files => from_files(&named(files), &device)?,
     };
     let folder = RunFolder::create(&output::run_folder(Some(out), "weights")?)?;
     folder.write_config(&config, &TrainFindings::default())?;
@@ -36,7 +39,7 @@ pub(crate) fn run(files: &[PathBuf], out: &Path) -> Result<()> {
     output::print(&format!("{}\n", path.display()))
 }
 
-/// Monodepth2's files among those given, by their names.
+/// Files in Monodepth2's layout, which Lite-Mono and R-MSFM share, among those given, by their names.
 fn named(files: &[PathBuf]) -> Monodepth2Files {
     let find = |name: &str| {
         let is = |p: &&PathBuf| p.file_stem().is_some_and(|stem| stem == name);
@@ -49,9 +52,62 @@ fn named(files: &[PathBuf]) -> Monodepth2Files {
     }
 }
 
-fn from_monodepth2(files: &Monodepth2Files, device: &Device) -> Result<(TrainConfig, Model)> {
-    let imported = load_monodepth2(files, device)?;
-    let mut config = Preset::Monodepth2.config();
+/// A depth network with its pose network, in whichever of the layouts' files.
+struct Imported {
+    /// Whose settings it goes on with.
+    preset: Preset,
+    depth_config: DepthNetConfig,
+    depth_net: DepthNet,
+    pose: Option<Pose>,
+    input_size: Option<InputSize>,
+}
+
+fn imported(files: &Monodepth2Files, device: &Device) -> Result<Imported> {
+    if is_lite_mono(&read(&files.encoder)?) {
+        let found = load_lite_mono(files, device)?;
+        return Ok(Imported {
+            preset: match found.size {
+                LiteMonoSize::Full => Preset::LiteMono,
+                LiteMonoSize::Small => Preset::LiteMonoSmall,
+                LiteMonoSize::Tiny => Preset::LiteMonoTiny,
+                LiteMonoSize::EightM => Preset::LiteMono8m,
+            },
+            depth_config: found.depth_config,
+            depth_net: found.depth_net,
+            pose: found.pose,
+            input_size: found.input_size,
+        });
+    }
+    if is_r_msfm(&read(&files.depth)?) {
+        let found = load_r_msfm(files, device)?;
+        return Ok(Imported {
+            preset: if found.iterations == 3 {
+                Preset::RMsfm3
+            } else {
+                Preset::RMsfm6
+            },
+            depth_config: found.depth_config,
+            depth_net: found.depth_net,
+            pose: found.pose,
+            input_size: found.input_size,
+        });
+    }
+    let found = load_monodepth2(files, device)?;
+    Ok(Imported {
+        preset: match found.depth_config.encoder.depth {
+            ResNetDepth::ResNet50 => Preset::Monodepth2R50,
+            _ => Preset::Monodepth2,
+        },
+        depth_config: found.depth_config,
+        depth_net: found.depth_net,
+        pose: found.pose,
+        input_size: found.input_size,
+    })
+}
+
+fn from_files(files: &Monodepth2Files, device: &Device) -> Result<(TrainConfig, Model)> {
+    let imported = imported(files, device)?;
+    let mut config = imported.preset.config();
     config.depth_net = imported.depth_config;
     if let Some(size) = imported.input_size {
         config.size = size;

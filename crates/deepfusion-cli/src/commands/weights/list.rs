@@ -1,3 +1,4 @@
+use deepfusion_hint::count_of;
 use deepfusion_weights::{Card, DEFAULT, Figure};
 use serde::Serialize;
 
@@ -5,7 +6,7 @@ use crate::failure::Result;
 use crate::output;
 
 /// What can be imported: name, files, what it gives, terms.
-const KNOWN: [[&str; 4]; 3] = [
+const KNOWN: [[&str; 4]; 5] = [
     [
         "torchvision ResNet-18, 34, 50, 101",
         "resnet*.pth or .safetensors",
@@ -17,6 +18,18 @@ const KNOWN: [[&str; 4]; 3] = [
         "encoder.pth, depth.pth, pose_encoder.pth, pose.pth",
         "the whole networks; depth up to an unknown factor",
         "non-commercial (Niantic)",
+    ],
+    [
+        "Lite-Mono, -small, -tiny, -8m",
+        "encoder.pth, depth.pth",
+        "the depth network; depth up to an unknown factor",
+        "MIT (its authors)",
+    ],
+    [
+        "R-MSFM3, R-MSFM6",
+        "encoder.pth, depth.pth, pose_encoder.pth, pose.pth",
+        "the whole networks; depth up to an unknown factor",
+        "its authors' own; see their repository",
     ],
     [
         "a run of this program",
@@ -129,14 +142,14 @@ fn network_text(card: &Card) -> String {
         ""
     };
     let mut text = format!(
-        "  {}{default}\n    network   {}{size}, {:.2} M parameters, {:.1} MB ({})\n    learned   {} steps, the {} checkpoint, {}\n    \
+        "  {}{default}\n    network   {}{size}, {:.2} M parameters, {:.1} MB ({})\n    learned   {}, the {} checkpoint, {}\n    \
          from      {}{real}\n",
         card.name,
         card.preset(),
         card.parameters as f64 / 1e6,
         card.bytes as f64 / 1e6,
         card.numbers,
-        card.steps,
+        count_of(card.steps, "step"),
         card.checkpoint,
         card.date,
         data.join(", "),
@@ -165,12 +178,12 @@ fn figure_text(figure: &Figure) -> String {
         None => "not known whether seen in training",
     };
     format!(
-        "{}: abs_rel {:.3}, scaled {:.3}, scale {:.3}, within 25 % {:.1} % ({} images, {seen})",
+        "{}: abs_rel {:.3}, scaled {:.3}, scale {:.3}, within 25 % {:.1} % ({}, {seen})",
         figure.data,
         figure.abs_rel,
         figure.abs_rel_scaled,
         figure.scale,
         100.0 * figure.a1,
-        figure.images,
+        count_of(figure.images, "image"),
     )
 }

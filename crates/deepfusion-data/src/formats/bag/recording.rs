@@ -92,7 +92,7 @@ impl Recording for BagRecording {
         &self.mounts
     }
 
-    fn has_ground_truth(&self, frame: &Frame) -> bool {
+    fn has_ground_truth(&self, frame: &Frame, _kind: GtKind) -> bool {
         let scans = self.scans.as_ref();
         scans.is_some_and(|scans| frame.time_s.is_some_and(|t| scans.has(t)))
     }
@@ -101,6 +101,7 @@ impl Recording for BagRecording {
         if kind != GtKind::Z {
             return Err(Error::DepthKind {
                 drive: frame.drive.clone(),
+                kind,
             });
         }
         let (Some(scans), Some(time_s)) = (&self.scans, frame.time_s) else {
@@ -113,6 +114,7 @@ impl Recording for BagRecording {
         if kind != GtKind::Z {
             return Err(Error::DepthKind {
                 drive: frame.drive.clone(),
+                kind,
             });
         }
         match (&self.scans, frame.time_s) {

@@ -65,7 +65,7 @@ pub(super) fn warnings_on(bag: &dyn MessageSource, index: &Index) -> Vec<String>
             n => format!("{n} messages have no time in their header"),
         };
         format!(
-            "{topic}: {untimed}; the time of recording is taken, which is as late as the message was on its way"
+            "{topic}: {untimed}; the time of recording is used, which is late by the transport delay"
         )
     }));
     warnings

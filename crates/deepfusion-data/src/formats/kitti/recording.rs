@@ -21,8 +21,8 @@ use image::RgbImage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Exact depth of the simulator's drives, one 16-bit PNG a frame.
-const DEPTHS: &str = "proj_depth/groundtruth/image_02";
+/// Exact depth of the simulator's drives and KITTI's annotated depth, one 16-bit PNG a frame, of each camera.
+const DEPTHS: &str = "proj_depth/groundtruth";
 
 /// One camera of one drive.
 #[derive(Debug)]
@@ -130,6 +130,34 @@ fn open_drive(
     Ok(dataset)
 }
 
+impl KittiRecording {
+    /// The depth image of a frame, where there is one.
+    fn depth_image(&self, frame: &Frame) -> Option<PathBuf> {
+        let name = format!(
+            "{DEPTHS}/image_0{}/{:010}.png",
+            self.camera.number(),
+            frame.number
+        );
+        let path = self.drive.folder.join(name);
+        path.is_file().then_some(path)
+    }
+
+    /// What it holds; `what` it is in errors.
+    fn read_depth(&self, frame: &Frame, what: &'static str) -> Result<Option<DepthMap>> {
+        let Some(path) = self.depth_image(frame) else {
+            return Ok(None);
+        };
+        let depth = read_depth_png(&path)?;
+        let k = self.calibration.intrinsics;
+        let found = (depth.width as u32, depth.height as u32);
+        if found != (k.width, k.height) {
+            let image = (k.width, k.height);
+            return Err(Error::Size { what, found, image });
+        }
+        Ok(Some(depth))
+    }
+}
+
 impl Recording for KittiRecording {
     fn kind(&self) -> DatasetKind {
         DatasetKind::KittiRaw
@@ -197,11 +225,17 @@ impl Recording for KittiRecording {
         })
     }
 
-    fn has_ground_truth(&self, frame: &Frame) -> bool {
-        self.drive.scan(frame.number).is_some()
+    fn has_ground_truth(&self, frame: &Frame, kind: GtKind) -> bool {
+        match kind {
+            GtKind::Annotated => self.depth_image(frame).is_some(),
+            GtKind::Z | GtKind::Velodyne => self.drive.scan(frame.number).is_some(),
+        }
     }
 
     fn ground_truth(&self, frame: &Frame, kind: GtKind) -> Result<Option<DepthMap>> {
+        if kind == GtKind::Annotated {
+            return self.read_depth(frame, "the annotated depth");
+        }
         let Some(path) = self.drive.scan(frame.number) else {
             return Ok(None);
         };
@@ -221,21 +255,9 @@ impl Recording for KittiRecording {
         if self.camera.number() != 2 || !self.drive.folder.join(MASKS).is_dir() {
             return Ok(None);
         }
-        let name = format!("{DEPTHS}/{:010}.png", frame.number);
-        let path = self.drive.folder.join(name);
-        if !path.is_file() {
+        let Some(mut depth) = self.read_depth(frame, "the exact depth")? else {
             return Ok(None);
-        }
-        let mut depth = read_depth_png(&path)?;
-        let k = self.calibration.intrinsics;
-        let found = (depth.width as u32, depth.height as u32);
-        if found != (k.width, k.height) {
-            return Err(Error::Size {
-                what: "the exact depth",
-                found,
-                image: (k.width, k.height),
-            });
-        }
+        };
         let sky = depth.data.iter_mut().filter(|d| **d == 0.0);
         sky.for_each(|d| *d = f32::INFINITY);
         Ok(Some(depth))

@@ -19,7 +19,7 @@ pub fn depth_map(
     kind: GtKind,
 ) -> DepthMap {
     let shift = match kind {
-        GtKind::Z => 0.0,
+        GtKind::Z | GtKind::Annotated => 0.0,
         GtKind::Velodyne => 1.0,
     };
     let mut map = DepthMap::empty(width, height);
@@ -32,7 +32,7 @@ pub fn depth_map(
         let u = (q.x / q.z).round_ties_even() - shift;
         let v = (q.y / q.z).round_ties_even() - shift;
         let depth = match kind {
-            GtKind::Z => q.z,
+            GtKind::Z | GtKind::Annotated => q.z,
             GtKind::Velodyne => point.x,
         };
         if depth > 0.0 && u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64 {
@@ -54,7 +54,7 @@ pub fn velo_point(
     let [x, y, z, rest] = [0, 1, 2, 3].map(|i| column_of(pixels_from_velo, i));
     match kind {
         // q = d·(u, v, 1) is known: three equations for x, y, z.
-        GtKind::Z => {
+        GtKind::Z | GtKind::Annotated => {
             let q: Vector3<f64> = Vector3::new(column as f64, row as f64, 1.0) * depth_m;
             let matrix: Matrix3<f64> = Matrix3::from_columns(&[x, y, z]);
             Some(matrix.try_inverse()? * (q - rest))

@@ -1,0 +1,62 @@
+//! The drawn points as a table, for figures of one's own: the paper's Table 2 and Fig. 10.
+
+use crate::compare::Result;
+use crate::{DrawnPoint, ImageScore};
+
+/// Columns of a drawn pixel. Places are in the camera's axes (x right, y down, z forward), metres; `scaled` is after each image's depth
+/// was multiplied by median(gt) / median(prediction).
+const HEADER: [&str; 16] = [
+    "image",
+    "u",
+    "v",
+    "gt_x_m",
+    "gt_y_m",
+    "gt_z_m",
+    "pred_x_m",
+    "pred_y_m",
+    "pred_z_m",
+    "error_m",
+    "abs_rel",
+    "scaled_x_m",
+    "scaled_y_m",
+    "scaled_z_m",
+    "scaled_error_m",
+    "scaled_abs_rel",
+];
+
+/// Drawn points as CSV, a row each in the order in which they were drawn; `images` are those they are of. Without the camera (`in_space` is
+/// false) x and y are empty and errors are those along z.
+///
+/// # Errors
+/// What the CSV writer says.
+pub fn points_csv(points: &[DrawnPoint], images: &[ImageScore], in_space: bool) -> Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(HEADER)?;
+    for point in points {
+        let image = images.get(point.image);
+        let mut row = vec![image.map_or_else(String::new, |image| image.name.clone())];
+        row.extend(point.pixel.map(|side| side.to_string()));
+        row.extend(place(point.truth, in_space));
+        for (predicted, error) in [
+            (point.predicted, point.distance_m()),
+            (point.median_scaled, point.median_scaled_distance_m()),
+        ] {
+            row.extend(place(predicted, in_space));
+            row.push(metres(error));
+            let (z, true_z) = (predicted[2], point.truth[2]);
+            row.push(format!("{:.5}", (z - true_z).abs() / true_z));
+        }
+        writer.write_record(row)?;
+    }
+    let bytes = writer.into_inner();
+    Ok(bytes.map_err(|e| csv::Error::from(e.into_error()))?)
+}
+
+fn metres(m: f64) -> String {
+    format!("{m:.4}")
+}
+
+fn place([x, y, z]: [f64; 3], in_space: bool) -> [String; 3] {
+    let sideways = |m: f64| if in_space { metres(m) } else { String::new() };
+    [sideways(x), sideways(y), metres(z)]
+}

@@ -1,0 +1,103 @@
+use burn::module::Module;
+use burn::tensor::{Device, Tensor, activation::leaky_relu};
+
+use super::strip::Strip;
+use crate::R_MSFM_STATE;
+use crate::init::WeightRng;
+use crate::layers::{Conv2d, Conv2dConfig};
+
+/// Slope of every leaky ReLU below 0.
+pub(super) const SLOPE: f64 = 0.01;
+
+/// A reflection-padded convolution.
+pub(super) fn reflected(
+    channels: [usize; 2],
+    kernel: usize,
+    stride: usize,
+    rng: &mut WeightRng,
+    device: &Device,
+) -> Conv2d {
+    let mut config = Conv2dConfig::new(channels[0], channels[1], kernel).reflected();
+    config.options.stride = stride;
+    config.init(rng, device)
+}
+
+/// R-MSFM6's second look at a feature: tanh(3×1(tanh(1×3(x)))).
+#[derive(Module, Debug)]
+pub struct Context {
+    /// 1×3.
+    pub across: Strip,
+    /// 3×1.
+    pub down: Strip,
+}
+
+impl Context {
+    fn new(rng: &mut WeightRng, device: &Device) -> Self {
+        let channels = [R_MSFM_STATE; 2];
+        Self {
+            across: Strip::new(channels, false, rng, device),
+            down: Strip::new(channels, true, rng, device),
+        }
+    }
+
+    /// # Shapes
+    /// - `x`, output: `[batch, 128, height, width]`
+    pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        self.down.forward(self.across.forward(x).tanh()).tanh()
+    }
+}
+
+/// The encoder's features at one size and with the state's channels.
+#[derive(Module, Debug)]
+pub struct Features {
+    /// Of the coarsest: 3×3.
+    pub coarse: Conv2d,
+    /// Of the middle one: 3×3 at stride 2.
+    pub middle: Conv2d,
+    /// Of the finest: 3×3 at stride 2, to 96 channels.
+    pub fine_reduce: Conv2d,
+    /// After it: 3×3 at stride 2.
+    pub fine: Conv2d,
+    /// R-MSFM6's second looks, from the coarsest feature to the finest; empty in R-MSFM3.
+    pub context: Vec<Context>,
+}
+
+impl Features {
+    pub(super) fn new(twice: bool, rng: &mut WeightRng, device: &Device) -> Self {
+        let state = R_MSFM_STATE;
+        Self {
+            fine_reduce: reflected([64, 96], 3, 2, rng, device),
+            fine: reflected([96, state], 3, 2, rng, device),
+            middle: reflected([64, state], 3, 2, rng, device),
+            coarse: reflected([128, state], 3, 1, rng, device),
+            context: (0..if twice { 3 } else { 0 })
+                .map(|_| Context::new(rng, device))
+                .collect(),
+        }
+    }
+
+    /// What the state begins as.
+    pub(super) fn first(&self, features: &[Tensor<4>; 3]) -> Tensor<4> {
+        self.coarse.forward(features[2].clone()).tanh()
+    }
+
+    /// What is taken up before refinement `index` (from 1 on).
+    pub(super) fn next(
+        &self,
+        index: usize,
+        features: &[Tensor<4>; 3],
+        state: Tensor<4>,
+    ) -> Tensor<4> {
+        let looks = if self.context.is_empty() { 1 } else { 2 };
+        let level = index / looks;
+        match (index % looks, level) {
+            // A second look at the feature that was taken up last.
+            (1, level) => self.context[level].forward(state),
+            (_, 1) => self.middle.forward(features[1].clone()).tanh(),
+            _ => {
+                let x = leaky_relu(self.fine_reduce.forward(features[0].clone()), SLOPE);
+                self.fine.forward(x).tanh()
+            }
+        }
+    }
+}
