@@ -21,8 +21,8 @@ import torch.nn.functional as F
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parents[2] / "deepfusion-nn/tests/reference"))
 from networks import write_safetensors  # noqa: E402
+from photometric import photometric  # noqa: E402
 
-ALPHA = 0.85
 N, H, W = 2, 12, 20
 tensors = {}
 rng = np.random.default_rng(7)
@@ -64,18 +64,6 @@ def sample(image, coords):
     u = 2 * coords[:, 0] / (W - 1) - 1
     v = 2 * coords[:, 1] / (H - 1) - 1
     return F.grid_sample(image, torch.stack([u, v], -1), "bilinear", "border", align_corners=True)
-
-
-def photometric(a, b):
-    def mean(x):
-        return F.avg_pool2d(F.pad(x, [1] * 4, mode="reflect"), 3, 1)
-
-    ma, mb = mean(a), mean(b)
-    va, vb = mean(a * a) - ma * ma, mean(b * b) - mb * mb
-    cov = mean(a * b) - ma * mb
-    ssim = (2 * ma * mb + 1e-4) * (2 * cov + 9e-4) / ((ma**2 + mb**2 + 1e-4) * (va + vb + 9e-4))
-    unlike = ((1 - ssim) / 2).clamp(0, 1)
-    return (ALPHA * unlike + (1 - ALPHA) * (a - b).abs()).mean(1, keepdim=True)
 
 
 def in_view(coords):
