@@ -85,7 +85,11 @@ pub(crate) fn open(place: &Path, options: &OpenOptions) -> Result<Dataset> {
         DatasetKind::Video,
         Pictures::Video(&file, lens.as_ref()),
         &mut warnings,
-    )?;
+    )
+    .map_err(|error| match (error, &lens) {
+        (Error::NoCameraFile { .. }, Some(lens)) => no_pinhole(&file, lens),
+        (other, _) => other,
+    })?;
     warnings.extend(lens.and_then(|lens| bent_warning(&lens, &calibration)));
     let times = match (video.times_ns(), config.fps) {
         (_, Some(fps)) => {
@@ -159,19 +163,43 @@ fn bent_warning(lens: &GoproLens, calibration: &CameraCalibration) -> Option<Str
     if lens.is_linear() || calibration.distortion != Distortion::default() {
         return None;
     }
-    Some(format!(
-        "the video says that its lens was \"{}\" on a {}, which bends lines as no pinhole does: film through the linear lens, or calibrate this one as \
-         a fisheye lens",
-        match lens.digital {
-            'N' => "narrow".to_owned(),
-            'W' => "wide".to_owned(),
-            'S' => "SuperView".to_owned(),
-            'H' => "HyperView".to_owned(),
-            'M' => "max".to_owned(),
-            other => other.to_string(),
-        },
+    Some(format!("{}: {OTHER_LENS}", bends(lens)))
+}
+
+/// What to do about a lens that bends lines.
+const OTHER_LENS: &str = "film through the linear lens, or calibrate this one as a fisheye lens";
+
+fn bends(lens: &GoproLens) -> String {
+    let digital = match lens.digital {
+        'N' => "narrow".to_owned(),
+        'W' => "wide".to_owned(),
+        'S' => "SuperView".to_owned(),
+        'H' => "HyperView".to_owned(),
+        'M' => "max".to_owned(),
+        other => other.to_string(),
+    };
+    format!(
+        "the video says that its lens was \"{digital}\" on a {}, which bends lines as no pinhole does",
         lens.model
-    ))
+    )
+}
+
+/// Why a GoPro's video does not say its camera.
+fn no_pinhole(video: &Path, lens: &GoproLens) -> Error {
+    let (problem, remedy) = if lens.is_linear() {
+        let problem = format!(
+            "filmed through the linear lens of a {}, but zoomed or cut to another shape: how wide it sees is not known",
+            lens.model
+        );
+        (problem, "calibrate the camera as it was zoomed")
+    } else {
+        (bends(lens), OTHER_LENS)
+    };
+    Error::CameraFile {
+        path: video.to_owned(),
+        problem,
+        remedy: format!("{remedy}; calibration.yaml beside the video then says it"),
+    }
 }
 
 /// When a video of dates' speeds began, whose own times count from 0: recorders say when it was made, and mean its first frame or

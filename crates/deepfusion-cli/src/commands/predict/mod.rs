@@ -364,9 +364,10 @@ impl<'a> Job<'a> {
 
     /// What there is of the job in its folder.
     fn bulk<'b>(&'b self, command: &PredictArgs) -> BulkJob<'b> {
-        let outputs = match self.outputs.frames {
-            true => &self.outputs.clone().with_image(),
-            false => &self.outputs,
+        let outputs = if self.outputs.frames {
+            &self.outputs.clone().with_image()
+        } else {
+            &self.outputs
         };
         let save = outputs.save.iter();
         BulkJob {
@@ -468,9 +469,10 @@ impl<'a> Job<'a> {
         } else {
             None
         };
-        let outputs = match self.outputs.frames && !has_file(input) {
-            true => &self.outputs.clone().with_image(),
-            false => &self.outputs,
+        let outputs = if self.outputs.frames && !has_file(input) {
+            &self.outputs.clone().with_image()
+        } else {
+            &self.outputs
         };
         let mut files = Vec::new();
         for save in &outputs.save {
