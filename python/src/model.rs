@@ -316,7 +316,7 @@ impl Prediction {
         self.camera.map(|k| (k.fx, k.fy, k.cx, k.cy))
     }
 
-    /// `depth`'s.
+    /// `depth`'s: `torch.from_dlpack(prediction)` shares its memory.
     #[pyo3(signature = (**options))]
     fn __dlpack__<'py>(
         &self,
