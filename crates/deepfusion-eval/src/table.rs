@@ -12,11 +12,7 @@ impl fmt::Display for Report {
             Crop::None => "whole image",
             Crop::Garg => "garg crop",
         };
-        let gt = match self.protocol.gt {
-            GroundTruth::Z => "camera z",
-            GroundTruth::Velodyne => "velodyne forward distance",
-            GroundTruth::Annotated => "annotated depth",
-        };
+        let gt = self.protocol.gt.meaning();
         let images = match (self.expected, self.n) {
             (Some(expected), n) => format!("{n} of the split's {expected} images"),
             (None, n) => count_of(n, "image"),

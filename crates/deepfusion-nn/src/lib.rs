@@ -27,7 +27,7 @@ pub use decoder::{DecoderStage, DisparityDecoder, SCALES};
 pub use deepfusion_model::{
     AttentionConfig, AttentionForm, DecoderConfig, DepthNetConfig, DepthScale, FlowDecoderConfig,
     HceConfig, InputNormalisation, InputSize, LiteMonoConfig, LiteMonoSize, NetworkError as Error,
-    PoseNetConfig, R_MSFM_STATE, RMsfmConfig, ResNetConfig, ResNetDepth,
+    PoseNetConfig, R_MSFM_STATE, RMsfmConfig, ResNetConfig, ResNetDepth, TakenUp,
 };
 pub use depth_net::{DepthNet, DepthOutput, Inspection};
 pub use flow_decoder::{FLOW_LEVELS, FlowDecoder, FlowLevel, FlowOutput};

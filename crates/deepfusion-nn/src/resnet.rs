@@ -37,31 +37,14 @@ impl ResNet {
         config.validate()?;
         let conv1 = Conv2dConfig::before_batch_norm(3 * config.frames, config.base_width, 7, 2)
             .init(rng, device);
-        let mut channels_in = config.base_width;
-        let mut layer = |index: usize, rng: &mut WeightRng| {
-            let width = config.base_width << index;
-            (0..config.depth.blocks()[index])
-                .map(|block| {
-                    let [stride, dilation] = config.steps(index, block);
-                    let config = BlockConfig {
-                        depth: config.depth,
-                        channels_in,
-                        width,
-                        stride,
-                        dilation,
-                    };
-                    channels_in = width * config.depth.expansion();
-                    ResidualBlock::new(config, rng, device)
-                })
-                .collect()
-        };
+        let mut layer = |index| layer(config, index, rng, device);
         let resnet = ResNet {
             conv1,
             bn1: BatchNorm2d::new(config.base_width, device),
-            layer1: layer(0, rng),
-            layer2: layer(1, rng),
-            layer3: layer(2, rng),
-            layer4: layer(3, rng),
+            layer1: layer(0),
+            layer2: layer(1),
+            layer3: layer(2),
+            layer4: layer(3),
             normalisation: config.normalisation,
         };
         Ok(freeze_statistics(resnet, config.frozen_statistics))
@@ -88,6 +71,31 @@ impl ResNet {
     pub fn normalisation(&self) -> InputNormalisation {
         self.normalisation
     }
+}
+
+/// The blocks of layer 1 to 4, counted from 0.
+pub(crate) fn layer(
+    config: &ResNetConfig,
+    index: usize,
+    rng: &mut WeightRng,
+    device: &Device,
+) -> Vec<ResidualBlock> {
+    let width = config.base_width << index;
+    let mut channels_in = config.channels()[index];
+    (0..config.depth.blocks()[index])
+        .map(|block| {
+            let [stride, dilation] = config.steps(index, block);
+            let config = BlockConfig {
+                depth: config.depth,
+                channels_in,
+                width,
+                stride,
+                dilation,
+            };
+            channels_in = width * config.depth.expansion();
+            ResidualBlock::new(config, rng, device)
+        })
+        .collect()
 }
 
 pub(crate) fn run(layer: &[ResidualBlock], x: Tensor<4>) -> Tensor<4> {

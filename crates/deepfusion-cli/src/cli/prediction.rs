@@ -85,7 +85,7 @@ impl PredictionArgs {
 pub(crate) struct Outputs {
     /// Beside the sidecar.
     pub save: Vec<Save>,
-    /// The images of films and bags, too, which are no files of their own.
+    /// The images of films, bags and live sources, too, which are no files of their own.
     pub frames: bool,
     /// Points of a cloud beyond this depth are left out, metres.
     pub max_depth_m: f64,
@@ -94,11 +94,12 @@ pub(crate) struct Outputs {
 }
 
 impl Outputs {
-    /// The images themselves, too.
-    pub(crate) fn with_image(mut self) -> Self {
-        if !self.save.contains(&Save::Image) {
-            self.save.push(Save::Image);
+    /// What is kept of one image. `is_file`: it is a file of its own, which whoever looks at its depth can open.
+    pub(crate) fn of_image(&self, is_file: bool) -> Vec<Save> {
+        let mut save = self.save.clone();
+        if self.frames && !is_file && !save.contains(&Save::Image) {
+            save.push(Save::Image);
         }
-        self
+        save
     }
 }

@@ -262,15 +262,20 @@ fn warn_of_other_meaning(theirs: &TrainConfig, own: &TrainConfig, depth_learned:
             name(was)
         );
     }
-    let of = |config: &TrainConfig| config.depth_net.initial_depth_m;
-    if own.depth_net.r_msfm.is_some() && of(theirs) != of(own) {
+    let refined = |config: &TrainConfig| {
+        let net = &config.depth_net;
+        net.r_msfm.as_ref().map(|_| net.initial_depth_m)
+    };
+    if let (true, Some(was), Some(is)) = (depth_learned, refined(theirs), refined(own))
+        && was != is
+    {
         let word = |metres: Option<f64>| {
             metres.map_or("the middle of the range".into(), |m| format!("{m} m"))
         };
         tracing::warn!(
             "the weights to start from refine {}, this configuration {} (depth_net.initial_depth_m): they have to learn that anew",
-            word(of(theirs)),
-            word(of(own))
+            word(was),
+            word(is)
         );
     }
     // A range that a data set names is meant.

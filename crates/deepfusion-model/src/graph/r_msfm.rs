@@ -3,7 +3,7 @@
 use deepfusion_infer::{Activation, Border, Op, ValueId};
 
 use super::{Builder, Layer, Offset};
-use crate::{DepthNetConfig, NetworkError, R_MSFM_STATE, RMsfmConfig};
+use crate::{DepthNetConfig, NetworkError, R_MSFM_STATE, RMsfmConfig, TakenUp};
 
 /// A mask is a quarter of what its layer gives (RAFT's balance of gradients).
 const MASK_SCALE: f32 = 0.25;
@@ -27,12 +27,10 @@ impl Builder {
         let mut logit = self.everywhere("r_msfm.start", state, start)?;
         for index in 0..r_msfm.iterations {
             if index > 0 {
-                let seen = match (r_msfm.twice(), index) {
-                    (true, 1) => self.second_look(0, state)?,
-                    (true, 3) => self.second_look(1, state)?,
-                    (true, 5) => self.second_look(2, state)?,
-                    (false, 1) | (true, 2) => self.feature("middle", f1, R_MSFM_STATE, 2)?,
-                    _ => self.fine(f0)?,
+                let seen = match r_msfm.taken_up(index) {
+                    TakenUp::Again(level) => self.second_look(level, state)?,
+                    TakenUp::Middle => self.feature("middle", f1, R_MSFM_STATE, 2)?,
+                    TakenUp::Fine => self.fine(f0)?,
                 };
                 state = self.gru(index, state, seen)?;
             }

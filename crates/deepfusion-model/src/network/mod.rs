@@ -23,5 +23,5 @@ pub use flow_decoder::FlowDecoderConfig;
 pub use hce::HceConfig;
 pub use lite_mono::{LAYER_NORM_EPSILON, LiteMonoConfig, LiteMonoSize, POSITION_CHANNELS};
 pub use pose_net::{POSE_WIDTH, PoseNetConfig};
-pub use r_msfm::{R_MSFM_STATE, RMsfmConfig};
+pub use r_msfm::{R_MSFM_STATE, RMsfmConfig, TakenUp};
 pub use resnet::{BATCH_NORM_EPSILON, InputNormalisation, ResNetConfig, ResNetDepth};

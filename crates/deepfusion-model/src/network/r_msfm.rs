@@ -9,6 +9,17 @@ use super::{InputSize, NetworkError};
 /// Channels of what the features become before they refine the disparity, and of the gated unit's state.
 pub const R_MSFM_STATE: usize = 128;
 
+/// What a refinement of R-MSFM takes up before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TakenUp {
+    /// The middle feature, `layer1`'s.
+    Middle,
+    /// The finest, the stem's.
+    Fine,
+    /// The state itself, by the second look of this level: 0 is the coarsest.
+    Again(usize),
+}
+
 /// What an `RMsfm` is built from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -37,8 +48,36 @@ impl RMsfmConfig {
         self.iterations == 6
     }
 
+    /// What is taken up into the state before refinement `index`, from 1 on: features from coarse to fine, each once or twice. The first
+    /// refinement has the coarsest feature as its state.
+    #[must_use]
+    pub fn taken_up(&self, index: usize) -> TakenUp {
+        let looks = if self.twice() { 2 } else { 1 };
+        match (index % looks, index / looks) {
+            (1, level) => TakenUp::Again(level),
+            (_, 1) => TakenUp::Middle,
+            _ => TakenUp::Fine,
+        }
+    }
+
     /// Pixels of the refined disparity: an eighth of the image along each axis.
     pub(super) fn pixels(size: InputSize) -> usize {
         (size.width >> 3) * (size.height >> 3)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_are_taken_up_from_coarse_to_fine() {
+        use TakenUp::{Again, Fine, Middle};
+        let all = |iterations: usize| -> Vec<TakenUp> {
+            let config = RMsfmConfig { iterations };
+            (1..iterations).map(|i| config.taken_up(i)).collect()
+        };
+        assert_eq!(all(3), [Middle, Fine]);
+        assert_eq!(all(6), [Again(0), Middle, Again(1), Fine, Again(2)]);
     }
 }

@@ -3,8 +3,8 @@ use burn::tensor::{Device, Tensor};
 
 use crate::init::WeightRng;
 use crate::layers::{BatchNorm2d, Conv2d, Conv2dConfig, max_pool_3x3_stride_2};
-use crate::residual_block::{BlockConfig, ResidualBlock};
-use crate::resnet::{normalised, run};
+use crate::residual_block::ResidualBlock;
+use crate::resnet::{layer, normalised, run};
 use crate::{InputNormalisation, ResNetConfig, ResNetDepth};
 
 /// ResNet-18 up to its second layer, under torchvision's names.
@@ -31,24 +31,7 @@ impl HalfResNet {
     ) -> Self {
         let config = ResNetConfig::new(ResNetDepth::ResNet18);
         let conv1 = Conv2dConfig::before_batch_norm(3, config.base_width, 7, 2).init(rng, device);
-        let mut channels_in = config.base_width;
-        let mut layer = |index: usize| {
-            let width = config.base_width << index;
-            (0..config.depth.blocks()[index])
-                .map(|block| {
-                    let [stride, dilation] = config.steps(index, block);
-                    let config = BlockConfig {
-                        depth: config.depth,
-                        channels_in,
-                        width,
-                        stride,
-                        dilation,
-                    };
-                    channels_in = width;
-                    ResidualBlock::new(config, rng, device)
-                })
-                .collect()
-        };
+        let mut layer = |index| layer(&config, index, rng, device);
         Self {
             conv1,
             bn1: BatchNorm2d::new(config.base_width, device),

@@ -2,9 +2,9 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation::leaky_relu};
 
 use super::strip::Strip;
-use crate::R_MSFM_STATE;
 use crate::init::WeightRng;
 use crate::layers::{Conv2d, Conv2dConfig};
+use crate::{R_MSFM_STATE, TakenUp};
 
 /// Slope of every leaky ReLU below 0.
 pub(super) const SLOPE: f64 = 0.01;
@@ -81,20 +81,17 @@ impl Features {
         self.coarse.forward(features[2].clone()).tanh()
     }
 
-    /// What is taken up before refinement `index` (from 1 on).
+    /// What a refinement takes up.
     pub(super) fn next(
         &self,
-        index: usize,
+        taken_up: TakenUp,
         features: &[Tensor<4>; 3],
         state: Tensor<4>,
     ) -> Tensor<4> {
-        let looks = if self.context.is_empty() { 1 } else { 2 };
-        let level = index / looks;
-        match (index % looks, level) {
-            // A second look at the feature that was taken up last.
-            (1, level) => self.context[level].forward(state),
-            (_, 1) => self.middle.forward(features[1].clone()).tanh(),
-            _ => {
+        match taken_up {
+            TakenUp::Again(level) => self.context[level].forward(state),
+            TakenUp::Middle => self.middle.forward(features[1].clone()).tanh(),
+            TakenUp::Fine => {
                 let x = leaky_relu(self.fine_reduce.forward(features[0].clone()), SLOPE);
                 self.fine.forward(x).tanh()
             }

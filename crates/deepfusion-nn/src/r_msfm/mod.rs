@@ -80,9 +80,13 @@ impl RMsfm {
         let [batch, _, height, width] = state.dims();
         let mut logit = Tensor::full([batch, 1, height, width], self.start, &state.device());
         let mut disparities = Vec::with_capacity(self.iterations);
-        for index in 0..self.iterations {
+        let config = RMsfmConfig {
+            iterations: self.iterations,
+        };
+        for index in 0..config.iterations {
             if index > 0 {
-                let seen = self.features.next(index, &features, state.clone());
+                let taken_up = config.taken_up(index);
+                let seen = self.features.next(taken_up, &features, state.clone());
                 state = self.gru.forward(state, seen);
             }
             let (refined, seen) = self.update.forward(state.clone(), logit);

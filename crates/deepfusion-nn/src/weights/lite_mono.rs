@@ -5,28 +5,12 @@ use std::cmp::Ordering;
 
 use burn::tensor::Device;
 
-use super::monodepth2::{Pose, input_size, load_pose, rename};
-use super::{Monodepth2Files, Weights, apply, read};
-use crate::{DepthNet, DepthNetConfig, Error, InputSize, LiteMonoConfig, LiteMonoSize};
-
-/// Lite-Mono's networks, imported.
-#[derive(Debug)]
-pub struct ImportedLiteMono {
-    /// Which of the published networks it is.
-    pub size: LiteMonoSize,
-    /// What the depth network is.
-    pub depth_config: DepthNetConfig,
-    /// The depth network.
-    pub depth_net: DepthNet,
-    /// The pose network and what it is, where the files have one.
-    pub pose: Option<Pose>,
-    /// The image size it was trained at, where `encoder.pth` says so.
-    pub input_size: Option<InputSize>,
-}
+use super::monodepth2::{input_size, load_pose, rename};
+use super::{Imported, Monodepth2Files, Weights, apply, read};
+use crate::{DepthNet, DepthNetConfig, Error, LiteMonoConfig, LiteMonoSize};
 
 /// Whether tensors have the names of Lite-Mono's `encoder.pth`.
-#[must_use]
-pub fn is_lite_mono(encoder: &Weights) -> bool {
+pub(super) fn is_lite_mono(encoder: &Weights) -> bool {
     encoder.tensors.contains_key("stem2.0.conv.weight")
 }
 
@@ -36,7 +20,7 @@ pub fn is_lite_mono(encoder: &Weights) -> bool {
 ///
 /// # Errors
 /// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] if the encoder is none of the published ones.
-pub fn load_lite_mono(files: &Monodepth2Files, device: &Device) -> Result<ImportedLiteMono, Error> {
+pub fn load_lite_mono(files: &Monodepth2Files, device: &Device) -> Result<Imported, Error> {
     let encoder = tensors_alone(read(&files.encoder)?);
     let size = detect(&encoder)?;
     let input_size = input_size(&files.encoder);
@@ -61,8 +45,7 @@ pub fn load_lite_mono(files: &Monodepth2Files, device: &Device) -> Result<Import
         None => None,
         Some((encoder, decoder)) => Some(load_pose(encoder, decoder, device)?),
     };
-    Ok(ImportedLiteMono {
-        size,
+    Ok(Imported {
         depth_config,
         depth_net,
         pose,

@@ -5,6 +5,7 @@
 //! fit: nothing missing, nothing left over, every shape equal.
 
 mod file;
+mod imported;
 mod lite_mono;
 mod module;
 mod monodepth2;
@@ -15,8 +16,9 @@ pub use deepfusion_model::weights::{
     WeightTensor, Weights, read_bytes, read_safetensors_under, write_safetensors,
 };
 pub use file::read;
-pub use lite_mono::{ImportedLiteMono, is_lite_mono, load_lite_mono};
+pub use imported::{Imported, load_networks};
+pub use lite_mono::load_lite_mono;
 pub use module::{apply, collect};
-pub use monodepth2::{Monodepth2, Monodepth2Files, Pose, load_monodepth2};
-pub use r_msfm::{ImportedRMsfm, is_r_msfm, load_r_msfm};
+pub use monodepth2::{Monodepth2Files, Pose, load_monodepth2};
+pub use r_msfm::load_r_msfm;
 pub use torchvision::{detect_resnet, load_torchvision_half, load_torchvision_resnet};

@@ -7,7 +7,7 @@ use burn::store::pytorch_reader::{PickleValue, PytorchReader};
 use burn::tensor::Device;
 
 use super::torchvision::apply_torchvision;
-use super::{Weights, apply, detect_resnet, read};
+use super::{Imported, Weights, apply, detect_resnet, read};
 use crate::{DepthNet, DepthNetConfig, Error, InputSize, PoseNet, PoseNetConfig};
 
 /// Where the four files are.
@@ -45,25 +45,12 @@ impl Monodepth2Files {
 /// A pose network and what it is.
 pub type Pose = (PoseNetConfig, PoseNet);
 
-/// Monodepth2's networks, imported.
-#[derive(Debug)]
-pub struct Monodepth2 {
-    /// What the depth network is.
-    pub depth_config: DepthNetConfig,
-    /// The depth network.
-    pub depth_net: DepthNet,
-    /// The pose network and what it is, where the files have one.
-    pub pose: Option<Pose>,
-    /// The image size it was trained at, where `encoder.pth` says so.
-    pub input_size: Option<InputSize>,
-}
-
 /// Reads Monodepth2's `encoder.pth`, `depth.pth`, `pose_encoder.pth` and `pose.pth`. The ResNets are
 /// recognised by their blocks; the configs are the `monodepth2` preset.
 ///
 /// # Errors
 /// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] if the encoder is not a ResNet.
-pub fn load_monodepth2(files: &Monodepth2Files, device: &Device) -> Result<Monodepth2, Error> {
+pub fn load_monodepth2(files: &Monodepth2Files, device: &Device) -> Result<Imported, Error> {
     let encoder = read_encoder(&files.encoder)?;
     let depth_config = DepthNetConfig::monodepth2(detect_resnet(&encoder)?);
     let decoder = read(&files.depth)?;
@@ -82,7 +69,7 @@ pub fn load_monodepth2(files: &Monodepth2Files, device: &Device) -> Result<Monod
         None => None,
         Some((encoder, decoder)) => Some(load_pose(encoder, decoder, device)?),
     };
-    Ok(Monodepth2 {
+    Ok(Imported {
         depth_config,
         depth_net,
         pose,

@@ -3,29 +3,13 @@
 
 use burn::tensor::Device;
 
-use super::monodepth2::{Pose, input_size, load_pose, rename};
+use super::monodepth2::{input_size, load_pose, rename};
 use super::torchvision::apply_half;
-use super::{Monodepth2Files, Weights, apply, read};
-use crate::{DepthNet, DepthNetConfig, Error, InputSize};
-
-/// R-MSFM's networks, imported.
-#[derive(Debug)]
-pub struct ImportedRMsfm {
-    /// How often the disparity is refined: 3 or 6.
-    pub iterations: usize,
-    /// What the depth network is.
-    pub depth_config: DepthNetConfig,
-    /// The depth network.
-    pub depth_net: DepthNet,
-    /// The pose network and what it is, where the files have one.
-    pub pose: Option<Pose>,
-    /// The image size it was trained at, where `encoder.pth` says so.
-    pub input_size: Option<InputSize>,
-}
+use super::{Imported, Monodepth2Files, Weights, apply, read};
+use crate::{DepthNet, DepthNetConfig, Error};
 
 /// Whether tensors have the names of R-MSFM's `depth.pth`.
-#[must_use]
-pub fn is_r_msfm(depth: &Weights) -> bool {
+pub(super) fn is_r_msfm(depth: &Weights) -> bool {
     depth.tensors.contains_key("convX11.1.weight")
 }
 
@@ -33,7 +17,7 @@ pub fn is_r_msfm(depth: &Weights) -> bool {
 ///
 /// # Errors
 /// As [`read`] and [`apply`]; [`Error::UnknownArchitecture`] for other files, and for R-MSFMX, whose encoder is a ResNet-50.
-pub fn load_r_msfm(files: &Monodepth2Files, device: &Device) -> Result<ImportedRMsfm, Error> {
+pub fn load_r_msfm(files: &Monodepth2Files, device: &Device) -> Result<Imported, Error> {
     let decoder = read(&files.depth)?;
     let iterations = detect(&decoder)?;
     let depth_config = DepthNetConfig {
@@ -54,8 +38,7 @@ pub fn load_r_msfm(files: &Monodepth2Files, device: &Device) -> Result<ImportedR
         None => None,
         Some((encoder, decoder)) => Some(load_pose(encoder, decoder, device)?),
     };
-    Ok(ImportedRMsfm {
-        iterations,
+    Ok(Imported {
         depth_config,
         depth_net,
         pose,

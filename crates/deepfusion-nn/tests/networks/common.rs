@@ -181,6 +181,14 @@ pub(crate) fn pattern_loss(
 
 /// The gradient of every weight of a network that has one, by its name.
 pub(crate) fn gradients(net: &impl Module, loss: Tensor<1>) -> Vec<(String, Vec<f32>)> {
+    take_gradients(net, &mut loss.backward())
+}
+
+/// The same out of gradients that are there.
+pub(crate) fn take_gradients(
+    net: &impl Module,
+    gradients: &mut Gradients,
+) -> Vec<(String, Vec<f32>)> {
     struct Collect<'a> {
         path: Vec<String>,
         gradients: &'a mut Gradients,
@@ -199,10 +207,9 @@ pub(crate) fn gradients(net: &impl Module, loss: Tensor<1>) -> Vec<(String, Vec<
             }
         }
     }
-    let mut gradients = loss.backward();
     let mut collect = Collect {
         path: Vec::new(),
-        gradients: &mut gradients,
+        gradients,
         found: Vec::new(),
     };
     net.visit(&mut collect);

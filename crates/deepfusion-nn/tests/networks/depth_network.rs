@@ -10,8 +10,8 @@
     reason = "a test's panic is its message"
 )]
 
-use burn::module::{Module, ModuleVisitor, Param};
-use burn::tensor::{Device, Gradients, Tensor, TensorData};
+use burn::module::Module;
+use burn::tensor::{Device, Tensor, TensorData};
 use deepfusion_nn::layers::freeze_statistics;
 use deepfusion_nn::weights::{self, WeightTensor, Weights};
 use deepfusion_nn::{
@@ -20,7 +20,7 @@ use deepfusion_nn::{
     WeightRng,
 };
 
-use crate::common::{formula, largest_difference, reference, uniform, values};
+use crate::common::{formula, largest_difference, reference, take_gradients, uniform, values};
 
 /// Of a tensor's root mean square.
 const TOLERANCE: f32 = 1e-4;
@@ -45,27 +45,6 @@ fn filled<M: Module>(module: M) -> M {
         };
     }
     weights::apply(module, &weights).unwrap()
-}
-
-/// The gradients of a module's weights by their names.
-struct Collect<'a> {
-    path: Vec<String>,
-    gradients: &'a mut Gradients,
-    found: Vec<(String, Vec<f32>)>,
-}
-
-impl ModuleVisitor for Collect<'_> {
-    fn enter_module(&mut self, name: &str, _: &str) {
-        self.path.push(name.to_owned());
-    }
-    fn exit_module(&mut self, _: &str, _: &str) {
-        self.path.pop();
-    }
-    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        if let Some(gradient) = param.val().grad_remove(self.gradients) {
-            self.found.push((self.path.join("."), values(gradient)));
-        }
-    }
 }
 
 /// Runs a case of the reference: `forward` is what the module does with the input.
@@ -94,13 +73,7 @@ fn check<M: Module>(
     let mut gradients = loss.backward();
     let grad_x = x.grad_remove(&mut gradients).unwrap();
     actual.push(("grad/x".into(), values(grad_x)));
-    let mut collect = Collect {
-        path: Vec::new(),
-        gradients: &mut gradients,
-        found: Vec::new(),
-    };
-    module.visit(&mut collect);
-    let found = collect.found.into_iter();
+    let found = take_gradients(&module, &mut gradients).into_iter();
     actual.extend(found.map(|(name, gradient)| (format!("grad/{name}"), gradient)));
 
     let compared = actual.iter().map(|(name, values)| {

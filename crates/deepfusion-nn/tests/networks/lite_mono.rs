@@ -71,7 +71,10 @@ fn the_four_published_networks() {
         let folder = tempfile::tempdir().unwrap();
         let files = files(folder.path(), model);
         let imported = load_lite_mono(&files, &device).unwrap();
-        assert_eq!(imported.size, size);
+        assert_eq!(
+            imported.depth_config.lite_mono,
+            DepthNetConfig::lite_mono(size).lite_mono
+        );
         assert_eq!((imported.input_size, imported.pose.is_none()), (None, true));
         let x = images("images", 3, &device);
         check(model, imported.depth_net.forward(x));

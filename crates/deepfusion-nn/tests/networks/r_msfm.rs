@@ -46,7 +46,8 @@ fn both_published_networks() {
     for iterations in [3, 6] {
         let folder = tempfile::tempdir().unwrap();
         let imported = load_r_msfm(&files(folder.path(), iterations), &device).unwrap();
-        assert_eq!(imported.iterations, iterations);
+        let found = imported.depth_config.r_msfm.as_ref().unwrap();
+        assert_eq!(found.iterations, iterations);
         assert_eq!((imported.input_size, imported.pose.is_none()), (None, true));
         let disparities = imported.depth_net.forward(images("images", 3, &device));
         assert_eq!(disparities.len(), iterations);

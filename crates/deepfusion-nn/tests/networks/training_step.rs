@@ -76,27 +76,8 @@ fn gradients_and_running_statistics_are_pytorchs() {
     println!("loss: {loss_error:.2e}");
     assert!(loss_error.abs() < 1e-6);
 
-    let mut gradients = loss.backward();
     let mut compared = 0;
     let mut worst = (0.0, String::new());
-    struct Collect<'a>(
-        &'a mut dyn FnMut(&str, Vec<f32>),
-        Vec<String>,
-        &'a mut burn::tensor::Gradients,
-    );
-    impl burn::module::ModuleVisitor for Collect<'_> {
-        fn enter_module(&mut self, name: &str, _: &str) {
-            self.1.push(name.to_owned());
-        }
-        fn exit_module(&mut self, _: &str, _: &str) {
-            self.1.pop();
-        }
-        fn visit_float<const D: usize>(&mut self, param: &burn::module::Param<Tensor<D>>) {
-            if let Some(gradient) = param.val().grad_remove(self.2) {
-                (self.0)(&self.1.join("."), values(gradient));
-            }
-        }
-    }
     let mut compare = |name: &str, gradient: Vec<f32>| {
         let reference = format!("training/{}", pytorch_name(name));
         let norm = expected.tensors[&format!("{reference}/norm")].values[0];
@@ -121,7 +102,9 @@ fn gradients_and_running_statistics_are_pytorchs() {
         }
         compared += 1;
     };
-    net.visit(&mut Collect(&mut compare, Vec::new(), &mut gradients));
+    for (name, gradient) in crate::common::gradients(&net, loss) {
+        compare(&name, gradient);
+    }
     println!("{compared} gradients, worst {:.2e} in {}", worst.0, worst.1);
     assert!(worst.0 < 1e-4, "{worst:?}");
     let wanted = expected

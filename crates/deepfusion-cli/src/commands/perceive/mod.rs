@@ -43,12 +43,12 @@ pub(super) fn run(args: &PerceiveArgs) -> Result<()> {
         config.max_depth_m = far as f32;
     }
     let mut estimator = engine::load(&model, &prediction.engine)?;
-    let outputs = args.outputs(f64::from(config.max_depth_m));
-    let outputs = match source {
-        Some(_) => outputs.with_image(),
-        None => outputs,
-    };
-    let job = Job::new(prediction, outputs, &model, &estimator)?;
+    let job = Job::new(
+        prediction,
+        args.outputs(f64::from(config.max_depth_m)),
+        &model,
+        &estimator,
+    )?;
     let processor = FrameProcessor::open(args, &model, &mut estimator, config)?;
     std::fs::create_dir_all(out).map_err(|e| deepfusion_data::Error::file(out, e))?;
     if source.is_some() {

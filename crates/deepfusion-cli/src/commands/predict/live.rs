@@ -25,7 +25,11 @@ pub(super) fn run(args: &PredictArgs, model: &ModelSource, address: &Address) ->
     check_watched(prediction, Some(address), &[])?;
     let mut estimator = engine::load(model, &prediction.engine)?;
     // They are nowhere else, and depth is little without them.
-    let job = Job::new(prediction, args.outputs().with_image(), model, &estimator)?;
+    let outputs = Outputs {
+        frames: true,
+        ..args.outputs()
+    };
+    let job = Job::new(prediction, outputs, model, &estimator)?;
     if args.cloud() && matches!(job.camera, CameraSource::Unknown) {
         return Err(CliError::NoCamera.into());
     }

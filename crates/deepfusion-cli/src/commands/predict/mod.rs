@@ -364,15 +364,11 @@ impl<'a> Job<'a> {
 
     /// What there is of the job in its folder.
     fn bulk<'b>(&'b self, command: &PredictArgs) -> BulkJob<'b> {
-        let outputs = if self.outputs.frames {
-            &self.outputs.clone().with_image()
-        } else {
-            &self.outputs
-        };
-        let save = outputs.save.iter();
+        // Of a frame of a film more is kept than of a photograph: whatever it may be.
+        let save = self.outputs.of_image(false).into_iter();
         BulkJob {
             folder: &self.args.out,
-            endings: save.map(|save| outputs::ending(*save)).collect(),
+            endings: save.map(outputs::ending).collect(),
             made_with: &self.made_with,
             overwrite: self.args.overwrite,
             shard: command.shard,
@@ -469,14 +465,10 @@ impl<'a> Job<'a> {
         } else {
             None
         };
-        let outputs = if self.outputs.frames && !has_file(input) {
-            &self.outputs.clone().with_image()
-        } else {
-            &self.outputs
-        };
+        let is_file = loaded.live.is_none() && has_file(input);
         let mut files = Vec::new();
-        for save in &outputs.save {
-            let file = format!("{}{}", input.name, outputs::ending(*save));
+        for save in self.outputs.of_image(is_file) {
+            let file = format!("{}{}", input.name, outputs::ending(save));
             let path = args.out.join(&file);
             let maps = outputs::Maps {
                 prediction,
@@ -484,8 +476,8 @@ impl<'a> Job<'a> {
                 layers: &seen.layers,
                 sigma: sigma.as_ref(),
             };
-            let limits = (outputs.max_depth_m, outputs.max_sigma);
-            outputs::write(*save, limits, image, loaded.camera.as_ref(), &maps, &path)?;
+            let limits = (self.outputs.max_depth_m, self.outputs.max_sigma);
+            outputs::write(save, limits, image, loaded.camera.as_ref(), &maps, &path)?;
             files.push(file);
         }
         let known = depth.data.iter().copied().filter(|d| *d > 0.0);

@@ -2,12 +2,9 @@ use std::path::{Path, PathBuf};
 
 use burn::tensor::Device;
 use deepfusion_nn::weights::{
-    Monodepth2Files, Pose, detect_resnet, is_lite_mono, is_r_msfm, load_lite_mono, load_monodepth2,
-    load_r_msfm, load_torchvision_resnet, read,
+    Monodepth2Files, detect_resnet, load_networks, load_torchvision_resnet, read,
 };
-use deepfusion_nn::{
-    DepthNet, DepthNetConfig, InputSize, LiteMonoSize, PoseNet, PoseNetConfig, ResNetDepth,
-};
+use deepfusion_nn::{DepthNet, DepthNetConfig, PoseNet, PoseNetConfig};
 use deepfusion_train::{
     Checkpoint, CheckpointKind, Checkpoints, Model, Preset, RunFolder, TrainConfig, TrainFindings,
 };
@@ -52,62 +49,23 @@ fn named(files: &[PathBuf]) -> Monodepth2Files {
     }
 }
 
-/// A depth network with its pose network, in whichever of the layouts' files.
-struct Imported {
-    /// Whose settings it goes on with.
-    preset: Preset,
-    depth_config: DepthNetConfig,
-    depth_net: DepthNet,
-    pose: Option<Pose>,
-    input_size: Option<InputSize>,
-}
-
-fn imported(files: &Monodepth2Files, device: &Device) -> Result<Imported> {
-    if is_lite_mono(&read(&files.encoder)?) {
-        let found = load_lite_mono(files, device)?;
-        return Ok(Imported {
-            preset: match found.size {
-                LiteMonoSize::Full => Preset::LiteMono,
-                LiteMonoSize::Small => Preset::LiteMonoSmall,
-                LiteMonoSize::Tiny => Preset::LiteMonoTiny,
-                LiteMonoSize::EightM => Preset::LiteMono8m,
-            },
-            depth_config: found.depth_config,
-            depth_net: found.depth_net,
-            pose: found.pose,
-            input_size: found.input_size,
-        });
-    }
-    if is_r_msfm(&read(&files.depth)?) {
-        let found = load_r_msfm(files, device)?;
-        return Ok(Imported {
-            preset: if found.iterations == 3 {
-                Preset::RMsfm3
-            } else {
-                Preset::RMsfm6
-            },
-            depth_config: found.depth_config,
-            depth_net: found.depth_net,
-            pose: found.pose,
-            input_size: found.input_size,
-        });
-    }
-    let found = load_monodepth2(files, device)?;
-    Ok(Imported {
-        preset: match found.depth_config.encoder.depth {
-            ResNetDepth::ResNet50 => Preset::Monodepth2R50,
-            _ => Preset::Monodepth2,
-        },
-        depth_config: found.depth_config,
-        depth_net: found.depth_net,
-        pose: found.pose,
-        input_size: found.input_size,
-    })
+/// The preset whose settings a network goes on with: of those that learn as Monodepth2 does the one with its layers.
+fn preset_of(net: &DepthNetConfig) -> Preset {
+    let layers = |net: &DepthNetConfig| {
+        let lite_mono = net.lite_mono.as_ref();
+        let stages = lite_mono.map(|own| (own.widths, own.dilations.each_ref().map(Vec::len)));
+        (stages, net.r_msfm.clone(), net.encoder.depth)
+    };
+    let family = Preset::ALL
+        .into_iter()
+        .skip_while(|preset| *preset != Preset::Monodepth2);
+    let mut alike = family.filter(|preset| layers(&preset.config().depth_net) == layers(net));
+    alike.next().unwrap_or(Preset::Monodepth2)
 }
 
 fn from_files(files: &Monodepth2Files, device: &Device) -> Result<(TrainConfig, Model)> {
-    let imported = imported(files, device)?;
-    let mut config = imported.preset.config();
+    let imported = load_networks(files, device)?;
+    let mut config = preset_of(&imported.depth_config).config();
     config.depth_net = imported.depth_config;
     if let Some(size) = imported.input_size {
         config.size = size;
@@ -137,4 +95,24 @@ fn from_resnet(file: &Path, device: &Device) -> Result<(TrainConfig, Model)> {
     pose_net.encoder = load_torchvision_resnet(pose_net.encoder, file)?;
     let model = Model::with_networks(&config, depth_net, pose_net, device);
     Ok((config, model))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_networks_layers_say_its_preset() {
+        let all = Preset::ALL.into_iter();
+        let family: Vec<Preset> = all.skip_while(|p| *p != Preset::Monodepth2).collect();
+        assert_eq!(family.len(), 8);
+        for preset in family {
+            // As an import leaves it.
+            let mut net = preset.config().depth_net;
+            net.initial_depth_m = None;
+            assert_eq!(preset_of(&net), preset);
+        }
+        let net = DepthNetConfig::monodepth2(deepfusion_nn::ResNetDepth::ResNet34);
+        assert_eq!(preset_of(&net), Preset::Monodepth2);
+    }
 }
