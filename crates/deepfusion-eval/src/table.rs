@@ -1,6 +1,6 @@
 use std::fmt;
 
-use crate::{Crop, GroundTruth, Intervals, Metrics, PointErrors, Points, Report, Sharpness};
+use crate::{Crop, Intervals, Metrics, PointErrors, Points, Report, Sharpness};
 use deepfusion_hint::count_of;
 
 const LABEL: usize = 22;

@@ -9,7 +9,7 @@ use deepfusion_runtime::ModelSource;
 use deepfusion_video::{Address, LiveFrame, shown_for};
 
 use super::{Job, check_watched, outputs, print_videos};
-use crate::cli::{PredictArgs, Save, Shard};
+use crate::cli::{Outputs, PredictArgs, Save, Shard};
 use crate::commands::live::{self, Feed};
 use crate::error::CliError;
 use crate::failure::Result;

@@ -1,0 +1,36 @@
+//! Networks of other programs, in whichever of the known layouts their files are.
+
+use burn::tensor::Device;
+
+use super::lite_mono::{is_lite_mono, load_lite_mono};
+use super::monodepth2::{Monodepth2Files, Pose, load_monodepth2};
+use super::r_msfm::{is_r_msfm, load_r_msfm};
+use super::read;
+use crate::{DepthNet, DepthNetConfig, Error, InputSize};
+
+/// Networks as files held them.
+#[derive(Debug)]
+pub struct Imported {
+    /// What the depth network is.
+    pub depth_config: DepthNetConfig,
+    /// The depth network.
+    pub depth_net: DepthNet,
+    /// The pose network and what it is, where the files have one.
+    pub pose: Option<Pose>,
+    /// The image size it was trained at, where `encoder.pth` says so.
+    pub input_size: Option<InputSize>,
+}
+
+/// Reads Lite-Mono's, R-MSFM's or Monodepth2's files; which they are, the names of their tensors say.
+///
+/// # Errors
+/// As [`load_lite_mono`], [`load_r_msfm`] and [`load_monodepth2`].
+pub fn load_networks(files: &Monodepth2Files, device: &Device) -> Result<Imported, Error> {
+    if is_lite_mono(&read(&files.encoder)?) {
+        load_lite_mono(files, device)
+    } else if is_r_msfm(&read(&files.depth)?) {
+        load_r_msfm(files, device)
+    } else {
+        load_monodepth2(files, device)
+    }
+}
