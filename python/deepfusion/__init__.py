@@ -19,12 +19,14 @@ from typing import Any
 import numpy as np
 
 from . import _native
+from ._adapt import Adaptation, adapt
 from ._native import Dataset, DeepFusionError, Frame, Model, Prediction, Predictions, __version__
 from ._perceive import Collision, Ground, Perception, Surroundings, Target, perceive
 from ._snippets import Snippets
 from ._train import Run, TrainEvent, train
 
 __all__ = [
+    "Adaptation",
     "Collision",
     "Dataset",
     "DeepFusionError",
@@ -39,6 +41,7 @@ __all__ = [
     "Surroundings",
     "Target",
     "TrainEvent",
+    "adapt",
     "doctor",
     "evaluate",
     "load",

@@ -1,5 +1,6 @@
 //! The Python module `deepfusion._native`. `deepfusion/__init__.py` is what people import; `_native.pyi` has the types.
 
+mod adapt;
 mod bulk;
 mod command;
 mod dataset;
@@ -15,6 +16,8 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
+    use super::adapt::{adapt, undo_adaptation};
+    #[pymodule_export]
     use super::bulk::Predictions;
     #[pymodule_export]
     use super::command::command;
@@ -26,7 +29,6 @@ mod _native {
     use super::measure::{doctor, evaluate, simulate};
     #[pymodule_export]
     use super::model::{Model, Prediction, load, networks};
-
     #[pymodule_export]
     use super::perceive::Perception;
     #[pymodule_export]

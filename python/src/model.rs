@@ -6,11 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use deepfusion::data::{RgbImage, load_photo};
 use deepfusion::geometry::cloud::PointCloud;
 use deepfusion::geometry::{DepthMap, Intrinsics};
-use deepfusion::model::TrainConfig;
-use deepfusion::model::weights::Weights;
-use deepfusion::runtime::{
-    DepthEstimator, DepthRunner, Error, FusedRunner, ModelSource, Precision, embedded_names,
-};
+use deepfusion::runtime::{DepthEstimator, ModelSource, Precision, embedded_names};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -43,13 +39,9 @@ pub fn load(
             return Err(PyValueError::new_err(message));
         }
     };
-    let runner = move |config: &TrainConfig, weights: Weights| {
-        let runner = FusedRunner::new(config, weights, precision)?;
-        Ok::<_, Error>(Box::new(runner) as Box<dyn DepthRunner>)
-    };
     let open = || {
         let network = ModelSource::named(&model)?.load(data_set.as_deref())?;
-        DepthEstimator::of(network, runner)
+        DepthEstimator::fused(network, precision)
     };
     py.detach(open).map(Model::new).map_err(raise)
 }

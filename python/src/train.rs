@@ -1,19 +1,16 @@
 //! Training, with a listener in Python.
 
 use std::collections::BTreeMap;
+use std::ffi::CString;
 use std::path::{Path, PathBuf};
 
-use deepfusion::data::{Cameras, Dataset, OpenOptions, Split};
-use deepfusion::model::{Compute, DepthNetConfig, Preset, RunFolder, TrainConfig};
-use deepfusion::runtime::{ModelSource, embedded_names};
-use deepfusion::train::log::{CsvLog, CsvRecord};
-use deepfusion::train::{
-    Checkpoints, Control, Device, Error, LossTerms, Model, SampleSet, SingleWorker, TrainEvent,
-    Trainer, Workers,
-};
+use deepfusion::jobs::samples::{SampleWarning, open_samples};
+use deepfusion::jobs::training::{RunLog, Start};
+use deepfusion::model::{Compute, Preset, RunFolder, TrainConfig};
+use deepfusion::train::{Control, Device, LossTerms, SingleWorker, TrainEvent, Trainer, Workers};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -87,15 +84,16 @@ pub fn train<'py>(
     // As the command does: every operation needs again what the one before freed.
     deepfusion_cli::keep_memory();
     let outcome = interruptible(py, |stop| -> Result<_, Failure> {
-        let (mut trainer, skipped) = opened(&asked)?;
+        let mut warnings = Warnings::default();
+        let mut trainer = opened(&asked, &mut warnings)?;
+        listener.warn(&warnings);
         // The first worker's log is of all of them.
         if asked.workers.as_ref().is_none_or(|w| w.rank == 0) {
-            let path = trainer.folder().join("log.csv");
-            listener.log = Some(CsvLog::open(&path, trainer.step())?);
+            listener.keep_log(&trainer)?;
         }
         let listen = &mut |event| listener.hear(event, stop);
         let summary = trainer.run(listen)?;
-        Ok((summary, skipped))
+        Ok((summary, warnings.skipped))
     });
     // What the listener raised is the reason; the run is saved.
     if let Some(raised) = listener.raised {
@@ -117,14 +115,32 @@ pub fn train<'py>(
     Ok(figures)
 }
 
-/// The trainer that is asked for, and why drives were left out.
-fn opened(asked: &TrainRequest) -> Result<(Trainer, Vec<String>), Failure> {
+/// What may not be meant of the recordings.
+#[derive(Default)]
+pub struct Warnings {
+    /// Why drives were left out.
+    pub skipped: Vec<String>,
+    pub others: Vec<String>,
+}
+
+impl Warnings {
+    pub fn add(&mut self, warning: SampleWarning) {
+        match warning {
+            SampleWarning::Skipped(reason) => self.skipped.push(reason),
+            other => self.others.push(other.to_string()),
+        }
+    }
+}
+
+/// The trainer that is asked for.
+fn opened(asked: &TrainRequest, warnings: &mut Warnings) -> Result<Trainer, Failure> {
     let device = Device::flex();
     let workers: Box<dyn Workers> = match &asked.workers {
         Some(others) => others.another(),
         None => Box::new(SingleWorker),
     };
     let leads = workers.rank() == 0;
+    let mut warn = |warning| warnings.add(warning);
     if asked.resume {
         let folder = RunFolder::open(&asked.out)?.0;
         let mut config = folder.read_settings()?;
@@ -133,32 +149,36 @@ fn opened(asked: &TrainRequest) -> Result<(Trainer, Vec<String>), Failure> {
         }
         choose_data(&mut config, asked)?;
         config.validate()?;
-        let (train, validation, skipped) = samples(&config)?;
+        let sets = open_samples(&config, &mut |_, _| (), &mut warn)?;
         if leads {
             folder.write_config(&config, &folder.read_findings()?)?;
         }
-        let sets = (train, validation);
-        let trainer = Trainer::resume_among(workers, config, folder, sets, &device)?;
-        return Ok((trainer, skipped));
+        return Ok(Trainer::resume_among(
+            workers, config, folder, sets, &device,
+        )?);
     }
-    let mut config = configuration(asked)?;
-    let start = Start::of(asked, &config)?;
+    let (mut config, is_preset) = configuration(asked)?;
+    let start = Start::of(asked.init.as_deref(), &config, is_preset)?;
     start.record_in(&mut config)?;
     config.validate()?;
-    let (train, validation, skipped) = samples(&config)?;
+    let sets = open_samples(&config, &mut |_, _| (), &mut warn)?;
     let folder = if leads {
         RunFolder::create(&asked.out)?
     } else {
         RunFolder::of_another(&asked.out)
     };
-    let sets = (train, validation);
-    let trainer = Trainer::create_among(workers, config, folder, sets, &device, |model| {
-        start.initialise(model, &device)
-    })?;
-    Ok((trainer, skipped))
+    Ok(Trainer::create_among(
+        workers,
+        config,
+        folder,
+        sets,
+        &device,
+        |model| start.initialise(model, &device, &mut |_| ()),
+    )?)
 }
 
-fn configuration(asked: &TrainRequest) -> Result<TrainConfig, Failure> {
+/// The configuration that is asked for, and whether it is a preset's: no file then says what the run starts from.
+fn configuration(asked: &TrainRequest) -> Result<(TrainConfig, bool), Failure> {
     let preset = Preset::ALL
         .into_iter()
         .find(|preset| Path::new(preset.name()) == asked.config);
@@ -186,7 +206,7 @@ fn configuration(asked: &TrainRequest) -> Result<TrainConfig, Failure> {
             hint: Some("train(config, data): a recording's path or several; or data.paths in the configuration".into()),
         });
     }
-    Ok(config)
+    Ok((config, preset.is_some()))
 }
 
 /// The recordings that are given, in place of the configuration's own.
@@ -215,199 +235,19 @@ fn choose_data(config: &mut TrainConfig, asked: &TrainRequest) -> Result<(), Fai
     Ok(())
 }
 
-/// Samples to learn from and to validate on, and why drives were left out.
-fn samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet, Vec<String>), Failure> {
-    let (mut train, mut validation) = (Vec::new(), Vec::new());
-    let data = &config.data;
-    if data.sets.is_empty() {
-        let (clock, topics) = (data.camera_ahead_s, &data.topics);
-        let open =
-            |paths: &[PathBuf], split| recordings(paths, split, &data.camera, (clock, topics), 0);
-        train = open(&data.paths, data.split.as_deref())?;
-        if !data.validation.is_empty() || data.validation_split.is_some() {
-            let own = own_or(&data.validation, &data.paths);
-            validation = open(own, data.validation_split.as_deref())?;
-        }
-    }
-    for (i, set) in data.sets.iter().enumerate() {
-        let camera = match set.camera.as_str() {
-            "" => &data.camera,
-            own => own,
-        };
-        let clock = set.camera_ahead_s.or(data.camera_ahead_s);
-        let topics = match set.topics.as_slice() {
-            [] => &data.topics,
-            own => own,
-        };
-        let open = |paths: &[PathBuf], split| recordings(paths, split, camera, (clock, topics), i);
-        train.extend(open(&set.paths, set.split.as_deref())?);
-        if set.validates() {
-            let own = own_or(&set.validation, &set.paths);
-            validation.extend(open(own, set.validation_split.as_deref())?);
-        }
-    }
-    let validation = (!validation.is_empty()).then_some(validation);
-    Ok(SampleSet::split_sets(config, train, validation)?)
-}
-
-/// Without recordings of its own, validation takes frames of those that are learned from.
-fn own_or<'a>(own: &'a [PathBuf], others: &'a [PathBuf]) -> &'a [PathBuf] {
-    match own.is_empty() {
-        true => others,
-        false => own,
-    }
-}
-
-fn recordings(
-    paths: &[PathBuf],
-    split: Option<&Path>,
-    camera: &str,
-    (camera_ahead_s, topics): (Option<f64>, &[String]),
-    set: usize,
-) -> Result<Vec<(usize, Dataset)>, Failure> {
-    let camera: Result<Cameras, Failure> = match camera {
-        "" => Ok(Cameras::default()),
-        text => text.parse().map_err(|_| Failure {
-            message: format!("camera: `{text}`"),
-            hint: Some("\"2\", \"3\" or \"both\"".into()),
-        }),
-    };
-    let topics = topics.iter().map(|text| {
-        text.parse().map_err(|hint| Failure {
-            message: format!("topics: `{text}`"),
-            hint: Some(hint),
-        })
-    });
-    let options = OpenOptions {
-        camera: camera?,
-        split: split.map(Split::read).transpose()?,
-        camera_ahead_s,
-        topics: topics.collect::<Result<_, Failure>>()?,
-        ..OpenOptions::default()
-    };
-    let mut all = Vec::new();
-    for path in paths {
-        let opened = Dataset::open(path, &options)?;
-        all.extend(opened.into_iter().map(|dataset| (set, dataset)));
-    }
-    Ok(all)
-}
-
-/// What a new run's networks begin from.
-enum Start {
-    /// The weights of the seed.
-    Nothing,
-    /// A trained network.
-    Network(ModelSource),
-}
-
-impl Start {
-    /// What is asked for, else what the configuration says, else for a preset the embedded network with the same layers: as the command.
-    fn of(asked: &TrainRequest, config: &TrainConfig) -> Result<Self, Failure> {
-        if let Some(init) = asked.init.as_ref().or(config.init.as_ref()) {
-            if init == Path::new("none") {
-                return Ok(Self::Nothing);
-            }
-            return Ok(Self::Network(ModelSource::named(init)?));
-        }
-        if Preset::ALL
-            .iter()
-            .all(|preset| Path::new(preset.name()) != asked.config)
-        {
-            return Ok(Self::Nothing);
-        }
-        for name in embedded_names() {
-            let source = ModelSource::named(Path::new(name))?;
-            let theirs = source.load(None)?.config;
-            if same_layers(&theirs.depth_net, &config.depth_net) {
-                return Ok(Self::Network(source));
-            }
-        }
-        Ok(Self::Nothing)
-    }
-
-    /// So that the run can be repeated; and takes what the weights' metres stand on.
-    fn record_in(&self, config: &mut TrainConfig) -> Result<(), Failure> {
-        let Self::Network(source) = self else {
-            (config.init, config.init_sha256) = (None, None);
-            return Ok(());
-        };
-        let given = source.given();
-        let embedded = embedded_names().iter().any(|name| Path::new(name) == given);
-        let sha256 = source
-            .packed_sha256()
-            .filter(|_| embedded && !given.exists());
-        if let (Some(expected), Some(found)) = (&config.init_sha256, sha256)
-            && expected != found
-            && config.init.as_deref() == Some(given)
-        {
-            return Err(Failure {
-                message: format!(
-                    "the run began from other weights of the name `{}` than are embedded here",
-                    given.display()
-                ),
-                hint: Some("init=\"none\", or the path of the weights that are meant".into()),
-            });
-        }
-        config.init_sha256 = sha256.map(Into::into);
-        config.init = Some(given.to_owned());
-        let theirs = match source {
-            ModelSource::Run { folder, .. } => folder.read_config()?,
-            ModelSource::Packed { .. } => source.load(None)?.config,
-        };
-        config.canonical_focal_px = config.canonical_focal_px.or(theirs.canonical_focal_px);
-        if let ModelSource::Run { folder, kind, .. } = source
-            && config.pose_net.metres_per_unit == 0.0
-            && !folder.read_state(*kind)?.encoders_only
-        {
-            // Its PoseNet speaks of this unit.
-            config.pose_net.metres_per_unit = theirs.pose_net.metres_per_unit;
-        }
-        Ok(())
-    }
-
-    fn initialise(&self, mut model: Model, device: &Device) -> Result<Model, Error> {
-        match self {
-            Self::Nothing => Ok(model),
-            Self::Network(ModelSource::Run { folder, kind, .. }) => {
-                let device = device.clone().autodiff();
-                Ok(folder.load_networks(*kind, model.config(), &device)?.0)
-            }
-            Self::Network(source) => {
-                let weights = source.load(None)?.weights;
-                model.depth_net = model.depth_net.with_weights(&weights)?.0;
-                Ok(model)
-            }
-        }
-    }
-}
-
-/// Whether one network's weights are the other's and mean the same depths: all but the depth that a new one starts at, whether its
-/// batch norms learn, and the head for uncertainty.
-fn same_layers(a: &DepthNetConfig, b: &DepthNetConfig) -> bool {
-    let bare = |config: &DepthNetConfig| {
-        let mut config = config.clone();
-        config.initial_depth_m = None;
-        config.encoder.frozen_statistics = false;
-        config.uncertainty = false;
-        config
-    };
-    bare(a) == bare(b)
-}
-
 /// Hears the trainer's events, logs them as the command does, and calls Python.
-struct Listener {
+pub struct Listener {
     callback: Option<Py<PyAny>>,
-    log: Option<CsvLog>,
+    log: Option<RunLog>,
     /// What went wrong in it: training stops, and this is raised.
-    raised: Option<PyErr>,
+    pub raised: Option<PyErr>,
     losses: Option<LossTerms>,
     validation: Option<LossTerms>,
     scale_ratio: Option<f64>,
 }
 
 impl Listener {
-    fn new(callback: Option<Py<PyAny>>) -> Self {
+    pub fn new(callback: Option<Py<PyAny>>) -> Self {
         Self {
             callback,
             log: None,
@@ -418,9 +258,27 @@ impl Listener {
         }
     }
 
-    fn hear(&mut self, event: TrainEvent, stop: &Stop) -> Control {
+    /// Writes the run's files from now on.
+    pub fn keep_log(&mut self, trainer: &Trainer) -> deepfusion::jobs::Result<()> {
+        self.log = Some(RunLog::open(trainer.folder(), trainer.step())?);
+        Ok(())
+    }
+
+    /// As Python's own warnings; where those are errors, the first stops the run.
+    pub fn warn(&mut self, warnings: &Warnings) {
+        for text in &warnings.others {
+            let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+            let warned =
+                Python::attach(|py| PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1));
+            if let Err(error) = warned {
+                self.raised.get_or_insert(error);
+            }
+        }
+    }
+
+    pub fn hear(&mut self, event: TrainEvent, stop: &Stop) -> Control {
         match self.handle(event) {
-            Ok(true) if !stop.asked() => Control::Continue,
+            Ok(true) if !stop.asked() && self.raised.is_none() => Control::Continue,
             Ok(_) => Control::Stop,
             Err(error) => {
                 self.raised.get_or_insert(error);
@@ -442,48 +300,19 @@ impl Listener {
         })
     }
 
-    fn record(&mut self, event: &TrainEvent) -> Result<(), Error> {
-        let record = match event {
+    /// Keeps an event's figures, and what the run's files have of it.
+    fn record(&mut self, event: &TrainEvent) -> deepfusion::jobs::Result<()> {
+        match event {
             TrainEvent::Step {
-                step,
                 losses,
-                learning_rate,
-                images_per_second,
                 scale_ratio,
                 ..
-            } => {
-                self.losses = Some(*losses);
-                self.scale_ratio = Some(*scale_ratio);
-                CsvRecord {
-                    step: *step,
-                    losses,
-                    learning_rate: *learning_rate,
-                    scale_ratio: *scale_ratio,
-                    images_per_second: *images_per_second,
-                    selection: None,
-                }
-            }
-            TrainEvent::Validated {
-                step,
-                losses,
-                selection,
-                scale_ratio,
-                ..
-            } => {
-                self.validation = Some(*losses);
-                CsvRecord {
-                    step: *step,
-                    losses,
-                    learning_rate: 0.0,
-                    scale_ratio: *scale_ratio,
-                    images_per_second: 0.0,
-                    selection: Some(*selection),
-                }
-            }
-            _ => return Ok(()),
-        };
+            } => (self.losses, self.scale_ratio) = (Some(*losses), Some(*scale_ratio)),
+            TrainEvent::Validated { losses, .. } => self.validation = Some(*losses),
+            _ => {}
+        }
         match &mut self.log {
-            Some(log) => log.write(&record),
+            Some(log) => log.write(event),
             None => Ok(()),
         }
     }

@@ -52,6 +52,12 @@ def test_a_run_is_trained_and_can_be_loaded(run, street):
     assert np.isfinite(model.predict(frame.image, frame.intrinsics).depth).all()
 
 
+def test_a_run_leaves_what_the_command_leaves(run):
+    path = run[0].path
+    assert any(name.startswith("events.out.tfevents") for name in os.listdir(path))
+    assert (path / "panels" / "000003.png").is_file()
+
+
 def test_the_same_seed_is_the_same_run(run, street, tmp_path):
     again = deepfusion.train(SMALL, [street], out=tmp_path / "again", init="none")
     assert again.losses == run[0].losses

@@ -83,18 +83,6 @@ pub(crate) enum CliError {
         /// Its name.
         model: String,
     },
-    /// An embedded network that is not the one a configuration began from.
-    #[error(
-        "the embedded network `{name}` is another one than this configuration began from: SHA-256 {found}, not {expected}"
-    )]
-    OtherStart {
-        /// Its name.
-        name: String,
-        /// Of the weights in this build.
-        found: String,
-        /// In the configuration.
-        expected: String,
-    },
     /// A file where a run's folder is needed.
     #[error("{}: pictures need a run's folder, and this is a file", path.display())]
     NoModel {
@@ -212,15 +200,6 @@ pub(crate) enum CliError {
         /// The option that says where it is now; none for a data set's.
         option: Option<&'static str>,
     },
-    /// Drives that a network cannot be judged on, and so not adapted to.
-    #[cfg(feature = "train")]
-    #[error("{frames} of the frames that are held out can show how good a network is, too few to adapt by{}", because(*why))]
-    NotJudged {
-        /// How many.
-        frames: usize,
-        /// Why there are none.
-        why: Option<deepfusion_eval::verdict::NoCertificate>,
-    },
     /// An adapted network that is worse than the one it began from.
     #[cfg(feature = "train")]
     #[error("not kept: on the frames that are held out it became worse: {worse}; laid aside as {}", path.display())]
@@ -229,13 +208,6 @@ pub(crate) enum CliError {
         path: PathBuf,
         /// In what.
         worse: String,
-    },
-    /// A folder without a network to go back to.
-    #[cfg(feature = "train")]
-    #[error("{}: `adapt` wrote no run there, or it is undone already", path.display())]
-    NotAdapted {
-        /// The folder.
-        path: PathBuf,
     },
     /// Work that was stopped and has nothing to go on with.
     #[error("{what} was stopped before it was done")]
@@ -320,9 +292,6 @@ impl Reportable for CliError {
                 "train on from it (deepfusion train --data DRIVE --init NAME), and give that run's folder".into(),
             ),
             Self::NoPoseNet { .. } => Some("give the folder of a run that `train` wrote".into()),
-            Self::OtherStart { .. } => Some(
-                "take the version of the program that made the run, or remove init_sha256 from the file to begin from this one".into(),
-            ),
             Self::NoModel { .. } => Some("give run folders alone, or leave out --pictures".into()),
             Self::SeveralDrives { .. } => Some("convert them one by one: give a drive's own folder".into()),
             Self::NoRos2Writer { .. } => {
@@ -362,15 +331,9 @@ impl Reportable for CliError {
                 run.join("config.toml").display()
             )),
             #[cfg(feature = "train")]
-            Self::NotJudged { .. } => Some(
-                "give longer drives with speed and yaw rate, or more of them with --held-out SHARE; or learn without this check: deepfusion train --data DRIVE --init NETWORK".into(),
-            ),
-            #[cfg(feature = "train")]
             Self::Refused { .. } => Some(
                 "the given network is the better one here; more drives, fewer --steps or a smaller --learning-rate may change that".into(),
             ),
-            #[cfg(feature = "train")]
-            Self::NotAdapted { .. } => Some("give the folder that `adapt --out` named".into()),
             Self::Ended { .. } => Some("start it again, into another folder".into()),
             Self::LiveAlone { .. } => Some("start one run for each source, each with a folder of its own".into()),
             Self::Terminal => Some("… | deepfusion … -, or give a camera or an address instead of -".into()),
@@ -399,11 +362,6 @@ impl Reportable for CliError {
             ),
         }
     }
-}
-
-#[cfg(feature = "train")]
-fn because(why: Option<deepfusion_eval::verdict::NoCertificate>) -> String {
-    why.map_or_else(String::new, |why| format!(": {why}"))
 }
 
 /// The failures of a run, a line each, as many as a person reads; the manifest has them all.

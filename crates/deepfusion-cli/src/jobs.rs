@@ -60,6 +60,12 @@ impl Reportable for Error {
             Self::NothingToPack { .. } => {
                 Some("train from it first: deepfusion train --data DRIVE --init RUN".into())
             }
+            #[cfg(feature = "train")]
+            Self::NotJudged { .. } => Some(
+                "give longer drives with speed and yaw rate, or more of them with --held-out SHARE; or learn without this check: deepfusion train --data DRIVE --init NETWORK".into(),
+            ),
+            #[cfg(feature = "train")]
+            Self::NotAdapted { .. } => Some("give the folder that `adapt --out` named".into()),
             other => other.hint(),
         }
     }
@@ -79,6 +85,9 @@ fn wrapped(error: &Error) -> Option<&dyn Reportable> {
         Error::Video(error) => Some(error),
         Error::Data(error) => Some(error),
         Error::Cloud(error) => Some(error),
+        Error::PoseFile(error) => Some(error),
+        Error::Track(error) => Some(error),
+        Error::Calibrate(error) => Some(error),
         Error::Eval(error) => Some(error),
         Error::Compare(error) => Some(error),
         Error::Model(error) => Some(error),
@@ -87,6 +96,8 @@ fn wrapped(error: &Error) -> Option<&dyn Reportable> {
         Error::Runtime(error) => Some(error),
         #[cfg(feature = "train")]
         Error::Train(error) => Some(error),
+        #[cfg(feature = "train")]
+        Error::Render(error) => Some(error),
         Error::Perception(error) => Some(error),
         _ => None,
     }

@@ -4,6 +4,7 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use crate::failure::{Context, Result};
+use deepfusion_fs::unused;
 pub(crate) use deepfusion_jobs::dates::now;
 pub(crate) use deepfusion_jobs::name_of;
 
@@ -74,21 +75,6 @@ pub(crate) fn run_folder(asked: Option<&Path>, command: &str) -> Result<PathBuf>
         .into());
     }
     Ok(folder)
-}
-
-/// `path`, or `path-2`, `path-3` … where that is taken.
-pub(crate) fn unused(path: &Path) -> PathBuf {
-    let numbered = |n: u32| {
-        if n == 1 {
-            path.to_owned()
-        } else {
-            PathBuf::from(format!("{}-{n}", path.display()))
-        }
-    };
-    (1..)
-        .map(numbered)
-        .find(|p| !p.exists())
-        .unwrap_or_else(|| path.to_owned())
 }
 
 /// Fails where a file could not be written for want of its folder: an error before long work, not after it.

@@ -108,6 +108,58 @@ pub enum Error {
         /// Why not.
         source: toml::ser::Error,
     },
+    /// An embedded network that is not the one a configuration began from.
+    #[cfg(feature = "train")]
+    #[error(
+        "the embedded network `{name}` is another one than this configuration began from: SHA-256 {found}, not {expected}"
+    )]
+    OtherStart {
+        /// Its name.
+        name: String,
+        /// Of the weights in this build.
+        found: String,
+        /// In the configuration.
+        expected: String,
+    },
+    /// A folder for an adapted network that is not new.
+    #[cfg(feature = "train")]
+    #[error("{}: already exists", path.display())]
+    AdaptedBefore {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// An interrupted adaptation with other settings.
+    #[cfg(feature = "train")]
+    #[error("{}: already exists", path.display())]
+    OtherSettings {
+        /// Its folder.
+        path: PathBuf,
+    },
+    /// Drives that a network cannot be judged on, and so not adapted to.
+    #[cfg(feature = "train")]
+    #[error("{frames} of the frames that are held out can show how good a network is, too few to adapt by{}", because(*why))]
+    NotJudged {
+        /// How many.
+        frames: usize,
+        /// Why there are none.
+        why: Option<deepfusion_eval::verdict::NoCertificate>,
+    },
+    /// A folder without a network to go back to.
+    #[cfg(feature = "train")]
+    #[error("{}: no network was adapted there, or it is undone already", path.display())]
+    NotAdapted {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// What an ablation keeps of a run cannot be read.
+    #[cfg(feature = "train")]
+    #[error("{}: not a result of an ablation", path.display())]
+    NoResult {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: serde_json::Error,
+    },
     /// Something that has no TOML form.
     #[error(transparent)]
     Toml(#[from] toml::ser::Error),
@@ -123,6 +175,15 @@ pub enum Error {
     /// A scan.
     #[error(transparent)]
     Cloud(#[from] deepfusion_geometry::cloud::Error),
+    /// A file of poses.
+    #[error(transparent)]
+    PoseFile(#[from] deepfusion_eval::odometry::PoseFileError),
+    /// A path that is none.
+    #[error(transparent)]
+    Track(#[from] deepfusion_eval::odometry::TrackError),
+    /// A board in pictures.
+    #[error(transparent)]
+    Calibrate(#[from] deepfusion_calibrate::Error),
     /// What was measured.
     #[error(transparent)]
     Eval(#[from] deepfusion_eval::Error),
@@ -145,6 +206,10 @@ pub enum Error {
     #[cfg(feature = "train")]
     #[error(transparent)]
     Train(#[from] deepfusion_train::Error),
+    /// A panel that cannot be drawn.
+    #[cfg(feature = "train")]
+    #[error(transparent)]
+    Render(#[from] deepfusion_render::Error),
     /// A depth image that nothing can be found in.
     #[error(transparent)]
     Perception(#[from] deepfusion_perception::Error),
@@ -223,6 +288,28 @@ impl Hint for Error {
             Self::PackedAlready { .. } => {
                 Some("give the folder of the run that it was packed from".into())
             }
+            #[cfg(feature = "train")]
+            Self::OtherStart { .. } => Some(
+                "take the version of the program that made the run, or remove init_sha256 from the file to begin from this one".into(),
+            ),
+            #[cfg(feature = "train")]
+            Self::AdaptedBefore { .. } => {
+                Some("choose another folder: what was adapted before stays".into())
+            }
+            #[cfg(feature = "train")]
+            Self::OtherSettings { .. } => Some(
+                "it was left by an adaptation with other settings: give those to go on with it, or remove it".into(),
+            ),
+            #[cfg(feature = "train")]
+            Self::NotJudged { .. } => Some(
+                "give longer drives with speed and yaw rate, or hold more of them out; or train on from the network without this check".into(),
+            ),
+            #[cfg(feature = "train")]
+            Self::NotAdapted { .. } => {
+                Some("give the folder that the adapted network was written to".into())
+            }
+            #[cfg(feature = "train")]
+            Self::NoResult { .. } => Some("delete it to run this row again".into()),
             Self::Pattern(_)
             | Self::Kept { .. }
             | Self::NoTomlForm { .. }
@@ -232,6 +319,9 @@ impl Hint for Error {
             Self::Video(error) => error.hint(),
             Self::Data(error) => error.hint(),
             Self::Cloud(error) => error.hint(),
+            Self::PoseFile(error) => error.hint(),
+            Self::Track(error) => error.hint(),
+            Self::Calibrate(error) => error.hint(),
             Self::Eval(error) => error.hint(),
             Self::Compare(error) => error.hint(),
             Self::Model(error) => error.hint(),
@@ -240,7 +330,14 @@ impl Hint for Error {
             Self::Simulator(error) => error.hint(),
             #[cfg(feature = "train")]
             Self::Train(error) => error.hint(),
+            #[cfg(feature = "train")]
+            Self::Render(error) => error.hint(),
             Self::Perception(error) => error.hint(),
         }
     }
+}
+
+#[cfg(feature = "train")]
+fn because(why: Option<deepfusion_eval::verdict::NoCertificate>) -> String {
+    why.map_or_else(String::new, |why| format!(": {why}"))
 }

@@ -8,6 +8,7 @@ use deepfusion_geometry::DepthMap;
 use deepfusion_runtime::{DepthEstimator, ModelSource, Prediction};
 
 use crate::evaluation::{Evaluated, ImageRef, Truth, known_pixels};
+use crate::files;
 use crate::{Error, ModelFacts, Result};
 
 /// The file in a run's folder.
@@ -47,7 +48,7 @@ fn write(factors: &IntervalFactors, run: &Path) -> Result<PathBuf> {
          # each level and range of predicted depth. Written by `eval --calibrate-uncertainty`.\n{}",
         toml::to_string(factors)?
     );
-    deepfusion_fs::write(&path, text).map_err(|e| deepfusion_data::Error::file(&path, e))?;
+    files::write(&path, text)?;
     Ok(path)
 }
 

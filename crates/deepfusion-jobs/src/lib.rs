@@ -8,30 +8,45 @@
 //! | [`bulk`] | images in, outputs exactly once, on any number of machines |
 //! | [`scene`] | how the camera moved from frame to frame, and whether metres still are what they were |
 //! | [`verdict`] | what a drive with speeds says of a network's depth, without ground truth |
+//! | [`board`] | the board of a calibration in pictures and videos |
 //! | [`packing`] | a run's network as a file of its own, with its card |
 //! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training saw what is measured on |
 #![cfg_attr(
     feature = "train",
     doc = "| [`samples`] | the samples that a configuration is trained and validated with |"
 )]
+#![cfg_attr(
+    feature = "train",
+    doc = "| [`odometry`] | the pose network's path beside the true one |"
+)]
+#![cfg_attr(
+    feature = "train",
+    doc = "| [`training`] | what a run starts from and what it leaves; adapting a network to new drives; the table of an ablation |"
+)]
 //!
 //! Nothing here prints. What a person should know is returned, or passed to a callback.
 
+pub mod board;
 pub mod bulk;
 pub mod dates;
 mod error;
 pub mod evaluation;
 mod figures;
+mod files;
 pub mod held_out;
 mod inputs;
 pub mod intervals;
 pub mod labelled;
 mod model_facts;
+#[cfg(feature = "train")]
+pub mod odometry;
 pub mod packing;
 pub mod recordings;
 #[cfg(feature = "train")]
 pub mod samples;
 pub mod scene;
+#[cfg(feature = "train")]
+pub mod training;
 pub mod verdict;
 
 pub use error::{Error, OtherJob, Result, StaleReason};

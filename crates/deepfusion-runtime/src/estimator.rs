@@ -62,14 +62,22 @@ impl OtherSizes {
 impl DepthEstimator {
     /// A network by its path (a run's folder, a checkpoint in it, a packed file) or by the name of an embedded one, in the
     /// fused engine and f32. For a run that learned several data sets, use [`ModelSource::load`] with the name of one, and
-    /// [`Self::of`]: each has its own metric scale.
+    /// [`Self::fused`]: each has its own metric scale.
     ///
     /// # Errors
     /// As [`ModelSource::named`] and [`ModelSource::load`].
     pub fn load(model: impl AsRef<Path>) -> Result<Self, Error> {
         let network = ModelSource::named(model.as_ref())?.load(None)?;
-        Self::of(network, |config, weights| {
-            let runner = FusedRunner::new(config, weights, Precision::F32)?;
+        Self::fused(network, Precision::F32)
+    }
+
+    /// An estimator for a stored network in the fused engine.
+    ///
+    /// # Errors
+    /// As [`FusedRunner::new`].
+    pub fn fused(network: StoredNetwork, precision: Precision) -> Result<Self, Error> {
+        Self::of(network, move |config, weights| {
+            let runner = FusedRunner::new(config, weights, precision)?;
             Ok::<_, Error>(Box::new(runner) as Box<dyn DepthRunner>)
         })
     }

@@ -1,5 +1,4 @@
 #[cfg(feature = "train")]
-#[cfg(feature = "train")]
 use burn::tensor::Device;
 
 use crate::cli::ComputeDevice;

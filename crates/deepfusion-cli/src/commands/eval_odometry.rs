@@ -1,10 +1,11 @@
 use std::path::Path;
 
-use deepfusion_data::{Camera, CameraPath, Dataset, DatasetKind, OpenOptions};
+use deepfusion_data::OpenOptions;
 use deepfusion_eval::odometry::{
-    OdometryReport, PoseFile, TrackError, TrackPair, chain, from_first, kitti_text, tum_text,
+    OdometryReport, PoseFile, TrackPair, from_first, kitti_text, tum_text,
 };
-use deepfusion_geometry::{Intrinsics, Se3};
+use deepfusion_geometry::Se3;
+use deepfusion_jobs::odometry::tracks;
 use deepfusion_render::TopView;
 use deepfusion_runtime::ModelSource;
 use deepfusion_train::PosePredictor;
@@ -19,13 +20,6 @@ use crate::failure::Result;
 use crate::model::ModelFacts;
 use crate::output;
 use crate::progress::Progress;
-
-/// Exact poses of simulated drives.
-const EXACT_POSES: &str = "poses.txt";
-/// Pairs of frames that the network sees at once.
-const PAIRS: usize = 8;
-/// Another focal length than the one trained with, at network size, by more than this share is a warning.
-const FOCAL_TOLERANCE: f64 = 0.05;
 
 /// `deepfusion eval-odometry`.
 pub(super) fn run(args: &EvalOdometryArgs) -> Result<()> {
@@ -69,125 +63,12 @@ fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
     };
     options.camera_ahead_s = clocks::seconds(args.clock_offset, &args.data, &options)?;
     let datasets = open_recordings(&args.data, &options)?;
-    let mut stretches = Vec::new();
-    let (mut exact, mut integrated, mut tracked) = (0, 0, 0);
-    for dataset in &datasets {
-        warn_of_focal_length(&predictor, dataset);
-        let paths = match exact_paths(dataset)? {
-            Some(paths) => {
-                exact += 1;
-                paths
-            }
-            None => {
-                match dataset.kind() {
-                    DatasetKind::KittiRaw => integrated += 1,
-                    _ => tracked += 1,
-                }
-                dataset.camera_paths()?
-            }
-        };
-        let several = paths.len() > 1;
-        stretches.extend(paths.into_iter().map(|path| (dataset, path, several)));
-    }
-    let total = stretches.iter().map(|(_, p, _)| p.frames.len()).sum();
-    let (mut progress, mut done) = (Progress::new("following"), 0);
-    let mut tracks = Vec::new();
-    for (dataset, path, several) in stretches {
-        let mut motions = Vec::new();
-        let mut images: Vec<Vec<f32>> = Vec::new();
-        for &frame in &path.frames {
-            images.push(predictor.prepare(&dataset.load_image(frame)?));
-            if images.len() > PAIRS {
-                motions.extend(predictor.motions(&images));
-                // The last image of one batch is the first of the next.
-                images.drain(..images.len() - 1);
-            }
-            done += 1;
-            progress.set(done, total);
-        }
-        motions.extend(predictor.motions(&images));
-        let name = track_name(dataset, &path, several, args.camera.cameras().len() > 1);
-        let track = TrackPair::new(name, path.world_from_cam, chain(&motions))?;
-        tracks.push(track.with_times(path.times_s));
-    }
-    if tracks.is_empty() {
-        let name = datasets.first().map_or("the data given", Dataset::name);
-        return Err(TrackError::TooShort {
-            name: name.to_owned(),
-            poses: 1,
-        }
-        .into());
-    }
-    let truth = match (exact, integrated, tracked) {
-        (_, 0, 0) => "the simulator's exact poses",
-        (0, _, 0) => "OXTS attitude and integrated velocity",
-        (0, 0, _) => "the recordings' own poses",
-        (_, _, 1..) => "each recording's own: exact poses, OXTS, or a tracker's poses",
-        _ => {
-            "the simulator's exact poses where there are any, else OXTS attitude and integrated velocity"
-        }
-    };
+    let mut progress = Progress::new("following");
+    let found = tracks(&predictor, &datasets, &mut |done, total| {
+        progress.set(done, total);
+    });
+    let (tracks, truth) = found?;
     Ok((tracks, truth.to_owned()))
-}
-
-/// The exact path of a simulated drive; `None` for real ones.
-fn exact_paths(dataset: &Dataset) -> Result<Option<Vec<CameraPath>>> {
-    let file = dataset.folder().join(EXACT_POSES);
-    if dataset.kind() != DatasetKind::KittiRaw
-        || dataset.camera() != Camera::Left
-        || !file.is_file()
-    {
-        return Ok(None);
-    }
-    let poses = PoseFile::read(&file)?.poses;
-    let pose = |frame: &usize| -> Option<(usize, f64, Se3)> {
-        let number = dataset.frames()[*frame].number;
-        let pose = poses.get(usize::try_from(number).ok()?)?;
-        Some((*frame, dataset.time_of(number)?, *pose))
-    };
-    let mut paths = Vec::new();
-    for stretch in dataset.stretches() {
-        let known: Vec<_> = stretch.iter().filter_map(pose).collect();
-        if known.len() == stretch.len() {
-            paths.push(CameraPath {
-                frames: stretch,
-                times_s: known.iter().map(|k| k.1).collect(),
-                world_from_cam: known.iter().map(|k| k.2).collect(),
-            });
-        }
-    }
-    Ok(Some(paths))
-}
-
-/// A drive's name, with the camera where both are looked at, and the first frame where it has gaps.
-fn track_name(dataset: &Dataset, path: &CameraPath, several: bool, cameras: bool) -> String {
-    let mut name = dataset.name().to_owned();
-    if cameras {
-        name += &format!("_{:02}", dataset.camera().number());
-    }
-    if several {
-        let first = path.frames.first().map(|f| dataset.frames()[*f].number);
-        name += &format!("_from_{}", first.unwrap_or_default());
-    }
-    name
-}
-
-/// A pose network sees pixels: another focal length shows it another motion.
-fn warn_of_focal_length(predictor: &PosePredictor, dataset: &Dataset) {
-    let (Some(train), Some(&frame)) = (predictor.training_camera(), dataset.selected().first())
-    else {
-        return;
-    };
-    let size = predictor.config().size;
-    let at_network_size = |k: Intrinsics| k.resized(size.width as u32, size.height as u32);
-    let here = at_network_size(dataset.intrinsics(frame));
-    let ratio = here.fx / at_network_size(train).fx;
-    if (ratio - 1.0).abs() > FOCAL_TOLERANCE {
-        tracing::warn!(
-            "{}: its focal length is {ratio:.2} times the one trained with, at network size; poses are not corrected for it",
-            dataset.name()
-        );
-    }
 }
 
 /// Both paths in the world of their first pose, and their picture.

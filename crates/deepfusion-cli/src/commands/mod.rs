@@ -36,8 +36,6 @@ mod resume;
 mod run_report;
 mod simulate;
 #[cfg(feature = "train")]
-mod start;
-#[cfg(feature = "train")]
 mod time_estimate;
 #[cfg(feature = "train")]
 mod train;

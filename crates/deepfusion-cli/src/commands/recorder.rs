@@ -1,16 +1,14 @@
 //! What becomes of a trainer's events: log files, panels, and lines for the person who waits.
 
-use deepfusion_hint::count_of;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
-use deepfusion_data::RgbImage;
-use deepfusion_render::{DepthPanel, depth_panel, sample_panel};
-use deepfusion_train::log::{CsvLog, CsvRecord, TensorBoardLog};
-use deepfusion_train::{Control, LossTerms, SamplePanel, Supervision, TrainEvent};
+use deepfusion_hint::count_of;
+use deepfusion_jobs::training::RunLog;
+use deepfusion_train::{Control, LossTerms, TrainEvent};
 
 use super::time_estimate::TimeEstimate;
-use crate::failure::{Context, Failure, Result};
+use crate::failure::{Failure, Result};
 use crate::interrupt;
 use crate::progress::{Progress, clock, say};
 
@@ -19,9 +17,7 @@ const LINE_EVERY: Duration = Duration::from_secs(20);
 
 /// Writes the logs of a run and shows its progress.
 pub(super) struct Recorder {
-    csv: CsvLog,
-    events: TensorBoardLog,
-    panels: PathBuf,
+    log: RunLog,
     progress: Progress,
     last_line: Instant,
     time_estimate: Option<TimeEstimate>,
@@ -36,13 +32,8 @@ impl Recorder {
         step: usize,
         time_estimate: Option<TimeEstimate>,
     ) -> Result<Self> {
-        let panels = folder.join("panels");
-        std::fs::create_dir_all(&panels)
-            .with_context(|| format!("{}: cannot be made", panels.display()))?;
         Ok(Self {
-            csv: CsvLog::open(&folder.join("log.csv"), step)?,
-            events: TensorBoardLog::create(folder)?,
-            panels,
+            log: RunLog::open(folder, step)?,
             progress: Progress::new("training"),
             last_line: Instant::now(),
             time_estimate,
@@ -52,11 +43,12 @@ impl Recorder {
 
     /// Handles an event.
     pub(super) fn handle(&mut self, event: TrainEvent) -> Control {
-        if let Err(error) = self.record(event) {
+        if let Err(error) = self.log.write(&event) {
             // A full disk: what is saved is safe, more would be lost.
-            self.failure.get_or_insert(error);
+            self.failure.get_or_insert(error.into());
             return Control::Stop;
         }
+        self.say(event);
         if interrupt::asked() {
             Control::Stop
         } else {
@@ -72,7 +64,7 @@ impl Recorder {
         }
     }
 
-    fn record(&mut self, event: TrainEvent) -> Result<()> {
+    fn say(&mut self, event: TrainEvent) {
         match event {
             TrainEvent::Started {
                 from_step,
@@ -102,30 +94,11 @@ impl Recorder {
                 step,
                 steps,
                 losses,
-                learning_rate,
                 images_per_second,
                 remaining_s,
                 scale_ratio,
-                gradient_norm,
+                ..
             } => {
-                self.csv.write(&CsvRecord {
-                    step,
-                    losses: &losses,
-                    learning_rate,
-                    scale_ratio,
-                    images_per_second,
-                    selection: None,
-                })?;
-                let mut scalars: Vec<_> = losses.named().to_vec();
-                scalars.push(("learning_rate", learning_rate));
-                scalars.push(("scale_ratio", scale_ratio));
-                scalars.push(("gradient_norm", gradient_norm));
-                let tagged: Vec<_> = scalars
-                    .iter()
-                    .map(|(n, v)| (format!("train/{n}"), *v))
-                    .collect();
-                let tagged: Vec<_> = tagged.iter().map(|(n, v)| (n.as_str(), *v)).collect();
-                self.events.scalars(step, &tagged)?;
                 let line = format!(
                     "loss {:.4} ({}), scale ratio {scale_ratio:.3}, {images_per_second:.1} images/s, {} left",
                     losses.total,
@@ -153,31 +126,11 @@ impl Recorder {
                 scale_ratio,
                 best,
             } => {
-                self.csv.write(&CsvRecord {
-                    step,
-                    losses: &losses,
-                    learning_rate: 0.0,
-                    scale_ratio,
-                    images_per_second: 0.0,
-                    selection: Some(selection),
-                })?;
-                let mut named = losses.named().to_vec();
-                named.push(("selection", selection));
-                let tagged: Vec<_> = named
-                    .iter()
-                    .map(|(n, v)| (format!("validation/{n}"), *v))
-                    .collect();
-                let tagged: Vec<_> = tagged.iter().map(|(n, v)| (n.as_str(), *v)).collect();
-                self.events.scalars(step, &tagged)?;
                 say(&format!(
                     "step {step}: held out {selection:.4}{} ({}), scale ratio {scale_ratio:.3}",
                     if best { ", the best so far" } else { "" },
                     held_out_terms(&losses),
                 ));
-            }
-            TrainEvent::Panel { step, panel } => {
-                let picture = drawn(&panel)?;
-                deepfusion_data::save_png(&picture, &self.panels.join(format!("{step:06}.png")))?;
             }
             TrainEvent::Camera { camera, learned } => {
                 let [fx, fy] = learned.focal_px;
@@ -185,19 +138,16 @@ impl Recorder {
                     Some([x, y]) => format!("standard deviations {x:.1} and {y:.1}"),
                     None => "not determined by these drives".into(),
                 };
-                self.events
-                    .scalars(learned.step, &[("camera/fx", fx), ("camera/fy", fy)])?;
                 say(&format!(
                     "camera learned: fx {fx:.1}, fy {fy:.1} in pixels of {}x{} ({spread}), the principal point in the middle",
                     camera.width, camera.height
                 ));
             }
-            TrainEvent::Saved { .. } => {}
+            TrainEvent::Panel { .. } | TrainEvent::Saved { .. } => {}
             TrainEvent::Warning { step, message } => {
                 tracing::warn!("step {step}: {message}");
             }
         }
-        Ok(())
     }
 }
 
@@ -233,37 +183,4 @@ fn held_out_terms(losses: &LossTerms) -> String {
         terms.push(format!("depth {:.4}", losses.depth));
     }
     terms.join(", ")
-}
-
-/// The picture of a panel.
-fn drawn(panel: &SamplePanel) -> deepfusion_render::Result<RgbImage> {
-    let (width, height) = (panel.width as u32, panel.height as u32);
-    let (image, disparity) = (&panel.image[..], &panel.disparity[..]);
-    match &panel.supervision {
-        Supervision::View {
-            warped,
-            error,
-            mask,
-            flow,
-            moving,
-        } => sample_panel(&deepfusion_render::SamplePanel {
-            width,
-            height,
-            image,
-            disparity,
-            warped,
-            error,
-            mask,
-            flow: flow.as_deref(),
-            moving: moving.as_deref(),
-        }),
-        Supervision::Depth { truth, error } => depth_panel(&DepthPanel {
-            width,
-            height,
-            image,
-            disparity,
-            truth,
-            error,
-        }),
-    }
 }

@@ -41,12 +41,17 @@ pub(super) fn open_recordings(paths: &[PathBuf], options: &OpenOptions) -> Resul
 /// validation frames that are seen in training.
 #[cfg(feature = "train")]
 pub(super) fn open_samples(config: &TrainConfig) -> Result<(SampleSet, SampleSet)> {
-    let mut warn = |warning: SampleWarning| warnings::warn_once(warning.to_string());
-    samples::open_samples(config, &mut print_warnings, &mut warn).map_err(jobs::in_words)
+    samples::open_samples(config, &mut print_warnings, &mut warn_of_sample).map_err(jobs::in_words)
+}
+
+/// Prints what may not be meant of the samples.
+#[cfg(feature = "train")]
+pub(super) fn warn_of_sample(warning: SampleWarning) {
+    warnings::warn_once(warning.to_string());
 }
 
 /// Their warnings, and that frames of the split are missing.
-fn print_warnings(options: &OpenOptions, datasets: &[Dataset]) {
+pub(super) fn print_warnings(options: &OpenOptions, datasets: &[Dataset]) {
     warnings::print(datasets);
     if let Some(missing) = missing_frames(options, datasets) {
         warnings::warn_once(missing.to_string());

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use deepfusion_jobs::recordings::camera_word;
+use deepfusion_jobs::training::Start;
 use deepfusion_model::TrainConfig;
 
-use super::start;
 use crate::cli::{ClockOffset, TrainArgs};
 use crate::error::CliError;
 use crate::failure::{Failure, Result};
@@ -100,7 +100,7 @@ pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainC
     }
     if let Some(asked) = init {
         // `none`, and the names of embedded networks, are no paths.
-        let asked = match (start::is_none(asked), &run.init_sha256) {
+        let asked = match (Start::is_none(asked), &run.init_sha256) {
             (true, _) | (false, Some(_)) => asked.clone(),
             (false, None) => std::path::absolute(asked).unwrap_or_else(|_| asked.clone()),
         };

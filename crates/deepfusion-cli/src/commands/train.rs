@@ -1,6 +1,7 @@
 use deepfusion_data::Cameras;
 use deepfusion_hint::count_of;
 use deepfusion_jobs::recordings::{camera_word, training_recordings};
+use deepfusion_jobs::training::{Began, Start};
 use deepfusion_model::{
     DataConfig, Error as ModelError, InputSize, Learn, Preset, RunFolder, TrainConfig,
 };
@@ -8,7 +9,6 @@ use deepfusion_train::{TrainSummary, Trainer};
 
 use super::recorder::Recorder;
 use super::recordings::open_samples;
-use super::start::Start;
 use super::time_estimate::TimeEstimate;
 use super::{clocks, device, resume};
 use crate::allocator;
@@ -40,12 +40,13 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
             Trainer::resume(config, folder, sets, &device)?
         }
         None => {
-            let start = Start::of(args, &config)?;
+            // A file says what its run starts from, if anything.
+            let start = Start::of(args.init.as_deref(), &config, args.config.is_none())?;
             start.record_in(&mut config)?;
             let folder = output::run_folder(args.out.as_deref(), "train")?;
             let folder = RunFolder::create(&folder)?;
             Trainer::create(config, folder, sets, &device, |model| {
-                start.initialise(model, &device)
+                start.initialise(model, &device, &mut began)
             })?
         }
     };
@@ -62,6 +63,17 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
         .into());
     }
     output::print(&format!("{}\n", trainer.folder().display()))
+}
+
+/// Prints what a run starts from.
+pub(super) fn began(began: Began) {
+    let embedded = matches!(began, Began::Packed { path: None, .. });
+    let hint = if embedded {
+        " (--init none starts from nothing)"
+    } else {
+        ""
+    };
+    say(&format!("{began}{hint}"));
 }
 
 /// What will be done: the network, its images, and how many steps and why.

@@ -1,5 +1,7 @@
 //! Whether a network that was learned on became worse, by what can be known without ground truth.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use super::Verdict;
@@ -78,7 +80,28 @@ impl Verdict {
     }
 }
 
+impl fmt::Display for WorsenedCheck {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            check,
+            before,
+            after,
+        } = *self;
+        let (before, after) = (check.figure(before), check.figure(after));
+        write!(f, "{check} {after} after {before}")
+    }
+}
+
 impl Check {
+    /// What it gives, as text.
+    #[must_use]
+    pub fn figure(self, value: f64) -> String {
+        match self {
+            Self::Reprojection => format!("{value:.4}"),
+            Self::Consistency | Self::Flip | Self::Scale => format!("{:.1} %", 100.0 * value),
+        }
+    }
+
     /// The most that is not worse than `before`.
     fn most(self, before: f64) -> f64 {
         match self {

@@ -9,6 +9,7 @@ use deepfusion_records::Sidecar;
 use serde::Serialize;
 
 use crate::Result;
+use crate::files::write;
 
 /// Where the sidecar of a name lies.
 #[must_use]
@@ -93,7 +94,7 @@ pub(super) fn is_complete(sidecar: &Sidecar, folder: &Path) -> bool {
 /// Where it cannot be written.
 pub fn write_json<T: Serialize>(value: &T, path: &Path) -> Result<()> {
     let text = as_json(value)?;
-    Ok(deepfusion_fs::write(path, text).map_err(|e| DataError::file(path, e))?)
+    Ok(write(path, text)?)
 }
 
 fn as_json<T: Serialize>(value: &T) -> Result<Vec<u8>> {

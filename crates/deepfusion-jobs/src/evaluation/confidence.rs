@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::division::divide;
 use super::known_pixels::known_pixels;
 use super::{Evaluated, ImageRef, Truth};
+use crate::files::write;
 use crate::{Error, Result};
 
 /// The file in a run's folder.
@@ -60,8 +61,7 @@ impl Confidence {
              # with the mirrored image); confidence = exp(-error). Written by `eval --calibrate-confidence`.\n{}",
             toml::to_string(self)?
         );
-        let failed = |e| deepfusion_data::Error::file(&path, e);
-        deepfusion_fs::write(&path, text).map_err(failed)?;
+        write(&path, text)?;
         Ok(path)
     }
 }

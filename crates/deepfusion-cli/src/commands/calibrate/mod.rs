@@ -1,21 +1,19 @@
 //! `deepfusion calibrate`: a camera from pictures of a checkerboard.
 
 mod page;
-mod pictures;
 mod summary;
 
 use deepfusion_calibrate::{Board, Calibration, Error, LEAST_VIEWS, calibrate};
 use deepfusion_data::{Lens, camera_info_yaml};
 use deepfusion_hint::count_of;
+use deepfusion_jobs::board::{BoardViews, LeftOut, Look, look};
 use serde::Serialize;
 
 use crate::cli::CalibrateArgs;
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::output;
-use crate::progress::say;
-
-use pictures::{LeftOut, Seen};
+use crate::progress::{Progress, say};
 
 /// What is reported of a calibration.
 #[derive(Debug, Serialize)]
@@ -51,7 +49,23 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
     for file in std::iter::once(&args.out).chain(&args.report) {
         output::require_folder_of(file)?;
     }
-    let seen = pictures::look(&args.inputs, &board, usize::from(args.frames))?;
+    let mut progress = Progress::new("looking for the board");
+    let seen = look(
+        &args.inputs,
+        &board,
+        usize::from(args.frames),
+        &mut |look| match look {
+            Look::Video { file, frames } => {
+                say(&format!(
+                    "{}: {}",
+                    file.display(),
+                    count_of(frames, "frame")
+                ));
+            }
+            Look::Done(done, total) => progress.set(done, total),
+        },
+    )?;
+    drop(progress);
     enough(&seen, &board)?;
     let mut found = calibrate(&seen.views, &board, seen.size, args.model())?;
     found.warnings.extend(seen.turned());
@@ -94,7 +108,7 @@ pub(super) fn run(args: &CalibrateArgs) -> Result<()> {
 }
 
 /// Whether there are views enough; which grid was seen instead, where not.
-fn enough(seen: &Seen, board: &Board) -> Result<()> {
+fn enough(seen: &BoardViews, board: &Board) -> Result<()> {
     let (found, pictures, board) = (seen.views.len(), seen.looked_at, *board);
     if found >= LEAST_VIEWS {
         return Ok(());

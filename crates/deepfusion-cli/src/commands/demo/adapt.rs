@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::Parser;
 use deepfusion_data::{Dataset, OpenOptions, Split};
 use deepfusion_jobs::evaluation::Evaluated;
+use deepfusion_jobs::training::Start;
 use deepfusion_model::{TrainConfig, ViewMotion};
 use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_render::{HtmlReport, PictureFormat};
@@ -16,8 +17,7 @@ use deepfusion_weights::{DEFAULT, Shipped};
 use super::page::{self, Shown};
 use super::{Demo, TEST_SEED, measure};
 use crate::cli::PerceiveArgs;
-use crate::commands::start::Start;
-use crate::commands::{device, perceive, run_report};
+use crate::commands::{device, perceive, run_report, train};
 use crate::failure::Result;
 use crate::output;
 use crate::progress::{clock, say};
@@ -104,7 +104,9 @@ pub(super) fn run(demo: &Demo, network: Box<Shipped>) -> Result<()> {
     config.data.paths = vec![drive.clone()];
     config.data.split = Some(parts.learn.clone());
     start.record_in(&mut config)?;
-    let adapted = demo.learn(config, |model| start.initialise(model, &demo.device))?;
+    let adapted = demo.learn(config, |model| {
+        start.initialise(model, &demo.device, &mut train::began)
+    })?;
 
     say("4/4 measuring again on the part that was not learned from; pictures and the report");
     let mut estimator = demo.estimator(&adapted)?;

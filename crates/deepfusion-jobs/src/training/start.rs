@@ -1,28 +1,27 @@
-//! What a new run starts from: `--init`, its configuration's `init`, or the network that the program carries.
+//! What a new run starts from: what is asked for, its configuration's `init`, or the network that the program carries.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
-use burn::tensor::Device;
-use deepfusion_jobs::held_out::is_run;
 use deepfusion_model::weights::{Weights, read_bytes};
 use deepfusion_model::{
     CheckpointKind, DepthNetConfig, Error as ModelError, InputNormalisation, RunFolder, TrainConfig,
 };
 use deepfusion_nn::weights::load_torchvision_resnet;
 use deepfusion_runtime::{Error as RuntimeError, ModelSource, embedded, embedded_names};
-use deepfusion_train::{Checkpoints, Error, Model};
+use deepfusion_train::{Checkpoints, Device, Error as TrainError, Model};
 use deepfusion_weights::Shipped;
 
-use crate::cli::TrainArgs;
-use crate::error::CliError;
-use crate::failure::Result;
-use crate::progress::say;
+use crate::held_out::is_run;
+use crate::{Error, Result};
 
 /// The weights of a new run before its first step.
 #[derive(Debug)]
-pub(super) enum Start {
+pub enum Start {
     /// Those of the seed.
     Nothing,
+    /// Those of the seed: an embedded network was wanted, and none is built as the configuration's.
+    NoneFits,
     /// A run's, or an ImageNet encoder's.
     Path(PathBuf),
     /// A packed network's; `path` where it is no embedded one.
@@ -34,26 +33,91 @@ pub(super) enum Start {
     },
 }
 
-/// Whether `--init` asks for nothing at all.
-pub(super) fn is_none(init: &Path) -> bool {
-    init == Path::new("none")
+/// What a new run began from.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Began<'a> {
+    /// An embedded network was wanted, and none is built as the configuration's.
+    NoneFits,
+    /// A packed network.
+    Packed {
+        /// The network.
+        network: &'a Shipped,
+        /// Its file; an embedded network has none.
+        path: Option<&'a Path>,
+        /// Parts that begin with the seed's weights.
+        new: Vec<&'static str>,
+    },
+    /// A run's checkpoint.
+    Run {
+        /// Its file.
+        checkpoint: PathBuf,
+        /// Parts that begin with the seed's weights.
+        new: Vec<&'static str>,
+    },
+}
+
+impl fmt::Display for Began<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let new = match self {
+            Self::NoneFits => {
+                return f.write_str(
+                    "starts from nothing: no embedded network is built as this configuration's",
+                );
+            }
+            Self::Packed {
+                network,
+                path: None,
+                new,
+            } => {
+                let card = &network.card;
+                let (name, date) = (&card.name, &card.date);
+                write!(f, "starts from the embedded network `{name}` of {date}")?;
+                new
+            }
+            Self::Packed {
+                path: Some(path),
+                new,
+                ..
+            } => {
+                write!(f, "starts from {}", path.display())?;
+                new
+            }
+            Self::Run { checkpoint, new } => {
+                write!(f, "starts from {}", checkpoint.display())?;
+                new
+            }
+        };
+        match new.as_slice() {
+            [] => Ok(()),
+            parts => write!(f, "; new: {}", parts.join(", ")),
+        }
+    }
 }
 
 impl Start {
-    /// What the options say, else the configuration file, else the embedded network that is built as the preset's. A file that names
-    /// nothing means nothing: a run repeated by its config.toml starts as it did, whatever is embedded.
+    /// Whether a wanted start is none at all: the word `none`.
+    #[must_use]
+    pub fn is_none(init: &Path) -> bool {
+        init == Path::new("none")
+    }
+
+    /// What is asked for, else what the configuration names, else, `by_default`, the embedded network that is built as the
+    /// configuration's. A configuration read from a file that names nothing means nothing: a run that is repeated by its config.toml starts
+    /// as it did, whatever is embedded.
     ///
     /// # Errors
-    /// [`RuntimeError::NoSuchModel`] for what is neither there nor embedded; [`CliError::OtherStart`] where a configuration began from other
+    /// [`RuntimeError::NoSuchModel`] for what is neither there nor embedded; [`Error::OtherStart`] where a configuration began from other
     /// weights of the name; [`Shipped::read`]'s.
-    pub(super) fn of(args: &TrainArgs, config: &TrainConfig) -> Result<Self> {
-        if let Some(init) = &args.init {
+    pub fn of(asked: Option<&Path>, config: &TrainConfig, by_default: bool) -> Result<Self> {
+        if let Some(init) = asked {
             return Self::named(init);
         }
         let Some(init) = &config.init else {
-            return match args.config {
-                Some(_) => Ok(Self::Nothing),
-                None => Self::by_default(config),
+            return if by_default {
+                Self::embedded_for(config)
+            } else {
+                Ok(Self::Nothing)
             };
         };
         let Some(expected) = &config.init_sha256 else {
@@ -67,19 +131,19 @@ impl Start {
             .into());
         };
         if network.card.sha256 != *expected {
-            return Err(CliError::OtherStart {
+            return Err(Error::OtherStart {
                 name: network.card.name,
                 found: network.card.sha256,
                 expected: expected.clone(),
-            }
-            .into());
+            });
         }
         let path = None;
         Ok(Self::Packed { network, path })
     }
 
     /// A network that was found.
-    pub(super) fn from_source(source: &ModelSource) -> Self {
+    #[must_use]
+    pub fn from_source(source: &ModelSource) -> Self {
         match source {
             ModelSource::Run { folder, kind, .. } => Self::Path(folder.checkpoint_path(*kind)),
             ModelSource::Packed { given, network } => Self::Packed {
@@ -90,7 +154,7 @@ impl Start {
     }
 
     fn named(init: &Path) -> Result<Self> {
-        if is_none(init) {
+        if Self::is_none(init) {
             return Ok(Self::Nothing);
         }
         if Shipped::is_at(init) {
@@ -114,9 +178,8 @@ impl Start {
         }
     }
 
-    /// The embedded network with the same layers, in the same range of depths; says so where there is none. Without any embedded
-    /// network there is nothing to say.
-    fn by_default(config: &TrainConfig) -> Result<Self> {
+    /// The embedded network with the same layers, in the same range of depths. Without any embedded network nobody expects one.
+    fn embedded_for(config: &TrainConfig) -> Result<Self> {
         let networks = deepfusion_weights::all()?;
         for network in &networks {
             let of_its_run = unpacked_config(network)?.depth_net;
@@ -127,10 +190,11 @@ impl Start {
                 });
             }
         }
-        if !networks.is_empty() {
-            say("starts from nothing: no embedded network is built as this configuration's");
-        }
-        Ok(Self::Nothing)
+        Ok(if networks.is_empty() {
+            Self::Nothing
+        } else {
+            Self::NoneFits
+        })
     }
 
     /// Writes down in a run's configuration what it starts from, so that it can be repeated, and takes the unit that a run's PoseNet
@@ -138,9 +202,9 @@ impl Start {
     ///
     /// # Errors
     /// As [`RunFolder::read_config`] and [`RunFolder::read_state`] of the run it starts from.
-    pub(super) fn record_in(&self, config: &mut TrainConfig) -> Result<(), ModelError> {
+    pub fn record_in(&self, config: &mut TrainConfig) -> Result<()> {
         (config.init, config.init_sha256) = match self {
-            Self::Nothing => (None, None),
+            Self::Nothing | Self::NoneFits => (None, None),
             Self::Path(path) => (Some(path.clone()), None),
             Self::Packed {
                 path: Some(path), ..
@@ -166,12 +230,12 @@ impl Start {
     }
 
     /// What its depth is of: a network whose metres are those of one focal length keeps that, unless another is asked for.
-    fn take_focal_length(&self, config: &mut TrainConfig) -> Result<(), ModelError> {
+    fn take_focal_length(&self, config: &mut TrainConfig) -> Result<()> {
         if config.canonical_focal_px.is_some() {
             return Ok(());
         }
         config.canonical_focal_px = match self {
-            Self::Nothing => None,
+            Self::Nothing | Self::NoneFits => None,
             Self::Packed { network, .. } => unpacked_config(network)?.canonical_focal_px,
             Self::Path(path) => match run_of(path)? {
                 Some((folder, _)) => folder.read_config()?.canonical_focal_px,
@@ -181,49 +245,45 @@ impl Start {
         Ok(())
     }
 
-    /// The model with the weights to start from, and a line of what they are.
+    /// The model with the weights to start from; `told` hears what they are. What may not be meant is a warning ([`tracing::warn`]).
     ///
     /// # Errors
-    /// As [`Checkpoints::load_networks`]; [`Error::Model`] for weights of another architecture.
-    pub(super) fn initialise(&self, mut model: Model, device: &Device) -> Result<Model, Error> {
-        let device = device.clone().autodiff();
+    /// As [`Checkpoints::load_networks`]; [`TrainError::Model`] for weights of another architecture.
+    pub fn initialise(
+        &self,
+        mut model: Model,
+        device: &Device,
+        told: &mut dyn FnMut(Began),
+    ) -> Result<Model, TrainError> {
         match self {
             Self::Nothing => Ok(model),
+            Self::NoneFits => {
+                told(Began::NoneFits);
+                Ok(model)
+            }
             Self::Packed { network, path } => {
                 warn_of_other_meaning(&unpacked_config(network)?, model.config(), true);
                 let weights = unpacked_weights(network)?;
                 let (depth_net, new_head) = model.depth_net.with_weights(&weights)?;
                 model.depth_net = depth_net;
-                let new = if new_head {
-                    "PoseNet, the head for uncertainty"
-                } else {
-                    "PoseNet"
-                };
-                say(&match path {
-                    Some(path) => format!("starts from {}; new: {new}", path.display()),
-                    None => format!(
-                        "starts from the embedded network `{}` of {}; new: {new} (--init none starts from nothing)",
-                        network.card.name, network.card.date
-                    ),
-                });
+                let mut new = vec!["PoseNet"];
+                new.extend(new_head.then_some("the head for uncertainty"));
+                let path = path.as_deref();
+                told(Began::Packed { network, path, new });
                 Ok(model)
             }
             Self::Path(path) => {
-                if let Some((folder, kind)) = run_of(path)? {
-                    let learned = !folder.read_state(kind)?.encoders_only;
-                    warn_of_other_meaning(&folder.read_config()?, model.config(), learned);
-                    let (model, anew) = folder.load_networks(kind, model.config(), &device)?;
-                    let from = folder.checkpoint_path(kind);
-                    say(&match anew.as_slice() {
-                        [] => format!("starts from {}", from.display()),
-                        parts => {
-                            format!("starts from {}; new: {}", from.display(), parts.join(", "))
-                        }
-                    });
+                let Some((folder, kind)) = run_of(path)? else {
+                    model.depth_net = model.depth_net.with_torchvision_encoder(path)?;
+                    model.pose_net.encoder = load_torchvision_resnet(model.pose_net.encoder, path)?;
                     return Ok(model);
-                }
-                model.depth_net = model.depth_net.with_torchvision_encoder(path)?;
-                model.pose_net.encoder = load_torchvision_resnet(model.pose_net.encoder, path)?;
+                };
+                let learned = !folder.read_state(kind)?.encoders_only;
+                warn_of_other_meaning(&folder.read_config()?, model.config(), learned);
+                let device = device.clone().autodiff();
+                let (model, new) = folder.load_networks(kind, model.config(), &device)?;
+                let checkpoint = folder.checkpoint_path(kind);
+                told(Began::Run { checkpoint, new });
                 Ok(model)
             }
         }
@@ -256,7 +316,7 @@ fn warn_of_other_meaning(theirs: &TrainConfig, own: &TrainConfig, depth_learned:
         let name = |n: InputNormalisation| format!("{n:?}").to_lowercase();
         tracing::warn!(
             "the weights to start from were learned on images normalised as {}, this configuration has {}: \
-             --set depth_net.encoder.normalisation={} keeps what they know",
+             set depth_net.encoder.normalisation={} to keep what they know",
             name(was),
             name(is),
             name(was)
@@ -285,7 +345,7 @@ fn warn_of_other_meaning(theirs: &TrainConfig, own: &TrainConfig, depth_learned:
     if depth_learned && one_range && was != is {
         tracing::warn!(
             "the weights to start from say depths of {} to {} m, this configuration of {} to {} m: \
-             --set depth_net.range.min_m={} --set depth_net.range.max_m={} keeps their metres",
+             set depth_net.range.min_m={} and depth_net.range.max_m={} to keep their metres",
             was.min_m,
             was.max_m,
             is.min_m,
@@ -322,6 +382,7 @@ fn run_of(path: &Path) -> Result<Option<(RunFolder, CheckpointKind)>, ModelError
 #[cfg(test)]
 mod tests {
     use super::*;
+    use deepfusion_hint::Hint as _;
     use deepfusion_model::Preset;
 
     /// Which presets could start from which: `light` is the shipped network's shape, Monodepth2's has the same tensors and other depths.
@@ -361,22 +422,15 @@ mod tests {
     /// A repeated run notices that what it began from is not embedded, or another.
     #[test]
     fn other_weights_than_a_run_began_from_are_refused() {
-        use clap::Parser;
-        #[derive(Parser)]
-        struct Alone {
-            #[command(flatten)]
-            args: TrainArgs,
-        }
-        let args = Alone::parse_from(["train", "--config", "run.toml"]).args;
         let mut config = Preset::Light.config();
-        assert!(matches!(Start::of(&args, &config).unwrap(), Start::Nothing));
+        let start = Start::of(None, &config, false).unwrap();
+        assert!(matches!(start, Start::Nothing));
         for name in embedded_names().into_iter().chain(["no-such-network"]) {
             (config.init, config.init_sha256) = (Some(name.into()), Some("ab".repeat(32)));
-            let error = Start::of(&args, &config).unwrap_err();
+            let error = Start::of(None, &config, false).unwrap_err();
             assert!(error.to_string().contains(name), "{error}");
         }
-        let nothing = Alone::parse_from(["train", "--config", "run.toml", "--init", "none"]).args;
-        let start = Start::of(&nothing, &config).unwrap();
+        let start = Start::of(Some(Path::new("none")), &config, false).unwrap();
         assert!(matches!(start, Start::Nothing));
         start.record_in(&mut config).unwrap();
         assert_eq!((config.init, config.init_sha256), (None, None));

@@ -7,13 +7,12 @@ use deepfusion_eval::verdict::{Check, Verdict, WorsenedCheck};
 use deepfusion_hint::count_of;
 use serde::Serialize;
 
-use crate::error::CliError;
-use crate::failure::{Context, Result};
-use crate::output;
+use crate::Result;
+use crate::files::write;
 
 /// Before, after, and what follows from it; `adapt.json` in the run's folder.
 #[derive(Debug, Serialize)]
-pub(super) struct Outcome {
+pub struct Outcome {
     /// The given network.
     pub from: String,
     /// Where the adapted one lies.
@@ -52,48 +51,12 @@ impl Outcome {
 
     /// Keeps it in the run's folder, wherever that is moved.
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
-        let text =
-            serde_json::to_string_pretty(self).context("the outcome cannot be written as JSON")?;
-        output::write(&folder.join("adapt.json"), text + "\n")
-    }
-
-    /// Why it is not kept.
-    pub(super) fn refusal(&self) -> Option<CliError> {
-        if self.kept {
-            return None;
-        }
-        let rows = self.worse.iter().map(|worse| {
-            let WorsenedCheck {
-                check,
-                before,
-                after,
-            } = *worse;
-            format!(
-                "{check} {} after {}",
-                number(check, after),
-                number(check, before)
-            )
-        });
-        let worse: Vec<String> = rows.collect();
-        Some(CliError::Refused {
-            path: self.run.clone(),
-            worse: if worse.is_empty() {
-                "the frames that are held out say nothing about it any more".into()
-            } else {
-                worse.join(", ")
-            },
-        })
+        let text = serde_json::to_string_pretty(self)?;
+        Ok(write(&folder.join("adapt.json"), text + "\n")?)
     }
 }
 
-/// A check's figure.
-fn number(check: Check, value: f64) -> String {
-    match check {
-        Check::Reprojection => format!("{value:.4}"),
-        _ => format!("{:.1} %", 100.0 * value),
-    }
-}
-
+/// Before and after, a check a line.
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
@@ -116,7 +79,7 @@ impl fmt::Display for Outcome {
             Check::Flip,
             Check::Scale,
         ] {
-            let of = |verdict: &Verdict| verdict.of(check).map(|value| number(check, value));
+            let of = |verdict: &Verdict| verdict.of(check).map(|value| check.figure(value));
             row(&check.to_string(), of(&self.before), of(&self.after))?;
         }
         let scale = |verdict: &Verdict| {
@@ -127,14 +90,6 @@ impl fmt::Display for Outcome {
             "scale (1 is metric)",
             scale(&self.before),
             scale(&self.after),
-        )?;
-        if self.kept {
-            let run = self.run.display();
-            writeln!(
-                f,
-                "\nkept: {run}  (undo it with: deepfusion adapt --undo {run})"
-            )?;
-        }
-        Ok(())
+        )
     }
 }

@@ -5,13 +5,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use deepfusion_data::Error as DataError;
+use deepfusion_fs::unused;
 use deepfusion_model::weights::{read_bytes, write_safetensors};
 use deepfusion_model::{Checkpoint, CheckpointKind, RunFolder, TrainConfig};
 use deepfusion_runtime::ModelSource;
 
-use crate::error::CliError;
-use crate::failure::{Context, Result};
-use crate::output;
+use crate::files::write;
+use crate::{Error, Result};
 
 /// The given network, beside the one that was learned: its checkpoint and its configuration.
 const START: [&str; 2] = ["start.safetensors", "start.toml"];
@@ -32,11 +32,9 @@ impl Folders {
             Err(_) => out.exists(),
         };
         if taken {
-            return Err(CliError::Exists {
+            return Err(Error::AdaptedBefore {
                 path: out.to_owned(),
-                remedy: "choose another folder: what was adapted before stays",
-            }
-            .into());
+            });
         }
         Ok(Self {
             out: out.to_owned(),
@@ -49,26 +47,25 @@ impl Folders {
         &self.work
     }
 
-    /// The run that an interrupted command with the same settings left; what it left before its first checkpoint is removed.
+    /// The run that was interrupted with the same settings; what it left before its first checkpoint is removed.
     pub(super) fn begun(&self, config: &TrainConfig) -> Result<Option<RunFolder>> {
         if !self.work.exists() {
             return Ok(None);
         }
-        let another = || CliError::Exists {
+        let another = || Error::OtherSettings {
             path: self.work.clone(),
-            remedy: "it was left by a command with other settings: give those to go on with it, or remove it",
         };
         let Ok((folder, _)) = RunFolder::open(&self.work) else {
             let ours = START.map(|name| self.work.join(name));
             let entries = fs::read_dir(&self.work).map_err(|e| DataError::file(&self.work, e))?;
             let mut entries = entries.filter_map(std::result::Result::ok);
             if entries.any(|entry| !ours.contains(&entry.path())) {
-                return Err(another().into());
+                return Err(another());
             }
             return self.remove().map(|()| None);
         };
         if folder.read_settings()? != *config {
-            return Err(another().into());
+            return Err(another());
         }
         if !folder.checkpoint_path(CheckpointKind::Last).exists() {
             return self.remove().map(|()| None);
@@ -101,9 +98,10 @@ impl Folders {
                 };
                 depth.metadata.extend(state.metadata());
                 write_safetensors(&weights, &depth).map_err(deepfusion_model::Error::from)?;
-                let text = toml::to_string_pretty(&network.card.config)
-                    .context("the network's configuration cannot be written")?;
-                output::write(&config, text)
+                Ok(write(
+                    &config,
+                    toml::to_string_pretty(&network.card.config)?,
+                )?)
             }
         }
     }
@@ -118,18 +116,21 @@ impl Folders {
 
     /// The work is laid aside, under a name that says so.
     pub(super) fn refuse(&self) -> Result<PathBuf> {
-        let aside = output::unused(&beside(&self.out, ".refused"));
+        let aside = unused(&beside(&self.out, ".refused"));
         rename(&self.work, &aside)?;
         Ok(aside)
     }
 }
 
 /// Makes an adapted run the network it began from; what was learned stays in it under other names.
-pub(super) fn undo(out: &Path) -> Result<()> {
+///
+/// # Errors
+/// [`Error::NotAdapted`] where there is nothing to go back to; a folder that cannot be written.
+pub fn undo(out: &Path) -> Result<()> {
     let [weights, config] = START.map(|name| out.join(name));
     if !weights.is_file() {
         let path = out.to_owned();
-        return Err(CliError::NotAdapted { path }.into());
+        return Err(Error::NotAdapted { path });
     }
     let (folder, _) = RunFolder::open(out)?;
     let aside = |path: &Path| {
@@ -164,5 +165,5 @@ fn rename(from: &Path, to: &Path) -> Result<()> {
 
 fn copy(from: &Path, to: &Path) -> Result<()> {
     let bytes = fs::read(from).map_err(|e| DataError::file(from, e))?;
-    output::write(to, bytes)
+    Ok(write(to, bytes)?)
 }

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 /// One row of the table: what is switched on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Row {
+pub struct Row {
     /// Hierarchical context encoding.
     pub hce: bool,
     /// The speed loss.
@@ -16,7 +16,8 @@ pub(super) struct Row {
 
 impl Row {
     /// The rows of the paper's Table 3: everything on first, then what lacks something.
-    pub(super) fn table_3() -> Vec<Self> {
+    #[must_use]
+    pub fn table_3() -> Vec<Self> {
         let combination = |off: u8| Self {
             hce: off & 1 == 0,
             speed: off & 2 == 0,
@@ -27,7 +28,8 @@ impl Row {
     }
 
     /// Every row that can be asked for: those of Table 3, and everything on with three frames.
-    pub(super) fn all() -> Vec<Self> {
+    #[must_use]
+    pub fn all() -> Vec<Self> {
         let three_frames = Self {
             hce: true,
             speed: true,
@@ -37,9 +39,33 @@ impl Row {
         Self::table_3().into_iter().chain([three_frames]).collect()
     }
 
-    /// Its name in file names and on the command line: what is on, joined by `+`; `none`, or `minimum` for the row with
+    /// The rows of these names; those of the paper's table where none is named.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a name that no row has.
+    pub fn named(names: &[String]) -> Result<Vec<Self>, Error> {
+        if names.is_empty() {
+            return Ok(Self::table_3());
+        }
+        let all = Self::all();
+        let find = |name: &String| {
+            let row = all.iter().find(|row| row.name() == *name).copied();
+            row.ok_or_else(|| {
+                let known: Vec<String> = all.iter().map(|row| row.name()).collect();
+                Error::Config {
+                    field: "rows",
+                    expected: format!("one of {}", known.join(", ")),
+                    found: name.clone(),
+                }
+            })
+        };
+        names.iter().map(find).collect()
+    }
+
+    /// Its name in file names: what is on, joined by `+`; `none`, or `minimum` for the row with
     /// three frames.
-    pub(super) fn name(self) -> String {
+    #[must_use]
+    pub fn name(self) -> String {
         if self.minimum {
             return "minimum".into();
         }
@@ -66,7 +92,7 @@ impl Row {
     ///
     /// # Errors
     /// [`Error::Config`] where the shared settings and the row's cannot be together.
-    pub(super) fn config(self, shared: &TrainConfig) -> Result<TrainConfig, Error> {
+    pub fn config(self, shared: &TrainConfig) -> Result<TrainConfig, Error> {
         let mut config = shared.clone();
         for (on, term) in [
             (self.hce, "hce"),

@@ -1,16 +1,16 @@
 //! With what settings a network learns on a new drive.
 
-use burn::tensor::Device;
-use deepfusion_jobs::recordings::camera_word;
 use deepfusion_model::{
     AssumedCamera, DataSetConfig, Learn, LearningRateSchedule, Preset, SimulatedConfig,
     TrainConfig, ViewMotion,
 };
 use deepfusion_nn::ops::{Precision, supports};
 use deepfusion_runtime::DepthEstimator;
+use deepfusion_train::Device;
 
-use crate::cli::AdaptArgs;
-use crate::failure::Result;
+use super::AdaptSettings;
+use crate::Result;
+use crate::recordings::camera_word;
 
 /// Steps over which the learning rate rises: the optimiser knows nothing of the gradients' sizes yet.
 const WARMUP: usize = 30;
@@ -22,10 +22,9 @@ const PLAIN: f64 = 0.2;
 /// The configuration: the network as it is, the loss of its own run where that learned from drives, else Monodepth2's with the
 /// vehicle's motion, in small steps.
 pub(super) fn config(
-    args: &AdaptArgs,
+    settings: &AdaptSettings,
     estimator: &DepthEstimator,
     device: &Device,
-    camera_ahead_s: Option<f64>,
 ) -> Result<TrainConfig> {
     let own = estimator.config();
     let learned_from_drives = if own.data.sets.is_empty() {
@@ -36,7 +35,7 @@ pub(super) fn config(
     let mut config = if learned_from_drives {
         own.clone()
     } else {
-        let monodepth2 = Preset::Monodepth2.config_on(args.device.compute());
+        let monodepth2 = Preset::Monodepth2.config_on(settings.compute);
         TrainConfig {
             preset: own.preset,
             size: own.size,
@@ -58,42 +57,43 @@ pub(super) fn config(
         // A new PoseNet's unit is found from these drives.
         config.pose_net.metres_per_unit = 0.0;
     }
-    config.batch = args.batch;
-    config.depth_batch = args.simulated;
+    config.batch = settings.batch;
+    config.depth_batch = settings.simulated;
     config.accumulate = 1;
-    config.steps = Some(args.steps);
-    config.learning_rate = args.learning_rate;
-    config.learning_rate_warmup_steps = WARMUP.min(args.steps / 4);
+    config.steps = Some(settings.steps);
+    config.learning_rate = settings.learning_rate;
+    config.learning_rate_warmup_steps = WARMUP.min(settings.steps / 4);
     config.learning_rate_schedule = LearningRateSchedule::Cosine;
     config.weight_decay = 0.0;
-    config.seed = args.seed;
-    config.validation_share = args.held_out;
-    config.validate_every = (args.steps / 4).max(1);
+    config.seed = settings.seed;
+    config.validation_share = settings.held_out;
+    config.validate_every = (settings.steps / 4).max(1);
     config.checkpoint_minutes = 2.0;
     if supports(device, Precision::Bf16) {
         config.precision = Precision::Bf16;
     }
     config.data = Default::default();
-    config.data.camera_ahead_s = camera_ahead_s;
-    config.data.camera = camera_word(args.camera).into();
-    config.data.topics = args.topics.iter().map(ToString::to_string).collect();
-    if args.simulated == 0 {
-        config.data.paths.clone_from(&args.data);
+    config.data.camera_ahead_s = settings.camera_ahead_s;
+    config.data.camera = camera_word(settings.camera).into();
+    config.data.topics = settings.topics.iter().map(ToString::to_string).collect();
+    if settings.simulated == 0 {
+        config.data.paths.clone_from(&settings.data);
         // The head has nothing to learn from; what it knows would no longer fit.
         config.depth_net.uncertainty = false;
     } else {
-        config.data.sets = vec![drives(args, &config), simulated(&config)];
+        config.data.sets = vec![drives(settings, &config), simulated(&config)];
         config.loss.depth.weight = 1.0;
         config.loss.depth.gradient = 0.5;
     }
-    for assignment in &args.set {
+    for assignment in &settings.set {
         config.set(assignment)?;
     }
     Ok(config)
 }
 
 /// Of a network whose run had recordings without a camera, the one that it learned or assumed for them, held as it is.
-pub(super) fn assumed_camera(estimator: &DepthEstimator) -> Option<AssumedCamera> {
+#[must_use]
+pub fn assumed_camera(estimator: &DepthEstimator) -> Option<AssumedCamera> {
     let assumed = estimator.config().assumed_camera?;
     if !assumed.learn {
         return Some(assumed);
@@ -104,10 +104,10 @@ pub(super) fn assumed_camera(estimator: &DepthEstimator) -> Option<AssumedCamera
         .map(AssumedCamera::held)
 }
 
-fn drives(args: &AdaptArgs, config: &TrainConfig) -> DataSetConfig {
+fn drives(settings: &AdaptSettings, config: &TrainConfig) -> DataSetConfig {
     DataSetConfig {
         name: "drives".into(),
-        paths: args.data.clone(),
+        paths: settings.data.clone(),
         learn: Learn::OwnMotion,
         metres_per_unit: config.pose_net.metres_per_unit,
         ..DataSetConfig::default()

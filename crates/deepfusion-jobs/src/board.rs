@@ -1,23 +1,19 @@
-//! The board in pictures and videos.
+//! The board of a calibration in pictures and videos.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use deepfusion_calibrate::{
-    Board, BoardDetection, Candidate, Error, View, find_board, pick, sharpness,
+    Board, BoardDetection, Candidate, Error as BoardError, View, find_board, pick, sharpness,
 };
 use deepfusion_data::{OpenOptions, load_photo, load_rgb};
-use deepfusion_hint::count_of;
-use deepfusion_jobs::find_inputs;
 use deepfusion_video::VideoFrames;
 use image::GrayImage;
 use image::imageops::grayscale;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::error::CliError;
-use crate::failure::Result;
-use crate::progress::{Progress, say};
+use crate::{Error, Result, find_inputs};
 
 /// Endings of pictures and videos.
 const IMAGES: [&str; 3] = ["png", "jpg", "jpeg"];
@@ -30,16 +26,30 @@ const BATCH: usize = 8;
 
 /// A picture without the board.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct LeftOut {
+pub struct LeftOut {
     /// The picture.
     pub name: String,
     /// Why.
     pub why: String,
 }
 
-/// What was seen in all pictures.
+/// What is being looked at.
+#[derive(Debug, Clone, Copy)]
+pub enum Look<'a> {
+    /// A video, its frames decoded, begins.
+    Video {
+        /// Its file.
+        file: &'a Path,
+        /// How many frames it has.
+        frames: usize,
+    },
+    /// So many pictures of all, or parts of a video, are done.
+    Done(usize, usize),
+}
+
+/// What was seen of the board in all pictures.
 #[derive(Debug, Default)]
-pub(super) struct Seen {
+pub struct BoardViews {
     /// The board in pictures, and in the frames picked of videos.
     pub views: Vec<View>,
     /// Width and height of all of them.
@@ -56,11 +66,16 @@ pub(super) struct Seen {
     others: BTreeMap<(usize, usize), usize>,
 }
 
-/// Looks for the board in everything that the arguments mean; of each video at most so many frames are kept.
+/// Looks for the board in everything that the inputs mean (pictures, folders, patterns, videos); of each video at most so many frames are kept.
 ///
 /// # Errors
 /// Inputs that cannot be read, or that are of several sizes or orientations.
-pub(super) fn look(inputs: &[String], board: &Board, most_frames: usize) -> Result<Seen> {
+pub fn look(
+    inputs: &[String],
+    board: &Board,
+    most_frames: usize,
+    progress: &mut dyn FnMut(Look),
+) -> Result<BoardViews> {
     let (mut files, mut videos) = (Vec::new(), Vec::new());
     for input in inputs {
         let path = PathBuf::from(input);
@@ -73,10 +88,10 @@ pub(super) fn look(inputs: &[String], board: &Board, most_frames: usize) -> Resu
             files.extend(found.into_iter().map(|i| i.path));
         }
     }
-    let mut seen = Seen::default();
-    seen.look_at_pictures(&files, board)?;
+    let mut seen = BoardViews::default();
+    seen.look_at_pictures(&files, board, progress)?;
     for video in &videos {
-        seen.look_at_video(video, board, most_frames)?;
+        seen.look_at_video(video, board, most_frames, progress)?;
     }
     Ok(seen)
 }
@@ -87,10 +102,9 @@ fn images_of(folder: &Path) -> Result<Vec<PathBuf>> {
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
     let mut images: Vec<_> = paths.filter(|p| has_ending(p, &IMAGES)).collect();
     if images.is_empty() {
-        return Err(CliError::NoImages {
+        return Err(Error::NoImages {
             input: folder.display().to_string(),
-        }
-        .into());
+        });
     }
     images.sort();
     Ok(images)
@@ -101,9 +115,13 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
     ending.is_some_and(|e| endings.contains(&e.to_ascii_lowercase().as_str()))
 }
 
-impl Seen {
-    fn look_at_pictures(&mut self, files: &[PathBuf], board: &Board) -> Result<()> {
-        let mut progress = Progress::new("looking for the board");
+impl BoardViews {
+    fn look_at_pictures(
+        &mut self,
+        files: &[PathBuf],
+        board: &Board,
+        progress: &mut dyn FnMut(Look),
+    ) -> Result<()> {
         for (done, batch) in files.chunks(BATCH).enumerate() {
             let looked: Vec<Result<(GrayImage, u8, BoardDetection)>> = batch
                 .par_iter()
@@ -124,25 +142,31 @@ impl Seen {
                     other => self.leave_out(name, &other, board),
                 }
             }
-            progress.set((done * BATCH + batch.len()).min(files.len()), files.len());
+            let done = (done * BATCH + batch.len()).min(files.len());
+            progress(Look::Done(done, files.len()));
         }
         Ok(())
     }
 
     /// Of each part of a video the sharpest frame is looked at; of those with the board, the most different are kept.
-    fn look_at_video(&mut self, file: &Path, board: &Board, most: usize) -> Result<()> {
+    fn look_at_video(
+        &mut self,
+        file: &Path,
+        board: &Board,
+        most: usize,
+        progress: &mut dyn FnMut(Look),
+    ) -> Result<()> {
         let folder = file.parent().unwrap_or(Path::new("."));
         let video = VideoFrames::open(file, folder)?;
         let frames = video.count();
         let parts = frames.min(PARTS);
         let name = file.display().to_string();
-        say(&format!("{name}: {}", count_of(frames, "frame")));
+        progress(Look::Video { file, frames });
         if frames > 0 {
             // The first look decodes all of them.
             video.frame(0)?;
         }
         let part = |i: usize| (i * frames / parts)..((i + 1) * frames / parts);
-        let mut progress = Progress::new("looking for the board");
         let mut candidates: Vec<(Candidate, String)> = Vec::new();
         let numbers: Vec<usize> = (0..parts).collect();
         for batch in numbers.chunks(BATCH) {
@@ -167,7 +191,7 @@ impl Seen {
                     other => self.leave_out(name, &other, board),
                 }
             }
-            progress.set(batch[0] + batch.len(), parts);
+            progress(Look::Done(batch[0] + batch.len(), parts));
         }
         let alone: Vec<Candidate> = candidates.iter().map(|(c, _)| c.clone()).collect();
         let picked = pick(&alone, self.size, most);
@@ -191,7 +215,7 @@ impl Seen {
         };
         let (picture, first) = (name.to_owned(), first.clone());
         if orientation != *first_orientation {
-            return Err(Error::MixedOrientations {
+            return Err(BoardError::MixedOrientations {
                 picture,
                 turned: turned(orientation),
                 first,
@@ -200,7 +224,7 @@ impl Seen {
             .into());
         }
         if size != self.size {
-            return Err(Error::MixedSizes {
+            return Err(BoardError::MixedSizes {
                 picture,
                 size,
                 first,
@@ -239,13 +263,15 @@ impl Seen {
     }
 
     /// The whole grid of another size that was seen most often: columns, rows, how often.
-    pub(super) fn other_grid(&self) -> Option<(usize, usize, usize)> {
+    #[must_use]
+    pub fn other_grid(&self) -> Option<(usize, usize, usize)> {
         let most = self.others.iter().max_by_key(|(_, n)| **n);
         most.map(|((columns, rows), n)| (*columns, *rows, *n))
     }
 
     /// That pictures were turned upright, which the calibration then is of.
-    pub(super) fn turned(&self) -> Option<String> {
+    #[must_use]
+    pub fn turned(&self) -> Option<String> {
         let (_, orientation) = self.first.as_ref()?;
         (*orientation != 1).then(|| {
             format!(

@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 /// What one run came to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct RunResult {
+pub struct RunResult {
     /// Its row.
     pub row: Row,
     /// Its seed.
@@ -58,7 +58,7 @@ const COLUMNS: [Column; 13] = [
 
 /// A figure over the seeds of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct Spread {
+pub struct Spread {
     /// The mean.
     pub mean: f64,
     /// The standard deviation between seeds (n − 1); absent for one seed.
@@ -86,7 +86,7 @@ impl Spread {
 
 /// A row with its figures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct TableRow {
+pub struct TableRow {
     /// What is on.
     #[serde(flatten)]
     pub row: Row,
@@ -108,7 +108,8 @@ fn by_name<S: serde::Serializer>(
 }
 
 /// The rows of `rows` that have a run, with what their runs came to.
-pub(super) fn table(rows: &[Row], results: &[RunResult]) -> Vec<TableRow> {
+#[must_use]
+pub fn table(rows: &[Row], results: &[RunResult]) -> Vec<TableRow> {
     let of_row = |row: &Row| {
         let runs: Vec<_> = results.iter().filter(|r| r.row == *row).collect();
         let figure = |column: &Column| {
@@ -145,7 +146,8 @@ fn views(row: Row) -> &'static str {
 }
 
 /// For people at a terminal.
-pub(super) fn text(table: &[TableRow]) -> String {
+#[must_use]
+pub fn text(table: &[TableRow]) -> String {
     let mark = |on: bool| if on { "x" } else { "·" }.to_owned();
     let mut lines = vec![
         ["HCE", "speed", "flow", "frames", "seeds"]

@@ -1,0 +1,124 @@
+//! `deepfusion adapt`: learning on new drives, kept only if what can be known without ground truth gets no worse.
+
+use std::path::Path;
+
+use deepfusion_jobs::training::adaptation::{
+    AdaptSettings, Adaptation, Outcome, assumed_camera, require_new, undo,
+};
+use deepfusion_runtime::{DepthEstimator, ModelSource};
+
+use super::recordings::{print_warnings, warn_of_sample};
+use super::time_estimate::TimeEstimate;
+use super::{clocks, device, train};
+use crate::cli::{AdaptArgs, EngineArgs};
+use crate::error::CliError;
+use crate::failure::Result;
+use crate::model;
+use crate::progress::{Progress, say};
+use crate::{engine, output};
+
+/// `deepfusion adapt`.
+pub(super) fn run(args: &AdaptArgs) -> Result<()> {
+    if let Some(out) = &args.undo {
+        undo(out)?;
+        return output::print(&format!("{}\n", out.display()));
+    }
+    let out = args.out.as_deref().unwrap_or(Path::new("adapted"));
+    require_new(out)?;
+    let device = device::open(args.device)?;
+    let given = model::chosen(args.model.as_deref())?;
+    let mut before = estimator(args, &given, args.data_set.as_deref())?;
+    let settings = settings(args, out, &before)?;
+    let mut progress = judging();
+    let adaptation = Adaptation::begin(
+        given,
+        settings,
+        &mut before,
+        &device,
+        &mut print_warnings,
+        &mut |done, total| progress.set(done, total),
+    )?;
+    drop(progress);
+    if adaptation.may_have_seen_held_out() {
+        say(
+            "the given network may have learned from the frames that are held out here: the figures before may be optimistic",
+        );
+    }
+    let mut trainer =
+        adaptation.trainer(&mut print_warnings, &mut warn_of_sample, &mut train::began)?;
+    let time_estimate = TimeEstimate::new(trainer.config().clone(), args.device.compute());
+    let summary = train::train(&mut trainer, Some(time_estimate))?;
+    drop(trainer);
+    if summary.step < summary.steps {
+        return Err(CliError::Stopped {
+            step: summary.step,
+            steps: summary.steps,
+            go_on: "the same command again".into(),
+        }
+        .into());
+    }
+    let learned = ModelSource::named(adaptation.work())?;
+    let mut learned = estimator(args, &learned, None)?;
+    let mut progress = judging();
+    let outcome = adaptation.end(summary.steps, &mut learned, &mut |done, total| {
+        progress.set(done, total);
+    })?;
+    drop(progress);
+    report(args, outcome)
+}
+
+fn judging() -> Progress {
+    Progress::new("judging without ground truth")
+}
+
+fn estimator(args: &AdaptArgs, model: &ModelSource, set: Option<&str>) -> Result<DepthEstimator> {
+    let mut engine = EngineArgs::on(args.device);
+    engine.set = set.map(str::to_owned);
+    engine::load(model, &engine)
+}
+
+/// What the options say.
+fn settings(args: &AdaptArgs, out: &Path, given: &DepthEstimator) -> Result<AdaptSettings> {
+    let mut settings = AdaptSettings {
+        camera: args.camera,
+        topics: args.topics.clone(),
+        steps: args.steps,
+        batch: args.batch,
+        simulated: args.simulated,
+        learning_rate: args.learning_rate,
+        held_out: args.held_out,
+        speed_sd: args.speed_error / 100.0,
+        seed: args.seed,
+        set: args.set.clone(),
+        compute: args.device.compute(),
+        ..AdaptSettings::new(args.data.clone(), out.to_owned())
+    };
+    let opened = settings.open_options(assumed_camera(given).as_ref());
+    settings.camera_ahead_s = clocks::seconds(args.clock_offset, &args.data, &opened)?;
+    Ok(settings)
+}
+
+/// Prints what it came to; what is not kept is an error.
+fn report(args: &AdaptArgs, outcome: Outcome) -> Result<()> {
+    if args.json {
+        output::print_json(&outcome)?;
+    } else {
+        let mut text = outcome.to_string();
+        if outcome.kept {
+            let run = outcome.run.display();
+            text += &format!("\nkept: {run}  (undo it with: deepfusion adapt --undo {run})\n");
+        }
+        output::print(&text)?;
+    }
+    if outcome.kept {
+        return Ok(());
+    }
+    let worse: Vec<String> = outcome.worse.iter().map(ToString::to_string).collect();
+    let worse = if worse.is_empty() {
+        "the frames that are held out say nothing about it any more".into()
+    } else {
+        worse.join(", ")
+    };
+    let path = outcome.run;
+    Err(CliError::Refused { path, worse }.into())
+}

@@ -1,0 +1,147 @@
+//! The pose network's motions, chained, beside the drives' true paths.
+
+use deepfusion_data::{Camera, CameraPath, Dataset, DatasetKind};
+use deepfusion_eval::odometry::{PoseFile, TrackError, TrackPair, chain};
+use deepfusion_geometry::{Intrinsics, Se3};
+use deepfusion_train::PosePredictor;
+
+use crate::Result;
+
+/// Exact poses of simulated drives.
+const EXACT_POSES: &str = "poses.txt";
+/// Pairs of frames that the network sees at once.
+const PAIRS: usize = 8;
+/// Another focal length than the one trained with, at network size, by more than this share is a warning.
+const FOCAL_TOLERANCE: f64 = 0.05;
+
+/// A track for each stretch of the recordings without a gap, and in words what their truth is. `progress` takes the frames seen and in
+/// all. Where a drive's focal length is another than the one trained with there is a warning ([`tracing::warn`]).
+///
+/// # Errors
+/// [`TrackError::TooShort`] where no stretch has two frames; recordings without poses, and images that cannot be read.
+pub fn tracks(
+    predictor: &PosePredictor,
+    datasets: &[Dataset],
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<(Vec<TrackPair>, &'static str)> {
+    let mut stretches = Vec::new();
+    let (mut exact, mut integrated, mut tracked) = (0, 0, 0);
+    for dataset in datasets {
+        warn_of_focal_length(predictor, dataset);
+        let paths = match exact_paths(dataset)? {
+            Some(paths) => {
+                exact += 1;
+                paths
+            }
+            None => {
+                match dataset.kind() {
+                    DatasetKind::KittiRaw => integrated += 1,
+                    _ => tracked += 1,
+                }
+                dataset.camera_paths()?
+            }
+        };
+        let several = paths.len() > 1;
+        stretches.extend(paths.into_iter().map(|path| (dataset, path, several)));
+    }
+    let total = stretches.iter().map(|(_, p, _)| p.frames.len()).sum();
+    let both_cameras = datasets.iter().any(|d| d.camera() != datasets[0].camera());
+    let mut done = 0;
+    let mut tracks = Vec::new();
+    for (dataset, path, several) in stretches {
+        let mut motions = Vec::new();
+        let mut images: Vec<Vec<f32>> = Vec::new();
+        for &frame in &path.frames {
+            images.push(predictor.prepare(&dataset.load_image(frame)?));
+            if images.len() > PAIRS {
+                motions.extend(predictor.motions(&images));
+                // The last image of one batch is the first of the next.
+                images.drain(..images.len() - 1);
+            }
+            done += 1;
+            progress(done, total);
+        }
+        motions.extend(predictor.motions(&images));
+        let name = track_name(dataset, &path, several, both_cameras);
+        let track = TrackPair::new(name, path.world_from_cam, chain(&motions))?;
+        tracks.push(track.with_times(path.times_s));
+    }
+    if tracks.is_empty() {
+        let name = datasets.first().map_or("the data given", Dataset::name);
+        return Err(TrackError::TooShort {
+            name: name.to_owned(),
+            poses: 1,
+        }
+        .into());
+    }
+    let truth = match (exact, integrated, tracked) {
+        (_, 0, 0) => "the simulator's exact poses",
+        (0, _, 0) => "OXTS attitude and integrated velocity",
+        (0, 0, _) => "the recordings' own poses",
+        (_, _, 1..) => "each recording's own: exact poses, OXTS, or a tracker's poses",
+        _ => {
+            "the simulator's exact poses where there are any, else OXTS attitude and integrated velocity"
+        }
+    };
+    Ok((tracks, truth))
+}
+
+/// The exact path of a simulated drive; `None` for real ones.
+fn exact_paths(dataset: &Dataset) -> Result<Option<Vec<CameraPath>>> {
+    let file = dataset.folder().join(EXACT_POSES);
+    if dataset.kind() != DatasetKind::KittiRaw
+        || dataset.camera() != Camera::Left
+        || !file.is_file()
+    {
+        return Ok(None);
+    }
+    let poses = PoseFile::read(&file)?.poses;
+    let pose = |frame: &usize| -> Option<(usize, f64, Se3)> {
+        let number = dataset.frames()[*frame].number;
+        let pose = poses.get(usize::try_from(number).ok()?)?;
+        Some((*frame, dataset.time_of(number)?, *pose))
+    };
+    let mut paths = Vec::new();
+    for stretch in dataset.stretches() {
+        let known: Vec<_> = stretch.iter().filter_map(pose).collect();
+        if known.len() == stretch.len() {
+            paths.push(CameraPath {
+                frames: stretch,
+                times_s: known.iter().map(|k| k.1).collect(),
+                world_from_cam: known.iter().map(|k| k.2).collect(),
+            });
+        }
+    }
+    Ok(Some(paths))
+}
+
+/// A drive's name, with the camera where both are looked at, and the first frame where it has gaps.
+fn track_name(dataset: &Dataset, path: &CameraPath, several: bool, cameras: bool) -> String {
+    let mut name = dataset.name().to_owned();
+    if cameras {
+        name += &format!("_{:02}", dataset.camera().number());
+    }
+    if several {
+        let first = path.frames.first().map(|f| dataset.frames()[*f].number);
+        name += &format!("_from_{}", first.unwrap_or_default());
+    }
+    name
+}
+
+/// A pose network sees pixels: another focal length shows it another motion.
+fn warn_of_focal_length(predictor: &PosePredictor, dataset: &Dataset) {
+    let (Some(train), Some(&frame)) = (predictor.training_camera(), dataset.selected().first())
+    else {
+        return;
+    };
+    let size = predictor.config().size;
+    let at_network_size = |k: Intrinsics| k.resized(size.width as u32, size.height as u32);
+    let here = at_network_size(dataset.intrinsics(frame));
+    let ratio = here.fx / at_network_size(train).fx;
+    if (ratio - 1.0).abs() > FOCAL_TOLERANCE {
+        tracing::warn!(
+            "{}: its focal length is {ratio:.2} times the one trained with, at network size; poses are not corrected for it",
+            dataset.name()
+        );
+    }
+}

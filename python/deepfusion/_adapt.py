@@ -1,0 +1,97 @@
+"""Adapting a network to new drives."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from . import _native
+from ._native import Model
+from ._train import TrainEvent, _paths, _settings
+
+
+@dataclass(frozen=True)
+class Adaptation:
+    """What an adaptation came to. `load()` gives the adapted network, kept or not."""
+
+    kept: bool
+    """Whether no check became worse. What is not kept is laid aside, and the given network is the better one on these drives."""
+    path: Path
+    """The run: the `out` that was asked for, or where it was laid aside (`out` + ".refused")."""
+    source: str
+    """The network that was given."""
+    steps: int
+    """Steps of learning."""
+    worse: list[dict[str, Any]]
+    """The checks that became worse: check, before, after."""
+    before: dict[str, Any]
+    """The given network on the held-out frames, without ground truth: scale_certificate, without_truth (as `deepfusion eval --json`)."""
+    after: dict[str, Any]
+    """The adapted one on the same frames."""
+
+    def load(self, **options: Any) -> Model:
+        """The adapted network; options as `deepfusion.load`."""
+        from . import load
+
+        return load(self.path, **options)
+
+    def undo(self) -> None:
+        """Makes the run in `path` predict as the network that was given; what was learned stays in it."""
+        _native.undo_adaptation(self.path)
+
+
+def adapt(
+    data: str | PathLike[str] | Sequence[str | PathLike[str]],
+    model: str | PathLike[str] = "street",
+    callback: Callable[[TrainEvent], bool | None] | None = None,
+    *,
+    out: str | PathLike[str],
+    data_set: str | None = None,
+    camera: str = "2",
+    clock_offset_ms: float | None = None,
+    steps: int = 240,
+    batch: int = 3,
+    simulated: int = 2,
+    learning_rate: float = 5e-5,
+    held_out: float = 0.25,
+    speed_error: float = 0.03,
+    seed: int = 0,
+    config: Mapping[str, Any] | None = None,
+) -> Adaptation:
+    """Learns on drives with speed and yaw rate from a network that is there, and keeps the result only if it is no worse.
+
+    The end of each drive (`held_out`, a share) is never learned from. The network is judged there before and after, without ground truth:
+    how well frames explain each other, whether depths agree from frame to frame and with the mirrored image, and the bias of the metre.
+
+    `model` is a run, a checkpoint, or the name of an embedded network; `data_set` names one of those that a run learned. Each step has
+    `batch` samples of the drives and `simulated` ones of simulated depth, which keep what the network knows. `clock_offset_ms` is how far the
+    camera's clock is ahead of the vehicle's, where the recordings do not say. `speed_error` is one standard error of the speed, as a share of
+    it. `config` changes any key of the configuration, as in `train`.
+
+    The run goes to `out`, new or empty. `callback` gets each `TrainEvent`, as in `train`; where it returns False or raises, or at Ctrl-C, what
+    was learned is saved, and the same call goes on.
+    """
+    asked = {
+        "model": os.fspath(model),
+        "data_set": data_set,
+        "data": _paths(data),
+        "out": Path(out),
+        "camera": camera,
+        "clock_offset_ms": clock_offset_ms,
+        "steps": steps,
+        "batch": batch,
+        "simulated": simulated,
+        "learning_rate": learning_rate,
+        "held_out": held_out,
+        "speed_error": speed_error,
+        "seed": seed,
+        "settings": list(_settings(config or {})),
+    }
+    outcome = json.loads(_native.adapt(asked, callback))
+    outcome["path"], outcome["source"] = Path(outcome.pop("run")), outcome.pop("from")
+    return Adaptation(**outcome)

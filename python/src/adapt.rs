@@ -1,0 +1,128 @@
+//! Adapting a network to new drives.
+
+use std::path::{Path, PathBuf};
+
+use deepfusion::jobs::training::adaptation::{AdaptSettings, Adaptation, undo};
+use deepfusion::runtime::{DepthEstimator, ModelSource, Precision};
+use deepfusion::train::Device;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::error::{Failure, raise};
+use crate::interrupt::interruptible;
+use crate::train::{Listener, Warnings};
+
+/// What was asked for, as `deepfusion/_adapt.py` arranges it.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct AdaptRequest {
+    model: PathBuf,
+    data_set: Option<String>,
+    data: Vec<PathBuf>,
+    out: PathBuf,
+    camera: String,
+    clock_offset_ms: Option<f64>,
+    steps: usize,
+    batch: usize,
+    simulated: usize,
+    learning_rate: f64,
+    held_out: f64,
+    speed_error: f64,
+    seed: u64,
+    /// `key=value` over the configuration.
+    settings: Vec<String>,
+}
+
+impl AdaptRequest {
+    fn settings(&self) -> Result<AdaptSettings, Failure> {
+        let camera = self.camera.parse().map_err(|_| Failure {
+            message: format!("camera: `{}`", self.camera),
+            hint: Some("\"2\", \"3\" or \"both\"".into()),
+        })?;
+        Ok(AdaptSettings {
+            camera,
+            camera_ahead_s: self.clock_offset_ms.map(|ms| ms / 1e3),
+            steps: self.steps,
+            batch: self.batch,
+            simulated: self.simulated,
+            learning_rate: self.learning_rate,
+            held_out: self.held_out,
+            speed_sd: self.speed_error,
+            seed: self.seed,
+            set: self.settings.clone(),
+            ..AdaptSettings::new(self.data.clone(), self.out.clone())
+        })
+    }
+}
+
+/// Learns on new drives, judges before and after, and keeps the result or lays it aside; the outcome as JSON.
+#[pyfunction]
+pub fn adapt(
+    py: Python<'_>,
+    asked: Bound<'_, PyDict>,
+    callback: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    let asked: AdaptRequest = asked.extract()?;
+    let mut listener = Listener::new(callback);
+    deepfusion_cli::keep_memory();
+    let outcome = interruptible(py, |stop| -> Result<_, Failure> {
+        let judging = &mut |_, _| stop.unwind_if_asked();
+        let given = ModelSource::named(&asked.model)?;
+        let mut estimator = fused(&given, asked.data_set.as_deref())?;
+        let device = Device::flex();
+        let mut quiet = |_: &_, _: &[_]| ();
+        let adaptation = Adaptation::begin(
+            given,
+            asked.settings()?,
+            &mut estimator,
+            &device,
+            &mut quiet,
+            judging,
+        )?;
+        let mut warnings = Warnings::default();
+        if adaptation.may_have_seen_held_out() {
+            warnings.others.push(
+                "the given network may have learned from the frames that are held out here: the figures before may be optimistic".into(),
+            );
+        }
+        let mut trainer = adaptation.trainer(
+            &mut quiet,
+            &mut |warning| warnings.add(warning),
+            &mut |_| (),
+        )?;
+        listener.warn(&warnings);
+        listener.keep_log(&trainer)?;
+        let summary = trainer.run(&mut |event| listener.hear(event, stop))?;
+        drop(trainer);
+        if summary.step < summary.steps {
+            return Err(Failure {
+                message: format!(
+                    "stopped after {} of {} steps; what was learned is saved, and not judged",
+                    summary.step, summary.steps
+                ),
+                hint: Some("the same call goes on".into()),
+            });
+        }
+        let mut learned = fused(&ModelSource::named(adaptation.work())?, None)?;
+        let outcome = adaptation.end(summary.steps, &mut learned, judging)?;
+        serde_json::to_string(&outcome).map_err(|error| Failure {
+            message: format!("the outcome cannot be written as JSON: {error}"),
+            hint: None,
+        })
+    });
+    // What the listener raised is the reason; what was learned is saved.
+    if let Some(raised) = listener.raised {
+        return Err(raised);
+    }
+    Ok(outcome??)
+}
+
+fn fused(network: &ModelSource, set: Option<&str>) -> Result<DepthEstimator, Failure> {
+    Ok(DepthEstimator::fused(network.load(set)?, Precision::F32)?)
+}
+
+/// Makes an adapted network predict as the one that it began from.
+#[pyfunction]
+pub fn undo_adaptation(out: PathBuf) -> PyResult<()> {
+    undo(Path::new(&out)).map_err(raise)
+}
