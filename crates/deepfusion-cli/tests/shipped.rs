@@ -254,14 +254,26 @@ fn what_is_not_there_is_an_error_that_names_what_is() {
         fails(at, command, &["no-such-network", "folder", embedded]);
         assert!(!at.join("out").exists(), "{command}");
     }
-    // A folder that is no run is one, whatever else could be meant.
+    // What is left of a run is an error, whatever else could be meant.
     fs::create_dir(at.join("street")).unwrap();
+    fs::write(at.join("street/last.safetensors"), "").unwrap();
     fails(
         at,
         "predict --model street sim --out out",
         &["street", "no config.toml"],
     );
-    fs::remove_dir(at.join("street")).unwrap();
+    // A folder of something else does not hide the network of its name.
+    fs::rename(
+        at.join("street/last.safetensors"),
+        at.join("street/photo.png"),
+    )
+    .unwrap();
+    if known.contains(&"street") {
+        ok(at, "bench --model street --repeats 1");
+        let train = "train --data sim --preset light --init street --batch 1 --steps 1";
+        ok(at, &format!("{train} --size 64x64 --out begun"));
+    }
+    fs::remove_dir_all(at.join("street")).unwrap();
 
     if known.contains(&deepfusion_weights::DEFAULT) {
         return;

@@ -1,3 +1,5 @@
+//! Boxes that a model proposes, and non-maximum suppression among them.
+
 /// A box that a model proposes, in the pixels of its input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
@@ -21,4 +23,22 @@ impl Candidate {
         let all = (r - l) * (b - t) + (or - ol) * (ob - ot) - common;
         if all > 0.0 { common / all } else { 0.0 }
     }
+}
+
+/// Drops candidates that a better one of the same class overlaps by more than `overlap` (intersection over union).
+/// The result is sorted by descending score and has at most `most` entries.
+#[must_use]
+pub fn suppress(mut candidates: Vec<Candidate>, overlap: f32, most: usize) -> Vec<Candidate> {
+    candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut kept: Vec<Candidate> = Vec::new();
+    for candidate in candidates {
+        if kept.len() == most {
+            break;
+        }
+        let same = |k: &Candidate| k.class == candidate.class && k.overlap(&candidate) > overlap;
+        if !kept.iter().any(same) {
+            kept.push(candidate);
+        }
+    }
+    kept
 }

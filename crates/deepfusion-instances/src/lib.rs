@@ -16,13 +16,11 @@ mod letterbox;
 mod mask;
 mod model;
 mod names;
-mod suppress;
 
-pub use candidate::Candidate;
+pub use candidate::{Candidate, suppress};
 pub use decode::decode;
 pub use error::{Error, Result};
 pub use layout::{Kind, Layout};
 pub use letterbox::{Colours, Letterbox};
 pub use mask::{Mask, Prototypes, in_size};
 pub use model::{Instance, InstanceModel, Limits};
-pub use suppress::suppress;

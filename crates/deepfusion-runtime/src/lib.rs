@@ -35,4 +35,4 @@ pub use ort::OrtRunner;
 pub use prediction::Prediction;
 pub use prepare::{PreparedImage, Preparer, fitting};
 pub use runner::{DepthRunner, NetworkOutput, metric_disparity};
-pub use source::{ModelSource, embedded, embedded_names, unpacked};
+pub use source::{ModelSource, embedded, embedded_names, embedded_unless_run, unpacked};

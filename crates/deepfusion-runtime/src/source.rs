@@ -42,7 +42,7 @@ impl ModelSource {
         }))
     }
 
-    /// Resolves a path or a name: an existing path comes first, then an embedded network's name.
+    /// Resolves a path or a name: a run or file that is there comes first, then an embedded network's name. A folder of images that has an embedded network's name does not stand in its way.
     ///
     /// # Errors
     /// [`Error::NoSuchModel`] for neither; [`RunFolder::open`]'s and [`Shipped::read`]'s for a path that holds no network.
@@ -52,15 +52,15 @@ impl ModelSource {
             let network = Box::new(Shipped::read(model)?);
             return Ok(Self::Packed { given, network });
         }
+        if let Some(network) = embedded_unless_run(model)? {
+            return Ok(Self::Packed { given, network });
+        }
         // A checkpoint that is named and not there is reported as one: its folder may be a run.
         if !model.exists() && !names_a_checkpoint(model) {
-            return match embedded(model)? {
-                Some(network) => Ok(Self::Packed { given, network }),
-                None => Err(Error::NoSuchModel {
-                    model: given,
-                    known: embedded_names(),
-                }),
-            };
+            return Err(Error::NoSuchModel {
+                model: given,
+                known: embedded_names(),
+            });
         }
         let (folder, kind) = RunFolder::open(model)?;
         let kind = kind.unwrap_or_else(|| folder.preferred());
@@ -151,6 +151,21 @@ pub fn embedded(model: &Path) -> Result<Option<Box<Shipped>>, deepfusion_weights
     let name = deepfusion_weights::names().find(|name| Path::new(name) == model);
     let network = name.map(deepfusion_weights::find).transpose()?;
     Ok(network.map(Box::new))
+}
+
+/// As [`embedded`], unless a run of that name is there, or what is left of one.
+///
+/// # Errors
+/// As [`embedded`].
+pub fn embedded_unless_run(
+    model: &Path,
+) -> Result<Option<Box<Shipped>>, deepfusion_weights::Error> {
+    let of_a_run = |path: &Path| path.ends_with("config.toml") || names_a_checkpoint(path);
+    let entries = std::fs::read_dir(model).into_iter().flatten();
+    if entries.flatten().any(|entry| of_a_run(&entry.path())) {
+        return Ok(None);
+    }
+    embedded(model)
 }
 
 /// The names of the embedded networks.

@@ -8,7 +8,9 @@ use deepfusion_model::{
     CheckpointKind, DepthNetConfig, Error as ModelError, InputNormalisation, RunFolder, TrainConfig,
 };
 use deepfusion_nn::weights::load_torchvision_resnet;
-use deepfusion_runtime::{Error as RuntimeError, ModelSource, embedded, embedded_names};
+use deepfusion_runtime::{
+    Error as RuntimeError, ModelSource, embedded, embedded_names, embedded_unless_run,
+};
 use deepfusion_train::{Checkpoints, Device, Error as TrainError, Model};
 use deepfusion_weights::Shipped;
 
@@ -162,20 +164,18 @@ impl Start {
             let path = Some(init.to_owned());
             return Ok(Self::Packed { network, path });
         }
+        if let Some(network) = embedded_unless_run(init)? {
+            let path = None;
+            return Ok(Self::Packed { network, path });
+        }
         if init.exists() {
             return Ok(Self::Path(init.to_owned()));
         }
-        match embedded(init)? {
-            Some(network) => Ok(Self::Packed {
-                network,
-                path: None,
-            }),
-            None => Err(RuntimeError::NoSuchModel {
-                model: init.to_owned(),
-                known: embedded_names(),
-            }
-            .into()),
+        Err(RuntimeError::NoSuchModel {
+            model: init.to_owned(),
+            known: embedded_names(),
         }
+        .into())
     }
 
     /// The embedded network with the same layers, in the same range of depths. Without any embedded network nobody expects one.
