@@ -12,7 +12,7 @@ fn each_row_of_kittis_tables_starts() {
     let at = folder.path();
     ok(
         at,
-        "simulate --out sim --frames 8 --seed 3 --scan-every 0 --size 192x64",
+        "simulate --out sim --frames 8 --seed 3 --scan-every 0 --size 192x64 --stereo 0.5",
     );
     let recipes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../recipes/kitti");
     let mut started = 0;
@@ -34,5 +34,5 @@ fn each_row_of_kittis_tables_starts() {
         assert!(config.contains("steps = 2"), "{config}");
         started += 1;
     }
-    assert_eq!(started, 9);
+    assert_eq!(started, 10);
 }

@@ -542,3 +542,35 @@ fn weights_and_bench_say_what_they_do() {
     #[cfg(target_os = "linux")]
     assert!(bench["peak_rss_mb"].as_f64().unwrap() > 1.0);
 }
+
+/// Two cameras learn from each other's view without a word of the speeds; one camera is refused.
+#[test]
+fn both_cameras_are_each_others_view() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let street = "simulate --frames 8 --seed 3 --scan-every 0 --size 192x64";
+    ok(at, &format!("{street} --stereo 0.5 --out two"));
+    ok(at, &format!("{street} --out one"));
+    let train = "train --preset tiny --size 96x64 --batch 2 --steps 2 --init none --stereo";
+    ok(
+        at,
+        &format!("{train} --data two --without speed --view-motion posenet --out run"),
+    );
+    let config = fs::read_to_string(at.join("run/config.toml")).unwrap();
+    for line in [
+        "stereo = true",
+        "reprojection = \"minimum\"",
+        "camera = \"both\"",
+    ] {
+        assert!(config.contains(line), "{line}: {config}");
+    }
+    ok(at, "train --out run --resume --steps 3 --stereo");
+    let refused = format!("{train} --data one --out other");
+    fails(at, &refused, &["other camera", "image_03"]);
+    fails(
+        at,
+        "simulate --format bag --stereo 0.5 --frames 2 --out bag",
+        &["stereo_baseline_m", "one camera"],
+    );
+    assert!(!at.join("bag").exists());
+}

@@ -133,6 +133,8 @@ pub struct SimConfig {
     pub sensors: Sensors,
     /// Height of the camera above the road, in metres.
     pub camera_height_m: f64,
+    /// [`crate::write_kitti`] also writes the pictures of a second camera, so far to the right of the first one, in metres; 0: of none.
+    pub stereo_baseline_m: f64,
     /// [`crate::write_kitti`] writes a velodyne scan for every n-th frame; 0 writes none.
     pub scan_every: usize,
     /// Angle between two columns of a velodyne scan, in degrees.
@@ -151,6 +153,7 @@ impl Default for SimConfig {
             scene: Scene::Urban,
             sensors: Sensors::Kitti,
             camera_height_m: CAMERA_HEIGHT,
+            stereo_baseline_m: 0.0,
             scan_every: 1,
             scan_step_deg: 0.3,
         }
@@ -216,6 +219,12 @@ impl SimConfig {
             "camera_height_m",
             self.camera_height_m.to_string(),
             "0.3 to 4 metres",
+        )?;
+        check(
+            (0.0..=5.0).contains(&self.stereo_baseline_m),
+            "stereo_baseline_m",
+            self.stereo_baseline_m.to_string(),
+            "0 to 5 metres",
         )?;
         check(
             self.scan_step_deg >= 0.05 && self.scan_step_deg <= 5.0,

@@ -24,7 +24,8 @@ const BATCH: usize = 8;
 /// `velodyne_points` (every [`crate::SimConfig::scan_every`]-th frame), `proj_depth/groundtruth/image_02` (dense exact camera z,
 /// 16-bit PNG, metres × 256, 0 beyond 255 m), `moving_02` (255 on dynamic objects), `tracklet_labels.xml` (exact boxes of
 /// everything in reach, in the velodyne's axes; objects are `Car`, `Pole`, `Tree`, `Building`, `Fence`), and `poses.txt`
-/// (`world_from_cam`, the upper three rows of the matrix in 12 numbers a line).
+/// (`world_from_cam`, the upper three rows of the matrix in 12 numbers a line). With a second camera ([`crate::SimConfig::stereo_baseline_m`])
+/// its pictures are in `image_03`.
 ///
 /// `progress` is called with the frames done and their number. Everything is written to a folder
 /// beside its final place and renamed at the end: after an error `out` is as it was.
@@ -93,6 +94,8 @@ fn write_all(
     let drive = date.join(&name);
     let scan_every = simulation.config().scan_every;
     let images = drive.join("image_02/data");
+    let right = drive.join("image_03/data");
+    let stereo = simulation.config().stereo_baseline_m > 0.0;
     let depths = drive.join("proj_depth/groundtruth/image_02");
     let moving = drive.join("moving_02");
     let oxts = drive.join("oxts/data");
@@ -103,13 +106,20 @@ fn write_all(
     if scan_every > 0 {
         make_folder(&scans)?;
     }
+    if stereo {
+        make_folder(&right)?;
+    }
     write_calibration(simulation, date)?;
     let frames = simulation.frames();
     for first in (0..frames).step_by(BATCH) {
         let last = (first + BATCH).min(frames);
         (first..last).into_par_iter().try_for_each(|index| {
             let frame = simulation.frame(index);
-            write_png(&images.join(format!("{index:010}.png")), &frame)?;
+            let name = format!("{index:010}.png");
+            write_png(&images.join(&name), &frame)?;
+            if stereo {
+                write_png(&right.join(&name), &simulation.right_frame(index))?;
+            }
             write_depth(&depths.join(format!("{index:010}.png")), &frame.depth)?;
             write_mask(&moving.join(format!("{index:010}.png")), &frame)?;
             let line = simulation.oxts(index).line() + "\n";
@@ -129,13 +139,18 @@ fn write_all(
     };
     let stamp_files = [
         ("image_02/timestamps.txt", 0.0),
+        ("image_03/timestamps.txt", 0.0),
         ("oxts/timestamps.txt", 0.0),
         ("velodyne_points/timestamps.txt", 0.0),
         ("velodyne_points/timestamps_start.txt", -0.05),
         ("velodyne_points/timestamps_end.txt", 0.05),
     ];
     for (file, shift) in stamp_files {
-        if scan_every > 0 || !file.starts_with("velodyne") {
+        let is_there = match file.split_once(['_', '/']) {
+            Some(("velodyne", _)) => scan_every > 0,
+            _ => stereo || !file.starts_with("image_03"),
+        };
+        if is_there {
             write_file(&drive.join(file), stamps(shift).as_bytes())?;
         }
     }
@@ -306,7 +321,12 @@ fn write_calibration(simulation: &Simulation, date: &Path) -> Result<()> {
     let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
     let matrix = [k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0];
     let mut text = String::from("calib_time: 01-Jan-2026 12:00:00\ncorner_dist: 9.950000e-02\n");
-    for (camera, shift) in [("00", 0.0), ("02", CAM2_FROM_CAM0_X)] {
+    let baseline = simulation.config().stereo_baseline_m;
+    let mut cameras = vec![("00", 0.0), ("02", CAM2_FROM_CAM0_X)];
+    if baseline > 0.0 {
+        cameras.push(("03", CAM2_FROM_CAM0_X - baseline));
+    }
+    for (camera, shift) in cameras {
         let projection = [
             k.fx,
             0.0,

@@ -15,6 +15,7 @@ use crate::{Result, render, velodyne};
 use deepfusion_geometry::cloud::PointCloud;
 use deepfusion_geometry::{DepthMap, Intrinsics, Se3};
 use image::RgbImage;
+use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -185,8 +186,24 @@ impl Simulation {
     /// Where there is no such frame.
     #[must_use]
     pub fn frame(&self, frame: usize) -> SimFrame {
+        self.seen_from(frame, self.world_from_cam(frame))
+    }
+
+    /// The picture of the second camera at a frame, with its exact depth; the first one's without a
+    /// [`SimConfig::stereo_baseline_m`].
+    ///
+    /// # Panics
+    /// Where there is no such frame.
+    #[must_use]
+    pub fn right_frame(&self, frame: usize) -> SimFrame {
+        let to_the_right = Vector3::new(self.config.stereo_baseline_m, 0.0, 0.0);
+        let cam_from_right = Se3::from_axis_angle(Vector3::zeros(), to_the_right);
+        self.seen_from(frame, self.world_from_cam(frame) * cam_from_right)
+    }
+
+    /// What a camera sees from a pose, in the world of a frame's time.
+    fn seen_from(&self, frame: usize, world_from_cam: Se3) -> SimFrame {
         let time_s = self.times[frame];
-        let world_from_cam = self.world_from_cam(frame);
         let solids = self.traffic.solids(&self.world, time_s);
         let picture = render::render(
             &self.world,

@@ -84,8 +84,15 @@ pub fn write_bag(
     settings: &BagSettings,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<PathBuf> {
-    let existed = crate::kitti::prepare(out)?;
     let config = simulation.config();
+    if config.stereo_baseline_m > 0.0 {
+        return Err(Error::Config {
+            field: "stereo_baseline_m",
+            value: config.stereo_baseline_m.to_string(),
+            expected: "0 for a bag, which has one camera",
+        });
+    }
+    let existed = crate::kitti::prepare(out)?;
     let name = format!("{}_{:04}", config.scene.name(), config.seed);
     let path = out.join(format!("{name}.bag"));
     let sidecar = path.with_extension("toml");

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-/// A batch of B samples with F frames each: the target, then its sources.
+/// A batch of B samples with F frames each: the target, then its sources, then, with stereo, the other camera's view.
 #[derive(Debug, Clone)]
 pub struct SnippetBatch {
     /// Clean images by frame, each B×3×H×W; the losses use these.
@@ -22,13 +22,13 @@ pub struct SnippetBatch {
     pub intrinsics: Tensor<3>,
     /// K⁻¹, B×3×3.
     pub inverse_intrinsics: Tensor<3>,
-    /// Length of the camera's translation by source, each B, in metres.
+    /// Length of the camera's translation by source in time, each B, in metres.
     pub distance_m: Vec<Tensor<1>>,
     /// What these lengths weigh in the speed loss by source, each B ([`crate::losses::distance_weight`]); `None` where all weigh 1.
     pub distance_weight: Vec<Option<Tensor<1>>>,
-    /// The camera's `source_from_target` as measured by the vehicle's sensors, by source, B each.
+    /// The camera's `source_from_target`, by source, B each: as measured by the vehicle's sensors, and of the other camera as calibrated.
     pub measured: Vec<Motion>,
-    /// Offsets of the sources.
+    /// Offsets of the sources in time.
     pub offsets: Vec<i32>,
     /// Drive and frame of each target.
     pub names: Vec<String>,
@@ -196,7 +196,7 @@ struct Item {
     network: Vec<Vec<f32>>,
     intrinsics: [f32; 9],
     inverse_intrinsics: [f32; 9],
-    /// Distance, rotation and translation by source.
+    /// Distance, rotation and translation by source, the other camera's last.
     motion: Vec<(f32, [f32; 9], [f32; 3])>,
     /// What the distances weigh, by source.
     weights: Vec<f32>,
@@ -209,7 +209,8 @@ impl Maker {
             .enumerate()
             .map(|(slot, sample)| self.item(*sample, number * samples.len() + slot))
             .collect::<Result<Vec<Item>, Error>>()?;
-        let frames = 1 + self.config.frames.len();
+        let views = self.config.frames.len() + usize::from(self.config.stereo);
+        let frames = 1 + views;
         let images = |of: fn(&Item) -> &Vec<Vec<f32>>| {
             (0..frames)
                 .map(|f| {
@@ -231,14 +232,12 @@ impl Maker {
                 .map(|s| items.iter().map(|i| i.motion[s].0).collect())
                 .collect(),
             distance_weight: sources
-                .clone()
                 .map(|s| items.iter().map(|i| i.weights[s]).collect())
                 .collect(),
-            rotation: sources
-                .clone()
+            rotation: (0..views)
                 .map(|s| items.iter().flat_map(|i| i.motion[s].1).collect())
                 .collect(),
-            translation: sources
+            translation: (0..views)
                 .map(|s| items.iter().flat_map(|i| i.motion[s].2).collect())
                 .collect(),
             offsets: self.config.frames.clone(),
@@ -271,10 +270,10 @@ impl Maker {
             .flatten();
 
         let sources = &sample.snippet.sources;
-        let frames = std::iter::once(sample.snippet.target).chain(sources.iter().map(|s| s.frame));
+        let target = (sample.dataset, sample.snippet.target);
         let mut clean = Vec::new();
-        for frame in frames {
-            clean.push(self.image(sample.dataset, frame, flip)?);
+        for (dataset, frame) in std::iter::once(target).chain(sample.sources()) {
+            clean.push(self.image(dataset, frame, flip)?);
         }
         let network = clean
             .iter()
@@ -293,20 +292,24 @@ impl Maker {
         if flip {
             k = k.flipped();
         }
-        let motion = sources
-            .iter()
-            .map(|source| {
-                // Where no yaw rate was recorded nothing reads this: `SampleSet` refuses configurations that
-                // would.
-                let mut motion = source
-                    .motion
-                    .source_from_target
-                    .unwrap_or_else(Se3::identity);
-                if flip {
-                    motion = motion.mirrored_x();
-                }
+        // Where no yaw rate was recorded nothing reads this: `SampleSet` refuses configurations that would.
+        let measured = sources.iter().map(|source| {
+            let motion = source.motion.source_from_target;
+            (
+                source.motion.distance_m,
+                motion.unwrap_or_else(Se3::identity),
+            )
+        });
+        let calibrated = sample.stereo.iter().map(|view| {
+            let motion = view.source_from_target;
+            (motion.translation().norm(), motion)
+        });
+        let motion = measured
+            .chain(calibrated)
+            .map(|(distance_m, motion)| {
+                let motion = if flip { motion.mirrored_x() } else { motion };
                 (
-                    source.motion.distance_m as f32,
+                    distance_m as f32,
                     row_major(&motion.rotation()),
                     motion.translation().map(|v| v as f32).into(),
                 )

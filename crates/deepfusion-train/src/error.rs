@@ -1,4 +1,5 @@
 use crate::SharedFrames;
+use crate::stereo::{NoStereo, without_stereo};
 use deepfusion_hint::Hint;
 
 /// What can go wrong while learning.
@@ -18,6 +19,14 @@ pub enum Error {
     NoYawRate {
         /// The drive.
         drive: String,
+    },
+    /// A drive whose other camera is wanted as a view, and cannot be one.
+    #[error("{drive}: {}", without_stereo(*why))]
+    NoStereo {
+        /// The drive.
+        drive: String,
+        /// Why not.
+        why: NoStereo,
     },
     /// A recording to learn depth from that has none.
     #[error("{drive}: no frame has depth, and `learn` asks for it")]
@@ -128,6 +137,10 @@ impl Hint for Error {
             Self::NoYawRate { .. } => Some(
                 "train with view_motion posenet or distance and loss.rotation = 0, or give a yaw rate: \
                  yaw_rate_radps in speed.csv, or imu.csv"
+                    .into(),
+            ),
+            Self::NoStereo { .. } => Some(
+                "stereo needs both cameras of each drive, as KITTI's image_02 and image_03; without it one camera and the speeds will do"
                     .into(),
             ),
             Self::NoDepth { .. } => Some(

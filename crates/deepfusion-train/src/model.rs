@@ -35,7 +35,7 @@ pub struct ViewFlow {
 pub struct ForwardPass {
     /// Sigmoid disparities of the targets, T×1×H/2ˢ×W/2ˢ, as of [`DepthNet::forward`].
     pub disparities: Vec<Tensor<4>>,
-    /// PoseNet's `source_from_target`, by view, T each.
+    /// PoseNet's `source_from_target`, by view, T each; of the other camera's view the calibrated one.
     pub motions: Vec<Motion>,
     /// The same, measured by the vehicle's sensors.
     pub measured: Vec<Motion>,
@@ -53,9 +53,9 @@ pub struct ForwardPass {
 
 /// Share of the predicted displacement that the loss saw: for the scale ratio.
 pub(crate) fn displacement_ratio(pass: &ForwardPass, batch: &SnippetBatch) -> f64 {
-    let predicted: f32 = pass
-        .motions
-        .iter()
+    // The other camera's view is no motion.
+    let in_time = pass.motions.iter().take(batch.distance_m.len());
+    let predicted: f32 = in_time
         .map(|m| {
             m.distance()
                 .narrow(0, 0, batch.len())
@@ -180,6 +180,9 @@ impl Model {
         if let Some(factors) = &batch.factors {
             pass.motions = pass.motions.iter().map(|m| factors.scale(m)).collect();
         }
+        // In metres already, and nobody's guess.
+        pass.motions
+            .extend(batch.measured.iter().skip(batch.offsets.len()).cloned());
         pass
     }
 

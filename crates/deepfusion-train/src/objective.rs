@@ -297,6 +297,8 @@ impl Model {
     /// The loss between PoseNet's motion and the vehicle's.
     fn motion_loss(&self, pass: &ForwardPass, batch: &SnippetBatch) -> Tensor<1> {
         let views = pass.motions.iter().zip(&pass.measured);
+        // The other camera's view is nothing that PoseNet could know.
+        let views = views.take(batch.offsets.len());
         match self.config.view_motion {
             ViewMotion::Vehicle => mean_of(views, |pair| losses::motion(pair.0, pair.1)),
             ViewMotion::PoseNet | ViewMotion::Distance => {
@@ -332,7 +334,10 @@ impl Model {
             ViewMotion::Vehicle => pass.measured.clone(),
             ViewMotion::Distance => {
                 let views = pass.motions.iter().enumerate();
-                let scaled = views.map(|(view, m)| m.with_distance(self.distance_m(batch, view)));
+                let scaled = views.map(|(view, m)| match batch.distance_m.get(view) {
+                    Some(_) => m.with_distance(self.distance_m(batch, view)),
+                    None => m.clone(),
+                });
                 scaled.collect()
             }
         }

@@ -23,10 +23,10 @@ pub fn shared_frames(train: &SampleSet, validation: &SampleSet) -> Vec<SharedFra
     let mut files = Files::default();
     let mut seen = HashMap::new();
     for sample in &train.samples {
-        let frames = train.datasets[sample.dataset].frames();
-        let sources = sample.snippet.sources.iter().map(|s| (s.frame, false));
-        for (frame, is_target) in sources.chain([(sample.snippet.target, true)]) {
-            let place = files.place(&frames[frame].image);
+        let target = (sample.dataset, sample.snippet.target);
+        let sources = sample.sources().map(|source| (source, false));
+        for ((dataset, frame), is_target) in sources.chain([(target, true)]) {
+            let place = files.place(&train.datasets[dataset].frames()[frame].image);
             *seen.entry(place).or_insert(is_target) |= is_target;
         }
     }

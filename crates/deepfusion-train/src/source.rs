@@ -1,3 +1,4 @@
+use crate::stereo::{NoStereo, OtherCameras, StereoSource};
 use crate::{DepthSet, Error, Learn, TrainConfig, shared_frames};
 use deepfusion_data::{Dataset, Snippet, hold_out};
 use deepfusion_geometry::Intrinsics;
@@ -22,6 +23,16 @@ pub struct Sample {
     pub dataset: usize,
     /// The frames and the motion between them.
     pub snippet: Snippet,
+    /// The other camera's view of the target's moment, where the run has stereo.
+    pub stereo: Option<StereoSource>,
+}
+
+impl Sample {
+    /// Every frame that the sample shows beside its target: recording and frame.
+    pub fn sources(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let own = self.snippet.sources.iter().map(|s| (self.dataset, s.frame));
+        own.chain(self.stereo.iter().map(|s| (s.dataset, s.frame)))
+    }
 }
 
 /// The samples of all recordings.
@@ -134,6 +145,7 @@ impl SampleSet {
         // Why drives have no sample: an error, the last, or unsure distances.
         let (mut last, mut unsure) = (None, Vec::<String>::new());
         let learns = |dataset: &usize| config.learn(set_of[*dataset]);
+        let other_cameras = OtherCameras::of(datasets, set_of);
         for (dataset, recording) in datasets.iter().enumerate() {
             if learns(&dataset) == Learn::Depth {
                 continue;
@@ -163,9 +175,30 @@ impl SampleSet {
                         }
                     }
                     let (a, b) = hold_out(snippets, share);
-                    let sample = |snippet| Sample { dataset, snippet };
-                    train.extend(a.into_iter().map(sample));
-                    held.extend(b.into_iter().map(sample));
+                    let other = config.stereo.then(|| other_cameras.beside(dataset));
+                    let other = other.transpose()?;
+                    // A frame that the other camera lacks is left out.
+                    let sample = |snippet: Snippet| {
+                        let number = recording.frames()[snippet.target].number;
+                        let stereo = match &other {
+                            Some(other) => Some(other.at(number)?),
+                            None => None,
+                        };
+                        Some(Sample {
+                            dataset,
+                            snippet,
+                            stereo,
+                        })
+                    };
+                    let (wanted, before) = (a.len(), train.len());
+                    train.extend(a.into_iter().filter_map(sample));
+                    held.extend(b.into_iter().filter_map(sample));
+                    if wanted > 0 && train.len() == before {
+                        return Err(Error::NoStereo {
+                            drive: recording.name().to_owned(),
+                            why: NoStereo::NoCommonFrame,
+                        });
+                    }
                 }
                 Err(error) => {
                     // Both cameras of a drive, or a drive that is validated on as well, have one reason.
@@ -234,7 +267,9 @@ impl SampleSet {
     /// Drive and frame numbers of a sample, for messages.
     #[must_use]
     pub fn name(&self, sample: usize) -> String {
-        let Sample { dataset, snippet } = &self.samples[sample];
+        let Sample {
+            dataset, snippet, ..
+        } = &self.samples[sample];
         let frame = &self.datasets[*dataset].frames()[snippet.target];
         format!("{}/{:010}", frame.drive, frame.number)
     }

@@ -185,6 +185,9 @@ pub(crate) struct SimulateArgs {
     /// Height of the camera above the road.
     #[arg(long, value_name = "M", default_value_t = 1.65, value_parser = values::positive)]
     pub camera_height: f64,
+    /// Write the pictures of a second camera, too, so far to the right of the first one (KITTI's: 0.53).
+    #[arg(long, value_name = "M", value_parser = values::positive)]
+    pub stereo: Option<f64>,
     /// Set the clock of camera and LiDAR so many milliseconds ahead of the vehicle's (bag).
     #[arg(
         long,

@@ -60,6 +60,10 @@ pub(crate) struct TrainArgs {
     /// Which cameras [default: 2].
     #[arg(long, value_name = "2|3|both")]
     pub camera: Option<Cameras>,
+    /// The other camera's image of the same moment is a view, too: its calibrated baseline gives metres. Takes both cameras, and the
+    /// smallest error of all views (reprojection = "minimum").
+    #[arg(long)]
+    pub stereo: bool,
     /// Train on the frames of this split file only (lines "folder index side").
     #[arg(long, value_name = "FILE")]
     pub split: Option<PathBuf>,

@@ -29,6 +29,7 @@ pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainC
         seed,
         learn,
         camera,
+        stereo,
         split,
         val_data,
         val_split,
@@ -67,6 +68,9 @@ pub(super) fn with_options(run: &TrainConfig, args: &TrainArgs) -> Result<TrainC
     if let Some(camera) = camera {
         let found = camera_of(&config);
         same("--camera", camera_word(*camera).into(), found)?;
+    }
+    if *stereo && !run.stereo {
+        return contradicts("--stereo", "on".into(), "has it off".into());
     }
     if intrinsics.is_some() {
         let found = run.learned_camera().map_or("none", |_| "learn");
@@ -393,7 +397,7 @@ mod tests {
             change(&mut expected);
             assert_eq!(with(options).unwrap(), expected, "{options:?}");
         }
-        let refused: [(&[&str], &str, &str); 18] = [
+        let refused: [(&[&str], &str, &str); 19] = [
             (&["--intrinsics", "learn"], "learn", "none"),
             (&["--preset", "light"], "light", "tiny"),
             (&["--size", "640x192"], "640x192", "320x96"),
@@ -402,6 +406,7 @@ mod tests {
             (&["--set", "batch=5"], "batch=5", "another value"),
             (&["--learn", "both"], "both", "self"),
             (&["--camera", "both"], "both", "2"),
+            (&["--stereo"], "on", "has it off"),
             (&["--view-motion", "vehicle"], "vehicle", "distance"),
             (&["--with", "hce"], "hce", "learned without it"),
             (

@@ -59,6 +59,7 @@ fn config(args: &SimulateArgs) -> SimConfig {
         scene: args.scene,
         sensors: args.sensors.unwrap_or(sensors),
         camera_height_m: args.camera_height,
+        stereo_baseline_m: args.stereo.unwrap_or(0.0),
         scan_every: args.scan_every,
         ..SimConfig::default()
     }

@@ -3,7 +3,7 @@ use deepfusion_hint::count_of;
 use deepfusion_jobs::recordings::{camera_word, training_recordings};
 use deepfusion_jobs::training::{Began, Start};
 use deepfusion_model::{
-    DataConfig, Error as ModelError, InputSize, Learn, Preset, RunFolder, TrainConfig,
+    DataConfig, Error as ModelError, InputSize, Learn, Preset, Reprojection, RunFolder, TrainConfig,
 };
 use deepfusion_train::{TrainSummary, Trainer};
 
@@ -169,6 +169,9 @@ fn start_config(args: &TrainArgs) -> Result<TrainConfig> {
     for term in &args.without {
         config.without(term)?;
     }
+    if args.stereo {
+        (config.stereo, config.reprojection) = (true, Reprojection::Minimum);
+    }
     // Said last: a motion that contradicts a term left out is an error, and not silently another one.
     config.view_motion = args.view_motion.unwrap_or(config.view_motion);
     if args.intrinsics.is_some() {
@@ -242,6 +245,8 @@ fn choose_recordings(data: &mut DataConfig, args: &TrainArgs) -> Result<(), Mode
     data.learn = args.learn.unwrap_or(data.learn);
     if let Some(camera) = args.camera {
         data.camera = camera_word(camera).into();
+    } else if args.stereo {
+        data.camera = camera_word(Cameras::Both).into();
     } else if data.camera.is_empty() && data.sets.is_empty() {
         data.camera = camera_word(Cameras::default()).into();
     }

@@ -62,9 +62,9 @@ fn seen_by(
     let (train, _, _) = SampleSet::split_sets(&config, recordings, None).ok()?;
     let mut seen = HashSet::new();
     for sample in &train.samples {
-        let frames = train.datasets[sample.dataset].frames();
-        seen.insert(key(&frames[sample.snippet.target]));
-        seen.extend(sample.snippet.sources.iter().map(|s| key(&frames[s.frame])));
+        let of = |(dataset, frame): (usize, usize)| key(&train.datasets[dataset].frames()[frame]);
+        seen.insert(of((sample.dataset, sample.snippet.target)));
+        seen.extend(sample.sources().map(of));
     }
     for frame in &train.depth.frames {
         seen.insert(key(&train.datasets[frame.dataset].frames()[frame.frame]));

@@ -126,6 +126,7 @@ impl Preset {
             frame_distance_m: 0.0,
             reprojection: Reprojection::Bidirectional,
             reversed_pose: ReversedPose::Predicted,
+            stereo: false,
             batch: 12,
             depth_batch: 0,
             accumulate: 1,

@@ -143,6 +143,10 @@ pub struct TrainConfig {
     pub reprojection: Reprojection,
     /// Where the reversed pair's motion comes from.
     pub reversed_pose: ReversedPose,
+    /// Whether the other camera's image of the same moment is a source, too, warped by the calibrated baseline, which gives metres
+    /// whatever the speeds say. Needs both cameras of each drive, and `reprojection = "minimum"`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub stereo: bool,
     /// Samples a step.
     pub batch: usize,
     /// Samples of known depth a step, beside those of video where there are both; 0: as many as `batch`.
@@ -289,6 +293,30 @@ fn absolute(path: PathBuf) -> PathBuf {
 }
 
 impl TrainConfig {
+    /// What the other camera's view cannot be beside.
+    fn validate_stereo(&self) -> Result<(), Error> {
+        let fail = |field, expected: &str, found: String| {
+            Err(Error::Config {
+                field,
+                expected: format!("{expected} where stereo is on"),
+                found,
+            })
+        };
+        if !self.stereo {
+            return Ok(());
+        }
+        if self.reprojection != Reprojection::Minimum {
+            return fail("reprojection", "minimum", "bidirectional".into());
+        }
+        if self.loss.flow.weight > 0.0 {
+            return fail("loss.flow.weight", "0", self.loss.flow.weight.to_string());
+        }
+        if self.learned_camera().is_some() {
+            return fail("assumed_camera.learn", "false", "true".into());
+        }
+        Ok(())
+    }
+
     /// Makes every path absolute. The name of an embedded network is none.
     pub fn make_absolute(&mut self) {
         self.data.make_absolute();
@@ -468,6 +496,7 @@ impl TrainConfig {
         if self.batch == 0 {
             return fail("batch", "at least 1", "0".into());
         }
+        self.validate_stereo()?;
         if let Some(threads) = self.data.loader_threads
             && !(1..=1024).contains(&threads)
         {

@@ -1,5 +1,6 @@
 //! With what settings a network learns on a new drive.
 
+use deepfusion_data::Cameras;
 use deepfusion_model::{
     AssumedCamera, DataSetConfig, Learn, LearningRateSchedule, Preset, SimulatedConfig,
     TrainConfig, ViewMotion,
@@ -53,6 +54,8 @@ pub(super) fn config(
         Some(camera.resized(width, height).fy)
     });
     config.assumed_camera = assumed_camera(estimator);
+    // The other camera's view takes both cameras of the new drives, too.
+    config.stereo &= settings.camera == Cameras::Both;
     if !learned_from_drives {
         // A new PoseNet's unit is found from these drives.
         config.pose_net.metres_per_unit = 0.0;

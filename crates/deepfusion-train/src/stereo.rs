@@ -1,0 +1,133 @@
+//! The other camera's view of the same moment.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use deepfusion_data::{Camera, Dataset};
+use deepfusion_geometry::{Intrinsics, Se3};
+
+use crate::Error;
+
+/// How far the two cameras' intrinsics may differ, in pixels: rectified ones are the same.
+const SAME_CAMERA_PX: f64 = 0.5;
+
+/// Why a drive's other camera is no view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NoStereo {
+    /// It is not among the data.
+    OneCamera,
+    /// No frame of the drive has one of the other camera.
+    NoCommonFrame,
+    /// The calibration does not say where the cameras are.
+    NoBaseline,
+    /// They see through other lenses, or are turned: their images are not rectified.
+    NotRectified,
+}
+
+pub(crate) fn without_stereo(why: NoStereo) -> &'static str {
+    match why {
+        NoStereo::OneCamera => "its other camera is not among the data, and stereo asks for it",
+        NoStereo::NoCommonFrame => "its two cameras have no frame in common",
+        NoStereo::NoBaseline => "nothing says where its two cameras are",
+        NoStereo::NotRectified => {
+            "its two cameras are not rectified: their images have other intrinsics, or are turned"
+        }
+    }
+}
+
+/// A view by the drive's other camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StereoSource {
+    /// Index of that camera's recording in [`crate::SampleSet::datasets`].
+    pub dataset: usize,
+    /// Its frame of the same moment.
+    pub frame: usize,
+    /// From the target's camera to that one, metres.
+    pub source_from_target: Se3,
+}
+
+/// The other cameras of a run's recordings.
+pub(crate) struct OtherCameras<'a> {
+    datasets: &'a [Dataset],
+    /// By set, folder, name and camera.
+    places: HashMap<(usize, &'a Path, &'a str, Camera), usize>,
+    set_of: &'a [usize],
+}
+
+/// The other camera of one recording.
+pub(crate) struct OtherCamera {
+    dataset: usize,
+    /// Its frames by their numbers.
+    frames: HashMap<u64, usize>,
+    source_from_target: Se3,
+}
+
+impl<'a> OtherCameras<'a> {
+    pub(crate) fn of(datasets: &'a [Dataset], set_of: &'a [usize]) -> Self {
+        let place =
+            |(i, d): (usize, &'a Dataset)| ((set_of[i], d.folder(), d.name(), d.camera()), i);
+        Self {
+            places: datasets.iter().enumerate().map(place).collect(),
+            datasets,
+            set_of,
+        }
+    }
+
+    /// The camera beside a recording's.
+    ///
+    /// # Errors
+    /// [`Error::NoStereo`].
+    pub(crate) fn beside(&self, dataset: usize) -> Result<OtherCamera, Error> {
+        let own = &self.datasets[dataset];
+        let fail = |why| Error::NoStereo {
+            drive: own.name().to_owned(),
+            why,
+        };
+        let camera = match own.camera() {
+            Camera::Left => Camera::Right,
+            Camera::Right => Camera::Left,
+        };
+        let place = (self.set_of[dataset], own.folder(), own.name(), camera);
+        let other = self.places.get(&place).copied();
+        let other = other.ok_or_else(|| fail(NoStereo::OneCamera))?;
+        let theirs = &self.datasets[other];
+        let mounts = own.cam_from_vehicle().zip(theirs.cam_from_vehicle());
+        let (here, there) = mounts.ok_or_else(|| fail(NoStereo::NoBaseline))?;
+        let source_from_target = there * here.inverse();
+        let (angle, baseline_m) = (
+            source_from_target.angle(),
+            source_from_target.translation().norm(),
+        );
+        if baseline_m < 1e-3 {
+            return Err(fail(NoStereo::NoBaseline));
+        }
+        let first = own.selected().first().zip(theirs.selected().first());
+        let (a, b) = first.ok_or_else(|| fail(NoStereo::NoCommonFrame))?;
+        if angle > 1e-3 || !same(own.intrinsics(*a), theirs.intrinsics(*b)) {
+            return Err(fail(NoStereo::NotRectified));
+        }
+        let frames = theirs.frames().iter().enumerate();
+        Ok(OtherCamera {
+            dataset: other,
+            frames: frames.map(|(i, frame)| (frame.number, i)).collect(),
+            source_from_target,
+        })
+    }
+}
+
+impl OtherCamera {
+    /// The view of the frame with this number, where that camera has it.
+    pub(crate) fn at(&self, number: u64) -> Option<StereoSource> {
+        Some(StereoSource {
+            dataset: self.dataset,
+            frame: *self.frames.get(&number)?,
+            source_from_target: self.source_from_target,
+        })
+    }
+}
+
+fn same(a: Intrinsics, b: Intrinsics) -> bool {
+    let apart = [a.fx - b.fx, a.fy - b.fy, a.cx - b.cx, a.cy - b.cy];
+    (a.width, a.height) == (b.width, b.height) && apart.iter().all(|d| d.abs() < SAME_CAMERA_PX)
+}

@@ -1,0 +1,215 @@
+//! The other camera's view: where it is, what it shows, and what is refused.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test's panic is its message"
+)]
+
+use std::path::Path;
+
+use burn::tensor::{Device, Tensor, TensorData};
+use deepfusion_data::{Cameras, Dataset, OpenOptions};
+use deepfusion_sim::{SimConfig, Simulation, write_kitti};
+use deepfusion_train::{
+    BatchLoader, Error, Model, NoStereo, Preset, Reprojection, SampleSet, Schedule, TrainConfig,
+    synthesise,
+};
+
+const BASELINE_M: f64 = 0.5;
+
+/// A drive with two cameras.
+fn street() -> Simulation {
+    Simulation::new(&SimConfig {
+        seed: 5,
+        frames: 5,
+        width: 192,
+        height: 96,
+        scan_every: 0,
+        stereo_baseline_m: BASELINE_M,
+        ..SimConfig::default()
+    })
+    .unwrap()
+}
+
+fn opened(drive: &Path, camera: Cameras) -> Vec<Dataset> {
+    let options = OpenOptions {
+        camera,
+        ..OpenOptions::default()
+    };
+    Dataset::open(drive, &options).unwrap()
+}
+
+fn settings() -> TrainConfig {
+    let mut config = Preset::Tiny.config();
+    (config.size.width, config.size.height) = (192, 96);
+    (config.batch, config.validation_share) = (2, 0.0);
+    (config.stereo, config.reprojection) = (true, Reprojection::Minimum);
+    config.augmentation.jitter = 0.0;
+    config
+}
+
+fn samples(config: &TrainConfig, drive: &Path, camera: Cameras) -> Result<SampleSet, Error> {
+    Ok(SampleSet::split(config, opened(drive, camera), None)?.0)
+}
+
+/// Each camera's frame is explained by the other's, by its exact depth, at the calibrated baseline and at no other; mirrored or not.
+#[test]
+fn the_other_cameras_view_is_where_the_depth_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let street = street();
+    let drive = write_kitti(&street, folder.path(), &mut |_, _| ()).unwrap();
+    let config = settings();
+    let set = samples(&config, &drive, Cameras::Both).unwrap();
+    assert_eq!(set.samples.len(), 8, "four pairs of each camera");
+    for sample in &set.samples {
+        let view = sample.stereo.as_ref().unwrap();
+        let t = view.source_from_target.translation();
+        let to_the_right = set.datasets[sample.dataset].camera() == deepfusion_data::Camera::Left;
+        let expected = if to_the_right {
+            -BASELINE_M
+        } else {
+            BASELINE_M
+        };
+        assert!((t.x - expected).abs() < 1e-6 && t.yz().norm() < 1e-6, "{t}");
+        assert_ne!(view.dataset, sample.dataset);
+        let number = |dataset: usize, frame: usize| set.datasets[dataset].frames()[frame].number;
+        assert_eq!(
+            number(view.dataset, view.frame),
+            number(sample.dataset, sample.snippet.target)
+        );
+    }
+
+    let device = Device::flex();
+    let loader = BatchLoader::training(&config, set, 0);
+    let mut mirrored = [0, 0];
+    for _ in 0..8 {
+        let batch = loader.next(&device).unwrap().unwrap();
+        assert_eq!((batch.clean.len(), batch.measured.len()), (3, 2));
+        assert_eq!((batch.offsets.len(), batch.distance_m.len()), (1, 1));
+        for (i, name) in batch.names.iter().enumerate() {
+            let image: Vec<f32> = values(batch.clean[0].clone().narrow(0, i, 1));
+            let (depth, flip) = depth_of(&street, name, &image);
+            mirrored[usize::from(flip)] += 1;
+            let error = |scale: f32| {
+                let inverse: Vec<f32> = depth
+                    .iter()
+                    .map(|z| if *z > 0.0 { scale / z } else { 1e-4 })
+                    .collect();
+                let inverse = Tensor::from_data(TensorData::new(inverse, [1, 1, 96, 192]), &device);
+                let seen = synthesise(
+                    batch.clean[2].clone().narrow(0, i, 1),
+                    inverse,
+                    &batch.measured[1].narrow(i, 1),
+                    &batch.intrinsics.clone().narrow(0, i, 1),
+                    &batch.inverse_intrinsics.clone().narrow(0, i, 1),
+                );
+                let warped = values(seen.image);
+                let apart = warped.iter().zip(&image).map(|(a, b)| (a - b).abs());
+                apart.sum::<f32>() / image.len() as f32
+            };
+            let [right, too_far, too_near] = [1.0, 0.8, 1.25].map(error);
+            assert!(
+                right < 0.75 * too_far.min(too_near),
+                "{right} {too_far} {too_near}"
+            );
+        }
+    }
+    assert!(mirrored.iter().all(|n| *n > 0), "{mirrored:?}");
+}
+
+fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    tensor.into_data().try_into_vec().unwrap()
+}
+
+/// The exact depth of the picture that an image is: of either camera, mirrored or not.
+fn depth_of(street: &Simulation, name: &str, image: &[f32]) -> (Vec<f32>, bool) {
+    let index: usize = name.rsplit('/').next().unwrap().parse().unwrap();
+    let mut found: Option<(f32, Vec<f32>, bool)> = None;
+    for frame in [street.frame(index), street.right_frame(index)] {
+        for flip in [false, true] {
+            let mut red: Vec<f32> = frame
+                .rgb
+                .pixels()
+                .map(|p| f32::from(p[0]) / 255.0)
+                .collect();
+            let mut depth = frame.depth.data.clone();
+            if flip {
+                red.chunks_exact_mut(192).for_each(<[f32]>::reverse);
+                depth.chunks_exact_mut(192).for_each(<[f32]>::reverse);
+            }
+            let apart: f32 = red.iter().zip(image).map(|(a, b)| (a - b).abs()).sum();
+            if found.as_ref().is_none_or(|(least, ..)| apart < *least) {
+                found = Some((apart, depth, flip));
+            }
+        }
+    }
+    let (apart, depth, flip) = found.unwrap();
+    assert!(apart < 1.0, "no picture of the street: {apart}");
+    (depth, flip)
+}
+
+/// The baseline is in the warp alone: PoseNet is asked for the pair in time, and its loss and the scale ratio are that pair's.
+#[test]
+fn posenet_is_not_asked_for_the_other_camera() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = write_kitti(&street(), folder.path(), &mut |_, _| ()).unwrap();
+    let device = Device::flex();
+    let mut config = settings();
+    config.pose_net.metres_per_unit = 1.0;
+    let set = samples(&config, &drive, Cameras::Both).unwrap();
+    let batch = BatchLoader::training(&config, set, 0)
+        .next(&device)
+        .unwrap()
+        .unwrap();
+    let learning = device.autodiff();
+    let model = Model::new(&config, &learning).unwrap().valid(&learning);
+    let pass = model.forward(&batch);
+    assert_eq!((pass.motions.len(), pass.sources.len()), (2, 2));
+    let baseline: Vec<f32> = values(pass.motions[1].distance());
+    assert!(
+        baseline
+            .iter()
+            .all(|b| (b - BASELINE_M as f32).abs() < 1e-4),
+        "{baseline:?}"
+    );
+    let schedule = Schedule {
+        speed_weight: 1.0,
+        masks_active: false,
+    };
+    let with = model.loss(&pass, &batch, schedule);
+    // Without the other camera's view the loss of PoseNet's motion is the same, that of the pictures is not.
+    let mut alone = batch.clone();
+    alone.clean.pop();
+    alone.network.pop();
+    alone.measured.pop();
+    let without = model.loss(&model.forward(&alone), &alone, schedule);
+    assert_eq!(with.terms.speed, without.terms.speed);
+    assert_ne!(with.terms.reprojection, without.terms.reprojection);
+}
+
+#[test]
+fn one_camera_is_no_stereo() {
+    let folder = tempfile::tempdir().unwrap();
+    let drive = write_kitti(&street(), folder.path(), &mut |_, _| ()).unwrap();
+    let why = |camera| match samples(&settings(), &drive, camera) {
+        Err(Error::NoStereo { why, .. }) => why,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(why(Cameras::Left), NoStereo::OneCamera);
+    // A drive whose second camera has other frames.
+    for entry in std::fs::read_dir(drive.join("image_03/data")).unwrap() {
+        let path = entry.unwrap().path();
+        if !path.ends_with("0000000004.png") {
+            std::fs::remove_file(path).unwrap();
+        }
+    }
+    assert_eq!(why(Cameras::Both), NoStereo::NoCommonFrame);
+    let mut both_ways = settings();
+    both_ways.reprojection = Reprojection::Bidirectional;
+    let error = both_ways.validate().unwrap_err().to_string();
+    assert!(
+        error.contains("reprojection") && error.contains("stereo"),
+        "{error}"
+    );
+}
