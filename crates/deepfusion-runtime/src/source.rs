@@ -42,7 +42,8 @@ impl ModelSource {
         }))
     }
 
-    /// Resolves a path or a name: a run or file that is there comes first, then an embedded network's name. A folder of images that has an embedded network's name does not stand in its way.
+    /// Resolves a path or a name: a run or file that is there comes first, then an embedded network's name. A folder of images that has
+    /// an embedded network's name does not stand in its way.
     ///
     /// # Errors
     /// [`Error::NoSuchModel`] for neither; [`RunFolder::open`]'s and [`Shipped::read`]'s for a path that holds no network.
