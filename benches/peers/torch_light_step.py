@@ -1,14 +1,16 @@
 """The peer of `cargo bench -p deepfusion-train -- light`: a training step of the preset `light` in PyTorch, eager.
 
 pip install torch torchvision
-python benches/peers/torch_light_step.py [--threads 2] [--size 320x96] [--batch 4] [--autocast]
+python benches/peers/torch_light_step.py [--threads 2] [--size 320x96] [--batch 4] [--autocast] [--depth 18] [--device cpu] [--compile] [--json]
 
 Prints the median of ten steps on random images, in both memory layouts. A step is: depth of both frames (ResNet-18, four
 scales), motion of the pair (ResNet-18 on six channels) and its inverse, the views of both frames at the measured distance
 for four disparities enlarged to full size, SSIM + L1 with auto-mask, smoothness at each scale's size, speed loss,
-backward, gradient clipping, fused Adam. With --autocast the two networks run in bf16 as torch.autocast chooses.
+backward, gradient clipping, fused Adam. With --autocast the two networks run in bf16 as torch.autocast chooses, with --depth 50 both are
+ResNet-50 (the preset `resnet50`), with --compile they go through torch.compile. --json prints the better layout's images a second.
 """
 import argparse
+import json
 
 import torch
 import torch.nn as nn
@@ -24,12 +26,12 @@ RADIANS, METRES = 0.01, 0.8  # per unit of PoseNet's output
 class PoseNet(nn.Module):
     """Axis-angle and translation of a pair of images stacked in time order."""
 
-    def __init__(self):
+    def __init__(self, depth=18):
         super().__init__()
-        self.resnet = torchvision.models.resnet18()
+        self.resnet = getattr(torchvision.models, f"resnet{depth}")()
         self.resnet.conv1 = nn.Conv2d(6, 64, 7, 2, 3, bias=False)
         self.decoder = nn.Sequential(
-            nn.Conv2d(512, 256, 1),
+            nn.Conv2d(512 if depth < 50 else 2048, 256, 1),
             nn.ReLU(),
             nn.Conv2d(256, 256, 3, padding=1),
             nn.ReLU(),
@@ -102,7 +104,7 @@ class Views:
 
 
 def step(depth_net, pose_net, optimiser, views, first, second, k, inverse_k, distance, autocast):
-    with torch.autocast("cpu", torch.bfloat16, enabled=autocast):
+    with torch.autocast(first.device.type, torch.bfloat16, enabled=autocast):
         disparities = depth_net(torch.cat([first, second]))[::-1]  # the finest first
         axis_angle, t = pose_net(torch.cat([first, second], 1))
     disparities = [disparity.float() for disparity in disparities]
@@ -143,14 +145,20 @@ def main():
     parser.add_argument("--size", default="320x96")
     parser.add_argument("--batch", type=int, default=4)
     parser.add_argument("--autocast", action="store_true")
+    parser.add_argument("--depth", type=int, choices=[18, 50], default=18)
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--compile", action="store_true")
+    parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
+    torch.set_default_device(args.device)
+    fastest = float("inf")
     width, height = map(int, args.size.split("x"))
     k = torch.tensor([[0.58 * width, 0, width / 2], [0, 1.92 * height, height / 2], [0, 0, 1]])
     distance = torch.full((2 * args.batch,), METRES)
     for layout, name in ((torch.contiguous_format, "NCHW"), (torch.channels_last, "channels last")):
-        depth_net = DepthNet(18).to(memory_format=layout)
-        pose_net = PoseNet().to(memory_format=layout)
+        depth_net = DepthNet(args.depth).to(memory_format=layout)
+        pose_net = PoseNet(args.depth).to(memory_format=layout)
         # Disparities of about 10 m, a car that drives ahead, as DeepFusion starts.
         for head in depth_net.heads:
             nn.init.constant_(head[1].bias, -4.6)
@@ -159,10 +167,19 @@ def main():
         optimiser = torch.optim.Adam([*depth_net.parameters(), *pose_net.parameters()], LEARNING_RATE, fused=True)
         first, second = (torch.rand(args.batch, 3, height, width).to(memory_format=layout) for _ in range(2))
         views = Views(height, width)
+        if args.compile:
+            depth_net, pose_net = torch.compile(depth_net), torch.compile(pose_net)
         work = depth_net, pose_net, optimiser, views, first, second, k, k.inverse(), distance, args.autocast
         ms = median_ms(lambda: step(*work))
-        word = ", autocast bf16" if args.autocast else ""
-        print(f"training step, preset light, {args.size}, batch {args.batch}, {name}{word}: {ms:.1f} ms")
+        fastest = min(fastest, ms)
+        if args.json:
+            continue
+        preset = "light" if args.depth == 18 else "resnet50"
+        words = (", autocast bf16" if args.autocast else "") + (", compiled" if args.compile else "")
+        print(f"training step, preset {preset}, {args.size}, batch {args.batch}, {name}{words}: {ms:.1f} ms")
+    if args.json:
+        # Two frames a sample.
+        print(json.dumps({"ms": fastest, "images_per_second": 2e3 * args.batch / fastest}))
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 pip install torch torchvision
 python benches/peers/torch_paper_step.py [--threads 2] [--size 640x192] [--batch 2] [--accumulate 6] [--steps 2] [--layout NCHW|channels-last]
+    [--device cpu] [--compile] [--json]
 
 Prints the median time of a step on random images in one memory layout and the peak memory of the process (VmHWM, Linux).
 A step is `accumulate` batches of: depth of both frames (the paper's network, four scales; the module of
@@ -10,6 +11,7 @@ views of both frames with that motion for four disparities enlarged to full size
 scale's size, speed loss, backward; then gradient clipping and fused Adam. Flow and affine losses are left out.
 """
 import argparse
+import json
 import statistics
 import sys
 import time
@@ -18,7 +20,6 @@ from pathlib import Path
 import torch
 import torch.nn as nn
 import torch.nn.functional as F
-import torchvision
 from torch_light_step import FAR_M, METRES, NEAR_M, SMOOTHNESS, SPEED, Views, length, photometric, rotation, smoothness
 from torch_light_step import PoseNet as LightPoseNet
 from torch_step import CLIP_NORM, LEARNING_RATE
@@ -31,10 +32,7 @@ class PoseNet(LightPoseNet):
     """The same on a ResNet-50."""
 
     def __init__(self):
-        super().__init__()
-        self.resnet = torchvision.models.resnet50()
-        self.resnet.conv1 = nn.Conv2d(6, 64, 7, 2, 3, bias=False)
-        self.decoder[0] = nn.Conv2d(2048, 256, 1)
+        super().__init__(50)
 
 
 def backward(depth_net, pose_net, views, first, second, k, inverse_k, distance, share):
@@ -72,8 +70,12 @@ def main():
     parser.add_argument("--accumulate", type=int, default=6)
     parser.add_argument("--steps", type=int, default=2)
     parser.add_argument("--layout", choices=["NCHW", "channels-last"], default="channels-last")
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--compile", action="store_true")
+    parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
+    torch.set_default_device(args.device)
     width, height = map(int, args.size.split("x"))
     k = torch.tensor([[0.58 * width, 0, width / 2], [0, 1.92 * height, height / 2], [0, 0, 1]])
     distance = torch.full((2 * args.batch,), METRES)
@@ -86,6 +88,13 @@ def main():
     optimiser = torch.optim.Adam(parameters, LEARNING_RATE, fused=True)
     first, second = (torch.rand(args.batch, 3, height, width).to(memory_format=layout) for _ in range(2))
     views = Views(height, width)
+    if args.compile:
+        depth_net, pose_net = torch.compile(depth_net), torch.compile(pose_net)
+
+    def finish():
+        """What a GPU was asked for is done."""
+        if args.device != "cpu":
+            parameters[0].sum().item()
 
     def step():
         optimiser.zero_grad()
@@ -96,11 +105,17 @@ def main():
         optimiser.step()
 
     step()
+    finish()
     times = []
     for _ in range(args.steps):
         start = time.perf_counter()
         step()
+        finish()
         times.append(time.perf_counter() - start)
+    if args.json:
+        seconds = statistics.median(times)
+        print(json.dumps({"seconds": seconds, "images_per_second": 2 * args.batch * args.accumulate / seconds}))
+        return
     lines = Path("/proc/self/status").read_text().splitlines()
     peak = next(int(line.split()[1]) / 1024**2 for line in lines if line.startswith("VmHWM"))
     print(

@@ -6,7 +6,7 @@ use deepfusion_model::weights::Weights;
 use deepfusion_runtime::{DepthEstimator, DepthRunner, FusedRunner, ModelSource, OrtRunner};
 
 use crate::allocator;
-use crate::cli::{ComputeDevice, Engine, EngineArgs};
+use crate::cli::{Backend, Engine, EngineArgs};
 use crate::error::CliError;
 use crate::failure::Result;
 
@@ -25,7 +25,7 @@ pub(crate) fn runner(
     config: &TrainConfig,
     weights: Weights,
 ) -> Result<Box<dyn DepthRunner>> {
-    let on_cpu = args.device == ComputeDevice::Cpu;
+    let on_cpu = args.device.backend == Backend::Cpu;
     let engine = match args.engine {
         Engine::Auto if on_cpu => Engine::Fused,
         Engine::Auto => Engine::Burn,

@@ -21,6 +21,29 @@ pub(crate) enum CliError {
         /// The device's name.
         device: &'static str,
     },
+    /// A device that this machine does not have.
+    #[error("no device `{device}`: this machine has {count} of the `{backend}` backend")]
+    NoSuchDevice {
+        /// As it was given.
+        device: String,
+        /// Its backend.
+        backend: &'static str,
+        /// How many devices that has here.
+        count: usize,
+    },
+    /// A device that computes something else than the processor.
+    #[cfg(feature = "train")]
+    #[error("{wrong} of {of} operations on `{device}` are not what the processor computes")]
+    DeviceDiffers {
+        /// The device.
+        device: String,
+        /// How many operations differ or failed.
+        wrong: usize,
+        /// Of how many.
+        of: usize,
+        /// What to do without.
+        remedy: String,
+    },
     /// A file of a viewer that was not compiled in.
     #[cfg(not(feature = "rerun"))]
     #[error("this build writes no files for the rerun viewer")]
@@ -275,6 +298,14 @@ impl Reportable for CliError {
             Self::NoBackend { device } => Some(format!(
                 "build it with `cargo build --release --features {device}`, or use --device cpu"
             )),
+            Self::NoSuchDevice { backend, count: 1.., .. } => Some(format!(
+                "they are counted from 0: `--device {backend}` takes the one that the backend prefers"
+            )),
+            #[cfg(feature = "train")]
+            Self::DeviceDiffers { remedy, .. } => Some(remedy.clone()),
+            Self::NoSuchDevice { .. } => Some(
+                "is the GPU's driver installed, and may this user open it? `--device cpu` computes on the processor".into(),
+            ),
             #[cfg(not(feature = "rerun"))]
             Self::NoRerun => Some(
                 "build it with `cargo build --release --features rerun`, or leave out --rerun to look at the folder in a browser".into(),

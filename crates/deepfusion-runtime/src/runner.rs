@@ -42,6 +42,11 @@ pub trait DepthRunner: Debug + Send + Sync {
         true
     }
 
+    /// The most memory that it has held on a GPU, in bytes; `None` on a processor, or where the GPU's allocator does not say.
+    fn peak_device_bytes(&self) -> Option<u64> {
+        None
+    }
+
     /// Runs once and returns each step's name and duration; `None` if the engine cannot measure them.
     fn profile(&mut self, image: &[f32]) -> Option<Vec<(String, Duration)>> {
         let _ = image;

@@ -1,21 +1,33 @@
+mod on_device;
+
 use crate::{Error, Model};
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{Gradients, Tensor, TensorData};
 use deepfusion_kernels::{AdamStep, adam, sum_of_squares};
+use deepfusion_nn::ops::is_cpu;
 use deepfusion_nn::weights::{self, WeightTensor, Weights};
 use std::collections::BTreeMap;
 
-/// A parameter's moments.
-#[derive(Debug, Clone, Default)]
+/// A parameter's gradient or one of its moments, flat.
+#[derive(Debug, Clone)]
+enum Values {
+    /// In main memory: the processor's kernels read it there.
+    Host(Vec<f32>),
+    /// On a GPU, which it does not leave.
+    Device(Tensor<1>),
+}
+
+/// A parameter's moments, in the same place as its gradient.
+#[derive(Debug, Clone)]
 struct Moments {
-    first: Vec<f32>,
-    second: Vec<f32>,
+    first: Values,
+    second: Values,
 }
 
 /// Adam (Kingma and Ba), β₁ = 0.9, β₂ = 0.999, ε = 1e-8, with the gradient clipped by its norm.
 ///
-/// The moments are kept by the parameters' names in main memory; the update is one pass over
-/// parameter, gradient and moments.
+/// The moments are kept by the parameters' names. On the processor the update is one pass over parameter, gradient and moments; on a GPU
+/// all of them stay there, and a step reads one number from it: the gradient's norm.
 #[derive(Debug, Clone, Default)]
 pub struct Adam {
     moments: BTreeMap<String, Moments>,
@@ -36,7 +48,12 @@ pub enum StepOutcome {
 
 /// A step's gradients by parameter name.
 #[derive(Debug, Default)]
-pub struct NamedGradients(BTreeMap<String, Vec<f32>>);
+pub struct NamedGradients {
+    values: BTreeMap<String, Values>,
+    /// Whether gradients stay on the processor as tensors, too: the way of GPUs, for tests.
+    #[cfg(test)]
+    as_tensors: bool,
+}
 
 impl NamedGradients {
     /// Adds the gradients of the module's parameters, named with `prefix`, times `scale`.
@@ -50,41 +67,100 @@ impl NamedGradients {
         module.visit(&mut Collect {
             path: vec![prefix.to_owned()],
             gradients,
-            into: &mut self.0,
+            into: self,
             scale,
         });
     }
 
+    /// Whether the gradient is kept where it is.
+    fn keeps<const D: usize>(&self, gradient: &Tensor<D>) -> bool {
+        #[cfg(test)]
+        if self.as_tensors {
+            return true;
+        }
+        !is_cpu(&gradient.device())
+    }
+
     /// All values one after the other, in the order of the names.
     pub(crate) fn append_to(&self, flat: &mut Vec<f32>) {
-        for values in self.0.values() {
-            flat.extend_from_slice(values);
+        for values in self.values.values() {
+            match values {
+                Values::Host(values) => flat.extend_from_slice(values),
+                Values::Device(values) => flat.extend(to_vec(values.clone())),
+            }
         }
     }
 
     /// Takes the values back from where [`Self::append_to`] put them.
     pub(crate) fn take_from(&mut self, flat: &[f32]) {
         let mut rest = flat;
-        for values in self.0.values_mut() {
+        for values in self.values.values_mut() {
             let (own, others) = rest.split_at(values.len());
-            values.copy_from_slice(own);
+            match values {
+                Values::Host(values) => values.copy_from_slice(own),
+                Values::Device(values) => *values = Tensor::from_data(own, &values.device()),
+            }
             rest = others;
         }
     }
 
     fn norm(&self) -> f64 {
-        self.0
-            .values()
-            .map(|g| sum_of_squares(g))
-            .sum::<f64>()
-            .sqrt()
+        let mut on_host = 0.0;
+        let mut on_device = Vec::new();
+        for values in self.values.values() {
+            match values {
+                Values::Host(values) => on_host += sum_of_squares(values),
+                Values::Device(values) => on_device.push(values),
+            }
+        }
+        (on_host + on_device::sum_of_squares(&on_device)).sqrt()
+    }
+}
+
+impl Values {
+    fn len(&self) -> usize {
+        match self {
+            Self::Host(values) => values.len(),
+            Self::Device(values) => values.dims()[0],
+        }
+    }
+
+    /// As many zeros, in the same place.
+    fn zeros(&self) -> Self {
+        match self {
+            Self::Host(values) => Self::Host(vec![0.0; values.len()]),
+            Self::Device(values) => Self::Device(values.zeros_like()),
+        }
+    }
+
+    fn to_vec(&self) -> Vec<f32> {
+        match self {
+            Self::Host(values) => values.clone(),
+            Self::Device(values) => to_vec(values.clone()),
+        }
+    }
+
+    /// On the gradient's device: what a checkpoint held is in main memory at first.
+    fn beside(&self, gradient: &Tensor<1>) -> Tensor<1> {
+        match self {
+            Self::Host(values) => Tensor::from_data(values.as_slice(), &gradient.device()),
+            Self::Device(values) => values.clone(),
+        }
+    }
+
+    /// Moves the values out into main memory.
+    fn take(&mut self) -> Vec<f32> {
+        match std::mem::replace(self, Self::Host(Vec::new())) {
+            Self::Host(values) => values,
+            Self::Device(values) => to_vec(values),
+        }
     }
 }
 
 struct Collect<'a> {
     path: Vec<String>,
     gradients: &'a mut Gradients,
-    into: &'a mut BTreeMap<String, Vec<f32>>,
+    into: &'a mut NamedGradients,
     scale: f32,
 }
 
@@ -99,17 +175,30 @@ impl ModuleVisitor for Collect<'_> {
         let Some(gradient) = param.val().grad_remove(self.gradients) else {
             return;
         };
-        let mut values = to_vec(gradient);
-        if self.scale != 1.0 {
-            values.iter_mut().for_each(|v| *v *= self.scale);
-        }
-        match self.into.entry(self.path.join(".")) {
+        let count = gradient.shape().num_elements();
+        let found = if self.into.keeps(&gradient) {
+            Values::Device(gradient.reshape([count]).mul_scalar(self.scale))
+        } else {
+            let mut values = to_vec(gradient);
+            if self.scale != 1.0 {
+                values.iter_mut().for_each(|v| *v *= self.scale);
+            }
+            Values::Host(values)
+        };
+        match self.into.values.entry(self.path.join(".")) {
             std::collections::btree_map::Entry::Vacant(entry) => {
-                entry.insert(values);
+                entry.insert(found);
             }
             std::collections::btree_map::Entry::Occupied(mut entry) => {
-                for (sum, add) in entry.get_mut().iter_mut().zip(values) {
-                    *sum += add;
+                match (entry.get_mut(), found) {
+                    (Values::Device(sum), Values::Device(add)) => *sum = sum.clone() + add,
+                    (before, add) => {
+                        let mut sum = before.take();
+                        for (sum, add) in sum.iter_mut().zip(add.to_vec()) {
+                            *sum += add;
+                        }
+                        *before = Values::Host(sum);
+                    }
                 }
             }
         }
@@ -193,7 +282,7 @@ impl Adam {
             for (prefix, values) in [("m", &moments.first), ("v", &moments.second)] {
                 let tensor = WeightTensor {
                     shape: vec![values.len()],
-                    values: values.clone(),
+                    values: values.to_vec(),
                 };
                 weights.tensors.insert(format!("{prefix}.{name}"), tensor);
             }
@@ -233,17 +322,21 @@ impl Adam {
                     others: 0,
                 }));
             }
-            let moments = moments.entry(parameter.to_owned()).or_default();
+            let moments = moments.entry(parameter.to_owned()).or_insert(Moments {
+                first: Values::Host(Vec::new()),
+                second: Values::Host(Vec::new()),
+            });
+            let values = Values::Host(tensor.values);
             if name.starts_with("m.") {
-                moments.first = tensor.values
+                moments.first = values
             } else {
-                moments.second = tensor.values
+                moments.second = values
             }
         }
         for (name, moments) in &moments {
-            let missing = match (moments.first.is_empty(), moments.second.is_empty()) {
-                (true, _) => "m",
-                (_, true) => "v",
+            let missing = match (moments.first.len(), moments.second.len()) {
+                (0, _) => "m",
+                (_, 0) => "v",
                 _ => continue,
             };
             return Err(Error::from(deepfusion_nn::Error::MissingTensor {
@@ -291,24 +384,37 @@ impl ModuleMapper for Update<'_> {
     }
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
         let name = self.path.join(".");
-        let Some(gradient) = self.gradients.0.get(&name) else {
+        let Some(gradient) = self.gradients.values.get(&name) else {
             return param;
         };
         // A parameter's first step makes its moments; those of a file were held against it when they were read.
         let moments = self.moments.entry(name).or_insert_with(|| Moments {
-            first: vec![0.0; gradient.len()],
-            second: vec![0.0; gradient.len()],
+            first: gradient.zeros(),
+            second: gradient.zeros(),
         });
-        param.map(|tensor| {
-            let (shape, device) = (tensor.dims(), tensor.device());
-            let mut values = to_vec(tensor.inner());
-            let Moments { first, second } = moments;
-            let step = AdamStep {
-                weight_decay: if D > 1 { self.step.weight_decay } else { 0.0 },
-                ..*self.step
-            };
-            adam(&step, &mut values, gradient, first, second);
-            Tensor::from_data(TensorData::new(values, shape), &device).require_grad()
+        let step = AdamStep {
+            weight_decay: if D > 1 { self.step.weight_decay } else { 0.0 },
+            ..*self.step
+        };
+        let Moments { first, second } = moments;
+        param.map(|tensor| match gradient {
+            Values::Host(gradient) => {
+                let (shape, device) = (tensor.dims(), tensor.device());
+                let mut values = to_vec(tensor.inner());
+                let (mut m, mut v) = (first.take(), second.take());
+                adam(&step, &mut values, gradient, &mut m, &mut v);
+                (*first, *second) = (Values::Host(m), Values::Host(v));
+                Tensor::from_data(TensorData::new(values, shape), &device).require_grad()
+            }
+            Values::Device(gradient) => {
+                let moments = [&*first, &*second].map(|moment| moment.beside(gradient));
+                let (moved, [m, v]) = on_device::update(&step, tensor, gradient.clone(), moments);
+                (*first, *second) = (Values::Device(m), Values::Device(v));
+                moved
+            }
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,5 @@
 use crate::SharedFrames;
-use crate::stereo::{NoStereo, without_stereo};
+use crate::stereo::NoStereo;
 use deepfusion_hint::Hint;
 
 /// What can go wrong while learning.
@@ -21,7 +21,7 @@ pub enum Error {
         drive: String,
     },
     /// A drive whose other camera is wanted as a view, and cannot be one.
-    #[error("{drive}: {}", without_stereo(*why))]
+    #[error("{drive}: {why}")]
     NoStereo {
         /// The drive.
         drive: String,

@@ -55,20 +55,14 @@ pub struct ForwardPass {
 pub(crate) fn displacement_ratio(pass: &ForwardPass, batch: &SnippetBatch) -> f64 {
     // The other camera's view is no motion.
     let in_time = pass.motions.iter().take(batch.distance_m.len());
-    let predicted: f32 = in_time
-        .map(|m| {
-            m.distance()
-                .narrow(0, 0, batch.len())
-                .sum()
-                .into_scalar::<f32>()
-        })
-        .sum();
-    let measured: f32 = batch
-        .distance_m
-        .iter()
-        .map(|d| d.clone().sum().into_scalar::<f32>())
-        .sum();
-    f64::from(measured) / f64::from(predicted).max(1e-9)
+    let predicted = in_time.map(|m| m.distance().narrow(0, 0, batch.len()));
+    let [predicted, measured] = [predicted.collect(), batch.distance_m.clone()]
+        .map(|distances: Vec<Tensor<1>>| Tensor::cat(distances, 0).sum().detach().inner());
+    // Both numbers in one transfer from the device.
+    let numbers = Tensor::cat(vec![measured, predicted], 0).into_data();
+    let mut numbers = numbers.iter::<f32>().map(f64::from);
+    let (measured, predicted) = (numbers.next(), numbers.next());
+    measured.unwrap_or(f64::NAN) / predicted.unwrap_or(f64::NAN).max(1e-9)
 }
 
 impl Model {

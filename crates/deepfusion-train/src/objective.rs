@@ -70,8 +70,9 @@ impl Model {
         let masks = (schedule.masks_active && settings.moving.enabled)
             .then(|| moving_masks(self, &finest, &flow_views, &motions, &levels[0]));
         if let Some(masks) = &masks {
-            let shares = masks.iter().map(share);
-            sum.terms.moving_share = shares.sum::<f64>() / masks.len() as f64;
+            sum.note(mean_of(masks.iter(), share), |terms| {
+                &mut terms.moving_share
+            });
         }
 
         let warped = finest.synthesised[0].image.clone().detach();
@@ -96,30 +97,31 @@ impl Model {
         }
         #[expect(clippy::expect_used, reason = "one for each scale")]
         let output = finest_output.expect("a decoder has a scale at least");
-        sum.terms.valid_share = share(&output.valid);
-        sum.terms.explained_share = share(&output.explained);
+        sum.note(share(&output.valid), |terms| &mut terms.valid_share);
+        sum.note(share(&output.explained), |terms| &mut terms.explained_share);
         let added = |terms: Vec<Tensor<1>>| terms.into_iter().reduce(|a, b| a + b);
-        sum.terms.reprojection = sum.add(added(reprojection), 1.0);
-        sum.terms.smoothness = sum.add(added(smooth), settings.smoothness);
+        sum.add(added(reprojection), 1.0, |terms| &mut terms.reprojection);
+        sum.add(added(smooth), settings.smoothness, |terms| {
+            &mut terms.smoothness
+        });
         let speed = (settings.speed > 0.0).then(|| self.motion_loss(pass, batch));
-        sum.terms.speed = sum.add(speed, schedule.speed_weight);
+        sum.add(speed, schedule.speed_weight, |terms| &mut terms.speed);
         let affine = (settings.affine > 0.0)
             .then(|| self.affine_loss((pass, batch), &finest, &motions, masks.as_deref()));
-        sum.terms.affine = sum.add(affine, settings.affine);
+        sum.add(affine, settings.affine, |terms| &mut terms.affine);
         if !flow_views.is_empty() {
             let flow = self.flow_loss(pass, &flow_views);
-            sum.terms.flow = sum.add(Some(flow), settings.flow.weight);
+            sum.add(Some(flow), settings.flow.weight, |terms| &mut terms.flow);
             if schedule.masks_active && settings.flow.agreement > 0.0 {
                 let apart = agreement(&finest, &flow_views, &levels[0], masks.as_deref());
-                sum.terms.agreement = sum.add(Some(apart), settings.flow.agreement);
+                let weight = settings.flow.agreement;
+                sum.add(Some(apart), weight, |terms| &mut terms.agreement);
             }
         }
-        #[expect(clippy::expect_used, reason = "the reprojection was added")]
-        let total = sum.total.expect("the reprojection is always a part of it");
-        sum.terms.total = number(&total);
+        let (total, terms, _) = sum.read(None);
         BatchLoss {
             total,
-            terms: sum.terms,
+            terms,
             finest: output,
             warped,
             moving: masks.and_then(|masks| masks.into_iter().next()),
@@ -153,17 +155,15 @@ impl Model {
         let settings = &self.config.loss.depth;
         let found = losses::depth(&inverse, &batch.truth, settings);
         let mut sum = Sum::default();
-        sum.terms.depth = sum.add(Some(found.loss), settings.weight);
+        sum.add(Some(found.loss), settings.weight, |terms| &mut terms.depth);
         let likelihood =
             log_scale.map(|b| losses::uncertainty(inverse[0].clone(), b, &batch.truth));
-        sum.terms.uncertainty = sum.add(likelihood, 1.0);
-        #[expect(clippy::expect_used, reason = "the depth was added")]
-        let total = sum.total.expect("it was added");
-        sum.terms.total = number(&total);
+        sum.add(likelihood, 1.0, |terms| &mut terms.uncertainty);
+        let (total, terms, bias) = sum.read(Some(found.bias));
         DepthPass {
             total,
-            terms: sum.terms,
-            scale_ratio: (-number(&found.bias)).exp(),
+            terms,
+            scale_ratio: (-bias).exp(),
             inverse_depth: inverse[0].clone().detach(),
         }
     }
@@ -411,29 +411,49 @@ fn agreement(
     })
 }
 
-/// The sum that is differentiated, and its terms.
+/// A term among the others.
+type Place = fn(&mut LossTerms) -> &mut f64;
+
+/// The sum that is differentiated, and its terms, which stay on the device until all are read at once.
 #[derive(Default)]
 struct Sum {
     total: Option<Tensor<1>>,
-    terms: LossTerms,
+    terms: Vec<(Place, Tensor<1>)>,
 }
 
 impl Sum {
-    /// Adds a term if there is one, and returns its unweighted value.
-    fn add(&mut self, term: Option<Tensor<1>>, weight: f64) -> f64 {
-        let Some(term) = term else { return 0.0 };
-        let value = number(&term);
+    /// Adds a term if there is one; what is kept of it is its unweighted value.
+    fn add(&mut self, term: Option<Tensor<1>>, weight: f64, place: Place) {
+        let Some(term) = term else { return };
+        self.note(term.clone(), place);
         let weighted = term.mul_scalar(weight);
         self.total = Some(match self.total.take() {
             Some(total) => total + weighted,
             None => weighted,
         });
-        value
     }
-}
 
-fn number(value: &Tensor<1>) -> f64 {
-    f64::from(value.clone().into_scalar::<f32>())
+    /// Keeps a value that is no part of the sum.
+    fn note(&mut self, value: Tensor<1>, place: Place) {
+        self.terms.push((place, value.detach().inner()));
+    }
+
+    /// The sum, its terms as numbers, and one number more (NaN if none is asked for): a single transfer from the device.
+    #[expect(clippy::expect_used, reason = "every loss has a term")]
+    fn read(mut self, other: Option<Tensor<1>>) -> (Tensor<1>, LossTerms, f64) {
+        let total = self.total.expect("a loss has a term at least");
+        self.terms
+            .push((|terms| &mut terms.total, total.clone().detach().inner()));
+        let (places, mut values): (Vec<_>, Vec<_>) = self.terms.into_iter().unzip();
+        values.extend(other.map(|other| other.detach().inner()));
+        let values = Tensor::cat(values, 0).into_data();
+        let mut values = values.iter::<f32>().map(f64::from);
+        let mut terms = LossTerms::default();
+        for (place, value) in places.iter().zip(values.by_ref()) {
+            *place(&mut terms) = value;
+        }
+        (total, terms, values.next().unwrap_or(f64::NAN))
+    }
 }
 
 /// The mean of a loss over views.

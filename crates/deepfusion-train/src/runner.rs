@@ -51,10 +51,27 @@ impl DepthRunner for BurnRunner {
         Ok(())
     }
 
+    fn peak_device_bytes(&self) -> Option<u64> {
+        peak_device_bytes(&self.device)
+    }
+
     /// The tensors are shared.
     fn another(&self) -> Result<Box<dyn DepthRunner>, RuntimeError> {
         Ok(Box::new(self.clone()))
     }
+}
+
+/// The most memory that a GPU's allocator has held for this process, in bytes: what it keeps for the next tensors counts, as a GPU's own
+/// tools count it. `None` on a processor, or where the allocator does not say.
+#[must_use]
+pub fn peak_device_bytes(device: &Device) -> Option<u64> {
+    let pools = device.clone().inner().memory_pool_report()?;
+    Some(
+        pools
+            .iter()
+            .map(|pool| pool.pages_peak * pool.page_size)
+            .sum(),
+    )
 }
 
 /// The depth network of a configuration with these weights, on a device.

@@ -25,14 +25,16 @@ pub enum NoStereo {
     NotRectified,
 }
 
-pub(crate) fn without_stereo(why: NoStereo) -> &'static str {
-    match why {
-        NoStereo::OneCamera => "its other camera is not among the data, and stereo asks for it",
-        NoStereo::NoCommonFrame => "its two cameras have no frame in common",
-        NoStereo::NoBaseline => "nothing says where its two cameras are",
-        NoStereo::NotRectified => {
-            "its two cameras are not rectified: their images have other intrinsics, or are turned"
-        }
+impl std::fmt::Display for NoStereo {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::OneCamera => "its other camera is not among the data, and stereo asks for it",
+            Self::NoCommonFrame => "its two cameras have no frame in common",
+            Self::NoBaseline => "nothing says where its two cameras are",
+            Self::NotRectified => {
+                "its two cameras are not rectified: their images have other intrinsics, or are turned"
+            }
+        })
     }
 }
 

@@ -93,8 +93,8 @@ pub(crate) struct AblateArgs {
     /// Go on with the table in --out.
     #[arg(long, requires = "out")]
     pub resume: bool,
-    /// Where to compute.
-    #[arg(long, value_enum, default_value_t)]
+    /// Where to compute; one of several GPUs by its index, as cuda:1.
+    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
     pub device: ComputeDevice,
     /// Print the table as JSON on stdout.
     #[arg(long)]

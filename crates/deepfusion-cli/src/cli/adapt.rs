@@ -74,8 +74,8 @@ pub(crate) struct AdaptArgs {
     /// Any key of the configuration, as loss.smoothness=0.01 (`deepfusion config show` prints them all); may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// Where to compute.
-    #[arg(long, value_enum, default_value_t)]
+    /// Where to compute; one of several GPUs by its index, as cuda:1.
+    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
     pub device: ComputeDevice,
     /// Print before and after as JSON.
     #[arg(long)]

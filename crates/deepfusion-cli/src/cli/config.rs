@@ -24,6 +24,6 @@ pub(crate) struct ShowArgs {
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// What is to be trained on: a preset's sizes follow it.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
     pub device: ComputeDevice,
 }

@@ -4,8 +4,8 @@ use clap::Args;
 use deepfusion_data::NamedTopic;
 use deepfusion_logs::SpeedUnit;
 
-use super::CameraIntrinsics;
 use super::values::{ClockOffset, hfov};
+use super::{CameraIntrinsics, ComputeDevice};
 
 /// `deepfusion doctor`.
 #[derive(Debug, Args)]
@@ -14,7 +14,7 @@ use super::values::{ClockOffset, hfov};
     The exit code is 1 where there is an error, 0 with warnings alone.\n\n\
     Examples:\n  deepfusion doctor\n  deepfusion doctor kitti/2011_09_26/2011_09_26_drive_0005_sync\n  \
     deepfusion doctor drive.bag --report drive.html\n  deepfusion doctor track.gpx\n  \
-    deepfusion doctor trace.blf --dbc car.dbc --speed Wheels.Speed"
+    deepfusion doctor trace.blf --dbc car.dbc --speed Wheels.Speed\n  deepfusion doctor --device cuda"
 )]
 pub(crate) struct DoctorArgs {
     /// A recording: a KITTI drive, date or root, KITTI odometry, KITTI-360, nuScenes, a bag, a folder of images, a video, a comma2k19
@@ -52,6 +52,10 @@ pub(crate) struct DoctorArgs {
     /// Of a CAN trace by itself: what its frames hold.
     #[arg(long, value_name = "FILE", requires = "path")]
     pub dbc: Option<PathBuf>,
+    /// Instead of a recording: compute everything that networks and losses are made of on this device and on the processor, and compare.
+    /// The exit code is 1 where they differ, with what to do without.
+    #[arg(long, value_parser = ComputeDevice::parser(), conflicts_with = "path")]
+    pub device: Option<ComputeDevice>,
     /// Also write a page with plots over time and measured depth on images.
     #[arg(long, value_name = "FILE.html", requires = "path")]
     pub report: Option<PathBuf>,

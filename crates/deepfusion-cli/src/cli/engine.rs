@@ -17,8 +17,8 @@ pub(crate) struct EngineArgs {
     /// The ONNX Runtime library of `--engine ort` [default: found].
     #[arg(long, value_name = "FILE")]
     pub ort_lib: Option<PathBuf>,
-    /// Where to compute.
-    #[arg(long, value_enum, default_value_t)]
+    /// Where to compute; one of several GPUs by its index, as cuda:1.
+    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
     pub device: ComputeDevice,
     /// The data set whose metric scale to use, for a run trained on several.
     #[arg(long = "data-set", alias = "set", value_name = "NAME")]

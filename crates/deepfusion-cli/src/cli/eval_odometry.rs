@@ -62,8 +62,8 @@ pub(crate) struct EvalOdometryArgs {
     /// Folder for both paths as KITTI and TUM files, and their picture from above.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Where to compute.
-    #[arg(long, value_enum, default_value_t)]
+    /// Where to compute; one of several GPUs by its index, as cuda:1.
+    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
     pub device: ComputeDevice,
     /// Print as JSON.
     #[arg(long)]

@@ -7,6 +7,7 @@ mod compare;
 mod completions;
 mod config;
 mod data;
+mod device;
 mod doctor;
 mod engine;
 mod eval;
@@ -37,6 +38,7 @@ pub(crate) use compare::{CompareArgs, TableFormat};
 pub(crate) use completions::{CompletionsArgs, CompletionsKind};
 pub(crate) use config::{ConfigCommand, ShowArgs};
 pub(crate) use data::{ConvertArgs, DataCommand, ExportGtArgs, ImportArgs, InspectArgs};
+pub(crate) use device::{Backend, ComputeDevice};
 pub(crate) use doctor::DoctorArgs;
 pub(crate) use engine::{Engine, EngineArgs};
 pub(crate) use eval::{EvalArgs, PredKind};
@@ -48,7 +50,7 @@ pub(crate) use live::LiveArgs;
 pub(crate) use perceive::{PerceiveArgs, PerceiveSave};
 pub(crate) use predict::{BenchArgs, PredictArgs, Save};
 pub(crate) use prediction::{Outputs, PredictionArgs};
-pub(crate) use train::{ComputeDevice, TrainArgs};
+pub(crate) use train::TrainArgs;
 pub(crate) use values::{CameraIntrinsics, ClockOffset, Shard, Size};
 pub(crate) use view::ViewArgs;
 pub(crate) use weights::{PackArgs, WeightsCommand};
@@ -143,8 +145,8 @@ pub(crate) struct DemoArgs {
     /// Chooses the streets.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
-    /// Where to compute.
-    #[arg(long, value_enum, default_value_t)]
+    /// Where to compute; one of several GPUs by its index, as cuda:1.
+    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
     pub device: ComputeDevice,
 }
 

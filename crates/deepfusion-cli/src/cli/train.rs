@@ -1,11 +1,11 @@
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use deepfusion_data::{Cameras, NamedTopic};
-use deepfusion_model::{Compute, Learn, Preset, TrainConfig, ViewMotion};
+use deepfusion_model::{Learn, Preset, TrainConfig, ViewMotion};
 
 use super::values::{ClockOffset, LearnCamera, learn_camera};
-use super::{Size, names};
+use super::{ComputeDevice, Size, names};
 
 /// `deepfusion train`.
 #[derive(Debug, Args)]
@@ -36,8 +36,8 @@ pub(crate) struct TrainArgs {
     /// Continue the run in --out exactly where it stopped.
     #[arg(long, requires = "out")]
     pub resume: bool,
-    /// Where to compute.
-    #[arg(long, value_enum, default_value_t)]
+    /// Where to compute; one of several GPUs by its index, as cuda:1.
+    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
     pub device: ComputeDevice,
     /// Passes over the data [default: the preset's 20, and at least 1200 steps].
     #[arg(long, value_name = "N", conflicts_with = "steps")]
@@ -107,34 +107,4 @@ pub(crate) struct TrainArgs {
     /// Any key of the configuration, as loss.smoothness=0.01 (`deepfusion config show` prints them all); may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-}
-
-/// Where to compute. Help lists what this build has; the others are known, so that they are answered with how to build them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub(crate) enum ComputeDevice {
-    /// This machine's processor.
-    #[default]
-    Cpu,
-    /// A GPU through Vulkan.
-    #[cfg_attr(not(feature = "vulkan"), value(hide = true))]
-    Vulkan,
-    /// A GPU through WebGPU.
-    #[cfg_attr(not(feature = "wgpu"), value(hide = true))]
-    Wgpu,
-    /// An NVIDIA GPU.
-    #[cfg_attr(not(feature = "cuda"), value(hide = true))]
-    Cuda,
-    /// An Apple GPU.
-    #[cfg_attr(not(feature = "metal"), value(hide = true))]
-    Metal,
-}
-
-impl ComputeDevice {
-    /// What a preset's sizes follow.
-    pub(crate) fn compute(self) -> Compute {
-        match self {
-            Self::Cpu => Compute::Processor,
-            Self::Vulkan | Self::Wgpu | Self::Cuda | Self::Metal => Compute::Gpu,
-        }
-    }
 }

@@ -5,7 +5,7 @@ use deepfusion_jobs::training::{Began, Start};
 use deepfusion_model::{
     DataConfig, Error as ModelError, InputSize, Learn, Preset, Reprojection, RunFolder, TrainConfig,
 };
-use deepfusion_train::{TrainSummary, Trainer};
+use deepfusion_train::{TrainSummary, Trainer, peak_device_bytes};
 
 use super::recorder::Recorder;
 use super::recordings::open_samples;
@@ -53,6 +53,10 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
     say(&plan(&trainer));
     let time_estimate = TimeEstimate::new(trainer.config().clone(), args.device.compute());
     let summary = train(&mut trainer, Some(time_estimate))?;
+    if let Some(bytes) = peak_device_bytes(&device) {
+        let megabytes = device::megabytes(bytes);
+        say(&format!("memory of the device: {megabytes:.0} MB at most"));
+    }
     if summary.step < summary.steps {
         let folder = trainer.folder().display();
         return Err(CliError::Stopped {

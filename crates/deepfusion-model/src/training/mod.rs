@@ -10,6 +10,7 @@ mod loss_config;
 mod preset;
 mod sample_factors;
 mod train_config;
+mod validation;
 
 pub use assumed_camera::{AssumedCamera, LearnedCamera};
 pub use config_keys::{ConfigKey, config_keys};

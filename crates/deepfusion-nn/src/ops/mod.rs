@@ -12,7 +12,7 @@ mod flex;
 mod kernel;
 
 use burn::backend::{Dispatch, DispatchDevice};
-use burn::tensor::{Bool, Tensor, TensorData};
+use burn::tensor::{Bool, Device, Tensor, TensorData};
 use kernel::KernelOps;
 
 pub use autocast::{autocast, supports};
@@ -26,12 +26,18 @@ pub use composed::{
 pub use deepfusion_kernels::Precision;
 pub use kernel::ConvOptions;
 
-/// Whether the tensor is on the device on which the kernels run.
-fn on_cpu<const D: usize>(tensor: &Tensor<D>) -> bool {
+/// Whether it is the processor, on which the kernels run.
+#[must_use]
+pub fn is_cpu(device: &Device) -> bool {
     matches!(
-        tensor.device().inner().as_dispatch(),
+        device.clone().inner().as_dispatch(),
         DispatchDevice::Flex(_)
     )
+}
+
+/// Whether the tensor is on the device on which the kernels run.
+fn on_cpu<const D: usize>(tensor: &Tensor<D>) -> bool {
+    is_cpu(&tensor.device())
 }
 
 /// Convolution, y = w ⋆ x + b.

@@ -16,10 +16,10 @@ pub fn mean_where(values: Tensor<4>, mask: &Tensor<4, Bool>) -> Tensor<1> {
         .div(count.mul_scalar(channels as f64))
 }
 
-/// The share of true pixels.
+/// The share of true pixels, one value.
 #[must_use]
-pub fn share(mask: &Tensor<4, Bool>) -> f64 {
-    f64::from(mask.clone().float().mean().into_scalar::<f32>())
+pub fn share(mask: &Tensor<4, Bool>) -> Tensor<1> {
+    mask.clone().float().mean()
 }
 
 #[cfg(test)]
@@ -35,7 +35,7 @@ mod tests {
         let first = mask.clone().greater_elem(0.5);
         let mean = mean_where(values.clone(), &first).into_scalar::<f32>();
         assert!((mean - 2.0).abs() < 1e-6, "{mean}");
-        assert!((share(&first) - 0.5).abs() < 1e-6);
+        assert!((share(&first).into_scalar::<f32>() - 0.5).abs() < 1e-6);
         let none = mask.greater_elem(2.0);
         assert_eq!(mean_where(values, &none).into_scalar::<f32>(), 0.0);
     }

@@ -36,7 +36,7 @@ const IMAGES_PER_REPEAT: usize = 3;
 #[derive(Debug, Serialize)]
 struct Report {
     engine: &'static str,
-    device: &'static str,
+    device: String,
     network: String,
     size: [usize; 2],
     /// That the depth network learns.
@@ -84,7 +84,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
     };
     let report = Report {
         engine: runner.name(),
-        device: device::name(args.engine.device),
+        device: args.engine.device.to_string(),
         network: name,
         size: [config.size.width, config.size.height],
         parameters: modules.parameters(),
@@ -93,7 +93,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
         latency_ms: stages.sum(),
         fps: bench.overlapped_fps(&mut *runner, repeats)?,
         peak_rss_mb: peak_rss_mb(),
-        peak_device_mb: None,
+        peak_device_mb: runner.peak_device_bytes().map(device::megabytes),
         profile_ms,
         stages_ms: stages,
     };
@@ -101,9 +101,12 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
         return output::print_json(&report);
     }
     let s = &report.stages_ms;
-    let memory = report
+    let mut memory = report
         .peak_rss_mb
         .map_or("?".into(), |m| format!("{m:.0} MB"));
+    if let Some(on_device) = report.peak_device_mb {
+        memory = format!("{memory}, {on_device:.0} MB on the device");
+    }
     output::print(&format!(
         "{} at {}x{}, {:.2} M parameters, {:.2} G multiply-adds, {} engine on {}\n\
          median of {} runs, ms\n\

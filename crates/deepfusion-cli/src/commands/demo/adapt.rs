@@ -17,7 +17,7 @@ use deepfusion_weights::{DEFAULT, Shipped};
 use super::page::{self, Shown};
 use super::{Demo, TEST_SEED, measure};
 use crate::cli::PerceiveArgs;
-use crate::commands::{device, perceive, run_report, train};
+use crate::commands::{perceive, run_report, train};
 use crate::failure::Result;
 use crate::output;
 use crate::progress::{clock, say};
@@ -172,7 +172,7 @@ impl Parts {
 /// 3D targets of the whole drive, followed over time, with pictures: the program's own command, which takes the embedded
 /// network where none is named.
 fn perceive(demo: &Demo, drive: &Path, out: &Path) -> Result<()> {
-    let device = device::name(demo.args.device);
+    let device = demo.args.device.to_string();
     let words = [
         "perceive".as_ref(),
         drive.as_os_str(),

@@ -5,6 +5,7 @@ use std::process::{Command, Stdio};
 
 use serde::Serialize;
 
+use crate::cli::Backend;
 use crate::failure::Result;
 use crate::output;
 
@@ -150,18 +151,8 @@ fn cpu_flags() -> String {
 
 /// What `--device` takes in this build.
 fn devices() -> Vec<&'static str> {
-    let built = [
-        ("cpu", true),
-        ("vulkan", cfg!(feature = "vulkan")),
-        ("wgpu", cfg!(feature = "wgpu")),
-        ("cuda", cfg!(feature = "cuda")),
-        ("metal", cfg!(feature = "metal")),
-    ];
-    built
-        .into_iter()
-        .filter(|(_, is)| *is)
-        .map(|(name, _)| name)
-        .collect()
+    let built = Backend::ALL.into_iter().filter(|(.., built)| *built);
+    built.map(|(_, name, ..)| name).collect()
 }
 
 /// Whole and available memory, MB, as Linux reports it.

@@ -1,5 +1,7 @@
 //! `deepfusion doctor`: what is wrong with a recording, or what this machine has.
 
+#[cfg(feature = "train")]
+mod device;
 mod lines;
 mod machine;
 mod report;
@@ -12,7 +14,7 @@ use deepfusion_doctor::{Diagnosis, Severity, doctor_log, doctor_with, is_log};
 use deepfusion_hint::count_of;
 use deepfusion_logs::ReadOptions;
 
-use crate::cli::{CameraIntrinsics, DoctorArgs};
+use crate::cli::{CameraIntrinsics, ComputeDevice, DoctorArgs};
 use crate::commands::clocks;
 use crate::error::CliError;
 use crate::failure::{Reportable, Result};
@@ -21,6 +23,9 @@ use crate::progress::say;
 
 /// `deepfusion doctor`.
 pub(super) fn run(args: &DoctorArgs) -> Result<()> {
+    if let Some(device) = args.device {
+        return of_device(device, args.json);
+    }
     let Some(path) = &args.path else {
         return machine::run(args.json);
     };
@@ -52,6 +57,16 @@ pub(super) fn run(args: &DoctorArgs) -> Result<()> {
         say(&format!("report: {}", file.display()));
     }
     verdict(path, &diagnosis)
+}
+
+#[cfg(feature = "train")]
+fn of_device(chosen: ComputeDevice, json: bool) -> Result<()> {
+    device::run(chosen, json)
+}
+
+#[cfg(not(feature = "train"))]
+fn of_device(_: ComputeDevice, _: bool) -> Result<()> {
+    Err(CliError::BuiltWithoutTraining { what: "--device" }.into())
 }
 
 /// An option that says nothing of what is looked at: a recording has a camera and its own file of settings, a log has columns.

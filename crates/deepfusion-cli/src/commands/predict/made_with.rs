@@ -7,7 +7,6 @@ use deepfusion_records::MadeWith;
 use deepfusion_runtime::{DepthEstimator, ModelSource};
 
 use crate::cli::{Outputs, PredictionArgs, Save};
-use crate::commands::device;
 use crate::model::ModelFacts;
 
 /// For these arguments and this network.
@@ -21,11 +20,7 @@ pub(super) fn made_with(
     Ok(MadeWith {
         version: env!("CARGO_PKG_VERSION").into(),
         weights: model.content_sha256()?,
-        engine: format!(
-            "{} on {}",
-            estimator.engine(),
-            device::name(args.engine.device)
-        ),
+        engine: format!("{} on {}", estimator.engine(), args.engine.device),
         save: outputs.save.iter().map(|s| word(*s)).collect(),
         max_depth_m: outputs.max_depth_m,
         max_sigma: outputs.max_sigma,
