@@ -10,6 +10,10 @@ use std::collections::BTreeMap;
 
 /// A parameter's gradient or one of its moments, flat.
 #[derive(Debug, Clone)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "some hundred of them, whose values are a thousand times as large"
+)]
 enum Values {
     /// In main memory: the processor's kernels read it there.
     Host(Vec<f32>),

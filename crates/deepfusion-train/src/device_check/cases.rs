@@ -284,7 +284,6 @@ fn known_depth(device: &Device) -> Outcome {
     let settings = DepthLossConfig {
         weight: 1.0,
         gradient: 0.5,
-        ..DepthLossConfig::default()
     };
     let found = depth(&inverse_depths, &truth, &settings);
     outcome(found.loss, |raw| {
