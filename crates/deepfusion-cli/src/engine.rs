@@ -6,7 +6,8 @@ use deepfusion_model::weights::Weights;
 use deepfusion_runtime::{DepthEstimator, DepthRunner, FusedRunner, ModelSource, OrtRunner};
 
 use crate::allocator;
-use crate::cli::{Backend, Engine, EngineArgs};
+use crate::cli::{Engine, EngineArgs};
+use crate::devices::Backend;
 use crate::error::CliError;
 use crate::failure::Result;
 
@@ -57,11 +58,11 @@ fn in_burn(
     config: &TrainConfig,
     weights: &Weights,
 ) -> Result<Box<dyn DepthRunner>> {
-    use crate::commands::device;
+    use crate::devices;
     use deepfusion_train::BurnRunner;
 
     allocator::keep_memory();
-    let device = device::open(args.device)?;
+    let device = devices::open(args.device)?;
     Ok(Box::new(BurnRunner::new(config, weights, &device)?))
 }
 

@@ -12,6 +12,7 @@
 mod allocator;
 mod cli;
 mod commands;
+mod devices;
 mod engine;
 mod error;
 mod failure;

@@ -88,6 +88,40 @@ fn every_check_has_a_line_that_says_whether_it_was_made() {
 }
 
 /// A folder is as good as its good drives: one that stands and one of a single frame are left out and named.
+/// The processor beside itself: every operation is there, and right to the last bit.
+#[cfg(feature = "train")]
+#[test]
+fn a_device_is_compared_with_the_processor() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let found = json(at, "doctor --device cpu --json");
+    assert_eq!(
+        (&found["predict"], &found["train"]),
+        (&true.into(), &true.into())
+    );
+    let operations = found["operations"].as_array().unwrap();
+    assert!(operations.len() > 20);
+    for operation in operations {
+        assert_eq!(operation["right"], true, "{operation}");
+        assert_eq!(operation["forward"], 0.0, "{operation}");
+    }
+    let one = json(at, "doctor --device cpu --operation warp");
+    assert_eq!(
+        (&one["forward"], &one["backward"]),
+        (&0.0.into(), &0.0.into())
+    );
+    // This build has no GPU's backend: `auto` is the processor, and a GPU by name is answered with how to build it.
+    ok(at, "doctor --device auto --operation warp");
+    fails(
+        at,
+        "doctor --device metal:1",
+        &["no `metal` backend", "--features metal"],
+    );
+    let unknown = run(at, "doctor --device gpu");
+    assert_eq!(unknown.code, 2, "{}", unknown.stderr);
+    assert!(unknown.stderr.contains("cpu, auto"), "{}", unknown.stderr);
+}
+
 #[test]
 fn a_drive_that_cannot_train_does_not_fail_its_folder() {
     let folder = tempfile::tempdir().unwrap();

@@ -152,25 +152,11 @@ fn training_step(criterion: &mut Criterion, name: &str, mut config: TrainConfig)
             let loss = ops::autocast(config.precision, || {
                 model.loss(&model.forward(&batch), &batch, schedule)
             });
-            let mut raw = loss.total.backward();
             let mut gradients = NamedGradients::default();
-            gradients.add("depth", &model.depth_net, &mut raw, 1.0);
-            gradients.add("pose", &model.pose_net, &mut raw, 1.0);
-            if let Some(decoder) = &model.flow_decoder {
-                gradients.add("flow", decoder, &mut raw, 1.0);
-            }
+            model.add_gradients(&loss.total, 1.0, &mut gradients);
             let (_, step) = adam.begin(&gradients, LEARNING_RATE, CLIP_NORM, 0.0);
             let step = step.expect("the gradient is finite");
-            let Model {
-                depth_net,
-                pose_net,
-                flow_decoder,
-                ..
-            } = model.clone();
-            model.depth_net = adam.apply(&step, "depth", depth_net, &gradients);
-            model.pose_net = adam.apply(&step, "pose", pose_net, &gradients);
-            model.flow_decoder =
-                flow_decoder.map(|decoder| adam.apply(&step, "flow", decoder, &gradients));
+            model = model.clone().updated(&mut adam, &step, &gradients);
             loss.terms.total
         });
     });

@@ -1,4 +1,5 @@
 mod on_device;
+mod values;
 
 use crate::{Error, Model};
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
@@ -7,19 +8,8 @@ use deepfusion_kernels::{AdamStep, adam, sum_of_squares};
 use deepfusion_nn::ops::is_cpu;
 use deepfusion_nn::weights::{self, WeightTensor, Weights};
 use std::collections::BTreeMap;
-
-/// A parameter's gradient or one of its moments, flat.
-#[derive(Debug, Clone)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "some hundred of them, whose values are a thousand times as large"
-)]
-enum Values {
-    /// In main memory: the processor's kernels read it there.
-    Host(Vec<f32>),
-    /// On a GPU, which it does not leave.
-    Device(Tensor<1>),
-}
+use std::collections::btree_map::Entry;
+use values::{Values, to_vec};
 
 /// A parameter's moments, in the same place as its gradient.
 #[derive(Debug, Clone)]
@@ -52,12 +42,7 @@ pub enum StepOutcome {
 
 /// A step's gradients by parameter name.
 #[derive(Debug, Default)]
-pub struct NamedGradients {
-    values: BTreeMap<String, Values>,
-    /// Whether gradients stay on the processor as tensors, too: the way of GPUs, for tests.
-    #[cfg(test)]
-    as_tensors: bool,
-}
+pub struct NamedGradients(BTreeMap<String, Values>);
 
 impl NamedGradients {
     /// Adds the gradients of the module's parameters, named with `prefix`, times `scale`.
@@ -76,18 +61,19 @@ impl NamedGradients {
         });
     }
 
-    /// Whether the gradient is kept where it is.
-    fn keeps<const D: usize>(&self, gradient: &Tensor<D>) -> bool {
-        #[cfg(test)]
-        if self.as_tensors {
-            return true;
+    /// Adds a parameter's gradient to what there is of it.
+    fn insert(&mut self, name: String, gradient: Values) {
+        match self.0.entry(name) {
+            Entry::Vacant(entry) => {
+                entry.insert(gradient);
+            }
+            Entry::Occupied(mut entry) => entry.get_mut().add(gradient),
         }
-        !is_cpu(&gradient.device())
     }
 
     /// All values one after the other, in the order of the names.
     pub(crate) fn append_to(&self, flat: &mut Vec<f32>) {
-        for values in self.values.values() {
+        for values in self.0.values() {
             match values {
                 Values::Host(values) => flat.extend_from_slice(values),
                 Values::Device(values) => flat.extend(to_vec(values.clone())),
@@ -98,7 +84,7 @@ impl NamedGradients {
     /// Takes the values back from where [`Self::append_to`] put them.
     pub(crate) fn take_from(&mut self, flat: &[f32]) {
         let mut rest = flat;
-        for values in self.values.values_mut() {
+        for values in self.0.values_mut() {
             let (own, others) = rest.split_at(values.len());
             match values {
                 Values::Host(values) => values.copy_from_slice(own),
@@ -111,53 +97,13 @@ impl NamedGradients {
     fn norm(&self) -> f64 {
         let mut on_host = 0.0;
         let mut on_device = Vec::new();
-        for values in self.values.values() {
+        for values in self.0.values() {
             match values {
                 Values::Host(values) => on_host += sum_of_squares(values),
                 Values::Device(values) => on_device.push(values),
             }
         }
         (on_host + on_device::sum_of_squares(&on_device)).sqrt()
-    }
-}
-
-impl Values {
-    fn len(&self) -> usize {
-        match self {
-            Self::Host(values) => values.len(),
-            Self::Device(values) => values.dims()[0],
-        }
-    }
-
-    /// As many zeros, in the same place.
-    fn zeros(&self) -> Self {
-        match self {
-            Self::Host(values) => Self::Host(vec![0.0; values.len()]),
-            Self::Device(values) => Self::Device(values.zeros_like()),
-        }
-    }
-
-    fn to_vec(&self) -> Vec<f32> {
-        match self {
-            Self::Host(values) => values.clone(),
-            Self::Device(values) => to_vec(values.clone()),
-        }
-    }
-
-    /// On the gradient's device: what a checkpoint held is in main memory at first.
-    fn beside(&self, gradient: &Tensor<1>) -> Tensor<1> {
-        match self {
-            Self::Host(values) => Tensor::from_data(values.as_slice(), &gradient.device()),
-            Self::Device(values) => values.clone(),
-        }
-    }
-
-    /// Moves the values out into main memory.
-    fn take(&mut self) -> Vec<f32> {
-        match std::mem::replace(self, Self::Host(Vec::new())) {
-            Self::Host(values) => values,
-            Self::Device(values) => to_vec(values),
-        }
     }
 }
 
@@ -180,40 +126,17 @@ impl ModuleVisitor for Collect<'_> {
             return;
         };
         let count = gradient.shape().num_elements();
-        let found = if self.into.keeps(&gradient) {
-            Values::Device(gradient.reshape([count]).mul_scalar(self.scale))
-        } else {
+        let found = if is_cpu(&gradient.device()) {
             let mut values = to_vec(gradient);
             if self.scale != 1.0 {
                 values.iter_mut().for_each(|v| *v *= self.scale);
             }
             Values::Host(values)
+        } else {
+            Values::Device(gradient.reshape([count]).mul_scalar(self.scale))
         };
-        match self.into.values.entry(self.path.join(".")) {
-            std::collections::btree_map::Entry::Vacant(entry) => {
-                entry.insert(found);
-            }
-            std::collections::btree_map::Entry::Occupied(mut entry) => {
-                match (entry.get_mut(), found) {
-                    (Values::Device(sum), Values::Device(add)) => *sum = sum.clone() + add,
-                    (before, add) => {
-                        let mut sum = before.take();
-                        for (sum, add) in sum.iter_mut().zip(add.to_vec()) {
-                            *sum += add;
-                        }
-                        *before = Values::Host(sum);
-                    }
-                }
-            }
-        }
+        self.into.insert(self.path.join("."), found);
     }
-}
-
-#[expect(clippy::expect_used, reason = "the type that the networks have")]
-fn to_vec<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
-    let data = tensor.into_data();
-    data.try_into_vec::<f32>()
-        .expect("the networks are built in single precision")
 }
 
 impl Adam {
@@ -388,7 +311,7 @@ impl ModuleMapper for Update<'_> {
     }
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
         let name = self.path.join(".");
-        let Some(gradient) = self.gradients.values.get(&name) else {
+        let Some(gradient) = self.gradients.0.get(&name) else {
             return param;
         };
         // A parameter's first step makes its moments; those of a file were held against it when they were read.

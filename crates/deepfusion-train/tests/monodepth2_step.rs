@@ -257,12 +257,9 @@ fn twenty_steps_of_adam_lose_what_pytorchs_do() {
         rounding = f64::max(rounding, theirs);
         println!("{step}: {exact:.5}, off by {ours:.1e}, PyTorch's float32 by {theirs:.1e}");
         assert!(ours < f64::max(1e-3, 3.0 * rounding), "{step}: {ours:.1e}");
-        let (mut raw, mut gradients) = (loss.total.backward(), NamedGradients::default());
-        gradients.add("depth", &model.depth_net, &mut raw, 1.0);
-        gradients.add("pose", &model.pose_net, &mut raw, 1.0);
+        let mut gradients = NamedGradients::default();
+        model.add_gradients(&loss.total, 1.0, &mut gradients);
         let (_, update) = adam.begin(&gradients, LEARNING_RATE, 0.0, 0.0);
-        let update = update.unwrap();
-        model.depth_net = adam.apply(&update, "depth", model.depth_net, &gradients);
-        model.pose_net = adam.apply(&update, "pose", model.pose_net, &gradients);
+        model = model.updated(&mut adam, &update.unwrap(), &gradients);
     }
 }

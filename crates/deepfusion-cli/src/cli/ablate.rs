@@ -4,7 +4,9 @@ use clap::Args;
 use deepfusion_data::Cameras;
 use deepfusion_model::{Preset, ViewMotion};
 
-use super::{ComputeDevice, Size, names};
+use super::device::device;
+use super::{Size, names};
+use crate::devices::ComputeDevice;
 
 /// The parts and terms that no row decides.
 const SHARED_TERMS: [&str; 6] = [
@@ -94,7 +96,7 @@ pub(crate) struct AblateArgs {
     #[arg(long, requires = "out")]
     pub resume: bool,
     /// Where to compute; one of several GPUs by its index, as cuda:1.
-    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
+    #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
     /// Print the table as JSON on stdout.
     #[arg(long)]

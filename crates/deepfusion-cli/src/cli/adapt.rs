@@ -3,8 +3,9 @@ use std::path::PathBuf;
 use clap::Args;
 use deepfusion_data::{Cameras, NamedTopic};
 
-use super::ComputeDevice;
+use super::device::device;
 use super::values::{ClockOffset, not_negative};
+use crate::devices::ComputeDevice;
 
 /// `deepfusion adapt`.
 #[derive(Debug, Args)]
@@ -75,7 +76,7 @@ pub(crate) struct AdaptArgs {
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// Where to compute; one of several GPUs by its index, as cuda:1.
-    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
+    #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
     /// Print before and after as JSON.
     #[arg(long)]

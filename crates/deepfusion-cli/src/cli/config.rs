@@ -1,7 +1,9 @@
 use clap::{Args, Subcommand};
 use deepfusion_model::Preset;
 
-use super::{ComputeDevice, names};
+use super::device::device;
+use super::names;
+use crate::devices::ComputeDevice;
 
 /// `deepfusion config …`.
 #[derive(Debug, Subcommand)]
@@ -24,6 +26,6 @@ pub(crate) struct ShowArgs {
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// What is to be trained on: a preset's sizes follow it.
-    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
+    #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
 }

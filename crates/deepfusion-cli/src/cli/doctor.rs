@@ -4,8 +4,10 @@ use clap::Args;
 use deepfusion_data::NamedTopic;
 use deepfusion_logs::SpeedUnit;
 
+use super::CameraIntrinsics;
+use super::device::device;
 use super::values::{ClockOffset, hfov};
-use super::{CameraIntrinsics, ComputeDevice};
+use crate::devices::ComputeDevice;
 
 /// `deepfusion doctor`.
 #[derive(Debug, Args)]
@@ -54,8 +56,11 @@ pub(crate) struct DoctorArgs {
     pub dbc: Option<PathBuf>,
     /// Instead of a recording: compute everything that networks and losses are made of on this device and on the processor, and compare.
     /// The exit code is 1 where they differ, with what to do without.
-    #[arg(long, value_parser = ComputeDevice::parser(), conflicts_with = "path")]
+    #[arg(long, value_parser = device(), conflicts_with = "path")]
     pub device: Option<ComputeDevice>,
+    /// Of those operations one alone, as JSON: each has a process of its own.
+    #[arg(long, value_name = "NAME", requires = "device", hide = true)]
+    pub operation: Option<String>,
     /// Also write a page with plots over time and measured depth on images.
     #[arg(long, value_name = "FILE.html", requires = "path")]
     pub report: Option<PathBuf>,

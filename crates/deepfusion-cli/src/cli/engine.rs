@@ -3,7 +3,9 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use deepfusion_infer::Precision;
 
-use super::{ComputeDevice, names};
+use super::device::device;
+use super::names;
+use crate::devices::ComputeDevice;
 
 /// What runs a trained network, and where.
 #[derive(Debug, Clone, Args)]
@@ -18,7 +20,7 @@ pub(crate) struct EngineArgs {
     #[arg(long, value_name = "FILE")]
     pub ort_lib: Option<PathBuf>,
     /// Where to compute; one of several GPUs by its index, as cuda:1.
-    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
+    #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
     /// The data set whose metric scale to use, for a run trained on several.
     #[arg(long = "data-set", alias = "set", value_name = "NAME")]

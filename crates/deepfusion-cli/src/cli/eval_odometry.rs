@@ -3,8 +3,9 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args};
 use deepfusion_data::{Cameras, NamedTopic};
 
-use super::ComputeDevice;
+use super::device::device;
 use super::values::ClockOffset;
+use crate::devices::ComputeDevice;
 
 /// `deepfusion eval-odometry`.
 #[derive(Debug, Args)]
@@ -63,7 +64,7 @@ pub(crate) struct EvalOdometryArgs {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Where to compute; one of several GPUs by its index, as cuda:1.
-    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
+    #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
     /// Print as JSON.
     #[arg(long)]

@@ -31,6 +31,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use deepfusion_rosbag::Compression;
 use deepfusion_sim::{Scene, Sensors};
 
+use crate::devices::ComputeDevice;
+use device::device;
+
 pub(crate) use ablate::AblateArgs;
 pub(crate) use adapt::AdaptArgs;
 pub(crate) use calibrate::CalibrateArgs;
@@ -38,7 +41,6 @@ pub(crate) use compare::{CompareArgs, TableFormat};
 pub(crate) use completions::{CompletionsArgs, CompletionsKind};
 pub(crate) use config::{ConfigCommand, ShowArgs};
 pub(crate) use data::{ConvertArgs, DataCommand, ExportGtArgs, ImportArgs, InspectArgs};
-pub(crate) use device::{Backend, ComputeDevice};
 pub(crate) use doctor::DoctorArgs;
 pub(crate) use engine::{Engine, EngineArgs};
 pub(crate) use eval::{EvalArgs, PredKind};
@@ -146,7 +148,7 @@ pub(crate) struct DemoArgs {
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
     /// Where to compute; one of several GPUs by its index, as cuda:1.
-    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
+    #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
 }
 

@@ -4,8 +4,10 @@ use clap::Args;
 use deepfusion_data::{Cameras, NamedTopic};
 use deepfusion_model::{Learn, Preset, TrainConfig, ViewMotion};
 
+use super::device::device;
 use super::values::{ClockOffset, LearnCamera, learn_camera};
-use super::{ComputeDevice, Size, names};
+use super::{Size, names};
+use crate::devices::ComputeDevice;
 
 /// `deepfusion train`.
 #[derive(Debug, Args)]
@@ -37,7 +39,7 @@ pub(crate) struct TrainArgs {
     #[arg(long, requires = "out")]
     pub resume: bool,
     /// Where to compute; one of several GPUs by its index, as cuda:1.
-    #[arg(long, value_parser = ComputeDevice::parser(), default_value_t)]
+    #[arg(long, value_parser = device(), default_value_t)]
     pub device: ComputeDevice,
     /// Passes over the data [default: the preset's 20, and at least 1200 steps].
     #[arg(long, value_name = "N", conflicts_with = "steps")]

@@ -10,8 +10,9 @@ use deepfusion_model::{Preset, TrainConfig, ViewMotion};
 use deepfusion_runtime::ModelSource;
 
 use super::recordings::{open_samples, print_warnings, warn_of_sample};
-use super::{device, resume, train};
-use crate::cli::{AblateArgs, ComputeDevice, EngineArgs};
+use super::{resume, train};
+use crate::cli::{AblateArgs, EngineArgs};
+use crate::devices::{self, ComputeDevice};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::{Progress, say};
@@ -132,7 +133,7 @@ fn decided_by_the_table(assignment: &str) -> Option<&'static str> {
 /// Trains and measures one run, or as much of it as is not done yet.
 fn made(run: OpenRun, plan: &Plan, out: &Path, device: ComputeDevice) -> Result<RunResult> {
     let mut trainer = run.trainer(
-        &device::open(device)?,
+        &devices::open(device)?,
         &mut print_warnings,
         &mut warn_of_sample,
     )?;

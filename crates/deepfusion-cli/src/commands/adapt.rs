@@ -9,13 +9,13 @@ use deepfusion_runtime::{DepthEstimator, ModelSource};
 
 use super::recordings::{print_warnings, warn_of_sample};
 use super::time_estimate::TimeEstimate;
-use super::{clocks, device, train};
+use super::{clocks, train};
 use crate::cli::{AdaptArgs, EngineArgs};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::model;
 use crate::progress::{Progress, say};
-use crate::{engine, output};
+use crate::{devices, engine, output};
 
 /// `deepfusion adapt`.
 pub(super) fn run(args: &AdaptArgs) -> Result<()> {
@@ -25,7 +25,7 @@ pub(super) fn run(args: &AdaptArgs) -> Result<()> {
     }
     let out = args.out.as_deref().unwrap_or(Path::new("adapted"));
     require_new(out)?;
-    let device = device::open(args.device)?;
+    let device = devices::open(args.device)?;
     let given = model::chosen(args.model.as_deref())?;
     let mut before = estimator(args, &given, args.data_set.as_deref())?;
     let settings = settings(args, out, &before)?;

@@ -11,15 +11,14 @@ use deepfusion_runtime::ModelSource;
 use deepfusion_train::PosePredictor;
 
 use super::clocks;
-use super::device;
 use super::recordings::open_recordings;
 use crate::allocator;
 use crate::cli::EvalOdometryArgs;
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::model::ModelFacts;
-use crate::output;
 use crate::progress::Progress;
+use crate::{devices, output};
 
 /// `deepfusion eval-odometry`.
 pub(super) fn run(args: &EvalOdometryArgs) -> Result<()> {
@@ -54,7 +53,7 @@ fn from_model(args: &EvalOdometryArgs) -> Result<(Vec<TrackPair>, String)> {
         let model = source.name();
         return Err(CliError::NoPoseNet { model }.into());
     }
-    let predictor = PosePredictor::load(model, args.set.as_deref(), &device::open(args.device)?)?;
+    let predictor = PosePredictor::load(model, args.set.as_deref(), &devices::open(args.device)?)?;
     let mut options = OpenOptions {
         camera: args.camera,
         topics: args.topics.clone(),

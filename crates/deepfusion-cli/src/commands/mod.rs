@@ -13,7 +13,6 @@ mod config;
 mod convert;
 #[cfg(feature = "train")]
 mod demo;
-pub(crate) mod device;
 mod doctor;
 mod eval;
 #[cfg(feature = "train")]

@@ -10,17 +10,17 @@ use deepfusion_train::{TrainSummary, Trainer, peak_device_bytes};
 use super::recorder::Recorder;
 use super::recordings::open_samples;
 use super::time_estimate::TimeEstimate;
-use super::{clocks, device, resume};
+use super::{clocks, resume};
 use crate::allocator;
 use crate::cli::{ClockOffset, TrainArgs};
 use crate::error::CliError;
 use crate::failure::Result;
 use crate::progress::{clock, say};
-use crate::{interrupt, jobs, output};
+use crate::{devices, interrupt, jobs, output};
 
 /// `deepfusion train`.
 pub(super) fn run(args: &TrainArgs) -> Result<()> {
-    let device = device::open(args.device)?;
+    let device = devices::open(args.device)?;
     let resumed = match (&args.out, args.resume) {
         (Some(out), true) => Some(RunFolder::open(out)?.0),
         _ => None,
@@ -54,7 +54,7 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
     let time_estimate = TimeEstimate::new(trainer.config().clone(), args.device.compute());
     let summary = train(&mut trainer, Some(time_estimate))?;
     if let Some(bytes) = peak_device_bytes(&device) {
-        let megabytes = device::megabytes(bytes);
+        let megabytes = devices::megabytes(bytes);
         say(&format!("memory of the device: {megabytes:.0} MB at most"));
     }
     if summary.step < summary.steps {

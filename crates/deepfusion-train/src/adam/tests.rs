@@ -20,16 +20,23 @@ fn learned(as_tensors: bool, restore_after: usize) -> [Weights; 3] {
             .map(|i| ((i * 7 + step) % 11) as f32 / 11.0)
             .collect();
         let images = Tensor::<4>::from_data(TensorData::new(values, [1, 6, 64, 64]), &device);
-        let mut gradients = NamedGradients {
-            as_tensors,
-            ..NamedGradients::default()
-        };
+        let mut gradients = NamedGradients::default();
         // Of two batches, as with `accumulate = 2`.
         for part in [1.0, 3.0] {
             let motion = model.pose_net.forward(images.clone().mul_scalar(part));
             let loss = motion.axis_angle.sum() * 100.0 + motion.translation.sum();
-            let mut raw = loss.backward();
-            gradients.add("pose", &model.pose_net, &mut raw, 0.5);
+            let (mut raw, mut of_batch) = (loss.backward(), NamedGradients::default());
+            of_batch.add("pose", &model.pose_net, &mut raw, 0.5);
+            for (name, values) in of_batch.0 {
+                // As a GPU's would be.
+                let tensor = || Tensor::from_data(values.to_vec().as_slice(), &Device::flex());
+                let values = if as_tensors {
+                    Values::Device(tensor())
+                } else {
+                    values
+                };
+                gradients.insert(name, values);
+            }
         }
         let (outcome, step) = adam.begin(&gradients, 1e-3, 0.7, 0.01);
         let StepOutcome::Done { gradient_norm } = outcome else {
@@ -118,8 +125,8 @@ fn gradients_pass_through_main_memory_and_back() {
     let device = Device::flex();
     let mut gradients = NamedGradients::default();
     let tensor = Tensor::from_data([1.0_f32, 2.0], &device);
-    gradients.values.insert("a".into(), Values::Host(vec![3.0]));
-    gradients.values.insert("b".into(), Values::Device(tensor));
+    gradients.0.insert("a".into(), Values::Host(vec![3.0]));
+    gradients.0.insert("b".into(), Values::Device(tensor));
     assert!((gradients.norm() - 14.0_f64.sqrt()).abs() < 1e-6);
     let mut flat = Vec::new();
     gradients.append_to(&mut flat);

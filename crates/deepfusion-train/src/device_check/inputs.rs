@@ -2,31 +2,60 @@
 
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 
-/// What an operation gives.
+/// What an operation gives, in parts, each of which has a size of its own.
 pub(super) struct Outcome {
-    pub(super) forward: Vec<f32>,
-    /// Gradients of its inputs, one after another; empty of an operation without.
-    pub(super) backward: Vec<f32>,
+    pub(super) forward: Vec<Vec<f32>>,
+    /// Gradients of its inputs; empty of an operation without.
+    pub(super) backward: Vec<Vec<f32>>,
 }
 
-/// [`fixed`], as a tensor that learns.
-pub(super) fn noise<const D: usize>(
-    shape: [usize; D],
-    seed: u32,
-    ends: (f32, f32),
-    device: &Device,
-) -> Tensor<D> {
-    fixed(shape, seed, ends, device).require_grad()
+/// Where an operation's inputs are made.
+pub(super) struct Inputs {
+    pub(super) device: Device,
+    /// By which share of itself every number is off, up or down: as if something before had been rounded.
+    pub(super) rounding: f32,
 }
 
-/// Numbers between two ends, without a pattern, which depend on `seed` alone.
-pub(super) fn fixed<const D: usize>(
-    shape: [usize; D],
-    seed: u32,
-    (low, high): (f32, f32),
-    device: &Device,
-) -> Tensor<D> {
-    // Marsaglia's xorshift.
+impl Inputs {
+    /// As they are.
+    pub(super) fn exact(device: &Device) -> Self {
+        Self {
+            device: device.clone().autodiff(),
+            rounding: 0.0,
+        }
+    }
+
+    /// Numbers between two ends, without a pattern, which depend on `seed` alone; a tensor that learns.
+    pub(super) fn noise<const D: usize>(
+        &self,
+        shape: [usize; D],
+        seed: u32,
+        ends: (f32, f32),
+    ) -> Tensor<D> {
+        self.fixed(shape, seed, ends).require_grad()
+    }
+
+    /// The same of a tensor that does not learn.
+    pub(super) fn fixed<const D: usize>(
+        &self,
+        shape: [usize; D],
+        seed: u32,
+        ends: (f32, f32),
+    ) -> Tensor<D> {
+        let mut values = uniform(shape.iter().product(), seed, ends);
+        if self.rounding > 0.0 {
+            let off = uniform(values.len(), seed + 1000, (-self.rounding, self.rounding));
+            values
+                .iter_mut()
+                .zip(off)
+                .for_each(|(v, off)| *v += *v * off);
+        }
+        Tensor::from_data(TensorData::new(values, shape), &self.device)
+    }
+}
+
+/// Marsaglia's xorshift.
+fn uniform(count: usize, seed: u32, (low, high): (f32, f32)) -> Vec<f32> {
     let mut state = seed.wrapping_mul(0x9e37_79b9) | 1;
     let mut next = || {
         state ^= state << 13;
@@ -34,9 +63,7 @@ pub(super) fn fixed<const D: usize>(
         state ^= state << 5;
         state as f32 / u32::MAX as f32
     };
-    let values = (0..shape.iter().product()).map(|_| low + (high - low) * next());
-    let data = TensorData::new(values.collect::<Vec<f32>>(), shape);
-    Tensor::from_data(data, device)
+    (0..count).map(|_| low + (high - low) * next()).collect()
 }
 
 /// A tensor's values in main memory.
@@ -54,10 +81,12 @@ pub(super) fn outcome<const D: usize>(
     result: Tensor<D>,
     gradients: impl FnOnce(&Gradients) -> Vec<Vec<f32>>,
 ) -> Outcome {
-    let weights = fixed(result.dims(), 99, (-1.0, 1.0), &result.device());
+    let shape = result.dims();
+    let weights = uniform(shape.iter().product(), 99, (-1.0, 1.0));
+    let weights = Tensor::from_data(TensorData::new(weights, shape), &result.device());
     let raw = (result.clone() * weights).sum().backward();
     Outcome {
-        forward: values(result),
-        backward: gradients(&raw).concat(),
+        forward: vec![values(result)],
+        backward: gradients(&raw),
     }
 }

@@ -8,6 +8,7 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use burn::tensor::Device;
+use inputs::{Inputs, Outcome};
 
 /// How far a device may be from the processor, over the largest value: both round in single precision, in another order.
 pub const TOLERANCE: f64 = 1e-3;
@@ -63,42 +64,56 @@ impl OperationCheck {
     }
 }
 
-/// Computes everything that networks and losses are made of on `device` and on the processor, an operation at a time. `listen` gets each
-/// as it is done. An operation that panics, as drivers' errors do, is one that failed; a driver that ends the process is not survived.
-pub fn check_device(
-    device: &Device,
-    mut listen: impl FnMut(&OperationCheck),
-) -> Vec<OperationCheck> {
-    let processor = Device::flex().autodiff();
-    let device = device.clone().autodiff();
-    let mut checks = Vec::new();
-    for case in cases::all() {
-        let right = (case.run)(&processor);
-        let check = match catch_unwind(AssertUnwindSafe(|| (case.run)(&device))) {
-            Ok(found) => OperationCheck {
-                operation: case.operation,
-                needed_by: case.needed_by,
-                forward: apart(&right.forward, &found.forward),
-                backward: (!right.backward.is_empty())
-                    .then(|| apart(&right.backward, &found.backward)),
-                failure: None,
-            },
-            Err(panic) => OperationCheck {
-                operation: case.operation,
-                needed_by: case.needed_by,
-                forward: f64::INFINITY,
-                backward: None,
-                failure: Some(said(&*panic)),
-            },
-        };
-        listen(&check);
-        checks.push(check);
-    }
-    checks
+/// Everything that is compared, by name, the simple operations first.
+pub fn operations() -> impl Iterator<Item = (&'static str, NeededBy)> {
+    let cases = cases::all().into_iter();
+    cases.map(|case| (case.operation, case.needed_by))
 }
 
-/// The largest difference over the largest value.
-fn apart(right: &[f32], found: &[f32]) -> f64 {
+/// Computes an operation on a device and on the processor; `None` for a name that [`operations`] does not have. One that panics, as
+/// drivers' errors do, failed; a driver that ends the process is not survived: who wants to go on gives each operation a process.
+#[must_use]
+pub fn check_operation(operation: &str, device: &Device) -> Option<OperationCheck> {
+    let mut cases = cases::all().into_iter();
+    let case = cases.find(|case| case.operation == operation)?;
+    let right = (case.run)(&Inputs::exact(&Device::flex()));
+    let found = catch_unwind(AssertUnwindSafe(|| (case.run)(&Inputs::exact(device))));
+    let check = OperationCheck {
+        operation: case.operation,
+        needed_by: case.needed_by,
+        forward: f64::INFINITY,
+        backward: None,
+        failure: None,
+    };
+    Some(match found {
+        Ok(found) => compared(check, &right, &found),
+        Err(panic) => OperationCheck {
+            failure: Some(said(&*panic)),
+            ..check
+        },
+    })
+}
+
+/// How far what was found is from what is right.
+fn compared(check: OperationCheck, right: &Outcome, found: &Outcome) -> OperationCheck {
+    let has_gradients = !right.backward.is_empty();
+    OperationCheck {
+        forward: apart(&right.forward, &found.forward),
+        backward: has_gradients.then(|| apart(&right.backward, &found.backward)),
+        ..check
+    }
+}
+
+/// The largest difference in a part over the largest value there, of the part where that is largest.
+fn apart(right: &[Vec<f32>], found: &[Vec<f32>]) -> f64 {
+    if right.len() != found.len() {
+        return f64::INFINITY;
+    }
+    let parts = right.iter().zip(found);
+    parts.fold(0.0, |most, (a, b)| most.max(part_apart(a, b)))
+}
+
+fn part_apart(right: &[f32], found: &[f32]) -> f64 {
     let same_kind = |(a, b): (&f32, &f32)| a.is_finite() == b.is_finite();
     if right.len() != found.len() || !right.iter().zip(found).all(same_kind) {
         return f64::INFINITY;
@@ -122,37 +137,62 @@ fn said(panic: &(dyn Any + Send)) -> String {
 mod tests {
     use super::*;
 
-    /// The processor agrees with itself, and every case has numbers that say something.
+    fn check(operation: &str) -> OperationCheck {
+        check_operation(operation, &Device::flex()).unwrap()
+    }
+
     #[test]
-    fn the_processor_is_right() {
-        let mut seen = 0;
-        let checks = check_device(&Device::flex(), |_| seen += 1);
-        assert_eq!(seen, checks.len());
-        assert!(checks.len() > 20, "{}", checks.len());
-        for check in &checks {
-            assert!(check.is_right(), "{check:?}");
-            assert_eq!((check.forward, check.backward.unwrap_or(0.0)), (0.0, 0.0));
+    fn the_processor_agrees_with_itself() {
+        for operation in ["convolution 3x3", "optimiser"] {
+            let found = check(operation);
+            assert!(found.is_right() && found.forward == 0.0, "{found:?}");
         }
-        let device = Device::flex().autodiff();
+        assert!(check("warp").backward.is_some());
+        assert_eq!(check_operation("any", &Device::flex()), None);
+    }
+
+    /// What another order of sums may do to the inputs of an operation is no error; a thousand times as much is one. So every case says
+    /// something, and none decides by a pixel.
+    #[test]
+    fn rounding_is_right_and_a_percent_is_wrong() {
         for case in cases::all() {
-            let found = (case.run)(&device);
-            for (what, values) in [("forward", found.forward), ("backward", found.backward)] {
-                if what == "backward" && values.is_empty() {
-                    continue;
-                }
-                let moves = values.iter().any(|v| v.abs() > 1e-6);
-                let finite = values.iter().all(|v| v.is_finite());
-                assert!(moves && finite, "{}: {what}", case.operation);
-            }
+            let with = |rounding| {
+                (case.run)(&Inputs {
+                    rounding,
+                    ..Inputs::exact(&Device::flex())
+                })
+            };
+            let right = with(0.0);
+            let check = |found| {
+                let check = OperationCheck {
+                    operation: case.operation,
+                    needed_by: case.needed_by,
+                    forward: 0.0,
+                    backward: None,
+                    failure: None,
+                };
+                compared(check, &right, &found)
+            };
+            let (rounded, wrong) = (check(with(1e-6)), check(with(3e-2)));
+            println!(
+                "{:42} {:8.1e} {:?}; {:8.1e} {:?}",
+                case.operation, rounded.forward, rounded.backward, wrong.forward, wrong.backward
+            );
+            assert!(rounded.is_right(), "{rounded:?}");
+            assert!(!wrong.is_right(), "{wrong:?}");
         }
     }
 
     #[test]
     fn what_differs_is_measured() {
+        let apart = |right: &[f32], found: &[f32]| apart(&[right.to_vec()], &[found.to_vec()]);
         assert_eq!(apart(&[1.0, -4.0], &[1.0, -3.0]), 0.25);
         assert_eq!(apart(&[1.0, f32::NAN], &[1.0, f32::NAN]), 0.0);
         assert_eq!(apart(&[1.0, f32::NAN], &[1.0, 2.0]), f64::INFINITY);
         assert_eq!(apart(&[1.0], &[]), f64::INFINITY);
+        // A small part is not hidden by a large one.
+        let parts = |small| [vec![100.0], vec![small]];
+        assert!(super::apart(&parts(0.1), &parts(0.2)) > 0.9);
         let broken = catch_unwind(|| panic!("out of {}", "memory")).unwrap_err();
         assert_eq!(said(&*broken), "out of memory");
     }

@@ -5,9 +5,8 @@ use crate::model::displacement_ratio;
 use crate::workers::WorkerGroup;
 use crate::{
     BatchLoader, BatchLoss, DepthBatch, DepthLoader, DepthPass, Error, ForwardPass, LossTerms,
-    Model, NamedGradients, SamplePanel, SampleSet, Schedule, TrainConfig,
+    NamedGradients, SamplePanel, SampleSet, Schedule, TrainConfig,
 };
-use burn::tensor::Tensor;
 use deepfusion_kernels::AdamStep;
 use deepfusion_nn::ops::autocast;
 
@@ -33,7 +32,8 @@ impl Trainer {
                     .monitors
                     .ratio
                     .push(displacement_ratio(&pass, &batch));
-                self.add_gradients(&mut learned.gradients, &loss.total, scale);
+                self.model
+                    .add_gradients(&loss.total, scale as f32, &mut learned.gradients);
                 // The pass's first target is the batch's first sample.
                 let shown = batch.names.first().cloned().unwrap_or_default();
                 learned.names.extend(batch.names);
@@ -48,7 +48,8 @@ impl Trainer {
                 if loaders.video.is_none() {
                     learned.monitors.ratio.push(pass.scale_ratio);
                 }
-                self.add_gradients(&mut learned.gradients, &pass.total, scale);
+                self.model
+                    .add_gradients(&pass.total, scale as f32, &mut learned.gradients);
                 learned.names.extend(batch.names.iter().cloned());
                 let panel = learned.panel.take();
                 learned.panel = panel.or(Some(PanelInput::Depth(Box::new((pass, batch)))));
@@ -71,32 +72,11 @@ impl Trainer {
         }
     }
 
-    /// Adds a loss' gradients, `scale` times.
-    fn add_gradients(&self, gradients: &mut NamedGradients, total: &Tensor<1>, scale: f64) {
-        let (mut raw, scale) = (total.backward(), scale as f32);
-        gradients.add("depth", &self.model.depth_net, &mut raw, scale);
-        gradients.add("pose", &self.model.pose_net, &mut raw, scale);
-        if let Some(decoder) = &self.model.flow_decoder {
-            gradients.add("flow", decoder, &mut raw, scale);
-        }
-        if let Some(focal) = &self.model.focal {
-            gradients.add(FOCAL, focal, &mut raw, scale);
-        }
-    }
-
     /// A step of the optimiser on everything that learns.
     pub(super) fn apply(&mut self, step: AdamStep, gradients: &NamedGradients) {
-        let Model {
-            depth_net,
-            pose_net,
-            flow_decoder,
-            focal,
-            ..
-        } = self.model.clone();
-        self.model.depth_net = self.adam.apply(&step, "depth", depth_net, gradients);
-        self.model.pose_net = self.adam.apply(&step, "pose", pose_net, gradients);
-        self.model.flow_decoder =
-            flow_decoder.map(|decoder| self.adam.apply(&step, "flow", decoder, gradients));
+        let model = self.model.clone();
+        let focal = model.focal.clone();
+        self.model = model.updated(&mut self.adam, &step, gradients);
         let step = self.focal_step(step);
         let applied = focal.map(|focal| self.adam.apply(&step, FOCAL, focal, gradients));
         self.model.focal = match self.config.learned_camera() {

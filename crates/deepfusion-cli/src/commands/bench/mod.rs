@@ -21,11 +21,10 @@ use image::codecs::jpeg::JpegEncoder;
 use serde::Serialize;
 
 use self::modules::{Module, Modules};
-use super::device;
 use crate::cli::BenchArgs;
 use crate::failure::Result;
 use crate::model;
-use crate::{engine, output};
+use crate::{devices, engine, output};
 
 /// The picture that is decoded and resized, a simulated street: a KITTI frame's size.
 const PICTURE: (u32, u32) = (1242, 375);
@@ -93,7 +92,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<()> {
         latency_ms: stages.sum(),
         fps: bench.overlapped_fps(&mut *runner, repeats)?,
         peak_rss_mb: peak_rss_mb(),
-        peak_device_mb: runner.peak_device_bytes().map(device::megabytes),
+        peak_device_mb: runner.peak_device_bytes().map(devices::megabytes),
         profile_ms,
         stages_ms: stages,
     };

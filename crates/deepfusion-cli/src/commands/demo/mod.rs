@@ -23,11 +23,11 @@ use deepfusion_train::{Model, Trainer};
 use deepfusion_weights::DEFAULT;
 
 use super::recordings::open_samples;
-use super::{device, train};
+use super::train;
 use crate::cli::{DemoArgs, EngineArgs};
 use crate::failure::Result;
 use crate::progress::{Progress, clock, say};
-use crate::{engine, interrupt, output};
+use crate::{devices, engine, interrupt, output};
 
 /// Far from any seed a user is likely to choose for training.
 const TEST_SEED: u64 = 1_000_003;
@@ -45,7 +45,7 @@ pub(super) fn run(args: &DemoArgs) -> Result<()> {
     let demo = Demo {
         args,
         start: Instant::now(),
-        device: device::open(args.device)?,
+        device: devices::open(args.device)?,
         out: output::run_folder(args.out.as_deref(), "demo")?,
     };
     match embedded {

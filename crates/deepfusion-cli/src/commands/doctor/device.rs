@@ -1,12 +1,15 @@
 //! `deepfusion doctor --device`: whether a device computes what the processor does.
 
-use deepfusion_train::device_check::{NeededBy, OperationCheck, TOLERANCE, check_device};
-use serde::Serialize;
+use std::process::{Command, Stdio};
 
-use crate::cli::ComputeDevice;
-use crate::commands::device;
+use deepfusion_train::device_check::{
+    NeededBy, OperationCheck, TOLERANCE, check_operation, operations,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::devices::{self, Backend, ComputeDevice};
 use crate::error::CliError;
-use crate::failure::Result;
+use crate::failure::{Context, Result};
 use crate::output;
 
 /// What was found.
@@ -31,9 +34,17 @@ struct Row {
     failure: Option<String>,
 }
 
+/// One operation as its own process prints it.
+#[derive(Debug, Serialize, Deserialize)]
+struct Printed {
+    forward: f64,
+    backward: Option<f64>,
+    failure: Option<String>,
+}
+
 /// Compares, a line as each operation is done.
 pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
-    let device = device::open(chosen)?;
+    let device = devices::open(chosen)?;
     if !json {
         output::print(&format!(
             "{chosen} beside the processor: errors over the largest value, at most {TOLERANCE}\n\n\
@@ -41,13 +52,19 @@ pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
             "", "forward", "backward"
         ))?;
     }
-    let mut printed = Ok(());
-    let checks = check_device(&device, |check| {
-        if !json && printed.is_ok() {
-            printed = output::print(&line(check));
+    let mut checks = Vec::new();
+    for (operation, needed_by) in operations() {
+        // A driver may end its process, and with it all that was found so far.
+        let check = match chosen.backend {
+            Backend::Cpu => check_operation(operation, &device),
+            _ => Some(in_its_own_process(operation, needed_by, chosen)?),
+        };
+        let Some(check) = check else { continue };
+        if !json {
+            output::print(&line(&check))?;
         }
-    });
-    printed?;
+        checks.push(check);
+    }
     if json {
         output::print_json(&report(chosen, &checks))?;
     }
@@ -62,6 +79,52 @@ pub(super) fn run(chosen: ComputeDevice, json: bool) -> Result<()> {
         remedy: remedy(&checks),
     }
     .into())
+}
+
+/// What the process of one operation does.
+pub(super) fn one(chosen: ComputeDevice, operation: &str) -> Result<()> {
+    let device = devices::open(chosen)?;
+    let check = check_operation(operation, &device);
+    // JSON knows no infinity.
+    output::print_json(&check.map(|check| Printed {
+        forward: check.forward.min(f64::MAX),
+        backward: check.backward.map(|error| error.min(f64::MAX)),
+        failure: check.failure,
+    }))
+}
+
+/// Has this program check one operation.
+fn in_its_own_process(
+    operation: &'static str,
+    needed_by: NeededBy,
+    chosen: ComputeDevice,
+) -> Result<OperationCheck> {
+    let program = std::env::current_exe().context("cannot find this program's file")?;
+    let done = Command::new(program)
+        .args(["doctor", "--device", &chosen.to_string()])
+        .args(["--operation", operation])
+        .stdin(Stdio::null())
+        .output()
+        .context("cannot start this program again")?;
+    let check = OperationCheck {
+        operation,
+        needed_by,
+        forward: f64::INFINITY,
+        backward: None,
+        failure: None,
+    };
+    Ok(match serde_json::from_slice::<Printed>(&done.stdout) {
+        Ok(printed) => OperationCheck {
+            forward: printed.forward,
+            backward: printed.backward,
+            failure: printed.failure,
+            ..check
+        },
+        Err(_) => OperationCheck {
+            failure: Some(format!("its process ended ({})", done.status)),
+            ..check
+        },
+    })
 }
 
 fn line(check: &OperationCheck) -> String {
@@ -88,8 +151,8 @@ fn report(chosen: ComputeDevice, checks: &[OperationCheck]) -> Report {
     let rows = checks.iter().map(|check| Row {
         operation: check.operation,
         right: check.is_right(),
-        forward: Some(check.forward).filter(|error| error.is_finite()),
-        backward: check.backward.filter(|error| error.is_finite()),
+        forward: Some(check.forward).filter(|error| *error < f64::MAX),
+        backward: check.backward.filter(|error| *error < f64::MAX),
         failure: check.failure.clone(),
     });
     Report {

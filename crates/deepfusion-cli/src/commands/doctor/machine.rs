@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use serde::Serialize;
 
-use crate::cli::Backend;
+use crate::devices::Backend;
 use crate::failure::Result;
 use crate::output;
 

@@ -14,8 +14,9 @@ use deepfusion_doctor::{Diagnosis, Severity, doctor_log, doctor_with, is_log};
 use deepfusion_hint::count_of;
 use deepfusion_logs::ReadOptions;
 
-use crate::cli::{CameraIntrinsics, ComputeDevice, DoctorArgs};
+use crate::cli::{CameraIntrinsics, DoctorArgs};
 use crate::commands::clocks;
+use crate::devices::ComputeDevice;
 use crate::error::CliError;
 use crate::failure::{Reportable, Result};
 use crate::output;
@@ -24,7 +25,7 @@ use crate::progress::say;
 /// `deepfusion doctor`.
 pub(super) fn run(args: &DoctorArgs) -> Result<()> {
     if let Some(device) = args.device {
-        return of_device(device, args.json);
+        return of_device(device, args);
     }
     let Some(path) = &args.path else {
         return machine::run(args.json);
@@ -60,12 +61,15 @@ pub(super) fn run(args: &DoctorArgs) -> Result<()> {
 }
 
 #[cfg(feature = "train")]
-fn of_device(chosen: ComputeDevice, json: bool) -> Result<()> {
-    device::run(chosen, json)
+fn of_device(chosen: ComputeDevice, args: &DoctorArgs) -> Result<()> {
+    match &args.operation {
+        Some(operation) => device::one(chosen, operation),
+        None => device::run(chosen, args.json),
+    }
 }
 
 #[cfg(not(feature = "train"))]
-fn of_device(_: ComputeDevice, _: bool) -> Result<()> {
+fn of_device(_: ComputeDevice, _: &DoctorArgs) -> Result<()> {
     Err(CliError::BuiltWithoutTraining { what: "--device" }.into())
 }
 

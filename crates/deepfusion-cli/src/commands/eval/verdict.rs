@@ -93,7 +93,7 @@ fn add_pose_speeds(
     if !pose_net_is_metric(config) {
         return Ok(());
     }
-    let device = crate::commands::device::open(args.engine.device)?;
+    let device = crate::devices::open(args.engine.device)?;
     match PosePredictor::load(given, args.engine.set.as_deref(), &device) {
         // The unit of an imported PoseNet is unknown.
         Ok(predictor) if predictor.step == 0 => {}

@@ -5,13 +5,12 @@ mod imp {
     use crate::failure::Result;
     use deepfusion_model::StoredNetwork;
 
-    use crate::cli::ComputeDevice;
-    use crate::commands::device;
+    use crate::devices::{self, ComputeDevice};
 
     pub(crate) use deepfusion_train::Inspector;
 
     pub(crate) fn open(network: &StoredNetwork, device: ComputeDevice) -> Result<Inspector> {
-        Ok(Inspector::new(network, &device::open(device)?)?)
+        Ok(Inspector::new(network, &devices::open(device)?)?)
     }
 }
 
@@ -21,7 +20,7 @@ mod imp {
     use deepfusion_model::{InputSize, StoredNetwork};
     use deepfusion_runtime::LayerMaps;
 
-    use crate::cli::ComputeDevice;
+    use crate::devices::ComputeDevice;
     use crate::error::CliError;
 
     /// There is none.

@@ -1,0 +1,79 @@
+//! Numbers of a parameter, where it is learned.
+
+use burn::tensor::Tensor;
+
+/// A parameter's gradient or one of its moments, flat.
+#[derive(Debug, Clone)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "some hundred of them, whose values are a thousand times as large"
+)]
+pub(super) enum Values {
+    /// In main memory: the processor's kernels read it there.
+    Host(Vec<f32>),
+    /// On a GPU, which it does not leave.
+    Device(Tensor<1>),
+}
+
+impl Values {
+    pub(super) fn len(&self) -> usize {
+        match self {
+            Self::Host(values) => values.len(),
+            Self::Device(values) => values.dims()[0],
+        }
+    }
+
+    /// As many zeros, in the same place.
+    pub(super) fn zeros(&self) -> Self {
+        match self {
+            Self::Host(values) => Self::Host(vec![0.0; values.len()]),
+            Self::Device(values) => Self::Device(values.zeros_like()),
+        }
+    }
+
+    pub(super) fn to_vec(&self) -> Vec<f32> {
+        match self {
+            Self::Host(values) => values.clone(),
+            Self::Device(values) => to_vec(values.clone()),
+        }
+    }
+
+    /// Adds others of the same parameter, which are in the same place.
+    pub(super) fn add(&mut self, others: Self) {
+        match (&mut *self, others) {
+            (Self::Host(sum), Self::Host(add)) => {
+                for (sum, add) in sum.iter_mut().zip(add) {
+                    *sum += add;
+                }
+            }
+            (sum, Self::Device(add)) => *self = Self::Device(sum.beside(&add) + add),
+            (Self::Device(sum), add @ Self::Host(_)) => {
+                let add = add.beside(sum);
+                *sum = sum.clone() + add;
+            }
+        }
+    }
+
+    /// On the gradient's device: what a checkpoint held is in main memory at first.
+    pub(super) fn beside(&self, gradient: &Tensor<1>) -> Tensor<1> {
+        match self {
+            Self::Host(values) => Tensor::from_data(values.as_slice(), &gradient.device()),
+            Self::Device(values) => values.clone(),
+        }
+    }
+
+    /// Moves the values out into main memory.
+    pub(super) fn take(&mut self) -> Vec<f32> {
+        match std::mem::replace(self, Self::Host(Vec::new())) {
+            Self::Host(values) => values,
+            Self::Device(values) => to_vec(values),
+        }
+    }
+}
+
+#[expect(clippy::expect_used, reason = "the type that the networks have")]
+pub(super) fn to_vec<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    let data = tensor.into_data();
+    data.try_into_vec::<f32>()
+        .expect("the networks are built in single precision")
+}
