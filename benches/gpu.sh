@@ -28,14 +28,14 @@ out=$(cd "$out" && pwd)
 
 # Before any figure: is it right? What differs is written down and does not end the script.
 "$program" doctor --device "$device" --json >"$out/doctor.json" || true
-"$program" simulate --out "$out/drive" --frames 60 --seed 5 --size "$size" --scan-every 0 2>"$out/simulate.log"
+"$program" simulate --out "$out/drive" --frames 60 --seed 5 --size "$size" --scan-every 0 >"$out/simulate.log" 2>&1
 
 presets="light resnet50 paper"
 for preset in $presets; do
     "$program" bench --preset "$preset" --size "$size" --engine burn --device "$device" --repeats "$repeats" --json \
         >"$out/bench-$preset.json" 2>"$out/bench-$preset.log" || true
     "$program" train --data "$out/drive" --preset "$preset" --size "$size" --batch "$batch" --set accumulate=1 --init none --steps "$steps" \
-        --device "$device" --out "$out/$preset" 2>"$out/train-$preset.log" || true
+        --device "$device" --out "$out/$preset" >"$out/train-$preset.log" 2>&1 || true
 done
 
 # PyTorch knows CUDA and Metal, and no Vulkan.
