@@ -1,13 +1,8 @@
 use crate::learned_focal::{LearnedFocal, refocused};
-use crate::trainer::FOCAL;
-use crate::{
-    Adam, BilinearResize, Error, Motion, NamedGradients, Reprojection, ReversedPose, SnippetBatch,
-    TrainConfig,
-};
+use crate::{BilinearResize, Error, Motion, Reprojection, ReversedPose, SnippetBatch, TrainConfig};
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use deepfusion_geometry::DepthRange;
-use deepfusion_kernels::AdamStep;
 use deepfusion_nn::{DepthNet, FlowDecoder, PoseNet, SCALES, WeightRng};
 
 /// The networks of a run, and what a training step needs.
@@ -290,32 +285,6 @@ impl Model {
         });
         let flows = flows.collect();
         (self.depth_net.decode(targets), flows)
-    }
-
-    /// Adds a loss' gradients to those of a step, `scale` times.
-    pub fn add_gradients(&self, total: &Tensor<1>, scale: f32, step: &mut NamedGradients) {
-        let mut raw = total.backward();
-        step.add("depth", &self.depth_net, &mut raw, scale);
-        step.add("pose", &self.pose_net, &mut raw, scale);
-        if let Some(decoder) = &self.flow_decoder {
-            step.add("flow", decoder, &mut raw, scale);
-        }
-        if let Some(focal) = &self.focal {
-            step.add(FOCAL, focal, &mut raw, scale);
-        }
-    }
-
-    /// The networks after a step of the optimiser. A learned focal length stays: its step is another.
-    #[must_use]
-    pub fn updated(self, adam: &mut Adam, step: &AdamStep, gradients: &NamedGradients) -> Self {
-        Self {
-            depth_net: adam.apply(step, "depth", self.depth_net, gradients),
-            pose_net: adam.apply(step, "pose", self.pose_net, gradients),
-            flow_decoder: self
-                .flow_decoder
-                .map(|decoder| adam.apply(step, "flow", decoder, gradients)),
-            ..self
-        }
     }
 
     fn motion(&self, stacked: Tensor<4>) -> Motion {

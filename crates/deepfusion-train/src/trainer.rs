@@ -24,8 +24,6 @@ use std::path::Path;
 use std::time::Instant;
 use step::{Loaders, WorkerStep};
 
-/// The name of the focal length among parameters and moments.
-pub(crate) const FOCAL: &str = "focal";
 /// Skipped steps in a row after which training gives up.
 const MAX_SKIPPED: usize = 20;
 

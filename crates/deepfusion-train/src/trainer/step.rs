@@ -1,7 +1,8 @@
 //! What one worker learns from its part of a step, and the step of the optimiser.
 
-use super::{FOCAL, Trainer};
+use super::Trainer;
 use crate::model::displacement_ratio;
+use crate::update::FOCAL;
 use crate::workers::WorkerGroup;
 use crate::{
     BatchLoader, BatchLoss, DepthBatch, DepthLoader, DepthPass, Error, ForwardPass, LossTerms,
