@@ -58,7 +58,8 @@ def load(
 ) -> Model:
     """A trained network: a run's folder, a checkpoint in it, a packed file, or the name of an embedded one (`networks()`).
 
-    `precision` is "f32", or "bf16" on processors with AMX or AVX512-BF16. `data_set` names one of the data sets that a run
+    `precision` is "f32", "bf16" on processors with AMX or AVX512-BF16, or "int8" on those with AVX512-VNNI, for networks that
+    `deepfusion weights calibrate` has seen. `data_set` names one of the data sets that a run
     learned from, where it learned several: its metres are meant (`--data-set` on the command line).
     """
     return _native.load(model, precision, data_set)

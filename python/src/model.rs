@@ -34,8 +34,10 @@ pub fn load(
     let precision = match precision {
         "f32" => Precision::F32,
         "bf16" => Precision::Bf16,
+        "int8" => Precision::Int8,
         other => {
-            let message = format!("precision: expected \"f32\" or \"bf16\", found {other:?}");
+            let message =
+                format!("precision: expected \"f32\", \"bf16\" or \"int8\", found {other:?}");
             return Err(PyValueError::new_err(message));
         }
     };

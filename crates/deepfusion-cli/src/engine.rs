@@ -1,8 +1,8 @@
 //! What runs a trained network: the choice made on the command line.
 
 use deepfusion_infer::Precision;
-use deepfusion_model::TrainConfig;
 use deepfusion_model::weights::Weights;
+use deepfusion_model::{Int8Calibration, TrainConfig};
 use deepfusion_runtime::{DepthEstimator, DepthRunner, FusedRunner, ModelSource, OrtRunner};
 
 use crate::allocator;
@@ -14,17 +14,18 @@ use crate::failure::Result;
 /// Loads a network with the engine asked for.
 pub(crate) fn load(model: &ModelSource, args: &EngineArgs) -> Result<DepthEstimator> {
     let network = model.load(args.set.as_deref())?;
-    let args = args.clone();
+    let (args, int8) = (args.clone(), network.int8.clone());
     DepthEstimator::of(network, move |config, weights| {
-        runner(&args, config, weights)
+        runner(&args, config, weights, int8.as_ref())
     })
 }
 
-/// The engine asked for, with a network of this configuration and these weights.
+/// The engine asked for, with a network of this configuration and these weights, and what it was calibrated to.
 pub(crate) fn runner(
     args: &EngineArgs,
     config: &TrainConfig,
     weights: Weights,
+    int8: Option<&Int8Calibration>,
 ) -> Result<Box<dyn DepthRunner>> {
     let on_cpu = args.device.backend == Backend::Cpu;
     let engine = match args.engine {
@@ -44,7 +45,7 @@ pub(crate) fn runner(
     Ok(match engine {
         Engine::Burn | Engine::Auto => in_burn(args, config, &weights)?,
         Engine::Fused => {
-            let packed = || FusedRunner::new(config, weights, args.precision);
+            let packed = || FusedRunner::with_calibration(config, weights, args.precision, int8);
             Box::new(allocator::without_hoarding(packed)?)
         }
         Engine::Ort => Box::new(OrtRunner::new(args.ort_lib.as_deref(), config, weights)?),

@@ -2,7 +2,7 @@
 
 use std::ops::{Deref, DerefMut};
 
-use crate::element::Element;
+use crate::element::Plain;
 
 /// A cache line.
 #[derive(Debug, Clone, Copy)]
@@ -17,7 +17,7 @@ pub(crate) struct Aligned<T> {
     kind: std::marker::PhantomData<T>,
 }
 
-impl<T: Element> Aligned<T> {
+impl<T: Plain> Aligned<T> {
     /// Zeros; `None` where there is no memory for them.
     pub(crate) fn try_zeros(len: usize) -> Option<Self> {
         let bytes = len.checked_mul(size_of::<T>())?;
@@ -52,17 +52,17 @@ impl<T: Element> Aligned<T> {
     }
 }
 
-impl<T: Element> Deref for Aligned<T> {
+impl<T: Plain> Deref for Aligned<T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
         // SAFETY: the lines have room for `len` numbers, at a multiple of their alignment, and any bits are a number
-        // (the promise of `Element`).
+        // (the promise of `Plain`).
         unsafe { std::slice::from_raw_parts(self.lines.as_ptr().cast(), self.len) }
     }
 }
 
-impl<T: Element> DerefMut for Aligned<T> {
+impl<T: Plain> DerefMut for Aligned<T> {
     fn deref_mut(&mut self) -> &mut [T] {
         // SAFETY: as above.
         unsafe { std::slice::from_raw_parts_mut(self.lines.as_mut_ptr().cast(), self.len) }

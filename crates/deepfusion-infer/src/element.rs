@@ -1,19 +1,26 @@
 //! The element type of the arena: f32, or bf16 (the upper half of an f32).
 
-/// A number as it is stored between the operations.
+/// A number that plain memory can hold.
 ///
 /// # Safety
 /// Any bits must be such a number, zeros the default one; it has no padding, and its size and alignment are a power of
 /// two of at most 64 bytes. [`crate::aligned::Aligned`] makes numbers of plain memory and counts on it.
-pub(crate) unsafe trait Element:
-    Copy + Send + Sync + PartialOrd + Default + 'static
-{
+pub(crate) unsafe trait Plain: Copy + Default + 'static {}
+
+// SAFETY: four bytes, of which any are a float; zeros are 0.
+unsafe impl Plain for f32 {}
+// SAFETY: a byte, of which any bits are a number; zeros are 0.
+unsafe impl Plain for i8 {}
+// SAFETY: it is a `u16`, of which any bits are a number; zeros are 0.
+unsafe impl Plain for Bf16 {}
+
+/// A number as it is stored between the operations.
+pub(crate) trait Element: Plain + Send + Sync + PartialOrd {
     fn of(value: f32) -> Self;
     fn value(self) -> f32;
 }
 
-// SAFETY: four bytes, of which any are a float; zeros are 0.
-unsafe impl Element for f32 {
+impl Element for f32 {
     #[inline(always)]
     fn of(value: f32) -> Self {
         value
@@ -37,8 +44,7 @@ impl PartialOrd for Bf16 {
     }
 }
 
-// SAFETY: it is a `u16`, of which any bits are a number; zeros are 0.
-unsafe impl Element for Bf16 {
+impl Element for Bf16 {
     /// To the nearest, ties to even.
     #[inline(always)]
     fn of(value: f32) -> Self {

@@ -7,9 +7,10 @@ use std::time::{Duration, Instant};
 use crate::aligned::Aligned;
 use crate::conv_form::ConvForm;
 use crate::element::{Bf16, Element};
-use crate::forms::{Bf16Conv, F32Conv};
+use crate::forms::{Bf16Conv, F32Conv, Int8Conv};
 use crate::movement::{self, Normalisation};
 use crate::plan::{Plan, Step};
+use crate::ranges::{InputRanges, extent};
 use crate::view::Shared;
 use crate::{Border, Error, Graph};
 use crate::{channel_norm, enlarge, masks, means, recurrent};
@@ -22,6 +23,9 @@ pub enum Precision {
     F32,
     /// Weights and the values between operations in bf16 (8 bits of mantissa), sums in f32.
     Bf16,
+    /// Convolutions of 8-bit integers, weights and inputs, where the graph has the ranges of what they read
+    /// ([`Graph::set_input_ranges`]); everything else as in bf16.
+    Int8,
 }
 
 impl Precision {
@@ -31,6 +35,7 @@ impl Precision {
         match self {
             Self::F32 => "f32",
             Self::Bf16 => "bf16",
+            Self::Int8 => "int8",
         }
     }
 }
@@ -46,6 +51,7 @@ pub struct Engine {
 enum Runner {
     F32(Typed<f32, F32Conv>),
     Bf16(Typed<Bf16, Bf16Conv>),
+    Int8(Typed<Bf16, Int8Conv>),
 }
 
 impl Engine {
@@ -53,7 +59,8 @@ impl Engine {
     ///
     /// # Errors
     /// [`Error::Size`] if the graph cannot run on such images, [`Error::Graph`] if a residual or a mask's operand
-    /// is a concatenation or the image, [`Error::Memory`] if there is not enough memory, [`Error::NoBf16`].
+    /// is a concatenation or the image, [`Error::Memory`] if there is not enough memory, [`Error::NoBf16`], [`Error::NoInt8`],
+    /// [`Error::Ranges`] for int8 without ranges.
     pub fn new(
         graph: Graph,
         width: usize,
@@ -66,6 +73,11 @@ impl Engine {
             Precision::F32 => Runner::F32(Typed::new(graph, width, height)?),
             Precision::Bf16 if !Self::has_bf16() => return Err(Error::NoBf16),
             Precision::Bf16 => Runner::Bf16(Typed::new(graph, width, height)?),
+            Precision::Int8 if !Self::has_int8() => return Err(Error::NoInt8),
+            Precision::Int8 => {
+                graph.check_input_ranges()?;
+                Runner::Int8(Typed::new(graph, width, height)?)
+            }
         };
         Ok(Self {
             runner,
@@ -79,6 +91,12 @@ impl Engine {
         Bf16Conv::available()
     }
 
+    /// Whether this processor can compute in int8.
+    #[must_use]
+    pub fn has_int8() -> bool {
+        Int8Conv::available()
+    }
+
     /// A second engine on the same packed weights, with its own buffers: one for each thread.
     ///
     /// # Errors
@@ -89,6 +107,7 @@ impl Engine {
         let runner = match &self.runner {
             Runner::F32(runner) => Runner::F32(runner.another().ok_or_else(full)?),
             Runner::Bf16(runner) => Runner::Bf16(runner.another().ok_or_else(full)?),
+            Runner::Int8(runner) => Runner::Int8(runner.another().ok_or_else(full)?),
         };
         Ok(Self {
             runner,
@@ -127,17 +146,36 @@ impl Engine {
         times
     }
 
-    fn run_steps(&mut self, image: &[f32], after: impl FnMut(&str, &str) + Send) {
+    /// As [`Self::run`], and notes the least and the greatest value that each convolution reads.
+    ///
+    /// # Panics
+    /// As [`Self::run`].
+    pub fn observe(&mut self, image: &[f32], ranges: &mut InputRanges) {
+        self.check(image);
+        rayon::scope(|_| match &mut self.runner {
+            Runner::F32(runner) => runner.observe(image, ranges),
+            Runner::Bf16(runner) => runner.observe(image, ranges),
+            Runner::Int8(runner) => runner.observe(image, ranges),
+        });
+        ranges.images += 1;
+    }
+
+    fn check(&self, image: &[f32]) {
         let (width, height) = self.size;
         assert_eq!(
             image.len(),
             3 * width * height,
             "an image of {width}x{height}"
         );
+    }
+
+    fn run_steps(&mut self, image: &[f32], after: impl FnMut(&str, &str) + Send) {
+        self.check(image);
         // On one of rayon's threads: from outside, every single step would be handed over to them.
         rayon::scope(|_| match &mut self.runner {
             Runner::F32(runner) => runner.run(image, after),
             Runner::Bf16(runner) => runner.run(image, after),
+            Runner::Int8(runner) => runner.run(image, after),
         });
     }
 
@@ -160,6 +198,7 @@ impl Engine {
         match &self.runner {
             Runner::F32(runner) => runner.read_output(index, values),
             Runner::Bf16(runner) => runner.read_output(index, values),
+            Runner::Int8(runner) => runner.read_output(index, values),
         }
     }
 }
@@ -195,13 +234,38 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
         })
     }
 
-    pub(crate) fn run(&mut self, image: &[f32], mut after: impl FnMut(&str, &str)) {
+    pub(crate) fn run(&mut self, image: &[f32], after: impl FnMut(&str, &str)) {
+        self.run_watched(image, |_, _, _| {}, after);
+    }
+
+    fn observe(&mut self, image: &[f32], ranges: &mut InputRanges) {
+        self.run_watched(
+            image,
+            |name, step, arena| {
+                if let Step::Conv(conv) = step {
+                    // SAFETY: between two steps nobody writes.
+                    let seen = unsafe { extent(arena, &conv.geometry().input) };
+                    ranges.add(name, seen);
+                }
+            },
+            |_, _| {},
+        );
+    }
+
+    /// `before` sees each step and the arena as it finds it.
+    fn run_watched(
+        &mut self,
+        image: &[f32],
+        mut before: impl FnMut(&str, &Step<C>, Shared<E>),
+        mut after: impl FnMut(&str, &str),
+    ) {
         // An image may overflow and leave NaN in the arena; nothing of that may reach the next one.
         for places in &self.plan.stale {
             self.arena[places.clone()].fill(E::default());
         }
         let arena = Shared::new(&mut self.arena);
         for (name, step) in &self.plan.steps {
+            before(name, step, arena);
             // SAFETY: the plan's views lie in the arena, which is borrowed here alone; steps run one after the other,
             // and the output of each lies apart from what it reads.
             unsafe {

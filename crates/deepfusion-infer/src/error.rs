@@ -41,6 +41,15 @@ pub enum Error {
     /// A precision that this processor has no instructions for.
     #[error("bf16 needs a processor with AMX or AVX512-BF16; this one has neither")]
     NoBf16,
+    /// The same of int8.
+    #[error("int8 needs a processor with AVX512-VNNI and AVX512-BF16; this one has not both")]
+    NoInt8,
+    /// Int8 without the ranges of what its convolutions read, or with another network's.
+    #[error("int8: {reason}")]
+    Ranges {
+        /// What is wrong with them.
+        reason: String,
+    },
 }
 
 impl Hint for Error {

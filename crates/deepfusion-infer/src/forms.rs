@@ -126,20 +126,20 @@ impl ConvForm<Bf16> for Bf16Conv {
     }
 }
 
-/// Other processors' forms are not written yet.
+/// Other processors' forms of bf16 and int8 are not written yet.
 #[cfg(not(target_arch = "x86_64"))]
 #[derive(Debug)]
-pub(crate) enum Bf16Conv {}
+pub(crate) enum Unwritten {}
 
 #[cfg(not(target_arch = "x86_64"))]
-impl Bf16Conv {
+impl Unwritten {
     pub(crate) fn available() -> bool {
         false
     }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-impl ConvForm<Bf16> for Bf16Conv {
+impl ConvForm<Bf16> for Unwritten {
     fn new(_: &Conv, _: Geometry, _: &[Option<usize>]) -> Self {
         unreachable!("the engine asks `available` first")
     }
@@ -164,3 +164,10 @@ impl ConvForm<Bf16> for Bf16Conv {
         match *self {}
     }
 }
+
+#[cfg(not(target_arch = "x86_64"))]
+pub(crate) type Bf16Conv = Unwritten;
+#[cfg(not(target_arch = "x86_64"))]
+pub(crate) type Int8Conv = Unwritten;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use crate::int8::Int8Conv;

@@ -1,6 +1,8 @@
 //! A network as a list of operations with their weights, for the engine and for export.
 
+use crate::ranges::InputRanges;
 use crate::shape::shape_after;
+use crate::tile::LANES;
 use crate::{Border, Error, Node, Op};
 
 /// A value in a [`Graph`]: 0 is the normalised image, `i + 1` is the output of node `i`.
@@ -45,6 +47,8 @@ pub struct Graph {
     nodes: Vec<Node>,
     shapes: Vec<ValueShape>,
     outputs: Vec<ValueId>,
+    /// Of the nodes, where they were calibrated.
+    input_ranges: Option<Vec<Option<[f32; 2]>>>,
 }
 
 impl Graph {
@@ -61,6 +65,59 @@ impl Graph {
                 pooled: false,
             }],
             outputs: Vec::new(),
+            input_ranges: None,
+        }
+    }
+
+    /// Gives the graph what its convolutions read, for [`Precision::Int8`](crate::Precision::Int8). Names of no convolution of the graph are
+    /// passed over: a network with the head for uncertainty has more than one without.
+    ///
+    /// # Errors
+    /// [`Error::Ranges`] if a convolution that int8 computes has no range, or a range is not one.
+    pub fn set_input_ranges(&mut self, ranges: &InputRanges) -> Result<(), Error> {
+        let of = |index: usize| -> Result<Option<[f32; 2]>, Error> {
+            if !self.is_computed_in_int8(index) {
+                return Ok(None);
+            }
+            let name = &self.nodes[index].name;
+            let refused = |what: String| Error::Ranges {
+                reason: format!("{what} of what `{name}` reads"),
+            };
+            let range = ranges.get(name);
+            let [low, high] = range.ok_or_else(|| refused("no range".into()))?;
+            if !(low.is_finite() && high.is_finite() && low <= high) {
+                return Err(refused(format!("{low} to {high} is no range")));
+            }
+            Ok(Some([low, high]))
+        };
+        let found: Result<_, _> = (0..self.nodes.len()).map(of).collect();
+        self.input_ranges = Some(found?);
+        Ok(())
+    }
+
+    /// Whether a node is a convolution for int8: the first, which sees the image, and the heads, whose output is the result, are not.
+    fn is_computed_in_int8(&self, index: usize) -> bool {
+        let Op::Conv(conv) = &self.nodes[index].op else {
+            return false;
+        };
+        let seen = self.shape(conv.input);
+        let head = conv.channels_out == 1;
+        conv.input != ValueId::IMAGE && !seen.pooled && seen.channels >= LANES && !head
+    }
+
+    /// What a node reads, where int8 computes it.
+    pub(crate) fn input_range(&self, index: usize) -> Option<[f32; 2]> {
+        *self.input_ranges.as_ref()?.get(index)?
+    }
+
+    /// # Errors
+    /// [`Error::Ranges`] of a graph without them.
+    pub(crate) fn check_input_ranges(&self) -> Result<(), Error> {
+        match &self.input_ranges {
+            Some(ranges) if ranges.len() == self.nodes.len() => Ok(()),
+            _ => Err(Error::Ranges {
+                reason: "the network was not calibrated".into(),
+            }),
         }
     }
 

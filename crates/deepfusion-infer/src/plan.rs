@@ -96,6 +96,9 @@ impl<C> Plan<C> {
             None => "image".to_owned(),
         };
         let names: Vec<_> = outline.iter().map(|step| name(step.value())).collect();
+        let ranges: Vec<_> = (0..graph.nodes().len())
+            .map(|i| graph.input_range(i))
+            .collect();
         let mut nodes: Vec<_> = graph.into_nodes().into_iter().map(|n| Some(n.op)).collect();
         let mut step_of = |step: Outline| match step {
             Outline::Image => Step::Image(view(ValueId::IMAGE)),
@@ -202,6 +205,7 @@ impl<C> Plan<C> {
                     dilation: conv.dilation,
                     border: conv.border,
                     activation: conv.activation,
+                    input_range: ranges[node],
                 };
                 let channels = &layout.homes[conv.input.0].channel_of;
                 Step::Conv(C::new(&conv, geometry, channels))

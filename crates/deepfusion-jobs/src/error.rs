@@ -100,6 +100,12 @@ pub enum Error {
         /// What was given.
         path: PathBuf,
     },
+    /// A network inside the program, whose card nobody can write to.
+    #[error("{name}: is embedded in the program, and calibrated there")]
+    EmbeddedNetwork {
+        /// Its name.
+        name: String,
+    },
     /// Something of a card that TOML has no form for.
     #[error("{what}")]
     NoTomlForm {
@@ -285,6 +291,9 @@ impl Hint for Error {
             }
             Self::Busy { .. } => Some("wait for it, or share the work among shards".into()),
             Self::NothingToPack { .. } => Some("train from it first".into()),
+            Self::EmbeddedNetwork { .. } => {
+                Some("give a run's folder, or the network's file and card".into())
+            }
             Self::PackedAlready { .. } => {
                 Some("give the folder of the run that it was packed from".into())
             }

@@ -9,6 +9,7 @@
 //! | [`scene`] | how the camera moved from frame to frame, and whether metres still are what they were |
 //! | [`verdict`] | what a drive with speeds says of a network's depth, without ground truth |
 //! | [`board`] | the board of a calibration in pictures and videos |
+//! | [`int8`] | the ranges of what a network's convolutions read, for int8 |
 //! | [`packing`] | a run's network as a file of its own, with its card |
 //! | [`recordings`], [`held_out`] | the recordings of a configuration; whether training saw what is measured on |
 #![cfg_attr(
@@ -35,6 +36,7 @@ mod figures;
 mod files;
 pub mod held_out;
 mod inputs;
+pub mod int8;
 pub mod intervals;
 pub mod labelled;
 mod model_facts;

@@ -6,7 +6,7 @@ use deepfusion_data::to_network_input;
 use deepfusion_eval::compare::sha256_of_file;
 use deepfusion_model::weights::read_bytes;
 use deepfusion_model::{
-    CheckpointKind, Error as ModelError, RunFolder, StoredNetwork, TrainConfig,
+    CheckpointKind, Error as ModelError, Int8Calibration, RunFolder, StoredNetwork, TrainConfig,
     depth_graph_with_uncertainty,
 };
 use deepfusion_runtime::{DepthRunner, FusedRunner, Precision};
@@ -63,6 +63,7 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<Shipped> {
         camera: findings.camera,
         weights,
         step: state.step,
+        int8: Int8Calibration::of_run(folder.path(), state.step)?,
     };
     // All of it, and nothing else.
     depth_graph_with_uncertainty(&network.config.depth_net, network.weights.clone())
@@ -102,6 +103,12 @@ pub fn pack_run(model: &Path, options: PackOptions) -> Result<Shipped> {
             .map(toml::Table::try_from)
             .transpose()
             .map_err(no_form("the factors of its intervals have no TOML form"))?,
+        int8: network
+            .int8
+            .as_ref()
+            .map(toml::Table::try_from)
+            .transpose()
+            .map_err(no_form("the ranges for int8 have no TOML form"))?,
         config: config
             .without_places()
             .to_run_table(&findings)

@@ -8,6 +8,7 @@
 
 mod error;
 mod graph;
+mod int8;
 mod network;
 mod run_folder;
 mod stored;
@@ -16,6 +17,7 @@ pub mod weights;
 
 pub use error::Error;
 pub use graph::{depth_graph, depth_graph_with_uncertainty};
+pub use int8::Int8Calibration;
 pub use network::*;
 pub use run_folder::{CHECKPOINT_VERSION, Checkpoint, CheckpointKind, RunFolder};
 pub use stored::StoredNetwork;

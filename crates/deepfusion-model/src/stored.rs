@@ -3,7 +3,7 @@ use std::path::Path;
 use deepfusion_geometry::Intrinsics;
 
 use crate::weights::{Weights, read_bytes};
-use crate::{CheckpointKind, Error, RunFolder, TrainConfig};
+use crate::{CheckpointKind, Error, Int8Calibration, RunFolder, TrainConfig};
 
 /// A trained depth network as it is stored, in a run's folder or packed without one: everything that is needed to build it.
 #[derive(Debug, Clone)]
@@ -16,6 +16,8 @@ pub struct StoredNetwork {
     pub weights: Weights,
     /// Steps it was trained for.
     pub step: usize,
+    /// What it was calibrated to for int8, where it was.
+    pub int8: Option<Int8Calibration>,
 }
 
 impl StoredNetwork {
@@ -32,7 +34,7 @@ impl StoredNetwork {
     /// That of a checkpoint; `set` as in [`Self::of_run`].
     ///
     /// # Errors
-    /// As [`RunFolder::load_depth_weights`] and [`TrainConfig::for_set`].
+    /// As [`RunFolder::load_depth_weights`], [`TrainConfig::for_set`] and [`Int8Calibration::of_run`].
     pub fn of_checkpoint(
         folder: &RunFolder,
         kind: CheckpointKind,
@@ -45,6 +47,7 @@ impl StoredNetwork {
             camera: folder.camera_of(&state, set)?,
             weights,
             step: state.step,
+            int8: Int8Calibration::of_run(folder.path(), state.step)?,
         })
     }
 
@@ -71,6 +74,7 @@ impl StoredNetwork {
             config: findings.complete(config).for_set(set)?,
             weights: read_bytes(origin, bytes)?,
             step,
+            int8: None,
         })
     }
 }

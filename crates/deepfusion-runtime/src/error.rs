@@ -21,6 +21,9 @@ pub enum Error {
         /// What it says.
         reason: String,
     },
+    /// Int8 of a network whose convolutions' ranges nobody looked at.
+    #[error("int8: the network was not calibrated, or not since it was last trained")]
+    NotCalibrated,
     /// An image's values are not as many as the network takes.
     #[error("an image of {found} values, where the network takes {expected}")]
     ImageSize {
@@ -69,6 +72,7 @@ impl Hint for Error {
                         .into(),
                 )
             }
+            Self::NotCalibrated => Some("bf16 needs no calibration".into()),
             Self::ImageSize { .. } => Some("3 × height × width values of the network's size".into()),
             Self::Weights(error) => error.hint(),
             Self::Model(error) => error.hint(),

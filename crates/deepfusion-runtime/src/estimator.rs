@@ -74,10 +74,11 @@ impl DepthEstimator {
     /// An estimator for a stored network in the fused engine.
     ///
     /// # Errors
-    /// As [`FusedRunner::new`].
+    /// As [`FusedRunner::with_calibration`].
     pub fn fused(network: StoredNetwork, precision: Precision) -> Result<Self, Error> {
+        let int8 = network.int8.clone();
         Self::of(network, move |config, weights| {
-            let runner = FusedRunner::new(config, weights, precision)?;
+            let runner = FusedRunner::with_calibration(config, weights, precision, int8.as_ref())?;
             Ok::<_, Error>(Box::new(runner) as Box<dyn DepthRunner>)
         })
     }
@@ -101,6 +102,7 @@ impl DepthEstimator {
             camera,
             weights,
             step,
+            int8: _,
         } = network;
         let config = Arc::new(config);
         let kept = config.canonical_focal_px.map(|_| weights.clone());

@@ -1,9 +1,9 @@
 use std::time::Duration;
 
 use deepfusion_geometry::DepthRange;
-use deepfusion_infer::{Engine, Precision};
+use deepfusion_infer::{Engine, InputRanges, Precision};
 use deepfusion_model::weights::Weights;
-use deepfusion_model::{TrainConfig, depth_graph_with_uncertainty};
+use deepfusion_model::{Int8Calibration, TrainConfig, depth_graph_with_uncertainty};
 
 use crate::runner::check_image;
 use crate::{DepthRunner, Error, NetworkOutput, metric_disparity};
@@ -11,7 +11,7 @@ use crate::{DepthRunner, Error, NetworkOutput, metric_disparity};
 /// The network laid out and packed once for this processor.
 ///
 /// In f32 its sigmoid differs from the training framework's by rounding alone (below 1e-4 in the tests); in bf16 by the
-/// rounding of eight bits of mantissa.
+/// rounding of eight bits of mantissa; in int8 by 255 steps of each convolution's input and of each channel's weights.
 #[derive(Debug)]
 pub struct FusedRunner {
     engine: Engine,
@@ -21,16 +21,35 @@ pub struct FusedRunner {
 }
 
 impl FusedRunner {
-    /// The network of a configuration with these weights.
+    /// The network of a configuration with these weights, in f32 or bf16.
     ///
     /// # Errors
-    /// [`Error::Model`] for weights of another network, [`Error::Engine`] where the processor has no bf16.
+    /// As [`Self::with_calibration`].
     pub fn new(
         config: &TrainConfig,
         weights: Weights,
         precision: Precision,
     ) -> Result<Self, Error> {
-        let graph = depth_graph_with_uncertainty(&config.depth_net, weights)?;
+        Self::with_calibration(config, weights, precision, None)
+    }
+
+    /// The same in any precision: int8 needs what the network was calibrated to.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for weights of another network, [`Error::Engine`] where the processor has no bf16 or int8,
+    /// [`Error::NotCalibrated`] for int8 without a calibration.
+    pub fn with_calibration(
+        config: &TrainConfig,
+        weights: Weights,
+        precision: Precision,
+        int8: Option<&Int8Calibration>,
+    ) -> Result<Self, Error> {
+        let mut graph = depth_graph_with_uncertainty(&config.depth_net, weights)?;
+        if precision == Precision::Int8 {
+            let ranges = int8.ok_or(Error::NotCalibrated)?.input_ranges();
+            let set = graph.set_input_ranges(&ranges);
+            set.map_err(|e| Error::engine("fused-int8", &e))?;
+        }
         let engine = Engine::new(graph, config.size.width, config.size.height, precision);
         Ok(Self {
             engine: engine.map_err(|e| Error::engine("fused", &e))?,
@@ -38,6 +57,19 @@ impl FusedRunner {
             range: config.depth_net.range,
             uncertainty: config.depth_net.uncertainty,
         })
+    }
+
+    /// Runs the network on an image and notes what its convolutions read, for int8.
+    ///
+    /// # Errors
+    /// [`Error::ImageSize`].
+    ///
+    /// # Shapes
+    /// - `image`: as of [`DepthRunner::run`]
+    pub fn observe(&mut self, image: &[f32], ranges: &mut InputRanges) -> Result<(), Error> {
+        check_image(image, self.values())?;
+        self.engine.observe(image, ranges);
+        Ok(())
     }
 
     fn values(&self) -> usize {
@@ -51,6 +83,7 @@ impl DepthRunner for FusedRunner {
         match self.precision {
             Precision::F32 => "fused",
             Precision::Bf16 => "fused-bf16",
+            Precision::Int8 => "fused-int8",
         }
     }
 

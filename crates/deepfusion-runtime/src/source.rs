@@ -184,7 +184,14 @@ pub fn unpacked(
     set: Option<&str>,
 ) -> Result<StoredNetwork, deepfusion_model::Error> {
     let Shipped { card, bytes } = network;
-    StoredNetwork::packed(&card.name, card.config.clone(), bytes, card.steps, set)
+    let mut stored =
+        StoredNetwork::packed(&card.name, card.config.clone(), bytes, card.steps, set)?;
+    let int8 = card.int8.clone().map(toml::Table::try_into).transpose();
+    stored.int8 = int8.map_err(|e| deepfusion_model::Error::ConfigFile {
+        path: card.name.clone().into(),
+        reason: format!("int8: {e}"),
+    })?;
+    Ok(stored)
 }
 
 fn names_a_checkpoint(path: &Path) -> bool {

@@ -47,6 +47,9 @@ pub struct Card {
     /// The calibration of the network's uncertainty, as found by `eval --calibrate-uncertainty`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<toml::Table>,
+    /// The ranges for int8, as found by `weights calibrate`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub int8: Option<toml::Table>,
     /// The run's configuration, without the paths of its recordings.
     pub config: toml::Table,
 }
@@ -158,6 +161,7 @@ pub(crate) mod tests {
                 a1: 0.95,
             }],
             uncertainty: None,
+            int8: None,
             config: "preset = 'light'\nsize = { width = 640, height = 192 }"
                 .parse()
                 .unwrap(),

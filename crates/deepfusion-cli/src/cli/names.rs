@@ -127,6 +127,10 @@ pub(super) fn precision() -> impl TypedValueParser<Value = Precision> {
                 Precision::Bf16,
                 "Eight bits of mantissa: faster on processors with AMX or AVX512-BF16, a little less exact",
             ),
+            (
+                Precision::Int8,
+                "8-bit integers: faster still on processors with AVX512-VNNI, less exact; for networks that `weights calibrate` saw",
+            ),
         ],
     )
 }

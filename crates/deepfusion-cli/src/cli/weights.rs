@@ -24,12 +24,36 @@ pub(crate) enum WeightsCommand {
     },
     /// Pack a run as an embedded network: its weights in bf16, and a card.
     Pack(PackArgs),
+    /// Find the ranges of what a network's convolutions read on your images, for `--precision int8`.
+    Calibrate(CalibrateWeightsArgs),
     /// Which networks are embedded and what they were made from; which weights can be imported.
     List {
         /// Print as JSON.
         #[arg(long)]
         json: bool,
     },
+}
+
+/// `deepfusion weights calibrate`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Writes RUN/int8.toml, or the card of a packed network (FILE.safetensors). `predict`, `perceive`, `eval`, `bench` and `view` then take \
+    --precision int8. Look at images like those that the network will see; 32 are enough. After more training, calibrate again.\n\n\
+    Example:\n  deepfusion weights calibrate --model runs/first my-drive\n  deepfusion eval --model runs/first --data my-drive --precision int8"
+)]
+pub(crate) struct CalibrateWeightsArgs {
+    /// A run's folder, a checkpoint in it, or a packed network.
+    #[arg(long, value_name = "RUN")]
+    pub model: PathBuf,
+    /// Images, folders, patterns and recordings.
+    #[arg(required = true, value_name = "IMAGE|DRIVE")]
+    pub inputs: Vec<String>,
+    /// Look at this many of the images, evenly spread.
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..))]
+    pub images: u16,
+    /// Print the ranges as JSON on stdout.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `deepfusion weights pack`.

@@ -284,6 +284,10 @@ impl Reportable for deepfusion_runtime::Error {
                  every network on every device"
                     .into(),
             ),
+            Self::NotCalibrated => Some(
+                "look at some of your images first: deepfusion weights calibrate --model RUN DRIVE; `--precision bf16` needs no calibration"
+                    .into(),
+            ),
             Self::Weights(error) => error.remedy(),
             Self::Model(error) => error.remedy(),
             _ => self.hint(),

@@ -33,13 +33,13 @@ pub(crate) fn has_amx() -> bool {
 
 /// Offsets of an output pixel and of its residual.
 #[derive(Debug, Clone, Copy)]
-struct OutputPixel {
+pub(crate) struct OutputPixel {
     out: usize,
     residual: usize,
 }
 
 impl OutputPixel {
-    fn new(g: &Geometry, x: usize, y: usize) -> Self {
+    pub(crate) fn new(g: &Geometry, x: usize, y: usize) -> Self {
         Self {
             out: g.out.at(x, y),
             residual: g.residual.as_ref().map_or(0, |view| view.at(x, y)),
@@ -48,7 +48,7 @@ impl OutputPixel {
 }
 
 /// The end of a pixel's sums: bias, residual and activation, rounded to bf16.
-struct Epilogue<'a> {
+pub(crate) struct Epilogue<'a> {
     simd: V4,
     geometry: &'a Geometry,
     bias: &'a [f32],
@@ -59,7 +59,7 @@ impl<'a> Epilogue<'a> {
     /// # Panics
     /// Without AVX-512; [`has_dot`] must hold.
     #[expect(clippy::expect_used, reason = "asked before an engine of bf16 is made")]
-    fn new(geometry: &'a Geometry, bias: &'a [f32], arena: Shared<'a, Bf16>) -> Self {
+    pub(crate) fn new(geometry: &'a Geometry, bias: &'a [f32], arena: Shared<'a, Bf16>) -> Self {
         let simd = V4::try_new();
         Self {
             simd: simd.expect("AVX512-BF16 comes with AVX-512; the engine asked for it"),
@@ -76,7 +76,7 @@ impl<'a> Epilogue<'a> {
     /// [`has_dot`] must hold.
     #[inline]
     #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512bf16")]
-    unsafe fn channels(&self, place: OutputPixel, c: usize, sums: *const f32) {
+    pub(crate) unsafe fn channels(&self, place: OutputPixel, c: usize, sums: *const f32) {
         let bias = &self.bias[c..][..LANES];
         // SAFETY: sixteen values of the bias and, as `at` checks, of the arena; the rest is the caller's promise.
         // Vectors of one size are arrays of the same numbers, whoever names them.

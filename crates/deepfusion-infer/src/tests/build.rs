@@ -52,7 +52,8 @@ impl<F: FnMut() -> f32> Builder<F> {
     }
 
     pub(super) fn push(&mut self, op: Op) -> ValueId {
-        self.graph.push("node", op).unwrap()
+        let name = format!("node{}", self.graph.nodes().len());
+        self.graph.push(name, op).unwrap()
     }
 }
 

@@ -2,6 +2,8 @@
 
 mod attention;
 mod build;
+#[cfg(target_arch = "x86_64")]
+mod int8;
 mod lite;
 mod oracle;
 mod plain;

@@ -14,8 +14,7 @@ use deepfusion_model::weights::Weights;
 use deepfusion_model::{Preset, TrainConfig};
 use deepfusion_perception::{Perception, PerceptionConfig, Stamp};
 use deepfusion_render::{DepthScale, depth_picture};
-use deepfusion_runtime::DepthRunner;
-use deepfusion_runtime::ModelSource;
+use deepfusion_runtime::{DepthRunner, ModelSource, Precision};
 use deepfusion_sim::{SimConfig, Simulation};
 use image::codecs::jpeg::JpegEncoder;
 use serde::Serialize;
@@ -173,7 +172,10 @@ fn network(args: &BenchArgs) -> Result<(String, TrainConfig, Box<dyn DepthRunner
     }
     config.validate()?;
     let weights = first_weights(&config)?;
-    let runner = engine::runner(&args.engine, &config, weights)?;
+    let int8 = (args.engine.precision == Precision::Int8)
+        .then(|| deepfusion_jobs::int8::on_a_street(&config, &weights))
+        .transpose()?;
+    let runner = engine::runner(&args.engine, &config, weights, int8.as_ref())?;
     Ok((preset.to_string(), config, runner))
 }
 

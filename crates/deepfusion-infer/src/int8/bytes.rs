@@ -1,0 +1,194 @@
+//! A convolution's input as bytes.
+
+use std::arch::x86_64::{
+    _mm_storeu_si128, _mm256_loadu_si256, _mm512_castsi512_ps, _mm512_cvtepu16_epi32,
+    _mm512_cvtps_epi32, _mm512_cvtusepi32_epi8, _mm512_fmadd_ps, _mm512_max_ps, _mm512_min_ps,
+    _mm512_set1_ps, _mm512_setzero_ps, _mm512_slli_epi32,
+};
+use std::cell::RefCell;
+
+use rayon::prelude::*;
+
+use crate::conv::Geometry;
+use crate::element::Bf16;
+use crate::tile::LANES;
+use crate::view::{Shared, View};
+
+/// The largest byte.
+const STEPS: f32 = 255.0;
+
+/// How values become bytes: q = x / `step` + `zero`, rounded and held within a byte.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Scale {
+    pub(super) step: f32,
+    pub(super) zero: u8,
+}
+
+impl Scale {
+    /// That of a range, which is stretched to hold 0, so that 0 is a byte exactly: a border of zeros is one of `zero`.
+    pub(super) fn of([low, high]: [f32; 2]) -> Self {
+        let (low, high) = (low.min(0.0), high.max(0.0));
+        // A value that never differs from 0.
+        let step = if high > low {
+            (high - low) / STEPS
+        } else {
+            1.0
+        };
+        Self {
+            step,
+            zero: (-low / step).round().clamp(0.0, STEPS) as u8,
+        }
+    }
+}
+
+/// Where a convolution's input lies as bytes: without gaps between pixels, as far beyond the image as the kernel reaches.
+#[derive(Debug, Clone)]
+pub(super) struct ByteImage {
+    /// Of the bytes.
+    view: View,
+    /// The same convolution on them.
+    pub(super) geometry: Geometry,
+    /// Every how many pixels of the input one is read.
+    every: usize,
+    pub(super) len: usize,
+}
+
+impl ByteImage {
+    pub(super) fn new(geometry: &Geometry) -> Self {
+        let input = &geometry.input;
+        let reach = geometry.kernel / 2 * geometry.dilation;
+        // A single tap passes over the pixels between.
+        let every = if geometry.kernel == 1 {
+            geometry.stride
+        } else {
+            1
+        };
+        let (width, height) = (input.width / every, input.height / every);
+        let row = (width + 2 * reach) * input.channels;
+        let view = View {
+            offset: reach * (row + input.channels),
+            row,
+            pitch: input.channels,
+            width,
+            height,
+            border: reach,
+            ..*input
+        };
+        Self {
+            view,
+            geometry: Geometry {
+                input: view,
+                stride: geometry.stride / every,
+                ..geometry.clone()
+            },
+            every,
+            len: (height + 2 * reach) * row,
+        }
+    }
+
+    /// Writes the input of a convolution as bytes.
+    ///
+    /// # Safety
+    /// `input` must lie in the arena with its border, which nobody may write; the processor must have AVX-512.
+    pub(super) unsafe fn fill(
+        &self,
+        arena: Shared<Bf16>,
+        input: &View,
+        scale: Scale,
+        bytes: &mut [u8],
+    ) {
+        let reach = self.view.border;
+        let pixels = self.view.width + 2 * reach;
+        let first = input.offset - reach * (input.row + input.pitch);
+        // Without gaps a row is one piece.
+        let joined = input.pitch == input.channels && self.every == 1;
+        let rows = bytes[..self.len].par_chunks_mut(self.view.row).enumerate();
+        rows.for_each(|(y, row)| {
+            let start = first + y * self.every * input.row;
+            let piece = if joined {
+                pixels * input.channels
+            } else {
+                input.channels
+            };
+            for (x, to) in row.chunks_exact_mut(piece).enumerate() {
+                let from = arena.at(start + x * self.every * input.pitch, piece);
+                // SAFETY: as many values as bytes, which nobody writes (the caller's promise).
+                unsafe { to_bytes(from, scale, to) };
+            }
+        });
+    }
+}
+
+/// # Safety
+/// `from` must hold as many values as `to`, a multiple of [`LANES`]; the processor must have AVX-512.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl")]
+unsafe fn to_bytes(from: *const Bf16, scale: Scale, to: &mut [u8]) {
+    let inverse = _mm512_set1_ps(scale.step.recip());
+    let zero = _mm512_set1_ps(f32::from(scale.zero));
+    let most = _mm512_set1_ps(STEPS);
+    for (i, to) in to.chunks_exact_mut(LANES).enumerate() {
+        // SAFETY: sixteen values and sixteen bytes.
+        unsafe {
+            let bits = _mm256_loadu_si256(from.add(i * LANES).cast());
+            let value = _mm512_castsi512_ps(_mm512_slli_epi32::<16>(_mm512_cvtepu16_epi32(bits)));
+            let steps = _mm512_fmadd_ps(value, inverse, zero);
+            // NaN becomes the least value: bytes have none.
+            let steps = _mm512_min_ps(_mm512_max_ps(steps, _mm512_setzero_ps()), most);
+            let bytes = _mm512_cvtusepi32_epi8(_mm512_cvtps_epi32(steps));
+            _mm_storeu_si128(to.as_mut_ptr().cast(), bytes);
+        }
+    }
+}
+
+/// Lends `len` bytes that the thread keeps from image to image. They are taken out of their place meanwhile: a thread that
+/// waits for its tasks may run another engine's.
+pub(super) fn with_bytes<R>(len: usize, work: impl FnOnce(&mut [u8]) -> R) -> R {
+    thread_local! {
+        static BYTES: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+    }
+    let mut bytes = BYTES.take();
+    if bytes.len() < len {
+        bytes.resize(len, 0);
+    }
+    let result = work(&mut bytes);
+    BYTES.set(bytes);
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::Element;
+
+    #[test]
+    fn zero_is_a_byte_whatever_the_range() {
+        for range in [[-1.0, 3.0], [0.5, 2.0], [-4.0, -1.0], [0.0, 0.0]] {
+            let scale = Scale::of(range);
+            assert!(scale.step > 0.0, "{range:?}");
+            // One step is a 255th of what holds both the range and 0.
+            let all = range[1].max(0.0) - range[0].min(0.0);
+            assert!((scale.step * 255.0 - all).abs() < 1e-6 || all == 0.0);
+        }
+        assert_eq!(Scale::of([-1.0, 3.0]).zero, 64);
+        assert_eq!(Scale::of([0.5, 2.0]).zero, 0);
+        assert_eq!(Scale::of([-4.0, -1.0]).zero, 255);
+    }
+
+    #[test]
+    fn values_are_rounded_and_held_within_a_byte() {
+        if !super::super::has_int8() {
+            return;
+        }
+        let scale = Scale::of([-1.0, 1.55]);
+        let values = [-9.0, -1.0, -0.015, 0.0, 0.004, 0.02, 1.55, 1e30, f32::NAN];
+        let mut from = [Bf16::default(); LANES];
+        for (place, value) in from.iter_mut().zip(values) {
+            *place = Bf16::of(value);
+        }
+        let mut to = [0_u8; LANES];
+        // SAFETY: sixteen of each, and the processor was asked.
+        unsafe { to_bytes(from.as_ptr(), scale, &mut to) };
+        // In steps of 0.01 from 100 on; 1.55 is 1.546875 in bf16.
+        assert_eq!(to[..9], [0, 0, 99, 100, 100, 102, 255, 255, 0]);
+    }
+}

@@ -1,0 +1,103 @@
+//! What a network was calibrated to for int8: the ranges of what its convolutions read.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use deepfusion_infer::InputRanges;
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+
+/// The file in a run's folder.
+const FILE: &str = "int8.toml";
+
+/// The ranges that int8 divides into 255 steps, for one checkpoint of a network.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Int8Calibration {
+    /// The checkpoint's step: what was trained since has other ranges.
+    pub step: usize,
+    /// Number of images that were looked at.
+    pub images: usize,
+    /// For each convolution, by its name, the least and the greatest value of its input in an image, on average over the images.
+    pub ranges: BTreeMap<String, [f32; 2]>,
+}
+
+impl Int8Calibration {
+    /// What was seen of a network after so many steps.
+    #[must_use]
+    pub fn new(step: usize, seen: &InputRanges) -> Self {
+        Self {
+            step,
+            images: seen.images(),
+            ranges: seen.ranges(),
+        }
+    }
+
+    /// As the engine takes it.
+    #[must_use]
+    pub fn input_ranges(&self) -> InputRanges {
+        InputRanges::new(self.ranges.clone(), self.images)
+    }
+
+    /// That of a run at this step; `None` where it was not calibrated, or at another step.
+    ///
+    /// # Errors
+    /// [`Error::ConfigFile`] for a file that holds none, [`Error::Io`].
+    pub fn of_run(folder: &Path, step: usize) -> Result<Option<Self>, Error> {
+        let path = folder.join(FILE);
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(e) => return Err(Error::io(&path, "read", e)),
+        };
+        let found: Self = toml::from_str(&text).map_err(|e| Error::ConfigFile {
+            path,
+            reason: e.to_string(),
+        })?;
+        Ok(Some(found).filter(|found| found.step == step))
+    }
+
+    /// Writes it into a run's folder; returns the file.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write(&self, folder: &Path) -> Result<std::path::PathBuf, Error> {
+        let path = folder.join(FILE);
+        let table = toml::to_string(self).map_err(|e| Error::ConfigFile {
+            path: path.clone(),
+            reason: e.to_string(),
+        })?;
+        let text = format!(
+            "# The least and the greatest value that each convolution reads, for `--precision int8`. Written by `weights calibrate`.\n{table}"
+        );
+        deepfusion_fs::write(&path, text).map_err(|e| Error::io(&path, "write", e))?;
+        Ok(path)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_survives_its_file_and_counts_for_its_step_alone() {
+        let run = tempfile::tempdir().unwrap();
+        assert_eq!(Int8Calibration::of_run(run.path(), 7).unwrap(), None);
+        let ranges = [("encoder.layer1.0.conv1".to_owned(), [-0.5, 3.25])].into();
+        let calibration = Int8Calibration {
+            step: 7,
+            images: 32,
+            ranges,
+        };
+        let path = calibration.write(run.path()).unwrap();
+        let read = |step| Int8Calibration::of_run(run.path(), step).unwrap();
+        assert_eq!(read(7), Some(calibration.clone()));
+        assert_eq!(read(8), None);
+        let again = Int8Calibration::new(7, &calibration.input_ranges());
+        assert_eq!(again, calibration);
+        std::fs::write(&path, "step = 'seven'").unwrap();
+        let error = Int8Calibration::of_run(run.path(), 7).unwrap_err();
+        assert!(error.to_string().contains("int8.toml"), "{error}");
+    }
+}
