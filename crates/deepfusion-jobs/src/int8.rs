@@ -97,7 +97,10 @@ fn observed(
                 let camera = dataset.intrinsics(*frame);
                 (dataset.load_image(*frame)?, Some(camera))
             }
-            None => (load_photo(&input.path)?, None),
+            None => {
+                let photo = load_photo(&input.path)?;
+                (photo.image, photo.intrinsics)
+            }
         };
         let prepared = preparer.prepare(&image, camera.as_ref(), false, true);
         runner.observe(&prepared.input, &mut seen)?;

@@ -34,6 +34,14 @@ impl Int8Calibration {
         }
     }
 
+    /// That of a card's table.
+    ///
+    /// # Errors
+    /// A table that holds none.
+    pub fn from_table(table: toml::Table) -> Result<Self, toml::de::Error> {
+        table.try_into()
+    }
+
     /// As the engine takes it.
     #[must_use]
     pub fn input_ranges(&self) -> InputRanges {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use deepfusion_geometry::Intrinsics;
-use deepfusion_model::{CheckpointKind, RunFolder, StoredNetwork, TrainConfig};
+use deepfusion_model::{CheckpointKind, Int8Calibration, RunFolder, StoredNetwork, TrainConfig};
 use deepfusion_weights::{DEFAULT, Shipped};
 
 use crate::Error;
@@ -186,7 +186,11 @@ pub fn unpacked(
     let Shipped { card, bytes } = network;
     let mut stored =
         StoredNetwork::packed(&card.name, card.config.clone(), bytes, card.steps, set)?;
-    let int8 = card.int8.clone().map(toml::Table::try_into).transpose();
+    let int8 = card
+        .int8
+        .clone()
+        .map(Int8Calibration::from_table)
+        .transpose();
     stored.int8 = int8.map_err(|e| deepfusion_model::Error::ConfigFile {
         path: card.name.clone().into(),
         reason: format!("int8: {e}"),

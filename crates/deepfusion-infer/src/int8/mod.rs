@@ -26,6 +26,10 @@ pub(crate) fn has_int8() -> bool {
 }
 
 /// In bytes where that was calibrated, in bf16 elsewhere.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a few dozen of them a network, most of them bytes"
+)]
 #[derive(Debug)]
 pub(crate) enum Int8Conv {
     Bytes(ByteDot),
