@@ -10,7 +10,7 @@ use crate::element::{Bf16, Element};
 use crate::forms::{Bf16Conv, F32Conv, Int8Conv};
 use crate::movement::{self, Normalisation};
 use crate::plan::{Plan, Step};
-use crate::ranges::{InputRanges, extent};
+use crate::ranges::SeenInputs;
 use crate::view::Shared;
 use crate::{Border, Error, Graph};
 use crate::{channel_norm, enlarge, masks, means, recurrent};
@@ -146,18 +146,18 @@ impl Engine {
         times
     }
 
-    /// As [`Self::run`], and notes the least and the greatest value that each convolution reads.
+    /// As [`Self::run`], and counts the values that each convolution reads.
     ///
     /// # Panics
     /// As [`Self::run`].
-    pub fn observe(&mut self, image: &[f32], ranges: &mut InputRanges) {
+    pub fn observe(&mut self, image: &[f32], seen: &mut SeenInputs) {
         self.check(image);
         rayon::scope(|_| match &mut self.runner {
-            Runner::F32(runner) => runner.observe(image, ranges),
-            Runner::Bf16(runner) => runner.observe(image, ranges),
-            Runner::Int8(runner) => runner.observe(image, ranges),
+            Runner::F32(runner) => runner.observe(image, seen),
+            Runner::Bf16(runner) => runner.observe(image, seen),
+            Runner::Int8(runner) => runner.observe(image, seen),
         });
-        ranges.images += 1;
+        seen.images += 1;
     }
 
     fn check(&self, image: &[f32]) {
@@ -238,14 +238,13 @@ impl<E: Element, C: ConvForm<E>> Typed<E, C> {
         self.run_watched(image, |_, _, _| {}, after);
     }
 
-    fn observe(&mut self, image: &[f32], ranges: &mut InputRanges) {
+    fn observe(&mut self, image: &[f32], seen: &mut SeenInputs) {
         self.run_watched(
             image,
             |name, step, arena| {
                 if let Step::Conv(conv) = step {
                     // SAFETY: between two steps nobody writes.
-                    let seen = unsafe { extent(arena, &conv.geometry().input) };
-                    ranges.add(name, seen);
+                    unsafe { seen.of(name).add(arena, &conv.geometry().input) };
                 }
             },
             |_, _| {},

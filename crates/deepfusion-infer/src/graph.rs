@@ -69,30 +69,36 @@ impl Graph {
         }
     }
 
-    /// Gives the graph what its convolutions read, for [`Precision::Int8`](crate::Precision::Int8). Names of no convolution of the graph are
-    /// passed over: a network with the head for uncertainty has more than one without.
+    /// Gives the graph what its convolutions read, for [`Precision::Int8`](crate::Precision::Int8). A convolution without a range is computed in
+    /// bf16.
     ///
     /// # Errors
-    /// [`Error::Ranges`] if a convolution that int8 computes has no range, or a range is not one.
+    /// [`Error::Ranges`] for a name of no convolution that int8 computes, which is another network's, and a range that is none.
     pub fn set_input_ranges(&mut self, ranges: &InputRanges) -> Result<(), Error> {
-        let of = |index: usize| -> Result<Option<[f32; 2]>, Error> {
-            if !self.is_computed_in_int8(index) {
-                return Ok(None);
-            }
-            let name = &self.nodes[index].name;
-            let refused = |what: String| Error::Ranges {
-                reason: format!("{what} of what `{name}` reads"),
-            };
-            let range = ranges.get(name);
-            let [low, high] = range.ok_or_else(|| refused("no range".into()))?;
+        let mut found = vec![None; self.nodes.len()];
+        for (name, [low, high]) in ranges {
+            let mut nodes = self.nodes.iter();
+            let node = nodes.position(|node| node.name == *name);
+            let node = node.filter(|node| self.is_computed_in_int8(*node));
+            let node = node.ok_or_else(|| Error::Ranges {
+                reason: format!("`{name}` is no convolution of this network that int8 computes"),
+            })?;
             if !(low.is_finite() && high.is_finite() && low <= high) {
-                return Err(refused(format!("{low} to {high} is no range")));
+                return Err(Error::Ranges {
+                    reason: format!("{low} to {high} is no range of what `{name}` reads"),
+                });
             }
-            Ok(Some([low, high]))
-        };
-        let found: Result<_, _> = (0..self.nodes.len()).map(of).collect();
-        self.input_ranges = Some(found?);
+            found[node] = Some([*low, *high]);
+        }
+        self.input_ranges = Some(found);
         Ok(())
+    }
+
+    /// Those of the convolutions that int8 computes, by name.
+    pub fn computed_in_int8(&self) -> impl Iterator<Item = &str> {
+        let each = self.nodes.iter().enumerate();
+        each.filter(|(i, _)| self.is_computed_in_int8(*i))
+            .map(|(_, node)| node.name.as_str())
     }
 
     /// Whether a node is a convolution for int8: the first, which sees the image, and the heads, whose output is the result, are not.

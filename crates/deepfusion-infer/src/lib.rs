@@ -42,4 +42,4 @@ pub use engine::{Engine, Precision};
 pub use error::Error;
 pub use graph::{Graph, ValueId, ValueShape};
 pub use op::{Activation, Border, Conv, Depthwise, Node, Op};
-pub use ranges::InputRanges;
+pub use ranges::{InputRanges, SeenInputs};

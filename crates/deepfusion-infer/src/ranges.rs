@@ -1,98 +1,169 @@
-//! What convolutions read, as ranges: int8 divides them into 255 steps.
+//! What convolutions read, as ranges that int8 divides into 255 steps, and how they are found.
 
 use std::collections::BTreeMap;
 
 use crate::element::Element;
 use crate::view::{Shared, View};
 
-/// For each convolution, by its name, the least and the greatest value that it reads in an image, on average over the images that
-/// [`Engine::observe`](crate::Engine::observe) saw. What lies beyond is held at the end.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct InputRanges {
-    /// Sums over the images.
-    sums: BTreeMap<String, [f64; 2]>,
-    /// How many images were seen.
+/// For each convolution, by its name, the least and the greatest value that it is to read; what lies beyond is held at the end.
+pub type InputRanges = BTreeMap<String, [f32; 2]>;
+
+/// How often convolutions read which values, over the images that [`Engine::observe`](crate::Engine::observe) saw.
+#[derive(Debug, Clone, Default)]
+pub struct SeenInputs {
+    of: BTreeMap<String, Histogram>,
     pub(crate) images: usize,
 }
 
-impl InputRanges {
-    /// Ranges that were found before, over that many images.
-    #[must_use]
-    pub fn new(ranges: BTreeMap<String, [f32; 2]>, images: usize) -> Self {
-        let n = images.max(1) as f64;
-        let sums = ranges.into_iter();
-        Self {
-            sums: sums
-                .map(|(name, range)| (name, range.map(|end| f64::from(end) * n)))
-                .collect(),
-            images: images.max(1),
-        }
-    }
-
+impl SeenInputs {
     /// How many images were seen.
     #[must_use]
     pub fn images(&self) -> usize {
         self.images
     }
 
-    /// The ranges by name.
+    /// For each convolution the range whose 255 steps lose least: the squares of what is rounded within it, and of what is cut off
+    /// beyond it, are least in sum. Few values are far greater than all others, and steps as wide as those need would be wide for all.
     #[must_use]
-    pub fn ranges(&self) -> BTreeMap<String, [f32; 2]> {
-        let names = self.sums.keys();
-        names
-            .filter_map(|name| Some((name.clone(), self.get(name)?)))
+    pub fn ranges(&self) -> InputRanges {
+        let each = self.of.iter();
+        each.map(|(name, seen)| (name.clone(), seen.best_range()))
             .collect()
     }
 
-    /// That of a convolution.
-    pub(crate) fn get(&self, name: &str) -> Option<[f32; 2]> {
-        let sums = self.sums.get(name)?;
-        Some(sums.map(|sum| (sum / self.images.max(1) as f64) as f32))
+    pub(crate) fn of(&mut self, name: &str) -> &mut Histogram {
+        self.of.entry(name.to_owned()).or_default()
     }
+}
 
-    pub(crate) fn add(&mut self, name: &str, seen: [f32; 2]) {
-        let sums = match self.sums.get_mut(name) {
-            Some(sums) => sums,
-            None => self.sums.entry(name.to_owned()).or_default(),
-        };
-        for (sum, end) in sums.iter_mut().zip(seen) {
-            *sum += f64::from(end);
+/// Bits of an f32 that stay: sign, exponent and the first four of the mantissa.
+const KEPT_BITS: u32 = 13;
+/// Ends of ranges that are tried, on each side of 0.
+const ENDS: i32 = 64;
+
+/// Counts of values, in sixteen bins from each power of two to the next.
+#[derive(Debug, Clone)]
+pub(crate) struct Histogram {
+    counts: Vec<u64>,
+}
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self {
+            counts: vec![0; 1 << KEPT_BITS],
         }
     }
 }
 
-/// The least and the greatest value of a view.
-///
-/// # Safety
-/// The view must lie in the arena, and nobody may write it meanwhile.
-pub(crate) unsafe fn extent<E: Element>(arena: Shared<E>, view: &View) -> [f32; 2] {
-    let mut ends = [f32::INFINITY, f32::NEG_INFINITY];
-    for y in 0..view.height {
-        for x in 0..view.width {
-            // SAFETY: the caller's promise.
-            for value in unsafe { arena.read(view.at(x, y), view.channels) } {
-                let value = value.value();
-                ends = [ends[0].min(value), ends[1].max(value)];
+impl Histogram {
+    /// Counts the values of a view.
+    ///
+    /// # Safety
+    /// The view must lie in the arena, and nobody may write it meanwhile.
+    pub(crate) unsafe fn add<E: Element>(&mut self, arena: Shared<E>, view: &View) {
+        for y in 0..view.height {
+            for x in 0..view.width {
+                // SAFETY: the caller's promise.
+                for value in unsafe { arena.read(view.at(x, y), view.channels) } {
+                    self.count(value.value());
+                }
             }
         }
     }
-    ends
+
+    fn count(&mut self, value: f32) {
+        if value.is_finite() {
+            self.counts[(value.to_bits() >> (32 - KEPT_BITS)) as usize] += 1;
+        }
+    }
+
+    /// Values in the middle of their bins, with their counts; those next to 0 are 0.
+    fn values(&self) -> Vec<(f64, f64)> {
+        let half = 1_u32 << (31 - KEPT_BITS);
+        let counted = self.counts.iter().enumerate().filter(|(_, n)| **n > 0);
+        let middle = |bin: usize| f32::from_bits(((bin as u32) << (32 - KEPT_BITS)) | half);
+        counted
+            .map(|(bin, n)| (f64::from(middle(bin)), *n as f64))
+            .map(|(value, n)| {
+                if value.abs() < 1e-30 {
+                    (0.0, n)
+                } else {
+                    (value, n)
+                }
+            })
+            .collect()
+    }
+
+    fn best_range(&self) -> [f32; 2] {
+        let values = self.values();
+        let ends = values.iter().fold([0.0_f64; 2], |[low, high], (v, _)| {
+            [low.min(*v), high.max(*v)]
+        });
+        let tried = |end: f64| -> Vec<f64> {
+            if end == 0.0 {
+                return vec![0.0];
+            }
+            (1..=ENDS)
+                .map(|k| end * f64::from(k) / f64::from(ENDS))
+                .collect()
+        };
+        let mut best = (f64::INFINITY, ends);
+        for low in tried(ends[0]) {
+            for high in tried(ends[1]) {
+                let lost = lost(&values, [low, high]);
+                if lost < best.0 {
+                    best = (lost, [low, high]);
+                }
+            }
+        }
+        best.1.map(|end| end as f32)
+    }
+}
+
+/// What the 255 steps of a range lose of the values, as a sum of squares.
+fn lost(values: &[(f64, f64)], [low, high]: [f64; 2]) -> f64 {
+    let step = (high - low) / 255.0;
+    let rounded = step * step / 12.0;
+    let of = |value: f64| match value {
+        0.0 => 0.0,
+        v if v < low => (low - v).powi(2),
+        v if v > high => (v - high).powi(2),
+        _ => rounded,
+    };
+    values.iter().map(|(value, n)| n * of(*value)).sum()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn range_of(values: impl Iterator<Item = f32>) -> [f32; 2] {
+        let mut seen = SeenInputs::default();
+        let histogram = seen.of("conv");
+        values.for_each(|v| histogram.count(v));
+        seen.ranges()["conv"]
+    }
+
     #[test]
-    fn ranges_are_means_over_images() {
-        let mut ranges = InputRanges::default();
-        for seen in [[-1.0, 2.0], [-3.0, 6.0]] {
-            ranges.add("conv", seen);
-            ranges.images += 1;
-        }
-        assert_eq!(ranges.get("conv"), Some([-2.0, 4.0]));
-        assert_eq!(ranges.get("other"), None);
-        let again = InputRanges::new(ranges.ranges(), ranges.images());
-        assert_eq!(again, ranges);
+    fn even_values_keep_their_whole_range() {
+        let [low, high] = range_of((0..4000).map(|i| i as f32 * 0.001 - 1.0));
+        assert!(
+            (low + 1.0).abs() < 0.05 && (high - 3.0).abs() < 0.1,
+            "{low} {high}"
+        );
+    }
+
+    /// One of a million values is a hundred times as great as the others.
+    #[test]
+    fn what_is_rare_and_great_is_cut_off() {
+        let many = (0..1_000_000).map(|i| (i % 1000) as f32 * 0.001);
+        let [low, high] = range_of(many.chain([100.0]));
+        assert!(low == 0.0 && (1.0..20.0).contains(&high), "{low} {high}");
+    }
+
+    #[test]
+    fn nothing_but_zeros_or_what_is_not_finite_is_a_range_of_zeros() {
+        assert_eq!(range_of([0.0, 0.0].into_iter()), [0.0, 0.0]);
+        assert_eq!(range_of([f32::NAN, f32::INFINITY].into_iter()), [0.0, 0.0]);
     }
 }

@@ -1,27 +1,39 @@
-//! Calibration for int8: what a network's convolutions read on images of the user's.
+//! Calibration for int8: what a network's convolutions read on images of the user's, and which of them bear it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use deepfusion_data::{load_photo, to_network_input};
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{Int8Calibration, StoredNetwork, TrainConfig};
-use deepfusion_runtime::{FusedRunner, InputRanges, ModelSource, Precision, Preparer};
+use deepfusion_runtime::{DepthRunner, FusedRunner, ModelSource, Precision, Preparer, SeenInputs};
 use deepfusion_sim::{SimConfig, Simulation};
 use deepfusion_weights::Shipped;
 
 use crate::{Error, Input, Result};
 
-/// Looks at `most` of the images, evenly spread, and keeps the ranges beside the network: in the run's folder, or in the packed file's
-/// card. `shown` hears how many are done, of how many. Returns what was found and the file that holds it.
+/// Images on which depth in int8 is compared with depth in f32.
+const COMPARED_ON: usize = 4;
+
+/// How to calibrate.
+#[derive(Debug, Clone, Copy)]
+pub struct Int8Options {
+    /// Look at this many of the images, evenly spread.
+    pub images: usize,
+    /// Depth may differ from that in f32 by so much on average (|ln|): convolutions that harm it most stay in bf16 until it does not.
+    pub most_deviation: f64,
+}
+
+/// Finds the ranges of a network, and keeps them beside it: in the run's folder, or in the packed file's card. `shown` hears how far it is,
+/// of how far. Returns what was found and the file that holds it.
 ///
 /// # Errors
-/// [`Error::NoImages`] for none, [`Error::EmbeddedNetwork`] for a network inside the program, images that cannot be read, a file that
-/// cannot be written.
+/// [`Error::NoImages`] for none, [`Error::EmbeddedNetwork`] for a network inside the program, a processor without int8, images that
+/// cannot be read, a file that cannot be written.
 pub fn calibrate(
     source: &ModelSource,
     images: &[Input],
-    most: usize,
-    mut shown: impl FnMut(usize, usize),
+    options: Int8Options,
+    shown: impl FnMut(usize, usize),
 ) -> Result<(Int8Calibration, PathBuf)> {
     let packed = match source {
         ModelSource::Packed { given, .. } if !Shipped::is_at(given) => {
@@ -33,14 +45,13 @@ pub fn calibrate(
         ModelSource::Run { .. } => None,
     };
     let network = source.load(None)?;
-    let chosen = spread(images, most);
-    let seen = observed(&network, &chosen, |done| shown(done, chosen.len()))?;
-    let calibration = Int8Calibration::new(network.step, &seen);
+    let inputs = prepared(&network, images, options.images)?;
+    let calibration = found(&network, &inputs, options.most_deviation, shown)?;
     let path = match (packed, source.folder()) {
         (Some((given, network)), _) => {
             let mut network = network.clone();
             network.card.int8 = Some(toml::Table::try_from(&calibration)?);
-            let folder = given.parent().unwrap_or(std::path::Path::new("."));
+            let folder = given.parent().unwrap_or(Path::new("."));
             let [card, _] = network.write(folder, true)?;
             card
         }
@@ -63,35 +74,22 @@ pub fn on_a_street(config: &TrainConfig, weights: &Weights) -> Result<Int8Calibr
         ..SimConfig::default()
     })?;
     let input = to_network_input(&street.frame(0).rgb, [0, 0, width, height], width, height);
-    let mut runner = FusedRunner::new(config, weights.clone(), Precision::F32)?;
-    let mut seen = InputRanges::default();
-    runner.observe(&input, &mut seen)?;
-    Ok(Int8Calibration::new(0, &seen))
+    observed(config, weights, 0, &[input], |_| ())
 }
 
-/// Up to `most` of them, as far apart as they can be.
-fn spread(images: &[Input], most: usize) -> Vec<&Input> {
-    let count = most.min(images.len());
-    (0..count)
-        .map(|i| &images[i * images.len() / count])
-        .collect()
-}
-
-fn observed(
-    network: &StoredNetwork,
-    images: &[&Input],
-    mut done: impl FnMut(usize),
-) -> Result<InputRanges> {
-    let config = &network.config;
-    // At the size trained with, whatever the image's.
+/// Up to `most` of the images as the network sees them, as far apart as they can be, at the size trained with.
+fn prepared(network: &StoredNetwork, images: &[Input], most: usize) -> Result<Vec<Vec<f32>>> {
     let preparer = Preparer {
-        size: config.size,
+        size: network.config.size,
         training_camera: network.camera,
         canonical_focal_px: None,
     };
-    let mut runner = FusedRunner::new(config, network.weights.clone(), Precision::F32)?;
-    let mut seen = InputRanges::default();
-    for (i, input) in images.iter().enumerate() {
+    if images.is_empty() {
+        return Err(Error::NoImages {
+            input: "the arguments".into(),
+        });
+    }
+    let read = |input: &Input| -> Result<Vec<f32>> {
         let (image, camera) = match &input.frame {
             Some((dataset, frame)) => {
                 let camera = dataset.intrinsics(*frame);
@@ -102,16 +100,100 @@ fn observed(
                 (photo.image, photo.intrinsics)
             }
         };
-        let prepared = preparer.prepare(&image, camera.as_ref(), false, true);
-        runner.observe(&prepared.input, &mut seen)?;
-        done(i + 1);
+        Ok(preparer.prepare(&image, camera.as_ref(), false, true).input)
+    };
+    spread(images, most).map(read).collect()
+}
+
+/// Up to `most` of them, evenly spread.
+fn spread<T>(all: &[T], most: usize) -> impl Iterator<Item = &T> {
+    let count = most.min(all.len());
+    (0..count).map(move |i| &all[i * all.len() / count])
+}
+
+/// The ranges of all convolutions that int8 computes.
+fn observed(
+    config: &TrainConfig,
+    weights: &Weights,
+    step: usize,
+    inputs: &[Vec<f32>],
+    mut shown: impl FnMut(usize),
+) -> Result<Int8Calibration> {
+    let mut runner = FusedRunner::new(config, weights.clone(), Precision::F32)?;
+    let mut seen = SeenInputs::default();
+    for (i, input) in inputs.iter().enumerate() {
+        runner.observe(input, &mut seen)?;
+        shown(i + 1);
     }
-    if images.is_empty() {
-        return Err(Error::NoImages {
-            input: "the arguments".into(),
-        });
+    let computed = FusedRunner::computed_in_int8(config, weights.clone())?;
+    let mut ranges = seen.ranges();
+    ranges.retain(|name, _| computed.contains(name));
+    Ok(Int8Calibration {
+        step,
+        images: seen.images(),
+        deviation: 0.0,
+        ranges,
+    })
+}
+
+/// Ranges, without those of the convolutions that harm depth most in int8, as many as it takes.
+fn found(
+    network: &StoredNetwork,
+    inputs: &[Vec<f32>],
+    most_deviation: f64,
+    mut shown: impl FnMut(usize, usize),
+) -> Result<Int8Calibration> {
+    let (config, weights) = (&network.config, &network.weights);
+    // Looking at the images, then at each convolution alone.
+    let convolutions = FusedRunner::computed_in_int8(config, weights.clone())?.len();
+    let all = inputs.len() + convolutions;
+    let mut calibration = observed(config, weights, network.step, inputs, |done| {
+        shown(done, all);
+    })?;
+    let inputs: Vec<&Vec<f32>> = spread(inputs, COMPARED_ON).collect();
+    let mut exact = FusedRunner::new(config, weights.clone(), Precision::F32)?;
+    let exact = disparities(&mut exact, &inputs)?;
+    let deviation = |calibration: &Int8Calibration| -> Result<f64> {
+        let weights = weights.clone();
+        let int8 = Some(calibration);
+        let mut runner = FusedRunner::with_calibration(config, weights, Precision::Int8, int8)?;
+        Ok(mean_deviation(&disparities(&mut runner, &inputs)?, &exact))
+    };
+    let mut harm = Vec::with_capacity(convolutions);
+    for (i, (name, range)) in calibration.ranges.iter().enumerate() {
+        let alone = Int8Calibration {
+            ranges: [(name.clone(), *range)].into(),
+            ..calibration.clone()
+        };
+        harm.push((name.clone(), deviation(&alone)?));
+        shown(all - convolutions + i + 1, all);
     }
-    Ok(seen)
+    harm.sort_by(|a, b| a.1.total_cmp(&b.1));
+    tracing::debug!(?harm, "each convolution alone in int8");
+    loop {
+        calibration.deviation = deviation(&calibration)?;
+        if calibration.deviation <= most_deviation {
+            break;
+        }
+        let Some((worst, _)) = harm.pop() else { break };
+        calibration.ranges.remove(&worst);
+    }
+    Ok(calibration)
+}
+
+fn disparities(runner: &mut FusedRunner, inputs: &[&Vec<f32>]) -> Result<Vec<f32>> {
+    let mut all = Vec::new();
+    for input in inputs {
+        all.extend(runner.disparity(input)?);
+    }
+    Ok(all)
+}
+
+/// Mean |ln(a / b)|, of disparities as of depths.
+fn mean_deviation(a: &[f32], b: &[f32]) -> f64 {
+    let off = a.iter().zip(b);
+    let off = off.map(|(a, b)| (f64::from(*a) / f64::from(*b)).ln().abs());
+    off.sum::<f64>() / a.len().max(1) as f64
 }
 
 #[cfg(test)]
@@ -120,25 +202,16 @@ mod tests {
 
     #[test]
     fn images_are_taken_from_all_over() {
-        let inputs: Vec<Input> = (0..10)
-            .map(|i| Input {
-                path: format!("{i}.png").into(),
-                name: i.to_string(),
-                frame: None,
-            })
-            .collect();
-        let names = |most| {
-            let chosen = spread(&inputs, most);
-            chosen
-                .iter()
-                .map(|i| i.name.as_str())
-                .collect::<Vec<_>>()
-                .concat()
-        };
-        assert_eq!(
-            (names(3), names(20)),
-            ("036".to_owned(), "0123456789".to_owned())
-        );
-        assert_eq!(names(0), "");
+        let all: Vec<usize> = (0..10).collect();
+        let of = |most| spread(&all, most).copied().collect::<Vec<_>>();
+        assert_eq!(of(3), [0, 3, 6]);
+        assert_eq!(of(20), all);
+        assert!(of(0).is_empty());
+    }
+
+    #[test]
+    fn deviation_is_that_of_logarithms() {
+        let off = mean_deviation(&[1.0, 2.0], &[1.0, 1.0]);
+        assert!((off - 2_f64.ln() / 2.0).abs() < 1e-12, "{off}");
     }
 }

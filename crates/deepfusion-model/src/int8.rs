@@ -1,6 +1,5 @@
 //! What a network was calibrated to for int8: the ranges of what its convolutions read.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use deepfusion_infer::InputRanges;
@@ -19,33 +18,19 @@ pub struct Int8Calibration {
     pub step: usize,
     /// Number of images that were looked at.
     pub images: usize,
-    /// For each convolution, by its name, the least and the greatest value of its input in an image, on average over the images.
-    pub ranges: BTreeMap<String, [f32; 2]>,
+    /// Mean |ln(d / d₀)| of the depth d in int8 and d₀ in f32, on some of these images.
+    pub deviation: f64,
+    /// For each convolution that is computed in int8, by its name, the range of its input whose 255 steps lose least ([`deepfusion_infer::SeenInputs::ranges`]).
+    pub ranges: InputRanges,
 }
 
 impl Int8Calibration {
-    /// What was seen of a network after so many steps.
-    #[must_use]
-    pub fn new(step: usize, seen: &InputRanges) -> Self {
-        Self {
-            step,
-            images: seen.images(),
-            ranges: seen.ranges(),
-        }
-    }
-
     /// That of a card's table.
     ///
     /// # Errors
     /// A table that holds none.
     pub fn from_table(table: toml::Table) -> Result<Self, toml::de::Error> {
         table.try_into()
-    }
-
-    /// As the engine takes it.
-    #[must_use]
-    pub fn input_ranges(&self) -> InputRanges {
-        InputRanges::new(self.ranges.clone(), self.images)
     }
 
     /// That of a run at this step; `None` where it was not calibrated, or at another step.
@@ -77,7 +62,7 @@ impl Int8Calibration {
             reason: e.to_string(),
         })?;
         let text = format!(
-            "# The least and the greatest value that each convolution reads, for `--precision int8`. Written by `weights calibrate`.\n{table}"
+            "# The range of what each convolution reads, for `--precision int8`. Written by `weights calibrate`.\n{table}"
         );
         deepfusion_fs::write(&path, text).map_err(|e| Error::io(&path, "write", e))?;
         Ok(path)
@@ -96,14 +81,15 @@ mod tests {
         let calibration = Int8Calibration {
             step: 7,
             images: 32,
+            deviation: 0.0125,
             ranges,
         };
         let path = calibration.write(run.path()).unwrap();
         let read = |step| Int8Calibration::of_run(run.path(), step).unwrap();
         assert_eq!(read(7), Some(calibration.clone()));
         assert_eq!(read(8), None);
-        let again = Int8Calibration::new(7, &calibration.input_ranges());
-        assert_eq!(again, calibration);
+        let again = Int8Calibration::from_table(toml::Table::try_from(&calibration).unwrap());
+        assert_eq!(again.unwrap(), calibration);
         std::fs::write(&path, "step = 'seven'").unwrap();
         let error = Int8Calibration::of_run(run.path(), 7).unwrap_err();
         assert!(error.to_string().contains("int8.toml"), "{error}");

@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 use deepfusion_geometry::DepthRange;
-use deepfusion_infer::{Engine, InputRanges, Precision};
+use deepfusion_infer::{Engine, Precision, SeenInputs};
 use deepfusion_model::weights::Weights;
 use deepfusion_model::{Int8Calibration, TrainConfig, depth_graph_with_uncertainty};
 
@@ -46,8 +46,7 @@ impl FusedRunner {
     ) -> Result<Self, Error> {
         let mut graph = depth_graph_with_uncertainty(&config.depth_net, weights)?;
         if precision == Precision::Int8 {
-            let ranges = int8.ok_or(Error::NotCalibrated)?.input_ranges();
-            let set = graph.set_input_ranges(&ranges);
+            let set = graph.set_input_ranges(&int8.ok_or(Error::NotCalibrated)?.ranges);
             set.map_err(|e| Error::engine("fused-int8", &e))?;
         }
         let engine = Engine::new(graph, config.size.width, config.size.height, precision);
@@ -59,16 +58,25 @@ impl FusedRunner {
         })
     }
 
-    /// Runs the network on an image and notes what its convolutions read, for int8.
+    /// The names of the network's convolutions that int8 computes.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for weights of another network.
+    pub fn computed_in_int8(config: &TrainConfig, weights: Weights) -> Result<Vec<String>, Error> {
+        let graph = depth_graph_with_uncertainty(&config.depth_net, weights)?;
+        Ok(graph.computed_in_int8().map(str::to_owned).collect())
+    }
+
+    /// Runs the network on an image and counts the values that its convolutions read, for int8.
     ///
     /// # Errors
     /// [`Error::ImageSize`].
     ///
     /// # Shapes
     /// - `image`: as of [`DepthRunner::run`]
-    pub fn observe(&mut self, image: &[f32], ranges: &mut InputRanges) -> Result<(), Error> {
+    pub fn observe(&mut self, image: &[f32], seen: &mut SeenInputs) -> Result<(), Error> {
         check_image(image, self.values())?;
-        self.engine.observe(image, ranges);
+        self.engine.observe(image, seen);
         Ok(())
     }
 

@@ -26,7 +26,7 @@ mod prepare;
 mod runner;
 mod source;
 
-pub use deepfusion_infer::{InputRanges, Precision};
+pub use deepfusion_infer::{Precision, SeenInputs};
 pub use error::Error;
 pub use estimator::DepthEstimator;
 pub use fused::FusedRunner;

@@ -4,6 +4,7 @@ use clap::{Args, Subcommand};
 use deepfusion_model::CheckpointKind;
 
 use super::names;
+use super::values::share;
 
 /// `deepfusion weights …`.
 #[derive(Debug, Subcommand)]
@@ -51,6 +52,9 @@ pub(crate) struct CalibrateWeightsArgs {
     /// Look at this many of the images, evenly spread.
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..))]
     pub images: u16,
+    /// Depth may differ from f32's by this share on average; convolutions that harm it most stay in bf16.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.005, value_parser = share)]
+    pub most_deviation: f64,
     /// Print the ranges as JSON on stdout.
     #[arg(long)]
     pub json: bool,

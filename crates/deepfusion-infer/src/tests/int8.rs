@@ -4,7 +4,9 @@ use super::build::{Builder, deviation, noise, noise_image};
 use super::network;
 use super::oracle::run;
 use crate::element::{Bf16, Element};
-use crate::{Activation, Border, Conv, Engine, Error, Graph, InputRanges, Op, Precision, ValueId};
+use crate::{
+    Activation, Border, Conv, Engine, Error, Graph, InputRanges, Op, Precision, SeenInputs, ValueId,
+};
 
 const SIZE: (usize, usize) = (24, 16);
 
@@ -24,10 +26,13 @@ fn pair(second: impl Fn(&mut Conv)) -> Graph {
 /// The ranges that an image shows.
 fn observed(graph: &Graph, images: &[Vec<f32>], (width, height): (usize, usize)) -> InputRanges {
     let mut engine = Engine::new(graph.clone(), width, height, Precision::F32).unwrap();
-    let mut ranges = InputRanges::default();
+    let mut seen = SeenInputs::default();
     for image in images {
-        engine.observe(image, &mut ranges);
+        engine.observe(image, &mut seen);
     }
+    assert_eq!(seen.images(), images.len());
+    let mut ranges = seen.ranges();
+    ranges.retain(|name, _| graph.computed_in_int8().any(|n| n == name));
     ranges
 }
 
@@ -107,7 +112,7 @@ fn sums_are_those_of_the_integers() {
         graph.set_input_ranges(&ranges).unwrap();
         let mut engine = Engine::new(graph.clone(), SIZE.0, SIZE.1, Precision::Int8).unwrap();
         engine.run(&image);
-        let expected = by_integers(&graph, &engine.output(0), ranges.ranges()["node1"]);
+        let expected = by_integers(&graph, &engine.output(0), ranges["node1"]);
         let found = engine.output(1);
         assert_eq!(found.len(), expected.len());
         for (found, expected) in found.iter().zip(&expected) {
@@ -175,13 +180,16 @@ fn int8_without_ranges_or_with_another_networks_is_refused() {
     let (width, height) = SIZE;
     let error = Engine::new(graph.clone(), width, height, Precision::Int8).unwrap_err();
     assert!(matches!(error, Error::Ranges { .. }), "{error}");
-    let error = graph.set_input_ranges(&InputRanges::default()).unwrap_err();
-    assert!(error.to_string().contains("node1"), "{error}");
+    for name in ["node0", "node7"] {
+        let ranges = [(name.to_owned(), [0.0, 1.0])].into();
+        let error = graph.set_input_ranges(&ranges).unwrap_err();
+        assert!(error.to_string().contains(name), "{error}");
+    }
     for range in [[f32::NAN, 1.0], [0.0, f32::INFINITY], [2.0, 1.0]] {
-        let ranges = InputRanges::new([("node1".to_owned(), range)].into(), 1);
+        let ranges = [("node1".to_owned(), range)].into();
         assert!(graph.set_input_ranges(&ranges).is_err(), "{range:?}");
     }
-    let ranges = InputRanges::new([("node1".to_owned(), [-1.0, 4.0])].into(), 1);
+    let ranges = [("node1".to_owned(), [-1.0, 4.0])].into();
     graph.set_input_ranges(&ranges).unwrap();
     Engine::new(graph, width, height, Precision::Int8).unwrap();
 }

@@ -1,5 +1,7 @@
 use deepfusion_data::OpenOptions;
-use deepfusion_jobs::{find_inputs, int8};
+use deepfusion_hint::count_of;
+use deepfusion_jobs::find_inputs;
+use deepfusion_jobs::int8::{self, Int8Options};
 use deepfusion_runtime::ModelSource;
 
 use crate::cli::CalibrateWeightsArgs;
@@ -17,7 +19,11 @@ pub(crate) fn run(args: &CalibrateWeightsArgs) -> Result<()> {
     };
     let images = find_inputs(&args.inputs, &options, warnings::print)?;
     let mut shown = Progress::new("calibrating");
-    let found = int8::calibrate(&model, &images, usize::from(args.images), |done, total| {
+    let options = Int8Options {
+        images: usize::from(args.images),
+        most_deviation: args.most_deviation,
+    };
+    let found = int8::calibrate(&model, &images, options, |done, total| {
         shown.set(done, total);
     });
     drop(shown);
@@ -26,9 +32,9 @@ pub(crate) fn run(args: &CalibrateWeightsArgs) -> Result<()> {
         return output::print_json(&calibration);
     }
     output::print(&format!(
-        "{}: the ranges of {} convolutions, from {} images; --precision int8 uses them\n",
+        "{}: {} in int8; depth differs from f32's by {:.2} % on average\n",
         path.display(),
-        calibration.ranges.len(),
-        calibration.images
+        count_of(calibration.ranges.len(), "convolution"),
+        100.0 * calibration.deviation
     ))
 }
