@@ -25,6 +25,10 @@ class Prediction:
     def sigma(self) -> NDArray[np.float32] | None:
         """Standard deviation of `depth` in metres, H x W; None of a network that does not say. Not calibrated."""
     @property
+    def confidence(self) -> NDArray[np.float32] | None:
+        """How far each pixel of `depth` can be trusted, H x W, 0 to 1: exp(-the error of ln depth that is to be expected), 0.9 for 10 %;
+        None of a network that does not say. Not calibrated."""
+    @property
     def disparity(self) -> NDArray[np.float32]:
         """1/m, at the network's size."""
     @property

@@ -297,6 +297,16 @@ impl Prediction {
             .transpose()
     }
 
+    /// How far each pixel of `depth` can be trusted, H x W, 0 to 1: exp(-the error of ln depth that is to be expected), 0.9 for 10 %;
+    /// None of a network that does not say. Not calibrated.
+    #[getter]
+    fn confidence(&self, py: Python<'_>) -> PyResult<Option<Py<PyArray2<f32>>>> {
+        let confidence = py.detach(|| self.prediction.confidence());
+        confidence
+            .map(|map| image_array(py, map.height, map.width, map.data))
+            .transpose()
+    }
+
     /// 1/m, at the network's size.
     #[getter]
     fn disparity(&self, py: Python<'_>) -> PyResult<Py<PyArray2<f32>>> {

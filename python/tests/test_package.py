@@ -47,6 +47,17 @@ def test_image_to_metres(drive, model):
     assert np.array_equal(rgb, frame.image[depth <= 40])
 
 
+def test_how_far_to_trust_a_pixel(drive, model):
+    """exp(-the error that is to be expected), as the standard deviation beside it says."""
+    frame = deepfusion.Dataset(drive)[0]
+    seen = deepfusion.load("street").predict(frame.image, frame.intrinsics)
+    inside = seen.depth > 0
+    expected = np.exp(-seen.sigma[inside] / (np.sqrt(2) * seen.depth[inside]))
+    assert np.allclose(seen.confidence[inside], expected, atol=1e-6)
+    assert np.all(seen.confidence[~inside] == 0) and seen.confidence.dtype == np.float32
+    assert model.predict(frame.image, frame.intrinsics).confidence is None
+
+
 def test_every_kind_of_image_is_the_same_image(drive, model, tmp_path):
     frame = deepfusion.Dataset(drive)[1]
     expected = model.predict(frame.image, frame.intrinsics).depth

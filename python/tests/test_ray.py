@@ -105,10 +105,12 @@ def test_broken_images_are_named_and_the_others_done(street, tmp_path):
 
 
 def test_how_sure_the_network_is(street, tmp_path):
-    summary = cluster.predict(street / "left" / "0.png", "street", tmp_path, intrinsics=CAMERA, save=["sigma"])
+    kinds = ["sigma", "confidence"]
+    summary = cluster.predict(street / "left" / "0.png", "street", tmp_path, intrinsics=CAMERA, save=kinds)
     assert summary.done == 1
-    expected = deepfusion.load("street").predict(street / "left" / "0.png", CAMERA).sigma
-    assert np.array_equal(np.load(tmp_path / "0_sigma.npy"), expected)
+    expected = deepfusion.load("street").predict(street / "left" / "0.png", CAMERA)
+    for kind in kinds:
+        assert np.array_equal(np.load(tmp_path / f"0_{kind}.npy"), getattr(expected, kind))
 
 
 def test_a_worker_that_is_killed_loses_nothing_and_does_nothing_twice(street, tmp_path):

@@ -277,7 +277,7 @@ pub(crate) enum CliError {
     /// A cloud without a camera.
     #[error("a point cloud needs the camera's intrinsics, and the model knows none")]
     NoCamera,
-    /// `--save sigma` of a network, or an engine, that does not say how sure it is.
+    /// `--save sigma` or `confidence` of a network, or an engine, that does not say how sure it is.
     #[error("this network, or the engine that runs it, does not say how sure it is of its depth")]
     NoUncertainty,
 }
@@ -388,7 +388,7 @@ impl Reportable for CliError {
             Self::NoMedia => Some("give --video FILE or --images DIR".into()),
             Self::NoCamera => Some("give --intrinsics fx,fy,cx,cy or --calib".into()),
             Self::NoUncertainty => Some(
-                "leave out sigma of --save and --max-sigma, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"
+                "leave out sigma and confidence of --save, and --max-sigma, or use a network trained with depth_net.uncertainty = true (not with --engine ort)"
                     .into(),
             ),
         }

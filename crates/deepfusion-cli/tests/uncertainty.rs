@@ -55,7 +55,9 @@ fn clouds_carry_it(at: &Path) {
     let cloud = |options: &str, out: &str| {
         ok(
             at,
-            &format!("predict --model sure other --save ply,npy,sigma {options} --out {out}"),
+            &format!(
+                "predict --model sure other --save ply,npy,sigma,confidence {options} --out {out}"
+            ),
         );
         let path = at.join(out).join("0000000000.ply");
         let bytes = fs::read(&path).unwrap();
@@ -65,6 +67,16 @@ fn clouds_carry_it(at: &Path) {
     let pixels = 160 * 96;
     let map = |ending: &str| values(&at.join(format!("all/0000000000_{ending}.npy")), pixels);
     let (depth, sigma) = (map("depth"), map("sigma"));
+    // exp(−the error that is to be expected), by the sigma that is written beside it; 0 where the network did not look.
+    for (found, (z, s)) in map("confidence").iter().zip(depth.iter().zip(&sigma)) {
+        if *z > 0.0 {
+            let expected = (-s / (std::f32::consts::SQRT_2 * z)).exp();
+            assert!((expected - found).abs() < 1e-6, "{z}, {s}: {found}");
+            assert!(*found > 0.0 && *found < 1.0, "{found}");
+        } else {
+            assert_eq!(*found, 0.0);
+        }
+    }
     let of_points = depth.iter().zip(&sigma);
     let of_points = of_points.filter(|(z, _)| **z > 0.0 && **z <= 80.0);
     let expected: Vec<f32> = of_points.clone().map(|(_, s)| *s).collect();
@@ -117,6 +129,10 @@ fn how_sure_a_network_is_can_be_measured_calibrated_and_written() {
         (
             "predict --model plain other --save sigma --out no",
             ["does not say how sure", "sigma"],
+        ),
+        (
+            "predict --model plain other --save confidence --out no",
+            ["does not say how sure", "confidence"],
         ),
         (
             "eval --model plain --data other --calibrate-uncertainty",

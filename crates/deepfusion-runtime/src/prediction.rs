@@ -74,6 +74,34 @@ impl Prediction {
         Some(sigma)
     }
 
+    /// How far each pixel's depth can be trusted, at the image's own size ([`Self::confidence_of`]); `None` if the network does not
+    /// predict its uncertainty. It is the network's own estimate, not calibrated.
+    #[must_use]
+    pub fn confidence(&self) -> Option<DepthMap> {
+        let depth = self.depth();
+        let sigma = self.sigma_of(&depth)?;
+        Some(Self::confidence_of(&depth, &sigma))
+    }
+
+    /// How far each pixel of a depth can be trusted, 0 to 1, by its standard deviation `sigma`: exp(−b), where b = sigma/(√2·depth) is
+    /// the error of ln depth that is to be expected (the Laplace scale). 0.9 stands for a depth that is expected to be 10 % off; 0 where
+    /// there is none.
+    #[must_use]
+    pub fn confidence_of(depth: &DepthMap, sigma: &DepthMap) -> DepthMap {
+        let of = |(sigma, depth): (&f32, &f32)| {
+            if *depth > 0.0 {
+                (-sigma / (std::f32::consts::SQRT_2 * depth)).exp()
+            } else {
+                0.0
+            }
+        };
+        DepthMap {
+            width: depth.width,
+            height: depth.height,
+            data: sigma.data.iter().zip(&depth.data).map(of).collect(),
+        }
+    }
+
     /// Values at the image's own size, bilinear, with `of` applied to each; 0 outside the window.
     fn enlarge(&self, values: &[f32], of: impl Fn(f32) -> f32, map: &mut DepthMap) {
         let [x0, y0, w, h] = self.window.map(|v| v as usize);

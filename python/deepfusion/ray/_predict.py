@@ -26,7 +26,7 @@ from ._storage import Folder, Sources, images, urls, weights_mark
 
 _LOG = logging.getLogger(__name__)
 
-_ENDINGS = {"depth-png": "_depth.png", "npy": "_depth.npy", "sigma": "_sigma.npy"}
+_ENDINGS = {"depth-png": "_depth.png", "npy": "_depth.npy", "sigma": "_sigma.npy", "confidence": "_confidence.npy"}
 
 # Images that a worker takes at once: enough that reading, network and writing overlap, few enough that little is done again
 # where a worker dies.
@@ -214,9 +214,9 @@ def _reason(error: BaseException) -> str:
 def _encoded(kind: str, prediction: deepfusion.Prediction) -> bytes:
     if kind == "depth-png":
         return _depth_png(prediction.depth)
-    array = prediction.depth if kind == "npy" else prediction.sigma
+    array = prediction.depth if kind == "npy" else getattr(prediction, kind)
     if array is None:
-        raise ValueError("the network does not say how sure it is: save no sigma")
+        raise ValueError(f"the network does not say how sure it is: save no {kind}")
     file = io.BytesIO()
     np.save(file, np.ascontiguousarray(array))
     return file.getvalue()
@@ -255,7 +255,8 @@ def predict(
     network, are paths that all machines see, or URLs; `storage_options` are those of their file system (fsspec's). The images are
     of one camera: `intrinsics` are fx, fy, cx, cy in its pixels; without them each file's EXIF is asked, then the lens of the
     training camera is assumed. `save` names what is written: "depth-png" (`NAME_depth.png`, KITTI's 16-bit PNG), "npy"
-    (`NAME_depth.npy`, f32 metres), "sigma" (`NAME_sigma.npy`, of a network that says how sure it is).
+    (`NAME_depth.npy`, f32 metres), "sigma" and "confidence" (`NAME_sigma.npy`, `NAME_confidence.npy`, of a network that says how sure it
+    is).
 
     Each of up to `workers` processes (default: as many as the cluster has room for) has one network and `cpus_per_worker` threads. An
     image's `NAME.json` is written last and marks it as done: what is there whole, of the same image, network and options, is kept.
@@ -276,8 +277,9 @@ def predict(
         # Here rather than in each worker: a wrong name or a run without weights is one error, at once.
         network = deepfusion.load(model, precision=precision, data_set=data_set)
         grey = np.full((64, 64, 3), 128, np.uint8)
-        if "sigma" in save and network.predict(grey).sigma is None:
-            raise ValueError("save: the network does not say how sure it is, so that there is no sigma to save")
+        unsaid = [kind for kind in save if kind in ("sigma", "confidence")]
+        if unsaid and network.predict(grey).sigma is None:
+            raise ValueError(f"save: the network does not say how sure it is, so that there is no {unsaid[0]} to save")
     job = _Job(
         id=uuid.uuid4().hex,
         model=model,

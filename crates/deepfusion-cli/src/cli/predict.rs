@@ -97,6 +97,9 @@ pub(crate) enum Save {
     Npy,
     /// How sure the network is: H×W f32, the standard deviation of depth in metres, for NumPy; of networks that learned it.
     Sigma,
+    /// How far each pixel can be trusted: H×W f32 from 0 to 1, for NumPy; 0.9 where an error of 10 % is to be expected. Of networks that
+    /// say how sure they are.
+    Confidence,
     /// Depth in colours with a legend in metres.
     Color,
     /// The image itself as JPEG: `view` shows it where it is no file of its own.

@@ -325,7 +325,8 @@ impl<'a> Job<'a> {
         model: &'a ModelSource,
         estimator: &DepthEstimator,
     ) -> Result<Self> {
-        let wants_sigma = outputs.save.contains(&Save::Sigma) || outputs.max_sigma.is_some();
+        let says = |save: &Save| matches!(save, Save::Sigma | Save::Confidence);
+        let wants_sigma = outputs.save.iter().any(says) || outputs.max_sigma.is_some();
         if wants_sigma && !estimator.knows_uncertainty() {
             return Err(CliError::NoUncertainty.into());
         }
@@ -459,7 +460,8 @@ impl<'a> Job<'a> {
     fn write_outputs(&self, input: &Input, loaded: &Loaded, seen: &Seen) -> Result<Sidecar> {
         let (args, image, prediction) = (self.args, &loaded.image, &seen.prediction);
         let depth = prediction.depth();
-        let has_sigma = |save: &Save| *save == Save::Sigma || save.is_cloud();
+        let has_sigma =
+            |save: &Save| matches!(save, Save::Sigma | Save::Confidence) || save.is_cloud();
         let sigma = if self.outputs.save.iter().any(has_sigma) {
             intervals::sigma(prediction, &depth, &self.intervals)
         } else {

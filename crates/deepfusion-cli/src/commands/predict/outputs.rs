@@ -22,6 +22,7 @@ pub(super) fn ending(save: Save) -> &'static str {
         Save::DepthPng => "_depth.png",
         Save::Npy => "_depth.npy",
         Save::Sigma => "_sigma.npy",
+        Save::Confidence => "_confidence.npy",
         Save::Color => "_color.png",
         Save::Image => "_image.jpg",
         Save::SideBySide => "_side.png",
@@ -65,6 +66,10 @@ pub(super) fn write(
         Save::Sigma => {
             write_npy(sigma.ok_or(CliError::NoUncertainty)?, path)?;
         }
+        Save::Confidence => {
+            let sigma = sigma.ok_or(CliError::NoUncertainty)?;
+            write_npy(&Prediction::confidence_of(depth, sigma), path)?;
+        }
         Save::Color => {
             let picture = with_depth_legend(&depth_picture(depth, &scale), &scale);
             save_png(&picture, path)?;
@@ -107,8 +112,8 @@ fn save_jpeg(image: &RgbImage, path: &Path) -> Result<()> {
     output::write_unsynced(path, bytes)
 }
 
-fn write_npy(depth: &DepthMap, path: &Path) -> Result<()> {
-    let view = ndarray::ArrayView2::from_shape((depth.height, depth.width), &depth.data)?;
+fn write_npy(map: &DepthMap, path: &Path) -> Result<()> {
+    let view = ndarray::ArrayView2::from_shape((map.height, map.width), &map.data)?;
     let mut bytes = Vec::new();
     ndarray_npy::WriteNpyExt::write_npy(&view, &mut bytes)?;
     output::write_unsynced(path, bytes)
