@@ -354,16 +354,27 @@ fn options_replace_their_own_part_of_a_file() {
     };
     let path = |name: &str| toml::Value::from(at.join(name).display().to_string());
     // Without --data: the file's recordings, validated on what is asked for.
-    ok(
+    let second = ok(
         at,
         "train --config first/config.toml --val-data val --out second",
     );
+    // A file that names no start means none, and that is said where a network would fit.
+    let fits = deepfusion_weights::names().any(|name| name == "tiny");
+    let said = second
+        .stderr
+        .contains("starts from nothing, as the configuration names no init (--init tiny");
+    assert_eq!(said, fits, "{}", second.stderr);
     assert_eq!(data("second")["paths"][0], path("sim"));
     assert_eq!(data("second")["validation"][0], path("val"));
     // With it: other recordings, and the file's validation.
-    ok(
+    let third = ok(
         at,
-        "train --config second/config.toml --data more --out third",
+        "train --config second/config.toml --data more --init none --out third",
+    );
+    assert!(
+        !third.stderr.contains("starts from nothing"),
+        "{}",
+        third.stderr
     );
     assert_eq!(data("third")["paths"][0], path("more"));
     assert_eq!(data("third")["validation"][0], path("val"));

@@ -42,6 +42,15 @@ pub(super) fn run(args: &TrainArgs) -> Result<()> {
         None => {
             // A file says what its run starts from, if anything.
             let start = Start::of(args.init.as_deref(), &config, args.config.is_none())?;
+            if args.init.is_none()
+                && matches!(start, Start::Nothing)
+                && let Start::Packed { network, .. } = Start::embedded_for(&config)?
+            {
+                let name = &network.card.name;
+                say(&format!(
+                    "starts from nothing, as the configuration names no init (--init {name} starts from the embedded network)"
+                ));
+            }
             start.record_in(&mut config)?;
             let folder = output::run_folder(args.out.as_deref(), "train")?;
             let folder = RunFolder::create(&folder)?;

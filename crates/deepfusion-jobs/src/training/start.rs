@@ -178,8 +178,12 @@ impl Start {
         .into())
     }
 
-    /// The embedded network with the same layers, in the same range of depths. Without any embedded network nobody expects one.
-    fn embedded_for(config: &TrainConfig) -> Result<Self> {
+    /// The embedded network with the same layers, in the same range of depths: [`Self::NoneFits`] where none is so built, and
+    /// [`Self::Nothing`] without any embedded network, as nobody expects one.
+    ///
+    /// # Errors
+    /// An embedded network that cannot be read.
+    pub fn embedded_for(config: &TrainConfig) -> Result<Self> {
         let networks = deepfusion_weights::all()?;
         for network in &networks {
             let of_its_run = unpacked_config(network)?.depth_net;
