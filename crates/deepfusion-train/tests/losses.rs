@@ -439,3 +439,22 @@ fn the_loss_on_known_depth_equals_pytorchs() {
     let inputs: Vec<(&str, Tensor<4>)> = names.iter().map(String::as_str).zip(inverse).collect();
     reference.check("depth", found.loss, &inputs);
 }
+
+/// How sure the network is: PyTorch's Laplace distribution, scales beyond the limits among them; the sky and unknown pixels say nothing.
+#[test]
+fn the_likelihood_of_the_error_of_depth_equals_pytorchs() {
+    let reference = Reference::of("depth.safetensors");
+    let log_scale = reference
+        .tensor::<4>("uncertainty/log_scale")
+        .require_grad();
+    let inverse = reference.tensor::<4>("depth/inverse0").require_grad();
+    let truth = DepthTruth {
+        log_depth: reference.tensor("depth/log_depth"),
+        known: reference.tensor("depth/known"),
+        far: reference.tensor("depth/far"),
+    };
+    let loss = || deepfusion_train::losses::uncertainty(inverse.clone(), log_scale.clone(), &truth);
+    assert!(inverse.grad(&loss().backward()).is_none());
+    let inputs = [("log_scale", log_scale.clone())];
+    reference.check("uncertainty", loss(), &inputs);
+}

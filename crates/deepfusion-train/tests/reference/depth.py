@@ -1,11 +1,15 @@
 #!/usr/bin/env python3
-"""Reference values for the loss on known depth, from PyTorch.
+"""Reference values for the losses on known depth, from PyTorch: of the depth, and of how sure it is.
 
     python crates/deepfusion-train/tests/reference/depth.py
 
 writes `depth.safetensors` beside this file: the inputs (float32), and the loss, its parts and the gradient with respect to
 the inverse depth of every scale, computed in double precision from those inputs. Errors are drawn until each, and each
 difference between neighbours, is clear of 0, so that rounding cannot decide the sign of a gradient.
+
+`uncertainty/` has the scale ln b of the error at the finest scale, the negative log-likelihood of the known pixels by PyTorch's own
+Laplace distribution, without its constant ln 2, and the gradient with respect to ln b. Some scales are beyond the limits, where
+there is no gradient.
 
 Needs torch, torchvision and numpy.
 """
@@ -24,6 +28,8 @@ N, H, W = 2, 12, 20
 STEPS = (1, 2, 4)
 GRADIENT_WEIGHT = 0.5
 FARTHEST = 80.0
+# deepfusion_model::LOG_SCALE_BOUNDS
+LOG_SCALE = (-6.0, 2.0)
 rng = np.random.default_rng(11)
 
 
@@ -89,5 +95,19 @@ for name, value in (("loss", total), ("error", error), ("gradient", gradient), (
     tensors[f"depth/{name}"] = value.detach().float().reshape(1).numpy()
 for scale, prediction in enumerate(predictions):
     tensors[f"depth/inverse{scale}.grad"] = prediction.grad.float().numpy()
+
+log_scale = rng.normal(-1.5, 1.0, (N, 1, H, W))
+beyond = rng.choice(10, log_scale.shape)
+log_scale[beyond == 0], log_scale[beyond == 1] = LOG_SCALE[0] - 0.5, LOG_SCALE[1] + 0.5
+log_scale = log_scale.astype(np.float32)
+assert np.abs(log_scale[..., None] - LOG_SCALE).min() > 1e-3
+scale = torch.from_numpy(log_scale).double().requires_grad_()
+b = torch.exp(scale.clamp(*LOG_SCALE))
+e = -torch.log(predictions[0].detach()) - log_depth
+nll = (-torch.distributions.Laplace(0.0, b).log_prob(e) - np.log(2))[known].mean()
+nll.backward()
+tensors["uncertainty/log_scale"] = log_scale
+tensors["uncertainty/loss"] = nll.detach().float().reshape(1).numpy()
+tensors["uncertainty/log_scale.grad"] = scale.grad.float().numpy()
 write_safetensors(HERE / "depth.safetensors", tensors)
 print(f"{len(tensors)} tensors, loss {total.item():.4f}")
